@@ -297,15 +297,15 @@ sniff: ## Build and check the example that watches a bus, build/plain/linux/snif
 	@$(MAKE) --no-print-directory $(SNIFF)
 	@scripts/check-sniff $(SNIFF)
 
-CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan)
-$(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
+CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan identify calls)
+$(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_call mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 PEERS := $(BUILD)/plain/serve_libmodbus
 $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support/tcp_server support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) -lmodbus -lpthread -o $@
 
 .PHONY: clients
-clients: ## Build and check the client examples poll_table, scan and logger in build/plain/linux
+clients: ## Build and check the client examples poll_table, scan, logger, identify and calls in build/plain/linux
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check-clients $(BUILD)/plain

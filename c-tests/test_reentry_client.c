@@ -14,6 +14,7 @@ static uint16_t words[8];
 
 static mbm_client client;
 static mbm_clientRequest request, another;
+static mbm_identification identification;
 
 static int reset(void **state)
 {
@@ -22,6 +23,7 @@ static int reset(void **state)
     memset(&client, 0, sizeof client);
     memset(&request, 0, sizeof request);
     memset(&another, 0, sizeof another);
+    memset(&identification, 0, sizeof identification);
     memset(words, 0, sizeof words);
     wire.step = 500;
     port = hooked_port_of(&wire);
@@ -91,6 +93,19 @@ static void every_request_of_the_client_answers(uint8_t status, mbm_clientReques
     ASKED(mbm_client_custom(&client, r, 65, 1, &rule));
 }
 
+/* No read begins an identification, or it is cancelled again. */
+static void an_identification_answers(uint8_t status)
+{
+    const mbm_identification before = identification;
+
+    identification.request.unit = 17;
+    identification.request.reply = words;
+    IS(status, mbm_identification_read(&identification, &client, MBM_DEVICE_ID_BASIC, 0));
+    if (status == MBM_PENDING)
+        OK(mbm_client_cancel(&client, &identification.request));
+    identification = before;
+}
+
 static void every_function_of_the_client_is_busy(void)
 {
     static mbm_master master;
@@ -107,6 +122,7 @@ static void every_function_of_the_client_is_busy(void)
     memcpy(asked, &another, sizeof another);
     every_request_of_the_client_answers(MBM_BUSY, &another);
     assert_memory_equal(asked, &another, sizeof another);
+    an_identification_answers(MBM_BUSY);
     memcpy(asked, &request, sizeof request);
     every_request_of_the_client_answers(MBM_BUSY, &request);
     IS(MBM_BUSY, mbm_client_cancel(&client, &request));
@@ -223,6 +239,7 @@ static void done(void *context, mbm_clientRequest *ended)
         another.data = ended->data = words;
         every_request_of_the_client_answers(MBM_PENDING, &another);
         every_request_of_the_client_answers(MBM_PENDING, ended);
+        an_identification_answers(MBM_PENDING);
         assert_true(mbm_client_pollDelay(&client) == 0xFFFFFFFFu);
         assert_int_equal(mbm_client_pending(&client), 0);
         IS(framing_of_done == 1 ? MBM_OK : MBM_INVALID_ARGUMENT,

@@ -83,6 +83,8 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
         return F("the request is not pending");
     case MBM_FIELDS_OVERLAP:
         return F("two fields of the plan overlap");
+    case MBM_NO_PROGRESS:
+        return F("the device repeats itself without an end");
     default:
         break;
     }

@@ -93,6 +93,10 @@ pub const MBM_DUPLICATE_TRANSACTION: u8 = 0xF1;
 pub const MBM_NOT_PENDING: u8 = 0xF2;
 /// Two fields of a plan share an address of one unit and table.
 pub const MBM_FIELDS_OVERLAP: u8 = 0xF3;
+/// The device says that more objects of its identification follow, but it sends none, names
+/// an object that is not after those that it has sent, or then sends one before the one that
+/// it named. Reading on might never end.
+pub const MBM_NO_PROGRESS: u8 = 0xF4;
 
 statuses! {
     MBM_OK = Status::OK, c"success";
@@ -125,6 +129,7 @@ statuses! {
     MBM_DUPLICATE_TRANSACTION = Status::DUPLICATE_TRANSACTION, c"another pending request has this transaction id";
     MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
     MBM_FIELDS_OVERLAP = Status::FIELDS_OVERLAP, c"two fields of the plan overlap";
+    MBM_NO_PROGRESS = Status::NO_PROGRESS, c"the device repeats itself without an end";
 }
 
 /// Explains a status in a few words of English.

@@ -30,13 +30,14 @@ fn probes() -> Vec<(String, u64)> {
             mbm_turn mbm_plan mbm_planPosition mbm_planRead mbm_planSetup mbm_planUnitLimits
             mbm_planExcludedRange mbm_planReadInfo mbm_planField mbm_trace mbm_traceRecord
             mbm_gateway mbm_gatewayRoute mbm_gatewayLine mbm_gatewayConnection mbm_gatewayRequest
-            mbm_gatewayConfig;
+            mbm_gatewayConfig mbm_identification;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
                 resynchronisations bytesSent bytesReceived }
             mbm_clientRequest { done context data reply replyBytes transaction unit status exception
                 length }
+            mbm_identification { request object done context count conformity }
             mbm_clientUnit { requests replies exceptions retries delayUs unit status }
             mbm_linkHooks { context disconnect connect }
             mbm_turn { master lastUse }
@@ -94,7 +95,7 @@ fn probes() -> Vec<(String, u64)> {
             MBM_LINK_LOST MBM_BUSY MBM_BROADCAST_NOT_ALLOWED MBM_BUFFER_TOO_SMALL
             MBM_NOT_INITIALISED MBM_PENDING MBM_LINE_BUSY MBM_CANCELLED
             MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME MBM_QUEUE_FULL
-            MBM_DUPLICATE_TRANSACTION MBM_NOT_PENDING MBM_CLIENT_DEPTH
+            MBM_DUPLICATE_TRANSACTION MBM_NOT_PENDING MBM_NO_PROGRESS MBM_CLIENT_DEPTH
             MBM_BACKOFF_NONE MBM_BACKOFF_FIXED MBM_BACKOFF_LINEAR MBM_BACKOFF_EXPONENTIAL
             MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
             MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
@@ -214,7 +215,7 @@ fn every_status_constant_has_its_own_text() {
             .unwrap()
             .to_owned()
     };
-    let statuses: Vec<u8> = (0..=0x0B).chain(0xE0..=0xF2).collect();
+    let statuses: Vec<u8> = (0..=0x0B).chain(0xE0..=0xF2).chain([0xF8]).collect();
     let mut texts: Vec<String> = statuses.iter().map(|status| text(*status)).collect();
     texts.sort();
     texts.dedup();

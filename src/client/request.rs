@@ -2,6 +2,7 @@
 //! response.
 
 use super::storage::ClientStorage;
+use crate::engine::BROADCAST;
 use crate::error::Status;
 use crate::pdu::header::RequestHeader;
 use crate::time::elapsed;
@@ -80,6 +81,12 @@ impl RequestState {
     /// nothing: the caller may have written a new state.
     pub fn has_ended(&self) -> bool {
         self.is(Stage::Ended)
+    }
+
+    /// True if a device answers such a request: it is no broadcast, which only a serial line
+    /// has, and its function has a response.
+    pub const fn has_reply(&self) -> bool {
+        self.unit != BROADCAST && self.header.is_answered()
     }
 
     /// Ends the request with `status`.

@@ -51,13 +51,51 @@ pub(super) fn emit(writer: &mut Writer, mei_type: u8, data: &[u8]) {
     writer.put(data);
 }
 
+/// What a response to Read Device Identification has after its code.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct IdentificationReply<'a> {
+    /// The conformity level, not checked.
+    pub conformity: u8,
+    /// Another request is needed for the rest.
+    pub more_follows: bool,
+    /// The object to request next, not checked if none follows.
+    pub next_object: u8,
+    /// The objects of this response.
+    pub objects: ObjectList<'a>,
+}
+
+impl<'a> IdentificationReply<'a> {
+    /// Parses the bytes after the code, which is `code`. This is the part that a client
+    /// stores.
+    ///
+    /// # Errors
+    /// [`Status::MALFORMED_REPLY`] if they are not well-formed, for example if an object is
+    /// cut off.
+    pub fn parse(code: u8, bytes: &'a [u8]) -> Result<Self, Status> {
+        read_reply(code, &mut Reader::new(bytes)).map_err(|_| Status::MALFORMED_REPLY)
+    }
+}
+
 pub(super) fn parse_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
     let mei_type = byte(reader)?;
     if mei_type != MEI_READ_DEVICE_IDENTIFICATION {
         let data = reader.rest();
         return Ok(Response::EncapsulatedInterface { mei_type, data });
     }
-    let (code, conformity) = (byte(reader)?, byte(reader)?);
+    let code = byte(reader)?;
+    let reply = read_reply(code, reader)?;
+    Ok(Response::DeviceIdentification {
+        code,
+        conformity: reply.conformity,
+        more_follows: reply.more_follows,
+        next_object: reply.next_object,
+        objects: reply.objects,
+    })
+}
+
+#[inline(always)]
+fn read_reply<'a>(code: u8, reader: &mut Reader<'a>) -> Result<IdentificationReply<'a>, Status> {
+    let conformity = byte(reader)?;
     let (more, next_object, count) = (byte(reader)?, byte(reader)?, byte(reader)?);
     // The conformity level is not checked, nor the next object if none follows: some devices
     // send wrong values there, and nothing depends on them.
@@ -69,8 +107,7 @@ pub(super) fn parse_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>
     if !is_right {
         return Err(Status::ILLEGAL_DATA_VALUE);
     }
-    Ok(Response::DeviceIdentification {
-        code,
+    Ok(IdentificationReply {
         conformity,
         more_follows: more == MORE,
         next_object,

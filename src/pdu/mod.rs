@@ -12,6 +12,7 @@ pub mod files;
 pub mod function_spec;
 pub mod header;
 pub mod identification;
+pub mod identification_stream;
 pub mod length;
 pub mod limits;
 pub mod master_request;

@@ -6,7 +6,9 @@
 Prints `ready PORT` once it listens (port 0 for a tty), and serves until its standard input is
 closed. Each of the four tables has 2048 cells. Holding register A is A * 40503 + 0x1234 modulo
 65536. Input register A is its complement. Coil A is bit 7 of holding register A. Discrete input
-A is the opposite of coil A. With unit 0 it answers for every unit.
+A is the opposite of coil A. With unit 0 it answers for every unit. --objects N adds N objects of
+60 bytes to its identification, from id 80 (hex) on. --endless adds one that never ends: its two
+values do not fit into one response, so pymodbus sends the first one again and again.
 """
 
 import argparse
@@ -55,19 +57,25 @@ def arguments():
     where.add_argument("--port", type=int, help="the TCP port to serve on; 0 takes a free one")
     parser.add_argument("--unit", type=int, default=17)
     parser.add_argument("--baud", type=int, default=115200)
+    parser.add_argument("--objects", type=int, default=0)
+    parser.add_argument("--endless", action="store_true")
     return parser.parse_args()
 
 
 async def main():
     logging.disable(logging.CRITICAL)
     args = arguments()
+    private = {0x80 + n: f"object {0x80 + n:02X} ".ljust(60, ".") for n in range(args.objects)}
+    if args.endless:
+        private[0xF0] = ["a" * 200, "b" * 200]
     identity = ModbusDeviceIdentification(
+        info=private,
         info_name={
             "VendorName": "Vendor",
             "ProductCode": "PC",
             "MajorMinorRevision": "V2.11",
             "VendorUrl": "example.org",
-        }
+        },
     )
     common = {
         "framer": FRAMERS[args.framing],

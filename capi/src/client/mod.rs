@@ -2,10 +2,12 @@
 
 mod begin;
 mod getters;
+mod identification;
 mod kind;
 mod link;
 mod object;
 mod poll;
+mod reply;
 mod request;
 mod requests;
 mod settings;
@@ -13,10 +15,12 @@ mod storage;
 
 pub use begin::*;
 pub use getters::*;
+pub use identification::*;
 pub use link::*;
 pub use object::mbm_client;
 pub(crate) use poll::clock;
 pub use poll::*;
+pub use reply::*;
 pub use request::mbm_clientRequest;
 pub(crate) use requests::read_table;
 pub use requests::*;

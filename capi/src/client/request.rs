@@ -100,6 +100,29 @@ impl RequestPtr {
         unsafe { self.0.as_mut() }
     }
 
+    /// The received byte that has the index `index` on the wire; less than the number of
+    /// bytes received.
+    pub(super) fn received_byte(&self, index: usize) -> u8 {
+        let fields = self.fields();
+        let at = place(index, fields.state.header.takes_words());
+        // SAFETY: the client has put that many bytes there, and the caller keeps them until
+        // it queues the request again.
+        unsafe { *fields.reply.add(at) }
+    }
+
+    /// True if there are data to send.
+    pub(super) fn has_data(&self) -> bool {
+        !self.fields().data.is_null()
+    }
+
+    /// True if `has_part` returns true for the data sent or for the data received.
+    pub(super) fn lies_in(&self, has_part: impl Fn(*const u8, u16) -> bool) -> bool {
+        let fields = self.fields();
+        let state = &fields.state;
+        has_part(fields.data, state.header.data_length().into())
+            || has_part(fields.reply, state.length.into())
+    }
+
     /// Calls the request's `done`, if it has one.
     pub(super) fn call_done(self) {
         let pointer = self.0.as_ptr();

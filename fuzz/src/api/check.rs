@@ -5,7 +5,7 @@ use super::world::World;
 pub const OK: u8 = 0;
 pub const PENDING: u8 = 235;
 /// The greatest status.
-const LAST: u8 = 243;
+const LAST: u8 = 244;
 
 /// Calls a function of the C API. `$object` is marked as in use during the call.
 macro_rules! call {

@@ -2,7 +2,7 @@
 
 use super::check::{call, checked_call, refused_changes_nothing, span, PENDING};
 use super::world::{Grant, World};
-use super::{asked, ports};
+use super::{asked, identification, ports};
 use mbm_c::*;
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
@@ -174,7 +174,14 @@ pub fn step(w: &World) {
         2 | 3 => set(w, client),
         4..=8 => asked::request(w, client),
         9..=11 => poll(w, client),
-        12 => drop(call!(w, client, mbm_client_pollDelay(client))),
+        12 => {
+            call!(w, client, mbm_client_pollDelay(client));
+            match w.byte() % 4 {
+                0 => {}
+                1 => identification::reply(w),
+                _ => identification::identify(w, client),
+            }
+        }
         13 => {
             let request = w.requests.pick(w);
             call!(w, request, mbm_client_wireTransaction(request));

@@ -11,6 +11,7 @@ mod check;
 mod client;
 mod frame;
 mod gateway;
+mod identification;
 mod master;
 mod memory;
 mod packet;

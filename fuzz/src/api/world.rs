@@ -53,6 +53,7 @@ pub struct World {
     /// Clients whose port a master uses, or used when it was copied.
     pub lenders: RefCell<Vec<*mut mbm_client>>,
     pub requests: Pool<mbm_clientRequest>,
+    pub identifications: Pool<mbm_identification>,
     pub servers: Pool<mbm_server>,
     pub gateways: Pool<mbm_gateway>,
     /// The configs of all gateways so far.
@@ -98,6 +99,7 @@ impl World {
             plans: Pool::new(),
             lenders: RefCell::default(),
             requests: Pool::new(),
+            identifications: Pool::new(),
             servers: Pool::new(),
             gateways: Pool::new(),
             configs: RefCell::default(),

@@ -6,6 +6,7 @@
 
 mod build;
 mod forward;
+mod restore;
 
 pub use build::GROUP;
 

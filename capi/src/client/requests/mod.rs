@@ -88,6 +88,7 @@ unsafe fn submit(
             };
         }
         fields.state.status = status;
+        fields.state.exception = 0;
         status
     }
 }

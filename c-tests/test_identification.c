@@ -1,0 +1,512 @@
+/* mbm_identification: reading all objects of a device that the test plays, reply by reply,
+ * and devices that never come to an end. */
+#include "memory_port.h"
+#include "test.h"
+
+#include <string.h>
+
+enum { UNIT = 7, REPLIES = 300, OBJECTS = 64 };
+
+static memory_port m;
+static mbm_client client;
+static mbm_identification id;
+static uint8_t incoming[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME], reply[250];
+
+/* What was handed out: ids and values. */
+static uint8_t ids[OBJECTS], values[OBJECTS][8], lengths[OBJECTS];
+static unsigned handed, ended, asked;
+static uint8_t requested[REPLIES];
+static void (*in_object)(void);
+
+static void take(void *context, const mbm_object *object)
+{
+    assert_ptr_equal(context, &handed);
+    if (handed < OBJECTS) {
+        ids[handed] = object->id;
+        lengths[handed] = object->length;
+        memcpy(values[handed], object->data, object->length < 8 ? object->length : 8);
+    }
+    handed++;
+    assert_int_equal(id.count, handed);
+    if (in_object)
+        in_object();
+}
+
+static void end(void *context, mbm_identification *identification)
+{
+    assert_ptr_equal(context, &handed);
+    assert_ptr_equal(identification, &id);
+    assert_int_not_equal(id.request.status, MBM_PENDING);
+    ended++;
+}
+
+static void begin_port(void)
+{
+    mbm_port port = memory_port_of(&m);
+
+    memset(&m, 0, sizeof m);
+    OK(mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing, sizeof outgoing));
+}
+
+static void begin(void)
+{
+    begin_port();
+    memset(&id, 0, sizeof id);
+    handed = ended = asked = 0;
+    in_object = NULL;
+    id.request.unit = UNIT;
+    id.request.reply = reply;
+    id.request.replyBytes = sizeof reply;
+    id.object = take;
+    id.done = end;
+    id.context = &handed;
+}
+
+/* Waits until a request is sent, and lets a reply arrive. `objects` are the bytes after the
+ * number of objects. */
+static void answer(uint8_t more, uint8_t next, uint8_t count, const char *objects, size_t bytes)
+{
+    const mbm_framing framing = {.kind = MBM_FRAMING_TCP};
+    uint8_t frame[MBM_MAX_TCP_FRAME];
+    mbm_packet packet;
+    size_t length = 0;
+
+    memory_port_send(&m, &client);
+    OK(mbm_frame_parse(&framing, MBM_PACKET_REQUEST, m.sent, (uint16_t)m.sent_count, &packet));
+    assert_int_equal(packet.function, 0x2B);
+    assert_int_equal(packet.meiType, 0x0E);
+    assert_int_equal(packet.unit, UNIT);
+    requested[asked++] = packet.objectId;
+    assert_true(asked < REPLIES);
+
+    frame[length++] = m.sent[0];
+    frame[length++] = m.sent[1];
+    frame[length++] = 0;
+    frame[length++] = 0;
+    frame[length++] = 0;
+    frame[length++] = (uint8_t)(bytes + 8);
+    frame[length++] = UNIT;
+    frame[length++] = 0x2B;
+    frame[length++] = 0x0E;
+    frame[length++] = packet.readDeviceIdCode;
+    frame[length++] = 0x83;
+    frame[length++] = more;
+    frame[length++] = next;
+    frame[length++] = count;
+    memcpy(frame + length, objects, bytes);
+    m.sent_count = 0;
+    memory_port_bytes(&m, frame, length + bytes);
+    (void)mbm_client_poll(&client);
+}
+
+#define ANSWER(more, next, count, objects) answer(more, next, count, objects, sizeof objects - 1)
+
+static void read_all(uint8_t code)
+{
+    IS(MBM_PENDING, mbm_identification_read(&id, &client, code, 0));
+}
+
+static void assert_ended(uint8_t status, unsigned objects)
+{
+    assert_int_equal(id.request.status, status);
+    assert_int_equal(handed, objects);
+    assert_int_equal(ended, 1);
+    assert_int_equal(mbm_client_pending(&client), 0);
+}
+
+static void all_objects_are_read_with_as_many_requests_as_it_takes(void **state)
+{
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_EXTENDED);
+    ANSWER(0xFF, 2, 2, "\x00\x03mbm\x01\x00");
+    assert_int_equal(handed, 2);
+    assert_int_equal(ended, 0);
+    assert_int_equal(id.request.status, MBM_PENDING);
+    ANSWER(0xFF, 0x80, 1, "\x02\x01v");
+    ANSWER(0, 0, 1, "\xFF\x02\x00\x01");
+    assert_ended(MBM_OK, 4);
+    assert_int_equal(id.count, 4);
+    assert_int_equal(id.conformity, 0x83);
+    assert_memory_equal(ids, "\x00\x01\x02\xFF", 4);
+    assert_memory_equal(lengths, "\x03\x00\x01\x02", 4);
+    assert_memory_equal(values[0], "mbm", 3);
+    assert_memory_equal(values[3], "\x00\x01", 2);
+    assert_memory_equal(requested, "\x00\x02\x80", 3);
+
+    /* Once more with the same storage. */
+    handed = ended = 0;
+    id.object = NULL;
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0, 0, 1, "\x00\x01m");
+    assert_ended(MBM_OK, 0);
+    assert_int_equal(id.count, 1);
+}
+
+static void one_object_is_read_alone(void **state)
+{
+    (void)state;
+    begin();
+    IS(MBM_PENDING, mbm_identification_read(&id, &client, MBM_DEVICE_ID_INDIVIDUAL, 4));
+    ANSWER(0, 0, 1, "\x04\x01n");
+    assert_ended(MBM_OK, 1);
+    assert_int_equal(requested[0], 4);
+}
+
+static void another_object_than_the_one_requested_alone_is_malformed(void **state)
+{
+    (void)state;
+    begin();
+    IS(MBM_PENDING, mbm_identification_read(&id, &client, MBM_DEVICE_ID_INDIVIDUAL, 4));
+    ANSWER(0, 0, 1, "\x03\x01n");
+    assert_ended(MBM_MALFORMED_REPLY, 0);
+}
+
+static void a_device_that_lacks_the_first_object_may_begin_with_its_first(void **state)
+{
+    (void)state;
+    begin();
+    IS(MBM_PENDING, mbm_identification_read(&id, &client, MBM_DEVICE_ID_REGULAR, 5));
+    ANSWER(0, 0, 2, "\x01\x01n\x00\x01m");
+    assert_ended(MBM_OK, 2);
+}
+
+static void the_same_next_object_forever_is_no_progress(void **state)
+{
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0xFF, 1, 1, "\x00\x01m");
+    ANSWER(0xFF, 1, 1, "\x01\x01n"); /* it names the object that it has just sent */
+    assert_ended(MBM_NO_PROGRESS, 2);
+    assert_memory_equal(ids, "\x00\x01", 2);
+
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0xFF, 0, 1, "\x00\x01m");
+    assert_ended(MBM_NO_PROGRESS, 1);
+}
+
+static void a_next_object_before_those_received_is_no_progress(void **state)
+{
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_EXTENDED);
+    ANSWER(0xFF, 0x80, 1, "\x00\x01m");
+    ANSWER(0xFF, 3, 1, "\x81\x01n");
+    assert_ended(MBM_NO_PROGRESS, 2);
+}
+
+static void objects_that_were_sent_before_are_not_handed_out_again(void **state)
+{
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_EXTENDED);
+    ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
+    /* It does not know the object that it named, and begins again. */
+    ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
+    assert_ended(MBM_NO_PROGRESS, 2);
+
+    /* It goes back behind the object that it named, to one that is new. */
+    begin();
+    read_all(MBM_DEVICE_ID_EXTENDED);
+    ANSWER(0xFF, 5, 1, "\x00\x01m");
+    ANSWER(0xFF, 3, 1, "\x02\x01v");
+    assert_ended(MBM_NO_PROGRESS, 1);
+
+    /* An object in two parts. */
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0xFF, 1, 1, "\x00\x02mb");
+    ANSWER(0, 0, 2, "\x00\x01m\x01\x01n");
+    assert_ended(MBM_NO_PROGRESS, 1);
+}
+
+static void no_object_although_more_follow_is_no_progress(void **state)
+{
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0xFF, 1, 0, "");
+    assert_ended(MBM_NO_PROGRESS, 0);
+
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0, 0, 0, "");
+    assert_ended(MBM_OK, 0);
+}
+
+/* However a device lies, it is asked at most once for each of the 256 objects. */
+static void a_device_that_names_every_object_is_asked_256_times(void **state)
+{
+    char object[] = "?\x01x";
+    unsigned next;
+
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_EXTENDED);
+    for (next = 0; next < 256; next++) {
+        object[0] = (char)next;
+        ANSWER(0xFF, (uint8_t)(next + 1), 1, object);
+    }
+    assert_int_equal(asked, 256);
+    assert_ended(MBM_NO_PROGRESS, 256);
+}
+
+static void an_object_that_is_cut_off_is_malformed(void **state)
+{
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0xFF, 1, 1, "\x00\x01m");
+    ANSWER(0, 0, 2, "\x01\x01n\x02\x05v");
+    assert_ended(MBM_MALFORMED_REPLY, 1);
+
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0, 0, 1, "\x00\x01m\x01\x01n"); /* one more than it counts */
+    assert_ended(MBM_MALFORMED_REPLY, 1 - 1);
+
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0x01, 1, 1, "\x00\x01m"); /* neither 00 nor FF */
+    assert_ended(MBM_MALFORMED_REPLY, 0);
+}
+
+static void an_exception_ends_it_with_that_status(void **state)
+{
+    uint8_t frame[] = {0, 0, 0, 0, 0, 3, UNIT, 0xAB, MBM_ILLEGAL_DATA_ADDRESS};
+
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_REGULAR);
+    ANSWER(0xFF, 3, 1, "\x02\x01v");
+    memory_port_send(&m, &client);
+    memcpy(frame, m.sent, 2);
+    memory_port_bytes(&m, frame, sizeof frame);
+    (void)mbm_client_poll(&client);
+    assert_ended(MBM_ILLEGAL_DATA_ADDRESS, 1);
+    assert_int_equal(id.request.exception, MBM_ILLEGAL_DATA_ADDRESS);
+}
+
+static void a_device_that_falls_silent_ends_it_with_a_timeout(void **state)
+{
+    (void)state;
+    begin();
+    OK(mbm_client_setRetries(&client, 1));
+    read_all(MBM_DEVICE_ID_REGULAR);
+    ANSWER(0xFF, 3, 1, "\x02\x01v");
+    IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &id.request, 1000));
+    assert_ended(MBM_RESPONSE_TIMED_OUT, 1);
+}
+
+static void a_reply_that_does_not_fit_ends_it(void **state)
+{
+    (void)state;
+    begin();
+    id.request.replyBytes = 9;
+    read_all(MBM_DEVICE_ID_REGULAR);
+    ANSWER(0xFF, 1, 1, "\x00\x03mbm");
+    ANSWER(0, 0, 1, "\x01\x04name");
+    assert_ended(MBM_BUFFER_TOO_SMALL, 1);
+}
+
+static mbm_clientRequest others[MBM_CLIENT_DEPTH];
+
+static void fill_the_queue(void)
+{
+    unsigned i;
+
+    for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+        others[i].unit = UNIT;
+        (void)mbm_client_writeSingleCoil(&client, &others[i], 0, 1);
+    }
+    assert_int_equal(mbm_client_pending(&client), MBM_CLIENT_DEPTH);
+}
+
+static void others_may_fill_the_queue_meanwhile(void **state)
+{
+    (void)state;
+    begin();
+    OK(mbm_client_setInFlight(&client, 1));
+    in_object = fill_the_queue;
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0xFF, 1, 1, "\x00\x01m");
+    in_object = NULL;
+    assert_int_equal(id.request.status, MBM_PENDING);
+    ANSWER(0, 0, 1, "\x01\x01n");
+    assert_int_equal(id.request.status, MBM_OK);
+    assert_int_equal(handed, 2);
+    assert_int_equal(ended, 1);
+}
+
+static void cancel(void)
+{
+    /* After the last reply there is nothing to cancel. */
+    (void)mbm_client_cancel(&client, &id.request);
+}
+
+static void cancelling_in_object_ends_the_calls(void **state)
+{
+    (void)state;
+    begin();
+    in_object = cancel;
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
+    assert_int_equal(id.request.status, MBM_CANCELLED);
+    assert_int_equal(handed, 1);
+    assert_int_equal(ended, 0);
+    assert_int_equal(mbm_client_pending(&client), 0);
+
+    begin();
+    in_object = cancel;
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0, 0, 2, "\x00\x01m\x01\x01n");
+    assert_ended(MBM_OK, 2);
+}
+
+static void it_may_be_cancelled_between_two_replies(void **state)
+{
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0xFF, 2, 1, "\x00\x01m");
+    OK(mbm_client_cancel(&client, &id.request));
+    assert_int_equal(id.request.status, MBM_CANCELLED);
+    (void)mbm_client_poll(&client);
+    assert_int_equal(ended, 0);
+    read_all(MBM_DEVICE_ID_BASIC);
+}
+
+static void beginning_the_client_again_gives_it_up(void **state)
+{
+    (void)state;
+    begin();
+    in_object = begin_port;
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
+    assert_int_equal(id.request.status, MBM_CANCELLED);
+    assert_int_equal(handed, 1);
+    assert_int_equal(ended, 0);
+    in_object = NULL;
+    handed = 0;
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0, 0, 1, "\x00\x01m");
+    assert_ended(MBM_OK, 1);
+}
+
+static void spoil_the_reply(void)
+{
+    memset(reply, 0xFF, sizeof reply);
+}
+
+static void overwriting_the_reply_in_object_harms_nothing(void **state)
+{
+    (void)state;
+    begin();
+    in_object = spoil_the_reply;
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0, 0, 2, "\x00\x01m\x01\x01n");
+    assert_ended(MBM_OK, 1);
+}
+
+/* Asserts that a call is refused and changes nothing. */
+static void refuses(uint8_t status, mbm_client *with, uint8_t code)
+{
+    const mbm_identification before = id;
+
+    IS(status, mbm_identification_read(&id, with, code, 0));
+    assert_memory_equal(&id, &before, sizeof id);
+}
+
+static void read_again(void)
+{
+    refuses(MBM_BUSY, &client, MBM_DEVICE_ID_BASIC);
+}
+
+static void it_is_busy_while_it_is_pending_and_in_its_object(void **state)
+{
+    (void)state;
+    begin();
+    read_all(MBM_DEVICE_ID_BASIC);
+    refuses(MBM_BUSY, &client, MBM_DEVICE_ID_BASIC);
+    in_object = read_again;
+    ANSWER(0xFF, 1, 1, "\x00\x01m");
+    ANSWER(0, 0, 1, "\x01\x01n");
+    assert_ended(MBM_OK, 2);
+}
+
+static void wrong_arguments_change_nothing(void **state)
+{
+    static mbm_client never_begun;
+
+    (void)state;
+    begin();
+    IS(MBM_INVALID_ARGUMENT, mbm_identification_read(NULL, &client, MBM_DEVICE_ID_BASIC, 0));
+    refuses(MBM_INVALID_ARGUMENT, NULL, MBM_DEVICE_ID_BASIC);
+    refuses(MBM_NOT_INITIALISED, &never_begun, MBM_DEVICE_ID_BASIC);
+    refuses(MBM_ILLEGAL_DATA_VALUE, &client, 0);
+    refuses(MBM_ILLEGAL_DATA_VALUE, &client, 5);
+    id.request.unit = 0;
+    refuses(MBM_BROADCAST_NOT_ALLOWED, &client, MBM_DEVICE_ID_BASIC);
+    id.request.unit = UNIT;
+    id.request.reply = NULL;
+    refuses(MBM_INVALID_ARGUMENT, &client, MBM_DEVICE_ID_BASIC);
+    id.request.reply = reply;
+    fill_the_queue();
+    refuses(MBM_QUEUE_FULL, &client, MBM_DEVICE_ID_BASIC);
+    assert_int_equal(ended, 0);
+}
+
+static void read_the_next(void *context, mbm_identification *identification)
+{
+    (void)context;
+    ended++;
+    if (ended == 1)
+        IS(MBM_PENDING, mbm_identification_read(identification, &client, MBM_DEVICE_ID_REGULAR, 3));
+}
+
+static void done_may_read_the_next(void **state)
+{
+    (void)state;
+    begin();
+    id.done = read_the_next;
+    read_all(MBM_DEVICE_ID_BASIC);
+    ANSWER(0, 0, 1, "\x00\x01m");
+    assert_int_equal(ended, 1);
+    assert_int_equal(id.request.status, MBM_PENDING);
+    handed = 0;
+    ANSWER(0, 0, 1, "\x03\x01u");
+    assert_int_equal(ended, 2);
+    assert_int_equal(id.request.status, MBM_OK);
+    assert_memory_equal(requested, "\x00\x03", 2);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(all_objects_are_read_with_as_many_requests_as_it_takes),
+        cmocka_unit_test(one_object_is_read_alone),
+        cmocka_unit_test(another_object_than_the_one_requested_alone_is_malformed),
+        cmocka_unit_test(a_device_that_lacks_the_first_object_may_begin_with_its_first),
+        cmocka_unit_test(the_same_next_object_forever_is_no_progress),
+        cmocka_unit_test(a_next_object_before_those_received_is_no_progress),
+        cmocka_unit_test(objects_that_were_sent_before_are_not_handed_out_again),
+        cmocka_unit_test(no_object_although_more_follow_is_no_progress),
+        cmocka_unit_test(a_device_that_names_every_object_is_asked_256_times),
+        cmocka_unit_test(an_object_that_is_cut_off_is_malformed),
+        cmocka_unit_test(an_exception_ends_it_with_that_status),
+        cmocka_unit_test(a_device_that_falls_silent_ends_it_with_a_timeout),
+        cmocka_unit_test(a_reply_that_does_not_fit_ends_it),
+        cmocka_unit_test(others_may_fill_the_queue_meanwhile),
+        cmocka_unit_test(cancelling_in_object_ends_the_calls),
+        cmocka_unit_test(it_may_be_cancelled_between_two_replies),
+        cmocka_unit_test(beginning_the_client_again_gives_it_up),
+        cmocka_unit_test(overwriting_the_reply_in_object_harms_nothing),
+        cmocka_unit_test(it_is_busy_while_it_is_pending_and_in_its_object),
+        cmocka_unit_test(wrong_arguments_change_nothing),
+        cmocka_unit_test(done_may_read_the_next),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

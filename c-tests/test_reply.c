@@ -1,0 +1,443 @@
+/* mbm_client_reply: the reply of each function as a packet, compared with what
+ * mbm_frame_parse makes of the frame that arrived. */
+#include "examples.h"
+#include "memory_port.h"
+#include "test.h"
+
+#include <string.h>
+
+enum { UNIT = 7 };
+
+static const uint8_t kinds[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
+                                MBM_FRAMING_RTU_OVER_TCP};
+static const mbm_rule any_length;
+
+static memory_port m;
+static mbm_client client;
+static mbm_clientRequest request;
+static uint8_t frame[MBM_MAX_ASCII_FRAME], outgoing[MBM_MAX_TCP_FRAME], pdu[MBM_MAX_PDU];
+static uint16_t reply[MBM_MAX_PDU / 2 + 1], data[MBM_MAX_PDU / 2 + 1];
+
+static void begin(uint8_t kind)
+{
+    mbm_port port = memory_port_of(&m);
+
+    memset(&m, 0, sizeof m);
+    memset(&request, 0, sizeof request);
+    if (kind == MBM_FRAMING_RTU)
+        OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
+    else if (kind == MBM_FRAMING_ASCII)
+        OK(mbm_client_beginAscii(&client, &port, frame, sizeof frame));
+    else if (kind == MBM_FRAMING_RTU_OVER_TCP)
+        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
+    else
+        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+    request.unit = UNIT;
+    request.reply = reply;
+    request.replyBytes = sizeof reply;
+}
+
+static mbm_framing framing_of(uint8_t kind)
+{
+    return (mbm_framing){.kind = kind};
+}
+
+/* The data of a packet as words in the machine's byte order. */
+static void use_words(const mbm_packet *packet)
+{
+    uint16_t i;
+
+    for (i = 0; i < packet->dataLength / 2; i++)
+        data[i] = (uint16_t)(packet->data[2 * i] << 8 | packet->data[2 * i + 1]);
+}
+
+static void use_bytes(const mbm_packet *packet)
+{
+    if (packet->dataLength)
+        memcpy(data, packet->data, packet->dataLength);
+}
+
+/* Queues the request that a packet describes. */
+static uint8_t ask(const mbm_packet *p)
+{
+    const uint16_t bytes = p->dataLength, words = (uint16_t)(bytes / 2);
+    mbm_client *c = &client;
+    mbm_clientRequest *r = &request;
+
+    use_bytes(p);
+    r->data = data;
+    switch (p->function) {
+    case 0x01: return mbm_client_readCoils(c, r, p->address, p->quantity);
+    case 0x02: return mbm_client_readDiscreteInputs(c, r, p->address, p->quantity);
+    case 0x03: return mbm_client_readHoldingRegisters(c, r, p->address, p->quantity);
+    case 0x04: return mbm_client_readInputRegisters(c, r, p->address, p->quantity);
+    case 0x05: return mbm_client_writeSingleCoil(c, r, p->address, (uint8_t)p->value);
+    case 0x06: return mbm_client_writeSingleRegister(c, r, p->address, p->value);
+    case 0x07: return mbm_client_readExceptionStatus(c, r);
+    case 0x08: use_words(p); return mbm_client_diagnostics(c, r, p->subFunction, words);
+    case 0x0B: return mbm_client_getCommEventCounter(c, r);
+    case 0x0C: return mbm_client_getCommEventLog(c, r);
+    case 0x0F: return mbm_client_writeMultipleCoils(c, r, p->address, p->quantity);
+    case 0x10: use_words(p); return mbm_client_writeMultipleRegisters(c, r, p->address, words);
+    case 0x11: return mbm_client_reportServerId(c, r);
+    case 0x14: return mbm_client_readFileRecords(c, r, bytes);
+    case 0x15: return mbm_client_writeFileRecords(c, r, bytes);
+    case 0x16: return mbm_client_maskWriteRegister(c, r, p->address, p->andMask, p->orMask);
+    case 0x17:
+        use_words(p);
+        return mbm_client_readWriteMultipleRegisters(c, r, p->address, p->quantity, p->writeAddress,
+                                                     words);
+    case 0x18: return mbm_client_readFifoQueue(c, r, p->address);
+    case 0x2B:
+        if (p->meiType == MBM_MEI_READ_DEVICE_IDENTIFICATION)
+            return mbm_client_readDeviceIdentification(c, r, p->readDeviceIdCode, p->objectId);
+        return mbm_client_encapsulatedInterfaceTransport(c, r, p->meiType, bytes);
+    default: return mbm_client_custom(c, r, p->function, bytes, &any_length);
+    }
+}
+
+/* Lets the frame of a response arrive for the request that was queued, and waits until the
+ * request has ended. Then `wanted` is what mbm_frame_parse makes of the frame. */
+static uint8_t answer(uint8_t kind, const mbm_packet *response, uint8_t *received,
+                      mbm_packet *wanted)
+{
+    const mbm_framing framing = framing_of(kind);
+    mbm_packet sent = *response;
+    uint16_t length;
+
+    memory_port_send(&m, &client);
+    sent.unit = UNIT;
+    sent.transaction = mbm_client_wireTransaction(&request);
+    OK(mbm_frame_build(&framing, &sent, received, MBM_MAX_ASCII_FRAME, &length));
+    memory_port_bytes(&m, received, length);
+    (void)memory_port_run(&m, &client, &request, 100);
+    OK(mbm_frame_parse(&framing, MBM_PACKET_RESPONSE, received, length, wanted));
+    return request.status;
+}
+
+static void assert_reply_is(const mbm_packet *wanted)
+{
+    mbm_packet found;
+
+    OK(mbm_client_reply(&request, pdu, sizeof pdu, &found));
+    assert_same_packet(&found, wanted);
+    if (found.dataLength)
+        assert_true(found.data >= pdu && found.data + found.dataLength <= pdu + sizeof pdu);
+}
+
+/* Calls `check` with the packets of each request and its response, in each framing. */
+static void with_each_exchange(void (*check)(uint8_t kind, const mbm_packet *asked,
+                                             const mbm_packet *response, const uint8_t *body,
+                                             uint16_t bytes))
+{
+    uint8_t asked_pdu[MBM_MAX_PDU], response_pdu[MBM_MAX_PDU];
+    mbm_packet asked, response;
+    size_t i, k, count = 0;
+
+    for (i = 0; i + 1 < example_count; i++) {
+        const uint16_t length = example_load(&examples[i], asked_pdu, &asked);
+
+        (void)example_load(&examples[i + 1], response_pdu, &response);
+        if (asked.kind != MBM_PACKET_REQUEST)
+            continue;
+        assert_int_equal(response.kind, MBM_PACKET_RESPONSE);
+        count++;
+        for (k = 0; k < COUNT(kinds); k++) {
+            begin(kinds[k]);
+            check(kinds[k], &asked, &response, asked_pdu + 1, (uint16_t)(length - 1));
+        }
+    }
+    assert_true(count > 25);
+}
+
+static void check_request(uint8_t kind, const mbm_packet *asked, const mbm_packet *response,
+                          const uint8_t *body, uint16_t bytes)
+{
+    uint8_t received[MBM_MAX_ASCII_FRAME];
+    mbm_packet wanted;
+
+    (void)body;
+    (void)bytes;
+    IS(MBM_PENDING, ask(asked));
+    IS(MBM_PENDING, mbm_client_reply(&request, pdu, sizeof pdu, &wanted));
+    OK(answer(kind, response, received, &wanted));
+    /* The client does not keep the byte count of a server id. */
+    if (wanted.function == MBM_FC_REPORT_SERVER_ID)
+        wanted.byteCount = (uint8_t)wanted.dataLength;
+    assert_reply_is(&wanted);
+    /* Once more, since the first call changed nothing. */
+    assert_reply_is(&wanted);
+}
+
+static void the_reply_of_each_function_is_the_packet_of_its_frame(void **state)
+{
+    (void)state;
+    with_each_exchange(check_request);
+}
+
+static void check_forwarded(uint8_t kind, const mbm_packet *asked, const mbm_packet *response,
+                            const uint8_t *body, uint16_t bytes)
+{
+    uint8_t received[MBM_MAX_ASCII_FRAME];
+    mbm_packet wanted;
+
+    IS(MBM_PENDING, mbm_client_forward(&client, &request, asked->function, body, bytes));
+    OK(answer(kind, response, received, &wanted));
+    assert_reply_is(&wanted);
+}
+
+static void the_reply_of_a_forwarded_request_is_the_packet_of_its_frame(void **state)
+{
+    (void)state;
+    with_each_exchange(check_forwarded);
+}
+
+static void check_exception(uint8_t kind, const mbm_packet *asked, const mbm_packet *response,
+                            const uint8_t *body, uint16_t bytes)
+{
+    const mbm_packet refusal = {.kind = MBM_PACKET_EXCEPTION,
+                                .function = asked->function,
+                                .exceptionCode = MBM_SLAVE_DEVICE_FAILURE};
+    uint8_t received[MBM_MAX_ASCII_FRAME];
+    mbm_packet wanted;
+
+    (void)response;
+    (void)body;
+    (void)bytes;
+    request.reply = NULL;
+    IS(MBM_PENDING, ask(asked));
+    IS(MBM_SLAVE_DEVICE_FAILURE, answer(kind, &refusal, received, &wanted));
+    assert_reply_is(&wanted);
+    assert_int_equal(wanted.exceptionCode, MBM_SLAVE_DEVICE_FAILURE);
+}
+
+static void the_reply_of_a_refused_request_is_an_exception_packet(void **state)
+{
+    (void)state;
+    with_each_exchange(check_exception);
+}
+
+static void one_file_record_has_its_head_again(void **state)
+{
+    uint8_t received[MBM_MAX_ASCII_FRAME], bytes[8];
+    mbm_packet response = {
+        .kind = MBM_PACKET_RESPONSE, .function = 0x14, .data = bytes, .dataLength = 6};
+    mbm_record record;
+    mbm_packet wanted, found;
+    uint16_t cursor = 0;
+
+    (void)state;
+    hex_bytes(bytes, "05 06 0DFE 0020");
+    begin(MBM_FRAMING_RTU);
+    IS(MBM_PENDING, mbm_client_readFileRecord(&client, &request, 4, 1, 2));
+    OK(answer(MBM_FRAMING_RTU, &response, received, &wanted));
+    assert_reply_is(&wanted);
+    OK(mbm_client_reply(&request, pdu, sizeof pdu, &found));
+    assert_true(mbm_packet_nextRecord(&found, &cursor, &record));
+    assert_int_equal(record.length, 2);
+    assert_memory_equal(record.data, "\x0D\xFE\x00\x20", 4);
+    assert_false(mbm_packet_nextRecord(&found, &cursor, &record));
+
+    hex_bytes(bytes, "0DFE 0020");
+    begin(MBM_FRAMING_RTU);
+    response.function = 0x15;
+    response.dataLength = 0;
+    data[0] = 0x0DFE;
+    data[1] = 0x0020;
+    request.data = data;
+    OK(mbm_packet_addRecord(&response, pdu, sizeof pdu, &(mbm_record){bytes, 4, 7, 2}));
+    IS(MBM_PENDING, mbm_client_writeFileRecord(&client, &request, 4, 7, 2));
+    OK(answer(MBM_FRAMING_RTU, &response, received, &wanted));
+    assert_reply_is(&wanted);
+    request.data = NULL;
+    IS(MBM_INVALID_ARGUMENT, mbm_client_reply(&request, pdu, sizeof pdu, &found));
+}
+
+static void unused_bits_are_zero(void **state)
+{
+    const mbm_packet response = {.kind = MBM_PACKET_RESPONSE,
+                                 .function = 0x01,
+                                 .data = (const uint8_t *)"\xFF\xFF",
+                                 .dataLength = 2};
+    uint8_t received[MBM_MAX_ASCII_FRAME];
+    mbm_packet wanted, found;
+
+    (void)state;
+    begin(MBM_FRAMING_RTU);
+    IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 11));
+    OK(answer(MBM_FRAMING_RTU, &response, received, &wanted));
+    OK(mbm_client_reply(&request, pdu, sizeof pdu, &found));
+    assert_int_equal(found.dataLength, 2);
+    assert_memory_equal(found.data, "\xFF\x07", 2);
+}
+
+/* Asserts that there is no reply, and that the packet does not change. */
+static void refuses(uint8_t status)
+{
+    mbm_packet found, before;
+
+    memset(&found, 0x5A, sizeof found);
+    before = found;
+    IS(status, mbm_client_reply(&request, pdu, sizeof pdu, &found));
+    assert_memory_equal(&found, &before, sizeof found);
+}
+
+static void a_request_without_a_reply_says_why(void **state)
+{
+    static const mbm_packet registers = {.kind = MBM_PACKET_RESPONSE,
+                                         .function = 0x03,
+                                         .data = (const uint8_t *)"\x12\x34",
+                                         .dataLength = 2};
+    static const mbm_packet log = {.kind = MBM_PACKET_RESPONSE,
+                                   .function = 0x0C,
+                                   .data = (const uint8_t *)"\x01\x02\x03",
+                                   .dataLength = 3};
+    uint8_t received[MBM_MAX_ASCII_FRAME];
+    mbm_packet wanted;
+
+    (void)state;
+    begin(MBM_FRAMING_RTU);
+    refuses(MBM_INVALID_ARGUMENT); /* never queued */
+
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+    refuses(MBM_PENDING);
+    OK(mbm_client_cancel(&client, &request));
+    refuses(MBM_CANCELLED);
+
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+    IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, 1000));
+    refuses(MBM_RESPONSE_TIMED_OUT);
+
+    begin(MBM_FRAMING_TCP);
+    request.reply = NULL;
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+    OK(answer(MBM_FRAMING_TCP, &registers, received, &wanted));
+    refuses(MBM_BUFFER_TOO_SMALL);
+
+    begin(MBM_FRAMING_TCP);
+    request.replyBytes = 8; /* the log has nine */
+    IS(MBM_PENDING, mbm_client_getCommEventLog(&client, &request));
+    IS(MBM_BUFFER_TOO_SMALL, answer(MBM_FRAMING_TCP, &log, received, &wanted));
+    refuses(MBM_BUFFER_TOO_SMALL);
+}
+
+static void a_request_that_no_device_answers_has_no_reply(void **state)
+{
+    (void)state;
+    begin(MBM_FRAMING_RTU);
+    request.unit = 0;
+    IS(MBM_PENDING, mbm_client_writeSingleRegister(&client, &request, 1, 2));
+    OK(memory_port_run(&m, &client, &request, 1000));
+    refuses(MBM_INVALID_ARGUMENT);
+
+    begin(MBM_FRAMING_RTU);
+    request.data = data;
+    IS(MBM_PENDING,
+       mbm_client_diagnostics(&client, &request, MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY, 1));
+    OK(memory_port_run(&m, &client, &request, 1000));
+    refuses(MBM_INVALID_ARGUMENT);
+}
+
+static void a_refused_request_does_not_keep_an_earlier_exception(void **state)
+{
+    const mbm_packet refusal = {
+        .kind = MBM_PACKET_EXCEPTION, .function = 0x03, .exceptionCode = MBM_ILLEGAL_DATA_VALUE};
+    uint8_t received[MBM_MAX_ASCII_FRAME];
+    mbm_packet wanted;
+
+    (void)state;
+    begin(MBM_FRAMING_TCP);
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+    IS(MBM_ILLEGAL_DATA_VALUE, answer(MBM_FRAMING_TCP, &refusal, received, &wanted));
+    assert_int_equal(request.exception, MBM_ILLEGAL_DATA_VALUE);
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_client_readHoldingRegisters(&client, &request, 0, 0));
+    assert_int_equal(request.exception, 0);
+    refuses(MBM_ILLEGAL_DATA_VALUE);
+}
+
+static void a_log_that_the_client_accepted_may_be_malformed(void **state)
+{
+    static const mbm_framing framing = {.kind = MBM_FRAMING_RTU};
+    /* Two bytes do not hold the status, the events and the messages. */
+    uint8_t short_log[] = {UNIT, 0x0C, 2, 0, 0, 0, 0};
+    mbm_packet wanted;
+
+    (void)state;
+    begin(MBM_FRAMING_RTU);
+    IS(MBM_PENDING, mbm_client_getCommEventLog(&client, &request));
+    memory_port_send(&m, &client);
+    memory_port_rtu(&m, short_log, 5);
+    OK(memory_port_run(&m, &client, &request, 100));
+    refuses(MBM_MALFORMED_REPLY);
+    short_log[5] = (uint8_t)mbm_frame_crc16(short_log, 5);
+    short_log[6] = (uint8_t)(mbm_frame_crc16(short_log, 5) >> 8);
+    IS(MBM_MALFORMED_REPLY, mbm_frame_parse(&framing, MBM_PACKET_RESPONSE, short_log, 7, &wanted));
+}
+
+static void memory_that_is_missing_too_small_or_shared_is_refused(void **state)
+{
+    static const mbm_packet response = {.kind = MBM_PACKET_RESPONSE,
+                                        .function = 0x03,
+                                        .data = (const uint8_t *)"\x12\x34",
+                                        .dataLength = 2};
+    uint8_t received[MBM_MAX_ASCII_FRAME];
+    mbm_packet wanted, found;
+
+    (void)state;
+    begin(MBM_FRAMING_RTU);
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+    OK(answer(MBM_FRAMING_RTU, &response, received, &wanted));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_reply(NULL, pdu, sizeof pdu, &found));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_reply(&request, NULL, sizeof pdu, &found));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_reply(&request, pdu, sizeof pdu, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_reply(&request, (uint8_t *)reply, sizeof reply, &found));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_client_reply(&request, pdu, 0, &found));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_client_reply(&request, pdu, 3, &found));
+    OK(mbm_client_reply(&request, pdu, 4, &found));
+    assert_int_equal(reply[0], 0x1234);
+}
+
+static uint8_t status_in_done;
+
+static void read_reply(void *context, mbm_clientRequest *ended)
+{
+    status_in_done = mbm_client_reply(ended, pdu, sizeof pdu, (mbm_packet *)context);
+}
+
+static void done_may_read_the_reply(void **state)
+{
+    static const mbm_packet response = {
+        .kind = MBM_PACKET_RESPONSE, .function = 0x0B, .commStatus = 0xFFFF, .eventCount = 0x108};
+    uint8_t received[MBM_MAX_ASCII_FRAME];
+    mbm_packet wanted, found;
+
+    (void)state;
+    begin(MBM_FRAMING_TCP);
+    request.done = read_reply;
+    request.context = &found;
+    status_in_done = MBM_BUSY;
+    IS(MBM_PENDING, mbm_client_getCommEventCounter(&client, &request));
+    OK(answer(MBM_FRAMING_TCP, &response, received, &wanted));
+    OK(status_in_done);
+    assert_same_packet(&found, &wanted);
+    assert_int_equal(found.eventCount, 0x108);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_reply_of_each_function_is_the_packet_of_its_frame),
+        cmocka_unit_test(the_reply_of_a_forwarded_request_is_the_packet_of_its_frame),
+        cmocka_unit_test(the_reply_of_a_refused_request_is_an_exception_packet),
+        cmocka_unit_test(one_file_record_has_its_head_again),
+        cmocka_unit_test(unused_bits_are_zero),
+        cmocka_unit_test(a_request_without_a_reply_says_why),
+        cmocka_unit_test(a_request_that_no_device_answers_has_no_reply),
+        cmocka_unit_test(a_refused_request_does_not_keep_an_earlier_exception),
+        cmocka_unit_test(a_log_that_the_client_accepted_may_be_malformed),
+        cmocka_unit_test(memory_that_is_missing_too_small_or_shared_is_refused),
+        cmocka_unit_test(done_may_read_the_reply),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,101 @@
+/**
+ * @file mbm_call.h
+ * @brief Sees one request of a client through: polls, sleeps, returns its status.
+ *
+ * For programs that do one thing after the other, on any link whose port can wait: a serial
+ * line, a TCP connection, or a link of yours.
+ *
+ *     mbm_caller device = mbm_call_overTcp(&tcp, &client, &request);
+ *
+ *     status = mbm_call(&device, mbm_client_readHoldingRegisters(&client, &request, 100, 10));
+ *
+ * Compile mbm_call.c and the port that you use.
+ *
+ * Licence: MIT OR Apache-2.0.
+ */
+#ifndef MBM_CALL_H
+#define MBM_CALL_H
+
+#include "mbm_tcp.h"
+#include "mbm_tty.h"
+
+#include <signal.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** The longest sleep between two polls if the caller has a `stop`, in microseconds: a signal
+ *  just before a sleep does not end that sleep. */
+#define MBM_CALL_SLEEP 100000u
+
+/** A client, its request, and how to sleep on its link. mbm_call_overTty and mbm_call_overTcp
+ *  fill it in. It may be copied. */
+typedef struct mbm_caller {
+    mbm_client *client;         /**< the client; the program begins it */
+    mbm_clientRequest *request; /**< the request that mbm_call sees through; NULL: all requests
+                                     of the client */
+    /** Sleeps until bytes have arrived, the link is lost, a full port accepts bytes again, or
+     *  the time is over; it may return earlier. Returns -1 if it cannot sleep. */
+    int (*wait)(void *port, uint32_t timeoutUs);
+    void *port; /**< passed to `wait`; the port that the client uses */
+    /** NULL, or a variable that ends a call when it becomes other than 0, for example one that
+     *  a signal handler sets. */
+    const volatile sig_atomic_t *stop;
+} mbm_caller;
+
+/**
+ * Waits until a request has ended. Meanwhile it polls the client: other requests go on, and
+ * `done` of all that end is called. Between two polls it sleeps.
+ *
+ * The settings of the client say how long that takes at most: response timeout, retries,
+ * backoff, and the requests that were queued before. A signal ends the call only by `stop`.
+ * When the call returns, the request is not pending any more, except in a hook of the port.
+ *
+ * If `done` of the request queues it again, the call goes on until it has ended again. So the
+ * `request` of an mbm_identification has ended when all objects are read.
+ *
+ * @param caller  the client and its request
+ * @param queued  the status of the function that queued the request; MBM_PENDING if it was
+ *                queued before
+ * @return `queued` if it is not MBM_PENDING: the request was refused. Otherwise the status of
+ *         the request; if `request` is NULL, MBM_OK when no request is pending. MBM_CANCELLED
+ *         if `stop` is set. MBM_BUSY from within `done` or a hook of the port, and while the
+ *         client is suspended. MBM_INVALID_ARGUMENT for NULL, and for a request of another
+ *         client; MBM_NOT_INITIALISED. For MBM_CANCELLED and MBM_BUSY the request is cancelled;
+ *         if `request` is NULL, none is
+ */
+uint8_t mbm_call(const mbm_caller *caller, uint8_t queued);
+
+/* `wait` of a caller on a serial line, and on a TCP connection. */
+static inline int mbm_call_waitTty(void *tty, uint32_t timeoutUs)
+{
+    return mbm_tty_wait((mbm_tty *)tty, timeoutUs);
+}
+
+static inline int mbm_call_waitTcp(void *tcp, uint32_t timeoutUs)
+{
+    return mbm_tcp_wait((mbm_tcp *)tcp, 1, NULL, -1, timeoutUs);
+}
+
+/** A caller for a client on a serial line. */
+static inline mbm_caller mbm_call_overTty(mbm_tty *tty, mbm_client *client,
+                                          mbm_clientRequest *request)
+{
+    mbm_caller caller = {client, request, mbm_call_waitTty, tty, NULL};
+    return caller;
+}
+
+/** A caller for a client on a TCP connection. */
+static inline mbm_caller mbm_call_overTcp(mbm_tcp *tcp, mbm_client *client,
+                                          mbm_clientRequest *request)
+{
+    mbm_caller caller = {client, request, mbm_call_waitTcp, tcp, NULL};
+    return caller;
+}
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
