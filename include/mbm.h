@@ -63,9 +63,10 @@ extern "C" {
 #endif
 
 struct mbm_master;
+struct mbm_object;
+struct mbm_packet;
 struct mbm_unit;
 struct mbm_registers;
-struct mbm_object;
 
 /* ==== 1. Version ==================================================================== */
 
@@ -257,6 +258,13 @@ const char *mbm_version(void);
  * Two fields of a plan share an address of one unit and table.
  */
 #define MBM_FIELDS_OVERLAP 243
+
+/**
+ * The device says that more objects of its identification follow, but it sends none, names
+ * an object that is not after those that it has sent, or then sends one before the one that
+ * it named. Reading on might never end.
+ */
+#define MBM_NO_PROGRESS 244
 
 /**
  * Explains a status in a few words of English.
@@ -1522,26 +1530,6 @@ typedef struct mbm_client {
 } mbm_client;
 
 /**
- * Your hooks that close a link and open it again, for mbm_client_reconnect.
- */
-typedef struct mbm_linkHooks {
-    /**
-     * Your pointer, passed to both hooks; may be NULL.
-     */
-    void *context;
-    /**
-     * Optional: closes the link, if it is open.
-     */
-    void (*disconnect)(void *context);
-    /**
-     * Optional: opens the link without waiting. Returns MBM_OK if the link is open,
-     * MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
-     * or another status.
-     */
-    uint8_t (*connect)(void *context);
-} mbm_linkHooks;
-
-/**
  * A request to a device, and its result. You own the storage. Zero it before first use, and
  * then set the fields that you need. You may use it for any number of requests.
  *
@@ -1603,6 +1591,87 @@ typedef struct mbm_clientRequest {
      */
     uint32_t words[8];
 } mbm_clientRequest;
+
+/**
+ * Reads the objects that identify a device (function 2B/0E, V1.1b3, 6.21), with as many
+ * requests as the device needs. You own the storage. Zero it before first use, set `unit`,
+ * `reply` and `replyBytes` of `request`, and `object`, and pass it to
+ * mbm_identification_read. You may use it for any number of devices.
+ *
+ * From that call until `request.status` is no longer MBM_PENDING, do not change it, nor what
+ * it points to. To give it up, pass `request` to mbm_client_cancel.
+ */
+typedef struct mbm_identification {
+    /**
+     * The request for one part of the objects. Set its `unit`. Its `reply` receives one
+     * reply after the other, as mbm_client_readDeviceIdentification says: 250 bytes hold
+     * any, `replyBytes` is their number. On a TCP client you may set `transaction`.
+     * mbm_identification_read sets `done`, `context` and `data`.
+     *
+     * Its `status` is that of the identification: MBM_PENDING while objects are missing;
+     * MBM_OK when `object` was called for all; MBM_NO_PROGRESS if the device repeats itself;
+     * MBM_MALFORMED_REPLY also for a reply whose objects are not whole, and for one with
+     * another object than the one that was requested alone; otherwise as of
+     * mbm_client_readCoils. Objects that were handed out before a failure are sound.
+     */
+    struct mbm_clientRequest request;
+    /**
+     * Optional: mbm_client_poll calls it for each object. `object` and its data are valid
+     * during the call. It may call what `done` of a request may call: it may queue
+     * requests, and cancel, also this one, which ends the calls.
+     */
+    void (*object)(void *context, const struct mbm_object *object);
+    /**
+     * Optional: mbm_client_poll calls it when the identification has ended, as it calls
+     * `done` of a request. It may read the next identification with the same storage.
+     */
+    void (*done)(void *context, struct mbm_identification *identification);
+    /**
+     * Your pointer, passed to both; may be NULL.
+     */
+    void *context;
+    /**
+     * Private.
+     */
+    struct mbm_client *client;
+    /**
+     * How many objects `object` was called for, or would have been.
+     */
+    uint16_t count;
+    /**
+     * The conformity level in the last reply, by the standard 01 to 03 or 81 to 83 (hex). It
+     * is not checked: some devices send a wrong one, and reading does not depend on it.
+     */
+    uint8_t conformity;
+    /**
+     * Private.
+     */
+    uint8_t handingOut;
+    /**
+     * Private.
+     */
+    uint16_t stream[2];
+} mbm_identification;
+
+/**
+ * Your hooks that close a link and open it again, for mbm_client_reconnect.
+ */
+typedef struct mbm_linkHooks {
+    /**
+     * Your pointer, passed to both hooks; may be NULL.
+     */
+    void *context;
+    /**
+     * Optional: closes the link, if it is open.
+     */
+    void (*disconnect)(void *context);
+    /**
+     * Optional: opens the link without waiting. Returns MBM_OK if the link is open,
+     * MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
+     * or another status.
+     */
+    uint8_t (*connect)(void *context);
+} mbm_linkHooks;
 
 /**
  * The record of one unit, an item of the array for mbm_client_setUnits. You may read and
@@ -1819,6 +1888,30 @@ uint8_t mbm_client_getPostFlushHold(const struct mbm_client *client);
 uint8_t mbm_client_getInFlight(const struct mbm_client *client);
 
 /**
+ * Begins to read the objects of a device.
+ *
+ * `done` of a request, and `object` and `done` of another identification, may call it.
+ *
+ * @param identification  the storage, with unit, reply buffer and callbacks set
+ * @param client          the client that sends the requests; it must stay valid until the
+ *                        identification has ended
+ * @param code            MBM_DEVICE_ID_BASIC, MBM_DEVICE_ID_REGULAR or
+ *                        MBM_DEVICE_ID_EXTENDED: all objects of the category; a device that
+ *                        has fewer sends those that it has. MBM_DEVICE_ID_INDIVIDUAL: one
+ * @param object          the id of the first object, 0 for all, or of the only one. A device
+ *                        that does not have the first object begins with its first one
+ * @return MBM_PENDING if the first request is queued. Otherwise nothing has changed:
+ *         MBM_BUSY if the identification is pending, from within its `object`, and from
+ *         within a hook of the port; MBM_ILLEGAL_DATA_VALUE for another `code`;
+ *         MBM_INVALID_ARGUMENT if `request.reply` or another pointer is NULL; or another
+ *         status of mbm_client_readCoils
+ */
+uint8_t mbm_identification_read(struct mbm_identification *identification,
+                                struct mbm_client *client,
+                                uint8_t code,
+                                uint8_t object);
+
+/**
  * Closes the link and opens it again. The client discards an incomplete response. Requests
  * that were under way end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
  * that were not sent yet are sent over the new link.
@@ -1927,6 +2020,44 @@ uint8_t mbm_client_cancel(struct mbm_client *client,
  *         for NULL. 0 may also be the identifier of a frame
  */
 uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
+
+/**
+ * Returns the reply of a request that has ended as a packet, whose fields have names:
+ * commStatus and eventCount of function 0B, moreFollows of 2B/0E and so on. mbm_packet lists
+ * the fields of each function. The packet is the one that mbm_frame_parse makes of the
+ * reply's frame. Read file records with mbm_packet_nextRecord, objects of a device
+ * identification with mbm_packet_nextObject.
+ *
+ * Three differences from the frame: the unused bits of the last byte of functions 01 and 02
+ * are 0. The byteCount of function 11 is dataLength, because the client does not keep the
+ * count of a device that counts only a part of the data. The frame of mbm_client_forward has
+ * both as the device sent them. The response to function 15 repeats the request, and is made
+ * of the request's `data`: they must not have changed since.
+ *
+ * It reads `request` and what its `reply` and `data` point to, and changes none of them.
+ * `done` of the request may call it. Any thread or interrupt may call it for a request that
+ * has ended.
+ *
+ * @param request   a request that has ended
+ * @param pdu       receives the PDU of the reply, to which the packet's data point; it must
+ *                  not overlap `reply` and `data` of the request
+ * @param capacity  bytes of `pdu`; MBM_MAX_PDU hold any reply
+ * @param packet    receives the packet, with the unit of the request, and in TCP frames the
+ *                  transaction identifier of the reply; it changes only for MBM_OK
+ * @return MBM_OK, also for an exception, whose kind is MBM_PACKET_EXCEPTION; MBM_PENDING
+ *         if the request has not ended; the request's status if it ended without a reply,
+ *         or was not queued; MBM_BUFFER_TOO_SMALL if the reply's data did not fit into
+ *         `reply`, if `reply` is NULL, or if `capacity` is too small; MBM_MALFORMED_REPLY
+ *         if the data are not those of a reply of the function, although the client
+ *         accepted them: it does not look into an event log or a device identification;
+ *         MBM_INVALID_ARGUMENT for NULL, overlapping memory, a request that was never
+ *         queued, and for a request that no device answers: a broadcast, or sub-function
+ *         04 of 08
+ */
+uint8_t mbm_client_reply(const struct mbm_clientRequest *request,
+                         uint8_t *pdu,
+                         uint16_t capacity,
+                         struct mbm_packet *packet);
 
 /**
  * Function 01: reads coils into the bytes of `reply`, eight in each byte. The first coil is
@@ -5041,6 +5172,24 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
 #define MBM_LENGTH_UNKNOWN 3
 
 /**
+ * An object of a device identification.
+ */
+typedef struct mbm_object {
+    /**
+     * The value, usually text, without a NUL.
+     */
+    const uint8_t *data;
+    /**
+     * Length of the value in bytes.
+     */
+    uint8_t length;
+    /**
+     * The object id: 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
+     */
+    uint8_t id;
+} mbm_object;
+
+/**
  * A request, response or exception of any function. Each function uses the fields in this
  * table (function codes in hex). Parsing sets them and zeroes all others; building reads
  * them and ignores all others.
@@ -5226,24 +5375,6 @@ typedef struct mbm_record {
      */
     uint16_t length;
 } mbm_record;
-
-/**
- * An object of a device identification.
- */
-typedef struct mbm_object {
-    /**
-     * The value, usually text, without a NUL.
-     */
-    const uint8_t *data;
-    /**
-     * Length of the value in bytes.
-     */
-    uint8_t length;
-    /**
-     * The object id: 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
-     */
-    uint8_t id;
-} mbm_object;
 
 /**
  * Writes the frame of a packet: a request, a response or an exception. It never builds a
