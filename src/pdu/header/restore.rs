@@ -19,7 +19,7 @@ impl RequestHeader {
     /// True if the response repeats the data of the request: that of 15. The response to a
     /// query of 08 does too, but the client stores those data.
     pub const fn repeats_data(&self) -> bool {
-        self.form.has(REPEATS_DATA) && !self.has_data()
+        self.spec.has(REPEATS_DATA) && !self.has_data()
     }
 
     /// The PDU of the exception with the code `code` that answers this request.
@@ -57,7 +57,7 @@ impl RequestHeader {
         let before = self.before_data(stored);
         for (index, byte) in place.iter_mut().enumerate() {
             *byte = if !self.has_data() {
-                self.at(index, &sent)
+                self.byte_at(index, &sent)
             } else if index >= at {
                 received(index - at)
             } else {
