@@ -239,6 +239,15 @@ public:
     /** How often a request is repeated if its reply is missing, damaged or malformed, 0 to 255; 0 at first. */
     uint8_t setRetries(uint8_t retries) { return mbm_client_setRetries(&client, retries); }
     /**
+     * How often a request is repeated, after `waitMs` milliseconds each time, that the device
+     * refuses because it is busy (exception 06), or that only reads and that the device
+     * answers with exception 05; 0 to 255. See mbm_client_setBusyRetries.
+     */
+    uint8_t setBusyRetries(uint8_t retries, uint16_t waitMs)
+    {
+        return mbm_client_setBusyRetries(&client, retries, waitMs);
+    }
+    /**
      * Milliseconds before a repetition: MBM_BACKOFF_NONE (at first), _FIXED, _LINEAR or
      * _EXPONENTIAL, the first wait and the longest. Other requests are sent meanwhile.
      */

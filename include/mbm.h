@@ -1384,6 +1384,11 @@ uint16_t mbm_master_receive(struct mbm_master *master);
 #define MBM_CLIENT_DEPTH 16
 
 /**
+ * `retryLimit` of mbm_clientRequest and mbm_clientUnit: no repetitions.
+ */
+#define MBM_NO_RETRIES 255
+
+/**
  * mbm_client_setBackoff: the client repeats a request at once.
  */
 #define MBM_BACKOFF_NONE 0
@@ -1427,7 +1432,7 @@ typedef struct mbm_client {
     /**
      * Private.
      */
-    uint32_t words[24];
+    uint32_t words[25];
 } mbm_client;
 
 /**
@@ -1508,6 +1513,24 @@ typedef struct mbm_clientRequest {
      */
     uint8_t length;
     /**
+     * The response timeout of this request in milliseconds, 1 to 65535; 0: that of the unit
+     * (mbm_clientUnit) or of the client (mbm_client_setResponseTimeout). The client reads it
+     * each time it sends the request.
+     */
+    uint16_t timeoutMs;
+    /**
+     * How often the client repeats this request at most, 1 to 254; MBM_NO_RETRIES: never; 0:
+     * as often as the unit or mbm_client_setRetries says. With 1 to 254, a client refuses the
+     * request (MBM_INVALID_ARGUMENT) if none of mbm_client_setRetries,
+     * mbm_client_setBusyRetries and mbm_client_setUnits was called on it: only they link the
+     * code for repetitions.
+     */
+    uint8_t retryLimit;
+    /**
+     * Private.
+     */
+    uint8_t bytes[3];
+    /**
      * Private.
      */
     uint32_t words[8];
@@ -1555,6 +1578,16 @@ typedef struct mbm_clientUnit {
      * Private.
      */
     uint8_t cooling_down;
+    /**
+     * Set by you: how often the client repeats a request to this unit at most, 1 to 254;
+     * MBM_NO_RETRIES: never; 0: as often as mbm_client_setRetries says.
+     */
+    uint8_t retryLimit;
+    /**
+     * Set by you: the response timeout of this unit in milliseconds, 1 to 65535; 0: that of
+     * mbm_client_setResponseTimeout.
+     */
+    uint16_t timeoutMs;
 } mbm_clientUnit;
 
 /**
@@ -1771,6 +1804,79 @@ uint8_t mbm_client_cancel(struct mbm_client *client,
  *         for NULL. 0 may also be the identifier of a frame
  */
 uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
+
+/**
+ * Sets how often the client repeats a request whose response is missing, damaged or
+ * malformed, or that the port did not accept. It does not repeat a request that was
+ * answered with an exception (but see mbm_client_setBusyRetries), one that a lost link
+ * interrupted, or one whose response is too long for a buffer. `retryLimit` of a request or
+ * of a unit replaces this number.
+ *
+ * @param client   the object
+ * @param retries  0 to 255; the default is 0
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setRetries(struct mbm_client *client,
+                              uint8_t retries);
+
+/**
+ * Sets that the client repeats a request that a busy device refuses: one that the device
+ * answers with exception 06 (SERVER DEVICE BUSY), and one that only reads and that the device
+ * answers with exception 05 (ACKNOWLEDGE) (V1.1b3, 7). Without this setting both are the
+ * result of the request, as every exception is.
+ *
+ * After exception 06 the device has not carried out the request, so the client repeats any
+ * request. After exception 05 the device is carrying out the request, so a repetition would
+ * let it do the work again: the client repeats only functions 01 to 04, 07, 0B, 0C, 11, 14
+ * and 18, and 2B with MEI type 0E. A request that writes ends with the status 5; ask the
+ * device in your own way when the work is done.
+ *
+ * These repetitions are counted apart from those of mbm_client_setRetries. Meanwhile the
+ * client sends other requests, also to this unit.
+ *
+ * @param client   the object
+ * @param retries  the most repetitions of one request for this reason, 0 (the default) to
+ *                 255; the request then ends with the status 5 or 6
+ * @param waitMs   the wait before each repetition in milliseconds, 0 to 65535
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setBusyRetries(struct mbm_client *client,
+                                  uint8_t retries,
+                                  uint16_t waitMs);
+
+/**
+ * Sets how long a request waits before the client repeats it. Meanwhile the client sends
+ * other requests.
+ *
+ * @param client            the object
+ * @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
+ * @param delayMs           the wait before the first repetition, in milliseconds
+ * @param maxDelayMs        the longest wait, in milliseconds
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setBackoff(struct mbm_client *client,
+                              uint8_t backoff,
+                              uint16_t delayMs,
+                              uint16_t maxDelayMs);
+
+/**
+ * Shortens each wait before a repetition by a random part, so that several clients do not
+ * repeat their requests at the same time.
+ *
+ * @param client   the object
+ * @param percent  0 (the default) to 100: the largest part of the wait by which the client
+ *                 shortens it
+ * @param random   returns a new random number at each call, for example that of rand(). It
+ *                 may have 32 bits, 15 bits, or random bits in its upper half only. A
+ *                 function that it calls on the client returns MBM_BUSY. NULL only if
+ *                 `percent` is 0
+ * @param context  your pointer, passed to `random`; may be NULL
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setJitter(struct mbm_client *client,
+                             uint8_t percent,
+                             uint32_t (*random)(void *context),
+                             void *context);
 
 /**
  * Function 01: reads coils into the bytes of `reply`, eight in each byte. The first coil is
@@ -2157,7 +2263,8 @@ uint8_t mbm_client_forward(struct mbm_client *client,
 /**
  * Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the
  * request has been sent. In TCP frames it starts when mbm_client_poll puts the request into
- * the outgoing buffer, also if the port accepts it later.
+ * the outgoing buffer, also if the port accepts it later. `timeoutMs` of a request or of a unit
+ * replaces this time.
  *
  * @param client        the object
  * @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
@@ -2236,52 +2343,6 @@ uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
 uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t characters);
 
 /**
- * Sets how often the client repeats a request whose response is missing, damaged or
- * malformed, or that the port did not accept. It does not repeat a request that was
- * answered with an exception, one that a lost link interrupted, or one whose response is
- * too long for a buffer.
- *
- * @param client   the object
- * @param retries  0 to 255; the default is 0
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
-
-/**
- * Sets how long a request waits before the client repeats it. Meanwhile the client sends
- * other requests.
- *
- * @param client            the object
- * @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
- * @param delayMs           the wait before the first repetition, in milliseconds
- * @param maxDelayMs        the longest wait, in milliseconds
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setBackoff(struct mbm_client *client,
-                              uint8_t backoff,
-                              uint16_t delayMs,
-                              uint16_t maxDelayMs);
-
-/**
- * Shortens each wait before a repetition by a random part, so that several clients do not
- * repeat their requests at the same time.
- *
- * @param client   the object
- * @param percent  0 (the default) to 100: the largest part of the wait by which the client
- *                 shortens it
- * @param random   returns a new random number at each call, for example that of rand(). It
- *                 may have 32 bits, 15 bits, or random bits in its upper half only. A
- *                 function that it calls on the client returns MBM_BUSY. NULL only if
- *                 `percent` is 0
- * @param context  your pointer, passed to `random`; may be NULL
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setJitter(struct mbm_client *client,
-                             uint8_t percent,
-                             uint32_t (*random)(void *context),
-                             void *context);
-
-/**
  * Sets your storage for counters, in which the client counts from now on. You may read and
  * zero the counters at any time, but not from an interrupt. In TCP frames, foreignFrames
  * counts frames whose transaction identifier and unit match no pending request, and
@@ -2296,10 +2357,12 @@ uint8_t mbm_client_setCounters(struct mbm_client *client,
 
 /**
  * Sets the records of units. In a record the client counts the requests to its unit. The
- * record's `delayUs` sets the minimum time between two requests to the unit.
+ * record's `delayUs` sets the minimum time between two requests to the unit; its `timeoutMs`
+ * and `retryLimit` replace those of the client. You may change these three at any time.
  *
  * @param client  the object
- * @param units   your array of records, zeroed except `unit` and `delayUs`; NULL for none
+ * @param units   your array of records, zeroed except for the fields that you set; NULL for
+ *                none
  * @param count   the number of records, 0 to 255
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */

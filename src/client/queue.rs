@@ -1,7 +1,7 @@
 //! The queue of a client, and what follows when a request ends. Serial lines and TCP
 //! streams use the same queue, so a program contains its code once.
 
-use super::policy::Policy;
+use super::policy::{Policy, NO_RETRIES};
 use super::request::{ClientRequest, Stage};
 use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
@@ -23,6 +23,8 @@ pub struct RequestQueue<J, const N: usize> {
     pub has_broadcast: bool,
     /// Transaction numbers of pending requests must differ, except 0.
     pub has_transaction_ids: bool,
+    /// Requests may have their own limit of retries.
+    pub may_retry: bool,
     /// No request is due until `wait` microseconds have passed since `since`.
     since: u32,
     wait: u32,
@@ -42,6 +44,7 @@ impl<J, const N: usize> RequestQueue<J, N> {
             suspended: false,
             has_broadcast: false,
             has_transaction_ids: false,
+            may_retry: true,
             since: 0,
             wait: u32::MAX,
             policy: Policy::DEFAULT,
@@ -78,6 +81,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         state.exception = 0;
         state.length = 0;
         state.retries = 0;
+        state.busy_retries = 0;
         state.enter(Stage::Queued, 0, 0);
         self.changed = true;
         // `readiness` has checked that the queue is not full.
@@ -99,6 +103,8 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
             && self.has_transaction(state.transaction)
         {
             Status::DUPLICATE_TRANSACTION
+        } else if !self.may_retry && !matches!(state.retry_limit, 0 | NO_RETRIES) {
+            Status::INVALID_ARGUMENT
         } else {
             Status::PENDING
         }
@@ -291,20 +297,23 @@ fn end_or_retry(
     now: u32,
     storage: &mut impl ClientStorage,
 ) -> bool {
-    let (unit, retries) = (request.state().unit, request.state().retries);
-    // No reference to the request's state exists while `storage` may call a hook.
+    // No reference that may write the request's state exists while `storage` may call a hook.
     let again = if !FIRMWARE && status == Status::OK {
         None
     } else {
-        storage.again(policy, retries, status)
+        storage.again(policy, request.state(), status)
     };
-    storage.note(unit, status, again.is_some(), now);
+    storage.note(request.state().unit, status, again.is_some(), now);
     let state = request.state_mut();
     let Some(wait) = again else {
         state.end(status);
         return true;
     };
-    state.retries = retries + 1;
+    if status.is_exception() {
+        state.busy_retries += 1;
+    } else {
+        state.retries += 1;
+    }
     state.enter(Stage::Queued, now, wait);
     false
 }

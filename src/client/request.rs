@@ -4,7 +4,7 @@
 use super::storage::ClientStorage;
 use crate::error::Status;
 use crate::pdu::header::RequestHeader;
-use crate::time::elapsed;
+use crate::time::{elapsed, millis};
 use crate::FIRMWARE;
 
 /// The stage of a request.
@@ -41,9 +41,15 @@ pub struct RequestState {
     pub exception: u8,
     /// Number of data bytes received.
     pub length: u8,
+    /// The response timeout in milliseconds; 0 for that of the unit or line.
+    pub timeout_ms: u16,
+    /// Greatest number of retries; 0 for that of the unit or line, [`NO_RETRIES`] for none.
+    pub retry_limit: u8,
     stage: Stage,
     /// Number of retries so far.
     pub(super) retries: u8,
+    /// Number of retries so far after an exception.
+    pub(super) busy_retries: u8,
     /// The transaction identifier of its TCP frame.
     pub(super) wire: u16,
     /// The request is due when `wait` microseconds have passed since `since`.
@@ -62,8 +68,11 @@ impl RequestState {
         status: Status::OK,
         exception: 0,
         length: 0,
+        timeout_ms: 0,
+        retry_limit: 0,
         stage: Stage::Queued,
         retries: 0,
+        busy_retries: 0,
         wire: 0,
         since: 0,
         wait: 0,
@@ -109,6 +118,19 @@ impl RequestState {
             wait.max(storage.rest(self.unit, now))
         } else {
             wait
+        }
+    }
+
+    /// The response timeout in microseconds, if it is `line` on this line.
+    #[inline(always)]
+    pub(super) fn response_timeout(&self, storage: &mut impl ClientStorage, line: u32) -> u32 {
+        let timeout = match self.timeout_ms {
+            0 => storage.unit_timeout_ms(self.unit),
+            own => own,
+        };
+        match timeout {
+            0 => line,
+            own => millis(own),
         }
     }
 

@@ -5,18 +5,22 @@ mod kind;
 mod link;
 mod object;
 mod poll;
+mod repeat;
 mod request;
 mod requests;
 mod settings;
 mod storage;
+mod units;
 
 pub use begin::*;
 pub use link::*;
 pub use object::mbm_client;
 pub use poll::*;
+pub use repeat::*;
 pub use request::mbm_clientRequest;
 pub use requests::*;
 pub use settings::*;
+pub use units::*;
 
 /// The maximum number of requests that are pending in one client.
 pub const MBM_CLIENT_DEPTH: u8 = 16;

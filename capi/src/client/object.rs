@@ -12,7 +12,7 @@ use mbm::engine::Settings;
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use mbm::error::Status;
 
-const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
+pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 
 /// A client of one serial line or one TCP stream. It queues up to 16 requests.
 /// mbm_client_poll sends and receives; no function ever waits.
@@ -31,7 +31,7 @@ pub struct mbm_client {
     /// Private.
     pointers: [*mut c_void; 46],
     /// Private.
-    words: [u32; 24],
+    words: [u32; 25],
 }
 
 /// The fields in the storage of an `mbm_client`.
