@@ -24,12 +24,13 @@
  *    4 Functions and framings  codes, limits, length rules; RTU, ASCII, TCP
  *    5 Master                  RTU, one request at a time, blocking or not
  *    6 Client                  many requests, every framing, never waits
- *    7 Server                  answers requests on a line or connection
- *    8 Units                   the data that servers serve: tables, callbacks, files
- *    9 Values                  registers and bits as numbers, in words or bytes
- *   10 Packets                 requests and responses, built and parsed by hand
- *   11 Sniffer                 decodes the traffic between other devices
- *   12 Ring                    bytes from an interrupt to the main loop
+ *    7 Link                    keeps a client's link open
+ *    8 Server                  answers requests on a line or connection
+ *    9 Units                   the data that servers serve: tables, callbacks, files
+ *   10 Values                  registers and bits as numbers, in words or bytes
+ *   11 Packets                 requests and responses, built and parsed by hand
+ *   12 Sniffer                 decodes the traffic between other devices
+ *   13 Ring                    bytes from an interrupt to the main loop
  */
 
 #ifndef MBM_H
@@ -1436,11 +1437,12 @@ typedef struct mbm_client {
 } mbm_client;
 
 /**
- * Your hooks that close a link and open it again, for mbm_client_reconnect.
+ * Your hooks that close a link and open it again, for mbm_link_begin and
+ * mbm_client_reconnect.
  */
 typedef struct mbm_linkHooks {
     /**
-     * Your pointer, passed to both hooks; may be NULL.
+     * Your pointer, passed to all hooks; may be NULL.
      */
     void *context;
     /**
@@ -1448,11 +1450,17 @@ typedef struct mbm_linkHooks {
      */
     void (*disconnect)(void *context);
     /**
-     * Optional: opens the link without waiting. Returns MBM_OK if the link is open,
+     * Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the link is open,
      * MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
      * or another status.
      */
     uint8_t (*connect)(void *context);
+    /**
+     * For mbm_link_begin only; optional if `connect` never returns MBM_PENDING. Returns MBM_OK
+     * if the link is open, MBM_PENDING while the connection is still being made, or another
+     * status.
+     */
+    uint8_t (*status)(void *context);
 } mbm_linkHooks;
 
 /**
@@ -1529,7 +1537,7 @@ typedef struct mbm_clientRequest {
     /**
      * Private.
      */
-    uint8_t bytes[3];
+    uint8_t bytes[5];
     /**
      * Private.
      */
@@ -2370,7 +2378,221 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
                             struct mbm_clientUnit *units,
                             uint8_t count);
 
-/* ==== 7. Server ===================================================================== */
+/* ==== 7. Link ======================================================================= */
+
+/**
+ * mbm_link_state: there is no link. The client opens it when the wait is over.
+ */
+#define MBM_LINK_IS_DOWN 1
+
+/**
+ * mbm_link_state: the connection is being made.
+ */
+#define MBM_LINK_IS_CONNECTING 2
+
+/**
+ * mbm_link_state: the link is open.
+ */
+#define MBM_LINK_IS_UP 3
+
+/**
+ * An event of a link: it is open now. The status is MBM_OK.
+ */
+#define MBM_LINK_EVENT_CONNECTED 0
+
+/**
+ * An event of a link: it was open and is lost. The status is MBM_LINK_LOST.
+ */
+#define MBM_LINK_EVENT_LOST 1
+
+/**
+ * An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
+ * mbm_linkHooks returned; MBM_RESPONSE_TIMED_OUT if the connection took too long.
+ */
+#define MBM_LINK_EVENT_FAILED 2
+
+/**
+ * A link that opens itself again when it was lost. It belongs to one client:
+ * mbm_client_poll polls both.
+ *
+ * You own the storage. It must be zero before first use, as a static object is, and must stay
+ * where it is until mbm_link_end or until the client was begun again.
+ */
+typedef struct mbm_link {
+    /**
+     * Private.
+     */
+    void *pointers[31];
+    /**
+     * Private.
+     */
+    uint32_t words[22];
+} mbm_link;
+
+/**
+ * What has happened to a link. You may read and zero the counters at any time, but not from
+ * an interrupt; each wraps at 2^32.
+ */
+typedef struct mbm_linkCounters {
+    /**
+     * Calls of `connect` of mbm_linkHooks.
+     */
+    uint32_t attempts;
+    /**
+     * Attempts that failed.
+     */
+    uint32_t failed;
+    /**
+     * How often the link was opened, or found open by mbm_link_begin.
+     */
+    uint32_t connected;
+    /**
+     * How often an open link was lost.
+     */
+    uint32_t lost;
+} mbm_linkCounters;
+
+/**
+ * Gives a client a link, which mbm_client_poll keeps open from then on:
+ * - It notices the loss of the link also while the client has no request. For that, an idle
+ *   client reads the port in each poll and drops what it reads: late replies, noise, frames
+ *   of others. If something else reads the line, call mbm_client_suspend first.
+ * - It opens the link again, after a wait that grows with each attempt that fails.
+ * - When the link is lost, requests under way end with MBM_LINK_LOST, because the device may
+ *   have carried them out. The others end too, or wait: see mbm_link_setRequestsWait.
+ *
+ * mbm_client_pollDelay returns when the next poll is due, for an idle client at most one
+ * second. A wait for bytes that also ends when the link is lost, as mbm_tcp_wait and
+ * mbm_tty_wait, finds the loss at once.
+ *
+ * In the first poll the link calls `status` to find out whether the link is open already, and
+ * `connect` if not. After a loss or a failed attempt it calls `disconnect`, once.
+ *
+ * All settings of the link return to their defaults. The call may be repeated at any time,
+ * also with another client. A begin function of the client ends the link.
+ *
+ * @param link    the object; zeroed before the first call
+ * @param client  the client, begun; it must not have another link
+ * @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
+ *                hooks must not use the client or the link: each function returns MBM_BUSY
+ * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_NOT_INITIALISED if the client was not begun;
+ *         MBM_BUSY from within a hook, while the client is suspended, or if it has another
+ *         link
+ */
+uint8_t mbm_link_begin(struct mbm_link *link,
+                       struct mbm_client *client,
+                       const struct mbm_linkHooks *hooks);
+
+/**
+ * Ends a link. The client and its requests stay; the link itself stays open or closed as it
+ * is. The storage is free, and begins anew with mbm_link_begin.
+ *
+ * @param link  the object; the client's storage must still be valid
+ * @return MBM_OK; MBM_BUSY from within a hook and while the client is suspended;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_end(struct mbm_link *link);
+
+/**
+ * Closes the link and opens it again, at the next poll of the client and without a wait. Call
+ * it when you know better than the link: the network is back, the address has changed.
+ *
+ * @param link  the object
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_reconnect(struct mbm_link *link);
+
+/**
+ * Sets the wait before an attempt to open the link. The first attempt after a loss waits for
+ * `delayMs`; each attempt that fails lets the wait grow. It starts anew when the link was open
+ * for as long as the last wait.
+ *
+ * @param link        the object
+ * @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
+ *                    mbm_client_setBackoff
+ * @param delayMs     the first wait in milliseconds, 0 to 65535; the default is 500
+ * @param maxDelayMs  the longest wait in milliseconds, 0 to 65535; the default is 30000
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setBackoff(struct mbm_link *link,
+                            uint8_t backoff,
+                            uint16_t delayMs,
+                            uint16_t maxDelayMs);
+
+/**
+ * Shortens each wait before an attempt by a random part, so that many clients that lost their
+ * server together do not connect at the same time.
+ *
+ * @param link     the object
+ * @param percent  0 (the default) to 100: the largest part of the wait that is taken off
+ * @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only
+ *                 if `percent` is 0
+ * @param context  your pointer, passed to `random`; may be NULL
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setJitter(struct mbm_link *link,
+                           uint8_t percent,
+                           uint32_t (*random)(void *context),
+                           void *context);
+
+/**
+ * Sets how long a connection may take to be made. Then the attempt has failed.
+ *
+ * @param link       the object
+ * @param timeoutMs  milliseconds, 1 to 65535; 0: as long as `status` returns MBM_PENDING. The
+ *                   default is 10000
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setConnectTimeout(struct mbm_link *link,
+                                   uint16_t timeoutMs);
+
+/**
+ * Sets whether requests wait for the link. By default they do not: while the link is down,
+ * every request ends with MBM_LINK_LOST at the next poll. (A program whose `done` queues the
+ * request again at once then polls without a pause: let it wait.) If requests wait, they stay
+ * in the queue until the link is open again or until you cancel them; their response timeout
+ * begins when they are sent. While a connection is being made, requests always wait.
+ *
+ * @param link  the object
+ * @param on    0 (the default) or 1
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setRequestsWait(struct mbm_link *link,
+                                 uint8_t on);
+
+/**
+ * Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
+ * attempt has failed.
+ *
+ * @param link      the object
+ * @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
+ *                  request may, and call every function on the link; NULL for none
+ * @param context   your pointer, passed to `callback`; may be NULL
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setCallback(struct mbm_link *link,
+                             void (*callback)(void *context, uint8_t event, uint8_t status),
+                             void *context);
+
+/**
+ * Sets your storage for counters, in which the link counts from now on.
+ *
+ * @param link      the object
+ * @param counters  your counters, zeroed; NULL stops counting
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setCounters(struct mbm_link *link, struct mbm_linkCounters *counters);
+
+/**
+ * Returns what a link is doing.
+ *
+ * @param link  the object
+ * @return MBM_LINK_IS_DOWN, MBM_LINK_IS_CONNECTING or MBM_LINK_IS_UP; 0 before the first poll,
+ *         and for an object that was never begun
+ */
+uint8_t mbm_link_state(const struct mbm_link *link);
+
+/* ==== 8. Server ===================================================================== */
 
 /**
  * A Modbus server on one serial line or one connection.
@@ -2553,7 +2775,7 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
 
-/* ==== 8. Units ====================================================================== */
+/* ==== 9. Units ====================================================================== */
 
 /**
  * A function of yours returns this, or-ed with the exception code (1 to 127), to answer
@@ -3267,7 +3489,7 @@ uint8_t mbm_unit_serveInputRegisters(struct mbm_unit *unit,
  */
 uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table);
 
-/* ==== 9. Values ===================================================================== */
+/* ==== 10. Values ==================================================================== */
 
 /**
  * Passed to a function: use the order of the mbm_registers. As that order itself:
@@ -3914,7 +4136,7 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
                                const uint8_t *bytes,
                                uint16_t length);
 
-/* ==== 10. Packets =================================================================== */
+/* ==== 11. Packets =================================================================== */
 
 /**
  * A request: a client sends it.
@@ -4431,7 +4653,7 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
                        char *text,
                        uint16_t size);
 
-/* ==== 11. Sniffer =================================================================== */
+/* ==== 12. Sniffer =================================================================== */
 
 /**
  * The bytes come from a line that carries both directions.
@@ -4760,7 +4982,7 @@ uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
  */
 uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
 
-/* ==== 12. Ring ====================================================================== */
+/* ==== 13. Ring ====================================================================== */
 
 /**
  * A receive ring between an interrupt handler and the main loop.

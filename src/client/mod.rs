@@ -6,6 +6,7 @@
 //! The client copies data only between a request and a frame buffer.
 
 mod active;
+mod link;
 mod policy;
 mod queue;
 mod request;
@@ -16,6 +17,7 @@ mod transport;
 mod units;
 
 pub use active::{ActiveRequest, ClientEngine};
+pub use link::{Link, LinkEvent, LinkHooks, LinkState};
 pub use policy::{again, again_when_busy, Backoff, Policy, NO_RETRIES};
 pub use queue::RequestQueue;
 pub use request::{ClientRequest, RequestState};

@@ -81,6 +81,18 @@ impl Policy {
         self.max_wait = most;
     }
 
+    /// Sets the largest part of a wait that is subtracted at random, in percent. False, with
+    /// nothing changed, for more than 100, or if there is no random number and `percent` is not
+    /// 0.
+    #[inline(always)]
+    pub fn set_jitter(&mut self, percent: u8, has_random: bool) -> bool {
+        let allowed = percent <= 100 && (has_random || percent == 0);
+        if allowed {
+            self.jitter = ((u16::from(percent) * 163) >> 6).min(255) as u8;
+        }
+        allowed
+    }
+
     /// The wait before retry number `retry`, counted from 1. `random` returns a random
     /// number, which decides how much jitter is subtracted.
     #[inline]

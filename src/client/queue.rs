@@ -6,7 +6,7 @@ use super::request::{ClientRequest, Stage};
 use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
 use crate::error::Status;
-use crate::time::elapsed;
+use crate::time::{elapsed, LONGEST};
 use crate::FIRMWARE;
 use heapless::Vec;
 
@@ -275,6 +275,37 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         self.mark_lost(|_| true);
     }
 
+    /// Ends a request that [`RequestQueue::fail_all`] or [`RequestQueue::interrupt`] marked as
+    /// lost; `None` if there is none.
+    pub fn end_lost(&mut self, now: u32, storage: &mut impl ClientStorage) -> Option<J> {
+        let at = self.queue.iter().position(is_lost)?;
+        self.end(at, Status::LINK_LOST, now, storage)
+    }
+
+    /// True if [`RequestQueue::end_lost`] will return a request.
+    pub fn has_lost(&self) -> bool {
+        self.queue.iter().any(is_lost)
+    }
+
+    /// Marks all requests, none of which is under way, as lost.
+    pub fn fail_all(&mut self) {
+        self.mark_lost(|_| true);
+    }
+
+    /// Puts a placeholder into the empty queue, which is never due. While it is there, the
+    /// client reads and drops what arrives.
+    pub fn begin_idle(&mut self, mut placeholder: J, now: u32) {
+        placeholder.state_mut().enter(Stage::Queued, now, LONGEST);
+        self.set_next_due(now, LONGEST);
+        let _ = self.queue.push(placeholder);
+    }
+
+    /// Removes the placeholder.
+    pub fn end_idle(&mut self) {
+        self.queue.clear();
+        self.changed = true;
+    }
+
     /// Marks the requests for which `which` returns true as lost. The next polls end them
     /// with [`Status::LINK_LOST`].
     pub(super) fn mark_lost(&mut self, mut which: impl FnMut(&J) -> bool) {
@@ -285,6 +316,10 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         }
         self.changed = true;
     }
+}
+
+fn is_lost(request: &impl ClientRequest) -> bool {
+    request.state().is(Stage::Lost)
 }
 
 /// Ends a request with `status`, or prepares its retry. Returns true if it has ended,

@@ -8,17 +8,23 @@ use core::ffi::c_void;
 use mbm::client::Transport as _;
 use mbm::error::Status;
 
-/// Your hooks that close a link and open it again, for mbm_client_reconnect.
+/// Your hooks that close a link and open it again, for mbm_link_begin and
+/// mbm_client_reconnect.
 #[repr(C)]
+#[derive(Clone, Copy)]
 pub struct mbm_linkHooks {
-    /// Your pointer, passed to both hooks; may be NULL.
+    /// Your pointer, passed to all hooks; may be NULL.
     pub context: *mut c_void,
     /// Optional: closes the link, if it is open.
     pub disconnect: Option<unsafe extern "C" fn(context: *mut c_void)>,
-    /// Optional: opens the link without waiting. Returns MBM_OK if the link is open,
+    /// Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the link is open,
     /// MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
     /// or another status.
     pub connect: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
+    /// For mbm_link_begin only; optional if `connect` never returns MBM_PENDING. Returns MBM_OK
+    /// if the link is open, MBM_PENDING while the connection is still being made, or another
+    /// status.
+    pub status: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
 }
 
 /// Closes the link and opens it again. The client discards an incomplete response. Requests

@@ -3,10 +3,10 @@
 mod begin;
 mod kind;
 mod link;
-mod object;
-mod poll;
+pub(crate) mod object;
+pub(crate) mod poll;
 mod repeat;
-mod request;
+pub(crate) mod request;
 mod requests;
 mod settings;
 mod storage;

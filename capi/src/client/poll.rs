@@ -1,7 +1,7 @@
 //! Polling a client, and cancelling its requests.
 
 use super::object::{
-    mbm_client, on_transport, queue, Advance, Object, SerialTransport, TcpTransport,
+    mbm_client, on_transport, queue, Advance, LinkedKind, Object, SerialTransport, TcpTransport,
 };
 use super::request::{mbm_clientRequest, RequestPtr};
 use super::MBM_CLIENT_DEPTH;
@@ -50,7 +50,7 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
 /// # Safety
 /// `client` is begun, and `advance` is that of its transport; no reference into it lives.
 #[cfg_attr(not(any(target_os = "none", mbm_firmware)), inline(always))]
-pub(super) unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
+pub(crate) unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
     let object = pointers::object(client);
     // SAFETY: as the caller promises. No reference lives while `done` is called, because
     // `done` may use the object. If `done` zeroed the object, or began it again, `polling`
@@ -95,7 +95,12 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
             Status::OK => pointers::with_hooks(client, || {
                 let object = pointers::object(client);
                 let now = now(object);
-                on_transport!(object, transport => transport.poll_delay(&(*object).queue, now))
+                let delay =
+                    on_transport!(object, transport => transport.poll_delay(&(*object).queue, now));
+                if !(*object).linked {
+                    return delay;
+                }
+                ((*(*object).kind.cast::<LinkedKind>()).delay)(object, now, delay)
             }),
             Status::BUSY => 0,
             _ => u32::MAX,

@@ -163,10 +163,9 @@ pub unsafe extern "C" fn mbm_client_setJitter(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            if percent > 100 || (random.is_none() && percent > 0) {
+            if !parts.queue.policy.set_jitter(percent, random.is_some()) {
                 return Status::INVALID_ARGUMENT;
             }
-            parts.queue.policy.jitter = ((u16::from(percent) * 163) >> 6).min(255) as u8;
             parts.storage.random = random;
             parts.storage.random_context = context;
             Status::OK

@@ -54,7 +54,7 @@ pub struct mbm_clientRequest {
     /// code for repetitions.
     pub retryLimit: u8,
     /// Private.
-    bytes: [u8; 3],
+    bytes: [u8; 5],
     /// Private.
     words: [u32; 8],
 }
@@ -96,7 +96,7 @@ const _: () = {
 
 /// A pointer to a request of the C program, which stays valid until the request has ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct RequestPtr(NonNull<RequestFields>);
+pub(crate) struct RequestPtr(NonNull<RequestFields>);
 
 impl RequestPtr {
     /// The request at a pointer; `None` for NULL.
@@ -104,7 +104,7 @@ impl RequestPtr {
     /// # Safety
     /// It is NULL, or points to a request that is zeroed or was used before, and
     /// stays valid for as long as it is pending.
-    pub(super) unsafe fn new(request: *mut mbm_clientRequest) -> Option<Self> {
+    pub(crate) unsafe fn new(request: *mut mbm_clientRequest) -> Option<Self> {
         NonNull::new(request.cast()).map(RequestPtr)
     }
 

@@ -27,7 +27,7 @@ pub(super) struct Ended {
 
 /// The buffers and hooks of a client.
 #[repr(C)]
-pub(super) struct ClientBuffers {
+pub(crate) struct ClientBuffers {
     pub(super) frame: *mut u8,
     pub(super) outgoing: *mut u8,
     pub(super) counters: *mut mbm_counters,
