@@ -27,15 +27,17 @@ fn probes() -> Vec<(String, u64)> {
             mbm_service mbm_registerTable mbm_bitTable mbm_dataCallbacks mbm_file mbm_files mbm_fifo
             mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
             mbm_functionMask mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_linkHooks
-            mbm_turn;
+            mbm_link mbm_linkCounters mbm_turn;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
                 resynchronisations bytesSent bytesReceived }
             mbm_clientRequest { done context data reply replyBytes transaction unit status exception
-                length }
-            mbm_clientUnit { requests replies exceptions retries delayUs unit status }
-            mbm_linkHooks { context disconnect connect }
+                length timeoutMs retryLimit }
+            mbm_clientUnit { requests replies exceptions retries delayUs unit status retryLimit
+                timeoutMs }
+            mbm_linkHooks { context disconnect connect status }
+            mbm_linkCounters { attempts failed connected lost }
             mbm_turn { master lastUse }
             mbm_rule { kind bytes more }
             mbm_function { code request response }
@@ -79,6 +81,8 @@ fn probes() -> Vec<(String, u64)> {
             MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME MBM_QUEUE_FULL
             MBM_DUPLICATE_TRANSACTION MBM_NOT_PENDING MBM_CLIENT_DEPTH
             MBM_BACKOFF_NONE MBM_BACKOFF_FIXED MBM_BACKOFF_LINEAR MBM_BACKOFF_EXPONENTIAL
+            MBM_NO_RETRIES MBM_LINK_IS_DOWN MBM_LINK_IS_CONNECTING MBM_LINK_IS_UP
+            MBM_LINK_EVENT_CONNECTED MBM_LINK_EVENT_LOST MBM_LINK_EVENT_FAILED
             MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
             MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
             MBM_FC_READ_COILS MBM_FC_READ_DISCRETE_INPUTS MBM_FC_READ_HOLDING_REGISTERS

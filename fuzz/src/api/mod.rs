@@ -10,6 +10,7 @@ mod bits;
 mod check;
 mod client;
 mod frame;
+mod link;
 mod master;
 mod memory;
 mod packet;
@@ -34,7 +35,8 @@ use world::World;
 fn step(w: &World) {
     match w.byte() % 32 {
         0..=4 => master::step(w),
-        5..=11 => client::step(w),
+        5..=9 => client::step(w),
+        10 | 11 => link::step(w),
         12..=19 => server::step(w),
         20..=22 => sniffer::step(w),
         23 => ring::step(w),

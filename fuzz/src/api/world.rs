@@ -51,6 +51,8 @@ pub struct World {
     pub clients: Pool<mbm_client>,
     /// Clients whose port a master uses, or used when it was copied.
     pub lenders: RefCell<Vec<*mut mbm_client>>,
+    /// Clients with their links. They are not copied.
+    pub linked: RefCell<Vec<(*mut mbm_client, *mut mbm_link)>>,
     pub requests: Pool<mbm_clientRequest>,
     pub servers: Pool<mbm_server>,
     pub sniffers: Pool<mbm_sniffer>,
@@ -91,6 +93,7 @@ impl World {
             turn: Cell::new(std::ptr::null_mut()),
             clients: Pool::new(),
             lenders: RefCell::default(),
+            linked: RefCell::default(),
             requests: Pool::new(),
             servers: Pool::new(),
             sniffers: Pool::new(),
