@@ -2468,6 +2468,9 @@ typedef struct mbm_linkCounters {
  * In the first poll the link calls `status` to find out whether the link is open already, and
  * `connect` if not. After a loss or a failed attempt it calls `disconnect`, once.
  *
+ * Client and link must stay where they are, and must not be copied. A program does not also
+ * call mbm_client_reconnect.
+ *
  * All settings of the link return to their defaults. The call may be repeated at any time,
  * also with another client. A begin function of the client ends the link.
  *
