@@ -150,7 +150,7 @@ static void hang_up(line *l)
 /* Opens a line that is not open, at most once a second. Returns whether it is open. */
 static int open_if_due(line *l)
 {
-    const mbm_linkHooks link = {l, close_line, open_line};
+    const mbm_linkHooks link = {.context = l, .disconnect = close_line, .connect = open_line};
     struct pollfd idle = {l->tty.fd, 0, 0};
 
     /* It may have hung up since the last wait. */

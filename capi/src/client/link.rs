@@ -129,7 +129,7 @@ pub unsafe extern "C" fn mbm_client_suspend(
             Status::OK
         });
         if status == Status::OK.code() && !master.is_null() {
-            master::with_hooks(master, Core::line_used);
+            pointers::with_hooks(client, || master::with_hooks(master, Core::line_used));
         }
         status
     }
