@@ -190,7 +190,7 @@ static void refuse(int framing, uint8_t function, uint8_t code)
     uint8_t tcp[] = {0, 0, 0, 0, 0, 3, UNIT, (uint8_t)(function | 0x80), code};
 
     if (framing == MBM_FRAMING_ASCII) {
-        const uint8_t lrc = (uint8_t)-(rtu[0] + rtu[1] + rtu[2]);
+        const uint8_t lrc = (uint8_t) - (rtu[0] + rtu[1] + rtu[2]);
         char text[20];
 
         (void)snprintf(text, sizeof text, ":%02X%02X%02X%02X\r\n", rtu[0], rtu[1], rtu[2], lrc);
@@ -320,8 +320,8 @@ static void requests_under_way_at_once_have_their_own_timeouts_and_retries(void 
     tcp_peer_fault(peer, 6, FAULT_EXCEPTION, SERVER_DEVICE_BUSY);
     tcp_peer_fault(peer, 7, FAULT_EXCEPTION, ACKNOWLEDGE);
     for (i = 0; i < 8; i++)
-        IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[i],
-                                                        (uint16_t)(10 * i), 2));
+        IS(MBM_PENDING,
+           mbm_client_readHoldingRegisters(&a.client, &requests[i], (uint16_t)(10 * i), 2));
     asker_wait_all(&a);
     for (i = 0; i < 8; i++)
         IS(i < 3 || i == 7 ? MBM_RESPONSE_TIMED_OUT : MBM_OK, requests[i].status);

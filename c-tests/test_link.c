@@ -568,7 +568,7 @@ static void the_callback_may_use_link_and_client(void **state)
             m.is_lost = 0;
             IS(after[what], mbm_client_poll(&client));
             run(1000);
-            assert_int_equal(mbm_link_state(&kept), what == 0 || what == 4 ? 0
+            assert_int_equal(mbm_link_state(&kept), what == 0 || what == 4   ? 0
                                                     : what == 2 || what == 3 ? MBM_LINK_IS_DOWN
                                                                              : MBM_LINK_IS_UP);
             if (what == 5)

@@ -1727,7 +1727,7 @@ uint8_t mbm_client_reconnect(struct mbm_client *client,
  * @param client  the object
  * @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives
  *         or mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first
- *         request
+ *         request. With a link: 0 from each loss of it until it is open again
  */
 uint8_t mbm_client_isConnected(const struct mbm_client *client);
 
@@ -1758,7 +1758,8 @@ uint8_t mbm_client_resume(struct mbm_client *client,
 
 /**
  * Sends and receives for all requests, without waiting, and calls `done` of those that have
- * ended, of at most 17 in one call.
+ * ended, of at most 17 in one call. It also takes care of the client's link, if
+ * mbm_link_begin gave it one.
  *
  * Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
  *
@@ -1772,7 +1773,8 @@ uint8_t mbm_client_poll(struct mbm_client *client);
 /**
  * Returns how long mbm_client_poll will have nothing to do unless a byte arrives. A program
  * may sleep, or wait for a byte in select, for that time. The client reads bytes only while
- * a request is pending.
+ * a request is pending, or if it has a link (mbm_link_begin). With a link the delay also ends
+ * when the link is to be opened again, and is at most one second while the client is idle.
  *
  * @param client  the object
  * @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF

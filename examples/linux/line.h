@@ -34,8 +34,8 @@ typedef struct line {
     mbm_tty_options options;
     char path[256];
     uint8_t is_tcp;
-    int lost_by;        /* errno of the last loss of the link */
-    char status[128];   /* text of line_status */
+    int lost_by;      /* errno of the last loss of the link */
+    char status[128]; /* text of line_status */
     uint8_t incoming[1024], outgoing[1024];
 } line;
 

@@ -6,10 +6,12 @@
 //! The client copies data only between a request and a frame buffer.
 
 mod active;
+mod due;
 mod link;
 mod policy;
 mod queue;
 mod request;
+mod retry;
 mod serial;
 mod storage;
 mod tcp;
@@ -18,9 +20,10 @@ mod units;
 
 pub use active::{ActiveRequest, ClientEngine};
 pub use link::{Link, LinkEvent, LinkHooks, LinkState};
-pub use policy::{again, again_when_busy, Backoff, Policy, NO_RETRIES};
+pub use policy::{Backoff, Policy};
 pub use queue::RequestQueue;
 pub use request::{ClientRequest, RequestState};
+pub use retry::{again, again_when_busy, NO_RETRIES};
 pub use serial::Serial;
 pub use storage::ClientStorage;
 pub use tcp::Tcp;

@@ -79,7 +79,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
 /// @param client  the object
 /// @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives
 ///         or mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first
-///         request
+///         request. With a link: 0 from each loss of it until it is open again
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.

@@ -19,7 +19,8 @@ unsafe fn now(object: *mut Object) -> u32 {
 }
 
 /// Sends and receives for all requests, without waiting, and calls `done` of those that have
-/// ended, of at most 17 in one call.
+/// ended, of at most 17 in one call. It also takes care of the client's link, if
+/// mbm_link_begin gave it one.
 ///
 /// Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
 ///
@@ -81,7 +82,8 @@ pub(crate) unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> S
 
 /// Returns how long mbm_client_poll will have nothing to do unless a byte arrives. A program
 /// may sleep, or wait for a byte in select, for that time. The client reads bytes only while
-/// a request is pending.
+/// a request is pending, or if it has a link (mbm_link_begin). With a link the delay also ends
+/// when the link is to be opened again, and is at most one second while the client is idle.
 ///
 /// @param client  the object
 /// @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF

@@ -3,7 +3,7 @@
 mod object;
 mod port;
 
-pub use object::mbm_link;
+pub use object::{mbm_link, mbm_linkCounters};
 
 use crate::client::object::{self as client, LinkedKind, TransportKind};
 use crate::client::{mbm_client, mbm_linkHooks};
@@ -37,20 +37,6 @@ const _: () = {
     assert!(MBM_LINK_EVENT_LOST == LinkEvent::Lost as u8);
     assert!(MBM_LINK_EVENT_FAILED == LinkEvent::Failed as u8);
 };
-
-/// What has happened to a link. You may read and zero the counters at any time, but not from
-/// an interrupt; each wraps at 2^32.
-#[repr(C)]
-pub struct mbm_linkCounters {
-    /// Calls of `connect` of mbm_linkHooks.
-    pub attempts: u32,
-    /// Attempts that failed.
-    pub failed: u32,
-    /// How often the link was opened, or found open by mbm_link_begin.
-    pub connected: u32,
-    /// How often an open link was lost.
-    pub lost: u32,
-}
 
 /// Gives a client a link, which mbm_client_poll keeps open from then on:
 /// - It notices the loss of the link also while the client has no request. For that, an idle

@@ -1,6 +1,5 @@
 //! The link object, and how a client with a link is polled.
 
-use super::mbm_linkCounters;
 use crate::client::mbm_linkHooks;
 use crate::client::object::{self as client, LinkedKind, TransportKind};
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
@@ -24,6 +23,20 @@ pub struct mbm_link {
     pointers: [*mut c_void; 31],
     /// Private.
     words: [u32; 22],
+}
+
+/// What has happened to a link. You may read and zero the counters at any time, but not from
+/// an interrupt; each wraps at 2^32.
+#[repr(C)]
+pub struct mbm_linkCounters {
+    /// Calls of `connect` of mbm_linkHooks.
+    pub attempts: u32,
+    /// Attempts that failed.
+    pub failed: u32,
+    /// How often the link was opened, or found open by mbm_link_begin.
+    pub connected: u32,
+    /// How often an open link was lost.
+    pub lost: u32,
 }
 
 /// The fields in the storage of an `mbm_link`.
