@@ -119,7 +119,7 @@ abi: ## Generate packaging/mbm.abi, with which `make check` compares the C inter
 compile-commands: ## Write compile_commands.json, for editors and clang-tidy
 	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind libmosquitto-dev libcjson-dev
 	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SERVE) $(PEERS) $(MQTT) \
-		$(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) $(CLIENTS) $(DEMO) $(SNIFF) $(BUILD)/plain/linux/basic | scripts/compile-commands
+		$(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) $(CLIENTS) $(DEMO) $(SNIFF) $(KEEP_LINK) $(BUILD)/plain/linux/basic | scripts/compile-commands
 
 .PHONY: tidy
 tidy: compile-commands ## Run clang-tidy over C and C++, with the checks in .clang-tidy
@@ -291,6 +291,16 @@ SNIFF := $(BUILD)/plain/linux/sniff
 $(SNIFF): $(patsubst %,$(BUILD)/plain/%.o,linux/sniff linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
+KEEP_LINK := $(BUILD)/plain/linux/keep_link
+$(KEEP_LINK): $(patsubst %,$(BUILD)/plain/%.o,linux/keep_link linux/mbm_tcp linux/mbm_tcp_listener) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+
+.PHONY: keep-link
+keep-link: ## Build and run the example of a client whose link opens itself again
+	@scripts/need gcc libc6-dev
+	@$(MAKE) --no-print-directory $(KEEP_LINK)
+	@$(KEEP_LINK)
+
 .PHONY: sniff
 sniff: ## Build and check the example that watches a bus, build/plain/linux/sniff
 	@scripts/need gcc libc6-dev
@@ -307,7 +317,7 @@ $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support
 .PHONY: clients
 clients: ## Build and check the client examples poll_table, scan, logger, identify and calls in build/plain/linux
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS)
+	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) keep-link
 	@$(BUILD)/venv/bin/python scripts/check-clients $(BUILD)/plain
 	@$(BUILD)/venv/bin/python scripts/check-clients-lost $(BUILD)/plain
 
@@ -354,7 +364,7 @@ guarded: ## Show a server that refreshes registers at each read and refuses one 
 	@$(BUILD)/plain/linux/guarded_server
 
 # The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(SNIFF) $(CLIENTS) $(SERVE)
+PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(KEEP_LINK) $(SNIFF) $(CLIENTS) $(SERVE)
 ARM_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
 .PHONY: check-pages
 check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing

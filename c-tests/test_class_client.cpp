@@ -164,6 +164,43 @@ static void a_request_that_needs_more_words_than_it_has_is_refused(void **)
                     {17, 6, 0, 3, 0x12, 0x34});
 }
 
+static void a_request_has_its_own_timeout_and_retries(void **)
+{
+    ModbusSerialClient client;
+    ModbusRequestOf<1> request(17), other(17);
+    client.begin(Serial, 19200);
+    client.setResponseTimeout(50);
+    assert_int_equal(request.setRetryLimit(1), MBM_OK);
+    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_INVALID_ARGUMENT);
+    client.setRetries(2);
+    assert_int_equal(request.setResponseTimeout(1500), MBM_OK);
+    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
+    assert_int_equal(request.setRetryLimit(0), MBM_BUSY);
+    assert_int_equal(request.setResponseTimeout(0), MBM_BUSY);
+    unsigned long before = millis();
+    ends(client);
+    assert_int_equal(Serial.sent.size(), 2);
+    assert_in_range(millis() - before, 3000, 3300);
+    assert_int_equal(request.setResponseTimeout(0), MBM_OK);
+    assert_int_equal(request.setRetryLimit(MBM_NO_RETRIES), MBM_OK);
+    Serial.sent.clear();
+    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
+    before = millis();
+    ends(client);
+    assert_int_equal(Serial.sent.size(), 1);
+    assert_in_range(millis() - before, 50, 200); // with the quiet time before
+    Serial.sent.clear();
+
+    assert_int_equal(client.setBusyRetries(3, 20), MBM_OK);
+    Serial.reply(adu({17, 0x83, 6}));
+    Serial.reply(adu({17, 3, 2, 0, 5}));
+    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
+    ends(client);
+    assert_int_equal(request.status(), MBM_OK);
+    assert_int_equal(Serial.sent.size(), 2);
+    Serial.sent.clear();
+}
+
 static void a_request_is_repeated_as_often_as_set(void **)
 {
     ModbusSerialClient client;
@@ -384,6 +421,7 @@ int main()
         TEST(requests_are_sent_in_their_order),
         TEST(a_pending_request_is_refused_and_unchanged),
         TEST(a_request_that_needs_more_words_than_it_has_is_refused),
+        TEST(a_request_has_its_own_timeout_and_retries),
         TEST(a_request_is_repeated_as_often_as_set),
         TEST(poll_returns_before_the_reply_comes),
         TEST(wait_returns_how_a_request_ended),

@@ -74,7 +74,7 @@ static const int framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_T
 static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **state)
 {
     static const uint8_t statuses[] = {MBM_OK, MBM_PENDING, MBM_LINK_LOST, MBM_INVALID_ARGUMENT};
-    const mbm_linkHooks link = {NULL, NULL, reconnected};
+    const mbm_linkHooks link = {.connect = reconnected};
     unsigned i, k;
 
     (void)state;
@@ -105,7 +105,7 @@ static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **
 
 static void a_link_that_the_program_connected_is_connected(void **state)
 {
-    const mbm_linkHooks none = {NULL, NULL, NULL};
+    const mbm_linkHooks none = {.connect = NULL};
     unsigned i;
 
     (void)state;

@@ -49,6 +49,7 @@ static void every_setting_of_the_client_answers(uint8_t status)
     IS(status, mbm_client_setEchoDiscard(&client, 0));
     IS(status, mbm_client_setPostFlushHold(&client, 0));
     IS(status, mbm_client_setRetries(&client, 0));
+    IS(status, mbm_client_setBusyRetries(&client, 0, 1));
     IS(status, mbm_client_setBackoff(&client, 0, 1, 1));
     IS(status, mbm_client_setJitter(&client, 1, random_number, NULL));
     IS(status, mbm_client_setCounters(&client, NULL));
@@ -297,6 +298,23 @@ static void a_done_function_may_call_its_client(void **state)
     }
 }
 
+static void the_clock_may_not_call_the_client_that_gives_its_line_to_a_master(void **state)
+{
+    static mbm_master facade;
+
+    (void)state;
+    memset(&facade, 0, sizeof facade);
+    begin_client(0);
+    OK(mbm_master_setBuffers(&facade, words, 1, words, 1, other_frame, 8));
+    request.unit = 17;
+    IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 1));
+    wire.within = within_client;
+    OK(mbm_client_suspend(&client, &facade));
+    wire.within = NULL;
+    assert_int_equal(entered, 1);
+    OK(mbm_client_resume(&client, &facade));
+}
+
 #define TEST(test) cmocka_unit_test_setup(test, reset)
 
 int main(void)
@@ -304,6 +322,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client),
         TEST(a_done_function_may_call_its_client),
+        TEST(the_clock_may_not_call_the_client_that_gives_its_line_to_a_master),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -245,6 +245,15 @@ public:
     /** What setRetries has set. */
     uint8_t getRetries() const { return mbm_client_getRetries(&client); }
     /**
+     * How often a request is repeated, after `waitMs` milliseconds each time, that the device
+     * refuses because it is busy (exception 06), or that only reads and that the device
+     * answers with exception 05; 0 to 255. See mbm_client_setBusyRetries.
+     */
+    uint8_t setBusyRetries(uint8_t retries, uint16_t waitMs)
+    {
+        return mbm_client_setBusyRetries(&client, retries, waitMs);
+    }
+    /**
      * Milliseconds before a repetition: MBM_BACKOFF_NONE (at first), _FIXED, _LINEAR or
      * _EXPONENTIAL, the first wait and the longest. Other requests are sent meanwhile.
      */

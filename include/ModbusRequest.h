@@ -57,6 +57,32 @@ public:
     uint8_t getUnitID() const { return request.unit; }
 
     /**
+     * Sets the response timeout of later calls in milliseconds, instead of the client's; 0
+     * (at first): the client's. Returns MBM_OK; MBM_BUSY, with nothing changed, while the
+     * request is pending.
+     */
+    uint8_t setResponseTimeout(uint16_t ms)
+    {
+        if (pending())
+            return MBM_BUSY;
+        request.timeoutMs = ms;
+        return MBM_OK;
+    }
+    /**
+     * Sets how often the client repeats later calls at most, 1 to 254, instead of its own
+     * number; MBM_NO_RETRIES: never; 0 (at first): the client's. Call setRetries of the client
+     * once before, also with 0: without it a call with a number returns MBM_INVALID_ARGUMENT.
+     * Returns MBM_OK; MBM_BUSY, with nothing changed, while the request is pending.
+     */
+    uint8_t setRetryLimit(uint8_t limit)
+    {
+        if (pending())
+            return MBM_BUSY;
+        request.retryLimit = limit;
+        return MBM_OK;
+    }
+
+    /**
      * MBM_OK, the device's exception code (0x01 to 0x7F), or the reason why there is
      * no reply (0xE0 and up). MBM_PENDING until it has ended, MBM_OK before the first call.
      */

@@ -25,14 +25,15 @@
  *    5 Master                  RTU, one request at a time, blocking or not
  *    6 Client                  many requests, every framing, never waits
  *    7 Plan                    a table of values that a client reads again and again
- *    8 Server                  answers requests on a line or connection
- *    9 Units                   the data that servers serve: tables, callbacks, files
- *   10 Gateway                 from Modbus TCP to the lines of clients
- *   11 Values                  registers and bits as numbers, in words or bytes
- *   12 Packets                 requests and responses, built and parsed by hand
- *   13 Sniffer                 decodes the traffic between other devices
- *   14 Trace                   calls your hook for each frame sent and received
- *   15 Ring                    bytes from an interrupt to the main loop
+ *    8 Link                    keeps a client's link open
+ *    9 Server                  answers requests on a line or connection
+ *   10 Units                   the data that servers serve: tables, callbacks, files
+ *   11 Gateway                 from Modbus TCP to the lines of clients
+ *   12 Values                  registers and bits as numbers, in words or bytes
+ *   13 Packets                 requests and responses, built and parsed by hand
+ *   14 Sniffer                 decodes the traffic between other devices
+ *   15 Trace                   calls your hook for each frame sent and received
+ *   16 Ring                    bytes from an interrupt to the main loop
  */
 
 #ifndef MBM_H
@@ -1483,6 +1484,11 @@ uint16_t mbm_master_receive(struct mbm_master *master);
 #define MBM_CLIENT_DEPTH 16
 
 /**
+ * `retryLimit` of mbm_clientRequest and mbm_clientUnit: no repetitions.
+ */
+#define MBM_NO_RETRIES 255
+
+/**
  * mbm_client_setBackoff: the client repeats a request at once.
  */
 #define MBM_BACKOFF_NONE 0
@@ -1526,7 +1532,7 @@ typedef struct mbm_client {
     /**
      * Private.
      */
-    uint32_t words[24];
+    uint32_t words[25];
 } mbm_client;
 
 /**
@@ -1586,6 +1592,24 @@ typedef struct mbm_clientRequest {
      * The number of bytes received into `reply`.
      */
     uint8_t length;
+    /**
+     * The response timeout of this request in milliseconds, 1 to 65535; 0: that of the unit
+     * (mbm_clientUnit) or of the client (mbm_client_setResponseTimeout). The client reads it
+     * each time it sends the request.
+     */
+    uint16_t timeoutMs;
+    /**
+     * How often the client repeats this request at most, 1 to 254; MBM_NO_RETRIES: never; 0:
+     * as often as the unit or mbm_client_setRetries says. With 1 to 254, a client refuses the
+     * request (MBM_INVALID_ARGUMENT) if none of mbm_client_setRetries,
+     * mbm_client_setBusyRetries and mbm_client_setUnits was called on it: only they link the
+     * code for repetitions.
+     */
+    uint8_t retryLimit;
+    /**
+     * Private.
+     */
+    uint8_t bytes[5];
     /**
      * Private.
      */
@@ -1654,11 +1678,12 @@ typedef struct mbm_identification {
 } mbm_identification;
 
 /**
- * Your hooks that close a link and open it again, for mbm_client_reconnect.
+ * Your hooks that close a link and open it again, for mbm_link_begin and
+ * mbm_client_reconnect.
  */
 typedef struct mbm_linkHooks {
     /**
-     * Your pointer, passed to both hooks; may be NULL.
+     * Your pointer, passed to all hooks; may be NULL.
      */
     void *context;
     /**
@@ -1666,11 +1691,17 @@ typedef struct mbm_linkHooks {
      */
     void (*disconnect)(void *context);
     /**
-     * Optional: opens the link without waiting. Returns MBM_OK if the link is open,
+     * Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the link is open,
      * MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
      * or another status.
      */
     uint8_t (*connect)(void *context);
+    /**
+     * For mbm_link_begin only; optional if `connect` never returns MBM_PENDING. Returns MBM_OK
+     * if the link is open, MBM_PENDING while the connection is still being made, or another
+     * status.
+     */
+    uint8_t (*status)(void *context);
 } mbm_linkHooks;
 
 /**
@@ -1715,6 +1746,16 @@ typedef struct mbm_clientUnit {
      * Private.
      */
     uint8_t cooling_down;
+    /**
+     * Set by you: how often the client repeats a request to this unit at most, 1 to 254;
+     * MBM_NO_RETRIES: never; 0: as often as mbm_client_setRetries says.
+     */
+    uint8_t retryLimit;
+    /**
+     * Set by you: the response timeout of this unit in milliseconds, 1 to 65535; 0: that of
+     * mbm_client_setResponseTimeout.
+     */
+    uint16_t timeoutMs;
 } mbm_clientUnit;
 
 /**
@@ -1935,7 +1976,7 @@ uint8_t mbm_client_reconnect(struct mbm_client *client,
  * @param client  the object
  * @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives
  *         or mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first
- *         request
+ *         request. With a link: 0 from each loss of it until it is open again
  */
 uint8_t mbm_client_isConnected(const struct mbm_client *client);
 
@@ -1966,7 +2007,8 @@ uint8_t mbm_client_resume(struct mbm_client *client,
 
 /**
  * Sends and receives for all requests, without waiting, and calls `done` of those that have
- * ended, of at most 17 in one call.
+ * ended, of at most 17 in one call. It also takes care of the client's link, if
+ * mbm_link_begin gave it one.
  *
  * Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
  *
@@ -1980,7 +2022,8 @@ uint8_t mbm_client_poll(struct mbm_client *client);
 /**
  * Returns how long mbm_client_poll will have nothing to do unless a byte arrives. A program
  * may sleep, or wait for a byte in select, for that time. The client reads bytes only while
- * a request is pending.
+ * a request is pending, or if it has a link (mbm_link_begin). With a link the delay also ends
+ * when the link is to be opened again, and is at most one second while the client is idle.
  *
  * @param client  the object
  * @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF
@@ -2020,6 +2063,79 @@ uint8_t mbm_client_cancel(struct mbm_client *client,
  *         for NULL. 0 may also be the identifier of a frame
  */
 uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
+
+/**
+ * Sets how often the client repeats a request whose response is missing, damaged or
+ * malformed, or that the port did not accept. It does not repeat a request that was
+ * answered with an exception (but see mbm_client_setBusyRetries), one that a lost link
+ * interrupted, or one whose response is too long for a buffer. `retryLimit` of a request or
+ * of a unit replaces this number.
+ *
+ * @param client   the object
+ * @param retries  0 to 255; the default is 0
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setRetries(struct mbm_client *client,
+                              uint8_t retries);
+
+/**
+ * Sets that the client repeats a request that a busy device refuses: one that the device
+ * answers with exception 06 (SERVER DEVICE BUSY), and one that only reads and that the device
+ * answers with exception 05 (ACKNOWLEDGE) (V1.1b3, 7). Without this setting both are the
+ * result of the request, as every exception is.
+ *
+ * After exception 06 the device has not carried out the request, so the client repeats any
+ * request. After exception 05 the device is carrying out the request, so a repetition would
+ * let it do the work again: the client repeats only functions 01 to 04, 07, 0B, 0C, 11, 14
+ * and 18, and 2B with MEI type 0E. A request that writes ends with the status 5; ask the
+ * device in your own way when the work is done.
+ *
+ * These repetitions are counted apart from those of mbm_client_setRetries. Meanwhile the
+ * client sends other requests, also to this unit.
+ *
+ * @param client   the object
+ * @param retries  the most repetitions of one request for this reason, 0 (the default) to
+ *                 255; the request then ends with the status 5 or 6
+ * @param waitMs   the wait before each repetition in milliseconds, 0 to 65535
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setBusyRetries(struct mbm_client *client,
+                                  uint8_t retries,
+                                  uint16_t waitMs);
+
+/**
+ * Sets how long a request waits before the client repeats it. Meanwhile the client sends
+ * other requests.
+ *
+ * @param client            the object
+ * @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
+ * @param delayMs           the wait before the first repetition, in milliseconds
+ * @param maxDelayMs        the longest wait, in milliseconds
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setBackoff(struct mbm_client *client,
+                              uint8_t backoff,
+                              uint16_t delayMs,
+                              uint16_t maxDelayMs);
+
+/**
+ * Shortens each wait before a repetition by a random part, so that several clients do not
+ * repeat their requests at the same time.
+ *
+ * @param client   the object
+ * @param percent  0 (the default) to 100: the largest part of the wait by which the client
+ *                 shortens it
+ * @param random   returns a new random number at each call, for example that of rand(). It
+ *                 may have 32 bits, 15 bits, or random bits in its upper half only. A
+ *                 function that it calls on the client returns MBM_BUSY. NULL only if
+ *                 `percent` is 0
+ * @param context  your pointer, passed to `random`; may be NULL
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setJitter(struct mbm_client *client,
+                             uint8_t percent,
+                             uint32_t (*random)(void *context),
+                             void *context);
 
 /**
  * Returns the reply of a request that has ended as a packet, whose fields have names:
@@ -2444,7 +2560,8 @@ uint8_t mbm_client_forward(struct mbm_client *client,
 /**
  * Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the
  * request has been sent. In TCP frames it starts when mbm_client_poll puts the request into
- * the outgoing buffer, also if the port accepts it later.
+ * the outgoing buffer, also if the port accepts it later. `timeoutMs` of a request or of a unit
+ * replaces this time.
  *
  * @param client        the object
  * @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
@@ -2523,52 +2640,6 @@ uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
 uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t characters);
 
 /**
- * Sets how often the client repeats a request whose response is missing, damaged or
- * malformed, or that the port did not accept. It does not repeat a request that was
- * answered with an exception, one that a lost link interrupted, or one whose response is
- * too long for a buffer.
- *
- * @param client   the object
- * @param retries  0 to 255; the default is 0
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
-
-/**
- * Sets how long a request waits before the client repeats it. Meanwhile the client sends
- * other requests.
- *
- * @param client            the object
- * @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
- * @param delayMs           the wait before the first repetition, in milliseconds
- * @param maxDelayMs        the longest wait, in milliseconds
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setBackoff(struct mbm_client *client,
-                              uint8_t backoff,
-                              uint16_t delayMs,
-                              uint16_t maxDelayMs);
-
-/**
- * Shortens each wait before a repetition by a random part, so that several clients do not
- * repeat their requests at the same time.
- *
- * @param client   the object
- * @param percent  0 (the default) to 100: the largest part of the wait by which the client
- *                 shortens it
- * @param random   returns a new random number at each call, for example that of rand(). It
- *                 may have 32 bits, 15 bits, or random bits in its upper half only. A
- *                 function that it calls on the client returns MBM_BUSY. NULL only if
- *                 `percent` is 0
- * @param context  your pointer, passed to `random`; may be NULL
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setJitter(struct mbm_client *client,
-                             uint8_t percent,
-                             uint32_t (*random)(void *context),
-                             void *context);
-
-/**
  * Sets your storage for counters, in which the client counts from now on. You may read and
  * zero the counters at any time, but not from an interrupt. In TCP frames, foreignFrames
  * counts frames whose transaction identifier and unit match no pending request, and
@@ -2583,10 +2654,12 @@ uint8_t mbm_client_setCounters(struct mbm_client *client,
 
 /**
  * Sets the records of units. In a record the client counts the requests to its unit. The
- * record's `delayUs` sets the minimum time between two requests to the unit.
+ * record's `delayUs` sets the minimum time between two requests to the unit; its `timeoutMs`
+ * and `retryLimit` replace those of the client. You may change these three at any time.
  *
  * @param client  the object
- * @param units   your array of records, zeroed except `unit` and `delayUs`; NULL for none
+ * @param units   your array of records, zeroed except for the fields that you set; NULL for
+ *                none
  * @param count   the number of records, 0 to 255
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
@@ -3103,7 +3176,224 @@ uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
                          uint16_t index,
                          struct mbm_planReadInfo *read);
 
-/* ==== 8. Server ===================================================================== */
+/* ==== 8. Link ======================================================================= */
+
+/**
+ * mbm_link_state: there is no link. The client opens it when the wait is over.
+ */
+#define MBM_LINK_IS_DOWN 1
+
+/**
+ * mbm_link_state: the connection is being made.
+ */
+#define MBM_LINK_IS_CONNECTING 2
+
+/**
+ * mbm_link_state: the link is open.
+ */
+#define MBM_LINK_IS_UP 3
+
+/**
+ * An event of a link: it is open now. The status is MBM_OK.
+ */
+#define MBM_LINK_EVENT_CONNECTED 0
+
+/**
+ * An event of a link: it was open and is lost. The status is MBM_LINK_LOST.
+ */
+#define MBM_LINK_EVENT_LOST 1
+
+/**
+ * An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
+ * mbm_linkHooks returned; MBM_RESPONSE_TIMED_OUT if the connection took too long.
+ */
+#define MBM_LINK_EVENT_FAILED 2
+
+/**
+ * A link that opens itself again when it was lost. It belongs to one client:
+ * mbm_client_poll polls both.
+ *
+ * You own the storage. It must be zero before first use, as a static object is, and must stay
+ * where it is until mbm_link_end or until the client was begun again.
+ */
+typedef struct mbm_link {
+    /**
+     * Private.
+     */
+    void *pointers[31];
+    /**
+     * Private.
+     */
+    uint32_t words[22];
+} mbm_link;
+
+/**
+ * What has happened to a link. You may read and zero the counters at any time, but not from
+ * an interrupt; each wraps at 2^32.
+ */
+typedef struct mbm_linkCounters {
+    /**
+     * Calls of `connect` of mbm_linkHooks.
+     */
+    uint32_t attempts;
+    /**
+     * Attempts that failed.
+     */
+    uint32_t failed;
+    /**
+     * How often the link was opened, or found open by mbm_link_begin.
+     */
+    uint32_t connected;
+    /**
+     * How often an open link was lost.
+     */
+    uint32_t lost;
+} mbm_linkCounters;
+
+/**
+ * Gives a client a link, which mbm_client_poll keeps open from then on:
+ * - It notices the loss of the link also while the client has no request. For that, an idle
+ *   client reads the port in each poll and drops what it reads: late replies, noise, frames
+ *   of others. If something else reads the line, call mbm_client_suspend first.
+ * - It opens the link again, after a wait that grows with each attempt that fails.
+ * - When the link is lost, requests under way end with MBM_LINK_LOST, because the device may
+ *   have carried them out. The others end too, or wait: see mbm_link_setRequestsWait.
+ *
+ * mbm_client_pollDelay returns when the next poll is due, for an idle client at most one
+ * second. A wait for bytes that also ends when the link is lost, as mbm_tcp_wait and
+ * mbm_tty_wait, finds the loss at once.
+ *
+ * In the first poll the link calls `status` to find out whether the link is open already, and
+ * `connect` if not. After a loss or a failed attempt it calls `disconnect`, once.
+ *
+ * Client and link must stay where they are, and must not be copied. A program does not also
+ * call mbm_client_reconnect.
+ *
+ * All settings of the link return to their defaults. The call may be repeated at any time,
+ * also with another client. A begin function of the client ends the link.
+ *
+ * @param link    the object; zeroed before the first call
+ * @param client  the client, begun; it must not have another link
+ * @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
+ *                hooks must not use the client or the link: each function returns MBM_BUSY
+ * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_NOT_INITIALISED if the client was not begun;
+ *         MBM_BUSY from within a hook, while the client is suspended, or if it has another
+ *         link
+ */
+uint8_t mbm_link_begin(struct mbm_link *link,
+                       struct mbm_client *client,
+                       const struct mbm_linkHooks *hooks);
+
+/**
+ * Ends a link. The client and its requests stay; the link itself stays open or closed as it
+ * is. The storage is free, and begins anew with mbm_link_begin.
+ *
+ * @param link  the object; the client's storage must still be valid
+ * @return MBM_OK; MBM_BUSY from within a hook and while the client is suspended;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_end(struct mbm_link *link);
+
+/**
+ * Closes the link and opens it again, at the next poll of the client and without a wait. Call
+ * it when you know better than the link: the network is back, the address has changed.
+ *
+ * @param link  the object
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_reconnect(struct mbm_link *link);
+
+/**
+ * Sets the wait before an attempt to open the link. The first attempt after a loss waits for
+ * `delayMs`; each attempt that fails lets the wait grow. It starts anew when the link was open
+ * for as long as the last wait.
+ *
+ * @param link        the object
+ * @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
+ *                    mbm_client_setBackoff
+ * @param delayMs     the first wait in milliseconds, 0 to 65535; the default is 500
+ * @param maxDelayMs  the longest wait in milliseconds, 0 to 65535; the default is 30000
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setBackoff(struct mbm_link *link,
+                            uint8_t backoff,
+                            uint16_t delayMs,
+                            uint16_t maxDelayMs);
+
+/**
+ * Shortens each wait before an attempt by a random part, so that many clients that lost their
+ * server together do not connect at the same time.
+ *
+ * @param link     the object
+ * @param percent  0 (the default) to 100: the largest part of the wait that is taken off
+ * @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only
+ *                 if `percent` is 0
+ * @param context  your pointer, passed to `random`; may be NULL
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setJitter(struct mbm_link *link,
+                           uint8_t percent,
+                           uint32_t (*random)(void *context),
+                           void *context);
+
+/**
+ * Sets how long a connection may take to be made. Then the attempt has failed.
+ *
+ * @param link       the object
+ * @param timeoutMs  milliseconds, 1 to 65535; 0: as long as `status` returns MBM_PENDING. The
+ *                   default is 10000
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setConnectTimeout(struct mbm_link *link,
+                                   uint16_t timeoutMs);
+
+/**
+ * Sets whether requests wait for the link. By default they do not: while the link is down,
+ * every request ends with MBM_LINK_LOST at the next poll. (A program whose `done` queues the
+ * request again at once then polls without a pause: let it wait.) If requests wait, they stay
+ * in the queue until the link is open again or until you cancel them; their response timeout
+ * begins when they are sent. While a connection is being made, requests always wait.
+ *
+ * @param link  the object
+ * @param on    0 (the default) or 1
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setRequestsWait(struct mbm_link *link,
+                                 uint8_t on);
+
+/**
+ * Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
+ * attempt has failed.
+ *
+ * @param link      the object
+ * @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
+ *                  request may, and call every function on the link; NULL for none
+ * @param context   your pointer, passed to `callback`; may be NULL
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setCallback(struct mbm_link *link,
+                             void (*callback)(void *context, uint8_t event, uint8_t status),
+                             void *context);
+
+/**
+ * Sets your storage for counters, in which the link counts from now on.
+ *
+ * @param link      the object
+ * @param counters  your counters, zeroed; NULL stops counting
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_link_setCounters(struct mbm_link *link, struct mbm_linkCounters *counters);
+
+/**
+ * Returns what a link is doing.
+ *
+ * @param link  the object
+ * @return MBM_LINK_IS_DOWN, MBM_LINK_IS_CONNECTING or MBM_LINK_IS_UP; 0 before the first poll,
+ *         and for an object that was never begun
+ */
+uint8_t mbm_link_state(const struct mbm_link *link);
+
+/* ==== 9. Server ===================================================================== */
 
 /**
  * A Modbus server on one serial line or one connection.
@@ -3303,7 +3593,7 @@ uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
  */
 uint8_t mbm_server_getEchoDiscard(const struct mbm_server *server);
 
-/* ==== 9. Units ====================================================================== */
+/* ==== 10. Units ===================================================================== */
 
 /**
  * A function of yours returns this, or-ed with the exception code (1 to 127), to answer
@@ -4121,7 +4411,7 @@ uint8_t mbm_unit_serveInputRegisters(struct mbm_unit *unit,
  */
 uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table);
 
-/* ==== 10. Gateway =================================================================== */
+/* ==== 11. Gateway =================================================================== */
 
 /**
  * The `line` of a route for broadcasts: to all lines, one after the other.
@@ -4480,7 +4770,7 @@ uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
                                  const struct mbm_function *functions,
                                  uint8_t count);
 
-/* ==== 11. Values ==================================================================== */
+/* ==== 12. Values ==================================================================== */
 
 /**
  * Passed to a function: use the order of the mbm_registers. As that order itself:
@@ -5127,7 +5417,7 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
                                const uint8_t *bytes,
                                uint16_t length);
 
-/* ==== 12. Packets =================================================================== */
+/* ==== 13. Packets =================================================================== */
 
 /**
  * A request: a client sends it.
@@ -5644,7 +5934,7 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
                        char *text,
                        uint16_t size);
 
-/* ==== 13. Sniffer =================================================================== */
+/* ==== 14. Sniffer =================================================================== */
 
 /**
  * The bytes come from a line that carries both directions.
@@ -5989,7 +6279,7 @@ uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
  */
 uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
 
-/* ==== 14. Trace ===================================================================== */
+/* ==== 15. Trace ===================================================================== */
 
 /**
  * The smallest buffer of a trace, in bytes.
@@ -6172,7 +6462,7 @@ uint8_t mbm_trace_flush(struct mbm_trace *trace);
 uint8_t mbm_trace_ofEvent(const struct mbm_event *event,
                           struct mbm_traceRecord *record);
 
-/* ==== 15. Ring ====================================================================== */
+/* ==== 16. Ring ====================================================================== */
 
 /**
  * A receive ring between an interrupt handler and the main loop.

@@ -19,6 +19,10 @@ impl Status {
     pub const ILLEGAL_DATA_VALUE: Status = Status(0x03);
     /// Exception 04 of the remote device.
     pub const SLAVE_DEVICE_FAILURE: Status = Status(0x04);
+    /// Exception 05 of the remote device: it carries the request out, which takes long.
+    pub const ACKNOWLEDGE: Status = Status(0x05);
+    /// Exception 06 of the remote device: it is busy and refused the request.
+    pub const SERVER_DEVICE_BUSY: Status = Status(0x06);
 
     /// No reply: only frames of other units arrived.
     pub const INVALID_SLAVE_ID: Status = Status(0xE0);

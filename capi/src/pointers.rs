@@ -182,6 +182,28 @@ pub(crate) unsafe fn with_hooks<O: CObject, T>(object: *const O, action: impl Fn
     }
 }
 
+/// Zeroes the storage of an object. (A loop instead of memset: libc's memset is larger, and
+/// most images do not need it otherwise.)
+///
+/// # Safety
+/// `object` points to storage of an object, which nothing else uses.
+#[inline(always)]
+pub(crate) unsafe fn zero<O: CObject>(object: *mut O) {
+    const { assert!(size_of::<O>().is_multiple_of(size_of::<usize>())) }
+    // SAFETY: as the caller promises; the storage is a number of words.
+    unsafe {
+        let mut word = object.cast::<usize>();
+        let end = object.add(1).cast::<usize>();
+        loop {
+            word.write_volatile(0);
+            word = word.add(1);
+            if word == end {
+                return;
+            }
+        }
+    }
+}
+
 /// Checks the object and runs `action` on it. Returns the code of the status of the check,
 /// or of `action`. `action` calls hooks only inside [`with_hooks`].
 ///

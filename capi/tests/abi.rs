@@ -30,16 +30,18 @@ fn probes() -> Vec<(String, u64)> {
             mbm_turn mbm_plan mbm_planPosition mbm_planRead mbm_planSetup mbm_planUnitLimits
             mbm_planExcludedRange mbm_planReadInfo mbm_planField mbm_trace mbm_traceRecord
             mbm_gateway mbm_gatewayRoute mbm_gatewayLine mbm_gatewayConnection mbm_gatewayRequest
-            mbm_gatewayConfig mbm_identification;
+            mbm_gatewayConfig mbm_identification mbm_link mbm_linkCounters;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
                 resynchronisations bytesSent bytesReceived }
             mbm_clientRequest { done context data reply replyBytes transaction unit status exception
-                length }
+                length timeoutMs retryLimit }
             mbm_identification { request object done context count conformity }
-            mbm_clientUnit { requests replies exceptions retries delayUs unit status }
-            mbm_linkHooks { context disconnect connect }
+            mbm_clientUnit { requests replies exceptions retries delayUs unit status retryLimit
+                timeoutMs }
+            mbm_linkHooks { context disconnect connect status }
+            mbm_linkCounters { attempts failed connected lost }
             mbm_turn { master lastUse }
             mbm_planUnitLimits { bitsPerRead registersPerRead unit }
             mbm_planExcludedRange { first last unit table }
@@ -97,6 +99,8 @@ fn probes() -> Vec<(String, u64)> {
             MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME MBM_QUEUE_FULL
             MBM_DUPLICATE_TRANSACTION MBM_NOT_PENDING MBM_NO_PROGRESS MBM_CLIENT_DEPTH
             MBM_BACKOFF_NONE MBM_BACKOFF_FIXED MBM_BACKOFF_LINEAR MBM_BACKOFF_EXPONENTIAL
+            MBM_NO_RETRIES MBM_LINK_IS_DOWN MBM_LINK_IS_CONNECTING MBM_LINK_IS_UP
+            MBM_LINK_EVENT_CONNECTED MBM_LINK_EVENT_LOST MBM_LINK_EVENT_FAILED
             MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
             MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
             MBM_FC_READ_COILS MBM_FC_READ_DISCRETE_INPUTS MBM_FC_READ_HOLDING_REGISTERS

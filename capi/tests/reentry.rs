@@ -13,6 +13,7 @@ const BUSY: u8 = MBM_BUSY;
 /// The state that all hooks share, reached through raw pointers as in C.
 struct HookState {
     client: *mut mbm_client,
+    link: *mut mbm_link,
     master: *mut mbm_master,
     server: *mut mbm_server,
     trace: *mut mbm_trace,
@@ -33,11 +34,22 @@ unsafe fn state<'a>(context: *mut c_void) -> &'a mut HookState {
 /// Calls functions on each object, which the library must refuse.
 unsafe fn use_objects(context: *mut c_void) {
     unsafe {
-        let (client, master, server, trace) = {
+        let (client, link, master, server, trace) = {
             let state = state(context);
             state.calls += 1;
-            (state.client, state.master, state.server, state.trace)
+            (
+                state.client,
+                state.link,
+                state.master,
+                state.server,
+                state.trace,
+            )
         };
+        if !link.is_null() {
+            assert_eq!(mbm_link_reconnect(link), BUSY);
+            assert_eq!(mbm_link_end(link), BUSY);
+            assert_eq!(mbm_link_state(link), 0);
+        }
         if !client.is_null() {
             assert_eq!(mbm_client_poll(client), BUSY);
             assert_eq!(mbm_client_setRetries(client, 9), BUSY);
@@ -85,7 +97,10 @@ unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) 
 
 unsafe extern "C" fn micros(context: *mut c_void) -> u32 {
     unsafe {
+        // The clock is read on behalf of the client, not of its link.
+        let link = std::mem::replace(&mut state(context).link, null_mut());
         use_objects(context);
+        state(context).link = link;
         let state = state(context);
         state.now += 2500;
         state.now
@@ -162,6 +177,7 @@ fn port(context: *mut c_void) -> mbm_port {
 fn new_state() -> *mut HookState {
     Box::into_raw(Box::new(HookState {
         client: null_mut(),
+        link: null_mut(),
         master: null_mut(),
         server: null_mut(),
         trace: null_mut(),
@@ -242,6 +258,41 @@ unsafe extern "C" fn traced(context: *mut c_void, record: *const mbm_traceRecord
     }
 }
 
+unsafe extern "C" fn connect(context: *mut c_void) -> u8 {
+    unsafe { use_objects(context) };
+    MBM_OK
+}
+
+unsafe extern "C" fn link_status(context: *mut c_void) -> u8 {
+    unsafe { use_objects(context) };
+    MBM_LINK_LOST
+}
+
+unsafe extern "C" fn changed(context: *mut c_void, event: u8, _: u8) {
+    unsafe {
+        let (client, link, request) = {
+            let state = state(context);
+            state.done += 1;
+            (state.client, state.link, state.again)
+        };
+        assert_eq!(mbm_client_poll(client), BUSY);
+        assert_eq!(mbm_link_setRequestsWait(link, 1), MBM_OK);
+        match event {
+            MBM_LINK_EVENT_CONNECTED if state(context).done < 4 => {
+                assert_eq!(mbm_link_reconnect(link), MBM_OK);
+            }
+            MBM_LINK_EVENT_CONNECTED => {
+                assert_eq!(mbm_link_end(link), MBM_OK);
+                state(context).link = null_mut();
+            }
+            _ => assert_eq!(mbm_client_readCoils(client, request, 1, 2), MBM_PENDING),
+        }
+        if event == MBM_LINK_EVENT_CONNECTED && (*request).status == MBM_PENDING {
+            assert_eq!(mbm_client_cancel(client, request), MBM_OK);
+        }
+    }
+}
+
 #[test]
 fn hooks_use_the_trace_that_called_them() {
     unsafe {
@@ -272,6 +323,56 @@ fn hooks_use_the_trace_that_called_them() {
         drop((Box::from_raw(buffer), Box::from_raw(framing)));
         drop(Box::from_raw(trace));
     }
+}
+
+#[test]
+fn hooks_and_callback_use_the_link_that_called_them() {
+    unsafe {
+        let state = new_state();
+        let (client, link) = (boxed::<mbm_client>(), boxed::<mbm_link>());
+        let frame = boxed::<[u8; 300]>();
+        (*state).again = boxed();
+        (*(*state).again).unit = 17;
+        let port = port(state.cast());
+        assert_eq!(
+            mbm_client_beginRtu(client, &port, frame.cast(), 300),
+            MBM_OK
+        );
+        let hooks = mbm_linkHooks {
+            context: state.cast(),
+            disconnect: Some(driver),
+            connect: Some(connect),
+            status: Some(link_status),
+        };
+        assert_eq!(mbm_link_begin(link, client, &hooks), MBM_OK);
+        assert_eq!(
+            mbm_link_setCallback(link, Some(changed), state.cast()),
+            MBM_OK
+        );
+        assert_eq!(
+            mbm_link_setJitter(link, 50, Some(link_random), state.cast()),
+            MBM_OK
+        );
+        (*state).client = client;
+        (*state).link = link;
+        for _ in 0..20 {
+            mbm_client_poll(client);
+            mbm_client_pollDelay(client);
+        }
+        // Connected, lost, connected, lost, connected: then the callback ended the link.
+        assert_eq!((*state).done, 5);
+        assert!((*state).calls > 10);
+        assert_eq!(mbm_link_end(link), MBM_NOT_INITIALISED);
+        assert_eq!(mbm_client_poll(client), MBM_OK);
+        drop((Box::from_raw((*state).again), Box::from_raw(state)));
+        drop((Box::from_raw(client), Box::from_raw(link)));
+        drop(Box::from_raw(frame));
+    }
+}
+
+unsafe extern "C" fn link_random(context: *mut c_void) -> u32 {
+    unsafe { use_objects(context) };
+    7
 }
 
 #[test]

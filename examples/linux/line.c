@@ -5,11 +5,11 @@
 
 #include <errno.h>
 #include <netdb.h>
-#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 volatile sig_atomic_t line_ended;
 
@@ -67,13 +67,53 @@ static int open_tcp(line *l, char *host, int rtu)
     if (mbm_tcp_open(&l->tcp, &l->addresses, host, service ? service : MBM_TCP_SERVICE) != 0)
         return -1;
     l->is_tcp = 1;
-    l->connected = line_milliseconds();
     port =
         trace_client(mbm_tcp_port(&l->tcp), rtu ? MBM_FRAMING_RTU_OVER_TCP : MBM_FRAMING_TCP, host);
     if (rtu)
         return mbm_client_beginRtuOverTcp(&l->client, &port, l->incoming, sizeof l->incoming);
     return mbm_client_beginTcp(&l->client, &port, l->incoming, sizeof l->incoming, l->outgoing,
                                sizeof l->outgoing);
+}
+
+static void close_tty(void *context)
+{
+    mbm_tty_close(&((line *)context)->tty);
+}
+
+static uint8_t open_tty_again(void *context)
+{
+    line *l = (line *)context;
+
+    if (mbm_tty_openWith(&l->tty, l->path, &l->options) == 0)
+        return MBM_OK;
+    l->lost_by = errno;
+    return MBM_LINK_LOST;
+}
+
+static uint8_t tty_status(void *context)
+{
+    return ((line *)context)->tty.isOpen ? MBM_OK : MBM_LINK_LOST;
+}
+
+/* Keeps the reason why the link was lost or not opened, since the next attempt clears it. */
+static void keep_reason(void *context, uint8_t event, uint8_t status)
+{
+    line *l = (line *)context;
+    const int error = l->is_tcp ? l->tcp.error : l->tty.error;
+
+    (void)status;
+    if (event != MBM_LINK_EVENT_CONNECTED && error != 0)
+        l->lost_by = error;
+}
+
+static void keep_open(line *l)
+{
+    const mbm_linkHooks terminal = {l, close_tty, open_tty_again, tty_status};
+    const mbm_linkHooks socket = mbm_tcp_link(&l->tcp);
+
+    (void)mbm_link_begin(&l->kept, &l->client, l->is_tcp ? &socket : &terminal);
+    (void)mbm_link_setBackoff(&l->kept, MBM_BACKOFF_FIXED, 1000, 1000);
+    (void)mbm_link_setCallback(&l->kept, keep_reason, l);
 }
 
 int line_open(line *l, const char *place)
@@ -102,6 +142,7 @@ int line_open(line *l, const char *place)
         return -1;
     }
     mbm_client_setCounters(&l->client, &l->counters);
+    keep_open(l);
     action.sa_handler = end;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
@@ -116,54 +157,9 @@ void line_close(line *l)
         mbm_tty_close(&l->tty);
 }
 
-static void close_tty(void *context)
-{
-    mbm_tty_close(&((line *)context)->tty);
-}
-
-static uint8_t open_tty_again(void *context)
-{
-    line *l = (line *)context;
-
-    if (mbm_tty_openWith(&l->tty, l->path, &l->options) == 0)
-        return MBM_OK;
-    l->lost_by = errno;
-    return MBM_LINK_LOST;
-}
-
-/* An idle client reads no bytes, so it does not notice that the server hangs up. */
-static int is_lost(line *l)
-{
-    int is_connected = mbm_client_isConnected(&l->client);
-
-    if (is_connected && mbm_client_pending(&l->client) > 0)
-        return 0;
-    /* A connection that is being made is not lost. */
-    if (l->is_tcp)
-        return mbm_tcp_isConnected(&l->tcp) < 0;
-    return !is_connected || l->tty.fd < 0;
-}
-
-/* Keeps the reason of a lost link, since opening the link again clears it. */
-static void keep_reason(line *l)
-{
-    const int error = l->is_tcp ? l->tcp.error : l->tty.error;
-
-    if (error != 0)
-        l->lost_by = error;
-}
-
 void line_poll(line *l)
 {
-    const mbm_linkHooks socket = {&l->tcp, mbm_tcp_disconnect, mbm_tcp_connect};
-    const mbm_linkHooks terminal = {l, close_tty, open_tty_again};
-
     (void)mbm_client_poll(&l->client);
-    keep_reason(l);
-    if (line_milliseconds() - l->connected >= 1000 && is_lost(l)) {
-        l->connected = line_milliseconds();
-        (void)mbm_client_reconnect(&l->client, l->is_tcp ? &socket : &terminal);
-    }
 }
 
 int line_connect(line *l)
@@ -172,9 +168,8 @@ int line_connect(line *l)
 
     while (l->is_tcp && !line_ended && (there = mbm_tcp_isConnected(&l->tcp)) == 0)
         (void)mbm_tcp_wait(&l->tcp, 1, NULL, -1, 1000000);
-    keep_reason(l);
     if (there < 0)
-        fprintf(stderr, "%s\n", line_reason(l));
+        fprintf(stderr, "%s\n", strerror(l->tcp.error));
     return there < 0 ? -1 : 0;
 }
 
@@ -202,17 +197,12 @@ void line_rest(line *l, uint32_t milliseconds)
         milliseconds = 1000;
     if (micros / 1000 >= milliseconds)
         micros = milliseconds * 1000;
-    if (l->is_tcp) {
+    if (l->is_tcp)
         (void)mbm_tcp_wait(&l->tcp, 1, NULL, -1, micros);
-    } else if (mbm_client_pending(&l->client) > 0) {
+    else if (l->tty.isOpen)
         (void)mbm_tty_wait(&l->tty, micros);
-    } else {
-        /* Unread bytes or a lost line would end mbm_tty_wait at once. */
-        const struct timespec time = {0, (long)(micros % 1000000u) * 1000};
-        const struct timespec second = {1, 0};
-
-        (void)ppoll(NULL, 0, micros >= 1000000u ? &second : &time, NULL);
-    }
+    else
+        (void)usleep(micros < 999999 ? micros : 999999);
 }
 
 int line_usage(int wrong, const char *usage)

@@ -26,6 +26,7 @@
 
 typedef struct line {
     mbm_client client;
+    mbm_link kept; /* opens the terminal or connection again when it was lost */
     mbm_counters counters;
     mbm_tty tty;
     mbm_tcp tcp;
@@ -33,9 +34,8 @@ typedef struct line {
     mbm_tty_options options;
     char path[256];
     uint8_t is_tcp;
-    int lost_by;        /* errno of the last loss of the link */
-    char status[128];   /* text of line_status */
-    uint32_t connected; /* when it was last tried to connect, in milliseconds */
+    int lost_by;      /* errno of the last loss of the link */
+    char status[128]; /* text of line_status */
     uint8_t incoming[1024], outgoing[1024];
 } line;
 
@@ -43,7 +43,7 @@ typedef struct line {
 int line_open(line *l, const char *place);
 void line_close(line *l);
 
-/* Moves requests on, and opens a lost terminal or connection again, at most once a second. */
+/* Moves requests on. A terminal or connection that was lost is opened again a second later. */
 void line_poll(line *l);
 
 /* Waits until there is a connection. Returns 0, or -1 after printing the reason to stderr. */

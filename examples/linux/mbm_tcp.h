@@ -178,6 +178,37 @@ uint8_t mbm_tcp_connect(void *tcp);
 void mbm_tcp_disconnect(void *tcp);
 
 /**
+ * Returns whether there is a connection, as a hook of mbm_linkHooks.
+ *
+ * @param tcp  an mbm_tcp
+ * @return MBM_OK, MBM_PENDING while the connection is being made, or MBM_LINK_LOST
+ */
+static inline uint8_t mbm_tcp_status(void *tcp)
+{
+    const int there = mbm_tcp_isConnected((mbm_tcp *)tcp);
+
+    return there > 0 ? MBM_OK : there == 0 ? MBM_PENDING : MBM_LINK_LOST;
+}
+
+/**
+ * Returns the hooks for mbm_link_begin, for a client of the server of mbm_tcp_open. In the
+ * callback of the link, `error` of the mbm_tcp says why a connection was lost or not made.
+ *
+ * @param tcp  in use; must outlive the link
+ * @return the hooks
+ */
+static inline mbm_linkHooks mbm_tcp_link(mbm_tcp *tcp)
+{
+    mbm_linkHooks hooks;
+
+    hooks.context = tcp;
+    hooks.disconnect = mbm_tcp_disconnect;
+    hooks.connect = mbm_tcp_connect;
+    hooks.status = mbm_tcp_status;
+    return hooks;
+}
+
+/**
  * Returns the port for the begin functions. It may be made before the socket is open, stays
  * valid when the socket is closed and opened again, and may be given to several objects.
  * While a blocking call of a master waits, the port sleeps until bytes arrive, at most for

@@ -94,6 +94,15 @@ impl<P, S: ClientStorage, J: ClientRequest> RequestSpec<P, S> for ActiveRequest<
         self.header().is_answered()
     }
 
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn response_timeout(engine: &mut ClientEngine<P, S, J>) -> u32 {
+        let line = engine.settings.response_timeout;
+        match &engine.request.client_request {
+            Some(request) => request.state().response_timeout(&mut engine.storage, line),
+            None => line,
+        }
+    }
+
     fn fits(&self, space: u16) -> bool {
         let length = self.header().request_length();
         let frame = match self.ascii {

@@ -6,9 +6,12 @@
 //! The client copies data only between a request and a frame buffer.
 
 mod active;
+mod due;
+mod link;
 mod policy;
 mod queue;
 mod request;
+mod retry;
 mod serial;
 mod storage;
 mod tcp;
@@ -16,14 +19,16 @@ mod transport;
 mod units;
 
 pub use active::{ActiveRequest, ClientEngine};
-pub use policy::{again, Backoff, Policy};
+pub use link::{Link, LinkEvent, LinkHooks, LinkState};
+pub use policy::{Backoff, Policy};
 pub use queue::RequestQueue;
 pub use request::{ClientRequest, RequestState};
+pub use retry::{again, again_when_busy, NO_RETRIES};
 pub use serial::Serial;
 pub use storage::ClientStorage;
 pub use tcp::Tcp;
 pub use transport::Transport;
-pub use units::{note, rest, UnitRecord};
+pub use units::{find, note, rest, UnitRecord};
 
 #[cfg(doc)]
 use crate::error::Status;
@@ -85,7 +90,9 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     /// # Errors
     /// Returns the request, with one of these as its status: [`Status::QUEUE_FULL`];
     /// [`Status::BROADCAST_NOT_ALLOWED`]; on TCP [`Status::DUPLICATE_TRANSACTION`] if its
-    /// transaction number is not 0 and another pending request has the same number.
+    /// transaction number is not 0 and another pending request has the same number;
+    /// [`Status::INVALID_ARGUMENT`] if it has its own limit of retries, and the client retries
+    /// none ([`RequestQueue::may_retry`]).
     pub fn queue(&mut self, request: J) -> Result<(), J> {
         self.queue.enqueue(request)
     }

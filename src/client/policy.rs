@@ -1,6 +1,4 @@
-//! Which failed requests a client retries, and when.
-
-use crate::error::Status;
+//! How often a client retries a request, and how long it waits before each retry.
 
 /// How the wait before a retry grows from one retry to the next. `wait` and `most` are
 /// the arguments of [`Policy::set_backoff`].
@@ -52,6 +50,10 @@ pub struct Policy {
     pub jitter: u8,
     /// Greatest number of retries of one request, 0 to 255.
     pub retries: u8,
+    /// Greatest number of retries of one request that a busy device refuses, 0 to 255.
+    pub busy_retries: u8,
+    /// The wait before each of these retries, in milliseconds.
+    pub busy_wait_ms: u16,
 }
 
 impl Policy {
@@ -63,6 +65,8 @@ impl Policy {
         backoff: Backoff::None,
         jitter: 0,
         retries: 0,
+        busy_retries: 0,
+        busy_wait_ms: 0,
     };
 
     /// Sets the wait before the first retry, how it grows, and the longest wait `most`.
@@ -71,6 +75,18 @@ impl Policy {
         self.backoff = backoff;
         self.wait = wait;
         self.max_wait = most;
+    }
+
+    /// Sets the largest part of a wait that is subtracted at random, in percent. False, with
+    /// nothing changed, for more than 100, or if there is no random number and `percent` is not
+    /// 0.
+    #[inline(always)]
+    pub fn set_jitter(&mut self, percent: u8, has_random: bool) -> bool {
+        let allowed = percent <= 100 && (has_random || percent == 0);
+        if allowed {
+            self.jitter = ((u16::from(percent) * 163) >> 6).min(255) as u8;
+        }
+        allowed
     }
 
     /// The wait before retry number `retry`, counted from 1. `random` returns a random
@@ -100,21 +116,6 @@ impl Policy {
             mix_bits(random),
         )
     }
-}
-
-/// Microseconds to wait before the next retry of a request that ended with `status` and
-/// has had `retries` retries; `None` if the request is not retried. `random` returns a
-/// random number for the jitter.
-pub fn again(
-    policy: &Policy,
-    retries: u8,
-    status: Status,
-    random: impl FnOnce() -> u32,
-) -> Option<u32> {
-    if retries >= policy.retries || !status.may_be_repeated() {
-        return None;
-    }
-    Some(policy.wait(retries + 1, random))
 }
 
 /// Mixes `random` into 16 bits, each of which depends on all lower bits of `random`. So

@@ -3,10 +3,11 @@
 
 use super::policy::Policy;
 use super::request::{ClientRequest, Stage};
+use super::retry::NO_RETRIES;
 use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
 use crate::error::Status;
-use crate::time::elapsed;
+use crate::time::{elapsed, LONGEST};
 use crate::FIRMWARE;
 use heapless::Vec;
 
@@ -23,6 +24,8 @@ pub struct RequestQueue<J, const N: usize> {
     pub has_broadcast: bool,
     /// Transaction numbers of pending requests must differ, except 0.
     pub has_transaction_ids: bool,
+    /// Requests may have their own limit of retries.
+    pub may_retry: bool,
     /// No request is due until `wait` microseconds have passed since `since`.
     since: u32,
     wait: u32,
@@ -42,6 +45,7 @@ impl<J, const N: usize> RequestQueue<J, N> {
             suspended: false,
             has_broadcast: false,
             has_transaction_ids: false,
+            may_retry: true,
             since: 0,
             wait: u32::MAX,
             policy: Policy::DEFAULT,
@@ -78,6 +82,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         state.exception = 0;
         state.length = 0;
         state.retries = 0;
+        state.busy_retries = 0;
         state.enter(Stage::Queued, 0, 0);
         self.changed = true;
         // `readiness` has checked that the queue is not full.
@@ -99,6 +104,8 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
             && self.has_transaction(state.transaction)
         {
             Status::DUPLICATE_TRANSACTION
+        } else if !self.may_retry && !matches!(state.retry_limit, 0 | NO_RETRIES) {
+            Status::INVALID_ARGUMENT
         } else {
             Status::PENDING
         }
@@ -269,6 +276,37 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         self.mark_lost(|_| true);
     }
 
+    /// Ends a request that [`RequestQueue::fail_all`] or [`RequestQueue::interrupt`] marked as
+    /// lost; `None` if there is none.
+    pub fn end_lost(&mut self, now: u32, storage: &mut impl ClientStorage) -> Option<J> {
+        let at = self.queue.iter().position(is_lost)?;
+        self.end(at, Status::LINK_LOST, now, storage)
+    }
+
+    /// True if [`RequestQueue::end_lost`] will return a request.
+    pub fn has_lost(&self) -> bool {
+        self.queue.iter().any(is_lost)
+    }
+
+    /// Marks all requests, none of which is under way, as lost.
+    pub fn fail_all(&mut self) {
+        self.mark_lost(|_| true);
+    }
+
+    /// Puts a placeholder into the empty queue, which is never due. While it is there, the
+    /// client reads and drops what arrives.
+    pub fn begin_idle(&mut self, mut placeholder: J, now: u32) {
+        placeholder.state_mut().enter(Stage::Queued, now, LONGEST);
+        self.set_next_due(now, LONGEST);
+        let _ = self.queue.push(placeholder);
+    }
+
+    /// Removes the placeholder.
+    pub fn end_idle(&mut self) {
+        self.queue.clear();
+        self.changed = true;
+    }
+
     /// Marks the requests for which `which` returns true as lost. The next polls end them
     /// with [`Status::LINK_LOST`].
     pub(super) fn mark_lost(&mut self, mut which: impl FnMut(&J) -> bool) {
@@ -281,6 +319,10 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     }
 }
 
+fn is_lost(request: &impl ClientRequest) -> bool {
+    request.state().is(Stage::Lost)
+}
+
 /// Ends a request with `status`, or prepares its retry. Returns true if it has ended,
 /// false if it waits for a retry.
 #[cfg_attr(target_os = "none", inline(never))]
@@ -291,20 +333,23 @@ fn end_or_retry(
     now: u32,
     storage: &mut impl ClientStorage,
 ) -> bool {
-    let (unit, retries) = (request.state().unit, request.state().retries);
-    // No reference to the request's state exists while `storage` may call a hook.
+    // No reference that may write the request's state exists while `storage` may call a hook.
     let again = if !FIRMWARE && status == Status::OK {
         None
     } else {
-        storage.again(policy, retries, status)
+        storage.again(policy, request.state(), status)
     };
-    storage.note(unit, status, again.is_some(), now);
+    storage.note(request.state().unit, status, again.is_some(), now);
     let state = request.state_mut();
     let Some(wait) = again else {
         state.end(status);
         return true;
     };
-    state.retries = retries + 1;
+    if status.is_exception() {
+        state.busy_retries += 1;
+    } else {
+        state.retries += 1;
+    }
     state.enter(Stage::Queued, now, wait);
     false
 }

@@ -1,11 +1,9 @@
 //! A request of a client: its state, the data to send, and the place for the data of the
 //! response.
 
-use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
 use crate::error::Status;
 use crate::pdu::header::RequestHeader;
-use crate::time::elapsed;
 use crate::FIRMWARE;
 
 /// The stage of a request.
@@ -42,9 +40,15 @@ pub struct RequestState {
     pub exception: u8,
     /// Number of data bytes received.
     pub length: u8,
+    /// The response timeout in milliseconds; 0 for that of the unit or line.
+    pub timeout_ms: u16,
+    /// Greatest number of retries; 0 for that of the unit or line, [`NO_RETRIES`] for none.
+    pub retry_limit: u8,
     stage: Stage,
     /// Number of retries so far.
     pub(super) retries: u8,
+    /// Number of retries so far after an exception.
+    pub(super) busy_retries: u8,
     /// The transaction identifier of its TCP frame.
     pub(super) wire: u16,
     /// The request is due when `wait` microseconds have passed since `since`.
@@ -63,8 +67,11 @@ impl RequestState {
         status: Status::OK,
         exception: 0,
         length: 0,
+        timeout_ms: 0,
+        retry_limit: 0,
         stage: Stage::Queued,
         retries: 0,
+        busy_retries: 0,
         wire: 0,
         since: 0,
         wait: 0,
@@ -102,21 +109,6 @@ impl RequestState {
     /// True if the request waits for its response.
     pub fn is_sent(&self) -> bool {
         matches!(self.stage, Stage::Sent | Stage::OtherUnit)
-    }
-
-    /// Microseconds until the request is due.
-    #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(super) fn remaining_wait(&self, now: u32, storage: &mut impl ClientStorage) -> u32 {
-        let wait = match self.wait {
-            0 => 0,
-            wait => wait.saturating_sub(elapsed(now, self.since)),
-        };
-        if self.is(Stage::Queued) {
-            wait.max(storage.rest(self.unit, now))
-        } else {
-            wait
-        }
     }
 
     /// Records that another unit sent a response with the number of this request.

@@ -1,7 +1,9 @@
 //! The buffers, records and random numbers that a caller supplies to a client.
 
-use super::policy::{again, Policy};
-use super::units::{note, rest, UnitRecord};
+use super::policy::Policy;
+use super::request::RequestState;
+use super::retry::{again, again_when_busy};
+use super::units::{find, note, rest, UnitRecord};
 use crate::engine::{Frame, Storage};
 use crate::error::Status;
 
@@ -35,10 +37,21 @@ pub trait ClientStorage: Storage<Count = u16> {
         note(self.units(), unit, status, again, now);
     }
 
-    /// Microseconds to wait before the next retry of a request that ended with `status`
-    /// and has had `retries` retries; `None` if the request is not retried.
-    fn again(&mut self, policy: &Policy, retries: u8, status: Status) -> Option<u32> {
-        again(policy, retries, status, || self.random())
+    /// The response timeout of a unit in milliseconds; 0 for that of the line. The client has
+    /// just called [`ClientStorage::rest`] for the unit.
+    fn unit_timeout_ms(&mut self, unit: u8) -> u16 {
+        find(self.units(), unit).map_or(0, |unit| unit.timeout_ms)
+    }
+
+    /// Microseconds to wait before the next retry of a request that ended with `status`;
+    /// `None` if the request is not retried.
+    fn again(&mut self, policy: &Policy, state: &RequestState, status: Status) -> Option<u32> {
+        if status.is_exception() {
+            return again_when_busy(policy, state, status);
+        }
+        let unit = find(self.units(), state.unit);
+        let limit = unit.map_or(0, |unit| unit.retry_limit);
+        again(policy, state, limit, status, || self.random())
     }
 
     /// A random number for the jitter, a different one at each call.

@@ -25,6 +25,11 @@ pub struct UnitRecord {
     pub status: u8,
     /// `delay` may not have passed since `last` yet.
     cooling_down: bool,
+    /// Greatest number of retries of a request to this unit; 0 for that of the line,
+    /// [`NO_RETRIES`](super::NO_RETRIES) for none.
+    pub retry_limit: u8,
+    /// Response timeout of this unit, in milliseconds; 0 for that of the line.
+    pub timeout_ms: u16,
 }
 
 impl UnitRecord {
@@ -40,6 +45,8 @@ impl UnitRecord {
             unit,
             status: 0,
             cooling_down: false,
+            retry_limit: 0,
+            timeout_ms: 0,
         }
     }
 
@@ -75,7 +82,7 @@ impl UnitRecord {
 }
 
 /// The record of a unit, if there is one.
-fn find(units: &mut [UnitRecord], unit: u8) -> Option<&mut UnitRecord> {
+pub fn find(units: &mut [UnitRecord], unit: u8) -> Option<&mut UnitRecord> {
     units.iter_mut().find(|record| record.unit == unit)
 }
 

@@ -232,7 +232,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.fault = RxFault::NOTHING;
         self.probation = Probation::Held;
         // If the line is never silent, the wait for a second reply ends at this time.
-        let timeout = self.settings.response_timeout;
+        let timeout = Q::response_timeout(self);
         self.wait = timeout
             .wrapping_add(timeout)
             .wrapping_add(self.settings.quiet_time);

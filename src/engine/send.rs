@@ -35,7 +35,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     pub(super) fn begin(&mut self) -> Status {
         self.take_back();
         Q::write(self);
-        let wait = self.settings.response_timeout;
+        let wait = Q::response_timeout(self);
         self.enter(Phase::Gap, wait.wrapping_add(self.required_silence()));
         Status::PENDING
     }
@@ -72,7 +72,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.late = false;
         self.phase = Phase::Send;
         self.phase_start = self.now;
-        self.wait = self.settings.response_timeout;
+        self.wait = Q::response_timeout(self);
         self.port.pre_transmission();
         self.send()
     }
@@ -128,7 +128,8 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         if self.unit == BROADCAST || !self.request.is_answered() {
             self.enter(Phase::Turnaround, self.settings.turnaround_delay);
         } else {
-            self.enter(Phase::Reply, self.settings.response_timeout);
+            let timeout = Q::response_timeout(self);
+            self.enter(Phase::Reply, timeout);
         }
         self.wait()
     }

@@ -35,6 +35,12 @@ pub trait RequestSpec<P, S: Storage>: Sized {
         true
     }
 
+    /// Microseconds that the reply may take, and that the request may wait for the line.
+    #[inline(always)]
+    fn response_timeout(engine: &mut Engine<P, S, Self>) -> u32 {
+        engine.settings.response_timeout
+    }
+
     /// True if a frame buffer of `space` bytes holds the frame of the request.
     fn fits(&self, space: S::Count) -> bool;
 

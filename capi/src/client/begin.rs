@@ -74,21 +74,10 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
         mbm_client::mark(client).write(pointers::IN_HOOK);
         ((*(*object).kind).release)(object, None);
         queue(object).cancel_all();
-        // A loop instead of memset: libc's memset is larger, and most images do not need it
-        // otherwise.
-        let mut word = client.cast::<usize>();
-        let end = client.add(1).cast::<usize>();
-        loop {
-            word.write_volatile(0);
-            word = word.add(1);
-            if word == end {
-                return Status::NOT_INITIALISED;
-            }
-        }
+        pointers::zero(client);
+        Status::NOT_INITIALISED
     }
 }
-
-const _: () = assert!(size_of::<mbm_client>().is_multiple_of(size_of::<usize>()));
 
 /// Begins a client of a serial line with RTU frames (serial line guide V1.02, 2.5.1).
 ///

@@ -19,7 +19,6 @@ const fn serial(start: unsafe fn(*mut Object), framing: u8, min_frame_bytes: u8)
     type Engine = ClientEngine<mbm_port, ClientBuffers, RequestPtr>;
     let engine = TRANSPORT + offset_of!(SerialTransport, engine);
     TransportKind {
-        #[cfg(any(target_os = "none", mbm_firmware))]
         advance: advance::<SerialTransport>,
         #[cfg(not(any(target_os = "none", mbm_firmware)))]
         poll: poll::<SerialTransport>,
@@ -38,7 +37,6 @@ pub(super) static RTU_OVER_TCP: TransportKind = serial(start_stream, MBM_FRAMING
 /// The shortest request and response, a function code and two words, are 17 characters.
 pub(super) static ASCII: TransportKind = serial(start_ascii, MBM_FRAMING_ASCII, 17);
 pub(super) static TCP: TransportKind = TransportKind {
-    #[cfg(any(target_os = "none", mbm_firmware))]
     advance: advance::<TcpTransport>,
     #[cfg(not(any(target_os = "none", mbm_firmware)))]
     poll: poll::<TcpTransport>,

@@ -8,17 +8,23 @@ use core::ffi::c_void;
 use mbm::client::Transport as _;
 use mbm::error::Status;
 
-/// Your hooks that close a link and open it again, for mbm_client_reconnect.
+/// Your hooks that close a link and open it again, for mbm_link_begin and
+/// mbm_client_reconnect.
 #[repr(C)]
+#[derive(Clone, Copy)]
 pub struct mbm_linkHooks {
-    /// Your pointer, passed to both hooks; may be NULL.
+    /// Your pointer, passed to all hooks; may be NULL.
     pub context: *mut c_void,
     /// Optional: closes the link, if it is open.
     pub disconnect: Option<unsafe extern "C" fn(context: *mut c_void)>,
-    /// Optional: opens the link without waiting. Returns MBM_OK if the link is open,
+    /// Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the link is open,
     /// MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
     /// or another status.
     pub connect: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
+    /// For mbm_link_begin only; optional if `connect` never returns MBM_PENDING. Returns MBM_OK
+    /// if the link is open, MBM_PENDING while the connection is still being made, or another
+    /// status.
+    pub status: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
 }
 
 /// Closes the link and opens it again. The client discards an incomplete response. Requests
@@ -73,7 +79,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
 /// @param client  the object
 /// @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives
 ///         or mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first
-///         request
+///         request. With a link: 0 from each loss of it until it is open again
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
@@ -123,7 +129,7 @@ pub unsafe extern "C" fn mbm_client_suspend(
             Status::OK
         });
         if status == Status::OK.code() && !master.is_null() {
-            master::with_hooks(master, Core::line_used);
+            pointers::with_hooks(client, || master::with_hooks(master, Core::line_used));
         }
         status
     }

@@ -5,13 +5,15 @@ mod getters;
 mod identification;
 mod kind;
 mod link;
-mod object;
-mod poll;
+pub(crate) mod object;
+pub(crate) mod poll;
+mod repeat;
 mod reply;
-mod request;
+pub(crate) mod request;
 mod requests;
 mod settings;
 mod storage;
+mod units;
 
 pub use begin::*;
 pub use getters::*;
@@ -20,11 +22,13 @@ pub use link::*;
 pub use object::mbm_client;
 pub(crate) use poll::clock;
 pub use poll::*;
+pub use repeat::*;
 pub use reply::*;
 pub use request::mbm_clientRequest;
 pub(crate) use requests::read_table;
 pub use requests::*;
 pub use settings::*;
+pub use units::*;
 
 /// The maximum number of requests that are pending in one client.
 pub const MBM_CLIENT_DEPTH: u8 = 16;

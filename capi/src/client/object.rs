@@ -12,7 +12,7 @@ use mbm::engine::Settings;
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use mbm::error::Status;
 
-const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
+pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 
 /// A client of one serial line or one TCP stream. It queues up to 16 requests.
 /// mbm_client_poll sends and receives; no function ever waits.
@@ -31,7 +31,7 @@ pub struct mbm_client {
     /// Private.
     pointers: [*mut c_void; 46],
     /// Private.
-    words: [u32; 24],
+    words: [u32; 25],
 }
 
 /// The fields in the storage of an `mbm_client`.
@@ -39,8 +39,10 @@ pub struct mbm_client {
 pub struct Object {
     mark: u8,
     pub(super) polling: bool,
-    pub(super) kind: *const TransportKind,
-    pub(super) queue: RequestQueue<RequestPtr, DEPTH>,
+    /// `kind` is the first field of a [`LinkedKind`].
+    pub(crate) linked: bool,
+    pub(crate) kind: *const TransportKind,
+    pub(crate) queue: RequestQueue<RequestPtr, DEPTH>,
     pub(super) transport: Transports,
 }
 
@@ -73,7 +75,7 @@ unsafe impl CObject for mbm_client {
 ///
 /// # Safety
 /// `object` is begun, and nothing else uses its client while the reference lives.
-pub(super) unsafe fn queue<'a>(object: *mut Object) -> &'a mut RequestQueue<RequestPtr, DEPTH> {
+pub(crate) unsafe fn queue<'a>(object: *mut Object) -> &'a mut RequestQueue<RequestPtr, DEPTH> {
     // SAFETY: as the caller promises.
     unsafe { &mut (*object).queue }
 }
@@ -89,32 +91,41 @@ pub(super) union Transports {
 }
 
 /// As [`Transport::advance`].
-pub(super) type Advance = unsafe fn(*mut Object, now: u32, fresh: bool) -> Option<RequestPtr>;
+pub(crate) type Advance = unsafe fn(*mut Object, now: u32, fresh: bool) -> Option<RequestPtr>;
 
 /// The functions and numbers in which the kinds of transport differ.
-pub(super) struct TransportKind {
-    #[cfg(any(target_os = "none", mbm_firmware))]
-    pub(super) advance: Advance,
+#[repr(C)]
+pub(crate) struct TransportKind {
+    pub(crate) advance: Advance,
     /// As [`advance_all`](super::poll::advance_all).
     #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    pub(super) poll: unsafe fn(*mut mbm_client) -> Status,
+    pub(crate) poll: unsafe fn(*mut mbm_client) -> Status,
     /// As [`Transport::release`].
-    pub(super) release: unsafe fn(*mut Object, Option<&RequestPtr>),
+    pub(crate) release: unsafe fn(*mut Object, Option<&RequestPtr>),
     /// Completes the begin function of a client.
-    pub(super) start: unsafe fn(*mut Object),
+    pub(crate) start: unsafe fn(*mut Object),
     /// The offsets, in bytes, of port, settings and buffers in an object.
-    pub(super) port: u16,
-    pub(super) settings: u16,
-    pub(super) storage: u16,
+    pub(crate) port: u16,
+    pub(crate) settings: u16,
+    pub(crate) storage: u16,
     /// The minimum size of the frame buffer, in bytes.
-    pub(super) min_frame_bytes: u8,
-    pub(super) framing: u8,
+    pub(crate) min_frame_bytes: u8,
+    pub(crate) framing: u8,
+}
+
+/// The kind of a client that has a link: the functions of the link, and the numbers of the
+/// client's transport.
+#[repr(C)]
+pub(crate) struct LinkedKind {
+    pub(crate) kind: TransportKind,
+    /// Microseconds until the next poll is due; `delay` is that of the transport.
+    pub(crate) delay: unsafe fn(*mut Object, now: u32, delay: u32) -> u32,
 }
 
 impl TransportKind {
     /// # Safety
     /// As for [`transport`], of this kind.
-    pub(super) unsafe fn port(&self, object: *mut Object) -> *mut mbm_port {
+    pub(crate) unsafe fn port(&self, object: *mut Object) -> *mut mbm_port {
         // SAFETY: as the caller promises.
         unsafe { object.byte_add(self.port.into()).cast() }
     }
@@ -128,7 +139,7 @@ impl TransportKind {
 
     /// # Safety
     /// As for [`transport`], of this kind.
-    pub(super) unsafe fn storage<'a>(&self, object: *mut Object) -> &'a mut ClientBuffers {
+    pub(crate) unsafe fn storage<'a>(&self, object: *mut Object) -> &'a mut ClientBuffers {
         // SAFETY: as the caller promises; the offset is that of the storage.
         unsafe { &mut *object.byte_add(self.storage.into()).cast() }
     }

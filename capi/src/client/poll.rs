@@ -1,7 +1,7 @@
 //! Polling a client, and cancelling its requests.
 
 use super::object::{
-    mbm_client, on_transport, queue, Advance, Object, SerialTransport, TcpTransport,
+    mbm_client, on_transport, queue, Advance, LinkedKind, Object, SerialTransport, TcpTransport,
 };
 use super::request::{mbm_clientRequest, RequestPtr};
 use super::MBM_CLIENT_DEPTH;
@@ -28,7 +28,8 @@ pub(crate) unsafe fn clock(client: *mut mbm_client) -> u32 {
 }
 
 /// Sends and receives for all requests, without waiting, and calls `done` of those that have
-/// ended, of at most 17 in one call.
+/// ended, of at most 17 in one call. It also takes care of the client's link, if
+/// mbm_link_begin gave it one.
 ///
 /// Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
 ///
@@ -59,7 +60,7 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
 /// # Safety
 /// `client` is begun, and `advance` is that of its transport; no reference into it lives.
 #[cfg_attr(not(any(target_os = "none", mbm_firmware)), inline(always))]
-pub(super) unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
+pub(crate) unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
     let object = pointers::object(client);
     // SAFETY: as the caller promises. No reference lives while `done` is called, because
     // `done` may use the object. If `done` zeroed the object, or began it again, `polling`
@@ -90,7 +91,8 @@ pub(super) unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> S
 
 /// Returns how long mbm_client_poll will have nothing to do unless a byte arrives. A program
 /// may sleep, or wait for a byte in select, for that time. The client reads bytes only while
-/// a request is pending.
+/// a request is pending, or if it has a link (mbm_link_begin). With a link the delay also ends
+/// when the link is to be opened again, and is at most one second while the client is idle.
 ///
 /// @param client  the object
 /// @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF
@@ -104,7 +106,12 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
             Status::OK => pointers::with_hooks(client, || {
                 let object = pointers::object(client);
                 let now = now(object);
-                on_transport!(object, transport => transport.poll_delay(&(*object).queue, now))
+                let delay =
+                    on_transport!(object, transport => transport.poll_delay(&(*object).queue, now));
+                if !(*object).linked {
+                    return delay;
+                }
+                ((*(*object).kind.cast::<LinkedKind>()).delay)(object, now, delay)
             }),
             Status::BUSY => 0,
             _ => u32::MAX,

@@ -43,6 +43,18 @@ pub struct mbm_clientRequest {
     pub exception: u8,
     /// The number of bytes received into `reply`.
     pub length: u8,
+    /// The response timeout of this request in milliseconds, 1 to 65535; 0: that of the unit
+    /// (mbm_clientUnit) or of the client (mbm_client_setResponseTimeout). The client reads it
+    /// each time it sends the request.
+    pub timeoutMs: u16,
+    /// How often the client repeats this request at most, 1 to 254; MBM_NO_RETRIES: never; 0:
+    /// as often as the unit or mbm_client_setRetries says. With 1 to 254, a client refuses the
+    /// request (MBM_INVALID_ARGUMENT) if none of mbm_client_setRetries,
+    /// mbm_client_setBusyRetries and mbm_client_setUnits was called on it: only they link the
+    /// code for repetitions.
+    pub retryLimit: u8,
+    /// Private.
+    bytes: [u8; 5],
     /// Private.
     words: [u32; 8],
 }
@@ -73,12 +85,18 @@ const _: () = {
     assert!(
         offset_of!(mbm_clientRequest, exception) == STATE + offset_of!(RequestState, exception)
     );
+    assert!(
+        offset_of!(mbm_clientRequest, timeoutMs) == STATE + offset_of!(RequestState, timeout_ms)
+    );
+    assert!(
+        offset_of!(mbm_clientRequest, retryLimit) == STATE + offset_of!(RequestState, retry_limit)
+    );
     assert!(offset_of!(mbm_clientRequest, length) == STATE + offset_of!(RequestState, length));
 };
 
 /// A pointer to a request of the C program, which stays valid until the request has ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct RequestPtr(NonNull<RequestFields>);
+pub(crate) struct RequestPtr(NonNull<RequestFields>);
 
 impl RequestPtr {
     /// The request at a pointer; `None` for NULL.
@@ -86,7 +104,7 @@ impl RequestPtr {
     /// # Safety
     /// It is NULL, or points to a request that is zeroed or was used before, and
     /// stays valid for as long as it is pending.
-    pub(super) unsafe fn new(request: *mut mbm_clientRequest) -> Option<Self> {
+    pub(crate) unsafe fn new(request: *mut mbm_clientRequest) -> Option<Self> {
         NonNull::new(request.cast()).map(RequestPtr)
     }
 

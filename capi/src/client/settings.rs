@@ -1,72 +1,20 @@
 //! The settings of a client.
 
-use super::object::mbm_client;
-use super::storage::{ClientBuffers, UnitRecords};
+use super::object::{mbm_client, queue, DEPTH};
+use super::request::RequestPtr;
+use super::storage::ClientBuffers;
 use crate::pointers;
 use crate::storage::mbm_counters;
-use core::ffi::c_void;
-use mbm::client::{again, note, rest, Backoff, ClientStorage as _, Policy, UnitRecord};
+use mbm::client::RequestQueue;
 use mbm::engine::Settings;
 use mbm::error::Status;
 use mbm::time::millis;
 
-/// mbm_client_setBackoff: the client repeats a request at once.
-pub const MBM_BACKOFF_NONE: u8 = 0;
-/// mbm_client_setBackoff: the client waits `delayMs` before each repetition.
-pub const MBM_BACKOFF_FIXED: u8 = 1;
-/// mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
-/// before the second, three times that before the third, but at most `maxDelayMs`.
-pub const MBM_BACKOFF_LINEAR: u8 = 2;
-/// mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
-/// before the second, four times that before the third, but at most `maxDelayMs`.
-pub const MBM_BACKOFF_EXPONENTIAL: u8 = 3;
-
-const _: () = {
-    assert!(MBM_BACKOFF_NONE == Backoff::None as u8);
-    assert!(MBM_BACKOFF_FIXED == Backoff::Fixed as u8);
-    assert!(MBM_BACKOFF_LINEAR == Backoff::Linear as u8);
-    assert!(MBM_BACKOFF_EXPONENTIAL == Backoff::Exponential as u8);
-};
-
-/// The record of one unit, an item of the array for mbm_client_setUnits. You may read and
-/// zero the counters at any time, but not from an interrupt; each wraps at 2^32.
-#[repr(C)]
-pub struct mbm_clientUnit {
-    /// Requests that ended, without retries.
-    pub requests: u32,
-    /// Requests that the unit answered, also with an exception.
-    pub replies: u32,
-    /// Requests that the unit answered with an exception.
-    pub exceptions: u32,
-    /// Repetitions of requests.
-    pub retries: u32,
-    /// Set by you: the minimum time from the end of a request to the next request to this
-    /// unit, in microseconds; a value above 2^31 (36 minutes) means 2^31.
-    pub delayUs: u32,
-    /// Private.
-    last: u32,
-    /// Set by you: the unit identifier.
-    pub unit: u8,
-    /// The status of the last request that ended; MBM_OK if none has ended.
-    pub status: u8,
-    /// Private.
-    cooling_down: u8,
-}
-
-const _: () = {
-    use core::mem::offset_of;
-    assert!(size_of::<mbm_clientUnit>() == size_of::<UnitRecord>());
-    assert!(align_of::<mbm_clientUnit>() == align_of::<UnitRecord>());
-    assert!(offset_of!(mbm_clientUnit, delayUs) == offset_of!(UnitRecord, delay));
-    assert!(offset_of!(mbm_clientUnit, unit) == offset_of!(UnitRecord, unit));
-    assert!(offset_of!(mbm_clientUnit, status) == offset_of!(UnitRecord, status));
-};
-
-/// The parts of a client that the functions here change.
-struct Parts<'a> {
-    settings: &'a mut Settings,
-    storage: &'a mut ClientBuffers,
-    policy: &'a mut Policy,
+/// The parts of a client that the settings change.
+pub(super) struct Parts<'a> {
+    pub(super) settings: &'a mut Settings,
+    pub(super) storage: &'a mut ClientBuffers,
+    pub(super) queue: &'a mut RequestQueue<RequestPtr, DEPTH>,
 }
 
 /// Changes a setting.
@@ -74,7 +22,7 @@ struct Parts<'a> {
 /// # Safety
 /// As for [`pointers::with`].
 #[cfg_attr(target_os = "none", inline(always))]
-unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> u8 {
+pub(super) unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> u8 {
     // SAFETY: as the caller promises.
     unsafe {
         pointers::with(client, |object| {
@@ -82,7 +30,7 @@ unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> 
             change(Parts {
                 settings: kind.settings(object),
                 storage: kind.storage(object),
-                policy: &mut (*object).queue.policy,
+                queue: queue(object),
             })
         })
     }
@@ -90,7 +38,8 @@ unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> 
 
 /// Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the
 /// request has been sent. In TCP frames it starts when mbm_client_poll puts the request into
-/// the outgoing buffer, also if the port accepts it later.
+/// the outgoing buffer, also if the port accepts it later. `timeoutMs` of a request or of a unit
+/// replaces this time.
 ///
 /// @param client        the object
 /// @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
@@ -236,89 +185,6 @@ fn if_built_in(built_in: bool, change: impl FnOnce()) -> Status {
     }
 }
 
-/// Sets how often the client repeats a request whose response is missing, damaged or
-/// malformed, or that the port did not accept. It does not repeat a request that was
-/// answered with an exception, one that a lost link interrupted, or one whose response is
-/// too long for a buffer.
-///
-/// @param client   the object
-/// @param retries  0 to 255; the default is 0
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            parts.policy.retries = retries;
-            parts.storage.again = Some(|storage, policy, retries, status| {
-                again(policy, retries, status, || storage.random())
-            });
-            Status::OK
-        })
-    }
-}
-
-/// Sets how long a request waits before the client repeats it. Meanwhile the client sends
-/// other requests.
-///
-/// @param client            the object
-/// @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
-/// @param delayMs           the wait before the first repetition, in milliseconds
-/// @param maxDelayMs        the longest wait, in milliseconds
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_setBackoff(
-    client: *mut mbm_client,
-    backoff: u8,
-    delayMs: u16,
-    maxDelayMs: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            let Some(backoff) = Backoff::from_code(backoff) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            let (wait, most) = (millis(delayMs), millis(maxDelayMs));
-            parts.policy.set_backoff(backoff, wait, most);
-            Status::OK
-        })
-    }
-}
-
-/// Shortens each wait before a repetition by a random part, so that several clients do not
-/// repeat their requests at the same time.
-///
-/// @param client   the object
-/// @param percent  0 (the default) to 100: the largest part of the wait by which the client
-///                 shortens it
-/// @param random   returns a new random number at each call, for example that of rand(). It
-///                 may have 32 bits, 15 bits, or random bits in its upper half only. A
-///                 function that it calls on the client returns MBM_BUSY. NULL only if
-///                 `percent` is 0
-/// @param context  your pointer, passed to `random`; may be NULL
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_setJitter(
-    client: *mut mbm_client,
-    percent: u8,
-    random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
-    context: *mut c_void,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            if percent > 100 || (random.is_none() && percent > 0) {
-                return Status::INVALID_ARGUMENT;
-            }
-            parts.policy.jitter = ((u16::from(percent) * 163) >> 6).min(255) as u8;
-            parts.storage.random = random;
-            parts.storage.random_context = context;
-            Status::OK
-        })
-    }
-}
-
 /// Sets your storage for counters, in which the client counts from now on. You may read and
 /// zero the counters at any time, but not from an interrupt. In TCP frames, foreignFrames
 /// counts frames whose transaction identifier and unit match no pending request, and
@@ -341,32 +207,3 @@ pub unsafe extern "C" fn mbm_client_setCounters(
         })
     }
 }
-
-/// Sets the records of units. In a record the client counts the requests to its unit. The
-/// record's `delayUs` sets the minimum time between two requests to the unit.
-///
-/// @param client  the object
-/// @param units   your array of records, zeroed except `unit` and `delayUs`; NULL for none
-/// @param count   the number of records, 0 to 255
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_setUnits(
-    client: *mut mbm_client,
-    units: *mut mbm_clientUnit,
-    count: u8,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            parts.storage.units = units.cast();
-            parts.storage.unit_count = count;
-            parts.storage.unit_records = (!units.is_null()).then_some(&UNIT_RECORDS);
-            Status::OK
-        })
-    }
-}
-
-const UNIT_RECORDS: UnitRecords = UnitRecords {
-    rest: |storage, unit, now| rest(storage.units(), unit, now),
-    note: |storage, unit, ended, now| note(storage.units(), unit, ended.status, ended.again, now),
-};

@@ -3,19 +3,20 @@
 use crate::storage::{frame_storage, mbm_counters};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
-use mbm::client::{ClientStorage, Policy, UnitRecord};
+use mbm::client::{ClientStorage, Policy, RequestState, UnitRecord};
 use mbm::engine::Storage;
 use mbm::error::Status;
 
 /// The function that computes how long a request waits for its repetition. `None` means that
 /// the client does not repeat it. (A pointer, for the reason that [`UnitRecords`] gives.)
-pub(super) type Again = fn(&mut ClientBuffers, &Policy, retries: u8, Status) -> Option<u32>;
+pub(super) type Again = fn(&mut ClientBuffers, &Policy, &RequestState, Status) -> Option<u32>;
 
 /// The functions that use the records of units. (Called through a pointer that
 /// mbm_client_setUnits sets, so that firmware that does not call it does not contain them.)
 pub(super) struct UnitRecords {
     pub(super) rest: fn(&mut ClientBuffers, unit: u8, now: u32) -> u32,
     pub(super) note: fn(&mut ClientBuffers, unit: u8, ended: Ended, now: u32),
+    pub(super) retry_limit: fn(&mut ClientBuffers, unit: u8) -> u8,
 }
 
 /// How a request to a unit ended, and whether the client repeats it.
@@ -26,7 +27,7 @@ pub(super) struct Ended {
 
 /// The buffers and hooks of a client.
 #[repr(C)]
-pub(super) struct ClientBuffers {
+pub(crate) struct ClientBuffers {
     pub(super) frame: *mut u8,
     pub(super) outgoing: *mut u8,
     pub(super) counters: *mut mbm_counters,
@@ -38,6 +39,8 @@ pub(super) struct ClientBuffers {
     pub(super) frame_bytes: u16,
     pub(super) outgoing_bytes: u16,
     pub(super) unit_count: u8,
+    /// The response timeout of the unit that `rest` last looked at.
+    pub(super) unit_timeout_ms: u16,
 }
 
 // SAFETY, of all functions here: each pointer is NULL, or valid as the C function that set
@@ -79,9 +82,13 @@ impl ClientStorage for ClientBuffers {
         }
     }
 
-    fn again(&mut self, policy: &Policy, retries: u8, status: Status) -> Option<u32> {
+    fn unit_timeout_ms(&mut self, _: u8) -> u16 {
+        self.unit_timeout_ms
+    }
+
+    fn again(&mut self, policy: &Policy, state: &RequestState, status: Status) -> Option<u32> {
         self.again
-            .and_then(|again| again(self, policy, retries, status))
+            .and_then(|again| again(self, policy, state, status))
     }
 
     fn random(&mut self) -> u32 {

@@ -19,6 +19,15 @@ unsafe extern "C" fn done(_: *mut c_void, request: *mut mbm_clientRequest) {
     w.hook(Grant::All, 4);
 }
 
+/// A limit of retries: mostly that of the client.
+pub fn retry_limit(w: &World) -> u8 {
+    match w.byte() {
+        0..0xC0 => 0,
+        0xC0..0xE0 => MBM_NO_RETRIES,
+        byte => byte,
+    }
+}
+
 /// Sets the fields of a request with `bytes` bytes of data.
 fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
     let space = match w.byte() {
@@ -41,6 +50,8 @@ fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
         (*request).replyBytes = space;
         (*request).transaction = if w.rarely(8) { w.word() } else { 0 };
         (*request).unit = w.unit_id();
+        (*request).timeoutMs = if w.rarely(4) { w.word() } else { 0 };
+        (*request).retryLimit = retry_limit(w);
     }
 }
 

@@ -7,7 +7,7 @@ use mbm_c::*;
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 
-fn begin(w: &World, client: *mut mbm_client) {
+pub fn begin(w: &World, client: *mut mbm_client) {
     let framing = w.byte() % 4;
     let port = ports::port(w, framing);
     let size = |w: &World| match w.byte() {
@@ -36,7 +36,7 @@ fn begin(w: &World, client: *mut mbm_client) {
     });
 }
 
-unsafe extern "C" fn random(_: *mut c_void) -> u32 {
+pub unsafe extern "C" fn random(_: *mut c_void) -> u32 {
     let w = World::current();
     w.hook(Grant::Nothing, 16);
     w.random()
@@ -44,7 +44,7 @@ unsafe extern "C" fn random(_: *mut c_void) -> u32 {
 
 fn set(w: &World, client: *mut mbm_client) {
     let (byte, word, more, long) = (w.byte(), w.word(), w.word(), w.long());
-    let choice = w.byte() % 15;
+    let choice = w.byte() % 16;
     let counters: *mut mbm_counters = if byte & 1 == 0 {
         null_mut()
     } else {
@@ -52,6 +52,7 @@ fn set(w: &World, client: *mut mbm_client) {
     };
     let chance: Option<unsafe extern "C" fn(*mut c_void) -> u32> = (!w.rarely(8)).then_some(random);
     let context: *mut c_void = null_mut();
+    let limit = asked::retry_limit(w);
     let records: Vec<u8> = (0..byte % 8).collect();
     let units: *mut mbm_clientUnit = w
         .block(
@@ -61,7 +62,9 @@ fn set(w: &World, client: *mut mbm_client) {
         .cast();
     for (at, unit) in records.iter().enumerate() {
         // SAFETY: the index is below the count.
-        unsafe { ((*units.add(at)).unit, (*units.add(at)).delayUs) = (*unit, more.into()) };
+        let record = unsafe { &mut *units.add(at) };
+        (record.unit, record.delayUs) = (*unit, more.into());
+        (record.retryLimit, record.timeoutMs) = (limit, if w.rarely(2) { word } else { 0 });
     }
     let none: *mut mbm_clientUnit = null_mut();
     let units = if w.rarely(8) { null_mut() } else { units };
@@ -88,6 +91,7 @@ fn set(w: &World, client: *mut mbm_client) {
         ),
         12 => call!(w, client, mbm_client_setCounters(client, counters)),
         13 => call!(w, client, mbm_client_setUnits(client, units, byte % 8)),
+        14 => call!(w, client, mbm_client_setBusyRetries(client, byte, word)),
         _ => call!(w, client, mbm_client_setUnits(client, none, byte)),
     });
     get(w, client);
@@ -144,6 +148,7 @@ fn line(w: &World, client: *mut mbm_client) {
                     context: null_mut(),
                     disconnect: (hooks & 1 != 0).then_some(disconnect),
                     connect: (hooks & 2 != 0).then_some(connect),
+                    status: None,
                 })
             };
             call!(w, client, mbm_client_reconnect(client, link));
@@ -166,9 +171,13 @@ fn line(w: &World, client: *mut mbm_client) {
     }
 }
 
-/// Makes one call with a client.
+/// Makes one call with a client of the pool.
 pub fn step(w: &World) {
-    let client = w.clients.pick(w);
+    step_with(w, w.clients.pick(w));
+}
+
+/// Makes one call with a client.
+pub fn step_with(w: &World, client: *mut mbm_client) {
     match w.byte() % 16 {
         0 | 1 => begin(w, client),
         2 | 3 => set(w, client),

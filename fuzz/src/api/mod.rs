@@ -12,6 +12,7 @@ mod client;
 mod frame;
 mod gateway;
 mod identification;
+mod link;
 mod master;
 mod memory;
 mod packet;
@@ -38,9 +39,10 @@ use world::World;
 fn step(w: &World) {
     match w.byte() % 32 {
         0..=4 => master::step(w),
-        5..=9 => client::step(w),
-        10 | 11 => plan::step(w),
-        12..=17 => server::step(w),
+        5..=8 => client::step(w),
+        9 | 10 => plan::step(w),
+        11 | 12 => link::step(w),
+        13..=17 => server::step(w),
         18 | 19 => gateway::step(w),
         20..=22 => sniffer::step(w),
         23 if w.byte() & 1 == 0 => trace::step(w),

@@ -52,6 +52,8 @@ pub struct World {
     pub plans: Pool<mbm_plan>,
     /// Clients whose port a master uses, or used when it was copied.
     pub lenders: RefCell<Vec<*mut mbm_client>>,
+    /// Clients with their links. They are not copied.
+    pub linked: RefCell<Vec<(*mut mbm_client, *mut mbm_link)>>,
     pub requests: Pool<mbm_clientRequest>,
     pub identifications: Pool<mbm_identification>,
     pub servers: Pool<mbm_server>,
@@ -98,6 +100,7 @@ impl World {
             clients: Pool::new(),
             plans: Pool::new(),
             lenders: RefCell::default(),
+            linked: RefCell::default(),
             requests: Pool::new(),
             identifications: Pool::new(),
             servers: Pool::new(),

@@ -4,7 +4,7 @@
 mod find;
 
 use super::queue::RequestQueue;
-use super::request::{data_of, ClientRequest, Stage};
+use super::request::{data_of, ClientRequest, RequestState, Stage};
 use super::storage::ClientStorage;
 use super::transport::Transport;
 use crate::bytes::move_to_front;
@@ -263,12 +263,8 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
                 Err(_) => return Status::BUSY,
             },
         };
+        let wait = self.time_of(request.state());
         let state = request.state_mut();
-        let wait = if state.header.is_answered() {
-            self.settings.response_timeout
-        } else {
-            self.settings.turnaround_delay
-        };
         state.wire = self.next;
         state.enter(Stage::Sent, now, wait);
         self.filled += length as u16;
@@ -276,6 +272,16 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         self.in_flight += 1;
         self.storage.count(Counter::Requests, 1);
         Status::OK
+    }
+
+    /// Microseconds for which a request waits when it was sent.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn time_of(&mut self, state: &RequestState) -> u32 {
+        if state.header.is_answered() {
+            state.response_timeout(&mut self.storage, self.settings.response_timeout)
+        } else {
+            self.settings.turnaround_delay
+        }
     }
 
     /// Writes the transmit buffer to the port; false if the link is lost.

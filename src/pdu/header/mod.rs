@@ -89,6 +89,19 @@ impl RequestHeader {
         !self.spec.has(UNANSWERED)
     }
 
+    /// True for a request that changes nothing in the device: functions 01 to 04, 07, 0B, 0C,
+    /// 11, 14 and 18, and 2B with MEI type 0E (hex).
+    pub const fn only_reads(&self) -> bool {
+        let [function, mei_type, ..] = self.head;
+        match function {
+            identification::ENCAPSULATED_INTERFACE_TRANSPORT => {
+                mei_type == MEI_READ_DEVICE_IDENTIFICATION
+            }
+            0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18 => true,
+            _ => false,
+        }
+    }
+
     /// Index of the first byte of data in the response; 0 if it has no data.
     pub const fn data_at(&self) -> u8 {
         self.spec.number(DATA)

@@ -1,0 +1,361 @@
+//! `mbm_link_*`: keeps the link of a client open.
+
+mod object;
+mod port;
+
+pub use object::{mbm_link, mbm_linkCounters};
+
+use crate::client::object::{self as client, LinkedKind, TransportKind};
+use crate::client::{mbm_client, mbm_linkHooks};
+use crate::pointers::{self, CObject as _};
+use core::ffi::c_void;
+use mbm::client::{Backoff, LinkEvent, LinkState};
+use mbm::error::Status;
+use mbm::time::millis;
+use object::{report, Object, KIND};
+
+/// mbm_link_state: there is no link. The client opens it when the wait is over.
+pub const MBM_LINK_IS_DOWN: u8 = 1;
+/// mbm_link_state: the connection is being made.
+pub const MBM_LINK_IS_CONNECTING: u8 = 2;
+/// mbm_link_state: the link is open.
+pub const MBM_LINK_IS_UP: u8 = 3;
+
+/// An event of a link: it is open now. The status is MBM_OK.
+pub const MBM_LINK_EVENT_CONNECTED: u8 = 0;
+/// An event of a link: it was open and is lost. The status is MBM_LINK_LOST.
+pub const MBM_LINK_EVENT_LOST: u8 = 1;
+/// An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
+/// mbm_linkHooks returned; MBM_RESPONSE_TIMED_OUT if the connection took too long.
+pub const MBM_LINK_EVENT_FAILED: u8 = 2;
+
+const _: () = {
+    assert!(MBM_LINK_IS_DOWN == LinkState::Down as u8);
+    assert!(MBM_LINK_IS_CONNECTING == LinkState::Connecting as u8);
+    assert!(MBM_LINK_IS_UP == LinkState::Up as u8);
+    assert!(MBM_LINK_EVENT_CONNECTED == LinkEvent::Connected as u8);
+    assert!(MBM_LINK_EVENT_LOST == LinkEvent::Lost as u8);
+    assert!(MBM_LINK_EVENT_FAILED == LinkEvent::Failed as u8);
+};
+
+/// Gives a client a link, which mbm_client_poll keeps open from then on:
+/// - It notices the loss of the link also while the client has no request. For that, an idle
+///   client reads the port in each poll and drops what it reads: late replies, noise, frames
+///   of others. If something else reads the line, call mbm_client_suspend first.
+/// - It opens the link again, after a wait that grows with each attempt that fails.
+/// - When the link is lost, requests under way end with MBM_LINK_LOST, because the device may
+///   have carried them out. The others end too, or wait: see mbm_link_setRequestsWait.
+///
+/// mbm_client_pollDelay returns when the next poll is due, for an idle client at most one
+/// second. A wait for bytes that also ends when the link is lost, as mbm_tcp_wait and
+/// mbm_tty_wait, finds the loss at once.
+///
+/// In the first poll the link calls `status` to find out whether the link is open already, and
+/// `connect` if not. After a loss or a failed attempt it calls `disconnect`, once.
+///
+/// Client and link must stay where they are, and must not be copied. A program does not also
+/// call mbm_client_reconnect.
+///
+/// All settings of the link return to their defaults. The call may be repeated at any time,
+/// also with another client. A begin function of the client ends the link.
+///
+/// @param link    the object; zeroed before the first call
+/// @param client  the client, begun; it must not have another link
+/// @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
+///                hooks must not use the client or the link: each function returns MBM_BUSY
+/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_NOT_INITIALISED if the client was not begun;
+///         MBM_BUSY from within a hook, while the client is suspended, or if it has another
+///         link
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_begin(
+    link: *mut mbm_link,
+    client: *mut mbm_client,
+    hooks: *const mbm_linkHooks,
+) -> u8 {
+    // SAFETY: as the header demands: each pointer is NULL or valid, and the object is storage,
+    // zeroed or begun. Zero is a valid value of every field but those that are set here.
+    let status = unsafe {
+        match hooks.as_ref() {
+            Some(hooks) if hooks.connect.is_some() && !link.is_null() => begin(link, client, hooks),
+            _ => Status::INVALID_ARGUMENT,
+        }
+    };
+    status.code()
+}
+
+/// As [`mbm_link_begin`].
+///
+/// # Safety
+/// As for [`mbm_link_begin`]; `link` is not NULL.
+#[inline(always)]
+unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHooks) -> Status {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let status = pointers::check(client);
+        if status != Status::OK {
+            return status;
+        }
+        let target = pointers::object(client);
+        let object = pointers::object(link);
+        if (*target).queue.suspended || (*target).linked && !is_of(object, target) {
+            return Status::BUSY;
+        }
+        match pointers::check(link) {
+            Status::NOT_INITIALISED => {}
+            Status::OK => {
+                let status = end(object);
+                if status != Status::OK {
+                    return status;
+                }
+            }
+            refused => return refused,
+        }
+        pointers::zero(link);
+        let transport = (*target).kind;
+        (*object).client = client;
+        (*object).transport = transport;
+        (*object).hooks = *hooks;
+        (*object).port.copy(&*(*transport).port(target));
+        (*object).request.done = Some(report);
+        (*object).request.context = link.cast();
+        (*object).core.begin();
+        let port = port::port(object);
+        (*(*transport).port(target)).copy(&port);
+        (&raw mut (*object).kind).write(linked(&*transport));
+        (*target).kind = (&raw const (*object).kind).cast();
+        (*target).linked = true;
+        mbm_link::mark(link).write(pointers::BEGUN);
+        Status::OK
+    }
+}
+
+/// The functions and numbers of a client that has a link, whose transport is `transport`.
+#[inline(always)]
+fn linked(transport: &TransportKind) -> LinkedKind {
+    LinkedKind {
+        kind: TransportKind {
+            advance: KIND.advance,
+            #[cfg(not(any(target_os = "none", mbm_firmware)))]
+            poll: KIND.poll,
+            ..*transport
+        },
+        delay: KIND.delay,
+    }
+}
+
+/// True if the link is that of the client. It is not if the client was begun again since.
+///
+/// # Safety
+/// `link` and `client` are storage of such objects.
+unsafe fn is_of(link: *mut Object, client: *mut client::Object) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe { (*client).linked && (*client).kind.cast::<Object>() == link.cast_const() }
+}
+
+/// Gives the client back what it had before.
+///
+/// # Safety
+/// `link` is begun, and its client's storage is valid.
+unsafe fn end(link: *mut Object) -> Status {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let object = pointers::object((*link).client);
+        if !is_of(link, object) {
+            return Status::OK;
+        }
+        if pointers::check((*link).client) != Status::OK || (*object).queue.suspended {
+            return Status::BUSY;
+        }
+        let transport = (*link).transport;
+        (*object).kind = transport;
+        (*object).linked = false;
+        (*(*transport).port(object)).copy(&(*link).port);
+        Status::OK
+    }
+}
+
+/// Ends a link. The client and its requests stay; the link itself stays open or closed as it
+/// is. The storage is free, and begins anew with mbm_link_begin.
+///
+/// @param link  the object; the client's storage must still be valid
+/// @return MBM_OK; MBM_BUSY from within a hook and while the client is suspended;
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_end(link: *mut mbm_link) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(link, |object| {
+            let status = end(object);
+            if status == Status::OK {
+                mbm_link::mark(link).write(0);
+            }
+            status
+        })
+    }
+}
+
+/// Closes the link and opens it again, at the next poll of the client and without a wait. Call
+/// it when you know better than the link: the network is back, the address has changed.
+///
+/// @param link  the object
+/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(link, |object| {
+            (*object).core.restart();
+            Status::OK
+        })
+    }
+}
+
+/// Sets the wait before an attempt to open the link. The first attempt after a loss waits for
+/// `delayMs`; each attempt that fails lets the wait grow. It starts anew when the link was open
+/// for as long as the last wait.
+///
+/// @param link        the object
+/// @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
+///                    mbm_client_setBackoff
+/// @param delayMs     the first wait in milliseconds, 0 to 65535; the default is 500
+/// @param maxDelayMs  the longest wait in milliseconds, 0 to 65535; the default is 30000
+/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_setBackoff(
+    link: *mut mbm_link,
+    backoff: u8,
+    delayMs: u16,
+    maxDelayMs: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(link, |object| {
+            let Some(backoff) = Backoff::from_code(backoff) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            let policy = &mut (*object).core.policy;
+            policy.set_backoff(backoff, millis(delayMs), millis(maxDelayMs));
+            Status::OK
+        })
+    }
+}
+
+/// Shortens each wait before an attempt by a random part, so that many clients that lost their
+/// server together do not connect at the same time.
+///
+/// @param link     the object
+/// @param percent  0 (the default) to 100: the largest part of the wait that is taken off
+/// @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only
+///                 if `percent` is 0
+/// @param context  your pointer, passed to `random`; may be NULL
+/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_setJitter(
+    link: *mut mbm_link,
+    percent: u8,
+    random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
+    context: *mut c_void,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(link, |object| {
+            if !(*object).core.policy.set_jitter(percent, random.is_some()) {
+                return Status::INVALID_ARGUMENT;
+            }
+            (*object).random = random;
+            (*object).random_context = context;
+            Status::OK
+        })
+    }
+}
+
+/// Sets how long a connection may take to be made. Then the attempt has failed.
+///
+/// @param link       the object
+/// @param timeoutMs  milliseconds, 1 to 65535; 0: as long as `status` returns MBM_PENDING. The
+///                   default is 10000
+/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeoutMs: u16) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(link, |object| {
+            (*object).core.connect_timeout = millis(timeoutMs);
+            Status::OK
+        })
+    }
+}
+
+/// Sets whether requests wait for the link. By default they do not: while the link is down,
+/// every request ends with MBM_LINK_LOST at the next poll. (A program whose `done` queues the
+/// request again at once then polls without a pause: let it wait.) If requests wait, they stay
+/// in the queue until the link is open again or until you cancel them; their response timeout
+/// begins when they are sent. While a connection is being made, requests always wait.
+///
+/// @param link  the object
+/// @param on    0 (the default) or 1
+/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_setRequestsWait(link: *mut mbm_link, on: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(link, |object| {
+            (*object).core.keeps_requests = on != 0;
+            Status::OK
+        })
+    }
+}
+
+/// Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
+/// attempt has failed.
+///
+/// @param link      the object
+/// @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
+///                  request may, and call every function on the link; NULL for none
+/// @param context   your pointer, passed to `callback`; may be NULL
+/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_setCallback(
+    link: *mut mbm_link,
+    callback: Option<unsafe extern "C" fn(context: *mut c_void, event: u8, status: u8)>,
+    context: *mut c_void,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(link, |object| {
+            (*object).callback = callback;
+            (*object).callback_context = context;
+            Status::OK
+        })
+    }
+}
+
+/// Sets your storage for counters, in which the link counts from now on.
+///
+/// @param link      the object
+/// @param counters  your counters, zeroed; NULL stops counting
+/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_setCounters(
+    link: *mut mbm_link,
+    counters: *mut mbm_linkCounters,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(link, |object| {
+            (*object).counters = counters;
+            Status::OK
+        })
+    }
+}
+
+/// Returns what a link is doing.
+///
+/// @param link  the object
+/// @return MBM_LINK_IS_DOWN, MBM_LINK_IS_CONNECTING or MBM_LINK_IS_UP; 0 before the first poll,
+///         and for an object that was never begun
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_state(link: *const mbm_link) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { pointers::read(link, 0, |object| (*object).core.state() as u8) }
+}

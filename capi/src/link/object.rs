@@ -1,0 +1,327 @@
+//! The link object, and how a client with a link is polled.
+
+use crate::client::mbm_linkHooks;
+use crate::client::object::{self as client, LinkedKind, TransportKind};
+#[cfg(not(any(target_os = "none", mbm_firmware)))]
+use crate::client::poll::advance_all;
+use crate::client::request::RequestPtr;
+use crate::client::{mbm_client, mbm_clientRequest};
+use crate::pointers::{self, CObject};
+use crate::port::mbm_port;
+use core::ffi::c_void;
+use mbm::client::{ClientRequest as _, Link, LinkEvent, LinkHooks, LinkState};
+use mbm::error::Status;
+
+/// A link that opens itself again when it was lost. It belongs to one client:
+/// mbm_client_poll polls both.
+///
+/// You own the storage. It must be zero before first use, as a static object is, and must stay
+/// where it is until mbm_link_end or until the client was begun again.
+#[repr(C)]
+pub struct mbm_link {
+    /// Private.
+    pointers: [*mut c_void; 31],
+    /// Private.
+    words: [u32; 22],
+}
+
+/// What has happened to a link. You may read and zero the counters at any time, but not from
+/// an interrupt; each wraps at 2^32.
+#[repr(C)]
+pub struct mbm_linkCounters {
+    /// Calls of `connect` of mbm_linkHooks.
+    pub attempts: u32,
+    /// Attempts that failed.
+    pub failed: u32,
+    /// How often the link was opened, or found open by mbm_link_begin.
+    pub connected: u32,
+    /// How often an open link was lost.
+    pub lost: u32,
+}
+
+/// The fields in the storage of an `mbm_link`.
+#[repr(C)]
+pub struct Object {
+    /// The client's `kind` points here.
+    pub(super) kind: LinkedKind,
+    mark: u8,
+    /// A LinkEvent, and its status.
+    pub(super) event: u8,
+    pub(super) status: u8,
+    pub(super) client: *mut mbm_client,
+    /// What the client had before.
+    pub(super) transport: *const TransportKind,
+    pub(super) port: mbm_port,
+    pub(super) hooks: mbm_linkHooks,
+    pub(super) random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
+    pub(super) random_context: *mut c_void,
+    pub(super) callback: Option<unsafe extern "C" fn(context: *mut c_void, event: u8, status: u8)>,
+    pub(super) callback_context: *mut c_void,
+    pub(super) counters: *mut mbm_linkCounters,
+    pub(super) core: Link,
+    /// A request that is never sent. While the client is idle, it is in the client's queue. Its
+    /// `done` calls `callback`, so `callback` may do what `done` of any request may.
+    pub(super) request: mbm_clientRequest,
+}
+
+const _: () = {
+    let space = size_of::<mbm_link>();
+    let used = size_of::<Object>();
+    assert!(align_of::<mbm_link>() >= align_of::<Object>());
+    assert!(used <= space);
+    // Hiding the fields may waste 5 % where RAM is scarce.
+    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
+};
+
+// SAFETY: the mark is a field of its own.
+unsafe impl CObject for mbm_link {
+    // A pointer, for the reason that `mbm_client` has.
+    type Access<'a> = *mut Object;
+
+    unsafe fn mark(link: *const mbm_link) -> *mut u8 {
+        // SAFETY: as the caller promises; every object is writable storage.
+        unsafe { &raw mut (*link.cast::<Object>().cast_mut()).mark }
+    }
+
+    unsafe fn access<'a>(link: *mut mbm_link) -> Self::Access<'a> {
+        link.cast()
+    }
+}
+
+/// The hooks of a link, as the core calls them.
+struct Hooks {
+    hooks: mbm_linkHooks,
+    link: *mut Object,
+}
+
+// SAFETY, of all functions here: the hooks are C functions that keep the contract of their
+// comments, and `link` is begun.
+impl LinkHooks for Hooks {
+    fn disconnect(&mut self) {
+        if let Some(disconnect) = self.hooks.disconnect {
+            // SAFETY: see above.
+            unsafe { disconnect(self.hooks.context) }
+        }
+    }
+
+    fn connect(&mut self) -> Status {
+        // SAFETY: see above.
+        unsafe {
+            count(self.link, |counters| &mut counters.attempts);
+            match self.hooks.connect {
+                Some(connect) => Status::from_code(connect(self.hooks.context)),
+                None => Status::LINK_LOST,
+            }
+        }
+    }
+
+    fn status(&mut self) -> Status {
+        match self.hooks.status {
+            // SAFETY: see above.
+            Some(status) => Status::from_code(unsafe { status(self.hooks.context) }),
+            // Only in the first step is the link neither open nor being opened.
+            None => Status::LINK_LOST,
+        }
+    }
+
+    fn random(&mut self) -> u32 {
+        // SAFETY: see above.
+        unsafe {
+            match (*self.link).random {
+                Some(random) => random((*self.link).random_context),
+                None => 0,
+            }
+        }
+    }
+}
+
+/// Counts one event, if there are counters.
+///
+/// # Safety
+/// `link` is begun.
+unsafe fn count(link: *mut Object, counter: fn(&mut mbm_linkCounters) -> &mut u32) {
+    // SAFETY: as the caller promises; the counters are valid as mbm_link_setCounters demands.
+    unsafe {
+        if let Some(counters) = (*link).counters.as_mut() {
+            let counter = counter(counters);
+            *counter = counter.wrapping_add(1);
+        }
+    }
+}
+
+/// The functions of a client that has a link.
+pub(super) const KIND: LinkedFunctions = LinkedFunctions {
+    advance,
+    #[cfg(not(any(target_os = "none", mbm_firmware)))]
+    poll,
+    delay,
+};
+
+/// See [`KIND`].
+pub(super) struct LinkedFunctions {
+    pub(super) advance: client::Advance,
+    #[cfg(not(any(target_os = "none", mbm_firmware)))]
+    pub(super) poll: unsafe fn(*mut mbm_client) -> Status,
+    pub(super) delay: unsafe fn(*mut client::Object, now: u32, delay: u32) -> u32,
+}
+
+/// # Safety
+/// As for [`advance_all`], with a client that has a link.
+#[cfg(not(any(target_os = "none", mbm_firmware)))]
+unsafe fn poll(object: *mut mbm_client) -> Status {
+    // SAFETY: as the caller promises.
+    unsafe { advance_all(object, advance) }
+}
+
+/// Advances link and client.
+///
+/// # Safety
+/// As for [`client::Advance`].
+unsafe fn advance(object: *mut client::Object, now: u32, fresh: bool) -> Option<RequestPtr> {
+    // SAFETY: as the caller promises. `done` of a request may have ended the link during this
+    // poll of the client.
+    unsafe {
+        if !(*object).linked {
+            return ((*(*object).kind).advance)(object, now, fresh);
+        }
+        let link = (*object).kind.cast::<Object>().cast_mut();
+        pointers::with_hooks(link.cast::<mbm_link>().cast_const(), || {
+            advance_linked(link, object, now, fresh)
+        })
+    }
+}
+
+/// As [`advance`].
+///
+/// # Safety
+/// As for [`advance`]; `link` is the client's.
+unsafe fn advance_linked(
+    link: *mut Object,
+    object: *mut client::Object,
+    now: u32,
+    fresh: bool,
+) -> Option<RequestPtr> {
+    // SAFETY: as the caller promises. No reference into link or client lives while the port's
+    // hooks run; the core is not used by the hooks of the link, whose calls are refused.
+    unsafe {
+        if (*link).core.is_up() {
+            let ended = advance_transport(link, object, now, fresh);
+            if (*link).core.is_up() || ended.is_some() {
+                return ended;
+            }
+        }
+        let mut hooks = Hooks {
+            hooks: (*link).hooks,
+            link,
+        };
+        let happened = (*link).core.step(now, fresh, &mut hooks);
+        if let Some((event, status)) = happened {
+            if event == LinkEvent::Lost {
+                ((*(*link).transport).release)(object, None);
+                client::queue(object).interrupt();
+            }
+            client::queue(object).connected = event == LinkEvent::Connected;
+            return note(link, event, status);
+        }
+        if (*link).core.is_up() {
+            // `fresh` is over, or the link was up before: there is nothing to do.
+            return None;
+        }
+        let queue = client::queue(object);
+        if (*link).core.fails_requests() {
+            queue.fail_all();
+        }
+        queue.end_lost(now, (*(*link).transport).storage(object))
+    }
+}
+
+/// Advances the client's requests. An idle client reads and drops what arrives.
+///
+/// # Safety
+/// As for [`advance_linked`].
+unsafe fn advance_transport(
+    link: *mut Object,
+    object: *mut client::Object,
+    now: u32,
+    fresh: bool,
+) -> Option<RequestPtr> {
+    // SAFETY: as the caller promises. The request of the link is in no queue.
+    unsafe {
+        let advance = (*(*link).transport).advance;
+        // The link's own step, which calls no hook while the link is up.
+        let mut hooks = Hooks {
+            hooks: (*link).hooks,
+            link,
+        };
+        (*link).core.step(now, false, &mut hooks);
+        if !fresh || !client::queue(object).is_empty() {
+            let mut ended = advance(object, now, fresh)?;
+            if (*link).core.is_lost && ended.state().status.is_failure() {
+                ended.state_mut().status = Status::LINK_LOST;
+            }
+            return Some(ended);
+        }
+        let placeholder = RequestPtr::new(&raw mut (*link).request)?;
+        client::queue(object).begin_idle(placeholder, now);
+        advance(object, now, true);
+        client::queue(object).end_idle();
+        None
+    }
+}
+
+/// Counts an event. Returns the request whose `done` reports the event, if the program wants
+/// to know it.
+///
+/// # Safety
+/// As for [`advance_linked`].
+unsafe fn note(link: *mut Object, event: LinkEvent, status: Status) -> Option<RequestPtr> {
+    // SAFETY: as the caller promises.
+    unsafe {
+        count(
+            link,
+            match event {
+                LinkEvent::Connected => |counters| &mut counters.connected,
+                LinkEvent::Lost => |counters| &mut counters.lost,
+                LinkEvent::Failed => |counters| &mut counters.failed,
+            },
+        );
+        (*link).callback?;
+        (*link).event = event as u8;
+        (*link).status = status.code();
+        RequestPtr::new(&raw mut (*link).request)
+    }
+}
+
+/// Reports an event to the program: `done` of the link's request.
+///
+/// # Safety
+/// `context` is a link that is begun.
+pub(super) unsafe extern "C" fn report(context: *mut c_void, _: *mut mbm_clientRequest) {
+    let link = context.cast::<Object>();
+    // SAFETY: as the caller promises; no reference lives while the hook runs.
+    unsafe {
+        if let Some(callback) = (*link).callback {
+            callback((*link).callback_context, (*link).event, (*link).status);
+        }
+    }
+}
+
+/// Microseconds until the next poll of the client is due; `delay` is that of its transport.
+///
+/// # Safety
+/// As for [`advance`]; `object` has a link.
+unsafe fn delay(object: *mut client::Object, now: u32, delay: u32) -> u32 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let link = (*object).kind.cast::<Object>();
+        let queue = client::queue(object);
+        if queue.suspended {
+            return u32::MAX;
+        }
+        let fails = (*link).core.fails_requests() && !queue.is_empty();
+        if (*link).core.state() != LinkState::Up && (fails || queue.has_lost()) {
+            return 0;
+        }
+        (*link).core.delay(now, delay)
+    }
+}

@@ -1,0 +1,225 @@
+//! Keeps a link open: decides when to open it again after it was lost.
+
+use super::policy::{Backoff, Policy};
+use crate::error::Status;
+use crate::time::{elapsed, has_elapsed, millis};
+
+/// The longest time between two looks at a link that is idle, in microseconds.
+pub const IDLE_DELAY: u32 = millis(1000);
+
+/// The time between two looks at a connection that is being made, in microseconds.
+pub const CONNECT_DELAY: u32 = millis(50);
+
+/// What a link needs of its user.
+pub trait LinkHooks {
+    /// Closes the link, if it is open.
+    fn disconnect(&mut self);
+
+    /// Opens the link without waiting: [`Status::OK`], [`Status::PENDING`] while the connection
+    /// is being made, or the reason why that failed.
+    fn connect(&mut self) -> Status;
+
+    /// [`Status::OK`] if the link is open, [`Status::PENDING`] while the connection is being
+    /// made, or another status.
+    fn status(&mut self) -> Status;
+
+    /// A random number for the jitter.
+    fn random(&mut self) -> u32;
+}
+
+/// What a link is doing.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum LinkState {
+    /// Nothing is known yet: the next step looks whether the link is open already.
+    Unknown,
+    /// There is no link. It is opened when the wait is over.
+    Down,
+    /// The connection is being made.
+    Connecting,
+    /// The link is open.
+    Up,
+}
+
+/// What has happened to a link.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum LinkEvent {
+    /// It is open.
+    Connected,
+    /// It was open, and is lost.
+    Lost,
+    /// It could not be opened.
+    Failed,
+}
+
+/// A link that is opened again whenever it was lost.
+///
+/// The wait before an attempt grows with each attempt that fails. It starts anew after the
+/// link was open for at least as long as the last wait; so a peer that accepts connections
+/// and closes them at once is not asked in a tight loop.
+#[repr(C)]
+#[derive(Clone, Debug)]
+pub struct Link {
+    state: LinkState,
+    /// Number of attempts since the link was last open for long enough, 0 to 255.
+    attempts: u8,
+    /// The link was lost or not opened, and [`LinkHooks::disconnect`] was not called since.
+    is_to_close: bool,
+    /// The next attempt follows at once.
+    at_once: bool,
+    /// The port has reported that the link is lost.
+    pub is_lost: bool,
+    /// Requests wait for the link instead of failing.
+    pub keeps_requests: bool,
+    /// The wait before an attempt, its growth and jitter.
+    pub policy: Policy,
+    /// How long a connection may take to be made, in microseconds; 0 for no limit.
+    pub connect_timeout: u32,
+    /// The time at which the state began, and how long it lasts.
+    since: u32,
+    wait: u32,
+}
+
+impl Link {
+    /// Sets the defaults: first wait half a second, each wait twice the one before, at most
+    /// 30 seconds; 10 seconds for a connection.
+    pub fn begin(&mut self) {
+        self.state = LinkState::Unknown;
+        self.policy
+            .set_backoff(Backoff::Exponential, millis(500), millis(30_000));
+        self.connect_timeout = millis(10_000);
+    }
+
+    /// What the link is doing.
+    pub const fn state(&self) -> LinkState {
+        self.state
+    }
+
+    /// True if bytes can be read and written.
+    pub fn is_up(&self) -> bool {
+        self.state == LinkState::Up && !self.is_lost
+    }
+
+    /// True if pending requests end now, because there is no link.
+    pub fn fails_requests(&self) -> bool {
+        self.state == LinkState::Down && !self.keeps_requests
+    }
+
+    /// Closes the link and opens it again without a wait.
+    pub fn restart(&mut self) {
+        self.attempts = 0;
+        match self.state {
+            LinkState::Up => {
+                self.is_lost = true;
+                self.at_once = true;
+            }
+            LinkState::Connecting => {
+                self.state = LinkState::Down;
+                self.is_to_close = true;
+                self.wait = 0;
+            }
+            _ => self.wait = 0,
+        }
+    }
+
+    /// Does what is due at the time `now`, and returns what has happened, with its status. An
+    /// attempt is made only if `fresh`, so at most once in each poll.
+    pub fn step(
+        &mut self,
+        now: u32,
+        fresh: bool,
+        hooks: &mut impl LinkHooks,
+    ) -> Option<(LinkEvent, Status)> {
+        let is_over = has_elapsed(self.wait, now, self.since);
+        let status = match self.state {
+            LinkState::Up => {
+                if self.is_lost {
+                    return self.fail(LinkEvent::Lost, Status::LINK_LOST, now, hooks);
+                }
+                if is_over {
+                    self.attempts = 0;
+                }
+                return None;
+            }
+            LinkState::Down => {
+                if self.is_to_close {
+                    self.is_to_close = false;
+                    hooks.disconnect();
+                }
+                if !fresh || !is_over {
+                    return None;
+                }
+                hooks.connect()
+            }
+            _ if !fresh => return None,
+            LinkState::Unknown => match hooks.status() {
+                Status::OK => Status::OK,
+                Status::PENDING => Status::PENDING,
+                _ => hooks.connect(),
+            },
+            LinkState::Connecting => match hooks.status() {
+                Status::PENDING if is_over && self.connect_timeout > 0 => {
+                    Status::RESPONSE_TIMED_OUT
+                }
+                status => status,
+            },
+        };
+        match status {
+            Status::OK => {
+                self.state = LinkState::Up;
+                self.is_lost = false;
+                self.since = now;
+                // The time for which the link must be open before the waits start anew.
+                self.wait = self.policy.wait(self.attempts, || 0);
+                Some((LinkEvent::Connected, status))
+            }
+            Status::PENDING => {
+                if self.state != LinkState::Connecting {
+                    self.state = LinkState::Connecting;
+                    self.since = now;
+                    self.wait = self.connect_timeout;
+                }
+                None
+            }
+            _ => self.fail(LinkEvent::Failed, status, now, hooks),
+        }
+    }
+
+    /// Notes that the link is lost or was not opened, and begins the wait before the next
+    /// attempt.
+    fn fail(
+        &mut self,
+        event: LinkEvent,
+        status: Status,
+        now: u32,
+        hooks: &mut impl LinkHooks,
+    ) -> Option<(LinkEvent, Status)> {
+        self.state = LinkState::Down;
+        self.is_to_close = true;
+        self.is_lost = false;
+        self.since = now;
+        self.wait = 0;
+        if !self.at_once {
+            self.attempts = self.attempts.saturating_add(1);
+            self.wait = self.policy.wait(self.attempts, || hooks.random());
+        }
+        self.at_once = false;
+        Some((event, status))
+    }
+
+    /// Microseconds until the next step is due. While the link is open, `delay` is the delay
+    /// of the client, `u32::MAX` if it has no request.
+    pub fn delay(&self, now: u32, delay: u32) -> u32 {
+        let rest = self.wait.saturating_sub(elapsed(now, self.since));
+        match self.state {
+            _ if self.is_lost || self.is_to_close => 0,
+            LinkState::Unknown => 0,
+            LinkState::Up if delay == u32::MAX => IDLE_DELAY,
+            LinkState::Up => delay,
+            LinkState::Connecting if self.connect_timeout == 0 => CONNECT_DELAY,
+            LinkState::Connecting => rest.min(CONNECT_DELAY),
+            LinkState::Down => rest,
+        }
+    }
+}
