@@ -130,7 +130,6 @@ static void optional_hooks_are_passed_on_only_where_the_port_has_them(void **sta
         assert_int_equal(traced->flush == NULL, i);
         assert_int_equal(traced->preTransmission == NULL, i);
         assert_int_equal(traced->idle == NULL, i);
-        /* It ends a sent frame. */
         traced->postTransmission(traced->context);
         assert_int_equal(wire.called[HOOK_POST], 1);
     }
@@ -263,7 +262,9 @@ static void the_frame_timeout_can_be_set(void **state)
     (void)state;
     begin_master();
     traced = mbm_trace_port(&trace);
+    assert_int_equal(mbm_trace_getFrameTimeout(&trace), 50);
     OK(mbm_trace_setFrameTimeout(&trace, 200));
+    assert_int_equal(mbm_trace_getFrameTimeout(&trace), 200);
     hooked_port_arrive(&wire, REPLY, 5);
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
     wire.now += 199000 - wire.step;
@@ -317,6 +318,8 @@ static void a_trace_goes_on_after_refused_calls(void **state)
     IS(MBM_NOT_INITIALISED, mbm_trace_setFrameTimeout(&trace, 1));
     assert_null(mbm_trace_port(&trace));
     assert_null(mbm_trace_port(NULL));
+    assert_int_equal(mbm_trace_getFrameTimeout(&trace), 0);
+    assert_int_equal(mbm_trace_getFrameTimeout(NULL), 0);
     IS(MBM_INVALID_ARGUMENT, mbm_trace_flush(NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_setFrameTimeout(NULL, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_beginClient(NULL, &port, &rtu, buffer, 64, keep, NULL));
@@ -358,11 +361,12 @@ static void try_everything(void)
     REFUSED(MBM_BUSY, trace,
             mbm_trace_beginClient(&trace, &port, FRAMING(MBM_FRAMING_RTU), buffer, 64, keep, NULL));
     assert_null(mbm_trace_port(&trace));
+    assert_int_equal(mbm_trace_getFrameTimeout(&trace), 0);
     IS(MBM_BUSY, mbm_master_poll(&master));
     IS(MBM_BUSY, mbm_master_cancel(&master));
 }
 
-/* From the hooks of the port that the trace calls while it works. */
+/* The trace is at work in these hooks of the port. */
 static void try_from_the_port(int hook)
 {
     if (hook == HOOK_READ || hook == HOOK_WRITE)
