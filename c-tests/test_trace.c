@@ -130,16 +130,8 @@ static void optional_hooks_are_passed_on_only_where_the_port_has_them(void **sta
         assert_int_equal(traced->flush == NULL, i);
         assert_int_equal(traced->preTransmission == NULL, i);
         assert_int_equal(traced->idle == NULL, i);
-        /* It ends a sent frame. */
         traced->postTransmission(traced->context);
         assert_int_equal(wire.called[HOOK_POST], 1);
-    }
-}
-
-static void answer_with(const uint8_t *reply, size_t length)
-{
-    hooked_port_arrive(&wire, reply, length);
-    while (mbm_client_poll(&client) == MBM_PENDING) {
     }
 }
 
@@ -176,7 +168,9 @@ static void a_client_of_each_framing_works_through_a_trace(void **state)
         packet.dataLength = 4;
         packet.quantity = 2;
         OK(mbm_frame_build(framing, &packet, reply, sizeof reply, &length));
-        answer_with(reply, length);
+        hooked_port_arrive(&wire, reply, length);
+        while (mbm_client_poll(&client) == MBM_PENDING) {
+        }
         OK(request.status);
         assert_int_equal(count, 2);
         is_record(0, MBM_TRACE_SENT, MBM_PACKET_REQUEST, MBM_OK, wire.sent, wire.length);
@@ -268,7 +262,9 @@ static void the_frame_timeout_can_be_set(void **state)
     (void)state;
     begin_master();
     traced = mbm_trace_port(&trace);
+    assert_int_equal(mbm_trace_getFrameTimeout(&trace), 50);
     OK(mbm_trace_setFrameTimeout(&trace, 200));
+    assert_int_equal(mbm_trace_getFrameTimeout(&trace), 200);
     hooked_port_arrive(&wire, REPLY, 5);
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
     wire.now += 199000 - wire.step;
@@ -312,6 +308,7 @@ static void a_trace_goes_on_after_refused_calls(void **state)
     const mbm_framing *const framings[] = {NULL,          &no_frames,      &unknown,
                                            &no_functions, &wrong_function, &wrong_end};
     mbm_port incomplete = port;
+    const mbm_port *traced;
     uint8_t bytes[16];
     size_t i;
 
@@ -321,36 +318,35 @@ static void a_trace_goes_on_after_refused_calls(void **state)
     IS(MBM_NOT_INITIALISED, mbm_trace_setFrameTimeout(&trace, 1));
     assert_null(mbm_trace_port(&trace));
     assert_null(mbm_trace_port(NULL));
+    assert_int_equal(mbm_trace_getFrameTimeout(&trace), 0);
+    assert_int_equal(mbm_trace_getFrameTimeout(NULL), 0);
     IS(MBM_INVALID_ARGUMENT, mbm_trace_flush(NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_setFrameTimeout(NULL, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_beginClient(NULL, &port, &rtu, buffer, 64, keep, NULL));
     begin_master();
     hooked_port_arrive_rtu(&wire, 17, REPLY + 1, sizeof REPLY - 1);
     wire.last = 4;
-    {
-        const mbm_port *const traced = mbm_trace_port(&trace);
-
-        assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 4);
-        for (i = 0; i < COUNT(framings); i++)
-            REFUSED(MBM_INVALID_ARGUMENT, trace,
-                    mbm_trace_beginServer(&trace, &port, framings[i], buffer, 64, keep, NULL));
+    traced = mbm_trace_port(&trace);
+    assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 4);
+    for (i = 0; i < COUNT(framings); i++)
         REFUSED(MBM_INVALID_ARGUMENT, trace,
-                mbm_trace_beginClient(&trace, NULL, &rtu, buffer, 64, keep, NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, trace,
-                mbm_trace_beginClient(&trace, &incomplete, &rtu, buffer, 64, keep, NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, trace,
-                mbm_trace_beginClient(&trace, traced, &rtu, buffer, 64, keep, NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, trace,
-                mbm_trace_beginClient(&trace, &port, &rtu, NULL, 64, keep, NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, trace,
-                mbm_trace_beginClient(&trace, &port, &rtu, buffer, 64, NULL, NULL));
-        REFUSED(MBM_BUFFER_TOO_SMALL, trace,
-                mbm_trace_beginClient(&trace, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER - 1, keep,
-                                      NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, trace, mbm_trace_setFrameTimeout(&trace, 0));
-        wire.last = sizeof REPLY + 2;
-        assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
-    }
+                mbm_trace_beginServer(&trace, &port, framings[i], buffer, 64, keep, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, trace,
+            mbm_trace_beginClient(&trace, NULL, &rtu, buffer, 64, keep, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, trace,
+            mbm_trace_beginClient(&trace, &incomplete, &rtu, buffer, 64, keep, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, trace,
+            mbm_trace_beginClient(&trace, traced, &rtu, buffer, 64, keep, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, trace,
+            mbm_trace_beginClient(&trace, &port, &rtu, NULL, 64, keep, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, trace,
+            mbm_trace_beginClient(&trace, &port, &rtu, buffer, 64, NULL, NULL));
+    REFUSED(
+        MBM_BUFFER_TOO_SMALL, trace,
+        mbm_trace_beginClient(&trace, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER - 1, keep, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, trace, mbm_trace_setFrameTimeout(&trace, 0));
+    wire.last = sizeof REPLY + 2;
+    assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
     assert_int_equal(count, 1);
     is_record(0, MBM_TRACE_RECEIVED, MBM_PACKET_RESPONSE, MBM_OK, wire.arriving, 9);
 }
@@ -365,11 +361,12 @@ static void try_everything(void)
     REFUSED(MBM_BUSY, trace,
             mbm_trace_beginClient(&trace, &port, FRAMING(MBM_FRAMING_RTU), buffer, 64, keep, NULL));
     assert_null(mbm_trace_port(&trace));
+    assert_int_equal(mbm_trace_getFrameTimeout(&trace), 0);
     IS(MBM_BUSY, mbm_master_poll(&master));
     IS(MBM_BUSY, mbm_master_cancel(&master));
 }
 
-/* From the hooks of the port that the trace calls while it works. */
+/* The trace is at work in these hooks of the port. */
 static void try_from_the_port(int hook)
 {
     if (hook == HOOK_READ || hook == HOOK_WRITE)

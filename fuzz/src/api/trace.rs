@@ -75,9 +75,12 @@ pub fn step(w: &World) {
         0 | 1 => begin(w, trace),
         2 => {
             let timeout = w.word();
-            refused_changes_nothing(w, &[span(trace)], "mbm_trace_setFrameTimeout", || {
-                call!(w, trace, mbm_trace_setFrameTimeout(trace, timeout))
-            });
+            let status =
+                refused_changes_nothing(w, &[span(trace)], "mbm_trace_setFrameTimeout", || {
+                    call!(w, trace, mbm_trace_setFrameTimeout(trace, timeout))
+                });
+            let found = call!(w, trace, mbm_trace_getFrameTimeout(trace));
+            assert!(status != MBM_OK || found == timeout);
         }
         _ => {
             refused_changes_nothing(w, &[span(trace)], "mbm_trace_flush", || {
