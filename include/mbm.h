@@ -6441,6 +6441,14 @@ uint8_t mbm_trace_setFrameTimeout(struct mbm_trace *trace,
                                   uint16_t timeoutMs);
 
 /**
+ * Returns the frame timeout: see mbm_trace_setFrameTimeout.
+ *
+ * @param trace  the object
+ * @return milliseconds; 0 for an object that was never begun, and from within its hook
+ */
+uint16_t mbm_trace_getFrameTimeout(const struct mbm_trace *trace);
+
+/**
  * Calls the hook for the bytes that wait for the rest of their frame: before the program
  * ends, or before a link is closed.
  *
