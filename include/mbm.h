@@ -1541,7 +1541,7 @@ typedef struct mbm_clientRequest {
     /**
      * Private.
      */
-    uint32_t words[8];
+    uint32_t words[7];
 } mbm_clientRequest;
 
 /**
@@ -2424,11 +2424,11 @@ typedef struct mbm_link {
     /**
      * Private.
      */
-    void *pointers[31];
+    void *pointers[32];
     /**
      * Private.
      */
-    uint32_t words[22];
+    uint32_t words[20];
 } mbm_link;
 
 /**
