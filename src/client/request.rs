@@ -42,7 +42,7 @@ pub struct RequestState {
     pub length: u8,
     /// The response timeout in milliseconds; 0 for that of the unit or line.
     pub timeout_ms: u16,
-    /// Greatest number of retries; 0 for that of the unit or line, [`NO_RETRIES`] for none.
+    /// Greatest number of retries; 0 for that of the unit or line, [`NO_RETRIES`](super::NO_RETRIES) for none.
     pub retry_limit: u8,
     stage: Stage,
     /// Number of retries so far.

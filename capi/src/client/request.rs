@@ -56,7 +56,7 @@ pub struct mbm_clientRequest {
     /// Private.
     bytes: [u8; 5],
     /// Private.
-    words: [u32; 8],
+    words: [u32; 7],
 }
 
 /// The fields in the storage of an `mbm_clientRequest`.

@@ -20,9 +20,9 @@ use mbm::error::Status;
 #[repr(C)]
 pub struct mbm_link {
     /// Private.
-    pointers: [*mut c_void; 31],
+    pointers: [*mut c_void; 32],
     /// Private.
-    words: [u32; 22],
+    words: [u32; 20],
 }
 
 /// What has happened to a link. You may read and zero the counters at any time, but not from
