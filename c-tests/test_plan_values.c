@@ -75,6 +75,14 @@ static void integers_have_their_sign_in_every_order(void **state)
         assert_int_equal(d.requested, 1);
         for (i = 0; i < COUNT(numbers); i++)
             assert_true(plan_device_integer(&d, (uint16_t)i, 0) == numbers[i].value);
+        for (i = 1; i < COUNT(numbers); i++) {
+            int32_t value;
+            uint8_t fits = numbers[i].value <= INT32_MAX && numbers[i].registers < 4;
+
+            assert_int_equal(mbm_plan_getInt32(&d.plan, (uint16_t)i, 0, &value) == MBM_OK, fits);
+            if (fits)
+                assert_int_equal(value, numbers[i].value);
+        }
     }
 }
 
@@ -144,8 +152,61 @@ static void a_number_is_scaled_and_rounded_to_the_nearest(void **state)
         put((uint16_t)i, scales[i].bits, 1, MBM_ORDER_ABCD);
     }
     read_all();
-    for (i = 0; i < COUNT(scales); i++)
+    for (i = 0; i < COUNT(scales); i++) {
+        int64_t product = (int64_t)(int16_t)scales[i].bits * scales[i].multiplier;
+        int32_t value = 77;
+
         assert_true(plan_device_integer(&d, (uint16_t)i, 0) == scales[i].value);
+        /* The same with 32 bits, where the product has no more. */
+        if (scales[i].divisor < INT32_MAX && product < INT32_MAX && product > -INT32_MAX) {
+            OK(mbm_plan_getInt32(&d.plan, (uint16_t)i, 0, &value));
+            assert_int_equal(value, scales[i].value);
+        }
+    }
+}
+
+static void a_number_beyond_32_bits_is_too_large_for_int32(void **state)
+{
+    static const struct {
+        uint8_t type;
+        uint64_t bits;
+        int32_t multiplier, divisor;
+        uint8_t status;
+        int32_t value;
+    } numbers[] = {
+        {MBM_TYPE_UINT32, INT32_MAX, 0, 0, MBM_OK, INT32_MAX},
+        {MBM_TYPE_UINT32, 0x80000000, 0, 0, MBM_BUFFER_TOO_SMALL, 0},
+        {MBM_TYPE_UINT32, UINT32_MAX, 0, 4, MBM_BUFFER_TOO_SMALL, 0},
+        {MBM_TYPE_UINT32, UINT32_MAX - 2, 0, 4, MBM_OK, 1073741823},
+        {MBM_TYPE_INT32, 0x80000001, 0, 0, MBM_OK, -INT32_MAX},
+        {MBM_TYPE_INT32, 0x80000000, 0, 0, MBM_BUFFER_TOO_SMALL, 0},
+        {MBM_TYPE_INT32, 0xFFFFFFFF, 7, 2, MBM_OK, -4},
+        {MBM_TYPE_INT16, 0x8000, INT32_MIN, 0, MBM_BUFFER_TOO_SMALL, 0},
+        {MBM_TYPE_UINT64, 1, 0, 0, MBM_INVALID_ARGUMENT, 0},
+        {MBM_TYPE_FLOAT, 1, 0, 0, MBM_INVALID_ARGUMENT, 0},
+    };
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(numbers); i++) {
+        mbm_planField *field = add(numbers[i].type, (uint16_t)(4 * i));
+        uint8_t type = numbers[i].type;
+
+        field->multiplier = numbers[i].multiplier;
+        field->divisor = numbers[i].divisor;
+        put((uint16_t)(4 * i), numbers[i].bits,
+            type == MBM_TYPE_INT16    ? 1
+            : type == MBM_TYPE_UINT64 ? 4
+                                      : 2,
+            MBM_ORDER_ABCD);
+    }
+    read_all();
+    for (i = 0; i < COUNT(numbers); i++) {
+        int32_t value = 77;
+
+        IS(numbers[i].status, mbm_plan_getInt32(&d.plan, (uint16_t)i, 0, &value));
+        assert_int_equal(value, numbers[i].status == MBM_OK ? numbers[i].value : 77);
+    }
 }
 
 static void a_number_beyond_64_bits_is_too_large(void **state)
@@ -394,6 +455,7 @@ int main(void)
         cmocka_unit_test(integers_have_their_sign_in_every_order),
         cmocka_unit_test(floats_and_doubles_are_numbers_too),
         cmocka_unit_test_setup(a_number_is_scaled_and_rounded_to_the_nearest, rtu),
+        cmocka_unit_test_setup(a_number_beyond_32_bits_is_too_large_for_int32, rtu),
         cmocka_unit_test_setup(a_number_beyond_64_bits_is_too_large, rtu),
         cmocka_unit_test_setup(a_field_may_have_many_values, rtu),
         cmocka_unit_test_setup(a_text_ends_at_its_nul_or_with_its_field, rtu),

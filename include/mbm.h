@@ -2396,7 +2396,7 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
 /**
  * The most fields of one plan.
  */
-#define MBM_PLAN_MAX_FIELDS 32767
+#define MBM_PLAN_MAX_FIELDS 16383
 
 /**
  * A plan: a table of fields that a client reads from units again and again.
@@ -2541,7 +2541,7 @@ typedef struct mbm_planSetup {
      */
     uint16_t *data;
     /**
-     * Storage: the requests with which the plan reads, zeroed. With one it sends one read after
+     * Storage: the requests with which the plan reads, zeroed; they are the plan's alone. With one it sends one read after
      * the other; more are for Modbus TCP, where several may be under way at once.
      */
     struct mbm_clientRequest *requests;
@@ -2554,9 +2554,9 @@ typedef struct mbm_planSetup {
      */
     const struct mbm_planExcludedRange *excluded;
     /**
-     * Optional: called by mbm_client_poll, or mbm_plan_poll, for each field of a read that has
-     * ended, and for each field of a unit that the plan takes for silent. It may call every
-     * function on the plan, and on the client what a `done` function may call.
+     * Optional: called by mbm_plan_poll for each field of a read that has ended, and for each
+     * field of a unit that the plan takes for silent. It may call every function on the plan
+     * and on the client.
      */
     void (*update)(void *context, struct mbm_plan *plan, uint16_t field);
     /**
@@ -2683,8 +2683,9 @@ uint8_t mbm_plan_begin(struct mbm_plan *plan,
 uint8_t mbm_plan_end(struct mbm_plan *plan);
 
 /**
- * Queues the reads that are due, as far as there are requests for them. It does not poll the
- * client: call mbm_client_poll after it.
+ * Takes the replies that have arrived, calls `update` for the fields of each read that has
+ * ended, and queues the reads that are due, as far as there are requests for them. It does not
+ * poll the client: call mbm_client_poll after it.
  *
  * @param plan  the object
  * @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT;
@@ -2737,6 +2738,22 @@ uint8_t mbm_plan_getInteger(const struct mbm_plan *plan,
                             uint16_t field,
                             uint16_t index,
                             int64_t *value);
+
+/**
+ * As mbm_plan_getInteger, but with 32 bits throughout: less code on a microcontroller.
+ *
+ * @param plan   the object
+ * @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number
+ * @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL also if the value, multiplied, plus half
+ *         of the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of
+ *         64 bits
+ */
+uint8_t mbm_plan_getInt32(const struct mbm_plan *plan,
+                          uint16_t field,
+                          uint16_t index,
+                          int32_t *value);
 
 /**
  * A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
