@@ -213,9 +213,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(a_unit_that_is_gone_keeps_its_last_value_with_status_and_age, rtu),
-        cmocka_unit_test_setup(the_plan_backs_off_from_a_silent_unit_and_goes_on_with_the_rest, rtu),
+        cmocka_unit_test_setup(the_plan_backs_off_from_a_silent_unit_and_goes_on_with_the_rest,
+                               rtu),
         cmocka_unit_test_setup(a_silent_unit_with_many_reads_is_tried_with_one_at_a_time, rtu),
-        cmocka_unit_test_setup(one_read_without_an_answer_does_not_stop_the_others_of_its_unit, rtu),
+        cmocka_unit_test_setup(one_read_without_an_answer_does_not_stop_the_others_of_its_unit,
+                               rtu),
         cmocka_unit_test_setup(an_exception_is_an_answer, rtu),
         cmocka_unit_test_setup(half_a_reply_is_no_value, rtu),
         cmocka_unit_test_setup(a_damaged_reply_is_read_again_at_the_interval, rtu),

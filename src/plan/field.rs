@@ -53,9 +53,9 @@ pub struct Field {
     pub count: u16,
     /// The time from one read to the next, 1 to [`LONGEST_INTERVAL_MS`].
     pub interval_ms: u32,
-    /// Each integer is multiplied by this; 0 means 1. Other types have no scale.
+    /// Each number is multiplied by this; 0 means 1.
     pub multiplier: i32,
-    /// Each integer is then divided by this; 0 means 1; not negative.
+    /// Each number is then divided by this; 0 means 1; not negative.
     pub divisor: i32,
 }
 

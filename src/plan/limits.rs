@@ -47,7 +47,7 @@ pub trait ReadLimits {
 
     /// Checks a field by itself: [`Status::OK`]; [`Status::INVALID_ARGUMENT`] for an unknown
     /// table, type or order, a type that the table does not have, an interval out of range, a
-    /// negative divisor, or a scale of a value that is no integer;
+    /// negative divisor, or a scale of a text;
     /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
     /// field goes beyond address 65535 or into an excluded range;
     /// [`Status::ILLEGAL_DATA_VALUE`] if one read cannot hold it.
@@ -58,7 +58,7 @@ pub trait ReadLimits {
             && field.is_in_bits() == (field.value_type == BIT)
             && field.order <= 4
             && field.divisor >= 0
-            && (field.is_integer() || field.multiplier | field.divisor == 0)
+            && (field.value_type != TEXT || field.multiplier | field.divisor == 0)
             && field.interval_ms.wrapping_sub(1) < LONGEST_INTERVAL_MS;
         if !known {
             Status::INVALID_ARGUMENT

@@ -11,6 +11,7 @@ mod divide;
 pub mod field;
 pub mod group;
 pub mod limits;
+mod number;
 mod read;
 pub mod schedule;
 pub mod value;

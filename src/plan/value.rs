@@ -151,7 +151,7 @@ impl Words<'_> {
 }
 
 /// The multiplier and the divisor of a field, without signs.
-fn scale(field: &Field) -> (u32, u32) {
+pub(super) fn scale(field: &Field) -> (u32, u32) {
     let or_1 = |number: i32| {
         if number == 0 {
             1
@@ -163,6 +163,18 @@ fn scale(field: &Field) -> (u32, u32) {
 }
 
 impl Words<'_> {
+    /// The magnitude of a bit or an integer, and whether it is below 0.
+    pub(super) fn magnitude(&self) -> (u64, bool) {
+        let raw = self.raw();
+        let number = match self.field.value_type {
+            INT16 => i64::from(raw as i16),
+            INT32 => i64::from(raw as i32),
+            INT64 => raw.cast_signed(),
+            _ => return (raw, false),
+        };
+        (number.unsigned_abs(), number < 0)
+    }
+
     /// A value as an integer: multiplied and divided as the field says, rounded to the
     /// nearest, halves away from 0.
     ///
@@ -176,17 +188,7 @@ impl Words<'_> {
         if field.value_type > INT64 {
             return Err(Status::INVALID_ARGUMENT);
         }
-        let mut raw = self.raw();
-        let mut is_below = false;
-        if field.is_signed() {
-            let number = match field.value_type {
-                INT16 => i64::from(raw as i16),
-                INT32 => i64::from(raw as i32),
-                _ => raw.cast_signed(),
-            };
-            is_below = number < 0;
-            raw = number.unsigned_abs();
-        }
+        let (raw, is_below) = self.magnitude();
         let (multiplier, divisor) = scale(field);
         let whole = quotient(multiplier, divisor);
         let part = multiplier.wrapping_sub(whole.wrapping_mul(divisor));

@@ -23,13 +23,14 @@ use mbm::plan::{group, schedule};
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
 /// @return MBM_OK; MBM_BUSY if it was begun already; of a field MBM_INVALID_ARGUMENT for an
 ///         unknown table, type or order, a type that the table does not have, an interval out
-///         of range, a negative divisor or a scale of what is no integer, MBM_BROADCAST_NOT_ALLOWED for unit 0,
-///         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range,
-///         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP for
-///         the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first without
-///         storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL pointers and
-///         counts out of range; MBM_NOT_INITIALISED for a client that was never begun. The
-///         object is changed on MBM_OK only; `positions` and `reads` may be changed always
+///         of range, a negative divisor or a scale of a text, MBM_BROADCAST_NOT_ALLOWED for
+///         unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded
+///         range, MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP
+///         for the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first
+///         without storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL
+///         pointers and counts out of range; MBM_NOT_INITIALISED for a client that was never
+///         begun. The object is changed on MBM_OK only; `positions` and `reads` may be changed
+///         always
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_begin(
     plan: *mut mbm_plan,

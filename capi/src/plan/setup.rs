@@ -28,9 +28,10 @@ pub struct mbm_planField {
     pub count: u16,
     /// The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL.
     pub intervalMs: u32,
-    /// mbm_plan_getInteger multiplies by this; 0 means 1. Only integers have a scale.
+    /// mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
+    /// It is 0 for a text.
     pub multiplier: i32,
-    /// It divides by this after that; 0 means 1. Not negative.
+    /// They divide by this after that; 0 means 1. Not negative; 0 for a text.
     pub divisor: i32,
 }
 

@@ -7,6 +7,8 @@ use crate::registers::{mbm_registers, MBM_REGISTERS_OF_WORDS};
 use core::ffi::c_char;
 use core::mem::MaybeUninit;
 use core::slice::from_raw_parts;
+#[cfg(target_arch = "avr")]
+use mbm::data::value::{ShortDouble, Value as _};
 use mbm::error::Status;
 use mbm::plan::value::{place, Words};
 use mbm::plan::{schedule, Field, Position, Read};
@@ -209,8 +211,39 @@ pub unsafe extern "C" fn mbm_plan_getInt32(
     unsafe { get(plan, field, index, value, |words| words.int32()) }
 }
 
+/// A bit, an integer or a float as a double: multiplied and divided as its field says, and
+/// rounded once, to the nearest. On AVR, where C's double has 32 bits, it is rounded to these after
+/// that.
+///
+/// @param plan   the object
+/// @param field  the index of the field
+/// @param index  which of its values, 0 for the first
+/// @param value  gets the number; a float that is infinite or not a number stays so
+/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a text; MBM_NOT_INITIALISED; if no value has
+///         arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK only
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getNumber(
+    plan: *const mbm_plan,
+    field: u16,
+    index: u16,
+    value: *mut f64,
+) -> u8 {
+    // SAFETY: as the header demands; a double is its bits.
+    #[cfg(not(target_arch = "avr"))]
+    unsafe {
+        get(plan, field, index, value.cast(), |words| words.number())
+    }
+    // SAFETY: as the header demands; C's double is a float here.
+    #[cfg(target_arch = "avr")]
+    unsafe {
+        get(plan, field, index, value.cast(), |words| {
+            Ok(ShortDouble::from_bytes(words.number()?.to_be_bytes()).0)
+        })
+    }
+}
+
 /// A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
-/// to the nearest.
+/// to the nearest; without the scale of its field.
 ///
 /// @param plan   the object
 /// @param field  the index of the field
@@ -230,7 +263,8 @@ pub unsafe extern "C" fn mbm_plan_getFloat(
     unsafe { get(plan, field, index, value.cast(), |words| words.float()) }
 }
 
-/// A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double. On AVR, where C's double has
+/// A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double, without the scale of its
+/// field. On AVR, where C's double has
 /// 32 bits, it is mbm_plan_getFloat.
 ///
 /// @param plan   the object
