@@ -4,7 +4,7 @@
 mod plan;
 
 use mbm::error::Status;
-use mbm::plan::field::{BIT, COILS, DOUBLE, HOLDING_REGISTERS, TEXT, UINT32};
+use mbm::plan::field::{BIT, COILS, DOUBLE, FLOAT, HOLDING_REGISTERS, TEXT, UINT32};
 use mbm::plan::group::{group, Refusal, MAX_FIELDS};
 use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, UnitLimits};
 use plan::{field, grouped, plain, LIMITS};
