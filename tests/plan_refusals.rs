@@ -151,7 +151,7 @@ fn storage_that_does_not_suffice_is_refused_with_the_first_field_left_over() {
     let fields = [field(20), field(0), field(10)];
     let run = |positions: usize, reads: usize, words| {
         let mut positions = vec![Position::NONE; positions];
-        let mut reads = vec![Read::NONE; reads];
+        let mut reads = vec![Read::default(); reads];
         group(&fields, &LIMITS, &mut positions, &mut reads, words)
     };
     let small = |field| {

@@ -98,7 +98,7 @@ fuzz_target!(|data: &[u8]| {
     let (read_count, words) = (usize::from(input.u8()), input.u16());
     let fields: Vec<Field> = (0..input.u8() % 24).map(|_| field(&mut input)).collect();
     let mut positions = vec![Position::NONE; fields.len()];
-    let mut reads = vec![Read::NONE; read_count];
+    let mut reads = vec![Read::default(); read_count];
     let count = match group(&fields, &limits, &mut positions, &mut reads, words) {
         Ok(count) => count,
         Err(refusal) => {

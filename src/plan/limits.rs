@@ -96,8 +96,8 @@ pub trait ReadLimits {
         }
     }
 
-    /// True if an address is excluded whose [`Field::place`] is from `first` up to, but not
-    /// including, `end`.
+    /// True if an address is excluded whose place (see `Field::place`) is from `first` up to, but
+    /// not including, `end`.
     #[cfg_attr(target_os = "none", inline(never))]
     fn excludes(&self, first: u32, end: u32) -> bool {
         self.excluded().iter().any(|range| {

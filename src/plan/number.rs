@@ -190,7 +190,7 @@ mod tests {
                     (product.abs_diff(whole << exponent), u128::from(divisor) << exponent)
                 };
                 prop_assert!(2 * distance <= half);
-                prop_assert!(2 * distance < half || fraction % 2 == 0);
+                prop_assert!(2 * distance < half || fraction.is_multiple_of(2));
             }
         }
     }

@@ -51,7 +51,7 @@ pub(super) const QUEUED: u8 = 16;
 /// One request that the plan repeats, and what came of it. (What changes is in cells: the reads
 /// of a unit change each other.)
 #[repr(C)]
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Read {
     /// When it is next due, in milliseconds.
     pub(super) due: Cell<u32>,
@@ -82,24 +82,6 @@ pub struct Read {
 }
 
 impl Read {
-    /// A read of nothing.
-    pub const NONE: Read = Read {
-        due: Cell::new(0),
-        not_before: Cell::new(0),
-        read_at: Cell::new(0),
-        interval_ms: 0,
-        first: 0,
-        last: 0,
-        address: 0,
-        quantity: 0,
-        offset: 0,
-        unit: 0,
-        table: 0,
-        status: Cell::new(Status::PENDING.code()),
-        doublings: Cell::new(0),
-        flags: Cell::new(0),
-    };
-
     /// True if the read requests bits.
     pub const fn is_of_bits(&self) -> bool {
         self.table <= super::field::DISCRETE_INPUTS

@@ -31,7 +31,7 @@ pub fn field(address: u16) -> Field {
 /// Groups with as much storage as any table needs.
 pub fn grouped(fields: &[Field], limits: &Limits) -> Result<Vec<Read>, Refusal> {
     let mut positions = vec![Position::NONE; fields.len()];
-    let mut reads = vec![Read::NONE; fields.len()];
+    let mut reads = vec![Read::default(); fields.len()];
     let count = group(fields, limits, &mut positions, &mut reads, u16::MAX)?;
     reads.truncate(count);
     check_positions(fields, &positions, &reads);
