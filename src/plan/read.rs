@@ -79,6 +79,8 @@ pub struct Read {
     /// How often the wait after a request without an answer is doubled.
     pub(super) doublings: Cell<u8>,
     pub(super) flags: Cell<u8>,
+    /// Its size is the same on an AVR, where nothing is aligned.
+    _padding: u8,
 }
 
 impl Read {
