@@ -19,7 +19,7 @@ static const mbm_planField fields[10] = {
     FIELD(2, MBM_TYPE_UINT16, 1000),  FIELD(10, MBM_TYPE_INT32, 1000),
     FIELD(12, MBM_TYPE_INT32, 1000),  FIELD(14, MBM_TYPE_INT32, 1000),
     FIELD(20, MBM_TYPE_UINT32, 5000), FIELD(22, MBM_TYPE_UINT32, 5000),
-    FIELD(40, MBM_TYPE_UINT64, 5000), FIELD(50, MBM_TYPE_UINT16, 5000),
+    FIELD(40, MBM_TYPE_UINT32, 5000), FIELD(50, MBM_TYPE_UINT16, 5000),
 };
 static mbm_planPosition positions[10];
 static mbm_planRead reads[10];
@@ -27,12 +27,12 @@ static uint16_t data[WORDS];
 
 static void update(void *context, mbm_plan *plan, uint16_t field)
 {
-    int64_t value;
+    int32_t value;
 
     (void)context;
     USED(plan);
     if (PLAN(mbm_plan_getStatus(plan, field, NULL)) == MBM_OK &&
-        PLAN(mbm_plan_getInteger(plan, field, 0, &value)) == MBM_OK) {
+        PLAN(mbm_plan_getInt32(plan, field, 0, &value)) == MBM_OK) {
         USED(&value);
         uart = (uint8_t)value;
     }

@@ -20,10 +20,30 @@ enum { FIELDS = 10, WORDS = 64, REQUESTS = 4, HOLDING = MBM_TABLE_HOLDING_REGIST
 
 /* The table: it may stay in flash. */
 static const mbm_planField fields[FIELDS] = {
-    {.unit = 17, .table = HOLDING, .type = MBM_TYPE_UINT16, .address = 0, .intervalMs = 500},
-    {.unit = 17, .table = HOLDING, .type = MBM_TYPE_UINT16, .address = 1, .intervalMs = 500},
-    {.unit = 17, .table = HOLDING, .type = MBM_TYPE_UINT16, .address = 2, .intervalMs = 500},
-    {.unit = 17, .table = HOLDING, .type = MBM_TYPE_INT32, .address = 6, .intervalMs = 500},
+    {.unit = 17,
+     .table = HOLDING,
+     .type = MBM_TYPE_UINT16,
+     .address = 0,
+     .intervalMs = 500,
+     .divisor = 10},
+    {.unit = 17,
+     .table = HOLDING,
+     .type = MBM_TYPE_UINT16,
+     .address = 1,
+     .intervalMs = 500,
+     .divisor = 10},
+    {.unit = 17,
+     .table = HOLDING,
+     .type = MBM_TYPE_UINT16,
+     .address = 2,
+     .intervalMs = 500,
+     .divisor = 10},
+    {.unit = 17,
+     .table = HOLDING,
+     .type = MBM_TYPE_INT32,
+     .address = 6,
+     .intervalMs = 500,
+     .divisor = 1000},
     {.unit = 17,
      .table = HOLDING,
      .type = MBM_TYPE_UINT32,
@@ -40,7 +60,8 @@ static const mbm_planField fields[FIELDS] = {
      .table = MBM_TABLE_INPUT_REGISTERS,
      .type = MBM_TYPE_INT16,
      .address = 40,
-     .intervalMs = 1000},
+     .intervalMs = 1000,
+     .divisor = 100},
     {.unit = 17, .table = MBM_TABLE_COILS, .type = MBM_TYPE_BIT, .address = 3, .intervalMs = 1000},
     {.unit = 17, .table = MBM_TABLE_COILS, .type = MBM_TYPE_BIT, .address = 9, .intervalMs = 1000},
     {.unit = 18, .table = HOLDING, .type = MBM_TYPE_UINT16, .address = 0, .intervalMs = 1000},
@@ -48,9 +69,6 @@ static const mbm_planField fields[FIELDS] = {
 static const char *const names[FIELDS] = {
     "voltage 1 (V)",    "voltage 2 (V)",   "voltage 3 (V)", "power (kW)",    "energy in (kWh)",
     "energy out (kWh)", "temperature (C)", "pump runs",     "valve is open", "level of unit 18"};
-
-/* How many of the device's steps are 1 in what is shown. */
-static const double steps[FIELDS] = {10, 10, 10, 1000, 1, 1, 100, 1, 1, 1};
 
 static mbm_planPosition positions[FIELDS];
 static mbm_planRead reads[FIELDS];
@@ -101,11 +119,11 @@ static void show_values(uint32_t second)
     for (field = 0; field < FIELDS; field++) {
         uint32_t age;
         uint8_t status = mbm_plan_getStatus(&plan, field, &age);
-        int64_t value;
+        double value;
 
         printf("  %-18s", names[field]);
-        if (mbm_plan_getInteger(&plan, field, 0, &value) == MBM_OK)
-            printf("%14.10g  %5" PRIu32 " ms old", (double)value / steps[field], age);
+        if (mbm_plan_getNumber(&plan, field, 0, &value) == MBM_OK)
+            printf("%14.10g  %5" PRIu32 " ms old", value, age);
         else
             printf("%14s  %11s", "-", "");
         printf("  %s\n", mbm_status_text(status));

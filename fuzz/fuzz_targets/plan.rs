@@ -5,10 +5,11 @@
 
 use libfuzzer_sys::fuzz_target;
 use mbm::error::Status;
+use mbm::plan::field::LONGEST_INTERVAL_MS;
 use mbm::plan::group::group;
 use mbm::plan::schedule::{self, Backoff};
-use mbm::plan::value::Words;
-use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, UnitLimits, NO_SLOT};
+use mbm::plan::value::{place, Words};
+use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, ReadLimits, UnitLimits};
 use mbm_fuzz::Input;
 
 fn u32_of(input: &mut Input) -> u32 {
@@ -41,6 +42,16 @@ fn field(input: &mut Input) -> Field {
     }
 }
 
+/// True if a read from the first to the last field touches an excluded address.
+fn excludes(limits: &Limits, first: &Field, last: &Field) -> bool {
+    limits.excluded.iter().any(|range| {
+        (range.unit == 0 || range.unit == first.unit)
+            && range.table == first.table
+            && u32::from(range.first) < last.end()
+            && range.last >= first.address
+    })
+}
+
 /// The least reads, and the least bits and registers of those, of the fields of one group.
 fn best(own: &[Field], limits: &Limits) -> (usize, u32) {
     let mut least = vec![(0, 0)];
@@ -52,7 +63,7 @@ fn best(own: &[Field], limits: &Limits) -> (usize, u32) {
             let gaps = own[start..end]
                 .windows(2)
                 .all(|pair| u32::from(pair[1].address) - pair[0].end() <= limits.widest_gap(first));
-            let touched = limits.excludes(first, first.address.into(), last.end());
+            let touched = excludes(limits, first, last);
             if gaps && !touched && length <= limits.longest_read(first) {
                 let (reads, quantity): (usize, u32) = least[start];
                 found = found.min((reads + 1, quantity + length));
@@ -87,7 +98,7 @@ fuzz_target!(|data: &[u8]| {
     let (read_count, words) = (usize::from(input.u8()), input.u16());
     let fields: Vec<Field> = (0..input.u8() % 24).map(|_| field(&mut input)).collect();
     let mut positions = vec![Position::NONE; fields.len()];
-    let mut reads = vec![Read::NONE; read_count];
+    let mut reads = vec![Read::default(); read_count];
     let count = match group(&fields, &limits, &mut positions, &mut reads, words) {
         Ok(count) => count,
         Err(refusal) => {
@@ -122,53 +133,63 @@ fuzz_target!(|data: &[u8]| {
 
     let mut now = u32_of(&mut input);
     let backoff = Backoff {
-        first_ms: u32_of(&mut input),
-        longest_ms: u32_of(&mut input),
+        first_ms: u32_of(&mut input) % (LONGEST_INTERVAL_MS + 1),
+        longest_ms: u32_of(&mut input) % (LONGEST_INTERVAL_MS + 1),
     };
     schedule::start(reads, now);
-    let mut queued = Vec::new();
+    let reads = &*reads;
+    let mut queued: Vec<&Read> = Vec::new();
     while !input.is_empty() {
         match input.u8() % 4 {
             0 => match schedule::next(reads, now) {
-                Ok(index) => {
-                    assert_eq!(reads[index].slot, NO_SLOT);
-                    reads[index].slot = 0;
-                    queued.push(index);
+                Ok(read) => {
+                    assert!(!queued
+                        .iter()
+                        .any(|other: &&Read| std::ptr::eq(*other, read)));
+                    read.begin();
+                    queued.push(read);
                 }
                 Err(delay) => assert!(delay > 0),
             },
             1 if !queued.is_empty() => {
-                let index = queued.remove(usize::from(input.u8()) % queued.len());
+                let read = queued.remove(usize::from(input.u8()) % queued.len());
                 let status = Status::from_code(input.u8());
-                schedule::end(reads, index, status, now, &backoff);
-                assert_eq!(reads[index].status(), status);
+                schedule::end(reads, read, status, now, &backoff);
+                assert_eq!(read.status(), status);
             }
             2 => now = now.wrapping_add(1 << (input.u8() % 28)),
-            _ => schedule::hasten(reads, usize::from(input.u8()), now),
+            _ => {
+                if let Some(read) = reads.get(usize::from(input.u8())) {
+                    schedule::hasten(read, now);
+                }
+            }
         }
     }
     let data: Vec<u16> = (0..total).map(|at| at as u16).collect();
     for read in reads.iter() {
-        for position in read.positions() {
-            let field = &fields[positions[position].field()];
-            let view = Words {
-                words: &data[..read.words().into()],
-                before: usize::from(field.address - read.address),
-                field,
-            };
+        for own in read.fields(&positions) {
+            let field = &fields[own];
             for index in 0..3 {
-                let raw = view.raw(index);
-                assert_eq!(
-                    raw.is_ok(),
-                    index < field.values() && field.value_type != 10
-                );
-                let is_float = raw.is_ok() && matches!(field.value_type, 8 | 9);
-                assert_eq!(view.double(index).is_ok(), is_float);
-                assert_eq!(view.float(index).is_ok(), is_float);
-                assert!(view.integer(index).is_err() || (raw.is_ok() && !is_float));
+                let Ok((first, before)) = place(field, read.address, index) else {
+                    assert!(index >= field.values() || (field.value_type == 10 && index > 0));
+                    continue;
+                };
+                let view = Words {
+                    words: &data[usize::from(first)..read.words().into()],
+                    before,
+                    field,
+                };
+                let is_float = matches!(field.value_type, 8 | 9);
+                assert_eq!(view.double().is_ok(), is_float);
+                assert_eq!(view.float().is_ok(), is_float);
+                assert!(view.integer().is_err() || field.value_type <= 7);
+                if let Ok(short) = view.int32() {
+                    assert_eq!(view.integer(), Ok(short.into()));
+                }
+                assert_eq!(view.number().is_ok(), field.value_type != 10);
+                let mut text = [0; 256];
+                assert_eq!(view.text(&mut text).is_ok(), field.value_type == 10);
             }
-            let mut text = [0; 256];
-            assert_eq!(view.text(&mut text).is_ok(), field.value_type == 10);
         }
     }
 });

@@ -79,6 +79,16 @@ impl FunctionSpec {
         FunctionSpec::new(function, RANGE | READ | TAKES_WORDS, 5, 0, 0, 2)
     }
 
+    /// 01 to 04: the functions that read a table.
+    pub const fn reads_table(function: u8) -> FunctionSpec {
+        let FunctionSpec(spec) = if function <= 2 {
+            FunctionSpec::bits(0)
+        } else {
+            FunctionSpec::registers(0)
+        };
+        FunctionSpec(spec | function as u32)
+    }
+
     /// True if the response is the function code and two words of the request.
     #[inline]
     pub(super) const fn repeats_two_words(self) -> bool {

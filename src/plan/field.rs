@@ -53,9 +53,9 @@ pub struct Field {
     pub count: u16,
     /// The time from one read to the next, 1 to [`LONGEST_INTERVAL_MS`].
     pub interval_ms: u32,
-    /// Each integer is multiplied by this; 0 means 1. Other types have no scale.
+    /// Each number is multiplied by this; 0 means 1.
     pub multiplier: i32,
-    /// Each integer is then divided by this; 0 means 1; not negative.
+    /// Each number is then divided by this; 0 means 1; not negative.
     pub divisor: i32,
 }
 
@@ -73,16 +73,6 @@ impl Field {
         divisor: 0,
     };
 
-    /// The registers of one value; 0 for a bit, a text, and an unknown type.
-    pub const fn value_registers(&self) -> u8 {
-        match self.value_type {
-            UINT16 | INT16 => 1,
-            UINT32 | INT32 | FLOAT => 2,
-            UINT64 | INT64 | DOUBLE => 4,
-            _ => 0,
-        }
-    }
-
     /// The number of values, at least 1.
     pub const fn values(&self) -> u16 {
         if self.count == 0 {
@@ -92,19 +82,44 @@ impl Field {
         }
     }
 
+    /// The registers of one value, as a power of 2; 0 for a type without.
+    pub(super) const fn value_shift(&self) -> u32 {
+        // Two bits for each type. (A table would be a constant of its own in flash.)
+        const SHIFTS: u32 = 1 << (2 * UINT32)
+            | 1 << (2 * INT32)
+            | 2 << (2 * UINT64)
+            | 2 << (2 * INT64)
+            | 1 << (2 * FLOAT)
+            | 2 << (2 * DOUBLE);
+        SHIFTS >> (2 * (self.value_type & 15)) & 3
+    }
+
     /// The number of bits or registers that the field takes.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub const fn length(&self) -> u32 {
         let count = self.values() as u32;
-        match self.value_type {
-            BIT => count,
-            TEXT => count.div_ceil(2),
-            _ => count * self.value_registers() as u32,
+        if self.value_type == TEXT {
+            count.div_ceil(2)
+        } else {
+            count << self.value_shift()
         }
+    }
+
+    /// The first bit or register on a line on which every table of every unit has its place.
+    /// There are more than 65535 places between two tables.
+    pub(super) const fn place(&self) -> u32 {
+        place(self.unit, self.table, self.address)
     }
 
     /// The address after the last bit or register, up to 65536.
     pub const fn end(&self) -> u32 {
         self.address as u32 + self.length()
+    }
+
+    /// The place after the last bit or register.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) const fn end_place(&self) -> u32 {
+        self.place().wrapping_add(self.length())
     }
 
     /// True if the field is in a table of bits.
@@ -114,12 +129,12 @@ impl Field {
 
     /// True if the values are integers.
     pub const fn is_integer(&self) -> bool {
-        matches!(self.value_type, UINT16..=INT64)
+        self.value_type.wrapping_sub(UINT16) <= INT64 - UINT16
     }
 
     /// True if the values are integers with a sign.
     pub const fn is_signed(&self) -> bool {
-        matches!(self.value_type, INT16 | INT32 | INT64)
+        self.is_integer() && self.value_type % 2 == INT16 % 2
     }
 
     /// The order of the bytes, if the field names one.
@@ -132,12 +147,9 @@ impl Field {
             _ => None,
         }
     }
+}
 
-    /// True if both are of one unit and table and share an address.
-    pub fn overlaps(&self, other: &Field) -> bool {
-        self.unit == other.unit
-            && self.table == other.table
-            && u32::from(self.address) < other.end()
-            && u32::from(other.address) < self.end()
-    }
+/// See [`Field::place`].
+pub(super) const fn place(unit: u8, table: u8, address: u16) -> u32 {
+    (unit as u32 * 8 + table as u32) << 17 | address as u32
 }

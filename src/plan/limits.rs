@@ -1,6 +1,6 @@
 //! What a read may be: how long, over which gaps, and where not.
 
-use super::field::{Field, BIT, INPUT_REGISTERS, LONGEST_INTERVAL_MS, TEXT};
+use super::field::{place, Field, BIT, INPUT_REGISTERS, LONGEST_INTERVAL_MS, TEXT};
 use crate::error::Status;
 use crate::pdu::limits::{MAX_READ_BITS, MAX_READ_REGISTERS};
 
@@ -30,46 +30,43 @@ pub struct ExcludedRange {
     pub table: u8,
 }
 
-/// What a read may be.
-#[derive(Clone, Copy, Debug)]
-pub struct Limits<'a> {
+/// What a read may be. [`Limits`] has it; the caller may have it otherwise.
+pub trait ReadLimits {
     /// The most bits that one read requests; 0 or more than 2000 mean 2000.
-    pub bits: u16,
+    fn bits(&self) -> u16;
     /// The most registers that one read requests; 0 or more than 125 mean 125.
-    pub registers: u8,
+    fn registers(&self) -> u8;
     /// The most bits between two fields that one read may cover in passing.
-    pub bit_gap: u16,
+    fn bit_gap(&self) -> u16;
     /// The most registers between two fields that one read may cover in passing.
-    pub register_gap: u8,
+    fn register_gap(&self) -> u8;
     /// Units with other limits.
-    pub units: &'a [UnitLimits],
+    fn units(&self) -> &[UnitLimits];
     /// Addresses that no read may touch.
-    pub excluded: &'a [ExcludedRange],
-}
+    fn excluded(&self) -> &[ExcludedRange];
 
-impl Limits<'_> {
     /// Checks a field by itself: [`Status::OK`]; [`Status::INVALID_ARGUMENT`] for an unknown
     /// table, type or order, a type that the table does not have, an interval out of range, a
-    /// negative divisor, or a scale of a value that is no integer;
+    /// negative divisor, or a scale of a text;
     /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
     /// field goes beyond address 65535 or into an excluded range;
     /// [`Status::ILLEGAL_DATA_VALUE`] if one read cannot hold it.
-    pub fn check(&self, field: &Field) -> Status {
-        let end = field.end();
+    fn check(&self, field: &Field) -> Status {
+        let length = field.length();
         let known = field.table.wrapping_sub(1) < INPUT_REGISTERS
             && field.value_type.wrapping_sub(1) < TEXT
             && field.is_in_bits() == (field.value_type == BIT)
             && field.order <= 4
             && field.divisor >= 0
-            && (field.is_integer() || field.multiplier | field.divisor == 0)
+            && (field.value_type != TEXT || field.multiplier | field.divisor == 0)
             && field.interval_ms.wrapping_sub(1) < LONGEST_INTERVAL_MS;
         if !known {
             Status::INVALID_ARGUMENT
         } else if field.unit == 0 {
             Status::BROADCAST_NOT_ALLOWED
-        } else if end > 0x1_0000 || self.excludes(field, field.address.into(), end) {
+        } else if field.end() > 0x1_0000 || self.excludes(field.place(), field.end_place()) {
             Status::ILLEGAL_DATA_ADDRESS
-        } else if field.length() > self.longest_read(field) {
+        } else if length > self.longest_read(field) {
             Status::ILLEGAL_DATA_VALUE
         } else {
             Status::OK
@@ -77,35 +74,83 @@ impl Limits<'_> {
     }
 
     /// The most bits or registers of one read from the table of a field.
-    pub fn longest_read(&self, field: &Field) -> u32 {
-        let own = self.units.iter().find(|limits| limits.unit == field.unit);
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn longest_read(&self, field: &Field) -> u32 {
+        let own = self.units().iter().find(|limits| limits.unit == field.unit);
         let (most, all, own): (u16, u16, u16) = if field.is_in_bits() {
-            (MAX_READ_BITS, self.bits, own.map_or(0, |own| own.bits))
+            (MAX_READ_BITS, self.bits(), own.map_or(0, |own| own.bits))
         } else {
             let own = own.map_or(0, |own| own.registers.into());
-            (MAX_READ_REGISTERS, self.registers.into(), own)
+            (MAX_READ_REGISTERS, self.registers().into(), own)
         };
         let limit = if own > 0 { own } else { all };
         (limit.wrapping_sub(1).min(most - 1) + 1).into()
     }
 
     /// The widest gap that a read from the table of a field may cover.
-    pub fn widest_gap(&self, field: &Field) -> u32 {
+    fn widest_gap(&self, field: &Field) -> u32 {
         if field.is_in_bits() {
-            self.bit_gap.into()
+            self.bit_gap().into()
         } else {
-            self.register_gap.into()
+            self.register_gap().into()
         }
     }
 
-    /// True if an address from `first` up to, but not including, `end` in the table of a field
-    /// is excluded.
-    pub fn excludes(&self, field: &Field, first: u32, end: u32) -> bool {
-        self.excluded.iter().any(|range| {
-            (range.unit == 0 || range.unit == field.unit)
-                && range.table == field.table
-                && u32::from(range.first) < end
-                && u32::from(range.last) >= first
+    /// True if an address is excluded whose place (see `Field::place`) is from `first` up to, but
+    /// not including, `end`.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn excludes(&self, first: u32, end: u32) -> bool {
+        self.excluded().iter().any(|range| {
+            let unit = if range.unit == 0 {
+                (first >> 20) as u8
+            } else {
+                range.unit
+            };
+            place(unit, range.table, range.first) < end
+                && place(unit, range.table, range.last) >= first
         })
+    }
+}
+
+/// What a read may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits<'a> {
+    /// See [`ReadLimits::bits`].
+    pub bits: u16,
+    /// See [`ReadLimits::registers`].
+    pub registers: u8,
+    /// See [`ReadLimits::bit_gap`].
+    pub bit_gap: u16,
+    /// See [`ReadLimits::register_gap`].
+    pub register_gap: u8,
+    /// See [`ReadLimits::units`].
+    pub units: &'a [UnitLimits],
+    /// See [`ReadLimits::excluded`].
+    pub excluded: &'a [ExcludedRange],
+}
+
+impl ReadLimits for Limits<'_> {
+    fn bits(&self) -> u16 {
+        self.bits
+    }
+
+    fn registers(&self) -> u8 {
+        self.registers
+    }
+
+    fn bit_gap(&self) -> u16 {
+        self.bit_gap
+    }
+
+    fn register_gap(&self) -> u8 {
+        self.register_gap
+    }
+
+    fn units(&self) -> &[UnitLimits] {
+        self.units
+    }
+
+    fn excluded(&self) -> &[ExcludedRange] {
+        self.excluded
     }
 }

@@ -7,13 +7,15 @@
 //! Nothing here sends anything or has a clock: time is an argument in milliseconds, which may
 //! wrap.
 
+mod divide;
 pub mod field;
 pub mod group;
 pub mod limits;
+mod number;
 mod read;
 pub mod schedule;
 pub mod value;
 
 pub use field::Field;
-pub use limits::{ExcludedRange, Limits, UnitLimits};
-pub use read::{Position, Read, NO_SLOT};
+pub use limits::{ExcludedRange, Limits, ReadLimits, UnitLimits};
+pub use read::{Position, Read};

@@ -1,6 +1,7 @@
 //! The storage of a plan: one [`Position`] for each field, and one [`Read`] for each read.
 
 use crate::error::Status;
+use core::cell::Cell;
 use core::ops::Range;
 
 /// One for each field. While the plan groups its fields, position `n` holds the field that is
@@ -36,9 +37,6 @@ impl Position {
     }
 }
 
-/// [`Read::slot`] of a read that is not queued.
-pub const NO_SLOT: u8 = 0xFF;
-
 /// The last two reads of the unit that ended had no answer, or all since.
 pub(super) const SUSPENDED: u8 = 1;
 /// The read of the unit that ended last had no answer.
@@ -47,17 +45,20 @@ pub(super) const DOUBTED: u8 = 2;
 pub(super) const HAS_DATA: u8 = 4;
 /// The status is news for the program.
 pub(super) const NEWS: u8 = 8;
+/// It is queued or under way.
+pub(super) const QUEUED: u8 = 16;
 
-/// One request that the plan repeats, and what came of it.
+/// One request that the plan repeats, and what came of it. (What changes is in cells: the reads
+/// of a unit change each other.)
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Read {
     /// When it is next due, in milliseconds.
-    pub(super) due: u32,
-    /// It is not sent before this time, if `failures` is not 0.
-    pub(super) not_before: u32,
+    pub(super) due: Cell<u32>,
+    /// It is not sent before this time.
+    pub(super) not_before: Cell<u32>,
     /// When its last good reply arrived.
-    pub(super) read_at: u32,
+    pub(super) read_at: Cell<u32>,
     /// The time from one read to the next, in milliseconds.
     pub interval_ms: u32,
     /// The first and the last of its fields, as positions of the sorted table.
@@ -74,40 +75,22 @@ pub struct Read {
     /// The table; its number is that of the function.
     pub table: u8,
     /// How it ended last; [`Status::PENDING`] before it has ended once.
-    pub(super) status: u8,
-    /// The request that it is queued as, or [`NO_SLOT`].
-    pub slot: u8,
-    /// How often in a row it had no answer; counts up to 31.
-    pub(super) failures: u8,
-    pub(super) flags: u8,
+    pub(super) status: Cell<u8>,
+    /// How often the wait after a request without an answer is doubled.
+    pub(super) doublings: Cell<u8>,
+    pub(super) flags: Cell<u8>,
+    /// Its size is the same on an AVR, where nothing is aligned.
+    _padding: u8,
 }
 
 impl Read {
-    /// A read of nothing.
-    pub const NONE: Read = Read {
-        due: 0,
-        not_before: 0,
-        read_at: 0,
-        interval_ms: 0,
-        first: 0,
-        last: 0,
-        address: 0,
-        quantity: 0,
-        offset: 0,
-        unit: 0,
-        table: 0,
-        status: Status::PENDING.code(),
-        slot: NO_SLOT,
-        failures: 0,
-        flags: 0,
-    };
-
     /// True if the read requests bits.
     pub const fn is_of_bits(&self) -> bool {
         self.table <= super::field::DISCRETE_INPUTS
     }
 
     /// The number of words that its data take.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub const fn words(&self) -> u16 {
         if self.is_of_bits() {
             self.quantity.div_ceil(16)
@@ -121,25 +104,44 @@ impl Read {
         self.first.into()..usize::from(self.last) + 1
     }
 
+    /// The indexes of its fields.
+    pub fn fields<'a>(&self, positions: &'a [Position]) -> impl Iterator<Item = usize> + 'a {
+        let own = positions.get(self.positions());
+        own.unwrap_or(&[]).iter().map(Position::field)
+    }
+
     /// How it ended last; [`Status::PENDING`] before it has ended once.
     pub const fn status(&self) -> Status {
-        Status::from_code(self.status)
+        Status::from_code(self.status.get())
     }
 
     /// True if a good reply has arrived at least once.
     pub const fn has_data(&self) -> bool {
-        self.flags & HAS_DATA != 0
+        self.flags.get() & HAS_DATA != 0
     }
 
     /// The milliseconds since the last good reply. Without one it means nothing.
     pub const fn age(&self, now: u32) -> u32 {
-        now.wrapping_sub(self.read_at)
+        now.wrapping_sub(self.read_at.get())
+    }
+
+    /// Notes that it is queued; [`end`](super::schedule::end) says that it has ended.
+    pub fn begin(&self) {
+        self.set(QUEUED);
     }
 
     /// Its fields' positions, once, after the status was set.
-    pub fn take_news(&mut self) -> Option<Range<usize>> {
-        let news = self.flags & NEWS != 0;
-        self.flags &= !NEWS;
-        news.then(|| self.positions())
+    pub fn take_news(&self) -> Option<Range<usize>> {
+        let flags = self.flags.get();
+        self.flags.set(flags & !NEWS);
+        (flags & NEWS != 0).then(|| self.positions())
+    }
+
+    pub(super) const fn is(&self, flag: u8) -> bool {
+        self.flags.get() & flag != 0
+    }
+
+    pub(super) fn set(&self, flags: u8) {
+        self.flags.set(self.flags.get() | flags);
     }
 }

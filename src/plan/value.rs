@@ -1,109 +1,102 @@
 //! Values out of the words of a read. The words of registers have the machine's byte order;
 //! bits are bytes as on the wire, the lowest bit first.
 
-use super::field::{Field, BIT, DOUBLE, FLOAT, TEXT};
-use crate::data::order::Order;
+use super::divide::quotient;
+use super::field::{Field, BIT, DOUBLE, FLOAT, INT16, INT32, INT64, TEXT};
 use crate::data::value::{ShortDouble, Value as _};
 use crate::error::Status;
 
-/// The words of a field: the words of its read, and where it begins in them.
+/// A value: its words, and its field.
 #[derive(Clone, Copy)]
 pub struct Words<'a> {
-    /// The words of the read.
+    /// The words of its read from the first one that has a part of the value.
     pub words: &'a [u16],
-    /// Bits or registers before the field.
-    pub before: usize,
+    /// Bits before it in the first word.
+    pub before: u8,
     /// The field.
     pub field: &'a Field,
 }
 
-/// A byte of words that hold bytes as they travel.
-fn byte(words: &[u16], index: usize) -> Option<u8> {
-    words
-        .get(index / 2)
-        .and_then(|word| word.to_ne_bytes().get(index % 2).copied())
+/// Where a value is in the words of its read: the first word, and bits before it in that word.
+/// `address` is the first address of the read.
+///
+/// # Errors
+/// [`Status::INVALID_ARGUMENT`] if the field has no such value. A text is one value.
+#[cfg_attr(target_os = "none", inline(never))]
+pub fn place(field: &Field, address: u16, index: u16) -> Result<(u16, u8), Status> {
+    if index >= field.values() || (field.value_type == TEXT && index > 0) {
+        return Err(Status::INVALID_ARGUMENT);
+    }
+    let place = field
+        .address
+        .wrapping_sub(address)
+        .wrapping_add(index << field.value_shift());
+    Ok(if field.is_in_bits() {
+        (place / 16, (place % 16) as u8)
+    } else {
+        (place, 0)
+    })
 }
 
 impl Words<'_> {
-    /// No words, of no field.
-    pub const NONE: Words<'static> = Words {
-        words: &[],
-        before: 0,
-        field: &Field::NONE,
-    };
-
-    /// The bits of a value of the field; a negative integer has its sign in all 64.
-    ///
-    /// # Errors
-    /// [`Status::INVALID_ARGUMENT`] for a text, and if the field has no such value.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub fn raw(&self, index: u16) -> Result<i64, Status> {
-        let field = self.field;
-        if index >= field.values() || field.value_type == TEXT {
-            return Err(Status::INVALID_ARGUMENT);
-        }
-        let index = usize::from(index);
-        if field.value_type == BIT {
-            let bit = self.before + index;
-            let byte = byte(self.words, bit / 8).ok_or(Status::INVALID_ARGUMENT)?;
-            return Ok(i64::from(byte >> (bit % 8) & 1));
-        }
-        let size = usize::from(field.value_registers());
-        let order = field.byte_order().unwrap_or(Order::Abcd);
-        let first = self.before + index * size;
-        let words = self.words.get(first..).and_then(|words| words.get(..size));
-        let words = words.ok_or(Status::INVALID_ARGUMENT)?;
-        let mut raw = 0;
-        for place in 0..size {
-            let source = if order.low_word_first() {
-                size - 1 - place
-            } else {
-                place
-            };
-            let mut word = words.get(source).copied().unwrap_or(0);
-            if order.swaps_bytes() {
-                word = word.swap_bytes();
-            }
-            if place == 0 && field.is_signed() && word >> 15 != 0 {
-                raw = -1;
-            }
-            raw = raw << 16 | i64::from(word);
-        }
-        Ok(raw)
+    /// A word, 0 past the end.
+    fn word(&self, index: usize) -> u16 {
+        self.words.get(index).copied().unwrap_or(0)
     }
 
-    /// A value as an integer: multiplied and divided as the field says, rounded to the
-    /// nearest, halves away from 0.
-    ///
-    /// # Errors
-    /// As [`Words::raw`]; [`Status::INVALID_ARGUMENT`] for floats;
-    /// [`Status::BUFFER_TOO_SMALL`] if the result is not in the range of an `i64`, its least
-    /// number left out.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub fn integer(&self, index: u16) -> Result<i64, Status> {
+    /// True if the orders has the low byte first.
+    const fn swaps_bytes(&self) -> bool {
+        self.field.order >= 3
+    }
+
+    /// True if the order has the low word first.
+    const fn low_word_first(&self) -> bool {
+        matches!(self.field.order, 2 | 4)
+    }
+
+    /// The bits of a value of at most 32 bits.
+    fn raw_32(&self) -> u32 {
         let field = self.field;
-        if matches!(field.value_type, FLOAT | DOUBLE) {
-            return Err(Status::INVALID_ARGUMENT);
+        if field.value_type == BIT {
+            return (u16::from_le(self.word(0)) >> self.before & 1).into();
         }
-        let raw = self.raw(index)?;
-        let is_below = field.is_signed() && raw < 0;
-        let magnitude = if is_below { raw.wrapping_neg() } else { raw };
-        match scale(magnitude.cast_unsigned(), field).map(u64::cast_signed) {
-            Some(scaled) if scaled >= 0 => Ok(if is_below != (field.multiplier < 0) {
-                -scaled
-            } else {
-                scaled
-            }),
-            _ => Err(Status::BUFFER_TOO_SMALL),
+        let mut raw = u32::from(self.word(0)) << 16 | u32::from(self.word(1));
+        if self.swaps_bytes() {
+            raw = raw.swap_bytes().rotate_left(16);
         }
+        if field.value_shift() == 0 {
+            raw >> 16
+        } else if self.low_word_first() {
+            raw.rotate_left(16)
+        } else {
+            raw
+        }
+    }
+
+    /// The bits of a value.
+    fn raw(&self) -> u64 {
+        if self.field.value_shift() < 2 {
+            return self.raw_32().into();
+        }
+        let mut raw = 0;
+        for nth in 0..4 {
+            let word = self.word(if self.low_word_first() { 3 - nth } else { nth });
+            raw = raw << 16
+                | u64::from(if self.swaps_bytes() {
+                    word.swap_bytes()
+                } else {
+                    word
+                });
+        }
+        raw
     }
 
     /// The bits of a float of 32 bits; of 64 bits, those of the nearest of 32.
     ///
     /// # Errors
-    /// As [`Words::raw`]; [`Status::INVALID_ARGUMENT`] for integers.
-    pub fn float(&self, index: u16) -> Result<u32, Status> {
-        let raw = self.raw(index)?;
+    /// [`Status::INVALID_ARGUMENT`] for other types.
+    pub fn float(&self) -> Result<u32, Status> {
+        let raw = self.raw();
         match self.field.value_type {
             FLOAT => Ok(raw as u32),
             DOUBLE => Ok(ShortDouble::from_bytes(raw.to_be_bytes()).0.to_bits()),
@@ -115,14 +108,14 @@ impl Words<'_> {
     ///
     /// # Errors
     /// As [`Words::float`].
-    pub fn double(&self, index: u16) -> Result<u64, Status> {
-        let raw = self.raw(index)?;
+    pub fn double(&self) -> Result<u64, Status> {
+        let raw = self.raw();
         match self.field.value_type {
             FLOAT => {
                 let number = ShortDouble(f32::from_bits(raw as u32));
                 Ok(u64::from_be_bytes(number.to_bytes()))
             }
-            DOUBLE => Ok(raw.cast_unsigned()),
+            DOUBLE => Ok(raw),
             _ => Err(Status::INVALID_ARGUMENT),
         }
     }
@@ -137,15 +130,9 @@ impl Words<'_> {
         if field.value_type != TEXT {
             return Err(Status::INVALID_ARGUMENT);
         }
-        let swapped = field.byte_order().is_some_and(Order::swaps_bytes);
         let character = |index: usize| {
-            let word = self
-                .words
-                .get(self.before + index / 2)
-                .copied()
-                .unwrap_or(0);
-            let [high, low] = word.to_be_bytes();
-            if index.is_multiple_of(2) != swapped {
+            let [high, low] = self.word(index / 2).to_be_bytes();
+            if index.is_multiple_of(2) != self.swaps_bytes() {
                 high
             } else {
                 low
@@ -163,34 +150,116 @@ impl Words<'_> {
     }
 }
 
-/// Multiplies and divides, rounded to the nearest, halves up; nothing beyond 64 bits. (Loops do
-/// it: firmware needs no arithmetic of 64 bits otherwise.)
-fn scale(magnitude: u64, field: &Field) -> Option<u64> {
-    let divisor = field.divisor.unsigned_abs();
-    let mut product = magnitude;
-    if field.multiplier != 0 {
-        product = 0;
-        // The bits of the multiplier, the most significant first.
-        for shift in (0..u32::BITS).rev() {
-            product = product.checked_add(product)?;
-            if field.multiplier.unsigned_abs() >> shift & 1 != 0 {
-                product = product.checked_add(magnitude)?;
+/// The multiplier and the divisor of a field, without signs.
+pub(super) fn scale(field: &Field) -> (u32, u32) {
+    let or_1 = |number: i32| {
+        if number == 0 {
+            1
+        } else {
+            number.unsigned_abs()
+        }
+    };
+    (or_1(field.multiplier), or_1(field.divisor))
+}
+
+impl Words<'_> {
+    /// The magnitude of a bit or an integer, and whether it is below 0.
+    pub(super) fn magnitude(&self) -> (u64, bool) {
+        let raw = self.raw();
+        let number = match self.field.value_type {
+            INT16 => i64::from(raw as i16),
+            INT32 => i64::from(raw as i32),
+            INT64 => raw.cast_signed(),
+            _ => return (raw, false),
+        };
+        (number.unsigned_abs(), number < 0)
+    }
+
+    /// A value as an integer: multiplied and divided as the field says, rounded to the
+    /// nearest, halves away from 0.
+    ///
+    /// # Errors
+    /// [`Status::INVALID_ARGUMENT`] for a float or a text;
+    /// [`Status::BUFFER_TOO_SMALL`] if the result is out of range; the least number of the range
+    /// counts as out of it.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn integer(&self) -> Result<i64, Status> {
+        let field = self.field;
+        if field.value_type > INT64 {
+            return Err(Status::INVALID_ARGUMENT);
+        }
+        let (raw, is_below) = self.magnitude();
+        let (multiplier, divisor) = scale(field);
+        let whole = quotient(multiplier, divisor);
+        let part = multiplier.wrapping_sub(whole.wrapping_mul(divisor));
+        let scaled = times(raw, whole, part, divisor).ok_or(Status::BUFFER_TOO_SMALL)?;
+        Ok(if is_below != (field.multiplier < 0) {
+            -scaled
+        } else {
+            scaled
+        })
+    }
+
+    /// As [`Words::integer`], with 32 bits throughout.
+    ///
+    /// # Errors
+    /// As [`Words::integer`]; [`Status::INVALID_ARGUMENT`] also for an integer of 64 bits, and
+    /// [`Status::BUFFER_TOO_SMALL`] also if the product before the division is out of range.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn int32(&self) -> Result<i32, Status> {
+        let field = self.field;
+        if field.value_type > INT32 {
+            return Err(Status::INVALID_ARGUMENT);
+        }
+        let mut raw = self.raw_32();
+        let mut is_below = field.multiplier < 0;
+        if field.is_signed() {
+            let mut number = raw.cast_signed();
+            if field.value_type == INT16 {
+                number = raw as i16 as i32;
             }
+            is_below ^= number < 0;
+            raw = number.unsigned_abs();
         }
+        let (multiplier, divisor) = scale(field);
+        let half = divisor / 2;
+        if raw > quotient(u32::MAX - half, multiplier) {
+            return Err(Status::BUFFER_TOO_SMALL);
+        }
+        let scaled = quotient(raw * multiplier + half, divisor);
+        let scaled = i32::try_from(scaled).map_err(|_| Status::BUFFER_TOO_SMALL)?;
+        Ok(if is_below { -scaled } else { scaled })
     }
-    if divisor <= 1 {
-        return Some(product);
-    }
-    product = product.checked_add(u64::from(divisor / 2))?;
-    let (mut quotient, mut rest) = (0, 0u64);
+}
+
+/// `magnitude` times the sum of `whole` and `part / divisor`, rounded to the nearest, halves
+/// up. `part` is less than `divisor`, and that less than 2^31. `None` if it is out of range.
+/// (Bit by bit: firmware has no other use for a multiplication and a division of this width.)
+#[inline(always)]
+fn times(mut magnitude: u64, whole: u32, part: u32, divisor: u32) -> Option<i64> {
+    let (mut product, mut rest) = (0u64, 0);
     for _ in 0..u64::BITS {
-        rest = rest << 1 | product >> 63;
-        product <<= 1;
-        quotient <<= 1;
-        if rest >= u64::from(divisor) {
-            rest -= u64::from(divisor);
-            quotient |= 1;
+        if product >> 62 != 0 {
+            return None;
         }
+        product <<= 1;
+        rest <<= 1;
+        // Twice, because `rest` and `part` together may be three times `divisor`.
+        for _ in 0..2 {
+            if rest >= divisor {
+                rest -= divisor;
+                product += 1;
+            }
+            if magnitude >> 63 != 0 {
+                product += u64::from(whole);
+                rest += part;
+            }
+            magnitude &= u64::MAX >> 1;
+        }
+        magnitude <<= 1;
     }
-    Some(quotient)
+    if rest >= divisor - rest {
+        product += 1;
+    }
+    i64::try_from(product).ok()
 }

@@ -1,12 +1,13 @@
 //! Beginning and ending a plan.
 
-use super::object::{reads, setup};
 use super::setup::mbm_planSetup;
 use super::storage::mbm_plan;
 use crate::client::{self, mbm_client, mbm_client_cancel};
 use crate::pointers;
+use core::ptr::null_mut;
+use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
-use mbm::plan::{group, schedule, NO_SLOT};
+use mbm::plan::{group, schedule};
 
 /// Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
 ///
@@ -22,13 +23,14 @@ use mbm::plan::{group, schedule, NO_SLOT};
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
 /// @return MBM_OK; MBM_BUSY if it was begun already; of a field MBM_INVALID_ARGUMENT for an
 ///         unknown table, type or order, a type that the table does not have, an interval out
-///         of range, a negative divisor or a scale of what is no integer, MBM_BROADCAST_NOT_ALLOWED for unit 0,
-///         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range,
-///         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP for
-///         the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first without
-///         storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL pointers and
-///         counts out of range; MBM_NOT_INITIALISED for a client that was never begun. The
-///         object is changed on MBM_OK only; `positions` and `reads` may be changed always
+///         of range, a negative divisor or a scale of a text, MBM_BROADCAST_NOT_ALLOWED for
+///         unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded
+///         range, MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP
+///         for the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first
+///         without storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL
+///         pointers and counts out of range; MBM_NOT_INITIALISED for a client that was never
+///         begun. The object is changed on MBM_OK only; `positions` and `reads` may be changed
+///         always
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_begin(
     plan: *mut mbm_plan,
@@ -67,24 +69,27 @@ unsafe fn begin(
         let Some(given) = setup.as_ref().filter(|setup| setup.is_complete()) else {
             return Status::INVALID_ARGUMENT;
         };
-        let (fields, positions) = (given.fields(), given.positions());
-        let reads = given.reads(u16::MAX);
-        let count = match group::group(fields, &given.limits(), positions, reads, given.dataWords) {
+        let count = usize::from(given.fieldCount);
+        let positions = from_raw_parts_mut(given.positions.cast(), count);
+        let reads = from_raw_parts_mut(given.reads.cast(), given.readCount.into());
+        let count = match group::group(given.fields(), given, positions, reads, given.dataWords) {
             Ok(count) => count as u16,
             Err(refusal) => {
                 *wrong = refusal.field as u16;
                 return refusal.status;
             }
         };
-        schedule::start(given.reads(count), 0);
+        for slot in 0..given.requestCount {
+            (*given.requests.add(slot.into())).context = null_mut();
+        }
         let object = pointers::object(plan);
         (*object).read_count = count;
         (*object).setup = setup;
         (*object).client = client;
-        (*object).rest = 0;
         (*object).millis = 0;
         (*object).micros = client::clock(client);
         (*object).mark = pointers::BEGUN;
+        schedule::start((*object).reads(), 0);
         Status::OK
     }
 }
@@ -104,12 +109,9 @@ pub unsafe extern "C" fn mbm_plan_end(plan: *mut mbm_plan) -> u8 {
             if pointers::check(client) == Status::BUSY {
                 return Status::BUSY;
             }
-            for index in 0..reads(object).len() {
-                let read = reads(object).get_mut(index);
-                let slot = read.map_or(NO_SLOT, |read| core::mem::replace(&mut read.slot, NO_SLOT));
-                if slot < setup(object).requestCount {
-                    mbm_client_cancel(client, setup(object).requests.add(slot.into()));
-                }
+            let setup = (*object).setup();
+            for slot in 0..setup.requestCount {
+                mbm_client_cancel(client, setup.requests.add(slot.into()));
             }
             (*object).mark = 0;
             Status::OK

@@ -36,7 +36,7 @@ pub const MBM_TYPE_TEXT: u8 = 10;
 /// The longest interval of a field in milliseconds: a day.
 pub const MBM_PLAN_LONGEST_INTERVAL: u32 = 86_400_000;
 /// The most fields of one plan.
-pub const MBM_PLAN_MAX_FIELDS: u16 = 32_767;
+pub const MBM_PLAN_MAX_FIELDS: u16 = 16_383;
 
 const _: () = {
     assert!(MBM_TABLE_COILS == field::COILS);

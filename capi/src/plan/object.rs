@@ -4,6 +4,7 @@ use super::setup::mbm_planSetup;
 use super::storage::mbm_plan;
 use crate::client::{self, mbm_client};
 use crate::pointers::{self, CObject};
+use core::slice::from_raw_parts;
 use mbm::error::Status;
 use mbm::plan::Read;
 
@@ -14,10 +15,8 @@ pub struct Object {
     pub(super) read_count: u16,
     pub(super) setup: *const mbm_planSetup,
     pub(super) client: *mut mbm_client,
-    /// The clock of the port when it was last read, in microseconds.
+    /// The clock of the port, in microseconds, when `millis` began.
     pub(super) micros: u32,
-    /// Microseconds that are not yet in `millis`.
-    pub(super) rest: u32,
     /// The plan's own time in milliseconds.
     pub(super) millis: u32,
 }
@@ -43,22 +42,24 @@ unsafe impl CObject for mbm_plan {
     }
 }
 
-/// The setup of a plan.
-///
-/// # Safety
-/// `object` is begun.
-pub(super) unsafe fn setup<'a>(object: *mut Object) -> &'a mbm_planSetup {
-    // SAFETY: as mbm_plan_begin demands, it stays valid and as it is.
-    unsafe { &*(*object).setup }
-}
+impl Object {
+    /// The setup of the plan.
+    ///
+    /// # Safety
+    /// It is begun.
+    pub(super) unsafe fn setup<'a>(&self) -> &'a mbm_planSetup {
+        // SAFETY: as mbm_plan_begin demands, it stays valid and as it is.
+        unsafe { &*self.setup }
+    }
 
-/// The reads of a plan.
-///
-/// # Safety
-/// `object` is begun, and nothing else uses its reads while the result lives.
-pub(super) unsafe fn reads<'a>(object: *mut Object) -> &'a mut [Read] {
-    // SAFETY: as the caller promises.
-    unsafe { setup(object).reads((*object).read_count) }
+    /// The reads of the plan.
+    ///
+    /// # Safety
+    /// It is begun, and not begun again while the result lives.
+    pub(super) unsafe fn reads<'a>(&self) -> &'a [Read] {
+        // SAFETY: mbm_plan_begin has made so many.
+        unsafe { from_raw_parts(self.setup().reads.cast(), self.read_count.into()) }
+    }
 }
 
 /// Brings the plan's time up to date and returns it, in milliseconds; as it was if the client
@@ -70,20 +71,16 @@ pub(super) unsafe fn reads<'a>(object: *mut Object) -> &'a mut [Read] {
 pub(super) unsafe fn time(object: *mut Object) -> u32 {
     // SAFETY: as the caller promises.
     unsafe {
-        if pointers::check((*object).client) == Status::OK {
-            let micros = client::clock((*object).client);
-            let passed = mbm::time::elapsed(micros, (*object).micros);
-            if passed > 0 {
-                (*object).micros = micros;
-                let mut rest = (*object).rest.saturating_add(passed);
-                // Without a division, which a Cortex-M0+ lacks.
-                for shift in [20, 15, 10, 5, 0] {
-                    while rest >= 1000 << shift {
-                        rest -= 1000 << shift;
-                        (*object).millis = (*object).millis.wrapping_add(1 << shift);
-                    }
+        let client = (*object).client;
+        if pointers::check(client) == Status::OK {
+            let mut passed = mbm::time::elapsed(client::clock(client), (*object).micros);
+            // Without a division, which a Cortex-M0+ lacks.
+            for shift in [20, 10, 0] {
+                while passed >= 1000 << shift {
+                    passed -= 1000 << shift;
+                    (*object).micros = (*object).micros.wrapping_add(1000 << shift);
+                    (*object).millis = (*object).millis.wrapping_add(1 << shift);
                 }
-                (*object).rest = rest;
             }
         }
         (*object).millis

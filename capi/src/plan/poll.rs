@@ -1,11 +1,10 @@
 //! Sending the reads that are due, and taking their replies.
 
-use super::object::{reads, setup, time, Object};
-use super::setup::mbm_planSetup;
+use super::object::{time, Object};
 use super::storage::mbm_plan;
-use crate::client::{self, mbm_client, mbm_clientRequest, mbm_client_pending, MBM_CLIENT_DEPTH};
+use crate::client::{self, mbm_clientRequest, mbm_client_pending, MBM_CLIENT_DEPTH};
 use crate::pointers;
-use core::ffi::c_void;
+use core::ptr::null_mut;
 use mbm::error::Status;
 use mbm::plan::{schedule, Read};
 
@@ -13,8 +12,9 @@ use mbm::plan::{schedule, Read};
 /// must be read before it wraps.
 const LONGEST_DELAY: u32 = 30 * 60 * 1000;
 
-/// Queues the reads that are due, as far as there are requests for them. It does not poll the
-/// client: call mbm_client_poll after it.
+/// Takes the replies that have arrived, calls `update` for the fields of each read that has
+/// ended, and queues the reads that are due, as far as there are requests for them. It does not
+/// poll the client: call mbm_client_poll after it.
 ///
 /// @param plan  the object
 /// @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT;
@@ -29,129 +29,86 @@ pub unsafe extern "C" fn mbm_plan_poll(plan: *mut mbm_plan) -> u8 {
                 refused => return refused,
             }
             let now = time(object);
-            while let Ok(index) = schedule::next(reads(object), now) {
-                match queue(plan, index) {
-                    Status::PENDING => {}
-                    // Not now.
-                    Status::BUSY | Status::QUEUE_FULL => break,
-                    refused => {
-                        end(plan, index, refused);
-                        // `update` may have zeroed it.
-                        if pointers::check(plan) != Status::OK {
-                            break;
-                        }
-                    }
+            let setup = (*object).setup();
+            let reads = (*object).reads();
+            for slot in 0..setup.requestCount {
+                let request = setup.requests.add(slot.into());
+                let status = Status::from_code((*request).status);
+                if status == Status::PENDING {
+                    continue;
+                }
+                if let Some(read) = read_of(request) {
+                    schedule::end(reads, read, status, now, &setup.backoff());
+                    (*request).context = null_mut();
+                }
+                if let Ok(read) = schedule::next(reads, now) {
+                    queue(object, request, read);
                 }
             }
+            update(plan);
             Status::OK
         })
     }
 }
 
-/// A request that no read uses.
+/// The read of a request. `None` for a request that the plan does not use.
 ///
 /// # Safety
-/// `object` is begun.
-unsafe fn free_slot(object: *mut Object) -> Option<u8> {
-    // SAFETY: as the caller promises; the setup has so many requests.
-    unsafe {
-        (0..setup(object).requestCount).find(|slot| {
-            let request = setup(object).requests.add((*slot).into());
-            (*request).status != Status::PENDING.code()
-                && reads(object).iter().all(|read| read.slot != *slot)
-        })
-    }
+/// The request is one of a begun plan.
+unsafe fn read_of<'a>(request: *const mbm_clientRequest) -> Option<&'a Read> {
+    // SAFETY: `queue` sets it, and mbm_plan_begin resets it.
+    unsafe { (*request).context.cast::<Read>().as_ref() }
 }
 
-/// Queues a read. [`Status::PENDING`], or why not.
+/// Queues a read as a request.
 ///
 /// # Safety
-/// `plan` is begun.
-unsafe fn queue(plan: *mut mbm_plan, index: usize) -> Status {
+/// `object` is begun, with this request and this read. The request is not pending.
+unsafe fn queue(object: *const Object, request: *mut mbm_clientRequest, read: &Read) {
     // SAFETY: as the caller promises. The data of a read lie within the plan's words.
     unsafe {
-        let object = pointers::object(plan);
-        let Some(slot) = free_slot(object) else {
-            return Status::BUSY;
-        };
-        let Some(read) = reads(object).get_mut(index) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        let mbm_planSetup {
-            requests,
-            data,
-            dataWords,
-            ..
-        } = *setup(object);
-        if read.offset > dataWords || read.words() > dataWords - read.offset {
-            return Status::INVALID_ARGUMENT;
-        }
-        let request = requests.add(slot.into());
-        (*request).done = Some(done);
-        (*request).context = plan.cast();
-        (*request).reply = data.add(read.offset.into()).cast();
-        (*request).replyBytes = read.words().saturating_mul(2);
+        (*request).done = None;
+        (*request).reply = (*object).setup().data.add(read.offset.into()).cast();
+        (*request).replyBytes = read.words() * 2;
         (*request).transaction = 0;
         (*request).unit = read.unit;
-        let Read {
-            table,
-            address,
-            quantity,
-            ..
-        } = *read;
-        let status = client::read_table((*object).client, request, table, address, quantity);
-        if status == Status::PENDING.code() {
-            read.slot = slot;
-        }
-        Status::from_code(status)
-    }
-}
-
-/// Takes a read that has ended, as `done` of its request.
-unsafe extern "C" fn done(context: *mut c_void, request: *mut mbm_clientRequest) {
-    let plan: *mut mbm_plan = context.cast();
-    // SAFETY: the client calls it with what `queue` set. If the plan was zeroed since, or begun
-    // anew, no read of it has this request.
-    unsafe {
-        if pointers::check(plan) != Status::OK {
-            return;
-        }
-        let object = pointers::object(plan);
-        let is_own = |read: &Read| {
-            read.slot < setup(object).requestCount
-                && setup(object).requests.add(read.slot.into()) == request
-        };
-        if let Some(index) = reads(object).iter().position(is_own) {
-            end(plan, index, Status::from_code((*request).status));
+        let (address, quantity) = (read.address, read.quantity);
+        let status = client::read_table((*object).client, request, read.table, address, quantity);
+        match Status::from_code(status) {
+            // Not now.
+            Status::BUSY | Status::QUEUE_FULL => {}
+            // If it was refused, the next poll ends the read.
+            _ => {
+                (*request).context = (&raw const *read).cast_mut().cast();
+                read.begin();
+            }
         }
     }
 }
 
-/// Ends a read, and calls `update` for the fields of each read whose status is news.
+/// Calls `update` for the fields of each read whose status is news.
 ///
 /// # Safety
 /// `plan` is begun; no reference into it lives, for `update` may use it, end it and zero it.
-#[cfg_attr(target_os = "none", inline(never))]
-unsafe fn end(plan: *mut mbm_plan, index: usize, status: Status) {
+unsafe fn update(plan: *mut mbm_plan) {
     // SAFETY: as the caller promises; looked at again after every call of `update`.
     unsafe {
         let object = pointers::object(plan);
-        let now = time(object);
-        schedule::end(reads(object), index, status, now, &setup(object).backoff());
-        while pointers::check(plan) == Status::OK {
-            let Some(update) = setup(object).update else {
-                return;
-            };
-            let Some(news) = reads(object).iter_mut().find_map(Read::take_news) else {
-                return;
+        let mut index = 0;
+        while let Some(read) = (*object).reads().get(index) {
+            index += 1;
+            let Some(news) = read.take_news() else {
+                continue;
             };
             for position in news {
-                if pointers::check(plan) != Status::OK {
-                    return;
-                }
-                let context = setup(object).context;
-                if let Some(position) = setup(object).positions().get(position) {
-                    update(context, plan, position.field() as u16);
+                let setup = (*object).setup();
+                if let (Some(update), Some(position)) =
+                    (setup.update, setup.positions().get(position))
+                {
+                    update(setup.context, plan, position.field() as u16);
+                    if pointers::check(plan) != Status::OK {
+                        return;
+                    }
                 }
             }
         }
@@ -173,19 +130,32 @@ pub unsafe extern "C" fn mbm_plan_pollDelay(plan: *mut mbm_plan) -> u32 {
             return u32::MAX;
         }
         let object = pointers::object(plan);
-        let client: *mut mbm_client = (*object).client;
+        let client = (*object).client;
         match pointers::check(client) {
             Status::OK => {}
             Status::BUSY => return 0,
             _ => return u32::MAX,
         }
         let now = time(object);
-        match schedule::next(reads(object), now) {
+        let setup = (*object).setup();
+        let mut is_free = mbm_client_pending(client) < MBM_CLIENT_DEPTH;
+        let mut has_request = false;
+        for slot in 0..setup.requestCount {
+            let request = setup.requests.add(slot.into());
+            if (*request).status == Status::PENDING.code() {
+                continue;
+            }
+            if read_of(request).is_some() {
+                return 0;
+            }
+            has_request = true;
+        }
+        is_free &= has_request;
+        match schedule::next((*object).reads(), now) {
             Err(u32::MAX) => u32::MAX,
-            Err(delay) => delay.min(LONGEST_DELAY) * 1000 - (*object).rest,
-            Ok(_) if mbm_client_pending(client) == MBM_CLIENT_DEPTH => u32::MAX,
-            Ok(_) if free_slot(object).is_none() => u32::MAX,
-            Ok(_) => 0,
+            Err(delay) => delay.min(LONGEST_DELAY) * 1000,
+            Ok(_) if is_free => 0,
+            Ok(_) => u32::MAX,
         }
     }
 }

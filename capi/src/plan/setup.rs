@@ -5,8 +5,10 @@ use crate::client::mbm_clientRequest;
 use crate::pointers;
 use core::ffi::c_void;
 use core::mem::offset_of;
+use core::slice::from_raw_parts;
+
 use mbm::plan::schedule::Backoff;
-use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, UnitLimits};
+use mbm::plan::{ExcludedRange, Field, Position, Read, ReadLimits, UnitLimits};
 
 /// A field of a plan: a value, or several of one type in a row, that a program wants from a
 /// unit again and again. A table of them may be constant.
@@ -26,9 +28,10 @@ pub struct mbm_planField {
     pub count: u16,
     /// The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL.
     pub intervalMs: u32,
-    /// mbm_plan_getInteger multiplies by this; 0 means 1. Only integers have a scale.
+    /// mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
+    /// It is 0 for a text.
     pub multiplier: i32,
-    /// It divides by this after that; 0 means 1. Not negative.
+    /// They divide by this after that; 0 means 1. Not negative; 0 for a text.
     pub divisor: i32,
 }
 
@@ -82,16 +85,16 @@ pub struct mbm_planSetup {
     pub reads: *mut mbm_planRead,
     /// Storage: the registers of all reads and the bits of all reads, 16 to a word.
     pub data: *mut u16,
-    /// Storage: the requests with which the plan reads, zeroed. With one it sends one read after
+    /// Storage: the requests with which the plan reads, zeroed; they are the plan's alone. With one it sends one read after
     /// the other; more are for Modbus TCP, where several may be under way at once.
     pub requests: *mut mbm_clientRequest,
     /// Units with limits of their own; NULL for none.
     pub units: *const mbm_planUnitLimits,
     /// Addresses that no read may touch; NULL for none.
     pub excluded: *const mbm_planExcludedRange,
-    /// Optional: called by mbm_client_poll, or mbm_plan_poll, for each field of a read that has
-    /// ended, and for each field of a unit that the plan takes for silent. It may call every
-    /// function on the plan, and on the client what a `done` function may call.
+    /// Optional: called by mbm_plan_poll for each field of a read that has ended, and for each
+    /// field of a unit that the plan takes for silent. It may call every function on the plan
+    /// and on the client.
     pub update: Option<unsafe extern "C" fn(context: *mut c_void, plan: *mut mbm_plan, field: u16)>,
     /// Handed to `update`. Yours, may be NULL.
     pub context: *mut c_void,
@@ -164,39 +167,41 @@ impl mbm_planSetup {
     }
 
     // SAFETY, of all below: `self` was handed to mbm_plan_begin, whose comment demands arrays
-    // of these lengths; nothing else uses those of the storage while a result lives. The
-    // types of C and of the core have the same layout.
+    // of these lengths, and `is_complete`. The types of C and of the core have the same layout.
 
     pub(super) unsafe fn fields<'a>(&self) -> &'a [Field] {
-        unsafe { pointers::array(self.fields.cast(), self.fieldCount.into()).unwrap_or(&[]) }
+        unsafe { from_raw_parts(self.fields.cast(), self.fieldCount.into()) }
     }
 
-    pub(super) unsafe fn positions<'a>(&self) -> &'a mut [Position] {
-        let positions = self.positions.cast();
-        unsafe { pointers::slice_mut(positions, self.fieldCount.into()).unwrap_or(&mut []) }
+    pub(super) unsafe fn positions<'a>(&self) -> &'a [Position] {
+        unsafe { from_raw_parts(self.positions.cast(), self.fieldCount.into()) }
+    }
+}
+
+impl ReadLimits for mbm_planSetup {
+    fn bits(&self) -> u16 {
+        self.bitsPerRead
     }
 
-    pub(super) unsafe fn reads<'a>(&self, count: u16) -> &'a mut [Read] {
-        let count = self.readCount.min(count);
-        unsafe { pointers::slice_mut(self.reads.cast(), count.into()).unwrap_or(&mut []) }
+    fn registers(&self) -> u8 {
+        self.registersPerRead
     }
 
-    pub(super) unsafe fn data<'a>(&self) -> &'a [u16] {
-        unsafe { pointers::array(self.data, self.dataWords.into()).unwrap_or(&[]) }
+    fn bit_gap(&self) -> u16 {
+        self.bitGap
     }
 
-    pub(super) unsafe fn limits<'a>(&self) -> Limits<'a> {
-        unsafe {
-            let units = pointers::array(self.units.cast(), self.unitCount.into());
-            let excluded = pointers::array(self.excluded.cast(), self.excludedCount.into());
-            Limits {
-                bits: self.bitsPerRead,
-                registers: self.registersPerRead,
-                bit_gap: self.bitGap,
-                register_gap: self.registerGap,
-                units: units.unwrap_or(&[]),
-                excluded: excluded.unwrap_or(&[]),
-            }
-        }
+    fn register_gap(&self) -> u8 {
+        self.registerGap
+    }
+
+    fn units(&self) -> &[UnitLimits] {
+        // SAFETY: as above.
+        unsafe { pointers::array(self.units.cast(), self.unitCount.into()).unwrap_or(&[]) }
+    }
+
+    fn excluded(&self) -> &[ExcludedRange] {
+        // SAFETY: as above.
+        unsafe { pointers::array(self.excluded.cast(), self.excludedCount.into()).unwrap_or(&[]) }
     }
 }

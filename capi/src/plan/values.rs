@@ -1,13 +1,17 @@
 //! The values of a plan, how old they are, and its reads.
 
-use super::object::{reads, setup, time};
+use super::object::{time, Object};
 use super::storage::mbm_plan;
 use crate::pointers::{self, slice_mut};
 use crate::registers::{mbm_registers, MBM_REGISTERS_OF_WORDS};
 use core::ffi::c_char;
+use core::mem::MaybeUninit;
+use core::slice::from_raw_parts;
+#[cfg(target_arch = "avr")]
+use mbm::data::value::{ShortDouble, Value as _};
 use mbm::error::Status;
-use mbm::plan::value::Words;
-use mbm::plan::{schedule, Read};
+use mbm::plan::value::{place, Words};
+use mbm::plan::{schedule, Field, Position, Read};
 
 /// A read of a plan: one request that it repeats.
 #[repr(C)]
@@ -26,21 +30,79 @@ pub struct mbm_planReadInfo {
     pub status: u8,
 }
 
-/// The index of the read that a field is in.
+/// A field of a plan, and its read.
+struct Found<'a> {
+    object: *mut Object,
+    field: &'a Field,
+    read: &'a Read,
+}
+
+/// Finds a field. Returns [`Status::OK`] with `found` set, or says why not.
 ///
 /// # Safety
 /// `plan` is NULL or storage of a plan.
-unsafe fn read_of(plan: *const mbm_plan, field: u16) -> Result<usize, Status> {
-    // SAFETY: as the caller promises.
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn find(plan: *const mbm_plan, field: u16, found: &mut MaybeUninit<Found>) -> Status {
+    // SAFETY: as the caller promises. Every field has a position and a read.
     unsafe {
         match pointers::check(plan) {
-            Status::OK => {
-                let setup = setup(pointers::object(plan));
-                let position = setup.positions().get(usize::from(field));
-                Ok(position.ok_or(Status::INVALID_ARGUMENT)?.read())
-            }
-            refused => Err(refused),
+            Status::OK => {}
+            refused => return refused,
         }
+        let object = pointers::object(plan);
+        let setup = (*object).setup();
+        if field >= setup.fieldCount {
+            return Status::INVALID_ARGUMENT;
+        }
+        let position: *const Position = setup.positions.add(field.into()).cast();
+        let read: *const Read = setup.reads.add((*position).read()).cast();
+        found.write(Found {
+            object,
+            field: &*setup.fields.add(field.into()).cast(),
+            read: &*read,
+        });
+        Status::OK
+    }
+}
+
+/// Finds the words of a field that has a value. Without a value it returns the status of the
+/// field.
+///
+/// # Safety
+/// As for [`find`]; nothing changes the data while `words` lives.
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn find_words(
+    plan: *const mbm_plan,
+    field: u16,
+    index: u16,
+    words: &mut MaybeUninit<Words>,
+) -> Status {
+    // SAFETY: as the caller promises. The data of a read lie within the plan's words.
+    unsafe {
+        let mut found = MaybeUninit::uninit();
+        match find(plan, field, &mut found) {
+            Status::OK => {}
+            refused => return refused,
+        }
+        let Found {
+            object,
+            field,
+            read,
+        } = found.assume_init();
+        if !read.has_data() {
+            return read.status();
+        }
+        let (first, before) = match place(field, read.address, index) {
+            Ok(place) => place,
+            Err(refused) => return refused,
+        };
+        let data = (*object).setup().data.add((read.offset + first).into());
+        words.write(Words {
+            words: from_raw_parts(data, (read.words() - first).into()),
+            before,
+            field,
+        });
+        Status::OK
     }
 }
 
@@ -53,49 +115,19 @@ unsafe fn read_of(plan: *const mbm_plan, field: u16) -> Result<usize, Status> {
 unsafe fn get<T>(
     plan: *const mbm_plan,
     field: u16,
+    index: u16,
     place: *mut T,
     find: impl FnOnce(&Words) -> Result<T, Status>,
 ) -> u8 {
     // SAFETY: as the caller promises.
-    let found = unsafe {
-        pointers::put_result(place, || {
-            let mut found = Words::NONE;
-            match words(plan, field, &mut found) {
-                Status::OK => find(&found),
-                refused => Err(refused),
-            }
-        })
-    };
-    found.err().unwrap_or(Status::OK).code()
-}
-
-/// Finds the words of a field that has a value.
-///
-/// # Safety
-/// As for [`read_of`]; nothing changes the data while `found` lives.
-#[cfg_attr(target_os = "none", inline(never))]
-unsafe fn words(plan: *const mbm_plan, field: u16, found: &mut Words) -> Status {
-    // SAFETY: as the caller promises.
     unsafe {
-        let index = match read_of(plan, field) {
-            Ok(index) => index,
-            Err(refused) => return refused,
-        };
-        let object = pointers::object(plan);
-        let read = reads(object).get(index).unwrap_or(&Read::NONE);
-        if !read.has_data() {
-            return read.status();
-        }
-        let setup = setup(object);
-        let words = setup.data().get(read.offset.into()..);
-        let words = words.and_then(|words| words.get(..read.words().into()));
-        if let (Some(words), Some(field)) = (words, setup.fields().get(usize::from(field))) {
-            found.words = words;
-            found.field = field;
-            found.before = field.address.wrapping_sub(read.address).into();
-            return Status::OK;
-        }
-        Status::INVALID_ARGUMENT
+        let mut words = MaybeUninit::uninit();
+        let result =
+            pointers::put_result(place, || match find_words(plan, field, index, &mut words) {
+                Status::OK => find(words.assume_init_ref()),
+                refused => Err(refused),
+            });
+        result.err().unwrap_or(Status::OK).code()
     }
 }
 
@@ -118,15 +150,13 @@ pub unsafe extern "C" fn mbm_plan_getStatus(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let index = match read_of(plan, field) {
-            Ok(index) => index,
-            Err(refused) => return refused.code(),
-        };
-        let object = pointers::object(plan);
+        let mut found = MaybeUninit::uninit();
+        match find(plan, field, &mut found) {
+            Status::OK => {}
+            refused => return refused.code(),
+        }
+        let Found { object, read, .. } = found.assume_init();
         let now = time(object);
-        let Some(read) = reads(object).get(index) else {
-            return Status::INVALID_ARGUMENT.code();
-        };
         pointers::put(
             ageMs,
             if read.has_data() {
@@ -158,11 +188,62 @@ pub unsafe extern "C" fn mbm_plan_getInteger(
     value: *mut i64,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { get(plan, field, value, |words| words.integer(index)) }
+    unsafe { get(plan, field, index, value, |words| words.integer()) }
+}
+
+/// As mbm_plan_getInteger, but with 32 bits throughout: less code on a microcontroller.
+///
+/// @param plan   the object
+/// @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
+/// @param index  which of its values, 0 for the first
+/// @param value  gets the number
+/// @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL also if the value, multiplied, plus half
+///         of the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of
+///         64 bits
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getInt32(
+    plan: *const mbm_plan,
+    field: u16,
+    index: u16,
+    value: *mut i32,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { get(plan, field, index, value, |words| words.int32()) }
+}
+
+/// A bit, an integer or a float as a double: multiplied and divided as its field says, and
+/// rounded once, to the nearest. On AVR, where C's double has 32 bits, it is rounded to these after
+/// that.
+///
+/// @param plan   the object
+/// @param field  the index of the field
+/// @param index  which of its values, 0 for the first
+/// @param value  gets the number; a float that is infinite or not a number stays so
+/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a text; MBM_NOT_INITIALISED; if no value has
+///         arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK only
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getNumber(
+    plan: *const mbm_plan,
+    field: u16,
+    index: u16,
+    value: *mut f64,
+) -> u8 {
+    // SAFETY: as the header demands; a double is its bits.
+    #[cfg(not(target_arch = "avr"))]
+    unsafe {
+        get(plan, field, index, value.cast(), |words| words.number())
+    }
+    // SAFETY: as the header demands; C's double is a float here.
+    #[cfg(target_arch = "avr")]
+    unsafe {
+        get(plan, field, index, value.cast(), |words| {
+            Ok(ShortDouble::from_bytes(words.number()?.to_be_bytes()).0)
+        })
+    }
 }
 
 /// A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
-/// to the nearest.
+/// to the nearest; without the scale of its field.
 ///
 /// @param plan   the object
 /// @param field  the index of the field
@@ -179,10 +260,11 @@ pub unsafe extern "C" fn mbm_plan_getFloat(
     value: *mut f32,
 ) -> u8 {
     // SAFETY: as the header demands; a float is its bits.
-    unsafe { get(plan, field, value.cast(), |words| words.float(index)) }
+    unsafe { get(plan, field, index, value.cast(), |words| words.float()) }
 }
 
-/// A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double. On AVR, where C's double has
+/// A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double, without the scale of its
+/// field. On AVR, where C's double has
 /// 32 bits, it is mbm_plan_getFloat.
 ///
 /// @param plan   the object
@@ -200,7 +282,7 @@ pub unsafe extern "C" fn mbm_plan_getDouble(
     // SAFETY: as the header demands; a double is its bits.
     #[cfg(not(target_arch = "avr"))]
     unsafe {
-        get(plan, field, value.cast(), |words| words.double(index))
+        get(plan, field, index, value.cast(), |words| words.double())
     }
     // SAFETY: as the header demands; C's double is a float here.
     #[cfg(target_arch = "avr")]
@@ -238,9 +320,12 @@ pub unsafe extern "C" fn mbm_plan_getText(
     }
     // SAFETY: as the header demands.
     unsafe {
-        let mut found = Words::NONE;
-        match words(plan, field, &mut found) {
-            Status::OK => copy(&found).err().unwrap_or(Status::OK).code(),
+        let mut words = MaybeUninit::uninit();
+        match find_words(plan, field, 0, &mut words) {
+            Status::OK => copy(words.assume_init_ref())
+                .err()
+                .unwrap_or(Status::OK)
+                .code(),
             refused => refused.code(),
         }
     }
@@ -261,13 +346,12 @@ pub unsafe extern "C" fn mbm_plan_getRegisters(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        get(plan, field, registers, |words| {
+        get(plan, field, 0, registers, |words| {
             if words.field.is_in_bits() {
                 return Err(Status::INVALID_ARGUMENT);
             }
-            let own = words.words.get(words.before..);
             Ok(mbm_registers {
-                data: own.ok_or(Status::INVALID_ARGUMENT)?.as_ptr().cast(),
+                data: words.words.as_ptr().cast(),
                 first: words.field.address,
                 count: words.field.length() as u16,
                 kind: MBM_REGISTERS_OF_WORDS,
@@ -288,18 +372,17 @@ pub unsafe extern "C" fn mbm_plan_getRegisters(
 pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        match read_of(plan, field) {
-            Ok(index) => {
-                let object = pointers::object(plan);
-                if pointers::check((*object).client) == Status::BUSY {
-                    return Status::BUSY.code();
-                }
-                let now = time(object);
-                schedule::hasten(reads(object), index, now);
-                Status::OK.code()
-            }
-            Err(refused) => refused.code(),
+        let mut found = MaybeUninit::uninit();
+        match find(plan, field, &mut found) {
+            Status::OK => {}
+            refused => return refused.code(),
         }
+        let Found { object, read, .. } = found.assume_init();
+        if pointers::check((*object).client) == Status::BUSY {
+            return Status::BUSY.code();
+        }
+        schedule::hasten(read, time(object));
+        Status::OK.code()
     }
 }
 
@@ -320,7 +403,7 @@ pub unsafe extern "C" fn mbm_plan_getRead(
         // SAFETY: as the header demands.
         let own = unsafe {
             match pointers::check(plan) {
-                Status::OK => reads(pointers::object(plan)).get(usize::from(index)),
+                Status::OK => (*pointers::object(plan)).reads().get(usize::from(index)),
                 refused => return Err(refused),
             }
         };

@@ -189,12 +189,7 @@ pub(crate) unsafe fn read_table(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    let function = match function {
-        1 => FunctionSpec::READ_COILS,
-        2 => FunctionSpec::READ_DISCRETE_INPUTS,
-        3 => FunctionSpec::READ_HOLDING_REGISTERS,
-        _ => FunctionSpec::READ_INPUT_REGISTERS,
-    };
+    let function = FunctionSpec::reads_table(function);
     // SAFETY: as the caller promises.
     unsafe { two_words(client, request, address, quantity, function) }
 }

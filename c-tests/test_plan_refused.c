@@ -1,0 +1,164 @@
+/* What a plan refuses, and that it changes nothing then. */
+#include "plan_device.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "refused.h"
+
+enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS };
+
+static plan_device d;
+
+static int rtu(void **state)
+{
+    (void)state;
+    plan_device_begin(&d, 0);
+    return 0;
+}
+
+static mbm_planField *add(uint8_t type, uint16_t address)
+{
+    return plan_device_add(&d, 1, HOLDING, type, address, 1000);
+}
+
+static void refuses(uint8_t status, uint16_t wrong)
+{
+    uint16_t field = 77;
+
+    REFUSED(status, d.plan, plan_device_try(&d, &field));
+    assert_int_equal(field, wrong);
+    REFUSED(status, d.plan, plan_device_try(&d, NULL));
+    IS(MBM_NOT_INITIALISED, mbm_plan_poll(&d.plan));
+}
+
+static void a_wrong_field_is_named(void **state)
+{
+    mbm_planField *field;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 0);
+    field = add(MBM_TYPE_UINT32, 20);
+    field->type = 99;
+    refuses(MBM_INVALID_ARGUMENT, 1);
+    field->type = MBM_TYPE_UINT32;
+    field->table = 5;
+    refuses(MBM_INVALID_ARGUMENT, 1);
+    field->table = HOLDING;
+    field->address = 0xFFFF;
+    refuses(MBM_ILLEGAL_DATA_ADDRESS, 1);
+    field->address = 20;
+    field->unit = 0;
+    refuses(MBM_BROADCAST_NOT_ALLOWED, 1);
+    field->unit = 1;
+    field->count = 63;
+    refuses(MBM_ILLEGAL_DATA_VALUE, 1);
+    field->count = 1;
+    d.fields[0].address = 21;
+    refuses(MBM_FIELDS_OVERLAP, 1);
+    d.fields[0].address = 0;
+    d.setup.readCount = 1;
+    refuses(MBM_BUFFER_TOO_SMALL, 1);
+    d.setup.readCount = 2;
+    d.setup.dataWords = 2;
+    refuses(MBM_BUFFER_TOO_SMALL, 1);
+    d.setup.dataWords = 3;
+    plan_device_start(&d);
+}
+
+static void a_setup_that_is_not_complete_is_refused(void **state)
+{
+    const mbm_planSetup whole = d.setup;
+    unsigned i;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 0);
+    for (i = 0; i < 12; i++) {
+        uint16_t count = d.setup.fieldCount;
+
+        d.setup = whole;
+        d.setup.fieldCount = count;
+        switch (i) {
+        case 0: d.setup.fields = NULL; break;
+        case 1: d.setup.positions = NULL; break;
+        case 2: d.setup.reads = NULL; break;
+        case 3: d.setup.data = NULL; break;
+        case 4: d.setup.requests = NULL; break;
+        case 5: d.setup.requestCount = 0; break;
+        case 6: d.setup.requestCount = 17; break;
+        case 7: d.setup.unitCount = 1; break;
+        case 8: d.setup.excludedCount = 1; break;
+        case 9: d.setup.fieldCount = 0; break;
+        case 10: d.setup.fieldCount = MBM_PLAN_MAX_FIELDS + 1; break;
+        default: break;
+        }
+        if (i < 11)
+            refuses(MBM_INVALID_ARGUMENT, 0xFFFF);
+        d.setup.fieldCount = count;
+    }
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(NULL, &d.client, &d.setup, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(&d.plan, NULL, &d.setup, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(&d.plan, &d.client, NULL, NULL));
+    memset(&d.client, 0, sizeof d.client);
+    refuses(MBM_NOT_INITIALISED, 0xFFFF);
+}
+
+static void what_was_never_begun_is_refused(void **state)
+{
+    static mbm_plan plan;
+    mbm_registers view = {0};
+    mbm_planReadInfo read = {0};
+    int64_t integer = 7;
+    float single = 7;
+    double wide = 7;
+    uint32_t age = 7;
+    char text[4] = "abc";
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < 2; i++) {
+        mbm_plan *object = i ? &plan : NULL;
+        uint8_t status = i ? MBM_NOT_INITIALISED : MBM_INVALID_ARGUMENT;
+
+        IS(status, mbm_plan_poll(object));
+        IS(status, mbm_plan_end(object));
+        IS(status, mbm_plan_getStatus(object, 0, &age));
+        IS(status, mbm_plan_getInteger(object, 0, 0, &integer));
+        IS(status, mbm_plan_getFloat(object, 0, 0, &single));
+        IS(status, mbm_plan_getDouble(object, 0, 0, &wide));
+        IS(status, mbm_plan_getText(object, 0, text, sizeof text));
+        IS(status, mbm_plan_getRegisters(object, 0, &view));
+        IS(status, mbm_plan_getRead(object, 0, &read));
+        IS(status, mbm_plan_refresh(object, 0));
+        assert_int_equal(mbm_plan_pollDelay(object), UINT32_MAX);
+    }
+    assert_true(integer == 7 && single == 7 && wide == 7 && age == 7);
+    assert_string_equal(text, "abc");
+}
+
+static void a_plan_is_begun_once(void **state)
+{
+    uint16_t field = 0;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 0);
+    plan_device_start(&d);
+    REFUSED(MBM_BUSY, d.plan, plan_device_try(&d, &field));
+    plan_device_run(&d, 200);
+    assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[0]);
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_refresh(&d.plan, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getStatus(&d.plan, 1, NULL));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(a_wrong_field_is_named, rtu),
+        cmocka_unit_test_setup(a_setup_that_is_not_complete_is_refused, rtu),
+        cmocka_unit_test_setup(what_was_never_begun_is_refused, rtu),
+        cmocka_unit_test_setup(a_plan_is_begun_once, rtu),
+    };
+
+    return cmocka_run_group_tests_name("plan_refused", tests, NULL, NULL);
+}

@@ -1,0 +1,141 @@
+//! The grouping of a plan's fields is optimal: held against every way to group a small table.
+
+#[path = "common/plan.rs"]
+mod plan;
+
+use mbm::error::Status;
+use mbm::plan::field::{
+    BIT, COILS, DOUBLE, HOLDING_REGISTERS, INPUT_REGISTERS, TEXT, UINT16, UINT32,
+};
+use mbm::plan::{ExcludedRange, Field, Limits, UnitLimits};
+use plan::grouped;
+use proptest::prelude::*;
+
+/// The least number of reads and registers, of every way to cut the sorted fields of a group.
+fn exhaustive(fields: &[Field], limits: &Limits) -> (usize, u32) {
+    let mut groups: Vec<(u8, u8, u32)> = fields
+        .iter()
+        .map(|field| (field.unit, field.table, field.interval_ms))
+        .collect();
+    groups.sort_unstable();
+    groups.dedup();
+    let mut total = (0, 0);
+    for (unit, table, interval) in groups {
+        let mut own: Vec<&Field> = fields
+            .iter()
+            .filter(|field| (field.unit, field.table, field.interval_ms) == (unit, table, interval))
+            .collect();
+        own.sort_by_key(|field| field.address);
+        let mut best = (usize::MAX, u32::MAX);
+        for cuts in 0..1u32 << (own.len() - 1) {
+            let mut cost = (0, 0);
+            let mut start = 0;
+            let mut allowed = true;
+            for place in 0..own.len() {
+                if place + 1 < own.len() && cuts & 1 << place == 0 {
+                    continue;
+                }
+                allowed &= is_allowed(&own[start..=place], limits);
+                cost.0 += 1;
+                cost.1 += own[place].end() - u32::from(own[start].address);
+                start = place + 1;
+            }
+            if allowed && cost < best {
+                best = cost;
+            }
+        }
+        total.0 += best.0;
+        total.1 += best.1;
+    }
+    total
+}
+
+/// Whether one read may hold these, by the words of the limits alone.
+fn is_allowed(fields: &[&Field], limits: &Limits) -> bool {
+    let (first, last) = (fields[0], fields[fields.len() - 1]);
+    let own = limits.units.iter().find(|own| own.unit == first.unit);
+    let bits = first.table <= 2;
+    let (mut most, gap) = if bits {
+        (u32::from(limits.bits), u32::from(limits.bit_gap))
+    } else {
+        (u32::from(limits.registers), u32::from(limits.register_gap))
+    };
+    if let Some(own) = own {
+        let own = if bits { own.bits } else { own.registers.into() };
+        if own > 0 {
+            most = own.into();
+        }
+    }
+    let standard = if bits { 2000 } else { 125 };
+    if most == 0 || most > standard {
+        most = standard;
+    }
+    let touched = u32::from(first.address)..last.end();
+    let excluded = limits.excluded.iter().any(|range| {
+        (range.unit == 0 || range.unit == first.unit)
+            && range.table == first.table
+            && (range.first..=range.last).any(|address| touched.contains(&address.into()))
+    });
+    let gaps = fields
+        .windows(2)
+        .all(|pair| u32::from(pair[1].address) - pair[0].end() <= gap);
+    touched.end - touched.start <= most && gaps && !excluded
+}
+
+prop_compose! {
+    /// A field of two units, three tables and two intervals, next to others.
+    fn fields_near()(
+        unit in 1u8..=2,
+        table in prop_oneof![1 => Just(COILS), 3 => Just(HOLDING_REGISTERS), 1 => Just(INPUT_REGISTERS)],
+        value_type in prop_oneof![Just(UINT16), Just(UINT32), Just(DOUBLE), Just(TEXT)],
+        address in 0u16..60,
+        count in 0u16..4,
+        slow in any::<bool>(),
+    ) -> Field {
+        let value_type = if table == COILS { BIT } else { value_type };
+        let interval_ms = if slow { 60_000 } else { 1000 };
+        Field { unit, table, value_type, address, count, interval_ms, ..Field::NONE }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn no_other_way_to_group_is_better(
+        fields in prop::collection::vec(fields_near(), 1..12),
+        (bits, registers) in (0u16..40, 0u8..30),
+        (bit_gap, register_gap) in (0u16..20, 0u8..12),
+        own in prop::option::of((1u8..=2, 0u16..30, 0u8..20)),
+        range in prop::option::of((0u8..=2, 1u8..=4, 0u16..60, 0u16..4)),
+    ) {
+        let units: Vec<_> = own
+            .map(|(unit, bits, registers)| UnitLimits { bits, registers, unit })
+            .into_iter()
+            .collect();
+        let excluded: Vec<_> = range
+            .map(|(unit, table, first, more)| ExcludedRange { first, last: first + more, unit, table })
+            .into_iter()
+            .collect();
+        let limits = Limits { bits, registers, bit_gap, register_gap, units: &units, excluded: &excluded };
+        // Only what the plan accepts, one field after the other.
+        let mut accepted: Vec<Field> = Vec::new();
+        for field in fields {
+            accepted.push(field);
+            let alone = is_allowed(&[&field], &limits);
+            match grouped(&accepted, &limits) {
+                Ok(_) => prop_assert!(alone),
+                Err(refusal) => {
+                    prop_assert_eq!(refusal.field, accepted.len() - 1);
+                    prop_assert!(!alone || refusal.status == Status::FIELDS_OVERLAP);
+                    accepted.pop();
+                }
+            }
+        }
+        if !accepted.is_empty() {
+            let reads = grouped(&accepted, &limits).expect("a plan");
+            let quantity = reads.iter().map(|read| u32::from(read.quantity)).sum::<u32>();
+            prop_assert_eq!((reads.len(), quantity), exhaustive(&accepted, &limits));
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Tables that a plan refuses, each with its status and the index of the field.
+
+#[path = "common/plan.rs"]
+mod plan;
+
+use mbm::error::Status;
+use mbm::plan::field::{BIT, COILS, DOUBLE, FLOAT, HOLDING_REGISTERS, TEXT, UINT32};
+use mbm::plan::group::{group, Refusal, MAX_FIELDS};
+use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, UnitLimits};
+use plan::{field, grouped, plain, LIMITS};
+
+#[track_caller]
+fn refused(status: Status, index: usize, fields: &[Field], limits: &Limits) {
+    let refusal = grouped(fields, limits).expect_err("a refusal");
+    assert_eq!((refusal.status, refusal.field), (status, index));
+}
+
+#[test]
+fn a_wrong_field_is_refused_with_its_index() {
+    let wrong = |change: fn(&mut Field)| {
+        let mut field = field(100);
+        change(&mut field);
+        [self::field(0), self::field(50), field]
+    };
+    let invalid: [fn(&mut Field); 10] = [
+        |field| field.table = 0,
+        |field| field.table = 5,
+        |field| field.value_type = 0,
+        |field| field.value_type = 11,
+        |field| field.value_type = BIT,
+        |field| field.table = COILS,
+        |field| field.order = 5,
+        |field| field.interval_ms = 0,
+        |field| field.divisor = -1,
+        |field| (field.value_type, field.multiplier) = (TEXT, 2),
+    ];
+    for change in invalid {
+        refused(Status::INVALID_ARGUMENT, 2, &wrong(change), &LIMITS);
+    }
+    let fields = wrong(|field| field.interval_ms = 86_400_001);
+    refused(Status::INVALID_ARGUMENT, 2, &fields, &LIMITS);
+    let fields = wrong(|field| field.unit = 0);
+    refused(Status::BROADCAST_NOT_ALLOWED, 2, &fields, &LIMITS);
+    let fields = wrong(|field| (field.address, field.value_type) = (65535, UINT32));
+    refused(Status::ILLEGAL_DATA_ADDRESS, 2, &fields, &LIMITS);
+    let fields = wrong(|field| (field.value_type, field.count) = (DOUBLE, 32));
+    refused(Status::ILLEGAL_DATA_VALUE, 2, &fields, &LIMITS);
+    let fields = wrong(|field| (field.value_type, field.count) = (TEXT, 251));
+    refused(Status::ILLEGAL_DATA_VALUE, 2, &fields, &LIMITS);
+}
+
+#[test]
+fn a_field_at_the_last_address_is_allowed() {
+    let last = Field {
+        value_type: FLOAT,
+        ..field(65534)
+    };
+    assert_eq!(
+        plain(&grouped(&[last], &LIMITS).expect("a plan")),
+        [(65534, 2)]
+    );
+}
+
+#[test]
+fn fields_that_overlap_are_refused_with_the_greater_index() {
+    let wide = Field {
+        value_type: UINT32,
+        ..field(9)
+    };
+    refused(
+        Status::FIELDS_OVERLAP,
+        1,
+        &[field(10), wide, field(20)],
+        &LIMITS,
+    );
+    refused(
+        Status::FIELDS_OVERLAP,
+        2,
+        &[wide, field(20), field(10)],
+        &LIMITS,
+    );
+    // Other intervals do not change that, another unit does.
+    let slow = Field {
+        interval_ms: 1,
+        ..field(10)
+    };
+    refused(Status::FIELDS_OVERLAP, 1, &[wide, slow], &LIMITS);
+    let other = Field {
+        unit: 2,
+        ..field(10)
+    };
+    assert_eq!(grouped(&[wide, other], &LIMITS).expect("a plan").len(), 2);
+}
+
+#[test]
+fn a_field_in_an_excluded_range_is_refused() {
+    let excluded = [ExcludedRange {
+        first: 0,
+        last: 10,
+        unit: 1,
+        table: HOLDING_REGISTERS,
+    }];
+    let limits = Limits {
+        excluded: &excluded,
+        ..LIMITS
+    };
+    refused(
+        Status::ILLEGAL_DATA_ADDRESS,
+        1,
+        &[field(11), field(10)],
+        &limits,
+    );
+}
+
+#[test]
+fn an_excluded_range_that_is_reversed_is_refused() {
+    let excluded = [ExcludedRange {
+        first: 11,
+        last: 10,
+        unit: 1,
+        table: HOLDING_REGISTERS,
+    }];
+    let limits = Limits {
+        excluded: &excluded,
+        ..LIMITS
+    };
+    let fields = [field(0), field(20)];
+    refused(Status::INVALID_ARGUMENT, usize::MAX, &fields, &limits);
+}
+
+#[test]
+fn a_field_longer_than_the_reads_of_its_unit_is_refused() {
+    let units = [UnitLimits {
+        bits: 0,
+        registers: 1,
+        unit: 1,
+    }];
+    let limits = Limits {
+        units: &units,
+        ..LIMITS
+    };
+    let wide = Field {
+        value_type: UINT32,
+        ..field(0)
+    };
+    refused(Status::ILLEGAL_DATA_VALUE, 1, &[field(5), wide], &limits);
+}
+
+#[test]
+fn storage_that_does_not_suffice_is_refused_with_the_first_field_left_over() {
+    let fields = [field(20), field(0), field(10)];
+    let run = |positions: usize, reads: usize, words| {
+        let mut positions = vec![Position::NONE; positions];
+        let mut reads = vec![Read::default(); reads];
+        group(&fields, &LIMITS, &mut positions, &mut reads, words)
+    };
+    let small = |field| {
+        Err(Refusal {
+            status: Status::BUFFER_TOO_SMALL,
+            field,
+        })
+    };
+    assert_eq!(run(2, 3, 3), small(2));
+    assert_eq!(run(3, 2, 3), small(0));
+    assert_eq!(run(3, 3, 1), small(2));
+    assert_eq!(run(3, 3, 2), small(0));
+    assert_eq!(run(3, 3, 3), Ok(3));
+}
+
+#[test]
+fn no_field_and_too_many_fields_are_refused() {
+    refused(Status::INVALID_ARGUMENT, usize::MAX, &[], &LIMITS);
+    let fields = vec![field(0); MAX_FIELDS + 1];
+    refused(Status::INVALID_ARGUMENT, usize::MAX, &fields, &LIMITS);
+}
