@@ -57,6 +57,7 @@
 #define mbm_registers_getDouble mbm_registers_getDouble_wants_mdouble_32
 #define mbm_registers_setDouble mbm_registers_setDouble_wants_mdouble_32
 #define mbm_plan_getDouble mbm_plan_getDouble_wants_mdouble_32
+#define mbm_plan_getNumber mbm_plan_getNumber_wants_mdouble_32
 #endif
 
 #ifdef __cplusplus
@@ -1613,7 +1614,7 @@ typedef struct mbm_clientRequest {
     /**
      * Private.
      */
-    uint32_t words[8];
+    uint32_t words[7];
 } mbm_clientRequest;
 
 /**
@@ -2748,7 +2749,7 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
 /**
  * The most fields of one plan.
  */
-#define MBM_PLAN_MAX_FIELDS 32767
+#define MBM_PLAN_MAX_FIELDS 16383
 
 /**
  * A plan: a table of fields that a client reads from units again and again.
@@ -2802,11 +2803,12 @@ typedef struct mbm_planField {
      */
     uint32_t intervalMs;
     /**
-     * mbm_plan_getInteger multiplies by this; 0 means 1. Only integers have a scale.
+     * mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
+     * It is 0 for a text.
      */
     int32_t multiplier;
     /**
-     * It divides by this after that; 0 means 1. Not negative.
+     * They divide by this after that; 0 means 1. Not negative; 0 for a text.
      */
     int32_t divisor;
 } mbm_planField;
@@ -2893,7 +2895,7 @@ typedef struct mbm_planSetup {
      */
     uint16_t *data;
     /**
-     * Storage: the requests with which the plan reads, zeroed. With one it sends one read after
+     * Storage: the requests with which the plan reads, zeroed; they are the plan's alone. With one it sends one read after
      * the other; more are for Modbus TCP, where several may be under way at once.
      */
     struct mbm_clientRequest *requests;
@@ -2906,9 +2908,9 @@ typedef struct mbm_planSetup {
      */
     const struct mbm_planExcludedRange *excluded;
     /**
-     * Optional: called by mbm_client_poll, or mbm_plan_poll, for each field of a read that has
-     * ended, and for each field of a unit that the plan takes for silent. It may call every
-     * function on the plan, and on the client what a `done` function may call.
+     * Optional: called by mbm_plan_poll for each field of a read that has ended, and for each
+     * field of a unit that the plan takes for silent. It may call every function on the plan
+     * and on the client.
      */
     void (*update)(void *context, struct mbm_plan *plan, uint16_t field);
     /**
@@ -3011,13 +3013,14 @@ typedef struct mbm_planReadInfo {
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
  * @return MBM_OK; MBM_BUSY if it was begun already; of a field MBM_INVALID_ARGUMENT for an
  *         unknown table, type or order, a type that the table does not have, an interval out
- *         of range, a negative divisor or a scale of what is no integer, MBM_BROADCAST_NOT_ALLOWED for unit 0,
- *         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range,
- *         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP for
- *         the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first without
- *         storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL pointers and
- *         counts out of range; MBM_NOT_INITIALISED for a client that was never begun. The
- *         object is changed on MBM_OK only; `positions` and `reads` may be changed always
+ *         of range, a negative divisor or a scale of a text, MBM_BROADCAST_NOT_ALLOWED for
+ *         unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded
+ *         range, MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP
+ *         for the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first
+ *         without storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL
+ *         pointers and counts out of range; MBM_NOT_INITIALISED for a client that was never
+ *         begun. The object is changed on MBM_OK only; `positions` and `reads` may be changed
+ *         always
  */
 uint8_t mbm_plan_begin(struct mbm_plan *plan,
                        struct mbm_client *client,
@@ -3035,8 +3038,9 @@ uint8_t mbm_plan_begin(struct mbm_plan *plan,
 uint8_t mbm_plan_end(struct mbm_plan *plan);
 
 /**
- * Queues the reads that are due, as far as there are requests for them. It does not poll the
- * client: call mbm_client_poll after it.
+ * Takes the replies that have arrived, calls `update` for the fields of each read that has
+ * ended, and queues the reads that are due, as far as there are requests for them. It does not
+ * poll the client: call mbm_client_poll after it.
  *
  * @param plan  the object
  * @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT;
@@ -3091,8 +3095,41 @@ uint8_t mbm_plan_getInteger(const struct mbm_plan *plan,
                             int64_t *value);
 
 /**
+ * As mbm_plan_getInteger, but with 32 bits throughout: less code on a microcontroller.
+ *
+ * @param plan   the object
+ * @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number
+ * @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL also if the value, multiplied, plus half
+ *         of the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of
+ *         64 bits
+ */
+uint8_t mbm_plan_getInt32(const struct mbm_plan *plan,
+                          uint16_t field,
+                          uint16_t index,
+                          int32_t *value);
+
+/**
+ * A bit, an integer or a float as a double: multiplied and divided as its field says, and
+ * rounded once, to the nearest. On AVR, where C's double has 32 bits, it is rounded to these after
+ * that.
+ *
+ * @param plan   the object
+ * @param field  the index of the field
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number; a float that is infinite or not a number stays so
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a text; MBM_NOT_INITIALISED; if no value has
+ *         arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK only
+ */
+uint8_t mbm_plan_getNumber(const struct mbm_plan *plan,
+                           uint16_t field,
+                           uint16_t index,
+                           double *value);
+
+/**
  * A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
- * to the nearest.
+ * to the nearest; without the scale of its field.
  *
  * @param plan   the object
  * @param field  the index of the field
@@ -3108,7 +3145,8 @@ uint8_t mbm_plan_getFloat(const struct mbm_plan *plan,
                           float *value);
 
 /**
- * A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double. On AVR, where C's double has
+ * A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double, without the scale of its
+ * field. On AVR, where C's double has
  * 32 bits, it is mbm_plan_getFloat.
  *
  * @param plan   the object
@@ -3220,11 +3258,11 @@ typedef struct mbm_link {
     /**
      * Private.
      */
-    void *pointers[31];
+    void *pointers[32];
     /**
      * Private.
      */
-    uint32_t words[22];
+    uint32_t words[20];
 } mbm_link;
 
 /**
