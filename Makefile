@@ -15,9 +15,13 @@ MODBUS = $(shell pkg-config --cflags libmodbus)
 LIBS := -Wl,--gc-sections -lmodbus -lcmocka -lpthread
 SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
 
-SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
+# Only programs with TLS link the TLS library.
+TLS := $(wildcard examples/linux/mbm_tls*.c) $(wildcard c-tests/support/tls_*.c)
+TLS_LIBS := -lmbedtls -lmbedx509 -lmbedcrypto
+SUPPORT := $(filter-out $(TLS),$(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c))
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
+TLS_TESTS := $(filter test_tls%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_command gateway
 # The files that clang-format formats. The headers in include/ are documentation too, and are
@@ -115,7 +119,7 @@ abi: ## Generate packaging/mbm.abi, with which `make check` compares the C inter
 
 .PHONY: compile-commands
 compile-commands: ## Write compile_commands.json, for editors and clang-tidy
-	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
+	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev libmbedtls-dev openssl valgrind
 	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SERVE) $(PEERS) \
 		$(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) $(CLIENTS) $(DEMO) $(SNIFF) $(BUILD)/plain/linux/basic | scripts/compile-commands
 
@@ -197,12 +201,18 @@ fault-table: need-test ## Generate docs/reports/fault-table.md from the test's r
 	@scripts/run-c-tests $(BUILD)/plain/test_bad_wire
 	@scripts/fault-table
 
+# Certificates for tests and examples, build/certificates.
+.PHONY: certificates
+certificates:
+	@scripts/need openssl
+	@scripts/certificates $(BUILD)/certificates
+
 .PHONY: need-check need-test
 need-check:
 	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
-		perl valgrind mbpoll
+		perl valgrind mbpoll libmbedtls-dev openssl
 
 # The test programs, one folder for each variant: $(1) name, $(2) C compiler, $(3) C++ compiler,
 # $(4) flags, $(5) archive
@@ -217,7 +227,9 @@ $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
-	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(LIBS) -o $$@
+	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
+$(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
+$(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
@@ -238,6 +250,8 @@ $(BUILD)/plain/test_class_examples.o $(BUILD)/sanitized/test_class_examples.o $(
 FIRMWARE_TESTS := $(TESTS:%=$(BUILD)/firmware/%)
 $(FIRMWARE_TESTS): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(SUPPORT))) $(FIRMWARE_ARCHIVE)
 	@g++ $(filter %.o,$^) $(FIRMWARE_ARCHIVE) $(LIBS) -o $@
+$(TLS_TESTS:%=$(BUILD)/firmware/%): $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(TLS))) | certificates
+$(TLS_TESTS:%=$(BUILD)/firmware/%): LIBS += $(TLS_LIBS)
 $(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tcp_listener.o $(BUILD)/plain/linux/mbm_tty.o $(FIRMWARE_ARCHIVE)
 	@mkdir -p $(@D)
 	@gcc $(filter %.o,$^) $(FIRMWARE_ARCHIVE) -Wl,--gc-sections -o $@
