@@ -64,7 +64,7 @@ static void callbacks_around_a_request_may_use_the_words(void **)
     assert_sent(Serial, {1, 16, 0, 0, 0, 2, 4, 0, 6, 0, 8});
 }
 
-static uint8_t begin_other(uint16_t, uint16_t, const uint8_t *)
+static uint8_t begin_other(const mbm_access &)
 {
     entered++;
     assert_int_equal(polled->begin(9, elsewhere, 9600), MBM_BUSY);

@@ -77,14 +77,14 @@ static void a_hook_refuses_a_write_and_another_is_told_of_it(void **)
     ModbusRegisterArray<4> registers(10);
     ModbusServer server;
     told_count = 0;
-    registers.beforeWrite([](uint16_t address, uint16_t quantity, const uint8_t *data) -> uint8_t {
-        assert_int_equal(address, 11);
-        assert_int_equal(quantity, 1);
-        return data[0] > 0x10 ? 4 : 0;
+    registers.beforeWrite([](const mbm_access &access) -> uint8_t {
+        assert_int_equal(access.address, 11);
+        assert_int_equal(access.quantity, 1);
+        return access.data[0] > 0x10 ? 4 : 0;
     });
-    registers.afterWrite([](uint16_t address, uint16_t quantity) {
-        told_address = address;
-        told_quantity = quantity;
+    registers.afterWrite([](const mbm_access &access) {
+        told_address = access.address;
+        told_quantity = access.quantity;
         told_count++;
     });
     server.holdingRegisters(registers);

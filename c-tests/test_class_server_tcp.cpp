@@ -264,7 +264,7 @@ static void a_hook_cannot_poll_or_begin_its_server(void **)
     polled = &server;
     again = &listener;
     listener.begin();
-    holding.afterWrite([](uint16_t, uint16_t) {
+    holding.afterWrite([](const mbm_access &) {
         assert_int_equal(polled->poll(), MBM_BUSY);
         assert_int_equal(polled->begin(9, *again), MBM_BUSY);
     });

@@ -62,7 +62,7 @@ static void answers_with_exception_04(uint8_t framing, mbm_unit *unit, const cha
 
     assert_non_null(frame);
     memcpy(frame, request, length);
-    OK(mbm_unit_respond(unit, 1, FRAMING(framing), frame, length, capacity, &response));
+    OK(mbm_unit_respond(unit, 1, NULL, FRAMING(framing), frame, length, capacity, &response));
     assert_true(response <= capacity);
     assert_int_equal(response, framing == MBM_FRAMING_TCP ? 9 : 5);
     assert_int_equal(frame[pdu], (uint8_t)request[pdu] | 0x80);

@@ -224,34 +224,36 @@ static void within_unit(void)
     OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
 }
 
-static uint8_t before_write(void *context, uint16_t address, uint16_t quantity, const uint8_t *data)
+static uint8_t before_access(void *context, const mbm_access *access)
 {
     (void)context;
-    (void)address;
-    (void)quantity;
-    (void)data;
+    (void)access;
     within_unit();
     return 0;
 }
 
-static void after_write(void *context, uint16_t address, uint16_t quantity)
+static void after_access(void *context, const mbm_access *access)
 {
-    before_write(context, address, quantity, NULL);
+    before_access(context, access);
 }
 
 static uint8_t cell_is_valid(void *context, uint16_t address)
 {
-    return (uint8_t)!before_write(context, address, 1, NULL);
+    (void)context;
+    (void)address;
+    within_unit();
+    return 1;
 }
 
 static uint16_t cell_get(void *context, uint16_t address)
 {
-    return before_write(context, address, 1, NULL);
+    return cell_is_valid(context, address);
 }
 
 static void cell_set(void *context, uint16_t address, uint16_t value)
 {
-    before_write(context, address, value, NULL);
+    (void)value;
+    cell_is_valid(context, address);
 }
 
 static uint16_t carry_out(void *context, const mbm_request *asked, uint8_t *response,
@@ -268,26 +270,15 @@ static uint16_t carry_out(void *context, const mbm_request *asked, uint8_t *resp
     return 1;
 }
 
-static uint8_t before_record(void *context, uint16_t number, uint16_t record, uint16_t length,
-                             const uint8_t *data)
-{
-    (void)number;
-    return before_write(context, record, length, data);
-}
-
-static void after_record(void *context, uint16_t number, uint16_t record, uint16_t length)
-{
-    (void)number;
-    before_write(context, record, length, NULL);
-}
-
 static void restarted(void *context, uint8_t clears)
 {
-    before_write(context, clears, 1, NULL);
+    cell_is_valid(context, clears);
 }
 
 static void serve_all(void)
 {
+    static const mbm_accessHooks access_hooks = {NULL, before_access, before_access, after_access};
+
     memset(&table, 0, sizeof table);
     memset(&late_table, 0, sizeof late_table);
     memset(&cells, 0, sizeof cells);
@@ -297,20 +288,17 @@ static void serve_all(void)
     unit.id = 17;
     table.words = late_table.words = words;
     table.size = late_table.size = 8;
-    table.before = before_write;
-    table.after = after_write;
+    OK(mbm_registerTable_setHooks(&table, &access_hooks));
     cells.isValid = cell_is_valid;
     cells.get = cell_get;
     cells.set = cell_set;
-    cells.before = before_write;
-    cells.after = after_write;
+    OK(mbm_dataCallbacks_setHooks(&cells, &access_hooks));
     custom.serve = carry_out;
     custom.code = 65;
     diagnostics.restart = restarted;
     files.files = &file;
     files.count = 1;
-    files.before = before_record;
-    files.after = after_record;
+    OK(mbm_files_setHooks(&files, &access_hooks));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_registerTable_serveMaskAndReadWrite(&table));
     OK(mbm_unit_serveCallbacks(&unit, &cells, 1));

@@ -81,12 +81,16 @@ static void a_refused_call_sets_its_length_to_0(void **state)
         assert_int_equal(expected.kind, MBM_LENGTH_UNKNOWN);                                       \
     } while (0)
     memset(&unit, 0, sizeof unit);
-    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(4), frame, 8, 16, &length));
-    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_unit_respond(NULL, 1, FRAMING(0), frame, 8, 16, &length));
-    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), NULL, 8, 16, &length));
-    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 17, 16, &length));
-    NO_LENGTH(MBM_OK, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 8, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 8, 16, NULL));
+    NO_LENGTH(MBM_INVALID_ARGUMENT,
+              mbm_unit_respond(&unit, 1, NULL, FRAMING(4), frame, 8, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT,
+              mbm_unit_respond(NULL, 1, NULL, FRAMING(0), frame, 8, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT,
+              mbm_unit_respond(&unit, 1, NULL, FRAMING(0), NULL, 8, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT,
+              mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 17, 16, &length));
+    NO_LENGTH(MBM_OK, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 8, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 8, 16, NULL));
     NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_build(&none, &packet, frame, 16, &length));
     NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, NULL, frame, 16, &length));
     NO_LENGTH(MBM_BUFFER_TOO_SMALL, mbm_frame_build(&rtu, &packet, frame, 7, &length));

@@ -122,8 +122,8 @@ static unsigned answer(mbm_unit *unit, uint8_t id, const char *pdu, size_t lengt
     frame[0] = id;
     memcpy(frame + 1, pdu, length);
     length = seal(frame, length + 1);
-    OK(mbm_unit_respond(unit, 1, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)length, sizeof frame,
-                        &response));
+    OK(mbm_unit_respond(unit, 1, NULL, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)length,
+                        sizeof frame, &response));
     assert_int_not_equal(response, 0xFFFF);
     return response == 0 ? 0 : frame[1];
 }
@@ -377,37 +377,34 @@ static void switches_can_be_registered_again_like_any_record(void **state)
 static mbm_registerTable *hooked;
 static uint16_t fewer[1];
 
-static uint8_t zero_before(void *context, uint16_t address, uint16_t quantity, const uint8_t *data)
+static uint8_t zero_before(void *context, const mbm_access *access)
 {
     (void)context;
-    (void)address;
-    (void)quantity;
-    (void)data;
+    (void)access;
     memset(hooked, 0, sizeof *hooked);
     return 0;
 }
 
-static uint8_t shrink_before(void *context, uint16_t address, uint16_t quantity,
-                             const uint8_t *data)
+static uint8_t shrink_before(void *context, const mbm_access *access)
 {
-    zero_before(context, address, quantity, data);
+    zero_before(context, access);
     hooked->words = fewer;
     hooked->size = 1;
     OK(mbm_unit_serveHoldingRegisters(&units[0], hooked));
     return 0;
 }
 
-static void shrink_after(void *context, uint16_t address, uint16_t quantity)
+static void shrink_after(void *context, const mbm_access *access)
 {
-    shrink_before(context, address, quantity, NULL);
+    shrink_before(context, access);
 }
 
-static uint8_t become_bits(void *context, uint16_t address, uint16_t quantity, const uint8_t *data)
+static uint8_t become_bits(void *context, const mbm_access *access)
 {
     static uint8_t bit[1];
     mbm_bitTable *table = (mbm_bitTable *)(void *)hooked;
 
-    zero_before(context, address, quantity, data);
+    zero_before(context, access);
     table->bits = bit;
     table->size = 8;
     OK(mbm_unit_serveCoils(&units[0], table));
@@ -425,13 +422,19 @@ static unsigned written(void)
     frame[0] = 17;
     memcpy(frame + 1, pdu, sizeof pdu - 1);
     length = seal(frame, sizeof pdu);
-    OK(mbm_unit_respond(units, 1, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)length, sizeof frame,
-                        &response));
+    OK(mbm_unit_respond(units, 1, NULL, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)length,
+                        sizeof frame, &response));
     return frame[1] & 0x80 ? frame[2] : 0;
 }
 
 static void a_request_goes_on_with_the_old_table_if_its_hook_changes_it(void **state)
 {
+    static const mbm_accessHooks before_hooks[] = {
+        {.beforeWrite = zero_before},
+        {.beforeWrite = shrink_before},
+        {.beforeWrite = become_bits},
+    };
+    static const mbm_accessHooks after_hooks = {.afterWrite = shrink_after};
     mbm_registerTable *table = (mbm_registerTable *)malloc(sizeof *table);
     int i;
 
@@ -443,7 +446,7 @@ static void a_request_goes_on_with_the_old_table_if_its_hook_changes_it(void **s
         memset(table, 0, sizeof *table);
         table->words = words;
         table->size = 4;
-        table->before = i == 0 ? zero_before : i == 1 ? shrink_before : become_bits;
+        OK(mbm_registerTable_setHooks(table, &before_hooks[i]));
         OK(mbm_unit_serveHoldingRegisters(units, table));
         words[3] = 0x7777;
         assert_int_equal(written(), 0);
@@ -456,7 +459,7 @@ static void a_request_goes_on_with_the_old_table_if_its_hook_changes_it(void **s
     memset(table, 0, sizeof *table);
     table->words = words;
     table->size = 4;
-    table->after = shrink_after;
+    OK(mbm_registerTable_setHooks(table, &after_hooks));
     OK(mbm_unit_serveHoldingRegisters(units, table));
     OK(mbm_registerTable_serveMaskAndReadWrite(table));
     assert_int_equal(answer(units, 17, "\x17\0\0\0\4\0\0\0\1\2\0\1", 12), 0x17);

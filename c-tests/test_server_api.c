@@ -147,11 +147,11 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(&unit, &switches, 0, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(&unit, &switches, 128, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(NULL, &switches, 3, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(4), frame, 8, 256, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(NULL, 1, FRAMING(0), frame, 8, 256, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), NULL, 8, 256, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 8, 256, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 9, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(4), frame, 8, 256, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(NULL, 1, NULL, FRAMING(0), frame, 8, 256, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), NULL, 8, 256, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 8, 256, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 9, 8, &length));
 }
 
 static void a_function_that_is_not_served_gets_exception_01(void **state)

@@ -296,11 +296,8 @@ static int prepare_callbacks(void **state)
         callbacks[i].isValid = is_valid;
         callbacks[i].get = get;
         callbacks[i].context = &callbacks[i];
-        if (i % 2 == 0) {
-            IS(MBM_INVALID_ARGUMENT,
-               mbm_unit_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1)));
+        if (i % 2 == 0)
             callbacks[i].set = set;
-        }
         status |= mbm_unit_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1));
     }
     IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCallbacks(&called, &callbacks[0], 5));
@@ -335,7 +332,7 @@ static void compare_with_model(mbm_unit *asked)
         seal(frame, length + 1);
         if (damaged)
             frame[below((unsigned)length + 3)] ^= (uint8_t)(1u << below(8));
-        OK(mbm_unit_respond(asked, 1, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)(length + 3),
+        OK(mbm_unit_respond(asked, 1, NULL, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)(length + 3),
                             sizeof frame, &answered));
         if (damaged) {
             assert_int_equal(answered, 0);

@@ -16,8 +16,9 @@
 /**
  * The members that ModbusRegisters and ModbusBits share. A cell is a register or a bit.
  *
- * A hook gets the address on the wire of the first cell and the number of cells. It
- * may read this table's cells; change them in loop, not in a hook.
+ * A hook gets the request: its unit and function, the address on the wire of the first
+ * cell, the number of cells and, of a write, the new values: registers with the high
+ * byte first, bits with the lowest bit first.
  */
 template <typename Table> class ModbusTable {
 public:
@@ -25,20 +26,31 @@ public:
     ModbusTable &operator=(const ModbusTable &) = delete;
 
     /**
-     * Sets a hook that is called once before a request writes cells. `data` are the new
-     * values: registers with the high byte first, bits with the lowest bit first. The hook
+     * Sets a hook that is called before a request reads cells, and may set them. It
      * returns 0, or an exception code that refuses the whole request. nullptr for none.
      */
-    void beforeWrite(uint8_t (*hook)(uint16_t address, uint16_t quantity, const uint8_t *data))
+    void beforeRead(uint8_t (*hook)(const mbm_access &access))
     {
-        onBefore = hook;
-        table.before = hook != nullptr ? beforeHook : nullptr;
+        onRead = hook;
+        hooks.beforeRead = hook != nullptr ? readHook : nullptr;
+        setHooks(&table, &hooks);
+    }
+    /**
+     * Sets a hook that is called before a request writes cells. It returns 0, or an
+     * exception code that refuses the whole request. nullptr for none.
+     */
+    void beforeWrite(uint8_t (*hook)(const mbm_access &access))
+    {
+        onWrite = hook;
+        hooks.beforeWrite = hook != nullptr ? writeHook : nullptr;
+        setHooks(&table, &hooks);
     }
     /** Sets a hook that is called after a request has written cells; nullptr for none. */
-    void afterWrite(void (*hook)(uint16_t address, uint16_t quantity))
+    void afterWrite(void (*hook)(const mbm_access &access))
     {
-        onAfter = hook;
-        table.after = hook != nullptr ? afterHook : nullptr;
+        onWritten = hook;
+        hooks.afterWrite = hook != nullptr ? writtenHook : nullptr;
+        setHooks(&table, &hooks);
     }
     /**
      * Says which cells exist: one bit for each, lowest bit of the first byte first.
@@ -52,9 +64,10 @@ public:
 
 protected:
     /** @cond for ModbusRegisters and ModbusBits */
-    ModbusTable(uint16_t size, uint16_t address) : table(), onBefore(), onAfter()
+    ModbusTable(uint16_t size, uint16_t address)
+        : table(), hooks(), onRead(), onWrite(), onWritten()
     {
-        table.context = this;
+        hooks.context = this;
         table.size = size;
         table.base = address;
     }
@@ -65,19 +78,32 @@ protected:
 private:
     friend class ModbusUnit;
 
-    uint8_t (*onBefore)(uint16_t, uint16_t, const uint8_t *);
-    void (*onAfter)(uint16_t, uint16_t);
+    mbm_accessHooks hooks;
+    uint8_t (*onRead)(const mbm_access &);
+    uint8_t (*onWrite)(const mbm_access &);
+    void (*onWritten)(const mbm_access &);
 
     Table *record() { return &table; }
 
-    static uint8_t beforeHook(void *context, uint16_t address, uint16_t quantity,
-                              const uint8_t *data)
+    static void setHooks(mbm_registerTable *table, const mbm_accessHooks *hooks)
     {
-        return static_cast<ModbusTable *>(context)->onBefore(address, quantity, data);
+        mbm_registerTable_setHooks(table, hooks);
     }
-    static void afterHook(void *context, uint16_t address, uint16_t quantity)
+    static void setHooks(mbm_bitTable *table, const mbm_accessHooks *hooks)
     {
-        static_cast<ModbusTable *>(context)->onAfter(address, quantity);
+        mbm_bitTable_setHooks(table, hooks);
+    }
+    static uint8_t readHook(void *context, const mbm_access *access)
+    {
+        return static_cast<ModbusTable *>(context)->onRead(*access);
+    }
+    static uint8_t writeHook(void *context, const mbm_access *access)
+    {
+        return static_cast<ModbusTable *>(context)->onWrite(*access);
+    }
+    static void writtenHook(void *context, const mbm_access *access)
+    {
+        static_cast<ModbusTable *>(context)->onWritten(*access);
     }
 };
 
@@ -162,7 +188,8 @@ public:
      *                 users; 0 is every function that no object before it serves
      * @param handler  writes the data of the response, at most `capacity` bytes, and
      *                 returns how many; or MBM_REPLY_EXCEPTION | code,
-     *                 MBM_REPLY_NONE, MBM_REPLY_PENDING to be called again
+     *                 MBM_REPLY_NONE, MBM_REPLY_PENDING to be called again, or
+     *                 MBM_REPLY_DECLINED to let the next object answer
      */
     ModbusFunction(uint8_t code, uint16_t (*handler)(const mbm_request &request, uint8_t *response,
                                                      uint16_t capacity))

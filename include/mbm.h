@@ -2510,6 +2510,12 @@ uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
 #define MBM_REPLY_PENDING 768
 
 /**
+ * A function of yours returns this to decline the request: the next record of the unit that
+ * serves the function code answers, or exception 01 if there is none.
+ */
+#define MBM_REPLY_DECLINED 1024
+
+/**
  * The most records that one unit can serve. Each is one struct that you pass to a
  * mbm_unit_serve function.
  */
@@ -2635,6 +2641,95 @@ typedef struct mbm_unit {
 } mbm_unit;
 
 /**
+ * A request that reads or writes cells of yours, as your hooks get it. A cell is a register,
+ * a coil, a discrete input or a record of a file.
+ */
+typedef struct mbm_access {
+    /**
+     * The new values, in the hooks of a write: registers and records with the high byte
+     * first, bits with the lowest bit of the first byte first. NULL in beforeRead. Valid
+     * until the hook returns.
+     */
+    const uint8_t *data;
+    /**
+     * The line or connection that the request came from: the `context` of the port of the
+     * server that received it, or the `connection` of mbm_unit_respond.
+     */
+    void *connection;
+    /**
+     * The address of the first cell; of a file, the number of the first record.
+     */
+    uint16_t address;
+    /**
+     * How many cells, 1 to 2000.
+     */
+    uint16_t quantity;
+    /**
+     * The number of the file; 0 for tables and callbacks.
+     */
+    uint16_t file;
+    /**
+     * The unit id in the request. 0 on a serial line is a broadcast.
+     */
+    uint8_t unit;
+    /**
+     * The function code of the request.
+     */
+    uint8_t function;
+} mbm_access;
+
+/**
+ * Functions of yours that the server calls around a read or a write of cells. Each is
+ * optional. Pass the struct to mbm_registerTable_setHooks, mbm_bitTable_setHooks,
+ * mbm_dataCallbacks_setHooks or mbm_files_setHooks. It may be a constant, and any number
+ * of records may share it.
+ *
+ * The server calls the hooks only for a request that is right and whose cells all exist.
+ * Functions 16 and 17 (hex) read and write: for them the server calls beforeRead,
+ * beforeWrite and afterWrite in this order. A request of function 14 or 15 (hex) has
+ * several groups of records. The server calls each hook once for each group; it calls the
+ * hook for all groups before it reads or writes any of them.
+ *
+ * A hook may change cells. It may call any function of this library but those on the
+ * server that calls it, which return MBM_BUSY. If it changes its record, or sets other
+ * hooks for it, that counts from the next request on.
+ */
+typedef struct mbm_accessHooks {
+    /**
+     * Your pointer, passed to each hook; may be NULL.
+     */
+    void *context;
+    /**
+     * Called before cells are read. It may refresh them. Returns 0 to allow the read, or an
+     * exception code to refuse the whole request; a number above 127 becomes exception 04.
+     */
+    uint8_t (*beforeRead)(void *context, const struct mbm_access *access);
+    /**
+     * Called before cells are written. Returns as beforeRead.
+     */
+    uint8_t (*beforeWrite)(void *context, const struct mbm_access *access);
+    /**
+     * Called after cells were written.
+     */
+    void (*afterWrite)(void *context, const struct mbm_access *access);
+} mbm_accessHooks;
+
+/**
+ * The hooks of a record. Private.
+ */
+typedef struct mbm_recordHooks {
+    /**
+     * The hooks.
+     */
+    const struct mbm_accessHooks *hooks;
+    /**
+     * Calls the hooks. NULL if there are none. A program in which no record has hooks does
+     * not contain the function.
+     */
+    void (*call)(void);
+} mbm_recordHooks;
+
+/**
  * Cells that your functions get and set one by one, in place of an array. A cell is a
  * register, a coil or a discrete input. Zero the struct, set the fields that you need,
  * and pass it to mbm_unit_serveCallbacks.
@@ -2660,20 +2755,15 @@ typedef struct mbm_dataCallbacks {
      */
     uint16_t (*get)(void *context, uint16_t address);
     /**
-     * Sets an existing cell; a bit to 0 or 1. Required for coils and holding registers.
+     * Sets an existing cell; a bit to 0 or 1. Coils and holding registers without it are
+     * read-only: the unit answers functions that write them with exception 01, unless a
+     * later record serves these functions.
      */
     void (*set)(void *context, uint16_t address, uint16_t value);
     /**
-     * As in mbm_registerTable.
+     * Private: see mbm_dataCallbacks_setHooks.
      */
-    uint8_t (*before)(void *context,
-                      uint16_t address,
-                      uint16_t quantity,
-                      const uint8_t *data);
-    /**
-     * As in mbm_registerTable.
-     */
-    void (*after)(void *context, uint16_t address, uint16_t quantity);
+    struct mbm_recordHooks hooks;
 } mbm_dataCallbacks;
 
 /**
@@ -2684,6 +2774,11 @@ typedef struct mbm_request {
      * The data of the request: the bytes after the function code.
      */
     const uint8_t *data;
+    /**
+     * The line or connection that the request came from: the `context` of the port of the
+     * server that received it, or the `connection` of mbm_unit_respond.
+     */
+    void *connection;
     /**
      * Length of `data` in bytes, 0 to 252.
      */
@@ -2702,6 +2797,11 @@ typedef struct mbm_request {
 /**
  * A function of yours. Zero the struct, set the fields that you need, and pass it to
  * mbm_unit_serveCustom.
+ *
+ * A unit asks its records in the order in which they were registered. So a function that is
+ * registered before the record that serves the same code is asked first. It answers the
+ * request itself, for example with an exception, or it returns MBM_REPLY_DECLINED: then the
+ * record after it answers.
  */
 typedef struct mbm_custom {
     /**
@@ -2712,7 +2812,8 @@ typedef struct mbm_custom {
      * Carries out a request and writes the data of the response, without the function
      * code, to `response`. `capacity` is the space in bytes that the frame buffer has
      * after the request; the server sends at most 252 bytes. Returns the number of bytes
-     * written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, or MBM_REPLY_PENDING.
+     * written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, MBM_REPLY_PENDING or
+     * MBM_REPLY_DECLINED.
      */
     uint16_t (*serve)(void *context,
                       const struct mbm_request *request,
@@ -2785,24 +2886,9 @@ typedef struct mbm_files {
      */
     uint16_t count;
     /**
-     * Optional: called before records are written, once for each group of a request,
-     * before any group is written. `data` has the new values, the high byte of each
-     * first. Return 0 to allow the write, or an exception code to refuse the whole
-     * request.
+     * Private: see mbm_files_setHooks.
      */
-    uint8_t (*before)(void *context,
-                      uint16_t file,
-                      uint16_t record,
-                      uint16_t length,
-                      const uint8_t *data);
-    /**
-     * Optional: called after the records of a group were written, once for each group.
-     */
-    void (*after)(void *context, uint16_t file, uint16_t record, uint16_t length);
-    /**
-     * Passed to both hooks. Any value; may be NULL.
-     */
-    void *context;
+    struct mbm_recordHooks hooks;
 } mbm_files;
 
 /**
@@ -2916,50 +3002,6 @@ typedef struct mbm_identification {
 } mbm_identification;
 
 /**
- * Coils or discrete inputs in an array of yours, eight bits in a byte, the lowest bit
- * first. Use it as mbm_registerTable, with mbm_unit_serveCoils or
- * mbm_unit_serveDiscreteInputs.
- */
-typedef struct mbm_bitTable {
-    /**
-     * Private.
-     */
-    struct mbm_service service;
-    /**
-     * The bits: `size` bits, in (size + 7) / 8 bytes.
-     */
-    uint8_t *bits;
-    /**
-     * As in mbm_registerTable.
-     */
-    const uint8_t *valid;
-    /**
-     * As in mbm_registerTable. `data` has the new bits, the lowest bit of the first byte
-     * first.
-     */
-    uint8_t (*before)(void *context,
-                      uint16_t address,
-                      uint16_t quantity,
-                      const uint8_t *data);
-    /**
-     * As in mbm_registerTable.
-     */
-    void (*after)(void *context, uint16_t address, uint16_t quantity);
-    /**
-     * As in mbm_registerTable.
-     */
-    void *context;
-    /**
-     * The address of the first bit.
-     */
-    uint16_t base;
-    /**
-     * How many bits there are.
-     */
-    uint16_t size;
-} mbm_bitTable;
-
-/**
  * Holding registers or input registers in an array of yours. Zero the struct, set the
  * fields that you need, and pass it to mbm_unit_serveHoldingRegisters or
  * mbm_unit_serveInputRegisters. You may change the registers at any time, and the fields
@@ -2983,22 +3025,9 @@ typedef struct mbm_registerTable {
      */
     const uint8_t *valid;
     /**
-     * Optional: called once a request, before registers are written. `data` has the new
-     * values, the high byte of each first. Return 0 to allow the write, or an exception
-     * code to refuse the whole request.
+     * Private: see mbm_registerTable_setHooks.
      */
-    uint8_t (*before)(void *context,
-                      uint16_t address,
-                      uint16_t quantity,
-                      const uint8_t *data);
-    /**
-     * Optional: called after registers were written, with the address and the quantity.
-     */
-    void (*after)(void *context, uint16_t address, uint16_t quantity);
-    /**
-     * Passed to both hooks. Any value; may be NULL.
-     */
-    void *context;
+    struct mbm_recordHooks hooks;
     /**
      * The address of the first register.
      */
@@ -3010,6 +3039,38 @@ typedef struct mbm_registerTable {
 } mbm_registerTable;
 
 /**
+ * Coils or discrete inputs in an array of yours, eight bits in a byte, the lowest bit
+ * first. Use it as mbm_registerTable, with mbm_unit_serveCoils or
+ * mbm_unit_serveDiscreteInputs.
+ */
+typedef struct mbm_bitTable {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * The bits: `size` bits, in (size + 7) / 8 bytes.
+     */
+    uint8_t *bits;
+    /**
+     * As in mbm_registerTable.
+     */
+    const uint8_t *valid;
+    /**
+     * Private: see mbm_bitTable_setHooks.
+     */
+    struct mbm_recordHooks hooks;
+    /**
+     * The address of the first bit.
+     */
+    uint16_t base;
+    /**
+     * How many bits there are.
+     */
+    uint16_t size;
+} mbm_bitTable;
+
+/**
  * Serves cells that your functions get and set.
  *
  * @param unit   the unit
@@ -3017,13 +3078,22 @@ typedef struct mbm_registerTable {
  * @param table  the table, named by the function that reads it: 1 coils (functions 01,
  *               05, 0F), 2 discrete inputs (02), 3 holding registers (03, 06, 10, 16,
  *               17), 4 input registers (04); functions in hex
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `get`, a NULL `set`
- *         for table 1 or 3, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
- *         mbm_unit_serveCoils
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `get` or another table;
+ *         MBM_BUSY and MBM_BUFFER_TOO_SMALL as mbm_unit_serveCoils
  */
 uint8_t mbm_unit_serveCallbacks(struct mbm_unit *unit,
                                 struct mbm_dataCallbacks *cells,
                                 uint8_t table);
+
+/**
+ * Sets the functions that are called around a read or a write of cells, or removes them.
+ *
+ * @param cells  the cells, registered already or not. Zeroing the struct removes the hooks
+ * @param hooks  must stay valid for as long as the cells are served; NULL for no hooks
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `cells`
+ */
+uint8_t mbm_dataCallbacks_setHooks(struct mbm_dataCallbacks *cells,
+                                   const struct mbm_accessHooks *hooks);
 
 /**
  * Serves a function of yours, in every framing.
@@ -3082,6 +3152,17 @@ uint8_t mbm_unit_serveDiagnostics(struct mbm_unit *unit,
 uint8_t mbm_unit_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
 
 /**
+ * Sets the functions that are called around a read or a write of records, or removes them.
+ * In mbm_access, `file` is the number of the file and `address` the first record.
+ *
+ * @param files  the files, registered already or not. Zeroing the struct removes the hooks
+ * @param hooks  must stay valid for as long as the files are served; NULL for no hooks
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `files`
+ */
+uint8_t mbm_files_setHooks(struct mbm_files *files,
+                           const struct mbm_accessHooks *hooks);
+
+/**
  * Serves FIFO queues: function 18 (hex), Read FIFO Queue.
  *
  * @param unit   the unit
@@ -3130,27 +3211,50 @@ uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
  * Answers one request without a server: reads a request frame from a buffer and writes
  * the response frame over it.
  *
- * @param units     the units to serve: one unit, or an array of units
- * @param count     how many units
- * @param framing   the framing. Its `functions` are not used: units know their own
- *                  functions
- * @param frame     holds the complete request; receives the response
- * @param length    length of the request in bytes
- * @param capacity  size of `frame` in bytes. 256 hold every response in RTU, 513 in
- *                  ASCII, 260 in TCP. A longer response becomes exception 04
- * @param response  receives the length of the response in bytes; 0 without a response:
- *                  after a damaged frame, a request for another unit, a broadcast, and
- *                  with any status but MBM_OK
+ * @param units       the units to serve: one unit, or an array of units
+ * @param count       how many units
+ * @param connection  your pointer, which hooks and functions of yours get as the connection
+ *                    that the request came from; may be NULL
+ * @param framing     the framing. Its `functions` are not used: units know their own
+ *                    functions
+ * @param frame       holds the complete request; receives the response
+ * @param length      length of the request in bytes
+ * @param capacity    size of `frame` in bytes. 256 hold every response in RTU, 513 in
+ *                    ASCII, 260 in TCP. A longer response becomes exception 04
+ * @param response    receives the length of the response in bytes; 0 without a response:
+ *                    after a damaged frame, a request for another unit, a broadcast, and
+ *                    with any status but MBM_OK
  * @return MBM_OK; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write
  *         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_unit_respond(struct mbm_unit *units,
                          uint8_t count,
+                         void *connection,
                          const struct mbm_framing *framing,
                          uint8_t *frame,
                          uint16_t length,
                          uint16_t capacity,
                          uint16_t *response);
+
+/**
+ * Sets the functions that are called around a read or a write of registers, or removes them.
+ *
+ * @param table  the table, registered already or not. Zeroing the struct removes the hooks
+ * @param hooks  must stay valid for as long as the table is served; NULL for no hooks
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `table`
+ */
+uint8_t mbm_registerTable_setHooks(struct mbm_registerTable *table,
+                                   const struct mbm_accessHooks *hooks);
+
+/**
+ * Sets the functions that are called around a read or a write of bits, or removes them.
+ *
+ * @param table  the table, registered already or not. Zeroing the struct removes the hooks
+ * @param hooks  must stay valid for as long as the table is served; NULL for no hooks
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `table`
+ */
+uint8_t mbm_bitTable_setHooks(struct mbm_bitTable *table,
+                              const struct mbm_accessHooks *hooks);
 
 /**
  * Serves coils: functions 01, 05 and 0F (hex).

@@ -31,21 +31,21 @@ uint8_t served_bit_pattern(unsigned address)
     return (uint8_t)(served_pattern(address) >> 7 & 1u);
 }
 
-static uint8_t before(void *context, uint16_t address, uint16_t quantity, const uint8_t *data)
+static uint8_t before(void *context, const mbm_access *access)
 {
+    const uint8_t *data = access->data;
     unsigned i;
 
     (void)context;
-    for (i = 0; i < quantity; i++)
-        if (address + i == SERVED_REFUSED && data[2 * i] == 0xBE && data[2 * i + 1] == 0xEF)
+    for (i = 0; i < access->quantity; i++)
+        if (access->address + i == SERVED_REFUSED && data[2 * i] == 0xBE && data[2 * i + 1] == 0xEF)
             return MBM_ILLEGAL_DATA_VALUE;
     return 0;
 }
 
-static void after(void *context, uint16_t address, uint16_t quantity)
+static void after(void *context, const mbm_access *access)
 {
-    (void)address;
-    (void)quantity;
+    (void)access;
     ((served *)context)->written++;
 }
 
@@ -89,17 +89,17 @@ void served_prepare(served *s)
     s->holding.base = SERVED_BASE;
     s->holding.size = SERVED_REGISTERS;
     s->holding.valid = s->valid;
-    s->holding.before = before;
-    s->holding.after = after;
-    s->holding.context = s;
+    s->word_hooks.beforeWrite = before;
+    s->word_hooks.afterWrite = s->bit_hooks.afterWrite = after;
+    s->word_hooks.context = s->bit_hooks.context = s;
+    mbm_registerTable_setHooks(&s->holding, &s->word_hooks);
     s->inputs.words = s->input_words;
     s->inputs.base = SERVED_BASE;
     s->inputs.size = SERVED_REGISTERS;
     s->coils.bits = s->bits;
     s->coils.base = SERVED_BASE;
     s->coils.size = SERVED_BITS;
-    s->coils.after = after;
-    s->coils.context = s;
+    mbm_bitTable_setHooks(&s->coils, &s->bit_hooks);
     s->discrete.bits = s->input_bits;
     s->discrete.base = SERVED_BASE;
     s->discrete.size = SERVED_BITS;

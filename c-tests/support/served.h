@@ -36,6 +36,7 @@ typedef struct served {
     uint16_t records[20], queue[31];
     mbm_file file;
     mbm_fifo fifo;
+    mbm_accessHooks word_hooks, bit_hooks;
     unsigned written; /* how often the hook after a write was called */
 
     mbm_server servers[SERVED_CONNECTIONS];

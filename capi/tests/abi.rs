@@ -25,7 +25,7 @@ fn probes() -> Vec<(String, u64)> {
         sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function
             mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
             mbm_service mbm_registerTable mbm_bitTable mbm_dataCallbacks mbm_file mbm_files mbm_fifo
-            mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
+            mbm_fifos mbm_access mbm_accessHooks mbm_recordHooks mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
             mbm_functionMask mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_linkHooks
             mbm_turn;
         offsets:
@@ -50,17 +50,20 @@ fn probes() -> Vec<(String, u64)> {
             mbm_registers { data first count kind order }
             mbm_service { serve kind }
             mbm_unit { services monitor diagnostics id }
-            mbm_registerTable { service words valid before after context base size }
-            mbm_bitTable { service bits valid before after context base size }
-            mbm_dataCallbacks { service context isValid get set before after }
+            mbm_registerTable { service words valid hooks base size }
+            mbm_bitTable { service bits valid hooks base size }
+            mbm_dataCallbacks { service context isValid get set hooks }
             mbm_file { records size number }
-            mbm_files { service files count before after context }
+            mbm_files { service files count hooks }
+            mbm_access { data connection address quantity file unit function }
+            mbm_accessHooks { context beforeRead beforeWrite afterWrite }
+            mbm_recordHooks { hooks call }
             mbm_fifo { words address count }
             mbm_fifos { service fifos count }
             mbm_exceptionStatus { service outputs }
             mbm_serverId { service id additional idLength additionalLength running }
             mbm_identification { service objects count }
-            mbm_request { data length unit function }
+            mbm_request { data connection length unit function }
             mbm_custom { service serve context code length }
             mbm_functionMask { service off }
             mbm_diagnostics { service restart context diagnosticRegister busMessages
@@ -106,7 +109,7 @@ fn probes() -> Vec<(String, u64)> {
             MBM_VERSION_PATCH MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME MBM_ORDER_DEFAULT
             MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA MBM_REGISTERS_OF_WORDS
             MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS MBM_REGISTERS_INTO_BYTES
-            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
+            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_REPLY_DECLINED MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
             MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_DIRECTION_BOTH
             MBM_DIRECTION_CLIENT MBM_DIRECTION_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS
             MBM_MAX_SERVICES;

@@ -250,10 +250,10 @@ fn hooks_and_idle_use_the_master_that_called_them() {
     }
 }
 
-unsafe extern "C" fn before(context: *mut c_void, _: u16, _: u16, data: *const u8) -> u8 {
+unsafe extern "C" fn before(context: *mut c_void, access: *const mbm_access) -> u8 {
     unsafe {
         use_objects(context);
-        data.read();
+        (*access).data.read();
         // A hook may register another service on the unit.
         let (unit, function_mask) = {
             let state = state(context);
@@ -264,8 +264,19 @@ unsafe extern "C" fn before(context: *mut c_void, _: u16, _: u16, data: *const u
     0
 }
 
-unsafe extern "C" fn after(context: *mut c_void, _: u16, _: u16) {
-    unsafe { use_objects(context) }
+unsafe extern "C" fn before_read(context: *mut c_void, access: *const mbm_access) -> u8 {
+    unsafe {
+        use_objects(context);
+        assert!((*access).data.is_null());
+    }
+    0
+}
+
+unsafe extern "C" fn after(context: *mut c_void, access: *const mbm_access) {
+    unsafe {
+        use_objects(context);
+        (*access).data.read();
+    }
 }
 
 unsafe extern "C" fn serve_custom(
@@ -304,9 +315,13 @@ fn hooks_use_the_server_that_called_them() {
             (*unit).id = 17;
             (*table).words = words.cast();
             (*table).size = 8;
-            (*table).before = Some(before);
-            (*table).after = Some(after);
-            (*table).context = state.cast();
+            let hooks = mbm_accessHooks {
+                context: state.cast(),
+                beforeRead: Some(before_read),
+                beforeWrite: Some(before),
+                afterWrite: Some(after),
+            };
+            assert_eq!(mbm_registerTable_setHooks(table, &hooks), MBM_OK);
             (*custom).serve = Some(serve_custom);
             (*custom).code = 65;
             (*custom).context = state.cast();

@@ -15,31 +15,33 @@ static mbm_registerTable holding, inputs;
 static mbm_bitTable coils, discrete;
 
 /* Refuses a write if one of its values is too high. */
-static uint8_t registers_before(void *context, uint16_t address, uint16_t quantity,
-                                const uint8_t *data)
+static uint8_t registers_before(void *context, const mbm_access *access)
 {
+    const uint8_t *data = access->data;
+    uint16_t left;
+
     (void)context;
-    (void)address;
-    for (; quantity > 0; quantity--, data += 2)
+    for (left = access->quantity; left > 0; left--, data += 2)
         if ((data[0] << 8 | data[1]) > SERVE_MOST)
             return MBM_ILLEGAL_DATA_VALUE;
     return 0;
 }
 
-static void registers_written(void *context, uint16_t address, uint16_t quantity)
+static void registers_written(void *context, const mbm_access *access)
 {
+    uint16_t i, first = access->address - SERVE_BASE;
+
     (void)context;
-    for (; quantity > 0; quantity--, address++)
-        input_words[address - SERVE_BASE] = (uint16_t)~holding_words[address - SERVE_BASE];
+    for (i = first; i < first + access->quantity; i++)
+        input_words[i] = (uint16_t)~holding_words[i];
 }
 
-static void coils_written(void *context, uint16_t address, uint16_t quantity)
+static void coils_written(void *context, const mbm_access *access)
 {
     uint16_t i;
 
     (void)context;
-    (void)address;
-    (void)quantity;
+    (void)access;
     for (i = 0; i < sizeof coil_bits; i++)
         input_bits[i] = (uint8_t)~coil_bits[i];
 }
@@ -54,18 +56,21 @@ static uint8_t is_over(void)
 
 static void fill(void)
 {
+    static const mbm_accessHooks register_hooks = {.beforeWrite = registers_before,
+                                                   .afterWrite = registers_written};
+    static const mbm_accessHooks coil_hooks = {.afterWrite = coils_written};
+
     holding.words = holding_words;
     holding.base = SERVE_BASE;
     holding.size = SERVE_CELLS;
-    holding.before = registers_before;
-    holding.after = registers_written;
+    mbm_registerTable_setHooks(&holding, &register_hooks);
     inputs.words = input_words;
     inputs.base = SERVE_BASE;
     inputs.size = SERVE_CELLS;
     coils.bits = coil_bits;
     coils.base = SERVE_BASE;
     coils.size = SERVE_CELLS;
-    coils.after = coils_written;
+    mbm_bitTable_setHooks(&coils, &coil_hooks);
     discrete.bits = input_bits;
     discrete.base = SERVE_BASE;
     discrete.size = SERVE_CELLS;

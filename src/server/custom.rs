@@ -23,6 +23,7 @@ pub fn serve(
         Outcome::Exception(code) => return Reply::exception(code),
         Outcome::NoResponse => return Reply::NO_RESPONSE,
         Outcome::Pending => return Reply::PENDING,
+        Outcome::Declined => return Reply::NOT_HANDLED,
     };
     // Move the response's data to directly after the function code.
     let cells = Cell::from_mut(pdu).as_slice_of_cells();
@@ -42,6 +43,8 @@ pub enum Outcome {
     NoResponse,
     /// Not finished: the server calls the handler again.
     Pending,
+    /// The handler leaves the request to the next service that serves its function.
+    Declined,
 }
 
 /// Serves one function code with a closure: see [`serve`].

@@ -18,16 +18,23 @@ pub trait Files {
     /// Writes `data`, high byte first, to existing records.
     fn store(&mut self, record: Record, data: &[u8]);
 
+    /// Called before records are read. It may change them. An exception code refuses the
+    /// whole request; 0 allows it.
+    fn before_read(&mut self, record: Record) -> u8 {
+        let _ = record;
+        0
+    }
+
     /// Called before records are written. An exception code refuses the whole request; 0
     /// allows it.
-    fn before(&mut self, record: Record, data: &[u8]) -> u8 {
+    fn before_write(&mut self, record: Record, data: &[u8]) -> u8 {
         let _ = (record, data);
         0
     }
 
     /// Called after records were written.
-    fn after(&mut self, record: Record) {
-        let _ = record;
+    fn after_write(&mut self, record: Record, data: &[u8]) {
+        let _ = (record, data);
     }
 }
 
@@ -62,7 +69,7 @@ pub fn serve(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
     }
 }
 
-fn read(files: &impl Files, pdu: &mut [u8], length: usize) -> Reply {
+fn read(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
     // The response may overwrite parts of the request that are still needed: work on a copy.
     let mut aside = [0; READ_FILE_BYTES.1];
     let request = pdu.get(2..length).unwrap_or_default();
@@ -83,6 +90,12 @@ fn read(files: &impl Files, pdu: &mut [u8], length: usize) -> Reply {
     let Some([_, count, rest @ ..]) = pdu.get_mut(..total) else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
+    for record in reads.iter() {
+        let refused = files.before_read(record);
+        if refused != 0 {
+            return Reply::exception(refused);
+        }
+    }
     *count = rest.len() as u8;
     let mut rest = rest;
     for record in reads.iter() {
@@ -109,7 +122,7 @@ fn write(files: &mut impl Files, request: &[u8], length: usize) -> Reply {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
     for (record, data) in writes.iter() {
-        let refused = files.before(record, data);
+        let refused = files.before_write(record, data);
         if refused != 0 {
             return Reply::exception(refused);
         }
@@ -117,8 +130,8 @@ fn write(files: &mut impl Files, request: &[u8], length: usize) -> Reply {
     for (record, data) in writes.iter() {
         files.store(record, data);
     }
-    for (record, _) in writes.iter() {
-        files.after(record);
+    for (record, data) in writes.iter() {
+        files.after_write(record, data);
     }
     Reply::length(length)
 }

@@ -43,10 +43,12 @@ impl<T: DataModel> Service for Coils<T> {
     }
 }
 
-/// Called before a write, as [`DataModel::before`].
-pub type Before<'a> = &'a mut dyn FnMut(u16, u16, &[u8]) -> u8;
-/// Called after a write, as [`DataModel::after`].
-pub type After<'a> = &'a mut dyn FnMut(u16, u16);
+/// Called before a read, as [`DataModel::before_read`].
+pub type BeforeRead<'a> = &'a mut dyn FnMut(u16, u16) -> u8;
+/// Called before a write, as [`DataModel::before_write`].
+pub type BeforeWrite<'a> = &'a mut dyn FnMut(u16, u16, &[u8]) -> u8;
+/// Called after a write, as [`DataModel::after_write`].
+pub type AfterWrite<'a> = &'a mut dyn FnMut(u16, u16, &[u8]);
 
 /// Registers in an array.
 pub struct RegisterArray<'a> {
@@ -57,10 +59,12 @@ pub struct RegisterArray<'a> {
     /// One bit for each register, lowest bit first: 0 means that the register does not exist.
     /// `None` if all registers exist.
     pub valid: Option<&'a [u8]>,
+    /// Called before a read.
+    pub before_read: Option<BeforeRead<'a>>,
     /// Called before a write.
-    pub before: Option<Before<'a>>,
+    pub before_write: Option<BeforeWrite<'a>>,
     /// Called after a write.
-    pub after: Option<After<'a>>,
+    pub after_write: Option<AfterWrite<'a>>,
 }
 
 /// BitArray in an array, eight to a byte, lowest first.
@@ -73,10 +77,12 @@ pub struct BitArray<'a> {
     pub size: u16,
     /// One bit for each bit, as in [`RegisterArray`].
     pub valid: Option<&'a [u8]>,
+    /// Called before a read.
+    pub before_read: Option<BeforeRead<'a>>,
     /// Called before a write.
-    pub before: Option<Before<'a>>,
+    pub before_write: Option<BeforeWrite<'a>>,
     /// Called after a write.
-    pub after: Option<After<'a>>,
+    pub after_write: Option<AfterWrite<'a>>,
 }
 
 impl<'a> RegisterArray<'a> {
@@ -86,8 +92,9 @@ impl<'a> RegisterArray<'a> {
             words,
             base,
             valid: None,
-            before: None,
-            after: None,
+            before_read: None,
+            before_write: None,
+            after_write: None,
         }
     }
 }
@@ -101,8 +108,9 @@ impl<'a> BitArray<'a> {
             base,
             size,
             valid: None,
-            before: None,
-            after: None,
+            before_read: None,
+            before_write: None,
+            after_write: None,
         }
     }
 }
@@ -146,14 +154,19 @@ impl DataModel for RegisterArray<'_> {
         }
     }
 
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        let hook = self.before.as_mut();
+    fn before_read(&mut self, address: u16, quantity: u16) -> u8 {
+        let hook = self.before_read.as_mut();
+        hook.map_or(0, |hook| hook(address, quantity))
+    }
+
+    fn before_write(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
+        let hook = self.before_write.as_mut();
         hook.map_or(0, |hook| hook(address, quantity, data))
     }
 
-    fn after(&mut self, address: u16, quantity: u16) {
-        if let Some(hook) = &mut self.after {
-            hook(address, quantity);
+    fn after_write(&mut self, address: u16, quantity: u16, data: &[u8]) {
+        if let Some(hook) = &mut self.after_write {
+            hook(address, quantity, data);
         }
     }
 }
@@ -182,14 +195,19 @@ impl DataModel for BitArray<'_> {
         }
     }
 
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        let hook = self.before.as_mut();
+    fn before_read(&mut self, address: u16, quantity: u16) -> u8 {
+        let hook = self.before_read.as_mut();
+        hook.map_or(0, |hook| hook(address, quantity))
+    }
+
+    fn before_write(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
+        let hook = self.before_write.as_mut();
         hook.map_or(0, |hook| hook(address, quantity, data))
     }
 
-    fn after(&mut self, address: u16, quantity: u16) {
-        if let Some(hook) = &mut self.after {
-            hook(address, quantity);
+    fn after_write(&mut self, address: u16, quantity: u16, data: &[u8]) {
+        if let Some(hook) = &mut self.after_write {
+            hook(address, quantity, data);
         }
     }
 }

@@ -43,7 +43,7 @@ impl TableKind {
     }
 
     /// How many data bytes `quantity` cells have; 0 for more cells than a request can have.
-    const fn bytes(self, quantity: usize) -> usize {
+    pub const fn bytes(self, quantity: usize) -> usize {
         if self.is_bits() {
             quantity.wrapping_add(7) >> 3
         } else {
@@ -74,26 +74,35 @@ pub trait DataModel {
     /// first, bits lowest first, unused bits 0.
     fn transfer(&mut self, direction: Direction, address: u16, quantity: u16, data: &mut [u8]);
 
+    /// Called before cells are read. It may change the cells. An exception code refuses the
+    /// request; 0 allows it.
+    fn before_read(&mut self, address: u16, quantity: u16) -> u8 {
+        let _ = (address, quantity);
+        0
+    }
+
     /// Called before cells are written, with the data as on the wire. An exception code
     /// refuses the request; 0 allows it.
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
+    fn before_write(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
         let _ = (address, quantity, data);
         0
     }
 
-    /// Called after cells were written.
-    fn after(&mut self, address: u16, quantity: u16) {
-        let _ = (address, quantity);
+    /// Called after cells were written, with the data as on the wire.
+    fn after_write(&mut self, address: u16, quantity: u16, data: &[u8]) {
+        let _ = (address, quantity, data);
     }
 }
 
-/// The part of [`DataModel`] that the less common functions need. They take it as a trait object,
-/// so firmware carries them once for all tables.
+/// The part of [`DataModel`] that functions need.
+///
+/// The first byte of `pdu` is the function code of the request, and the address of the cells
+/// follows it.
 pub trait TableAccess {
-    /// Reads or writes `quantity` cells, which are `bytes` bytes of data. Their address follows
-    /// the first byte of `pdu`; `operation` says where in `pdu` the data are. Returns
-    /// [`Reply::ILLEGAL_DATA_ADDRESS`] if a cell does not exist. A read of 0 bytes only checks
-    /// the address: it returns [`Reply::SERVER_DEVICE_FAILURE`] if all cells exist.
+    /// Reads or writes `quantity` cells, which are `bytes` bytes of data; `operation` says where
+    /// in `pdu` the data are. Returns [`Reply::ILLEGAL_DATA_ADDRESS`] if a cell does not exist. A
+    /// read of 0 bytes only checks the address: it returns [`Reply::SERVER_DEVICE_FAILURE`] if
+    /// all cells exist.
     fn access(
         &mut self,
         operation: TableOperation,
@@ -101,6 +110,17 @@ pub trait TableAccess {
         bytes: usize,
         pdu: &mut [u8],
     ) -> Reply;
+}
+
+/// The two steps of a read, for functions that also write. They take it as a trait object, so
+/// firmware carries them once for all tables.
+pub trait TableSteps: TableAccess {
+    /// Asks whether these existing cells may be read. Returns [`Reply::NOT_HANDLED`] if so, else
+    /// an exception. The quantity is in `pdu` too, after the address.
+    fn ask_read(&mut self, quantity: usize, pdu: &mut [u8]) -> Reply;
+
+    /// Reads cells as [`TableAccess::access`], once [`TableSteps::ask_read`] has allowed it.
+    fn load(&mut self, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply;
 }
 
 impl<T: DataModel> TableAccess for T {
@@ -113,31 +133,57 @@ impl<T: DataModel> TableAccess for T {
         bytes: usize,
         pdu: &mut [u8],
     ) -> Reply {
-        let &mut [_, high, low, ..] = pdu else {
-            return Reply::SERVER_DEVICE_FAILURE;
-        };
-        let (address, quantity) = (word(high, low) as u16, quantity as u16);
+        let (address, quantity) = (address_in(pdu), quantity as u16);
         if !self.contains(address, quantity) {
             return Reply::ILLEGAL_DATA_ADDRESS;
+        }
+        if operation == TableOperation::READ {
+            if bytes == 0 {
+                return Reply::SERVER_DEVICE_FAILURE;
+            }
+            return match self.before_read(address, quantity) {
+                0 => self.load(quantity.into(), bytes, pdu),
+                refused => Reply::exception(refused),
+            };
         }
         let at = operation.data();
         let Some(data) = pdu.get_mut(at..at + bytes) else {
             return Reply::SERVER_DEVICE_FAILURE;
         };
-        if operation == TableOperation::READ {
-            if bytes == 0 {
-                return Reply::SERVER_DEVICE_FAILURE;
-            }
-            self.transfer(Direction::Read, address, quantity, data);
-            return counted(pdu, bytes);
-        }
-        let refused = self.before(address, quantity, data);
+        let refused = self.before_write(address, quantity, data);
         if refused != 0 {
             return Reply::exception(refused);
         }
         self.transfer(Direction::Write, address, quantity, data);
-        self.after(address, quantity);
+        self.after_write(address, quantity, data);
         WRITTEN
+    }
+}
+
+impl<T: DataModel> TableSteps for T {
+    fn ask_read(&mut self, quantity: usize, pdu: &mut [u8]) -> Reply {
+        match self.before_read(address_in(pdu), quantity as u16) {
+            0 => Reply::NOT_HANDLED,
+            refused => Reply::exception(refused),
+        }
+    }
+
+    fn load(&mut self, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
+        let (address, at) = (address_in(pdu), TableOperation::READ.data());
+        let Some(data) = pdu.get_mut(at..at + bytes) else {
+            return Reply::SERVER_DEVICE_FAILURE;
+        };
+        self.transfer(Direction::Read, address, quantity as u16, data);
+        counted(pdu, bytes)
+    }
+}
+
+/// The address after the function code.
+#[inline(always)]
+fn address_in(pdu: &[u8]) -> u16 {
+    match pdu {
+        &[_, high, low, ..] => u16::from_be_bytes([high, low]),
+        _ => 0,
     }
 }
 
@@ -285,7 +331,7 @@ pub const fn is_mask_or_read_write(function: u8) -> bool {
 /// Serves 16 and 17 for holding registers, as [`serve`].
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn serve_mask_and_read_write(
-    cells: &mut (impl TableAccess + ?Sized),
+    cells: &mut (impl TableSteps + ?Sized),
     pdu: &mut [u8],
     length: usize,
 ) -> Reply {
@@ -296,24 +342,39 @@ pub fn serve_mask_and_read_write(
     }
 }
 
-fn mask_write(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
-    let Some(&[_, a, b, c, d, e, f]) = pdu.first_chunk().filter(|_| length == 7) else {
+fn mask_write(cells: &mut (impl TableSteps + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+    let Some(&[code, a, b, c, d, e, f]) = pdu.first_chunk().filter(|_| length == 7) else {
         return Reply::ILLEGAL_DATA_VALUE;
     };
-    let mut cell = [0, a, b, 0, 0];
-    if cells.access(TableOperation::READ, 1, 2, &mut cell) == Reply::ILLEGAL_DATA_ADDRESS {
+    let mut cell = [code, a, b, 0, 1];
+    if !exist(cells, 1, &mut cell) {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
+    let refused = cells.ask_read(1, &mut cell);
+    if refused != Reply::NOT_HANDLED {
+        return refused;
+    }
+    cells.load(1, 2, &mut cell);
     let [_, _, high, low, _] = cell;
     // c and d are the AND mask, e and f the OR mask.
     let (high, low) = ((high & c) | (e & !c), (low & d) | (f & !d));
-    match cells.access(TableOperation::WRITE_ONE, 1, 2, &mut [0, a, b, high, low]) {
+    match cells.access(
+        TableOperation::WRITE_ONE,
+        1,
+        2,
+        &mut [code, a, b, high, low],
+    ) {
         WRITTEN => Reply::length(7),
         refused => refused,
     }
 }
 
-fn read_write(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+/// True if all of these cells exist.
+fn exist(cells: &mut (impl TableSteps + ?Sized), quantity: usize, pdu: &mut [u8]) -> bool {
+    cells.access(TableOperation::READ, quantity, 0, pdu) != Reply::ILLEGAL_DATA_ADDRESS
+}
+
+fn read_write(cells: &mut (impl TableSteps + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
     let kind = TableKind::HOLDING_REGISTERS;
     let Some(&[_, _, _, c, d, _, _, g, h, count]) = pdu.first_chunk() else {
         return Reply::SERVER_DEVICE_FAILURE;
@@ -327,22 +388,30 @@ fn read_write(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: u
     {
         return Reply::ILLEGAL_DATA_VALUE;
     }
-    let mut has = |start: usize, quantity| {
-        let head = pdu.get_mut(start..).unwrap_or_default();
-        cells.access(TableOperation::READ, quantity, 0, head) != Reply::ILLEGAL_DATA_ADDRESS
-    };
-    if !has(0, quantity) || !has(WRITES, written) {
+    if !exist(cells, quantity, pdu) || !exist(cells, written, write_part(pdu)) {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
-    // Do not write if the response would not fit.
+    // Do not write if the response would not fit, or if the read is refused.
     if pdu.len() < 2 + bytes {
         return Reply::SERVER_DEVICE_FAILURE;
     }
-    let write = pdu.get_mut(WRITES..).unwrap_or_default();
+    let refused = cells.ask_read(quantity, pdu);
+    if refused != Reply::NOT_HANDLED {
+        return refused;
+    }
+    let write = write_part(pdu);
+    if let Some(code) = write.first_mut() {
+        *code = READ_WRITE_MULTIPLE_REGISTERS;
+    }
     match cells.access(TableOperation::WRITE_SEVERAL, written, data, write) {
-        WRITTEN => cells.access(TableOperation::READ, quantity, bytes, pdu),
+        WRITTEN => cells.load(quantity, bytes, pdu),
         refused => refused,
     }
+}
+
+/// The write part of a request of function 17.
+fn write_part(pdu: &mut [u8]) -> &mut [u8] {
+    pdu.get_mut(WRITES..).unwrap_or_default()
 }
 
 /// Index in a request of function 17 at which its write part begins. That part is laid out as

@@ -149,11 +149,11 @@ impl Device {
                 _ => 0,
             }
         };
-        let mut after = |address, quantity| written.push((address, quantity));
+        let mut after = |address, quantity, _: &[u8]| written.push((address, quantity));
         let mut holding = HoldingRegisters(RegisterArray::new(100, &mut self.holding));
         holding.0.valid = self.valid.as_ref().map(|valid| &valid[..]);
-        holding.0.before = Some(&mut before);
-        holding.0.after = Some(&mut after);
+        holding.0.before_write = Some(&mut before);
+        holding.0.after_write = Some(&mut after);
         let mut coils = Coils(BitArray::new(100, &mut self.coils));
         coils.0.size = 20;
         let mut discrete = DiscreteInputs(BitArray::new(100, &mut self.discrete));

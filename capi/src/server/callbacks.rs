@@ -1,10 +1,12 @@
 //! The four tables, with cells that the program's callbacks get and set one by one.
 
+use super::hooks::{mbm_access, mbm_accessHooks, mbm_recordHooks, Hook};
 use super::units::{add_as, is_ignored_broadcast, request};
 use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
+use core::ptr::{null, null_mut};
 use mbm::error::Status;
-use mbm::server::table::{self, DataModel, Direction, TableAccess, TableKind};
+use mbm::server::table::{self, DataModel, Direction, TableKind, TableSteps};
 use mbm::server::Reply;
 
 /// Cells that your functions get and set one by one, in place of an array. A cell is a
@@ -23,48 +25,62 @@ pub struct mbm_dataCallbacks {
     /// Required. Returns the value of an existing cell; of a bit, 0 for off and any other
     /// value for on.
     pub get: Option<unsafe extern "C" fn(context: *mut c_void, address: u16) -> u16>,
-    /// Sets an existing cell; a bit to 0 or 1. Required for coils and holding registers.
+    /// Sets an existing cell; a bit to 0 or 1. Coils and holding registers without it are
+    /// read-only: the unit answers functions that write them with exception 01, unless a
+    /// later record serves these functions.
     pub set: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, value: u16)>,
-    /// As in mbm_registerTable.
-    pub before: Option<
-        unsafe extern "C" fn(
-            context: *mut c_void,
-            address: u16,
-            quantity: u16,
-            data: *const u8,
-        ) -> u8,
-    >,
-    /// As in mbm_registerTable.
-    pub after: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, quantity: u16)>,
+    /// Private: see mbm_dataCallbacks_setHooks.
+    pub hooks: mbm_recordHooks,
 }
 
-/// The callbacks of C. They may use the struct, so no reference to it is kept.
-#[derive(Clone, Copy)]
-struct Callbacks(*mut mbm_dataCallbacks);
+/// The callbacks of C, and the request. They may use the struct, so no reference to it is
+/// kept.
+struct Callbacks {
+    record: *mut mbm_dataCallbacks,
+    /// The hooks that the record had when the request came.
+    hooks: mbm_recordHooks,
+    info: *const c_void,
+    function: u8,
+}
 
 // SAFETY, of all functions here: the header requires that the struct stays valid, at the
 // same address, and that its functions do what their comments say.
 impl Callbacks {
-    fn is_valid(self, address: u16) -> bool {
+    /// Calls a hook, if there are hooks.
+    fn call(&self, hook: Hook, address: u16, quantity: u16, data: *const u8) -> u8 {
         // SAFETY: see above.
         unsafe {
-            let check = (*self.0).isValid;
-            check.is_none_or(|check| check((*self.0).context, address) != 0)
+            self.hooks.call(self.info, hook, || mbm_access {
+                connection: null_mut(),
+                data,
+                address,
+                quantity,
+                file: 0,
+                unit: 0,
+                function: self.function,
+            })
         }
     }
-    fn get(self, address: u16) -> u16 {
+    fn is_valid(&self, address: u16) -> bool {
         // SAFETY: see above.
         unsafe {
-            (*self.0)
+            let check = (*self.record).isValid;
+            check.is_none_or(|check| check((*self.record).context, address) != 0)
+        }
+    }
+    fn get(&self, address: u16) -> u16 {
+        // SAFETY: see above.
+        unsafe {
+            (*self.record)
                 .get
-                .map_or(0, |get| get((*self.0).context, address))
+                .map_or(0, |get| get((*self.record).context, address))
         }
     }
-    fn set(self, address: u16, value: u16) {
+    fn set(&self, address: u16, value: u16) {
         // SAFETY: see above.
         unsafe {
-            if let Some(set) = (*self.0).set {
-                set((*self.0).context, address, value);
+            if let Some(set) = (*self.record).set {
+                set((*self.record).context, address, value);
             }
         }
     }
@@ -78,7 +94,7 @@ impl DataModel for Callbacks {
 
     fn transfer(&mut self, direction: Direction, address: u16, quantity: u16, data: &mut [u8]) {
         // SAFETY: see above.
-        let bits = TableKind::from_code(unsafe { (*self.0).service.kind }).is_bits();
+        let bits = TableKind::from_code(unsafe { (*self.record).service.kind }).is_bits();
         for index in 0..quantity {
             let cell = address.wrapping_add(index);
             if bits {
@@ -110,23 +126,16 @@ impl DataModel for Callbacks {
         }
     }
 
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        // SAFETY: see above.
-        unsafe {
-            let hook = (*self.0).before;
-            hook.map_or(0, |hook| {
-                hook((*self.0).context, address, quantity, data.as_ptr())
-            })
-        }
+    fn before_read(&mut self, address: u16, quantity: u16) -> u8 {
+        self.call(Hook::BeforeRead, address, quantity, null())
     }
 
-    fn after(&mut self, address: u16, quantity: u16) {
-        // SAFETY: see above.
-        unsafe {
-            if let Some(hook) = (*self.0).after {
-                hook((*self.0).context, address, quantity);
-            }
-        }
+    fn before_write(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
+        self.call(Hook::BeforeWrite, address, quantity, data.as_ptr())
+    }
+
+    fn after_write(&mut self, address: u16, quantity: u16, data: &[u8]) {
+        self.call(Hook::AfterWrite, address, quantity, data.as_ptr());
     }
 }
 
@@ -143,12 +152,21 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
         if is_ignored_broadcast(info, *pdu) {
             return Reply::NOT_HANDLED.code();
         }
+        let function = *pdu;
         let is_mask_or_read_write =
-            kind == TableKind::HOLDING_REGISTERS && table::is_mask_or_read_write(*pdu);
+            kind == TableKind::HOLDING_REGISTERS && table::is_mask_or_read_write(function);
+        if (*record).set.is_none() && function != kind.code() {
+            return Reply::NOT_HANDLED.code();
+        }
+        let mut cells = Callbacks {
+            record,
+            hooks: (*record).hooks,
+            info,
+            function,
+        };
         let (pdu, length) = request(pdu, info);
-        let mut cells = Callbacks(record);
         let reply = if is_mask_or_read_write {
-            let cells: &mut dyn TableAccess = &mut cells;
+            let cells: &mut dyn TableSteps = &mut cells;
             table::serve_mask_and_read_write(cells, pdu, length)
         } else {
             table::serve(kind, &mut cells, pdu, length)
@@ -164,9 +182,8 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
 /// @param table  the table, named by the function that reads it: 1 coils (functions 01,
 ///               05, 0F), 2 discrete inputs (02), 3 holding registers (03, 06, 10, 16,
 ///               17), 4 input registers (04); functions in hex
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `get`, a NULL `set`
-///         for table 1 or 3, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
-///         mbm_unit_serveCoils
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `get` or another table;
+///         MBM_BUSY and MBM_BUFFER_TOO_SMALL as mbm_unit_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCallbacks(
     unit: *mut mbm_unit,
@@ -175,11 +192,29 @@ pub unsafe extern "C" fn mbm_unit_serveCallbacks(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let useless =
-            cells.is_null() || (*cells).get.is_none() || (table & 1 != 0 && (*cells).set.is_none());
-        if useless || !(1..=4).contains(&table) {
+        if cells.is_null() || (*cells).get.is_none() || !(1..=4).contains(&table) {
             return Status::INVALID_ARGUMENT.code();
         }
         add_as(unit, cells.cast(), table, serve).code()
     }
+}
+
+/// Sets the functions that are called around a read or a write of cells, or removes them.
+///
+/// @param cells  the cells, registered already or not. Zeroing the struct removes the hooks
+/// @param hooks  must stay valid for as long as the cells are served; NULL for no hooks
+/// @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `cells`
+#[no_mangle]
+pub unsafe extern "C" fn mbm_dataCallbacks_setHooks(
+    cells: *mut mbm_dataCallbacks,
+    hooks: *const mbm_accessHooks,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        if cells.is_null() {
+            return Status::INVALID_ARGUMENT.code();
+        }
+        (*cells).hooks = mbm_recordHooks::new(hooks);
+    }
+    Status::OK.code()
 }

@@ -1,5 +1,6 @@
 //! Functions that the user defines, and functions that the user switches off.
 
+use super::hooks::connection;
 use super::records::{is_custom, mbm_custom, mbm_request, CUSTOM};
 use super::units::{add_as, add_first, is_ignored_broadcast, request, Services};
 use super::{mbm_service, mbm_unit};
@@ -18,6 +19,9 @@ pub const MBM_REPLY_NONE: u16 = 0x0200;
 /// A function of yours returns this if it has not finished. The next poll calls it again
 /// with the same request. The server receives nothing meanwhile.
 pub const MBM_REPLY_PENDING: u16 = 0x0300;
+/// A function of yours returns this to decline the request: the next record of the unit that
+/// serves the function code answers, or exception 01 if there is none.
+pub const MBM_REPLY_DECLINED: u16 = 0x0400;
 
 /// The functions that a unit answers with exception 01, even if it could serve them: see
 /// mbm_unit_switchFunction.
@@ -54,6 +58,7 @@ unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_voi
     // function runs.
     unsafe {
         let to = (*info.cast::<RequestInfo>()).to;
+        let connection = connection(info);
         let (pdu, length) = request(pdu, info);
         let function = pdu.first().copied().unwrap_or(0);
         if is_ignored_broadcast(info, function) {
@@ -65,6 +70,7 @@ unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_voi
         let context = (*record).context;
         custom::serve(pdu, length, |data, space| {
             let request = mbm_request {
+                connection,
                 data: data.as_ptr(),
                 length: data.len() as u16,
                 unit: to,
@@ -77,6 +83,7 @@ unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_voi
                 (MBM_REPLY_EXCEPTION, code @ 1..=0x7F) => Outcome::Exception(code),
                 (MBM_REPLY_NONE, 0) => Outcome::NoResponse,
                 (MBM_REPLY_PENDING, 0) => Outcome::Pending,
+                (MBM_REPLY_DECLINED, 0) => Outcome::Declined,
                 _ => Outcome::Exception(Reply::SERVER_DEVICE_FAILURE.exception_code()),
             }
         })

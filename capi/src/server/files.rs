@@ -1,8 +1,11 @@
 //! Files and FIFO queues, in arrays of the program.
 
+use super::hooks::{mbm_access, mbm_accessHooks, mbm_recordHooks, Hook};
 use super::units::{add, request};
 use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
+use core::ptr::{null, null_mut};
+use mbm::error::Status;
 use mbm::pdu::files::Record;
 use mbm::server::files::{self, Fifos, Files};
 
@@ -27,24 +30,8 @@ pub struct mbm_files {
     pub files: *const mbm_file,
     /// How many files.
     pub count: u16,
-    /// Optional: called before records are written, once for each group of a request,
-    /// before any group is written. `data` has the new values, the high byte of each
-    /// first. Return 0 to allow the write, or an exception code to refuse the whole
-    /// request.
-    pub before: Option<
-        unsafe extern "C" fn(
-            context: *mut c_void,
-            file: u16,
-            record: u16,
-            length: u16,
-            data: *const u8,
-        ) -> u8,
-    >,
-    /// Optional: called after the records of a group were written, once for each group.
-    pub after:
-        Option<unsafe extern "C" fn(context: *mut c_void, file: u16, record: u16, length: u16)>,
-    /// Passed to both hooks. Any value; may be NULL.
-    pub context: *mut c_void,
+    /// Private: see mbm_files_setHooks.
+    pub hooks: mbm_recordHooks,
 }
 
 /// One FIFO queue of registers.
@@ -72,8 +59,15 @@ pub struct mbm_fifos {
     pub count: u16,
 }
 
-/// The files of C. Their hooks may use the struct, so no reference to it is kept.
-struct CFiles(*mut mbm_files);
+/// The files of C, and the request. Their hooks may use the struct, so no reference to it is
+/// kept.
+struct CFiles {
+    record: *mut mbm_files,
+    /// The hooks that the record had when the request came.
+    hooks: mbm_recordHooks,
+    info: *const c_void,
+    function: u8,
+}
 
 /// The FIFO queues of C.
 struct CFifos(*mut mbm_fifos);
@@ -93,15 +87,31 @@ unsafe fn load(words: *const u16, data: &mut [u8]) {
 // same address, with arrays of the given sizes. `find` returns only records within these
 // arrays.
 impl CFiles {
+    /// Calls a hook, if there are hooks.
+    fn call(&self, hook: Hook, record: Record, data: *const u8) -> u8 {
+        // SAFETY: see above.
+        unsafe {
+            self.hooks.call(self.info, hook, || mbm_access {
+                connection: null_mut(),
+                data,
+                address: record.record,
+                quantity: record.length,
+                file: record.file,
+                unit: 0,
+                function: self.function,
+            })
+        }
+    }
+
     /// The first of these records, or `None` if not all of them exist.
     fn find(&self, wanted: Record) -> Option<*mut u16> {
         // SAFETY: see above.
         unsafe {
-            let mut file = (*self.0).files;
+            let mut file = (*self.record).files;
             if file.is_null() {
                 return None;
             }
-            for _ in 0..(*self.0).count {
+            for _ in 0..(*self.record).count {
                 if (*file).number == wanted.file {
                     let size = (*file).size;
                     let exist = !(*file).records.is_null()
@@ -137,29 +147,16 @@ impl Files for CFiles {
         }
     }
 
-    fn before(&mut self, record: Record, data: &[u8]) -> u8 {
-        // SAFETY: see above.
-        unsafe {
-            match (*self.0).before {
-                Some(hook) => hook(
-                    (*self.0).context,
-                    record.file,
-                    record.record,
-                    record.length,
-                    data.as_ptr(),
-                ),
-                None => 0,
-            }
-        }
+    fn before_read(&mut self, record: Record) -> u8 {
+        self.call(Hook::BeforeRead, record, null())
     }
 
-    fn after(&mut self, record: Record) {
-        // SAFETY: see above.
-        unsafe {
-            if let Some(hook) = (*self.0).after {
-                hook((*self.0).context, record.file, record.record, record.length);
-            }
-        }
+    fn before_write(&mut self, record: Record, data: &[u8]) -> u8 {
+        self.call(Hook::BeforeWrite, record, data.as_ptr())
+    }
+
+    fn after_write(&mut self, record: Record, data: &[u8]) {
+        self.call(Hook::AfterWrite, record, data.as_ptr());
     }
 }
 
@@ -211,8 +208,17 @@ unsafe extern "C" fn serve_files(
     info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
-    let (pdu, length) = unsafe { request(pdu, info) };
-    files::serve(&mut CFiles(service.cast()), pdu, length).code()
+    unsafe {
+        let record = service.cast::<mbm_files>();
+        let mut files = CFiles {
+            record,
+            hooks: (*record).hooks,
+            info,
+            function: *pdu,
+        };
+        let (pdu, length) = request(pdu, info);
+        files::serve(&mut files, pdu, length).code()
+    }
 }
 
 /// # Safety
@@ -239,6 +245,27 @@ unsafe extern "C" fn serve_fifos(
 pub unsafe extern "C" fn mbm_unit_serveFiles(unit: *mut mbm_unit, files: *mut mbm_files) -> u8 {
     // SAFETY: as the header demands.
     unsafe { add(unit, files.cast(), serve_files) }
+}
+
+/// Sets the functions that are called around a read or a write of records, or removes them.
+/// In mbm_access, `file` is the number of the file and `address` the first record.
+///
+/// @param files  the files, registered already or not. Zeroing the struct removes the hooks
+/// @param hooks  must stay valid for as long as the files are served; NULL for no hooks
+/// @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `files`
+#[no_mangle]
+pub unsafe extern "C" fn mbm_files_setHooks(
+    files: *mut mbm_files,
+    hooks: *const mbm_accessHooks,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        if files.is_null() {
+            return Status::INVALID_ARGUMENT.code();
+        }
+        (*files).hooks = mbm_recordHooks::new(hooks);
+    }
+    Status::OK.code()
 }
 
 /// Serves FIFO queues: function 18 (hex), Read FIFO Queue.

@@ -6,9 +6,11 @@ mod cells;
 mod custom;
 mod diagnostics;
 mod files;
+mod hooks;
 mod identity;
 mod records;
 mod respond;
+mod table_hooks;
 mod tables;
 mod units;
 
@@ -17,9 +19,11 @@ pub use callbacks::*;
 pub use custom::*;
 pub use diagnostics::*;
 pub use files::*;
+pub use hooks::*;
 pub use identity::*;
 pub use records::*;
 pub use respond::*;
+pub use table_hooks::*;
 pub use tables::*;
 pub use units::*;
 

@@ -20,7 +20,8 @@ pub struct mbm_service {
 }
 
 /// The function of a service. `pdu` points to the PDU of the request that `info`
-/// describes. Returns the number of a [`Reply`].
+/// describes. `info` is the field `request` of the server that received the request, and
+/// valid for that whole server. Returns the number of a [`Reply`].
 pub(super) type Serve =
     unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize;
 
@@ -29,6 +30,9 @@ pub(super) type Serve =
 pub struct mbm_request {
     /// The data of the request: the bytes after the function code.
     pub data: *const u8,
+    /// The line or connection that the request came from: the `context` of the port of the
+    /// server that received it, or the `connection` of mbm_unit_respond.
+    pub connection: *mut c_void,
     /// Length of `data` in bytes, 0 to 252.
     pub length: u16,
     /// The unit id in the request. 0 on a serial line is a broadcast: the server then
@@ -40,6 +44,11 @@ pub struct mbm_request {
 
 /// A function of yours. Zero the struct, set the fields that you need, and pass it to
 /// mbm_unit_serveCustom.
+///
+/// A unit asks its records in the order in which they were registered. So a function that is
+/// registered before the record that serves the same code is asked first. It answers the
+/// request itself, for example with an exception, or it returns MBM_REPLY_DECLINED: then the
+/// record after it answers.
 #[repr(C)]
 pub struct mbm_custom {
     /// Private.
@@ -47,7 +56,8 @@ pub struct mbm_custom {
     /// Carries out a request and writes the data of the response, without the function
     /// code, to `response`. `capacity` is the space in bytes that the frame buffer has
     /// after the request; the server sends at most 252 bytes. Returns the number of bytes
-    /// written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, or MBM_REPLY_PENDING.
+    /// written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, MBM_REPLY_PENDING or
+    /// MBM_REPLY_DECLINED.
     pub serve: Option<
         unsafe extern "C" fn(
             context: *mut c_void,

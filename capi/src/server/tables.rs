@@ -1,12 +1,14 @@
 //! The four tables of the data model, in arrays of the program.
 
 use super::cells::{are_all_on, transfer, transfer_many, Place};
+use super::hooks::mbm_recordHooks;
 use super::units::{add_as, is_ignored_broadcast, request};
 use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
 use core::hint::assert_unchecked;
+use core::mem::transmute;
 use mbm::error::Status;
-use mbm::server::table::{self, TableAccess, TableKind, TableOperation};
+use mbm::server::table::{self, TableAccess, TableKind, TableOperation, TableSteps};
 use mbm::server::Reply;
 use mbm::FIRMWARE;
 
@@ -26,21 +28,8 @@ pub struct mbm_registerTable {
     /// register, the lowest bit of the first byte first. A request for a register whose
     /// bit is 0 is answered with exception 02.
     pub valid: *const u8,
-    /// Optional: called once a request, before registers are written. `data` has the new
-    /// values, the high byte of each first. Return 0 to allow the write, or an exception
-    /// code to refuse the whole request.
-    pub before: Option<
-        unsafe extern "C" fn(
-            context: *mut c_void,
-            address: u16,
-            quantity: u16,
-            data: *const u8,
-        ) -> u8,
-    >,
-    /// Optional: called after registers were written, with the address and the quantity.
-    pub after: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, quantity: u16)>,
-    /// Passed to both hooks. Any value; may be NULL.
-    pub context: *mut c_void,
+    /// Private: see mbm_registerTable_setHooks.
+    pub hooks: mbm_recordHooks,
     /// The address of the first register.
     pub base: u16,
     /// How many registers there are.
@@ -58,28 +47,39 @@ pub struct mbm_bitTable {
     pub bits: *mut u8,
     /// As in mbm_registerTable.
     pub valid: *const u8,
-    /// As in mbm_registerTable. `data` has the new bits, the lowest bit of the first byte
-    /// first.
-    pub before: Option<
-        unsafe extern "C" fn(
-            context: *mut c_void,
-            address: u16,
-            quantity: u16,
-            data: *const u8,
-        ) -> u8,
-    >,
-    /// As in mbm_registerTable.
-    pub after: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, quantity: u16)>,
-    /// As in mbm_registerTable.
-    pub context: *mut c_void,
+    /// Private: see mbm_bitTable_setHooks.
+    pub hooks: mbm_recordHooks,
     /// The address of the first bit.
     pub base: u16,
     /// How many bits there are.
     pub size: u16,
 }
 
-/// A table of C. Its hooks may use the struct, so no reference to it is kept.
-struct Table(*mut mbm_registerTable);
+/// A table of C, and the request as for [`super::records::Serve`]. Its hooks may use the
+/// struct, so no reference to it is kept.
+pub(super) struct Table(pub(super) *mut mbm_registerTable, pub(super) *const c_void);
+
+/// Serves an access as [`TableAccess::access`] and calls the hooks of the table around it. The
+/// cells exist. With the operation [`TableOperation::NONE`] it only asks whether they may be
+/// read, as [`TableSteps::ask_read`].
+///
+/// A table has this function only with hooks, so a program without hooks does not contain it.
+pub(super) type AccessWithHooks = unsafe fn(
+    table: *mut mbm_registerTable,
+    info: *const c_void,
+    operation: TableOperation,
+    pdu: *mut u8,
+) -> Reply;
+
+/// The function that a table with hooks has.
+///
+/// # Safety
+/// `table` is a table.
+#[inline(always)]
+unsafe fn access_with_hooks(table: *const mbm_registerTable) -> Option<AccessWithHooks> {
+    // SAFETY: as the caller promises; `call` of a table is NULL or such a function.
+    unsafe { transmute((*table).hooks.call) }
+}
 
 // Both structs have the same layout; only the type of the array differs.
 const _: () = {
@@ -116,25 +116,19 @@ impl TableAccess for Table {
             let kind = TableKind::from_code((*table).service.kind);
             let place = Place::of_cells(cells, kind, first);
             let data = Place::of_data(pdu.add(operation.data()), kind);
-            let (mut from, mut to, mut reply, mut after) = (data, place, table::WRITTEN, None);
+            let (mut from, mut to, mut reply) = (data, place, table::WRITTEN);
+            if operation == TableOperation::READ && bytes == 0 {
+                return Reply::SERVER_DEVICE_FAILURE;
+            }
+            if let Some(access) = access_with_hooks(table) {
+                return access(table, self.1, operation, pdu);
+            }
             if operation == TableOperation::READ {
-                if bytes == 0 {
-                    return Reply::SERVER_DEVICE_FAILURE;
-                }
                 *pdu.add(1) = bytes as u8;
                 // The last byte may have bits without a cell: they are 0.
                 *pdu.add(1 + bytes) = 0;
                 reply = Reply::length(2 + bytes);
                 (from, to) = (place, data);
-            } else {
-                if let Some(hook) = (*table).before {
-                    let refused =
-                        hook((*table).context, address as u16, quantity as u16, data.byte);
-                    if refused != 0 {
-                        return Reply::exception(refused);
-                    }
-                }
-                after = (*table).after;
             }
             // Firmware has the smaller code, which copies cell by cell; a host copies
             // many at a time.
@@ -143,9 +137,6 @@ impl TableAccess for Table {
             } else {
                 let write = operation != TableOperation::READ;
                 transfer_many(cells, kind, write, first as u16, quantity as u16, data.byte);
-            }
-            if let Some(hook) = after {
-                hook((*table).context, address as u16, quantity as u16);
             }
             reply
         }
@@ -170,8 +161,8 @@ unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usiz
     }
 }
 
-/// As [`Table`], for function 17 (hex), which writes and then reads: the read uses the
-/// fields that the table had when the request came, also if a hook has changed them.
+/// As [`Table`], for functions that read and write: the read uses the fields that the table
+/// had when the request came, also if a hook has changed them. The copy has no hooks.
 struct TableSnapshot(Table, mbm_registerTable);
 
 impl TableAccess for TableSnapshot {
@@ -183,13 +174,29 @@ impl TableAccess for TableSnapshot {
         bytes: usize,
         pdu: &mut [u8],
     ) -> Reply {
-        let mut copy = Table(&raw mut self.1);
+        let mut copy = Table(&raw mut self.1, self.0 .1);
         let table = if operation == TableOperation::READ {
             &mut copy
         } else {
             &mut self.0
         };
         table.access(operation, quantity, bytes, pdu)
+    }
+}
+
+impl TableSteps for TableSnapshot {
+    fn ask_read(&mut self, _quantity: usize, pdu: &mut [u8]) -> Reply {
+        // SAFETY: see `Table`; a request that reads and writes has at least a quantity.
+        unsafe {
+            match access_with_hooks(self.0 .0) {
+                Some(ask) => ask(self.0 .0, self.0 .1, TableOperation::NONE, pdu.as_mut_ptr()),
+                None => Reply::NOT_HANDLED,
+            }
+        }
+    }
+
+    fn load(&mut self, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
+        self.access(TableOperation::READ, quantity, bytes, pdu)
     }
 }
 
@@ -231,7 +238,7 @@ unsafe fn serve_as(
     unsafe {
         let (pdu, length) = request(pdu, info);
         let kind = TableKind::from_code((*table).service.kind);
-        let cells = &mut Table(table);
+        let cells = &mut Table(table, info);
         if FIRMWARE || kind.is_bits() {
             table::serve_as(operation, kind, cells, pdu, length).code()
         } else {
@@ -303,9 +310,10 @@ unsafe fn serve_mask_and_read_write(
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, info);
-        let mut cells = TableSnapshot(Table(table), table.read());
+        let mut cells = TableSnapshot(Table(table, info), table.read());
+        cells.1.hooks.call = None;
         if FIRMWARE {
-            let cells: &mut dyn TableAccess = &mut cells;
+            let cells: &mut dyn TableSteps = &mut cells;
             return table::serve_mask_and_read_write(cells, pdu, length).code();
         }
         table::serve_mask_and_read_write(&mut cells, pdu, length).code()

@@ -19,7 +19,7 @@ ModbusServer server;
 void driverOn() { digitalWrite(driverEnable, HIGH); }
 void driverOff() { digitalWrite(driverEnable, LOW); }
 
-void relayWritten(uint16_t, uint16_t) { digitalWrite(relayPin, relay[0] ? HIGH : LOW); }
+void relayWritten(const mbm_access &) { digitalWrite(relayPin, relay[0] ? HIGH : LOW); }
 
 void setup() {
   digitalWrite(relayPin, LOW);

@@ -13,7 +13,7 @@ ModbusRegisterArray<1> sensor;
 ModbusBitArray<1> relay;
 ModbusTcpServer<EthernetServer> server; // on an Uno for two clients, elsewhere for four
 
-void relayWritten(uint16_t, uint16_t) { digitalWrite(relayPin, relay[0] ? HIGH : LOW); }
+void relayWritten(const mbm_access &) { digitalWrite(relayPin, relay[0] ? HIGH : LOW); }
 
 void setup() {
   digitalWrite(relayPin, LOW);

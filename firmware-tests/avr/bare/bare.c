@@ -68,11 +68,10 @@ static uint16_t words[CELLS], replies[CELLS];
 static mbm_registerTable table;
 static uint8_t is_wanted;
 
-static void written(void *context, uint16_t address, uint16_t quantity)
+static void written(void *context, const mbm_access *access)
 {
     (void)context;
-    (void)quantity;
-    if (address == 0)
+    if (access->address == 0)
         is_wanted = 1;
 }
 
@@ -88,6 +87,7 @@ static void port_of(mbm_port *port, usart *u)
 int main(void)
 {
     static mbm_port serving, asking;
+    static mbm_accessHooks hooks;
 
     UBRR0 = UBRR1 = DIVISOR;
     UCSR0B = UCSR1B = _BV(RXEN0) | _BV(TXEN0);
@@ -95,9 +95,10 @@ int main(void)
     port_of(&serving, &served);
     port_of(&asking, &asked);
 
+    hooks.afterWrite = written;
     table.words = words;
     table.size = CELLS;
-    table.after = written;
+    mbm_registerTable_setHooks(&table, &hooks);
     unit.id = 17;
     mbm_unit_serveHoldingRegisters(&unit, &table);
     mbm_server_beginRtu(&server, &serving, &unit, 1, frame, sizeof frame);

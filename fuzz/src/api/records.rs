@@ -132,6 +132,11 @@ const SERVICE: mbm_service = mbm_service {
     kind: 0,
 };
 
+const NO_HOOKS: mbm_recordHooks = mbm_recordHooks {
+    hooks: null(),
+    call: None,
+};
+
 fn bitmap(w: &World, bits: u16) -> *const u8 {
     if w.rarely(4) {
         w.noise(usize::from(bits).div_ceil(8))
@@ -149,14 +154,11 @@ fn words(w: &World, count: u16) -> *mut u16 {
 
 fn register_table(w: &World) -> mbm_registerTable {
     let size = w.word();
-    let hooks = w.byte();
     mbm_registerTable {
         service: SERVICE,
         words: words(w, size),
         valid: bitmap(w, size),
-        before: (hooks & 1 != 0).then_some(hooks::before_words),
-        after: (hooks & 2 != 0).then_some(hooks::after),
-        context: null_mut(),
+        hooks: NO_HOOKS,
         base: w.word() & 0xFFFC,
         size,
     }
@@ -164,7 +166,6 @@ fn register_table(w: &World) -> mbm_registerTable {
 
 fn bit_table(w: &World) -> mbm_bitTable {
     let size = w.word();
-    let hooks = w.byte();
     mbm_bitTable {
         service: SERVICE,
         bits: if w.rarely(64) {
@@ -173,15 +174,13 @@ fn bit_table(w: &World) -> mbm_bitTable {
             w.noise(usize::from(size).div_ceil(8))
         },
         valid: bitmap(w, size),
-        before: (hooks & 1 != 0).then_some(hooks::before_bits),
-        after: (hooks & 2 != 0).then_some(hooks::after),
-        context: null_mut(),
+        hooks: NO_HOOKS,
         base: w.word() & 0xFFFC,
         size,
     }
 }
 
-fn cells(w: &World, bits: bool) -> mbm_dataCallbacks {
+fn cells(w: &World) -> mbm_dataCallbacks {
     let hooks = w.byte();
     mbm_dataCallbacks {
         service: SERVICE,
@@ -189,12 +188,7 @@ fn cells(w: &World, bits: bool) -> mbm_dataCallbacks {
         isValid: (hooks & 1 != 0).then_some(hooks::is_valid),
         get: (hooks & 0x70 != 0).then_some(hooks::get),
         set: (hooks & 0x0E != 0).then_some(hooks::set),
-        before: (hooks & 2 != 0).then_some(if bits {
-            hooks::before_bits
-        } else {
-            hooks::before_words
-        }),
-        after: (hooks & 4 != 0).then_some(hooks::after),
+        hooks: NO_HOOKS,
     }
 }
 
@@ -232,7 +226,6 @@ fn files(w: &World) -> mbm_files {
             }
         })
         .collect();
-    let hooks = w.byte();
     mbm_files {
         service: SERVICE,
         files: if w.rarely(16) {
@@ -241,9 +234,7 @@ fn files(w: &World) -> mbm_files {
             w.array(&files)
         },
         count: files.len() as u16,
-        before: (hooks & 1 != 0).then_some(hooks::before_records),
-        after: (hooks & 2 != 0).then_some(hooks::after_records),
-        context: null_mut(),
+        hooks: NO_HOOKS,
     }
 }
 
@@ -327,6 +318,26 @@ fn diagnostics(w: &World) -> mbm_diagnostics {
     }
 }
 
+/// Sets or removes the hooks of a record, registered or not.
+pub fn set_hooks(w: &World) {
+    let records = &w.records;
+    macro_rules! set {
+        ($pool:ident, $name:ident) => {{
+            let record = records.$pool.pick(w);
+            let hooks = hooks::hooks(w);
+            refused_changes_nothing(w, &[span(record)], stringify!($name), || {
+                call!(w, record, $name(record, hooks))
+            });
+        }};
+    }
+    match w.byte() % 4 {
+        0 => set!(bits, mbm_bitTable_setHooks),
+        1 => set!(registers, mbm_registerTable_setHooks),
+        2 => set!(cells, mbm_dataCallbacks_setHooks),
+        _ => set!(files, mbm_files_setHooks),
+    }
+}
+
 /// Registers a record of any kind.
 pub fn serve(w: &World) {
     let records = &w.records;
@@ -358,7 +369,7 @@ pub fn serve(w: &World) {
         }
         6 | 7 => {
             let table = w.byte() % 6;
-            let fill = || cells(w, table < 3);
+            let fill = || cells(w);
             renew(w, &records.cells, fill, |record| {
                 register(w, "mbm_unit_serveCallbacks", unit, record, || {
                     call!(w, unit, mbm_unit_serveCallbacks(unit, record, table))
@@ -417,6 +428,8 @@ pub fn device(w: &World) -> *mut mbm_unit {
     unsafe {
         std::ptr::copy_nonoverlapping(holding, input, 1);
         std::ptr::copy_nonoverlapping(coils, inputs, 1);
+        mbm_registerTable_setHooks(holding, hooks::hooks(w));
+        mbm_bitTable_setHooks(coils, hooks::hooks(w));
         mbm_unit_serveHoldingRegisters(unit, holding);
         mbm_registerTable_serveMaskAndReadWrite(holding);
         mbm_unit_serveInputRegisters(unit, input);

@@ -4,6 +4,8 @@ use super::check::{call, checked_call, is_status, refused_changes_nothing, span,
 use super::world::World;
 use super::{ports, records, traffic};
 use mbm_c::*;
+use std::ffi::c_void;
+use std::ptr::null_mut;
 
 /// Begins a server with any framing and a buffer of any size.
 fn begin(w: &World) {
@@ -119,7 +121,16 @@ fn respond(w: &World) {
     let status = call!(
         w,
         std::ptr::null::<mbm_unit>(),
-        mbm_unit_respond(units, count, framing, frame, length, capacity, response)
+        mbm_unit_respond(
+            units,
+            count,
+            null_mut::<c_void>(),
+            framing,
+            frame,
+            length,
+            capacity,
+            response
+        )
     );
     is_status("mbm_unit_respond", status);
     if !response.is_null() {
@@ -164,6 +175,7 @@ pub fn step(w: &World) {
         8 => set(w),
         9 | 10 => respond(w),
         11 => unit(w),
+        12 => records::set_hooks(w),
         _ => records::serve(w),
     }
 }

@@ -31,37 +31,58 @@ fn refusal(w: &World) -> u8 {
     }
 }
 
-pub unsafe extern "C" fn before_words(_: *mut c_void, _: u16, count: u16, data: *const u8) -> u8 {
-    read_all(data, 2 * usize::from(count));
+/// Reads the access that a hook was given, before and after other calls. Of a write, it has data.
+unsafe fn read_access<'a>(access: *const mbm_access, writes: bool) -> &'a World {
+    let read = || {
+        // SAFETY: the header promises an access.
+        let access = unsafe { &*access };
+        assert!(access.quantity > 0 && access.data.is_null() != writes);
+        if writes {
+            let is_bits = matches!(access.function, 0x05 | 0x0F);
+            let count = usize::from(access.quantity);
+            read_all(
+                access.data,
+                if is_bits {
+                    count.div_ceil(8)
+                } else {
+                    2 * count
+                },
+            );
+        }
+    };
+    read();
     let w = enter();
-    read_all(data, 2 * usize::from(count));
-    refusal(w)
+    read();
+    w
 }
 
-pub unsafe extern "C" fn before_bits(_: *mut c_void, _: u16, count: u16, data: *const u8) -> u8 {
-    read_all(data, usize::from(count).div_ceil(8));
-    let w = enter();
-    read_all(data, usize::from(count).div_ceil(8));
-    refusal(w)
+unsafe extern "C" fn before_read(_: *mut c_void, access: *const mbm_access) -> u8 {
+    // SAFETY: as the header promises.
+    refusal(unsafe { read_access(access, false) })
 }
 
-pub unsafe extern "C" fn before_records(
-    _: *mut c_void,
-    _: u16,
-    _: u16,
-    length: u16,
-    data: *const u8,
-) -> u8 {
-    read_all(data, 2 * usize::from(length));
-    refusal(enter())
+unsafe extern "C" fn before_write(_: *mut c_void, access: *const mbm_access) -> u8 {
+    // SAFETY: as the header promises.
+    refusal(unsafe { read_access(access, true) })
 }
 
-pub unsafe extern "C" fn after(_: *mut c_void, _: u16, _: u16) {
-    enter();
+unsafe extern "C" fn after_write(_: *mut c_void, access: *const mbm_access) {
+    // SAFETY: as the header promises.
+    unsafe { read_access(access, true) };
 }
 
-pub unsafe extern "C" fn after_records(_: *mut c_void, _: u16, _: u16, _: u16) {
-    enter();
+/// Hooks of a record, each present or not; NULL if none is.
+pub fn hooks(w: &World) -> *const mbm_accessHooks {
+    let present = w.byte();
+    if present & 7 == 0 {
+        return std::ptr::null();
+    }
+    w.put(mbm_accessHooks {
+        context: std::ptr::null_mut(),
+        beforeRead: (present & 1 != 0).then_some(before_read),
+        beforeWrite: (present & 2 != 0).then_some(before_write),
+        afterWrite: (present & 4 != 0).then_some(after_write),
+    })
 }
 
 pub unsafe extern "C" fn is_valid(_: *mut c_void, address: u16) -> u8 {
@@ -101,6 +122,7 @@ pub unsafe extern "C" fn custom(
     match w.random() % 16 {
         0 => MBM_REPLY_NONE,
         1 | 2 => MBM_REPLY_PENDING,
+        7 => MBM_REPLY_DECLINED,
         3 => MBM_REPLY_EXCEPTION | (w.random() % 256) as u16,
         4 => w.random() as u16,
         5 => 255,

@@ -144,6 +144,7 @@ fn respond(w: &World, framing: u8, frame: &[u8]) -> Vec<u8> {
             mbm_unit_respond(
                 w.device.get(),
                 1,
+                std::ptr::null_mut(),
                 &mbm_framing {
                     functions: std::ptr::null(),
                     functionCount: 0,

@@ -19,15 +19,15 @@ ModbusRegisterArray<2> others;
 ModbusUnit units[] = {{17}, {18}};
 ModbusServer server;
 
-uint8_t beforeWrite(uint16_t, uint16_t quantity, const uint8_t *data) {
+uint8_t beforeWrite(const mbm_access &access) {
   report.asked++;
-  return quantity == 1 && data[0] == 0xFF ? MBM_SLAVE_DEVICE_BUSY : 0;
+  return access.quantity == 1 && access.data[0] == 0xFF ? MBM_SLAVE_DEVICE_BUSY : 0;
 }
 
-void afterWrite(uint16_t address, uint16_t quantity) {
+void afterWrite(const mbm_access &access) {
   report.told++;
-  report.address = address;
-  report.quantity = quantity;
+  report.address = access.address;
+  report.quantity = access.quantity;
 }
 
 // Function 65: the sum of the bytes, as a word.
