@@ -293,6 +293,26 @@ bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs
 	@scripts/bench-sniffer $(BENCH_SNIFFER)
 	@CARGO="$(CARGO)" scripts/bench-frames
 
+# Programs with TLS or UDP, which pymodbus talks with too.
+SECURE := $(BUILD)/plain/linux/secure
+$(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure mbm_tls mbm_tls_identity mbm_tls_linux mbm_tls_text mbm_tcp mbm_tcp_listener) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections $(TLS_LIBS) -o $@
+UDP := $(BUILD)/plain/linux/udp
+$(UDP): $(patsubst %,$(BUILD)/plain/linux/%.o,udp mbm_udp) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+
+.PHONY: secure
+secure: ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
+	@scripts/need python3 python3-venv gcc libc6-dev libmbedtls-dev openssl
+	@$(MAKE) --no-print-directory venv certificates $(SECURE)
+	@$(BUILD)/venv/bin/python scripts/check-secure $(SECURE) $(BUILD)/certificates
+
+.PHONY: udp
+udp: ## Build and check the example over UDP, build/plain/linux/udp
+	@scripts/need python3 python3-venv gcc libc6-dev
+	@$(MAKE) --no-print-directory venv $(UDP)
+	@$(BUILD)/venv/bin/python scripts/check-udp $(UDP)
+
 DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/recorder linux/mbm_tty support/pty support/server) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@

@@ -10,11 +10,15 @@
 #define MBEDTLS_PRIVATE(member) member
 #endif
 
-/* The types of the first record of a peer that speaks TLS. */
-enum { RECORD_ALERT = 21, RECORD_HANDSHAKE = 22 };
+/* The types of records that a peer may send first, and the level of an alert that ends the
+ * connection. */
+enum { RECORD_ALERT = 21, RECORD_HANDSHAKE = 22, FATAL = 2 };
 
 /* The most bytes that one read or write returns. */
 enum { MOST = INT16_MAX };
+
+/* How often a connection that is over reads the stream below, MBM_MAX_TCP_FRAME bytes each. */
+enum { DRAINS = 64 };
 
 /* --- the stream below, as Mbed TLS calls it --- */
 
@@ -24,28 +28,12 @@ static int lose(mbm_tls *tls)
     return MBEDTLS_ERR_SSL_CONN_EOF;
 }
 
-static int send_below(void *context, const unsigned char *bytes, size_t length)
+static int read_below(mbm_tls *tls, uint8_t *bytes, size_t capacity)
 {
-    mbm_tls *tls = (mbm_tls *)context;
-    int16_t count;
+    const int count = tls->isLost ? -1
+                                  : tls->below.read(tls->below.context, bytes,
+                                                    (uint16_t)(capacity < MOST ? capacity : MOST));
 
-    if (tls->isLost)
-        return lose(tls);
-    count = tls->below.write(tls->below.context, bytes, (uint16_t)(length < MOST ? length : MOST));
-    if (count < 0)
-        return lose(tls);
-    return count > 0 ? count : MBEDTLS_ERR_SSL_WANT_WRITE;
-}
-
-static int receive_below(void *context, unsigned char *bytes, size_t capacity)
-{
-    mbm_tls *tls = (mbm_tls *)context;
-    int16_t count;
-
-    if (tls->isLost)
-        return lose(tls);
-    count =
-        tls->below.read(tls->below.context, bytes, (uint16_t)(capacity < MOST ? capacity : MOST));
     if (count < 0)
         return lose(tls);
     if (count == 0)
@@ -56,6 +44,56 @@ static int receive_below(void *context, unsigned char *bytes, size_t capacity)
             tls->status = MBM_TLS_NOT_TLS;
     }
     return count;
+}
+
+static int receive_below(void *context, unsigned char *bytes, size_t capacity)
+{
+    mbm_tls *tls = (mbm_tls *)context;
+    size_t count = tls->hasAhead;
+
+    if (count == 0)
+        return read_below(tls, bytes, capacity);
+    if (count > capacity)
+        count = capacity;
+    memcpy(bytes, tls->ahead, count);
+    tls->hasAhead = (uint8_t)(tls->hasAhead - count);
+    memmove(tls->ahead, tls->ahead + count, tls->hasAhead);
+    return (int)count;
+}
+
+/* Looks whether the peer has refused the connection in the middle of this side's messages.
+ * Mbed TLS reads only after it has sent all of them, and then it is too late: the peer has
+ * closed the stream, and writing to it has lost the link. */
+static int is_refused(mbm_tls *tls)
+{
+    const int count =
+        tls->hasAhead < sizeof tls->ahead
+            ? read_below(tls, tls->ahead + tls->hasAhead, sizeof tls->ahead - tls->hasAhead)
+            : 0;
+
+    if (count > 0)
+        tls->hasAhead = (uint8_t)(tls->hasAhead + count);
+    if (tls->hasAhead < sizeof tls->ahead || tls->ahead[0] != RECORD_ALERT || tls->ahead[3] != 0 ||
+        tls->ahead[4] != 2 || tls->ahead[5] != FATAL)
+        return 0;
+    tls->alert = tls->ahead[6];
+    tls->status = MBM_TLS_REFUSED_BY_PEER;
+    return 1;
+}
+
+static int send_below(void *context, const unsigned char *bytes, size_t length)
+{
+    mbm_tls *tls = (mbm_tls *)context;
+    int16_t count;
+
+    if (tls->status == MBM_TLS_HANDSHAKE && is_refused(tls))
+        return MBEDTLS_ERR_SSL_FATAL_ALERT_MESSAGE;
+    if (tls->isLost)
+        return lose(tls);
+    count = tls->below.write(tls->below.context, bytes, (uint16_t)(length < MOST ? length : MOST));
+    if (count < 0)
+        return lose(tls);
+    return count > 0 ? count : MBEDTLS_ERR_SSL_WANT_WRITE;
 }
 
 /* --- failures --- */
@@ -133,6 +171,17 @@ static uint8_t reason_of(const mbm_tls *tls, int error)
     return tls->status == MBM_TLS_OPEN ? MBM_TLS_BAD_STREAM : MBM_TLS_FAILED;
 }
 
+/* Drops what the peer has sent and nobody will read. With unread bytes a socket that is closed
+ * sends a reset, and the peer's system then drops the alert that says why. */
+static void drain(mbm_tls *tls)
+{
+    unsigned rounds;
+
+    for (rounds = 0; rounds < DRAINS && !tls->isLost; rounds++)
+        if (tls->below.read(tls->below.context, tls->sending, sizeof tls->sending) <= 0)
+            return;
+}
+
 /* Ends the connection for an error. The first reason stays. */
 static void fail(mbm_tls *tls, int error)
 {
@@ -141,10 +190,11 @@ static void fail(mbm_tls *tls, int error)
     if (flags != UINT32_MAX)
         tls->flags |= flags;
     tls->error = error;
-    if (error == MBEDTLS_ERR_SSL_FATAL_ALERT_MESSAGE)
+    if (error == MBEDTLS_ERR_SSL_FATAL_ALERT_MESSAGE && tls->status != MBM_TLS_REFUSED_BY_PEER)
         tls->alert = tls->ssl.MBEDTLS_PRIVATE(in_msg)[1];
     if (tls->status <= MBM_TLS_CLOSING)
         tls->status = reason_of(tls, error);
+    drain(tls);
 }
 
 /* --- the handshake --- */
@@ -172,7 +222,7 @@ static uint32_t now(const mbm_tls *tls)
 
 static void begin_handshake(mbm_tls *tls)
 {
-    tls->alert = tls->isLost = tls->hasBadRole = tls->isTold = 0;
+    tls->alert = tls->isLost = tls->hasBadRole = tls->isTold = tls->hasAhead = 0;
     tls->isFirst = 1;
     tls->error = 0;
     tls->flags = 0;
@@ -398,6 +448,7 @@ void mbm_tls_close(mbm_tls *tls)
     if (!tls->isSetUp)
         return;
     (void)mbm_tls_shutDown(tls);
+    drain(tls);
     mbedtls_ssl_free(&tls->ssl);
     mbedtls_platform_zeroize(tls->sending, sizeof tls->sending);
     tls->isSetUp = 0;

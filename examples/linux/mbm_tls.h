@@ -68,25 +68,26 @@ enum {
     MBM_TLS_TIMED_OUT = 6,   /**< the handshake took longer than its time */
 
     /* The peer and this side do not fit. */
-    MBM_TLS_NOT_TLS = 7,            /**< the peer's first bytes are not TLS, for example plain Modbus */
+    MBM_TLS_NOT_TLS = 7, /**< the peer's first bytes are not TLS, for example plain Modbus */
     MBM_TLS_NO_COMMON_VERSION = 8,  /**< the peer speaks only versions older than TLS 1.2 */
     MBM_TLS_NO_COMMON_CIPHER = 9,   /**< no cipher suite, curve or signature in common */
     MBM_TLS_REFUSED_BY_PEER = 10,   /**< the peer refused the connection; `alert` says why */
     MBM_TLS_NO_CERTIFICATE = 11,    /**< the client sent no certificate */
     MBM_TLS_UNKNOWN_AUTHORITY = 12, /**< no authority of this side signed the peer's certificate */
     MBM_TLS_EXPIRED = 13,           /**< a certificate of the peer is valid no longer */
-    MBM_TLS_NOT_YET_VALID = 14,     /**< a certificate of the peer is not valid yet; or the clock is wrong */
-    MBM_TLS_REVOKED = 15,           /**< a certificate of the peer is on the revocation list */
-    MBM_TLS_OTHER_NAME = 16,        /**< the server's certificate is for another name */
-    MBM_TLS_BAD_CERTIFICATE = 17,   /**< the peer's certificate is damaged, has a weak key, or is not
-                                         for this use */
-    MBM_TLS_BAD_ROLE = 18,          /**< the client's role is no UTF8String, empty, longer than
-                                         MBM_TLS_ROLE_BYTES, has a zero byte, or there are two */
-    MBM_TLS_BAD_STREAM = 19,        /**< damaged or forged records, or messages out of order */
+    MBM_TLS_NOT_YET_VALID =
+        14,               /**< a certificate of the peer is not valid yet; or the clock is wrong */
+    MBM_TLS_REVOKED = 15, /**< a certificate of the peer is on the revocation list */
+    MBM_TLS_OTHER_NAME = 16,      /**< the server's certificate is for another name */
+    MBM_TLS_BAD_CERTIFICATE = 17, /**< the peer's certificate is damaged, has a weak key, or is not
+                                       for this use */
+    MBM_TLS_BAD_ROLE = 18,        /**< the client's role is no UTF8String, empty, longer than
+                                       MBM_TLS_ROLE_BYTES, has a zero byte, or there are two */
+    MBM_TLS_BAD_STREAM = 19,      /**< damaged or forged records, or messages out of order */
 
     /* This side. */
     MBM_TLS_OWN_CERTIFICATE = 20, /**< the options' certificate cannot be read */
-    MBM_TLS_OWN_KEY = 21,         /**< the options' key cannot be read, or is for another certificate */
+    MBM_TLS_OWN_KEY = 21, /**< the options' key cannot be read, or is for another certificate */
     MBM_TLS_OWN_AUTHORITIES = 22, /**< the options' authorities cannot be read */
     MBM_TLS_OWN_REVOKED = 23,     /**< the options' revocation list cannot be read */
     MBM_TLS_NO_MEMORY = 24,       /**< Mbed TLS got no memory */
@@ -99,26 +100,27 @@ enum {
  *  counted in the length, or DER. PEM may be freed after mbm_tls_begin. DER of certificates
  *  is not copied, so that it may be in flash: it must stay until mbm_tls_end. */
 typedef struct mbm_tls_options {
-    const uint8_t *certificate;   /**< this device's; in PEM others may follow, up to the authority's */
-    size_t certificateBytes;      /**< its length */
-    const uint8_t *key;           /**< the private key of the certificate, RSA or EC */
-    size_t keyBytes;              /**< its length */
-    const char *keyPassword;      /**< of the key, or NULL */
-    const uint8_t *authorities;   /**< the authorities whose certificates the peer may have;
-                                       several only in PEM */
-    size_t authoritiesBytes;      /**< their length */
-    const uint8_t *revoked;       /**< optional: revocation lists of these authorities, copied */
-    size_t revokedBytes;          /**< their length */
+    const uint8_t
+        *certificate;        /**< this device's; in PEM others may follow, up to the authority's */
+    size_t certificateBytes; /**< its length */
+    const uint8_t *key;      /**< the private key of the certificate, RSA or EC */
+    size_t keyBytes;         /**< its length */
+    const char *keyPassword; /**< of the key, or NULL */
+    const uint8_t *authorities; /**< the authorities whose certificates the peer may have;
+                                     several only in PEM */
+    size_t authoritiesBytes;    /**< their length */
+    const uint8_t *revoked;     /**< optional: revocation lists of these authorities, copied */
+    size_t revokedBytes;        /**< their length */
     int (*random)(void *context, unsigned char *bytes, size_t count); /**< fills bytes with random
                                        ones that no one can guess, and returns 0; or fails with
                                        another number. mbm_tls_random on Linux; elsewhere for
                                        example mbedtls_ctr_drbg_random */
-    void *randomContext;          /**< the first argument of `random` */
-    const int *ciphers;           /**< optional: the cipher suites to allow, best first, numbers
-                                       MBEDTLS_TLS_..., ended by 0; must stay until mbm_tls_end */
-    uint32_t handshakeMs;         /**< the longest handshake, up to 2000000 ms, with the connecting
-                                       of the stream below; 0: MBM_TLS_HANDSHAKE_MS */
-    uint8_t isServer;             /**< 1 for a server's connections, 0 for a client's */
+    void *randomContext;  /**< the first argument of `random` */
+    const int *ciphers;   /**< optional: the cipher suites to allow, best first, numbers
+                               MBEDTLS_TLS_..., ended by 0; must stay until mbm_tls_end */
+    uint32_t handshakeMs; /**< the longest handshake, up to 2000000 ms, with the connecting
+                               of the stream below; 0: MBM_TLS_HANDSHAKE_MS */
+    uint8_t isServer;     /**< 1 for a server's connections, 0 for a client's */
 } mbm_tls_options;
 
 /** Certificates and rules that any number of connections share; zero before first use. */
@@ -137,24 +139,26 @@ typedef struct mbm_tls_identity {
 /** A connection; zero before first use. It is the `context` of its port, so a server's hooks
  *  that get the connection's context get a pointer to it. */
 typedef struct mbm_tls {
-    uint8_t status;  /**< MBM_TLS_CLOSED to MBM_TLS_CLOSING, or why the connection ended */
-    uint8_t alert;   /**< for MBM_TLS_REFUSED_BY_PEER: the description of the peer's alert
-                          (RFC 5246, 7.2) */
-    int error;       /**< the number of Mbed TLS for a connection that failed, or 0 */
-    uint32_t flags;  /**< what is wrong with the peer's certificates: MBEDTLS_X509_BADCERT_... */
-    char role[MBM_TLS_ROLE_BYTES + 1];   /**< private: see mbm_tls_role */
-    uint8_t isSetUp;                     /**< private */
-    uint8_t isLost;                      /**< private */
-    uint8_t hasBadRole;                  /**< private */
-    uint8_t isTold;                      /**< private */
-    uint8_t isFirst;                     /**< private */
-    uint8_t sending[MBM_MAX_TCP_FRAME];  /**< private */
-    uint16_t sent, toSend;               /**< private */
-    uint32_t startedAt;                  /**< private */
-    const mbm_tls_identity *identity;    /**< private */
-    mbm_port below;                      /**< private */
-    mbm_linkHooks link;                  /**< private */
-    mbedtls_ssl_context ssl;             /**< private */
+    uint8_t status; /**< MBM_TLS_CLOSED to MBM_TLS_CLOSING, or why the connection ended */
+    uint8_t alert;  /**< for MBM_TLS_REFUSED_BY_PEER: the description of the peer's alert
+                         (RFC 5246, 7.2) */
+    int error;      /**< the number of Mbed TLS for a connection that failed, or 0 */
+    uint32_t flags; /**< what is wrong with the peer's certificates: MBEDTLS_X509_BADCERT_... */
+    char role[MBM_TLS_ROLE_BYTES + 1];  /**< private: see mbm_tls_role */
+    uint8_t isSetUp;                    /**< private */
+    uint8_t isLost;                     /**< private */
+    uint8_t hasBadRole;                 /**< private */
+    uint8_t isTold;                     /**< private */
+    uint8_t isFirst;                    /**< private */
+    uint8_t hasAhead;                   /**< private */
+    uint8_t ahead[7];                   /**< private */
+    uint8_t sending[MBM_MAX_TCP_FRAME]; /**< private */
+    uint16_t sent, toSend;              /**< private */
+    uint32_t startedAt;                 /**< private */
+    const mbm_tls_identity *identity;   /**< private */
+    mbm_port below;                     /**< private */
+    mbm_linkHooks link;                 /**< private */
+    mbedtls_ssl_context ssl;            /**< private */
 } mbm_tls;
 
 /**
