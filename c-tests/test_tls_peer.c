@@ -227,11 +227,12 @@ static void a_critical_role_is_refused(void **state)
     is_refused("role-critical", NULL, MBM_TLS_BAD_CERTIFICATE);
 }
 
-static void old_versions_and_ciphers_that_hide_nothing_are_refused(void **state)
+static void other_versions_and_ciphers_that_hide_nothing_are_refused(void **state)
 {
     (void)state;
     is_refused("operator", ARGUMENTS("-tls1_1", "-cipher", "DEFAULT:@SECLEVEL=0"),
                MBM_TLS_NO_COMMON_VERSION);
+    is_refused("operator", ARGUMENTS("-tls1_3"), MBM_TLS_NO_COMMON_CIPHER);
     is_refused("operator", ARGUMENTS("-tls1", "-cipher", "DEFAULT:@SECLEVEL=0"),
                MBM_TLS_NO_COMMON_VERSION);
     is_refused("operator", ARGUMENTS("-tls1_2", "-cipher", "ECDHE-ECDSA-NULL-SHA:@SECLEVEL=0"),
@@ -472,7 +473,7 @@ int main(void)
         TEST(openssl_asks_and_gets_the_bytes_of_the_reply),
         TEST(openssl_without_a_right_certificate_is_refused),
         TEST(a_critical_role_is_refused),
-        TEST(old_versions_and_ciphers_that_hide_nothing_are_refused),
+        TEST(other_versions_and_ciphers_that_hide_nothing_are_refused),
         TEST(a_client_without_tls_is_refused),
         TEST(a_client_that_closes_its_half_in_the_handshake_is_dropped),
         TEST(openssl_answers_a_request),

@@ -206,6 +206,7 @@ static int look_at_certificate(void *context, mbedtls_x509_crt *certificate, int
 {
     mbm_tls *tls = (mbm_tls *)context;
 
+    tls->isSeen |= depth == 0;
     if (depth == 0 && tls->identity->isServer &&
         mbm_tls_findRole(&certificate->v3_ext, tls->role) == MBM_TLS_WRONG_ROLE) {
         tls->hasBadRole = 1;
@@ -222,7 +223,7 @@ static uint32_t now(const mbm_tls *tls)
 
 static void begin_handshake(mbm_tls *tls)
 {
-    tls->alert = tls->isLost = tls->hasBadRole = tls->isTold = tls->hasAhead = 0;
+    tls->alert = tls->isLost = tls->isSeen = tls->hasBadRole = tls->isTold = tls->hasAhead = 0;
     tls->isFirst = 1;
     tls->error = 0;
     tls->flags = 0;
@@ -237,7 +238,8 @@ static void shake_hands(mbm_tls *tls)
     int result = mbedtls_ssl_handshake(&tls->ssl);
 
     /* Mbed TLS demands a verified certificate of the peer. This makes sure of it. */
-    if (result == 0 && (tls->flags != 0 || mbedtls_ssl_get_verify_result(&tls->ssl) != 0))
+    if (result == 0 &&
+        (!tls->isSeen || tls->flags != 0 || mbedtls_ssl_get_verify_result(&tls->ssl) != 0))
         result = MBEDTLS_ERR_X509_CERT_VERIFY_FAILED;
     if (result != 0 && !must_wait(result))
         fail(tls, result);

@@ -4,9 +4,9 @@
  *
  * It takes the mbm_port of any byte stream, and makes an mbm_port from it whose bytes cross
  * that stream encrypted: a socket's (mbm_tcp.h), or the one of a microcontroller's network.
- * Both sides prove who they are by a certificate, TLS is 1.2 or newer, and the role in the
- * client's certificate is there for the server's hooks (Modbus/TCP Security Protocol
- * Specification V21).
+ * Both sides prove who they are by a certificate, TLS is 1.2, and the role in the client's
+ * certificate is there for the server's hooks (Modbus/TCP Security Protocol Specification
+ * V21).
  *
  * mbm_tls.c, mbm_tls_identity.c and the library Mbed TLS (2.28 or 3) are all that is needed.
  * mbm_tls_text.c has the reasons in words. mbm_tls_linux.h has what a program on Linux needs
@@ -69,16 +69,15 @@ enum {
 
     /* The peer and this side do not fit. */
     MBM_TLS_NOT_TLS = 7, /**< the peer's first bytes are not TLS, for example plain Modbus */
-    MBM_TLS_NO_COMMON_VERSION = 8,  /**< the peer speaks only versions older than TLS 1.2 */
-    MBM_TLS_NO_COMMON_CIPHER = 9,   /**< no cipher suite, curve or signature in common */
+    MBM_TLS_NO_COMMON_VERSION = 8,  /**< the peer's TLS is older than 1.2 */
+    MBM_TLS_NO_COMMON_CIPHER = 9,   /**< no cipher suite in common, or the peer's TLS is newer */
     MBM_TLS_REFUSED_BY_PEER = 10,   /**< the peer refused the connection; `alert` says why */
     MBM_TLS_NO_CERTIFICATE = 11,    /**< the client sent no certificate */
     MBM_TLS_UNKNOWN_AUTHORITY = 12, /**< no authority of this side signed the peer's certificate */
     MBM_TLS_EXPIRED = 13,           /**< a certificate of the peer is valid no longer */
-    MBM_TLS_NOT_YET_VALID =
-        14,               /**< a certificate of the peer is not valid yet; or the clock is wrong */
-    MBM_TLS_REVOKED = 15, /**< a certificate of the peer is on the revocation list */
-    MBM_TLS_OTHER_NAME = 16,      /**< the server's certificate is for another name */
+    MBM_TLS_NOT_YET_VALID = 14,     /**< a certificate of the peer is not valid yet */
+    MBM_TLS_REVOKED = 15,           /**< a certificate of the peer is on the revocation list */
+    MBM_TLS_OTHER_NAME = 16,        /**< the server's certificate is for another name */
     MBM_TLS_BAD_CERTIFICATE = 17, /**< the peer's certificate is damaged, has a weak key, or is not
                                        for this use */
     MBM_TLS_BAD_ROLE = 18,        /**< the client's role is no UTF8String, empty, longer than
@@ -100,12 +99,11 @@ enum {
  *  counted in the length, or DER. PEM may be freed after mbm_tls_begin. DER of certificates
  *  is not copied, so that it may be in flash: it must stay until mbm_tls_end. */
 typedef struct mbm_tls_options {
-    const uint8_t
-        *certificate;        /**< this device's; in PEM others may follow, up to the authority's */
-    size_t certificateBytes; /**< its length */
-    const uint8_t *key;      /**< the private key of the certificate, RSA or EC */
-    size_t keyBytes;         /**< its length */
-    const char *keyPassword; /**< of the key, or NULL */
+    const uint8_t *certificate; /**< this device's; in PEM followed by those that signed it */
+    size_t certificateBytes;    /**< its length */
+    const uint8_t *key;         /**< the private key of the certificate, RSA or EC */
+    size_t keyBytes;            /**< its length */
+    const char *keyPassword;    /**< of the key, or NULL */
     const uint8_t *authorities; /**< the authorities whose certificates the peer may have;
                                      several only in PEM */
     size_t authoritiesBytes;    /**< their length */
@@ -147,6 +145,7 @@ typedef struct mbm_tls {
     char role[MBM_TLS_ROLE_BYTES + 1];  /**< private: see mbm_tls_role */
     uint8_t isSetUp;                    /**< private */
     uint8_t isLost;                     /**< private */
+    uint8_t isSeen;                     /**< private */
     uint8_t hasBadRole;                 /**< private */
     uint8_t isTold;                     /**< private */
     uint8_t isFirst;                    /**< private */

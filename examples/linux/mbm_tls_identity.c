@@ -124,12 +124,16 @@ static int read_revoked(mbm_tls_identity *identity, const mbm_tls_options *optio
 
 /* --- rules of TLS --- */
 
-static void set_versions(mbedtls_ssl_config *config)
+/* TLS 1.2 and no other. Mbed TLS 3.5 has 1.3 too, but there it does not call the function that
+ * finds the role. */
+static void set_version(mbedtls_ssl_config *config)
 {
 #if MBEDTLS_VERSION_NUMBER >= 0x03020000
     mbedtls_ssl_conf_min_tls_version(config, MBEDTLS_SSL_VERSION_TLS1_2);
+    mbedtls_ssl_conf_max_tls_version(config, MBEDTLS_SSL_VERSION_TLS1_2);
 #else
     mbedtls_ssl_conf_min_version(config, MBEDTLS_SSL_MAJOR_VERSION_3, MBEDTLS_SSL_MINOR_VERSION_3);
+    mbedtls_ssl_conf_max_version(config, MBEDTLS_SSL_MAJOR_VERSION_3, MBEDTLS_SSL_MINOR_VERSION_3);
 #endif
 }
 
@@ -147,7 +151,7 @@ static int configure(mbm_tls_identity *identity, const mbm_tls_options *options)
     if (options->revoked)
         revoked = &identity->revoked;
 #endif
-    set_versions(config);
+    set_version(config);
     mbedtls_ssl_conf_authmode(config, MBEDTLS_SSL_VERIFY_REQUIRED);
     mbedtls_ssl_conf_ca_chain(config, &identity->authorities, revoked);
     mbedtls_ssl_conf_rng(config, options->random, options->randomContext);
