@@ -60,7 +60,7 @@ dist: $(ARCHIVE) ## Pack the sources and the archives built so far, dist/mbm-VER
 
 .PHONY: check-install
 check-install: $(ARCHIVE) ## Install, build and run the README's program; pack twice and compare
-	@scripts/need gcc libc6-dev make cmake pkg-config
+	@scripts/need gcc libc6-dev make cmake pkg-config libmbedtls-dev
 	@scripts/check-install
 
 .PHONY: size
@@ -120,7 +120,7 @@ abi: ## Generate packaging/mbm.abi, with which `make check` compares the C inter
 .PHONY: compile-commands
 compile-commands: ## Write compile_commands.json, for editors and clang-tidy
 	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev libmbedtls-dev openssl valgrind
-	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SERVE) $(PEERS) \
+	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(UDP) $(SERVE) $(PEERS) \
 		$(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) $(CLIENTS) $(DEMO) $(SNIFF) $(BUILD)/plain/linux/basic | scripts/compile-commands
 
 .PHONY: tidy
@@ -350,11 +350,12 @@ demo: ## Show every function against a libmodbus server, frame by frame
 	@$(DEMO)
 
 # The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(SNIFF) $(CLIENTS) $(SERVE)
+PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(UDP) $(SNIFF) $(CLIENTS) $(SERVE)
 ARM_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
 .PHONY: check-pages
 check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
-	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev gcc-avr avr-libc arduino-core-avr \
+	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev openssl \
+		gcc-avr avr-libc arduino-core-avr \
 		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi) \
 		$(ARM_LIBC)
 	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
