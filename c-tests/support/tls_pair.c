@@ -4,6 +4,7 @@
 #include "test.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static mbm_tls_files files;
@@ -116,6 +117,11 @@ void tls_pair_begin(tls_pair *pair, const char *client, const char *server)
     tls_identify(&pair->client_identity, client, "authority", 0);
     tls_identify(&pair->server_identity, server, "authority", 1);
     tls_pair_open(pair, NULL);
+}
+
+size_t tls_step(size_t usual, size_t slow)
+{
+    return getenv("MBM_TRANSACTIONS") ? slow : usual;
 }
 
 void tls_pair_run(tls_pair *pair)

@@ -53,6 +53,10 @@ void tls_pair_open(tls_pair *pair, const char *name);
 /* Opens one end. Returns what mbm_tls_open does. */
 uint8_t tls_pair_open_end(tls_pair *pair, tls_end *end, const char *name);
 
+/* The step of a loop whose every round is a handshake: `slow` in valgrind, where one takes half
+ * a second, else `usual`. */
+size_t tls_step(size_t usual, size_t slow);
+
 /* Polls both ends until no byte moves any more. */
 void tls_pair_run(tls_pair *pair);
 
