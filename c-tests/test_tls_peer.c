@@ -39,6 +39,8 @@ static unsigned endings;                  /* how many have ended */
 static char role[MBM_TLS_ROLE_BYTES + 1]; /* of the connection that was polled last */
 static char address[32];
 
+static const char authorities[] = TLS_FOLDER "authority.pem";
+
 /* Reads registers 100 to 102 of unit 17, with the number 0x1234; the reply. */
 static const uint8_t ask[] = {0x12, 0x34, 0, 0, 0, 6, 17, 3, 0, FIRST, 0, 3};
 static const uint8_t reply[] = {0x12, 0x34, 0, 0, 0, 9, 17, 3, 6, 0xA0, 0, 0xA0, 1, 0xA0, 2};
@@ -129,7 +131,7 @@ static void start_client(program *p, const char *name, const char *const *more)
                                  address,
                                  "-quiet",
                                  "-CAfile",
-                                 TLS_FOLDER "authority.pem",
+                                 authorities,
                                  "-verify_return_error",
                                  "-verify_hostname",
                                  "localhost"};
@@ -325,7 +327,7 @@ static uint8_t ask_server(asker *a, const char *server, const char *client, cons
                                "-naccept",
                                "1",
                                "-CAfile",
-                               TLS_FOLDER "authority.pem",
+                               authorities,
                                "-Verify",
                                "1",
                                "-verify_return_error",

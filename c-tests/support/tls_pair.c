@@ -79,6 +79,14 @@ static uint32_t micros_end(void *context)
     return current->now;
 }
 
+static void idle_end(void *context, struct mbm_master *master)
+{
+    (void)context;
+    (void)master;
+    if (current->idle)
+        current->idle();
+}
+
 static void empty(tls_lane *lane)
 {
     lane->from = lane->count = lane->moved = 0;
@@ -87,8 +95,11 @@ static void empty(tls_lane *lane)
 
 uint8_t tls_pair_open_end(tls_pair *pair, tls_end *end, const char *name)
 {
-    const mbm_port below = {
-        .context = end, .read = read_end, .write = write_end, .micros = micros_end};
+    const mbm_port below = {.context = end,
+                            .read = read_end,
+                            .write = write_end,
+                            .micros = micros_end,
+                            .idle = idle_end};
 
     end->port = mbm_tls_port(&end->tls);
     return mbm_tls_open(&end->tls,

@@ -38,6 +38,7 @@ typedef struct tls_pair {
     tls_end client, server;
     uint32_t now; /* microseconds */
     mbm_tls_identity client_identity, server_identity;
+    void (*idle)(void); /* called while a master waits; may be NULL */
 } tls_pair;
 
 /* Begins an identity with the files NAME.pem, NAME.key.pem and AUTHORITY.pem of the folder. */

@@ -61,9 +61,8 @@ static int receive_below(void *context, unsigned char *bytes, size_t capacity)
     return (int)count;
 }
 
-/* Looks whether the peer has refused the connection in the middle of this side's messages.
- * Mbed TLS reads only after it has sent all of them, and then it is too late: the peer has
- * closed the stream, and writing to it has lost the link. */
+/* Looks whether the peer has refused the connection in the middle of this side's messages. Mbed
+ * TLS reads only after it has sent all: too late if the peer has closed the stream meanwhile. */
 static int is_refused(mbm_tls *tls)
 {
     const int count =
@@ -221,6 +220,14 @@ static uint32_t now(const mbm_tls *tls)
     return tls->below.micros(tls->below.context);
 }
 
+/* How long the handshake has been under way. A clock that steps back is not far ahead. */
+static uint32_t elapsed(const mbm_tls *tls)
+{
+    const uint32_t time = now(tls) - tls->startedAt;
+
+    return time <= INT32_MAX ? time : 0;
+}
+
 static void begin_handshake(mbm_tls *tls)
 {
     tls->alert = tls->isLost = tls->isSeen = tls->hasBadRole = tls->isTold = tls->hasAhead = 0;
@@ -245,13 +252,12 @@ static void shake_hands(mbm_tls *tls)
         fail(tls, result);
     else if (tls->status == MBM_TLS_HANDSHAKE && result == 0)
         tls->status = MBM_TLS_OPEN;
-    else if (tls->status == MBM_TLS_HANDSHAKE &&
-             now(tls) - tls->startedAt >= tls->identity->handshakeUs)
+    else if (tls->status == MBM_TLS_HANDSHAKE && elapsed(tls) >= tls->identity->handshakeUs)
         tls->status = MBM_TLS_TIMED_OUT;
 }
 
-/* Sends what the port has accepted. Mbed TLS wants each call that did not succeed again, with
- * the same bytes: that is what `sending` is for. */
+/* Sends what the port has accepted. Mbed TLS wants a call that waits again with the same bytes,
+ * so `sending` keeps them. */
 static void push(mbm_tls *tls)
 {
     int result;
@@ -303,9 +309,9 @@ static int16_t tls_read(void *context, uint8_t *bytes, uint16_t capacity)
     const int is_open = advance(tls);
 
     tls->isTold = 0;
-    if (is_open <= 0 || capacity == 0)
-        return (int16_t)(is_open < 0 ? -1 : 0);
-    return take(tls, bytes, capacity);
+    if (is_open > 0 && capacity > 0)
+        return take(tls, bytes, capacity);
+    return (int16_t)(is_open < 0 ? -1 : 0);
 }
 
 static int16_t tls_write(void *context, const uint8_t *bytes, uint16_t length)
@@ -355,12 +361,7 @@ static void tls_idle(void *context, struct mbm_master *master)
 
 mbm_port mbm_tls_port(mbm_tls *tls)
 {
-    return (mbm_port){.context = tls,
-                      .read = tls_read,
-                      .write = tls_write,
-                      .micros = tls_micros,
-                      .flush = tls_flush,
-                      .idle = tls_idle};
+    return (mbm_port){tls, tls_read, tls_write, tls_micros, tls_flush, NULL, NULL, tls_idle};
 }
 
 /* --- opening and closing --- */
@@ -410,9 +411,9 @@ uint8_t mbm_tls_poll(mbm_tls *tls)
 uint32_t mbm_tls_pollDelay(mbm_tls *tls)
 {
     if (tls->status == MBM_TLS_HANDSHAKE) {
-        const uint32_t elapsed = now(tls) - tls->startedAt, longest = tls->identity->handshakeUs;
+        const uint32_t past = elapsed(tls), longest = tls->identity->handshakeUs;
 
-        return elapsed < longest ? longest - elapsed : 0;
+        return past < longest ? longest - past : 0;
     }
     if (tls->status != MBM_TLS_OPEN || tls->isTold || mbedtls_ssl_get_bytes_avail(&tls->ssl) == 0)
         return UINT32_MAX;
