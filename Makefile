@@ -15,9 +15,13 @@ MODBUS = $(shell pkg-config --cflags libmodbus)
 LIBS := -Wl,--gc-sections -lmodbus -lcmocka -lpthread
 SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
 
-SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
+# Only programs with TLS link the TLS library.
+TLS := $(wildcard examples/linux/mbm_tls*.c) $(wildcard c-tests/support/tls_*.c)
+TLS_LIBS := -lmbedtls -lmbedx509 -lmbedcrypto
+SUPPORT := $(filter-out $(TLS),$(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c))
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
+TLS_TESTS := $(filter test_tls%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_command gateway guarded_server
 # The options --trace and --pcap of the examples for Linux.
@@ -58,7 +62,7 @@ dist: $(ARCHIVE) ## Pack the sources and the archives built so far, dist/mbm-VER
 
 .PHONY: check-install
 check-install: $(ARCHIVE) ## Install, build and run the README's program; pack twice and compare
-	@scripts/need gcc libc6-dev make cmake pkg-config
+	@scripts/need gcc libc6-dev make cmake pkg-config libmbedtls-dev
 	@scripts/check-install
 
 .PHONY: size
@@ -117,8 +121,8 @@ abi: ## Generate packaging/mbm.abi, with which `make check` compares the C inter
 
 .PHONY: compile-commands
 compile-commands: ## Write compile_commands.json, for editors and clang-tidy
-	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind libmosquitto-dev libcjson-dev
-	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SERVE) $(PEERS) $(MQTT) \
+	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev libmbedtls-dev openssl valgrind libmosquitto-dev libcjson-dev
+	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(UDP) $(SERVE) $(PEERS) $(MQTT) \
 		$(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) $(CLIENTS) $(DEMO) $(SNIFF) $(KEEP_LINK) $(BUILD)/plain/linux/basic | scripts/compile-commands
 
 .PHONY: tidy
@@ -199,12 +203,18 @@ fault-table: need-test ## Generate docs/reports/fault-table.md from the test's r
 	@scripts/run-c-tests $(BUILD)/plain/test_bad_wire
 	@scripts/fault-table
 
+# Certificates for tests and examples, build/certificates.
+.PHONY: certificates
+certificates:
+	@scripts/need openssl
+	@scripts/certificates $(BUILD)/certificates
+
 .PHONY: need-check need-test
 need-check:
 	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
-		perl valgrind mbpoll
+		perl valgrind mbpoll libmbedtls-dev openssl
 
 # The test programs, one folder for each variant: $(1) name, $(2) C compiler, $(3) C++ compiler,
 # $(4) flags, $(5) archive
@@ -219,7 +229,9 @@ $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
-	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(LIBS) -o $$@
+	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
+$(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
+$(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
@@ -240,6 +252,8 @@ $(BUILD)/plain/test_class_examples.o $(BUILD)/sanitized/test_class_examples.o $(
 FIRMWARE_TESTS := $(TESTS:%=$(BUILD)/firmware/%)
 $(FIRMWARE_TESTS): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(SUPPORT))) $(FIRMWARE_ARCHIVE)
 	@g++ $(filter %.o,$^) $(FIRMWARE_ARCHIVE) $(LIBS) -o $@
+$(TLS_TESTS:%=$(BUILD)/firmware/%): $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(TLS))) | certificates
+$(TLS_TESTS:%=$(BUILD)/firmware/%): LIBS += $(TLS_LIBS)
 $(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tcp_listener.o $(BUILD)/plain/linux/mbm_tty.o $(call TRACE,plain) $(FIRMWARE_ARCHIVE)
 	@mkdir -p $(@D)
 	@gcc $(filter %.o,$^) $(FIRMWARE_ARCHIVE) -Wl,--gc-sections -o $@
@@ -280,6 +294,26 @@ bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs
 	@scripts/bench-client $(BENCH_CLIENT)
 	@scripts/bench-sniffer $(BENCH_SNIFFER)
 	@CARGO="$(CARGO)" scripts/bench-frames
+
+# Programs with TLS or UDP, which pymodbus talks with too.
+SECURE := $(BUILD)/plain/linux/secure
+$(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure mbm_tls mbm_tls_identity mbm_tls_linux mbm_tls_text mbm_tcp mbm_tcp_listener) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections $(TLS_LIBS) -o $@
+UDP := $(BUILD)/plain/linux/udp
+$(UDP): $(patsubst %,$(BUILD)/plain/linux/%.o,udp mbm_udp) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+
+.PHONY: secure
+secure: ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
+	@scripts/need python3 python3-venv gcc libc6-dev libmbedtls-dev openssl
+	@$(MAKE) --no-print-directory venv certificates $(SECURE)
+	@$(BUILD)/venv/bin/python scripts/check-secure $(SECURE) $(BUILD)/certificates
+
+.PHONY: udp
+udp: ## Build and check the example over UDP, build/plain/linux/udp
+	@scripts/need python3 python3-venv gcc libc6-dev
+	@$(MAKE) --no-print-directory venv $(UDP)
+	@$(BUILD)/venv/bin/python scripts/check-udp $(UDP)
 
 DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
@@ -364,11 +398,12 @@ guarded: ## Show a server that refreshes registers at each read and refuses one 
 	@$(BUILD)/plain/linux/guarded_server
 
 # The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(KEEP_LINK) $(SNIFF) $(CLIENTS) $(SERVE)
+PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(KEEP_LINK) $(UDP) $(SNIFF) $(CLIENTS) $(SERVE)
 ARM_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
 .PHONY: check-pages
 check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
-	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev gcc-avr avr-libc arduino-core-avr \
+	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev openssl \
+		gcc-avr avr-libc arduino-core-avr \
 		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi) \
 		$(ARM_LIBC)
 	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)

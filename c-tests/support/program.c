@@ -12,29 +12,19 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-void program_start(program *p, const char *name, const char *const *arguments)
-{
-    program_start_limited(p, name, arguments, 0);
-}
-
-void program_start_limited(program *p, const char *name, const char *const *arguments,
-                           unsigned descriptors)
+/* A path without a slash is looked for in PATH. */
+static void start(program *p, const char *path, const char *name, const char *const *arguments,
+                  unsigned descriptors)
 {
     const struct rlimit limit = {descriptors, descriptors};
-    const char *argv[16] = {name};
-    char path[4096];
-    ssize_t length = readlink("/proc/self/exe", path, sizeof path - 64);
+    const char *argv[32] = {name};
     int in[2], out[2];
-    char *end;
     size_t i;
 
-    must(length > 0, "/proc/self/exe");
-    path[length] = 0;
-    end = strrchr(path, '/');
-    must(end != NULL && strlen(name) < 48, name);
-    sprintf(end, "/linux/%s", name);
-    for (i = 0; arguments[i] && i < 14; i++)
+    for (i = 0; arguments[i]; i++) {
+        must(i < 30, "too many arguments");
         argv[i + 1] = arguments[i];
+    }
     must(pipe2(in, O_CLOEXEC) == 0 && pipe2(out, O_CLOEXEC) == 0, "pipe");
     p->pid = fork();
     must(p->pid >= 0, "fork");
@@ -47,7 +37,7 @@ void program_start_limited(program *p, const char *name, const char *const *argu
         close_range(3, ~0u, 0);
         if (descriptors)
             must(setrlimit(RLIMIT_NOFILE, &limit) == 0, "setrlimit");
-        execv(path, (char *const *)argv);
+        execvp(path, (char *const *)argv);
         perror(path);
         _exit(127);
     }
@@ -55,6 +45,31 @@ void program_start_limited(program *p, const char *name, const char *const *argu
     close(out[1]);
     p->input = in[1];
     p->output = out[0];
+}
+
+void program_start_limited(program *p, const char *name, const char *const *arguments,
+                           unsigned descriptors)
+{
+    char path[4096];
+    ssize_t length = readlink("/proc/self/exe", path, sizeof path - 64);
+    char *end;
+
+    must(length > 0, "/proc/self/exe");
+    path[length] = 0;
+    end = strrchr(path, '/');
+    must(end != NULL && strlen(name) < 48, name);
+    sprintf(end, "/linux/%s", name);
+    start(p, path, name, arguments, descriptors);
+}
+
+void program_start(program *p, const char *name, const char *const *arguments)
+{
+    program_start_limited(p, name, arguments, 0);
+}
+
+void program_start_other(program *p, const char *name, const char *const *arguments)
+{
+    start(p, name, name, arguments, 0);
 }
 
 size_t program_line(const program *p, char *text, size_t capacity)

@@ -18,6 +18,9 @@ void program_start(program *p, const char *name, const char *const *arguments);
 void program_start_limited(program *p, const char *name, const char *const *arguments,
                            unsigned descriptors);
 
+/* Starts a program of the system, which is looked for in PATH. The arguments end with NULL. */
+void program_start_other(program *p, const char *name, const char *const *arguments);
+
 /* Looks at the program 50 times. Returns whether it was asleep each time. A program that
  * spins never is. One that sleeps may be seen awake, so call again. */
 int program_sleeps(const program *p);

@@ -1,0 +1,83 @@
+/* A blocking master inside TLS: RTU frames, as some gateways take them. */
+#include "test.h"
+#include "tls_pair.h"
+
+#include <string.h>
+
+enum { UNIT = 17, FIRST = 100, WORDS = 20, TICK_US = 1000 };
+
+static tls_pair pair;
+static mbm_server server;
+static mbm_master master;
+static mbm_unit unit;
+static mbm_registerTable holding;
+static uint16_t words[WORDS], response[WORDS];
+static uint8_t frame[MBM_MAX_FRAME], own_frame[MBM_MAX_FRAME];
+static unsigned idles;
+
+/* The port below sleeps here. Meanwhile time passes, and the server serves. */
+static void serve(void)
+{
+    idles++;
+    pair.now += TICK_US;
+    (void)mbm_server_poll(&server);
+}
+
+static int begin(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    tls_pair_begin(&pair, "operator", "server");
+    pair.idle = serve;
+    memset(&unit, 0, sizeof unit);
+    unit.id = UNIT;
+    holding = (mbm_registerTable){.words = words, .base = FIRST, .size = WORDS};
+    for (i = 0; i < WORDS; i++)
+        words[i] = (uint16_t)(0xC000 + i);
+    OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
+    OK(mbm_server_beginRtuOverTcp(&server, &pair.server.port, &unit, 1, frame, sizeof frame));
+    OK(mbm_master_setBuffers(&master, response, WORDS, NULL, 0, own_frame, sizeof own_frame));
+    OK(mbm_master_beginRtu(&master, UNIT, &pair.client.port));
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    tls_pair_end(&pair);
+    return 0;
+}
+
+static void a_master_reads_while_its_idle_hook_lets_the_port_below_sleep(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    tls_pair_run(&pair);
+    idles = 0;
+    for (i = 0; i < 3; i++) {
+        memset(response, 0, sizeof response);
+        OK(mbm_master_readHoldingRegisters(&master, FIRST, WORDS));
+        assert_memory_equal(response, words, sizeof words);
+    }
+    assert_true(idles > 0);
+}
+
+static void a_master_without_a_session_reports_a_lost_link(void **state)
+{
+    (void)state;
+    mbm_tls_close(&pair.client.tls);
+    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&master, FIRST, WORDS));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(
+            a_master_reads_while_its_idle_hook_lets_the_port_below_sleep, begin, end),
+        cmocka_unit_test_setup_teardown(a_master_without_a_session_reports_a_lost_link, begin, end),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
