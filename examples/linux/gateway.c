@@ -157,8 +157,7 @@ static void hang_up(line *l)
 static uint8_t is_ready(void *context)
 {
     line *l = (line *)context;
-    const mbm_linkHooks link = {
-        .context = l, .disconnect = close_line, .connect = open_line};
+    const mbm_linkHooks link = {.context = l, .disconnect = close_line, .connect = open_line};
     struct pollfd idle = {l->tty.fd, 0, 0};
 
     /* It may have hung up since the last wait. */

@@ -60,10 +60,10 @@ static int look_up(mbm_udp *udp, const char *host, const char *service, int flag
 
     hints.ai_socktype = SOCK_DGRAM;
     hints.ai_flags = flags;
-    udp->lookup = getaddrinfo(host, service, &hints, found);
-    switch (udp->lookup) {
+    udp->lookupError = getaddrinfo(host, service, &hints, found);
+    switch (udp->lookupError) {
     case 0: return 0;
-    case EAI_SYSTEM: udp->lookup = 0; return -1;
+    case EAI_SYSTEM: udp->lookupError = 0; return -1;
     case EAI_AGAIN: return refuse(EAGAIN);
     case EAI_MEMORY: return refuse(ENOMEM);
     default: return refuse(EADDRNOTAVAIL);

@@ -45,7 +45,7 @@ typedef struct mbm_udp {
     int fd;           /**< the socket, while `port` is not 0 */
     int error;        /**< why the link was lost, or why a datagram was not sent or its receiver
                            refused it, an errno; else 0 */
-    int lookup;       /**< why no address was found, for gai_strerror; else 0 */
+    int lookupError;  /**< why no address was found, for gai_strerror; else 0 */
     uint16_t port;    /**< this side's port */
     uint32_t dropped; /**< number of received datagrams that were not one frame */
     uint32_t unsent;  /**< number of frames that the system did not send, or whose receiver

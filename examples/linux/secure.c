@@ -123,7 +123,7 @@ static int serve(const char *service, char **paths)
         words[i] = (uint16_t)(1000 + i);
     if (mbm_tcp_listen(&listener, NULL, service) != 0) {
         fprintf(stderr, "%s: %s\n", service,
-                listener.lookup ? gai_strerror(listener.lookup) : strerror(errno));
+                listener.lookupError ? gai_strerror(listener.lookupError) : strerror(errno));
         return 1;
     }
     printf("ready %u\n", listener.port);
@@ -174,7 +174,7 @@ static int ask(const char *host, const char *service, const char *name, char **p
         return 1;
     if (mbm_tcp_open(tcps, &addresses, host, service) != 0) {
         fprintf(stderr, "%s: %s\n", host,
-                tcps->lookup ? gai_strerror(tcps->lookup) : strerror(errno));
+                tcps->lookupError ? gai_strerror(tcps->lookupError) : strerror(errno));
         return 1;
     }
     (void)mbm_tls_open(tlss, &identity, &socket, *name ? name : NULL, &link);

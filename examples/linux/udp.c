@@ -23,7 +23,8 @@ static void finish(int number)
 
 static int complain(const char *what)
 {
-    fprintf(stderr, "%s: %s\n", what, udp.lookup ? gai_strerror(udp.lookup) : strerror(errno));
+    fprintf(stderr, "%s: %s\n", what,
+            udp.lookupError ? gai_strerror(udp.lookupError) : strerror(errno));
     return 1;
 }
 
