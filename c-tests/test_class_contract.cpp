@@ -382,5 +382,6 @@ int main()
         TEST(objects_live_in_containers_that_move_them),
     };
 
-    return cmocka_run_group_tests_name("ModbusMaster: the contract with sketches", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusMaster: the contract with sketches", tests, nullptr,
+                                       nullptr);
 }

@@ -488,5 +488,6 @@ int main()
         TEST(a_request_may_be_polled_or_cancelled),
     };
 
-    return cmocka_run_group_tests_name("ModbusMaster: faults of the original", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusMaster: faults of the original", tests, nullptr,
+                                       nullptr);
 }

@@ -187,5 +187,6 @@ int main()
         TEST(a_write_error_means_that_no_byte_was_accepted),
     };
 
-    return cmocka_run_group_tests_name("ModbusMaster: other parts of the original", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusMaster: other parts of the original", tests, nullptr,
+                                       nullptr);
 }
