@@ -2,8 +2,8 @@
 
 use super::check::{call, is_status, refused_changes_nothing, span, PENDING};
 use super::records::rule;
-use super::traffic;
 use super::world::{Grant, World};
+use super::{identification, traffic};
 use mbm_c::*;
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
@@ -16,6 +16,7 @@ unsafe extern "C" fn done(_: *mut c_void, request: *mut mbm_clientRequest) {
         status != PENDING,
         "`done` is called for a request that is pending"
     );
+    identification::reply_of(w, request);
     w.hook(Grant::All, 4);
 }
 

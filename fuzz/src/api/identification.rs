@@ -6,9 +6,13 @@ use mbm_c::*;
 use std::ffi::c_void;
 use std::ptr::null_mut;
 
-/// Reads the reply of a request as a packet.
+/// Reads the reply of any request as a packet.
 pub fn reply(w: &World) {
-    let request = w.requests.pick(w);
+    reply_of(w, w.requests.pick(w));
+}
+
+/// Reads the reply of a request as a packet.
+pub fn reply_of(w: &World, request: *mut mbm_clientRequest) {
     let capacity = if w.rarely(4) { w.word() } else { MBM_MAX_PDU };
     let pdu = w.buffer(capacity.into());
     let packet: *mut mbm_packet = if w.rarely(32) { null_mut() } else { w.zeroed() };
