@@ -1,0 +1,323 @@
+/* A client's link: what its hooks and its callback may call, how it ends and begins again, and
+ * what a refused call leaves. */
+#include "linked.h"
+
+static unsigned called;
+
+static void use_everything(void)
+{
+    called++;
+    IS(MBM_BUSY, mbm_client_poll(&client));
+    IS(MBM_BUSY, mbm_client_readCoils(&client, &other, 0, 1));
+    IS(MBM_BUSY, mbm_client_cancel(&client, &request));
+    IS(MBM_BUSY, mbm_client_reconnect(&client, NULL));
+    IS(MBM_BUSY, mbm_client_suspend(&client, NULL));
+    IS(MBM_BUSY, mbm_link_begin(&kept, &client, &hooks));
+    IS(MBM_BUSY, mbm_link_end(&kept));
+    IS(MBM_BUSY, mbm_link_reconnect(&kept));
+    IS(MBM_BUSY, mbm_link_setBackoff(&kept, 0, 0, 0));
+    IS(MBM_BUSY, mbm_link_setJitter(&kept, 0, NULL, NULL));
+    IS(MBM_BUSY, mbm_link_setConnectTimeout(&kept, 0));
+    IS(MBM_BUSY, mbm_link_setRequestsWait(&kept, 0));
+    IS(MBM_BUSY, mbm_link_setCallback(&kept, NULL, NULL));
+    IS(MBM_BUSY, mbm_link_setCounters(&kept, NULL));
+    assert_int_equal(mbm_link_state(&kept), 0);
+    assert_int_equal(mbm_client_pollDelay(&client), 0);
+}
+
+static void the_hooks_of_a_link_may_use_neither_link_nor_client(void **state)
+{
+    (void)state;
+    begin(MBM_FRAMING_TCP);
+    called = 0;
+    within = use_everything;
+    connects_with = MBM_PENDING;
+    OK(mbm_client_poll(&client));
+    assert_int_equal(called, 2); /* status, connect */
+    status_is = MBM_LINK_LOST;
+    OK(mbm_client_poll(&client));
+    assert_int_equal(called, 4); /* status, disconnect */
+    assert_string_equal(events, "FE6 ");
+}
+
+static int what;
+
+/* Does one thing in the callback: the client goes on, or nothing of it is used any more. */
+static void act(void *context, uint8_t event, uint8_t status)
+{
+    const mbm_port port = memory_port_of(&m);
+
+    (void)context;
+    (void)status;
+    called++;
+    if (event != MBM_LINK_EVENT_LOST)
+        return;
+    IS(MBM_BUSY, mbm_client_poll(&client));
+    switch (what) {
+    case 0: OK(mbm_link_end(&kept)); break;
+    case 1: OK(mbm_link_begin(&kept, &client, &hooks)); break;
+    case 2: OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame)); break;
+    case 3: memset(&client, 0, sizeof client); break;
+    case 4:
+        OK(mbm_link_end(&kept));
+        memset(&kept, 0, sizeof kept);
+        break;
+    case 5: queue_read(&request); break;
+    case 6: OK(mbm_link_reconnect(&kept)); break;
+    case 7: OK(mbm_link_setCallback(&kept, NULL, NULL)); break;
+    default: break;
+    }
+}
+
+static void the_callback_may_use_link_and_client(void **state)
+{
+    static const uint8_t after[] = {MBM_OK, MBM_OK, MBM_OK, MBM_NOT_INITIALISED,
+                                    MBM_OK, MBM_OK, MBM_OK, MBM_OK};
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++)
+        for (what = 0; what < 8; what++) {
+            begin_up(framings[i]);
+            OK(mbm_link_setCallback(&kept, act, NULL));
+            called = 0;
+            m.is_lost = 1;
+            /* The link was lost before, so a request of the callback ends. */
+            IS(MBM_OK, mbm_client_poll(&client));
+            assert_int_equal(called, 1);
+            m.is_lost = 0;
+            IS(after[what], mbm_client_poll(&client));
+            run(1000);
+            assert_int_equal(mbm_link_state(&kept), what == 0 || what == 4   ? 0
+                                                    : what == 2 || what == 3 ? MBM_LINK_IS_DOWN
+                                                                             : MBM_LINK_IS_UP);
+            if (what == 5)
+                IS(MBM_LINK_LOST, request.status);
+        }
+}
+
+static void a_client_without_its_link_works_as_before(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin_up(framings[i]);
+        OK(mbm_link_end(&kept));
+        IS(MBM_NOT_INITIALISED, mbm_link_end(&kept));
+        assert_int_equal(mbm_client_pollDelay(&client), UINT32_MAX);
+        m.is_lost = 1;
+        OK(mbm_client_poll(&client));
+        m.is_lost = 0;
+        queue_read(&request);
+        memory_port_send(&m, &client);
+        answer(framings[i]);
+        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+        m.is_lost = 1;
+        queue_read(&request);
+        IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 1000));
+        assert_string_equal(events, "");
+        m.is_lost = 0;
+        OK(mbm_link_begin(&kept, &client, &hooks));
+        OK(mbm_client_poll(&client));
+        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+    }
+}
+
+static void a_client_that_is_begun_again_has_no_link(void **state)
+{
+    (void)state;
+    begin_up(MBM_FRAMING_TCP);
+    begin_client(MBM_FRAMING_RTU);
+    assert_int_equal(mbm_client_pollDelay(&client), UINT32_MAX);
+    OK(mbm_link_begin(&kept, &client, &hooks));
+    begin_client(MBM_FRAMING_TCP);
+    OK(mbm_link_end(&kept));
+    OK(mbm_link_begin(&kept, &client, &hooks));
+    OK(mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+}
+
+static void a_link_begun_again_has_its_default_settings(void **state)
+{
+    (void)state;
+    begin_up(MBM_FRAMING_TCP);
+    OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 7, 7));
+    OK(mbm_link_setRequestsWait(&kept, 1));
+    OK(mbm_link_begin(&kept, &client, &hooks));
+    OK(mbm_client_poll(&client));
+    assert_string_equal(events, "");
+    m.is_lost = 1;
+    OK(mbm_client_poll(&client));
+    queue_read(&request);
+    OK(mbm_client_poll(&client));
+    IS(MBM_LINK_LOST, request.status);
+    assert_int_equal(mbm_client_pollDelay(&client), 500 * MS);
+}
+
+static void a_suspended_client_leaves_its_link_alone(void **state)
+{
+    static mbm_master master;
+    static uint16_t registers[2];
+    static uint8_t buffer[16];
+    mbm_link second = {0};
+
+    (void)state;
+    memset(&master, 0, sizeof master);
+    begin_up(MBM_FRAMING_RTU);
+    OK(mbm_master_setBuffers(&master, registers, 2, registers, 0, buffer, sizeof buffer));
+    OK(mbm_master_setBlocking(&master, 0));
+    OK(mbm_client_suspend(&client, &master));
+    memory_port_bytes(&m, frame, 1);
+    IS(MBM_BUSY, mbm_client_poll(&client));
+    assert_int_equal(m.arriving_count, 1);
+    assert_int_equal(mbm_client_pollDelay(&client), UINT32_MAX);
+    IS(MBM_BUSY, mbm_link_end(&kept));
+    IS(MBM_BUSY, mbm_link_begin(&kept, &client, &hooks));
+    IS(MBM_BUSY, mbm_link_begin(&second, &client, &hooks));
+    /* The master learns of the loss, and then the client. */
+    m.is_lost = 1;
+    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
+    IS(MBM_LINK_LOST, mbm_master_poll(&master));
+    OK(mbm_client_resume(&client, &master));
+    OK(mbm_client_poll(&client));
+    assert_string_equal(events, "LE6 ");
+    /* A master on a link that is down learns it too. */
+    connects_with = MBM_LINK_LOST;
+    OK(mbm_client_suspend(&client, &master));
+    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
+    IS(MBM_LINK_LOST, mbm_master_poll(&master));
+    OK(mbm_client_resume(&client, &master));
+}
+
+static void a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin_up(framings[i]);
+        queue_read(&request);
+        memory_port_send(&m, &client);
+        m.now += 10000 * MS;
+        m.is_lost = 1;
+        OK(mbm_client_poll(&client));
+        IS(MBM_LINK_LOST, request.status);
+        assert_string_equal(events, "LE6 ");
+    }
+}
+
+static void a_reconnection_on_demand_closes_the_link_and_opens_it_at_once(void **state)
+{
+    (void)state;
+    begin_up(MBM_FRAMING_TCP);
+    OK(mbm_link_setRequestsWait(&kept, 1));
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    OK(mbm_link_reconnect(&kept));
+    OK(mbm_link_reconnect(&kept));
+    assert_int_equal(mbm_client_pollDelay(&client), 0);
+    OK(mbm_client_poll(&client));
+    IS(MBM_LINK_LOST, request.status);
+    OK(mbm_client_poll(&client));
+    assert_string_equal(events, "LE6 C00 ");
+    assert_int_equal(disconnects, 1);
+    assert_int_equal(connects, 2);
+    /* While the connection is being made. */
+    connects_with = status_is = MBM_PENDING;
+    OK(mbm_link_reconnect(&kept));
+    OK(mbm_client_poll(&client));
+    OK(mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
+    OK(mbm_link_reconnect(&kept));
+    OK(mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
+    assert_int_equal(disconnects, 3);
+    assert_int_equal(connects, 4);
+    /* While it is down. */
+    connects_with = MBM_LINK_LOST;
+    status_is = MBM_LINK_LOST;
+    OK(mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
+    OK(mbm_link_reconnect(&kept));
+    assert_int_equal(next_attempt(), 0);
+}
+
+static void queue_again(void *context, mbm_clientRequest *ended)
+{
+    (void)context;
+    called++;
+    queue_read(ended);
+}
+
+static void a_request_of_done_fails_or_waits_as_all_do(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < 2; i++) {
+        begin_up(MBM_FRAMING_TCP);
+        OK(mbm_link_setRequestsWait(&kept, (uint8_t)i));
+        connects_with = MBM_LINK_LOST;
+        request.done = queue_again;
+        queue_read(&request);
+        memory_port_send(&m, &client);
+        m.is_lost = 1;
+        called = 0;
+        IS(MBM_PENDING, mbm_client_poll(&client));
+        /* One poll ends at most 17 requests; the loss was one of them. */
+        assert_int_equal(called, i == 0 ? 16 : 1);
+    }
+}
+
+static void a_call_that_is_refused_changes_nothing(void **state)
+{
+    const mbm_linkHooks none = {.disconnect = disconnect};
+    static mbm_link zero, second;
+    static mbm_client unused;
+    mbm_link before;
+
+    (void)state;
+    memset(&second, 0, sizeof second);
+    begin_up(MBM_FRAMING_TCP);
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(NULL, &client, &hooks));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(&second, NULL, &hooks));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(&second, &client, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(&second, &client, &none));
+    IS(MBM_NOT_INITIALISED, mbm_link_begin(&second, &unused, &hooks));
+    IS(MBM_BUSY, mbm_link_begin(&second, &client, &hooks));
+    assert_memory_equal(&second, &zero, sizeof zero);
+    IS(MBM_NOT_INITIALISED, mbm_link_end(&second));
+    IS(MBM_NOT_INITIALISED, mbm_link_reconnect(&second));
+    IS(MBM_NOT_INITIALISED, mbm_link_setRequestsWait(&second, 1));
+    assert_int_equal(mbm_link_state(&second), 0);
+    assert_int_equal(mbm_link_state(NULL), 0);
+    before = kept;
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(&kept, &client, &none));
+    IS(MBM_NOT_INITIALISED, mbm_link_begin(&kept, &unused, &hooks));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_setBackoff(&kept, 4, 1, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_setJitter(&kept, 1, NULL, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_setJitter(&kept, 101, half, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_end(NULL));
+    assert_memory_equal(&before, &kept, sizeof kept);
+    run(3000);
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_hooks_of_a_link_may_use_neither_link_nor_client),
+        cmocka_unit_test(the_callback_may_use_link_and_client),
+        cmocka_unit_test(a_client_without_its_link_works_as_before),
+        cmocka_unit_test(a_client_that_is_begun_again_has_no_link),
+        cmocka_unit_test(a_link_begun_again_has_its_default_settings),
+        cmocka_unit_test(a_suspended_client_leaves_its_link_alone),
+        cmocka_unit_test(a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link),
+        cmocka_unit_test(a_reconnection_on_demand_closes_the_link_and_opens_it_at_once),
+        cmocka_unit_test(a_request_of_done_fails_or_waits_as_all_do),
+        cmocka_unit_test(a_call_that_is_refused_changes_nothing),
+    };
+
+    return cmocka_run_group_tests_name("link calls", tests, NULL, NULL);
+}
