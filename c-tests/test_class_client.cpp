@@ -178,7 +178,7 @@ static void a_request_has_its_own_timeout_and_retries(void **)
     assert_int_equal(request.setRetryLimit(0), MBM_BUSY);
     assert_int_equal(request.setResponseTimeout(0), MBM_BUSY);
     unsigned long before = millis();
-    ends(client);
+    run_until_idle(client);
     assert_int_equal(Serial.sent.size(), 2);
     assert_in_range(millis() - before, 3000, 3300);
     assert_int_equal(request.setResponseTimeout(0), MBM_OK);
@@ -186,7 +186,7 @@ static void a_request_has_its_own_timeout_and_retries(void **)
     Serial.sent.clear();
     assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
     before = millis();
-    ends(client);
+    run_until_idle(client);
     assert_int_equal(Serial.sent.size(), 1);
     assert_in_range(millis() - before, 50, 200); // with the quiet time before
     Serial.sent.clear();
@@ -195,7 +195,7 @@ static void a_request_has_its_own_timeout_and_retries(void **)
     Serial.reply(adu({17, 0x83, 6}));
     Serial.reply(adu({17, 3, 2, 0, 5}));
     assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
-    ends(client);
+    run_until_idle(client);
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(Serial.sent.size(), 2);
     Serial.sent.clear();

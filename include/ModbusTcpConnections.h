@@ -30,10 +30,11 @@
 /** @endcond */
 
 /**
- * Up to `Connections` connections of a `Listener`. `Derived` serves them: `opened` begins with
- * the port of a connection, `isServed` continues, `closed` ends.
+ * Up to `Connections` connections of a `Listener`, each with a `Content`. `Derived` serves them:
+ * `opened` begins with the port of a connection, `isServed` continues, `closed` ends.
  */
-template <typename Derived, typename Listener, uint8_t Connections> class ModbusTcpConnections {
+template <typename Derived, typename Listener, uint8_t Connections, typename Content>
+class ModbusTcpConnections {
 public:
     ModbusTcpConnections(const ModbusTcpConnections &) = delete;
     ModbusTcpConnections &operator=(const ModbusTcpConnections &) = delete;
@@ -74,7 +75,7 @@ protected:
         for (uint8_t i = 0; i < Connections; i++) {
             if (!places[i].taken)
                 continue;
-            if (!derived().isServed(i))
+            if (!derived().isServed(i, places[i].content))
                 close(i);
         }
         acceptNext(0);
@@ -97,6 +98,7 @@ private:
         Link link;
         uint32_t used; // milliseconds: when the last bytes were received
         bool taken;
+        Content content;
     };
 
     Listener *source;
@@ -164,7 +166,7 @@ private:
         const mbm_port port = modbusPort(&place, readHook, writeHook, clockHook);
         place.link = link;
         place.used = now;
-        place.taken = derived().opened(index, port);
+        place.taken = derived().opened(index, port, place.content);
     }
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)

@@ -33,6 +33,9 @@
 #include "ModbusTcpConnections.h"
 #include "mbm.h"
 
+/** What a gateway keeps of one connection beside its mbm_gateway: nothing. */
+struct ModbusTcpPassed {};
+
 /**
  * Forwards requests of up to `Connections` TCP clients to the devices of one line, and
  * returns the replies. It forwards any function. It is an mbm_gateway with one line.
@@ -53,7 +56,7 @@ template <typename Listener, uint8_t Connections = MODBUSSERVER_CONNECTIONS,
           uint16_t Requests = Connections>
 class ModbusTcpGateway
     : public ModbusTcpConnections<ModbusTcpGateway<Listener, Connections, Requests>, Listener,
-                                  Connections> {
+                                  Connections, ModbusTcpPassed> {
 public:
     /** Uses neither clock nor network. */
     ModbusTcpGateway() : gateway(), sides(), side(), places_(), requests() {}
@@ -111,7 +114,7 @@ public:
     }
 
 private:
-    template <typename, typename, uint8_t> friend class ModbusTcpConnections;
+    template <typename, typename, uint8_t, typename> friend class ModbusTcpConnections;
 
     static_assert(Requests >= Connections, "a gateway keeps a request for each connection");
 
@@ -127,12 +130,12 @@ private:
     mbm_gatewayConnection places_[Connections];
     mbm_gatewayRequest requests[Requests];
 
-    bool opened(uint8_t index, const mbm_port &port)
+    bool opened(uint8_t index, const mbm_port &port, ModbusTcpPassed &)
     {
         return mbm_gateway_open(&gateway, index, &port) == MBM_OK;
     }
     // A client whose device has not answered yet is not idle.
-    bool isServed(uint8_t index)
+    bool isServed(uint8_t index, ModbusTcpPassed &)
     {
         if (mbm_gateway_pending(&gateway, index) != 0)
             this->markUsed(index);

@@ -39,6 +39,14 @@
 #include "ModbusTcpConnections.h"
 #include "mbm.h"
 
+/** The server of one connection. Used by ModbusTcpServer. */
+struct ModbusTcpServed {
+    /** @cond for ModbusTcpServer */
+    mbm_server server;
+    uint8_t frame[MBM_MAX_TCP_FRAME];
+    /** @endcond */
+};
+
 /**
  * A Modbus TCP server with up to `Connections` clients at once, as one unit or several.
  *
@@ -52,10 +60,16 @@
 template <typename Listener, uint8_t Connections = MODBUSSERVER_CONNECTIONS>
 class ModbusTcpServer
     : public ModbusUnit,
-      public ModbusTcpConnections<ModbusTcpServer<Listener, Connections>, Listener, Connections> {
+      public ModbusTcpConnections<ModbusTcpServer<Listener, Connections>, Listener, Connections,
+                                  ModbusTcpServed> {
 public:
+<<<<<<< HEAD
     /** Uses neither clock nor network. */
     ModbusTcpServer() : first(), count(), servers() {}
+=======
+    /** Touches neither clock nor network. */
+    ModbusTcpServer() : first(), count() {}
+>>>>>>> gateway
 
     /**
      * Answers the clients of a listener as unit `id`. The sketch calls the listener's begin,
@@ -91,16 +105,10 @@ public:
     uint8_t poll() { return this->pollAll(); }
 
 private:
-    template <typename, typename, uint8_t> friend class ModbusTcpConnections;
-
-    struct Server {
-        mbm_server server;
-        uint8_t frame[MBM_MAX_TCP_FRAME];
-    };
+    template <typename, typename, uint8_t, typename> friend class ModbusTcpConnections;
 
     ModbusUnit *first;
     uint8_t count;
-    Server servers[Connections];
 
     uint8_t serve(ModbusUnit &units, uint8_t quantity, Listener &listener)
     {
@@ -112,16 +120,15 @@ private:
         return MBM_OK;
     }
 
-    bool opened(uint8_t index, const mbm_port &port)
+    bool opened(uint8_t, const mbm_port &port, ModbusTcpServed &place)
     {
-        Server &place = servers[index];
         place.server = mbm_server();
         return mbm_server_beginTcp(&place.server, &port, &first->unit, count, place.frame,
                                    MBM_MAX_TCP_FRAME) == MBM_OK;
     }
-    bool isServed(uint8_t index)
+    bool isServed(uint8_t, ModbusTcpServed &place)
     {
-        const uint8_t status = mbm_server_poll(&servers[index].server);
+        const uint8_t status = mbm_server_poll(&place.server);
         return status != MBM_LINK_LOST && status != MBM_MALFORMED_FRAME;
     }
     void closed(uint8_t) {}
