@@ -63,13 +63,8 @@ class ModbusTcpServer
       public ModbusTcpConnections<ModbusTcpServer<Listener, Connections>, Listener, Connections,
                                   ModbusTcpServed> {
 public:
-<<<<<<< HEAD
     /** Uses neither clock nor network. */
-    ModbusTcpServer() : first(), count(), servers() {}
-=======
-    /** Touches neither clock nor network. */
     ModbusTcpServer() : first(), count() {}
->>>>>>> gateway
 
     /**
      * Answers the clients of a listener as unit `id`. The sketch calls the listener's begin,
