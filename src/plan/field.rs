@@ -107,6 +107,7 @@ impl Field {
 
     /// The first bit or register on a line on which every table of every unit has its place.
     /// There are more than 65535 places between two tables.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) const fn place(&self) -> u32 {
         place(self.unit, self.table, self.address)
     }

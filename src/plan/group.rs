@@ -61,7 +61,10 @@ pub fn group<L: ReadLimits>(
         }
     }
     table.find_best();
-    table.cut(reads, words)
+    table.cut(reads, words).map_err(|position| Refusal {
+        status: Status::BUFFER_TOO_SMALL,
+        field: table.positions.get(position).map_or(0, Position::field),
+    })
 }
 
 /// The fields, sorted by interval, unit, table and address.
@@ -151,17 +154,16 @@ impl<'a, L: ReadLimits> Table<'a, L> {
         }
     }
 
-    /// Makes the reads that [`Table::find_best`] found.
+    /// Makes the reads that [`Table::find_best`] found. Returns how many.
+    ///
+    /// # Errors
+    /// The position of the first field for which the storage does not suffice.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn cut(&mut self, reads: &mut [Read], words: u16) -> Result<usize, Refusal> {
+    fn cut(&mut self, reads: &mut [Read], words: u16) -> Result<usize, usize> {
         let (mut start, mut count, mut offset) = (0, 0, 0u16);
-        while let Some(&Position { field, last, .. }) = self.positions.get(start) {
-            let too_small = Err(Refusal {
-                status: Status::BUFFER_TOO_SMALL,
-                field: field.into(),
-            });
+        while let Some(&Position { last, .. }) = self.positions.get(start) {
             let Some(read) = reads.get_mut(count) else {
-                return too_small;
+                return Err(start);
             };
             let first = self.field(start);
             let end = self.field(last.into()).end_place();
@@ -181,7 +183,7 @@ impl<'a, L: ReadLimits> Table<'a, L> {
             read.flags.set(0);
             let own = read.words();
             if own > words.wrapping_sub(offset) {
-                return too_small;
+                return Err(start);
             }
             offset = offset.wrapping_add(own);
             while start <= last.into() {
