@@ -1,6 +1,6 @@
 /* The getters of the classes' settings: defaults, and what was set. */
-#include "asking.h"
-#include "serving.h"
+#include "client_checks.h"
+#include "server_checks.h"
 
 #include "ModbusSniffer.h"
 

@@ -81,7 +81,9 @@ static void hooks_cannot_begin_their_server(void **)
     ModbusServer server;
     polled = &server;
     entered = 0;
-    registers.beforeWrite(begin_other);
+    ModbusHooks hooks;
+    hooks.beforeWrite(begin_other);
+    registers.setHooks(hooks);
     assert_int_equal(server.holdingRegisters(registers), MBM_OK);
     assert_int_equal(server.begin(17, Serial, 19200), MBM_OK);
     expect_response(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});

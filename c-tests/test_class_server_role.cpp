@@ -77,16 +77,18 @@ static void one_hook_refuses_a_write_and_another_is_called_after_it(void **)
     ModbusRegisterArray<4> registers(10);
     ModbusServer server;
     written_count = 0;
-    registers.beforeWrite([](const mbm_access &access) -> uint8_t {
+    ModbusHooks hooks;
+    hooks.beforeWrite([](const mbm_access &access) -> uint8_t {
         assert_int_equal(access.address, 11);
         assert_int_equal(access.quantity, 1);
         return access.data[0] > 0x10 ? 4 : 0;
     });
-    registers.afterWrite([](const mbm_access &access) {
+    hooks.afterWrite([](const mbm_access &access) {
         written_address = access.address;
         written_quantity = access.quantity;
         written_count++;
     });
+    registers.setHooks(hooks);
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
     expect_response(server, {17, 6, 0, 11, 0x11, 0}, {17, 0x86, 4});
@@ -97,10 +99,21 @@ static void one_hook_refuses_a_write_and_another_is_called_after_it(void **)
     assert_int_equal(written_count, 1);
     assert_int_equal(written_address, 11);
     assert_int_equal(written_quantity, 1);
-    registers.beforeWrite(nullptr);
-    registers.afterWrite(nullptr);
+    hooks.beforeWrite(nullptr);
     expect_response(server, {17, 6, 0, 10, 0x11, 0}, {17, 6, 0, 10, 0x11, 0});
-    assert_int_equal(written_count, 1);
+    assert_int_equal(written_count, 2);
+    hooks.afterWrite(nullptr);
+    expect_response(server, {17, 6, 0, 10, 0x12, 0}, {17, 6, 0, 10, 0x12, 0});
+    assert_int_equal(written_count, 2);
+    hooks.beforeRead([](const mbm_access &access) -> uint8_t {
+        assert_int_equal(access.unit, 17);
+        assert_int_equal(access.function, 3);
+        return access.quantity == 2 ? 6 : 0;
+    });
+    expect_response(server, {17, 3, 0, 10, 0, 2}, {17, 0x83, 6});
+    expect_response(server, {17, 3, 0, 10, 0, 1}, {17, 3, 2, 0x12, 0});
+    registers.removeHooks();
+    expect_response(server, {17, 3, 0, 12, 0, 2}, {17, 3, 4, 0, 0, 0, 0});
 }
 
 static void absent_registers_and_bits_are_refused(void **)

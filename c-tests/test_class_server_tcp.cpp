@@ -224,7 +224,9 @@ static void a_hook_cannot_poll_or_begin_its_server(void **)
     polled = &server;
     again = &listener;
     listener.begin();
-    holding.afterWrite([](const mbm_access &) {
+    ModbusHooks hooks;
+    holding.setHooks(hooks);
+    hooks.afterWrite([](const mbm_access &) {
         assert_int_equal(polled->poll(), MBM_BUSY);
         assert_int_equal(polled->begin(9, *again), MBM_BUSY);
     });

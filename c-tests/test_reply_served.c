@@ -47,7 +47,7 @@ static uint8_t serve(const mbm_clientRequest *until)
         if (m.sent_count == 0)
             continue;
         memcpy(buffer, m.sent, m.sent_count);
-        OK(mbm_unit_respond(s.units, 2, &kind, buffer, (uint16_t)m.sent_count, sizeof buffer,
+        OK(mbm_unit_respond(s.units, 2, NULL, &kind, buffer, (uint16_t)m.sent_count, sizeof buffer,
                             &length));
         assert_true(length > 0);
         m.sent_count = 0;

@@ -386,8 +386,9 @@ static uint8_t join(void *context)
 
 static void a_client_connects_anew_with_a_new_handshake(void **state)
 {
-    const mbm_linkHooks below = {NULL, cut, join};
-    const mbm_linkHooks link = {&pair.client.tls, mbm_tls_disconnect, mbm_tls_connect};
+    const mbm_linkHooks below = {.disconnect = cut, .connect = join};
+    const mbm_linkHooks link = {
+        .context = &pair.client.tls, .disconnect = mbm_tls_disconnect, .connect = mbm_tls_connect};
     unsigned i;
 
     (void)state;

@@ -41,7 +41,7 @@
 #include <stdint.h>
 
 #include "ModbusClientCalls.h"
-#include "ModbusHooks.h"
+#include "ModbusTransmission.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusStatusText.h"
 #include "mbm.h"
@@ -127,12 +127,12 @@ private:
     friend class ModbusTransmissionHooks<ModbusSerialClient>;
 
     Stream *stream;
-    ModbusHook onPre;
-    ModbusHook onPost;
+    ModbusTransmissionHook onPre;
+    ModbusTransmissionHook onPost;
     uint8_t frame[MODBUSCLIENT_FRAME_BYTES];
 
-    ModbusHook &preHookOf() { return onPre; }
-    ModbusHook &postHookOf() { return onPost; }
+    ModbusTransmissionHook &preHookOf() { return onPre; }
+    ModbusTransmissionHook &postHookOf() { return onPost; }
 
     static ModbusSerialClient &clientOf(void *context)
     {

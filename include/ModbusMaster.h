@@ -21,7 +21,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "ModbusHooks.h"
+#include "ModbusTransmission.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusMasterConstants.h"
 #include "ModbusMasterHelpers.h"
@@ -361,9 +361,9 @@ private:
         // The members that the hooks use come first: AVR reaches 63 bytes with one instruction.
         Stream *stream;
         Stream *counting; // the last Stream whose write returned another number than 0
-        ModbusHook onIdle;
-        ModbusHook onPre;
-        ModbusHook onPost;
+        ModbusTransmissionHook onIdle;
+        ModbusTransmissionHook onPre;
+        ModbusTransmissionHook onPost;
         bool sent; // the request is on the wire, so a reply is waited for
         uint8_t port;
         mbm_master master;
@@ -378,8 +378,8 @@ private:
 
     static State &stateOf(void *context) { return *static_cast<State *>(context); }
 
-    ModbusHook &preHookOf() { return state.onPre; }
-    ModbusHook &postHookOf() { return state.onPost; }
+    ModbusTransmissionHook &preHookOf() { return state.onPre; }
+    ModbusTransmissionHook &postHookOf() { return state.onPost; }
 
     void setBuffers()
     {

@@ -32,7 +32,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "ModbusHooks.h"
+#include "ModbusTransmission.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusServerTables.h"
 #include "ModbusStatusText.h"
@@ -247,8 +247,8 @@ private:
     // The hooks' context. The members that they use come first, as in ModbusMaster.
     struct State {
         Stream *stream;
-        ModbusHook onPre;
-        ModbusHook onPost;
+        ModbusTransmissionHook onPre;
+        ModbusTransmissionHook onPost;
         uint32_t receivedAt; // microseconds: when the last byte was read
         uint32_t silence;
         bool ready; // a response waits for the silence to end
@@ -261,8 +261,8 @@ private:
 
     static State &stateOf(void *context) { return *static_cast<State *>(context); }
 
-    ModbusHook &preHookOf() { return state.onPre; }
-    ModbusHook &postHookOf() { return state.onPost; }
+    ModbusTransmissionHook &preHookOf() { return state.onPre; }
+    ModbusTransmissionHook &postHookOf() { return state.onPost; }
 
     uint8_t listen(uint8_t (*beginFraming)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t,
                                          uint8_t *, uint16_t),

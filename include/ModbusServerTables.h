@@ -14,16 +14,19 @@
 #include "mbm.h"
 
 /**
- * The members that ModbusRegisters and ModbusBits share. A cell is a register or a bit.
+ * Functions of yours that are called around the requests to a table: pass the object to
+ * setHooks of each table. It must outlive the tables.
  *
  * A hook gets the request: its unit and function, the address on the wire of the first
  * cell, the number of cells and, of a write, the new values: registers with the high
- * byte first, bits with the lowest bit first.
+ * byte first, bits with the lowest bit first. A cell is a register or a bit.
  */
-template <typename Table> class ModbusTable {
+class ModbusHooks {
 public:
-    ModbusTable(const ModbusTable &) = delete;
-    ModbusTable &operator=(const ModbusTable &) = delete;
+    /** No hooks yet. */
+    ModbusHooks() : hooks(), onRead(), onWrite(), onWritten() { hooks.context = this; }
+    ModbusHooks(const ModbusHooks &) = delete;
+    ModbusHooks &operator=(const ModbusHooks &) = delete;
 
     /**
      * Sets a hook that is called before a request reads cells, and may set them. It
@@ -33,7 +36,6 @@ public:
     {
         onRead = hook;
         hooks.beforeRead = hook != nullptr ? readHook : nullptr;
-        setHooks(&table, &hooks);
     }
     /**
      * Sets a hook that is called before a request writes cells. It returns 0, or an
@@ -43,15 +45,46 @@ public:
     {
         onWrite = hook;
         hooks.beforeWrite = hook != nullptr ? writeHook : nullptr;
-        setHooks(&table, &hooks);
     }
     /** Sets a hook that is called after a request has written cells; nullptr for none. */
     void afterWrite(void (*hook)(const mbm_access &access))
     {
         onWritten = hook;
         hooks.afterWrite = hook != nullptr ? writtenHook : nullptr;
-        setHooks(&table, &hooks);
     }
+
+private:
+    template <typename Table> friend class ModbusTable;
+
+    mbm_accessHooks hooks;
+    uint8_t (*onRead)(const mbm_access &);
+    uint8_t (*onWrite)(const mbm_access &);
+    void (*onWritten)(const mbm_access &);
+
+    static uint8_t readHook(void *context, const mbm_access *access)
+    {
+        return static_cast<ModbusHooks *>(context)->onRead(*access);
+    }
+    static uint8_t writeHook(void *context, const mbm_access *access)
+    {
+        return static_cast<ModbusHooks *>(context)->onWrite(*access);
+    }
+    static void writtenHook(void *context, const mbm_access *access)
+    {
+        static_cast<ModbusHooks *>(context)->onWritten(*access);
+    }
+};
+
+/** The members that ModbusRegisters and ModbusBits share. A cell is a register or a bit. */
+template <typename Table> class ModbusTable {
+public:
+    ModbusTable(const ModbusTable &) = delete;
+    ModbusTable &operator=(const ModbusTable &) = delete;
+
+    /** Has these hooks called around requests to the table; other tables may have them too. */
+    void setHooks(const ModbusHooks &hooks) { set(&table, &hooks.hooks); }
+    /** Has no hooks called any more. */
+    void removeHooks() { set(&table, nullptr); }
     /**
      * Says which cells exist: one bit for each, lowest bit of the first byte first.
      * A request for another cell is answered with exception 02. nullptr: all exist.
@@ -64,10 +97,8 @@ public:
 
 protected:
     /** @cond for ModbusRegisters and ModbusBits */
-    ModbusTable(uint16_t size, uint16_t address)
-        : table(), hooks(), onRead(), onWrite(), onWritten()
+    ModbusTable(uint16_t size, uint16_t address) : table()
     {
-        hooks.context = this;
         table.size = size;
         table.base = address;
     }
@@ -78,32 +109,15 @@ protected:
 private:
     friend class ModbusUnit;
 
-    mbm_accessHooks hooks;
-    uint8_t (*onRead)(const mbm_access &);
-    uint8_t (*onWrite)(const mbm_access &);
-    void (*onWritten)(const mbm_access &);
-
     Table *record() { return &table; }
 
-    static void setHooks(mbm_registerTable *table, const mbm_accessHooks *hooks)
+    static void set(mbm_registerTable *table, const mbm_accessHooks *hooks)
     {
         mbm_registerTable_setHooks(table, hooks);
     }
-    static void setHooks(mbm_bitTable *table, const mbm_accessHooks *hooks)
+    static void set(mbm_bitTable *table, const mbm_accessHooks *hooks)
     {
         mbm_bitTable_setHooks(table, hooks);
-    }
-    static uint8_t readHook(void *context, const mbm_access *access)
-    {
-        return static_cast<ModbusTable *>(context)->onRead(*access);
-    }
-    static uint8_t writeHook(void *context, const mbm_access *access)
-    {
-        return static_cast<ModbusTable *>(context)->onWrite(*access);
-    }
-    static void writtenHook(void *context, const mbm_access *access)
-    {
-        static_cast<ModbusTable *>(context)->onWritten(*access);
     }
 };
 

@@ -13,7 +13,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "ModbusHooks.h"
+#include "ModbusTransmission.h"
 #include "mbm.h"
 
 /** @cond the macros are explained in ModbusTcpServer.h */

@@ -166,7 +166,8 @@ static int ask(const char *host, const char *service, const char *name, char **p
 {
     static mbm_tcp_addresses addresses;
     static uint16_t value = 2000;
-    const mbm_linkHooks link = {tcps, mbm_tcp_disconnect, mbm_tcp_connect};
+    const mbm_linkHooks link = {
+        .context = tcps, .disconnect = mbm_tcp_disconnect, .connect = mbm_tcp_connect};
     const mbm_port socket = mbm_tcp_port(tcps), port = mbm_tls_port(tlss);
     int status, i;
 

@@ -14,6 +14,7 @@ const uint8_t relayPin = 4;
 
 ModbusRegisterArray<1> sensor;
 ModbusBitArray<1> relay;
+ModbusHooks relayHooks;
 ModbusServer server;
 
 void driverOn() { digitalWrite(driverEnable, HIGH); }
@@ -29,7 +30,8 @@ void setup() {
 
   server.inputRegisters(sensor);
   server.coils(relay);
-  relay.afterWrite(relayWritten);
+  relayHooks.afterWrite(relayWritten);
+  relay.setHooks(relayHooks);
   server.preTransmission(driverOn);
   server.postTransmission(driverOff); // called after the last bit
 

@@ -11,6 +11,7 @@ const uint8_t relayPin = 4;
 EthernetServer ethernet(502);
 ModbusRegisterArray<1> sensor;
 ModbusBitArray<1> relay;
+ModbusHooks relayHooks;
 ModbusTcpServer<EthernetServer> server; // two clients at once on an Uno, four on larger boards
 
 void relayWritten(const mbm_access &) { digitalWrite(relayPin, relay[0] ? HIGH : LOW); }
@@ -20,7 +21,8 @@ void setup() {
   pinMode(relayPin, OUTPUT);
   server.inputRegisters(sensor);
   server.coils(relay);
-  relay.afterWrite(relayWritten);
+  relayHooks.afterWrite(relayWritten);
+  relay.setHooks(relayHooks);
   Ethernet.begin(mac, own);
   ethernet.begin();
   server.begin(1, ethernet);

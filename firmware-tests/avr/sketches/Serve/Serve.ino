@@ -17,6 +17,7 @@ ModbusBits coils(bits, 300);
 ModbusBitArray<50> inputs(400);
 ModbusRegisterArray<2> others;
 ModbusUnit units[] = {{17}, {18}};
+ModbusHooks hooks;
 ModbusServer server;
 
 uint8_t beforeWrite(const mbm_access &access) {
@@ -48,8 +49,9 @@ void setup() {
     readings[i] = 1000 + i;
   for (uint16_t i = 0; i < 50; i += 3)
     inputs.set(i, true);
-  holding.beforeWrite(beforeWrite);
-  holding.afterWrite(afterWrite);
+  hooks.beforeWrite(beforeWrite);
+  hooks.afterWrite(afterWrite);
+  holding.setHooks(hooks);
   units[0].holdingRegisters(holding);
   units[0].maskAndReadWrite(holding);
   units[0].inputRegisters(readings);

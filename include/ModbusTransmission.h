@@ -1,12 +1,12 @@
 /**
- * @file ModbusHooks.h
+ * @file ModbusTransmission.h
  * @brief The callbacks of a sketch around a transmission, and the port of a class.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h, ModbusServer.h and ModbusClient.h.
  */
 
-#ifndef MODBUSHOOKS_H
-#define MODBUSHOOKS_H
+#ifndef MODBUSTRANSMISSION_H
+#define MODBUSTRANSMISSION_H
 
 #include <stdint.h>
 
@@ -14,7 +14,7 @@
 
 /** @cond for the classes that have callbacks */
 /** A function of the sketch, with or without an argument; none if it is zeroed. */
-struct ModbusHook {
+struct ModbusTransmissionHook {
     void (*function)(void *);
     void *context;
 
