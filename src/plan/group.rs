@@ -111,7 +111,6 @@ impl<'a, L: ReadLimits> Table<'a, L> {
 
     /// Finds for each position, from the last to the first, the best read that begins there: the
     /// reads after it are known by then.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn find_best(&mut self) {
         let limits = self.limits;
         for start in (0..self.positions.len()).rev() {
@@ -158,7 +157,6 @@ impl<'a, L: ReadLimits> Table<'a, L> {
     ///
     /// # Errors
     /// The position of the first field for which the storage does not suffice.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn cut(&mut self, reads: &mut [Read], words: u16) -> Result<usize, usize> {
         let (mut start, mut count, mut offset) = (0, 0, 0u16);
         while let Some(&Position { last, .. }) = self.positions.get(start) {

@@ -90,7 +90,6 @@ impl Read {
     }
 
     /// The number of words that its data take.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub const fn words(&self) -> u16 {
         if self.is_of_bits() {
             self.quantity.div_ceil(16)

@@ -31,16 +31,20 @@ fn until(time: u32, now: u32) -> u32 {
 /// Makes every read due at once, and spreads the following rounds: the reads of one interval
 /// are due one after the other, at equal distances.
 pub fn start(reads: &[Read], now: u32) {
-    // Reads of the same interval stand side by side.
-    for same in reads.chunk_by(|read, next| read.interval_ms == next.interval_ms) {
-        let interval = same.first().map_or(0, |read| read.interval_ms);
-        let step = quotient(interval, same.len() as u32);
+    let mut rest = reads;
+    while let Some(first) = rest.first() {
+        let interval = first.interval_ms;
+        // Reads of the same interval stand side by side.
+        let is_same = |read: &&Read| read.interval_ms == interval;
+        let count = rest.iter().take_while(is_same).count();
+        let step = quotient(interval, count as u32);
         // The time before the first round, so that every round after it is on time.
         let mut due = now.wrapping_sub(interval);
-        for read in same {
+        for read in rest.iter().take(count) {
             read.due.set(due);
             due = due.wrapping_add(step);
         }
+        rest = rest.get(count..).unwrap_or(&[]);
     }
 }
 

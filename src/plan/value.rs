@@ -22,7 +22,6 @@ pub struct Words<'a> {
 ///
 /// # Errors
 /// [`Status::INVALID_ARGUMENT`] if the field has no such value. A text is one value.
-#[cfg_attr(target_os = "none", inline(never))]
 pub fn place(field: &Field, address: u16, index: u16) -> Result<(u16, u8), Status> {
     if index >= field.values() || (field.value_type == TEXT && index > 0) {
         return Err(Status::INVALID_ARGUMENT);
@@ -205,7 +204,6 @@ impl Words<'_> {
     /// # Errors
     /// As [`Words::integer`]; [`Status::INVALID_ARGUMENT`] also for an integer of 64 bits, and
     /// [`Status::BUFFER_TOO_SMALL`] also if the product before the division is out of range.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn int32(&self) -> Result<i32, Status> {
         let field = self.field;
         if field.value_type > INT32 {
