@@ -7,6 +7,7 @@
  * without a response can check that the request arrived. */
 #include "served.h"
 
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -27,6 +28,8 @@ int main(int argc, char **argv)
         fprintf(stderr, "usage: %s rtu | ascii | tcp | rtu-over-tcp\n", argv[0]);
         return 2;
     }
+    /* A client may close its connection before it has read the response. */
+    signal(SIGPIPE, SIG_IGN);
     served_prepare(&device);
     if (i < 2) {
         served_on_line(&device, framings[i]);
