@@ -6468,6 +6468,17 @@ uint8_t mbm_trace_beginServer(struct mbm_trace *trace,
 const struct mbm_port *mbm_trace_port(struct mbm_trace *trace);
 
 /**
+ * Returns your port, to which the trace passes everything on. Hooks and functions of a server
+ * get the context of the server's port as their `connection`, which is the trace: the context
+ * of your port is `mbm_trace_innerPort(access->connection)->context`.
+ *
+ * @param trace  the object
+ * @return a copy of your port, valid for as long as the trace is used. NULL for a trace that
+ *         was never begun, and from within its hook
+ */
+const struct mbm_port *mbm_trace_innerPort(const struct mbm_trace *trace);
+
+/**
  * Sets how long the trace waits for the rest of an incomplete frame. At first it is 50 ms in
  * RTU, which suits a USB adapter, and 1000 ms in the other framings.
  *

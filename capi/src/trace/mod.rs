@@ -376,6 +376,24 @@ pub unsafe extern "C" fn mbm_trace_port(trace: *mut mbm_trace) -> *const mbm_por
     }
 }
 
+/// Returns your port, to which the trace passes everything on. Hooks and functions of a server
+/// get the context of the server's port as their `connection`, which is the trace: the context
+/// of your port is `mbm_trace_innerPort(access->connection)->context`.
+///
+/// @param trace  the object
+/// @return a copy of your port, valid for as long as the trace is used. NULL for a trace that
+///         was never begun, and from within its hook
+#[no_mangle]
+pub unsafe extern "C" fn mbm_trace_innerPort(trace: *const mbm_trace) -> *const mbm_port {
+    // SAFETY: as the header demands.
+    unsafe {
+        match check(trace) {
+            Status::OK => &raw const (*trace.cast::<Object>()).inner,
+            _ => null(),
+        }
+    }
+}
+
 /// Sets how long the trace waits for the rest of an incomplete frame. At first it is 50 ms in
 /// RTU, which suits a USB adapter, and 1000 ms in the other framings.
 ///

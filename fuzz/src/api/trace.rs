@@ -86,6 +86,7 @@ pub fn step(w: &World) {
             refused_changes_nothing(w, &[span(trace)], "mbm_trace_flush", || {
                 call!(w, trace, mbm_trace_flush(trace))
             });
+            call!(w, trace, mbm_trace_innerPort(trace));
         }
     }
     let event = w.events.any();

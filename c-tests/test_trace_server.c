@@ -1,0 +1,90 @@
+/* A server behind a trace: its hooks find their connection, and mbm_trace_innerPort the port. */
+#include "test.h"
+
+#include "mbm.h"
+
+#include <string.h>
+
+typedef struct connection {
+    uint8_t request[8];
+    uint16_t arrived, sent;
+} connection;
+
+static connection wire;
+static mbm_trace trace;
+static const void *accessed;
+static uint32_t now;
+
+static int16_t read_wire(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    connection *c = (connection *)context;
+    const uint16_t count = c->arrived < capacity ? c->arrived : capacity;
+
+    memcpy(bytes, c->request, count);
+    c->arrived = (uint16_t)(c->arrived - count);
+    return (int16_t)count;
+}
+
+static int16_t write_wire(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)bytes;
+    ((connection *)context)->sent = (uint16_t)(((connection *)context)->sent + length);
+    return (int16_t)length;
+}
+
+static uint32_t micros(void *context)
+{
+    (void)context;
+    return now += 1000;
+}
+
+static void on_record(void *context, const mbm_traceRecord *record)
+{
+    (void)record;
+    assert_null(mbm_trace_innerPort((const mbm_trace *)context));
+}
+
+static uint8_t before_read(void *context, const mbm_access *access)
+{
+    (void)context;
+    accessed = mbm_trace_innerPort((const mbm_trace *)access->connection)->context;
+    return 0;
+}
+
+static void a_hook_finds_the_context_of_the_port_before_the_trace(void **state)
+{
+    static const uint8_t request[8] = {17, 3, 0, 0, 0, 1, 0x86, 0x9A};
+    static const mbm_accessHooks hooks = {.beforeRead = before_read};
+    static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
+    static uint8_t buffer[64], frame[64];
+    static uint16_t words[1];
+    static mbm_registerTable table = {.words = words, .size = 1};
+    static mbm_unit unit = {.id = 17};
+    static mbm_server server;
+    const mbm_port port = {
+        .context = &wire, .read = read_wire, .write = write_wire, .micros = micros};
+    int polls;
+
+    (void)state;
+    assert_null(mbm_trace_innerPort(NULL));
+    assert_null(mbm_trace_innerPort(&trace));
+    OK(mbm_registerTable_setHooks(&table, &hooks));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_trace_beginServer(&trace, &port, &rtu, buffer, sizeof buffer, on_record, &trace));
+    OK(mbm_server_beginRtu(&server, mbm_trace_port(&trace), &unit, 1, frame, sizeof frame));
+    memcpy(wire.request, request, sizeof request);
+    wire.arrived = sizeof request;
+    for (polls = 0; polls < 100 && wire.sent == 0; polls++)
+        OK(mbm_server_poll(&server));
+    assert_int_equal(wire.sent, 7);
+    assert_ptr_equal(accessed, &wire);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_hook_finds_the_context_of_the_port_before_the_trace),
+    };
+
+    return cmocka_run_group_tests_name("trace of a server", tests, NULL, NULL);
+}
