@@ -30,6 +30,7 @@ static void update(void *context, mbm_plan *plan, uint16_t field)
     int32_t value;
 
     (void)context;
+    (void)field;
     USED(plan);
     if (PLAN(mbm_plan_getStatus(plan, field, NULL)) == MBM_OK &&
         PLAN(mbm_plan_getInt32(plan, field, 0, &value)) == MBM_OK) {
