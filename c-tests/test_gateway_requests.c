@@ -99,7 +99,7 @@ static void a_reply_that_does_not_answer_the_request_gets_0b(void **state)
     EXPECT(0, 2, 2, "\x86\x0B");
 }
 
-static void a_late_reply_reaches_nobody(void **state)
+static void a_late_reply_to_a_closed_connection_is_discarded(void **state)
 {
     (void)state;
     ASK(0, 1, 2, READ);
@@ -279,7 +279,7 @@ int main(void)
         TEST(a_silent_device_gets_0b),
         TEST(half_a_reply_and_a_damaged_one_get_0b),
         TEST(a_reply_that_does_not_answer_the_request_gets_0b),
-        TEST(a_late_reply_reaches_nobody),
+        TEST(a_late_reply_to_a_closed_connection_is_discarded),
         TEST(a_request_that_the_standard_forbids_is_refused),
         TEST(force_listen_only_mode_gets_no_response),
         TEST(unknown_functions_pass),

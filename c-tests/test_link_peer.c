@@ -262,7 +262,7 @@ static void a_terminal_that_is_unplugged_during_a_request_ends_it(void **state)
     keep(&hooks);
     OK(mbm_link_setRequestsWait(&kept, 1));
     read_over_tty();
-    /* Nobody answers the first, so it is under way and the second waits. */
+    /* No device answers the first request. So it is under way, and the second waits. */
     requests[3] = asker_request(UNIT + 1, words[3], sizeof words[3], NULL);
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[3], 0, 2));
     queue_read(4);

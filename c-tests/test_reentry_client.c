@@ -300,19 +300,19 @@ static void a_done_function_may_call_its_client(void **state)
 
 static void the_clock_may_not_call_the_client_that_gives_its_line_to_a_master(void **state)
 {
-    static mbm_master facade;
+    static mbm_master master_on_the_line;
 
     (void)state;
-    memset(&facade, 0, sizeof facade);
+    memset(&master_on_the_line, 0, sizeof master_on_the_line);
     begin_client(0);
-    OK(mbm_master_setBuffers(&facade, words, 1, words, 1, other_frame, 8));
+    OK(mbm_master_setBuffers(&master_on_the_line, words, 1, words, 1, other_frame, 8));
     request.unit = 17;
     IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 1));
     wire.within = within_client;
-    OK(mbm_client_suspend(&client, &facade));
+    OK(mbm_client_suspend(&client, &master_on_the_line));
     wire.within = NULL;
     assert_int_equal(entered, 1);
-    OK(mbm_client_resume(&client, &facade));
+    OK(mbm_client_resume(&client, &master_on_the_line));
 }
 
 #define TEST(test) cmocka_unit_test_setup(test, reset)

@@ -304,7 +304,7 @@ static void datagrams_of_others_do_not_reach_the_client(void **state)
     close(stranger);
 }
 
-/* The system reports that nobody listens there. That is as good as a lost datagram. */
+/* The system reports that no program listens there. The datagram counts as lost. */
 static void a_server_that_is_not_there_yet_is_no_lost_link(void **state)
 {
     const mbm_port port = mbm_udp_port(&receiver);

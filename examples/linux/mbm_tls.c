@@ -170,8 +170,8 @@ static uint8_t reason_of(const mbm_tls *tls, int error)
     return tls->status == MBM_TLS_OPEN ? MBM_TLS_BAD_STREAM : MBM_TLS_FAILED;
 }
 
-/* Drops what the peer has sent and nobody will read. With unread bytes a socket that is closed
- * sends a reset, and the peer's system then drops the alert that says why. */
+/* Discards bytes that the peer has sent and that will not be read. With unread bytes a socket that
+ * is closed sends a reset, and the peer's system then drops the alert that says why. */
 static void drain(mbm_tls *tls)
 {
     unsigned rounds;

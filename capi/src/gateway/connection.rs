@@ -83,7 +83,7 @@ pub unsafe extern "C" fn mbm_gateway_open(
 }
 
 /// Gives up a connection and its requests. A request that a line has is cancelled: the device
-/// may have received it, but its reply reaches nobody. The place is free then.
+/// may have received it, and the gateway discards its reply. The place is free then.
 ///
 /// @param gateway     the object
 /// @param connection  the number of the place; nothing happens if it is free already
