@@ -111,11 +111,11 @@ static void floats_and_doubles_are_numbers_too(void **state)
         d.setup.registerGap = 10;
         read_all();
         OK(mbm_plan_getFloat(&d.plan, 0, 0, &single));
-        assert_true(memcmp(&single, &pi, sizeof pi) == 0);
+        assert_true(single == pi);
         OK(mbm_plan_getDouble(&d.plan, 0, 0, &wide));
         assert_true(wide == (double)pi);
         OK(mbm_plan_getDouble(&d.plan, 1, 0, &wide));
-        assert_true(memcmp(&wide, &e, sizeof e) == 0);
+        assert_true(wide == e);
         OK(mbm_plan_getFloat(&d.plan, 1, 0, &single));
         assert_true(single == (float)e);
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getFloat(&d.plan, 2, 0, &single));

@@ -146,7 +146,6 @@ static int connect_client(unsigned i)
         mbm_tcp_wait(places, CONNECTIONS + CLIENTS, &listener, -1, MBM_TCP_FOREVER);
         serve();
     }
-    return 0;
 }
 
 /* Serves until a request of a client has ended, and prints how. */
@@ -212,7 +211,9 @@ int main(int argc, char **argv)
         perror("guarded_server");
         return 2;
     }
-    while (!is_demonstration) {
+    if (is_demonstration)
+        return 0;
+    for (;;) {
         mbm_tcp_wait(places, CONNECTIONS, &listener, -1, MBM_TCP_FOREVER);
         serve();
     }

@@ -38,7 +38,7 @@ typedef struct block {
 
 static void put_bytes(block *b, const void *bytes, size_t length)
 {
-    if (b->length + length <= sizeof b->bytes)
+    if (length > 0 && b->length + length <= sizeof b->bytes)
         memcpy(b->bytes + b->length, bytes, length);
     b->length += length;
 }
