@@ -146,6 +146,7 @@ static int connect_client(unsigned i)
         mbm_tcp_wait(places, CONNECTIONS + CLIENTS, &listener, -1, MBM_TCP_FOREVER);
         serve();
     }
+    return 0;
 }
 
 /* Serves until a request of a client has ended, and prints how. */
@@ -217,5 +218,4 @@ int main(int argc, char **argv)
         mbm_tcp_wait(places, CONNECTIONS, &listener, -1, MBM_TCP_FOREVER);
         serve();
     }
-    return 0;
 }
