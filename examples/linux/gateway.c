@@ -13,7 +13,7 @@
  *
  * A connection may have MOST (8) requests under way. Its next requests wait in its socket.
  * When a line is free, the connections take turns. With WAIT, a request that has waited for
- * its line for so many milliseconds is answered with 0A and not sent.
+ * its line for this number of milliseconds is answered with 0A and not sent.
  *
  * The gateway has 16 places for connections, or fewer if the system gives it fewer
  * descriptors. When a new client finds no place, the gateway closes the connection that has

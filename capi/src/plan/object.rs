@@ -57,7 +57,7 @@ impl Object {
     /// # Safety
     /// It is begun, and not begun again while the result lives.
     pub(super) unsafe fn reads<'a>(&self) -> &'a [Read] {
-        // SAFETY: mbm_plan_begin has made so many.
+        // SAFETY: mbm_plan_begin has written `read_count` reads.
         unsafe { from_raw_parts(self.setup().reads.cast(), self.read_count.into()) }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::check::call;
 use super::port::Port;
+use super::traffic;
 use super::world::{Grant, World};
-use super::{trace, traffic};
 use mbm_c::{mbm_master, mbm_port};
 use std::ffi::c_void;
 
@@ -39,7 +39,9 @@ pub fn good(w: &World, index: usize, framing: u8) -> *const mbm_port {
 /// A port for an object of this framing; sometimes that of a trace.
 pub fn port(w: &World, framing: u8) -> *const mbm_port {
     if w.rarely(8) {
-        return trace::port(w);
+        // NULL if the trace was not begun, or while its hook runs.
+        let trace = w.traces.pick(w);
+        return call!(w, trace, mbm_trace_port(trace));
     }
     plain(w, framing)
 }

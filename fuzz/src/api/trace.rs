@@ -62,12 +62,6 @@ fn begin(w: &World, trace: *mut mbm_trace) {
     });
 }
 
-/// The port of one of the traces; NULL if it was not begun, or while its hook runs.
-pub fn port(w: &World) -> *const mbm_port {
-    let trace = w.traces.pick(w);
-    call!(w, trace, mbm_trace_port(trace))
-}
-
 /// Makes calls with a trace.
 pub fn step(w: &World) {
     let trace = w.traces.pick(w);
