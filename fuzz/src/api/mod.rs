@@ -66,7 +66,7 @@ fn step(w: &World) {
 
 /// Runs one input.
 pub fn run(data: &[u8]) {
-    let w = World::new(data);
+    let w = World::new(data, step);
     prepared::prepare(&w);
     while !w.is_over() {
         step(&w);

@@ -36,6 +36,8 @@ struct Frame {
 
 /// The state of one run.
 pub struct World {
+    /// Makes one step. Hooks make steps too.
+    step: fn(&World),
     memory: Memory,
     hook_calls: Cell<u32>,
     calls: Cell<u32>,
@@ -75,7 +77,7 @@ pub struct World {
 
 impl World {
     /// The state for an input, which must outlive it.
-    pub fn new(data: &[u8]) -> Box<World> {
+    pub fn new(data: &[u8], step: fn(&World)) -> Box<World> {
         // SAFETY: `run` drops the world before the input.
         let data: &'static [u8] = unsafe { std::mem::transmute(data) };
         let (head, input) = data.split_at(data.len().min(2));
@@ -83,6 +85,7 @@ impl World {
             seed.rotate_left(8) ^ u64::from(*byte)
         });
         let world = Box::new(World {
+            step,
             memory: Memory::new(input, seed),
             hook_calls: Cell::new(0),
             calls: Cell::new(0),
@@ -192,7 +195,7 @@ impl World {
         if over || !self.random().is_multiple_of(scarce) {
             return;
         }
-        self.inside(grant, || super::step(self));
+        self.inside(grant, || (self.step)(self));
     }
 
     /// Runs `action` as a hook.

@@ -10,7 +10,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The folders of the crates, relative to the root of the project.
-const CRATES: [&str; 2] = ["src", "capi/src"];
+const CRATES: [&str; 6] = [
+    "src",
+    "capi/src",
+    "fuzz/src",
+    "model/src",
+    "bench/src",
+    "tools/src",
+];
 
 /// The source files of a crate: their paths below its folder, and their texts.
 fn texts(folder: &Path) -> std::io::Result<Vec<(PathBuf, String)>> {
