@@ -1,0 +1,66 @@
+"""The layers of mbm: for docs/architecture.md and the first page."""
+
+from drawing import LINE, MARGIN, WIDTH, Drawing, text_width
+
+INNER = WIDTH - 2 * MARGIN
+GAP = 6
+
+# The rows of the core from the top on: modules side by side, and what each is for.
+CORE = [
+    [("master",), ("client",), ("plan",), ("server",), ("gateway",)],
+    [("engine", "one request"), ("sniffer", "others' frames"), ("trace", "each frame")],
+    [("text", "frames, events and statuses in words")],
+    [("pdu", "every function's data"), ("packet", "frame in, fields out")],
+    [("frame", "RTU, ASCII, TCP; CRC, LRC")],
+    [("data", "registers, typed values"), ("port", "stream of bytes")],
+    [("error, time", "statuses, t3.5")],
+]
+
+
+def row(drawing, y, modules):
+    """Boxes side by side in the middle of the core. Returns the height of the row."""
+    widths = [max(text_width(module[0], "strong"), text_width(module[-1], "soft")) for module in modules]
+    more = (INNER - 16 - GAP * (len(modules) - 1) - sum(widths)) / len(modules)
+    height = 13 + LINE * len(modules[0])
+    x = MARGIN + 8
+    for module, width in zip(modules, widths):
+        drawing.box(x, y, width + more, height, "ours", module)
+        x += width + more + GAP
+    return height
+
+
+def draw():
+    drawing = Drawing(
+        "The layers of mbm",
+        "Sketches use C++ classes, which use the C interface mbm.h. C and C++ programs use mbm.h. Rust firmware uses "
+        "the core. In the core, from top to bottom: master, client, plan, server and gateway; engine, sniffer and "
+        "trace; text; pdu and packet; frame; data and port; error and time. Each layer uses only layers below it. "
+        "The port calls functions of yours: read, write, clock, driver on and off, flush.")
+    third = (INNER - 2 * GAP) / 3
+    left, middle, right = (MARGIN + index * (third + GAP) for index in range(3))
+    y = MARGIN
+    drawing.box(left, y, third, 36, lines=["sketch"])
+    drawing.box(middle, y, third, 36, lines=["C or C++"])
+    drawing.box(right, y, third, 36, lines=["Rust"])
+    y += 36
+    drawing.line((left + third / 2, y), (left + third / 2, y + 18), arrow="end")
+    drawing.line((middle + third / 2, y), (middle + third / 2, y + 84), arrow="end")
+    drawing.line((right + third / 2, y), (right + third / 2, y + 150), arrow="end")
+    drawing.box(left, y + 18, third, 48, "good", ["C++ classes", "ModbusMaster.h"])
+    drawing.line((left + third / 2, y + 66), (left + third / 2, y + 84), arrow="end")
+    y += 84
+    drawing.box(left, y, 2 * third + GAP, 48, "theirs", ["C API", "mbm.h and libmbm.a"])
+    drawing.line((left + third + GAP / 2, y + 48), (left + third + GAP / 2, y + 66), arrow="end")
+    y += 66
+    top = y
+    y += 22
+    drawing.text(WIDTH / 2, y - 4, "the core, no_std Rust: each layer uses those below it", "soft", "middle")
+    for modules in CORE:
+        y += 5
+        y += row(drawing, y, modules)
+    y += 8
+    drawing.line((MARGIN, top), (MARGIN + INNER, top), (MARGIN + INNER, y), (MARGIN, y), (MARGIN, top), kind="dashed")
+    drawing.line((WIDTH / 2, y), (WIDTH / 2, y + 18), arrow="end")
+    y += 18
+    drawing.box(MARGIN, y, INNER, 48, lines=["your port", "read, write, clock, driver on and off, flush"])
+    return drawing
