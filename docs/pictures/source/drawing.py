@@ -15,7 +15,7 @@ LINE = 17  # from one line of text to the next
 
 FONT = 'system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",Arial,sans-serif'
 CODE = 'ui-monospace,Menlo,Consolas,"DejaVu Sans Mono",monospace'
-SIZES = {"": 13, "strong": 13, "head": 15, "soft": 12, "code": 12}
+SIZES = {"": 13, "strong": 13, "head": 14, "soft": 12, "code": 12}
 
 # What a colour means, and how it looks: light fill, light line, dark fill, dark line.
 KINDS = {
@@ -68,7 +68,7 @@ def colours(page, kinds):
     """The rules of the style sheet that name colours."""
     background, frame, ink, quiet, line = page
     rules = [f".card{{fill:{background};stroke:{frame}}}", f"text{{fill:{ink}}}", f".soft{{fill:{quiet}}}",
-             f".wire,.thin,.dashed{{stroke:{line}}}", f".head-of-arrow,.dot{{fill:{line}}}"]
+             f".wire,.thin,.dashed{{stroke:{line}}}.mark{{stroke:{ink}}}", f".head-of-arrow,.dot{{fill:{line}}}"]
     for name, (fill, stroke) in kinds.items():
         rules.append(f".{name}{{fill:{fill};stroke:{stroke}}}.bar-{name}{{fill:{stroke}}}"
                      f".trace-{name}{{stroke:{stroke}}}.text-{name}{{fill:{stroke}}}")
@@ -80,8 +80,8 @@ STYLE = (
     f".strong{{font-weight:bold}}.head{{font-weight:bold;font-size:{SIZES['head']}px}}"
     f".soft{{font-size:{SIZES['soft']}px}}.code{{font:{SIZES['code']}px {CODE}}}"
     ".box,.card{stroke-width:1.5}.middle{text-anchor:middle}.end{text-anchor:end}"
-    ".wire,.thin,.dashed,.trace{fill:none;stroke-width:1.5;stroke-linejoin:round}.thin{stroke-width:1}"
-    ".dashed{stroke-width:1;stroke-dasharray:4 3}.trace{stroke-width:2}"
+    ".wire,.thin,.dashed,.trace,.mark{fill:none;stroke-width:1.5;stroke-linejoin:round}.thin{stroke-width:1}"
+    ".dashed{stroke-width:1;stroke-dasharray:4 3}.trace,.mark{stroke-width:2}"
     + colours(LIGHT, {name: look[:2] for name, look in KINDS.items()})
     + "@media (prefers-color-scheme:dark){"
     + colours(DARK, {name: look[2:] for name, look in KINDS.items()}) + "}")

@@ -10,7 +10,8 @@ CORE = [
     [("master",), ("client",), ("plan",), ("server",), ("gateway",)],
     [("engine", "one request"), ("sniffer", "others' frames"), ("trace", "each frame")],
     [("text", "frames, events and statuses in words")],
-    [("pdu", "every function's data"), ("packet", "frame in, fields out")],
+    [("packet", "any frame as fields, and back")],
+    [("pdu", "requests and responses, one file for each family")],
     [("frame", "RTU, ASCII, TCP; CRC, LRC")],
     [("data", "registers, typed values"), ("port", "stream of bytes")],
     [("error, time", "statuses, t3.5")],
@@ -31,10 +32,10 @@ def row(drawing, y, modules):
 
 def draw():
     drawing = Drawing(
-        "The layers of mbm",
+        "The layers of mbm, from a sketch to the port",
         "Sketches use C++ classes, which use the C interface mbm.h. C and C++ programs use mbm.h. Rust firmware uses "
         "the core. In the core, from top to bottom: master, client, plan, server and gateway; engine, sniffer and "
-        "trace; text; pdu and packet; frame; data and port; error and time. Each layer uses only layers below it. "
+        "trace; text; packet; pdu; frame; data and port; error and time. Each layer uses only layers below it. "
         "The port calls functions of yours: read, write, clock, driver on and off, flush.")
     third = (INNER - 2 * GAP) / 3
     left, middle, right = (MARGIN + index * (third + GAP) for index in range(3))
