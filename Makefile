@@ -94,6 +94,9 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@scripts/check-docs
 	@scripts/check-functions
 	@scripts/check-packages
+	@scripts/pictures --check
+	@scripts/charts --check
+	@scripts/check-pictures
 	@$(MAKE) --no-print-directory check-pages
 	@scripts/check-symbols $(ARCHIVE)
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
@@ -113,6 +116,12 @@ format: ## Format Rust, C and C++ as `make check` requires
 	@$(CARGO) fmt --all
 	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
 	@clang-format -i $(C_SOURCES)
+
+.PHONY: pictures
+pictures: ## Draw the pictures and charts of the pages, docs/pictures
+	@scripts/need python3
+	@scripts/pictures
+	@scripts/charts
 
 .PHONY: abi
 abi: ## Generate packaging/mbm.abi, with which `make check` compares the C interface
@@ -211,7 +220,7 @@ certificates:
 
 .PHONY: need-check need-test
 need-check:
-	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools
+	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools python3
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
 		perl valgrind mbpoll libmbedtls-dev openssl
@@ -294,6 +303,7 @@ bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs
 	@scripts/bench-client $(BENCH_CLIENT)
 	@scripts/bench-sniffer $(BENCH_SNIFFER)
 	@CARGO="$(CARGO)" scripts/bench-frames
+	@scripts/charts
 
 # Programs with TLS or UDP, which pymodbus talks with too.
 SECURE := $(BUILD)/plain/linux/secure
