@@ -23,7 +23,7 @@ def draw():
         "The states of a request on a serial line",
         "A request is queued (client only), waits for the gap, is sent, flushed, held for the post-flush hold, and "
         "waits for its reply. A reply that may be a late one is held until the line was silent for the quiet time. "
-        "Ends: LINE_BUSY from gap, send and flush; LINK_LOST from gap, send, reply and held; OK or an exception from reply "
+        "Ends: LINE_BUSY from gap, send and flush; LINK_LOST from queued, gap, send, reply and held; OK or an exception from reply "
         "and held; a timeout or damage from reply and held, with a repetition if a retry is left; a broadcast ends "
         "after the turnaround delay; CANCELLED from every state.")
     tops = {}
@@ -46,6 +46,7 @@ def draw():
         drawing.line((LEFT + BOX, middle), (RIGHT, middle), arrow="end")
         drawing.box(RIGHT, middle - height / 2, END, height, kind, lines, ("soft", "soft"))
 
+    ends("queued", "bad", ["LINK_LOST"])
     ends("gap", "bad", ["LINE_BUSY", "LINK_LOST"])
     ends("send", "bad", ["LINE_BUSY", "LINK_LOST"])
     ends("flush", "bad", ["LINE_BUSY"])
@@ -73,5 +74,6 @@ def draw():
                 ("soft", "soft"))
     y = drawing.paragraph(MARGIN, y + 98, WIDTH - 2 * MARGIN,
                           "A repetition of a master begins with the gap, one of a client in the queue, with its "
-                          "back-off. CANCELLED ends each state and switches the driver off.", "soft")
+                          "back-off. A client also repeats after LINE_BUSY, and after the exception of a busy device. "
+                          "CANCELLED ends each state; the driver is off then.", "soft")
     return drawing

@@ -42,7 +42,7 @@ def draw():
         x = (edges[index] + edges[index + 1]) / 2
         drawing.text(x, 52, number, "strong", "middle", "ours")
     top, height = 62, 34
-    for edge, lanes in zip(edges[1:-1], (2, 2, 3, 1, 1)):
+    for edge, lanes in zip(edges[1:-1], (2, 2, 3, 1, 3)):
         drawing.line((edge, top - 4), (edge, top + lanes * (height + 16) - 8), kind="dashed")
 
     def label(y, *lines):
@@ -62,8 +62,9 @@ def draw():
 
     y += height + 16
     label(y, "response", "timeout")
-    drawing.line((device, y + height / 2), (end, y + height / 2), arrow="end")
-    drawing.text((device + end) / 2, y + height / 2 - 6, "runs until the reply is found", "soft", "middle")
+    drawing.line((device, y + height / 2), (following, y + height / 2), arrow="end")
+    drawing.line((following, y + height / 2), (end, y + height / 2), kind="dashed")
+    drawing.text((device + following) / 2, y + height / 2 - 6, "until the reply is found", "soft", "middle")
 
     y += height + 34
     for number, words in WORDS:
