@@ -104,7 +104,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
             && self.has_transaction(state.transaction)
         {
             Status::DUPLICATE_TRANSACTION
-        } else if !self.may_retry && !matches!(state.retry_limit, 0 | NO_RETRIES) {
+        } else if !matches!(state.retry_limit, 0 | NO_RETRIES) && !self.may_retry {
             Status::INVALID_ARGUMENT
         } else {
             Status::PENDING

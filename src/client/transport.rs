@@ -47,8 +47,10 @@ pub trait Transport<J> {
     where
         J: ClientRequest,
     {
+        if queue.suspended {
+            return u32::MAX;
+        }
         match self.delay(now) {
-            _ if queue.suspended => u32::MAX,
             Some(delay) => delay,
             None => queue.delay(now),
         }

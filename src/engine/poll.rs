@@ -212,15 +212,18 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     pub fn poll_with(&mut self, now: u32, receive: Option<Receive<Self>>) -> Status {
         self.waiting = false;
         self.look_at_clock(now);
-        let status = match self.phase {
-            Phase::Idle => return Status::OK,
-            Phase::Gap => self.wait_for_silence(),
-            Phase::Send | Phase::Flush | Phase::PostFlush => self.send(),
-            phase => match receive {
-                Some(receive) => receive(self),
-                None if phase == Phase::Reply => self.receive::<false>(),
-                None => self.turn_around(),
-            },
+        let status = if self.phase < Phase::Reply {
+            match self.phase {
+                Phase::Idle => return Status::OK,
+                Phase::Gap => self.wait_for_silence(),
+                _ => self.send(),
+            }
+        } else if let Some(receive) = receive {
+            receive(self)
+        } else if self.phase == Phase::Reply {
+            self.receive::<false>()
+        } else {
+            self.turn_around()
         };
         if status.is_failure() {
             self.cancel();
@@ -259,16 +262,20 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// this call, so the caller may sleep for the returned time.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
         self.look_at_clock(now);
-        let settings = &self.settings;
-        let (time, phase_start) = match self.phase {
-            Phase::Idle => return u32::MAX,
-            Phase::Send | Phase::Flush | Phase::PostFlush => return 0,
-            Phase::Gap => (self.required_silence(), self.last_byte),
-            Phase::Reply if self.probation == Probation::Held => {
-                (settings.quiet_time, self.last_byte)
+        let (time, phase_start) = if self.phase < Phase::Reply {
+            match self.phase {
+                Phase::Idle => return u32::MAX,
+                Phase::Gap => (self.required_silence(), self.last_byte),
+                _ => return 0,
             }
-            Phase::Reply if !self.resynced => (settings.silence, self.last_byte),
-            Phase::Reply | Phase::Turnaround => (self.wait, self.phase_start),
+        } else if self.phase == Phase::Turnaround {
+            (self.wait, self.phase_start)
+        } else if self.probation == Probation::Held {
+            (self.settings.quiet_time, self.last_byte)
+        } else if !self.resynced {
+            (self.settings.silence, self.last_byte)
+        } else {
+            (self.wait, self.phase_start)
         };
         time.saturating_sub(elapsed(now, phase_start))
     }

@@ -42,6 +42,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 
     /// Prepares the search for the reply to the request that has just been sent.
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn begin_reply(&mut self) {
         self.end = S::Count::ZERO;
         self.begin_frame(S::Count::ZERO);

@@ -72,14 +72,13 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.late = false;
         self.phase = Phase::Send;
         self.phase_start = self.now;
-        self.wait = Q::response_timeout(self);
         self.port.pre_transmission();
         self.send()
     }
 
     /// Writes the frame to the port, waits until the port has sent it, and keeps the driver on
     /// for the post-flush hold. If the port accepts nothing, the wait ends after the response
-    /// timeout.
+    /// timeout plus the silence that the request waited for.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn send(&mut self) -> Status {

@@ -57,8 +57,11 @@ unsafe fn poll<T: Transport<RequestPtr>>(client: *mut mbm_client) -> Status {
     unsafe { super::poll::advance_all(client, advance::<T>) }
 }
 
+/// On a host `poll` has a copy of its own. The table's copy is for a client with a link.
+///
 /// # Safety
 /// As for [`transport`].
+#[cfg_attr(not(any(target_os = "none", mbm_firmware)), inline(always))]
 unsafe fn advance<T: Transport<RequestPtr>>(
     object: *mut Object,
     now: u32,

@@ -263,6 +263,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
                 Err(_) => return Status::BUSY,
             },
         };
+        self.storage.count(Counter::Requests, 1);
         let wait = self.time_of(request.state());
         let state = request.state_mut();
         state.wire = self.next;
@@ -270,7 +271,6 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         self.filled += length as u16;
         self.next = self.next.wrapping_add(1);
         self.in_flight += 1;
-        self.storage.count(Counter::Requests, 1);
         Status::OK
     }
 

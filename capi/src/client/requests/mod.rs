@@ -93,8 +93,7 @@ unsafe fn submit(
     }
 }
 
-/// True if the request has ended on a client and was not changed since. Then it is in no
-/// client's queue.
+/// True if the request has ended on a client. Then it is in no client's queue.
 ///
 /// # Safety
 /// As the header demands.
@@ -104,7 +103,6 @@ unsafe fn is_free(client: *const mbm_client, request: *const mbm_clientRequest) 
     unsafe {
         pointers::check(client) == Status::OK
             && !request.is_null()
-            && (*request).status != Status::PENDING.code()
             && (*request.cast::<RequestFields>()).state.has_ended()
     }
 }
@@ -175,7 +173,31 @@ unsafe extern "C" fn two_words(
 ) -> u8 {
     let words = [first.into(), second.into(), 0, 0];
     // SAFETY: as the caller promises.
-    unsafe { queue_request(client, request, &Arguments { function, words }, None) }
+    unsafe {
+        if !FIRMWARE && !is_free(client, request) {
+            return two_words_unknown(client, request, first, second, function);
+        }
+        queue_request(client, request, &Arguments { function, words }, None)
+    }
+}
+
+/// As [`two_words`], for a request that may be pending. (Registers hold its arguments, so
+/// `two_words` needs no stack on a host.)
+///
+/// # Safety
+/// As the header demands.
+#[cold]
+#[inline(never)]
+unsafe extern "C" fn two_words_unknown(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    first: u16,
+    second: u16,
+    function: FunctionSpec,
+) -> u8 {
+    let words = [first.into(), second.into(), 0, 0];
+    // SAFETY: as the caller promises.
+    unsafe { queue_unknown(client, request, &Arguments { function, words }, None) }
 }
 
 /// Queues a read of a table of the data model, by the number of its function, 01 to 04.
