@@ -22,7 +22,7 @@ SYSTEMS = {"__linux__": "Linux", "__APPLE__": "macOS", "_WIN32": "Windows"}
 
 
 def flags(*names):
-    return [flag for name in names for flag in shlex.split(env.subst(f"${name}"))]  # noqa: F821
+    return [flag for name in names for flag in env.subst(f"${name}").split()]  # noqa: F821
 
 
 # The flags that select the processor.
@@ -31,7 +31,9 @@ machine = [flag for flag in flags("CCFLAGS", "CFLAGS") if flag.startswith(("-m",
 
 def macros():
     """The compiler's macros. There are none if it does not run: then compiling says why."""
-    command = [*shlex.split(env.subst("$CC")), *machine, "-dM", "-E", "-x", "c", "-"]  # noqa: F821
+    # A path of Windows has backslashes, which shlex must keep.
+    compiler = [word.strip('"') for word in shlex.split(env.subst("$CC"), posix=os.name != "nt")]  # noqa: F821
+    command = [*compiler, *machine, "-dM", "-E", "-x", "c", "-"]
     variables = {name: str(value) for name, value in env["ENV"].items()}  # noqa: F821
     try:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
