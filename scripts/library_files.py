@@ -52,8 +52,9 @@ def board_names() -> str:
 
 
 def licence() -> str:
+    mit, apache = ((ROOT / f"LICENSE-{name}").read_text(encoding="utf-8") for name in ("MIT", "APACHE"))
     return ("mbm is licensed under either of the two licences below, at your choice.\n\n"
-            + (ROOT / "LICENSE-MIT").read_text(encoding="utf-8") + "\n" + "-" * 78 + "\n\n" + (ROOT / "LICENSE-APACHE").read_text(encoding="utf-8"))
+            f"{mit}\n{'-' * 78}\n\n{apache}")
 
 
 def write_sources(folder: pathlib.Path, assembler: pathlib.Path) -> None:
