@@ -10,7 +10,8 @@ library: assembler
 	@scripts/arduino
 
 .PHONY: arduino
-arduino: library ## Build and check the Arduino libraries dist/mbm and dist/minimal/mbm-minimal, and their zips
+arduino: library ## Build and check the Arduino libraries in build/arduino, and pack them into two zips in dist/
+	@packaging/arduino/pack dist
 	@scripts/check-arduino
 	@scripts/check-assembler
 
@@ -51,12 +52,13 @@ WIDE_ELFS := $(AVR_OUT)/uno-125/TimeWait.elf
 PEER_ELFS := $(if $(MODBUSMASTER),$(patsubst %,$(AVR_OUT)/uno-peer/%.elf,TimeRead TimeBasicNoGap SizeFC03 \
                 Basic PhoenixContact))
 # A copy of the libraries with which the sketches were last compiled.
-DIST_STAMP := $(BUILD)/avr/library
+LIBRARY_STAMP := $(BUILD)/avr/library
 
 .PHONY: library-stamp
 library-stamp: library
 	@mkdir -p $(AVR_OUT)
-	@cat dist/*.zip dist/minimal/*.zip | cmp -s - $(DIST_STAMP) || cat dist/*.zip dist/minimal/*.zip >$(DIST_STAMP)
+	@tar --sort=name --mtime=@0 -cf $(LIBRARY_STAMP).new -C $(BUILD)/arduino mbm minimal
+	@cmp -s $(LIBRARY_STAMP).new $(LIBRARY_STAMP) || cp $(LIBRARY_STAMP).new $(LIBRARY_STAMP)
 
 .PHONY: avr-sketches
 avr-sketches: library-stamp
@@ -65,9 +67,9 @@ avr-sketches: library-stamp
 # The examples are compiled from their copies in the library.
 SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino firmware-tests/avr/libraries/*/src/*)
 define sketches
-$(AVR_OUT)/$(1)/%.elf: examples/arduino/%/ $(SKETCH_SOURCES) $(DIST_STAMP)
-	@scripts/sketch $(1) dist/mbm/examples/$$* $$@
-$(AVR_OUT)/$(1)/%.elf: firmware-tests/avr/sketches/%/ $(SKETCH_SOURCES) $(DIST_STAMP)
+$(AVR_OUT)/$(1)/%.elf: examples/arduino/%/ $(SKETCH_SOURCES) $(LIBRARY_STAMP)
+	@scripts/sketch $(1) $(BUILD)/arduino/mbm/examples/$$* $$@
+$(AVR_OUT)/$(1)/%.elf: firmware-tests/avr/sketches/%/ $(SKETCH_SOURCES) $(LIBRARY_STAMP)
 	@scripts/sketch $(1) $$< $$@
 endef
 $(eval $(call sketches,uno))
@@ -84,7 +86,7 @@ $(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
 UPSTREAM := $(patsubst %,upstream-%,basic-2 phoenix-2 halfduplex-2 basic-09 phoenix-09)
 UPSTREAM_BOARDS := uno mega atmega1284p
 define upstream
-$(AVR_OUT)/$(1)/upstream-%.elf: $(SKETCHES)/upstream-% scripts/sketch $(DIST_STAMP)
+$(AVR_OUT)/$(1)/upstream-%.elf: $(SKETCHES)/upstream-% scripts/sketch $(LIBRARY_STAMP)
 	@scripts/sketch $(1) $$< $$@
 endef
 $(foreach board,$(UPSTREAM_BOARDS),$(eval $(call upstream,$(board))))

@@ -1,0 +1,77 @@
+"""The files that the Arduino library and the PlatformIO package share: the headers, the assembler
+source, the licences and the sketches. scripts/arduino and packaging/platformio/pack import this."""
+
+import pathlib
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+sys.dont_write_bytecode = True
+from boards import SETS  # noqa: E402
+
+HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterHelpers.h", "ModbusMasterOptions.h",
+           "ModbusMasterPorts.h", "ModbusMasterTurn.h", "util/crc16.h", "util/word.h",
+           "ModbusMasterValues.h", "ModbusServer.h", "ModbusServerTables.h", "ModbusStatusText.h", "mbm.h",
+           "ModbusClient.h", "ModbusClientCalls.h", "ModbusRequest.h", "ModbusValues.h", "ModbusNumbers.h",
+           "ModbusCallback.h", "ModbusTransmission.h",
+           "ModbusTcpServer.h", "ModbusTcpConnections.h", "ModbusTcpGateway.h", "ModbusSniffer.h",
+           "ModbusSnifferText.h"]
+
+
+def version() -> str:
+    return subprocess.run([ROOT / "scripts/version"], check=True, text=True, stdout=subprocess.PIPE).stdout.strip()
+
+
+def write(path: pathlib.Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def boards_header() -> str:
+    conditions = " || \\\n      ".join(f"({which.guard})" for which in SETS.values())
+    names = "; ".join(which.what for which in SETS.values())
+    return f"""\
+/**
+ * @file ModbusMasterBoards.h
+ * @brief Stops the build on boards for which this library has no code.
+ *
+ * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h and ModbusServer.h.
+ * Written by scripts/library_files.py; the conditions are those of the files mbm_*.S.
+ */
+
+#if !({conditions})
+#error "mbm does not serve this board. Supported: {names}."
+#endif
+"""
+
+
+
+def board_names() -> str:
+    return "\n".join(f"- {which.what}" for which in SETS.values())
+
+
+def licence() -> str:
+    mit, apache = ((ROOT / f"LICENSE-{name}").read_text(encoding="utf-8") for name in ("MIT", "APACHE"))
+    return ("mbm is licensed under either of the two licences below, at your choice.\n\n"
+            f"{mit}\n{'-' * 78}\n\n{apache}")
+
+
+def write_sources(folder: pathlib.Path, assembler: pathlib.Path) -> None:
+    """Writes the headers, and the assembler source from the folder `assembler`."""
+    missing = [which for which in SETS if not (assembler / f"mbm_{which}.S").is_file()]
+    if missing:
+        sys.exit(f"library_files: {assembler} has no source for {', '.join(missing)}: run `make assembler`")
+    for header in HEADERS:
+        write(folder / header, (ROOT / "include" / header).read_text(encoding="utf-8"))
+    write(folder / "ModbusMasterBoards.h", boards_header())
+    for which in SETS:
+        write(folder / f"mbm_{which}.S", (assembler / f"mbm_{which}.S").read_text(encoding="utf-8"))
+
+
+def write_sketches(folder: pathlib.Path) -> int:
+    """Writes the sketches of examples/arduino, and returns how many there are."""
+    sketches = sorted((ROOT / "examples/arduino").glob("*/*.ino"))
+    for sketch in sketches:
+        write(folder / sketch.parent.name / sketch.name, sketch.read_text(encoding="utf-8"))
+    return len(sketches)
