@@ -11,18 +11,20 @@ file(GLOB mbm_TARGETS RELATIVE "${mbm_ROOT_DIR}/lib" "${mbm_ROOT_DIR}/lib/*/libm
 list(TRANSFORM mbm_TARGETS REPLACE "/libmbm.a$" "")
 set(_mbm_fault)
 
+# The language whose compiler and options say what the target is.
+set(_mbm_language C)
+if(NOT CMAKE_C_COMPILER)
+  set(_mbm_language CXX)
+endif()
+separate_arguments(_mbm_flags NATIVE_COMMAND "${CMAKE_${_mbm_language}_FLAGS}")
+
 # Sets _mbm_guess to the target of the compiler, or _mbm_fault.
 macro(_mbm_probe)
-  set(_mbm_language C)
-  if(NOT CMAKE_C_COMPILER)
-    set(_mbm_language CXX)
-  endif()
   # The options that all files of the caller's folder are compiled with.
   get_directory_property(_mbm_options COMPILE_OPTIONS)
   list(FILTER _mbm_options EXCLUDE REGEX "\\$<")
-  separate_arguments(_mbm_flags NATIVE_COMMAND "${CMAKE_${_mbm_language}_FLAGS}")
   if(CMAKE_${_mbm_language}_COMPILER_TARGET)
-    list(APPEND _mbm_flags
+    list(APPEND _mbm_options
       "${CMAKE_${_mbm_language}_COMPILE_OPTIONS_TARGET}${CMAKE_${_mbm_language}_COMPILER_TARGET}")
   endif()
   execute_process(
@@ -88,6 +90,8 @@ else()
     file(GLOB _mbm_sources "${mbm_ROOT_DIR}/asm${_mbm_small}/*.S")
     add_library(mbm_assembler STATIC EXCLUDE_FROM_ALL ${_mbm_sources})
     target_include_directories(mbm_assembler PUBLIC "${_mbm_include}")
+    # A #if in each file asks for the processor, which toolchain files often give only to C.
+    target_compile_options(mbm_assembler PRIVATE ${_mbm_flags})
     add_library(mbm::mbm ALIAS mbm_assembler)
   endif()
   include("${CMAKE_CURRENT_LIST_DIR}/mbmTargets.cmake")
