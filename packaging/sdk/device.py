@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Is unit 17 on a serial line, whose holding register 2 is 0x1234, and runs a program that reads it:
+"""Is unit 17 on a serial line, whose holding register 100 is 0x1234, and runs a program that reads it:
 
     device.py terminal PROGRAM...    the program gets the path of a terminal as its last argument
     device.py stdio PROGRAM...       the program's standard input and output are the line; QEMU
@@ -15,9 +15,9 @@ import sys
 import time
 import tty
 
-REQUEST = bytes([17, 3, 0, 2, 0, 1])
+REQUEST = bytes([17, 3, 0, 100, 0, 1])
 REPLY = bytes([17, 3, 2, 0x12, 0x34])
-EXPECTED = "register 2: 0x1234"
+EXPECTED = "register 100: 0x1234"
 SECONDS = 60
 
 

@@ -10,7 +10,8 @@ MBM_TARGET "atmega328p"
 #elif defined(__AVR_ARCH__) && __AVR_ARCH__ == 6
 MBM_TARGET "atmega2560"
 /* ATmega1284P, and the series 0, 1 and 2 from 16 KB. */
-#elif defined(__AVR_ARCH__) && (__AVR_ARCH__ == 51 || (__AVR_ARCH__ == 103 && defined(__AVR_HAVE_JMP_CALL__)))
+#elif defined(__AVR_ARCH__) &&                                                                     \
+    (__AVR_ARCH__ == 51 || (__AVR_ARCH__ == 103 && defined(__AVR_HAVE_JMP_CALL__)))
 MBM_TARGET "assembler"
 
 #elif defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)

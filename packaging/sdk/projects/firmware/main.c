@@ -1,4 +1,4 @@
-/* Reads holding register 2 of unit 17, 2400 baud, 8N1. The board's functions are those of
+/* Reads holding register 100 of unit 17, 2400 baud, 8N1. The board's functions are those of
  * examples/baremetal/board.h in the SDK.
  * Licence: MIT OR Apache-2.0. */
 #include "board.h"
@@ -31,9 +31,9 @@ int main(void)
     mbm_master_beginRtu(&master, 17, &port);
     mbm_master_setBaudRate(&master, BAUD);
 
-    status = mbm_master_readHoldingRegisters(&master, 2, 1);
+    status = mbm_master_readHoldingRegisters(&master, 100, 1);
     if (status == MBM_OK) {
-        console_print("register 2: ");
+        console_print("register 100: ");
         print_hexadecimal(response[0]);
     } else {
         console_print(mbm_status_text(status));

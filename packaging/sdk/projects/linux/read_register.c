@@ -1,4 +1,4 @@
-/* Reads holding register 2 of unit 17 on a serial line, 19200 baud, 8N1.
+/* Reads holding register 100 of unit 17 on a serial line, 19200 baud, 8N1.
  *
  *     read_register /dev/ttyUSB0
  *
@@ -27,9 +27,9 @@ int main(int argc, char **argv)
     mbm_master_beginRtu(&master, 17, &port);
     mbm_master_setBaudRate(&master, 19200);
 
-    status = mbm_master_readHoldingRegisters(&master, 2, 1);
+    status = mbm_master_readHoldingRegisters(&master, 100, 1);
     if (status == MBM_OK)
-        printf("register 2: 0x%04X\n", response[0]);
+        printf("register 100: 0x%04X\n", response[0]);
     else
         fprintf(stderr, "%s\n", mbm_status_text(status));
     mbm_tty_close(&tty);
