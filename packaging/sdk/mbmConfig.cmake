@@ -13,8 +13,10 @@ set(_mbm_fault)
 
 # The language whose compiler and options say what the target is.
 set(_mbm_language C)
+set(_mbm_kind c)
 if(NOT CMAKE_C_COMPILER)
   set(_mbm_language CXX)
+  set(_mbm_kind c++)
 endif()
 separate_arguments(_mbm_flags NATIVE_COMMAND "${CMAKE_${_mbm_language}_FLAGS}")
 
@@ -29,7 +31,7 @@ macro(_mbm_probe)
   endif()
   execute_process(
     COMMAND ${CMAKE_${_mbm_language}_COMPILER} ${CMAKE_${_mbm_language}_COMPILER_ARG1} ${_mbm_flags} ${_mbm_options}
-            -E -P -x c "${mbm_ROOT_DIR}/lib/target.h"
+            -E -P -x ${_mbm_kind} "${mbm_ROOT_DIR}/lib/target.h"
     OUTPUT_VARIABLE _mbm_output ERROR_VARIABLE _mbm_output_error RESULT_VARIABLE _mbm_code)
   if(_mbm_code EQUAL 0 AND _mbm_output MATCHES "MBM_TARGET \"([^\"]+)\"")
     set(_mbm_guess "${CMAKE_MATCH_1}")
