@@ -50,19 +50,15 @@ $(FIRMWARE_ARCHIVE):
 MCUS := $(shell scripts/archive --list)
 .PHONY: archives
 archives: ## Build the archives for microcontrollers, build/archives and build/minimal
-	@for mcu in $(MCUS); do scripts/archive $$mcu && scripts/archive $$mcu minimal || exit 1; done
+	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
 	@scripts/check-archive
 
 .PHONY: install
 install: $(ARCHIVE) ## Install library, header, ports, pkg-config and CMake files below PREFIX
 	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/install
 
-.PHONY: dist
-dist: $(ARCHIVE) ## Pack the sources and the archives built so far, dist/mbm-VERSION.tar.gz
-	@scripts/dist
-
 .PHONY: check-install
-check-install: $(ARCHIVE) ## Install, build and run the README's program; pack twice and compare
+check-install: $(ARCHIVE) ## Install, and build and run the README's program from there
 	@scripts/need gcc libc6-dev make cmake pkg-config libmbedtls-dev
 	@scripts/check-install
 
@@ -423,6 +419,8 @@ check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and ch
 # Everything for Arduino and the AVR simulator.
 include scripts/arduino.mk
 include firmware-tests/qemu/qemu.mk
+# The packages in dist/.
+include packaging/packaging.mk
 
 .PHONY: firmware-test
 firmware-test: ## Run firmware on simulated chips against a libmodbus server
