@@ -85,11 +85,11 @@ def struct(compound):
     return "\n".join([f"typedef struct {compound.name} {{", *lines, f"}} {compound.name};"])
 
 
-def page(section):
-    """The Markdown of a section's page."""
+def page(section, titles):
+    """The Markdown of a section's page. `titles` are those of the project's pages."""
     text = f"# {section.title}\n\n{section.about[0].upper() + section.about[1:].rstrip('.')}."
     if section.guide:
-        text += f" The guide with examples: [{section.guide.partition('#')[0].removeprefix('docs/')}](/{section.guide})."
+        text += f" The guide with examples: [{titles[section.guide.partition('#')[0]]}](/{section.guide})."
     text += "\n\n" + block(section.intro)
     if section.functions:
         text += summary(section.functions)

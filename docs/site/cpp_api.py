@@ -59,14 +59,14 @@ def function(name, group, level):
 def page(each, known):
     """The Markdown of a class's page. `known` are all classes by name."""
     compound = each.compound
-    bases = [base for base, is_public in compound.bases if is_public]
+    bases = [re.sub(r"< (.*?) >", r"<\1>", base) for base, is_public in compound.bases if is_public]
     template = f"template <{', '.join(compound.template)}>\n" if compound.template else ""
-    inherits = f" : public {', public '.join(bases)}" if bases else ""
+    inherits = " :\n    public " + ",\n    public ".join(bases) if bases else ""
     text = f"# {compound.name.replace('<', '&lt;')}\n\n"
     text += code(f"#include <{each.header}>\n\n{template}{compound.kind} {compound.name}{inherits};", "cpp")
     text += block(compound.comment.text)
     if of_sketches(each.header):
-        text += f"The guide with sketches: [guide-arduino.md](/{GUIDE}).\n\n"
+        text += f"The guide with sketches: [Arduino](/{GUIDE}).\n\n"
     functions = overloads(each.of("function"))
     if functions:
         rows = [[f'<a href="#{re.sub(chr(92) + "W+", "-", name).strip("-") or "operator"}"><code>{name}</code></a>',

@@ -25,6 +25,7 @@ def on_config(config):
     pages = pathlib.Path(config.docs_dir)
     folders = json.loads((pages.parent / "site-parts/navigation.json").read_text())
     config.nav = expanded(config.nav, folders)
+    config.mdx_configs["toc"]["slugify"] = slug
     # A sitemap needs an address and has the day of the build.
     config.theme.static_templates -= {"sitemap.xml"}
     return config

@@ -1,6 +1,7 @@
 """Takes the project's Markdown into the site: links between files become links between the site's
 pages, names of the API in code become links, and files that pages name get a page with their text."""
 
+import functools
 import os
 import pathlib
 import re
@@ -31,12 +32,19 @@ class Site:
         self.headers = dict(HEADERS)
         self.sources = set()
 
-    def markdown(self):
+    @functools.cached_property
+    def markdown_places(self):
         """The pages: {path in the project: path in the site}."""
         found = {name: place for name, place in PLACED.items() if name in self.files}
         found.update({name: name.removeprefix("docs/") for name in sorted(self.files)
                       if name.startswith("docs/") and name.endswith(".md")})
         return found
+
+    @functools.cached_property
+    def titles(self):
+        """The first heading of each page."""
+        return {path: re.search(r"^# (.*)", (self.root / path).read_text(encoding="utf-8"), re.M)[1]
+                for path in self.markdown_places}
 
     def place(self, path):
         """The page of the site for a path of the project; None if there is none."""
@@ -102,17 +110,9 @@ class Site:
             return f"[{part}]({relative(self.headers[header], page)})"
         return part
 
-    @property
+    @functools.cached_property
     def folders(self):
-        if not hasattr(self, "known_folders"):
-            self.known_folders = {str(folder) for name in self.files for folder in pathlib.PurePath(name).parents} - {"."}
-        return self.known_folders
-
-    @property
-    def markdown_places(self):
-        if not hasattr(self, "known_places"):
-            self.known_places = self.markdown()
-        return self.known_places
+        return {str(folder) for name in self.files for folder in pathlib.PurePath(name).parents} - {"."}
 
     def resolve(self, text, page):
         """Replaces @@NAME, @@NAME#ANCHOR and @@PAGE.md: in HTML by the file, in Markdown by the page."""

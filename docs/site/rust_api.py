@@ -6,6 +6,7 @@ import re
 
 from entries import table
 
+IMPLEMENTORS = re.compile(r'src="([./]+)(trait\.impl/[\w./]+\.js)"')
 BAR = "<!-- the way back -->"
 ITEM = re.compile(r'<dt>(?:<[^>]*>)*?<a class="(\w+)" href="([\w./]+)" title="\w+ ([\w:]+)">.*?</dt>(?:<dd>(.*?)</dd>)?', re.S)
 KINDS = {"struct": "struct", "enum": "enum", "trait": "trait", "fn": "function", "constant": "constant",
@@ -43,10 +44,15 @@ def page(folder):
 
 
 def lead_back(folder):
-    """Puts the path to the site's first page into the bar of each of rustdoc's pages. Returns how many have it."""
+    """Puts the path to the site's first page into the bar of each of rustdoc's pages, and adds the lists of a
+    trait's implementors that rustdoc names and does not write, as empty ones. Returns how many pages have the bar."""
     count = 0
     for file in folder.rglob("*.html"):
         text = file.read_text(encoding="utf-8")
+        for _, script in IMPLEMENTORS.findall(text):
+            listed = folder / script
+            listed.parent.mkdir(parents=True, exist_ok=True)
+            listed.touch()
         if BAR in text:
             root = "../" * (len(file.relative_to(folder).parts))
             file.write_text(text.replace(BAR, "").replace("SITE/", root), encoding="utf-8")
