@@ -85,7 +85,16 @@ def explained(comment):
 
 
 def heading(level, name, anchor=None):
-    return f"{'#' * level} {html.escape(name)} {{ #{anchor or name} .name }}\n\n"
+    return f"{'#' * level} {html.escape(name)} {{ #{anchor or name} .name }}\n\n{parts(name)}"
+
+
+def parts(name):
+    """What else one may look for to find a name, for the search: mbm_client_readCoils is also
+    client_readCoils, readCoils, and read coils."""
+    rest = name.split("_")
+    words = ["_".join(rest[start:]) for start in range(1, len(rest))]
+    words += [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", name) if word.lower() != "mbm"]
+    return f"<p hidden>{' '.join(dict.fromkeys(words))}</p>\n\n"
 
 
 def constants(members):
