@@ -89,7 +89,7 @@ def page(section, titles):
     """The Markdown of a section's page. `titles` are those of the project's pages."""
     text = f"# {section.title}\n\n{section.about[0].upper() + section.about[1:].rstrip('.')}."
     if section.guide:
-        text += f" The guide with examples: [{titles[section.guide.partition('#')[0]]}](/{section.guide})."
+        text += f" Guide: [{titles[section.guide.partition('#')[0]]}](/{section.guide})."
     text += "\n\n" + block(section.intro)
     if section.functions:
         text += summary(section.functions)
@@ -102,16 +102,23 @@ def page(section, titles):
         for member in section.typedefs:
             text += heading(3, member.name)
             text += code(f"typedef {declared(member.type, member.name, member.arguments)};") + explained(member.comment)
-    if section.functions:
-        text += "## Functions\n\n"
-        for member in section.functions:
-            text += heading(3, member.name) + code(prototype(member)) + explained(member.comment)
-    if section.constants or section.enumerations:
-        text += "## Constants\n\n"
-        text += constants(section.constants) if section.constants else ""
-        for enumeration in section.enumerations:
-            text += block(enumeration.comment.text) + constants(enumeration.values)
-    return text
+    parts = [functions_of(section), constants_of(section)]
+    # A section of constants begins with them.
+    return text + "".join(reversed(parts) if len(section.constants) > len(section.functions) else parts)
+
+
+def functions_of(section):
+    if not section.functions:
+        return ""
+    return "## Functions\n\n" + "".join(heading(3, m.name) + code(prototype(m)) + explained(m.comment)
+                                        for m in section.functions)
+
+
+def constants_of(section):
+    if not section.constants and not section.enumerations:
+        return ""
+    text = "## Constants\n\n" + (constants(section.constants) if section.constants else "")
+    return text + "".join(block(each.comment.text) + constants(each.values) for each in section.enumerations)
 
 
 def index(header, made):

@@ -15,16 +15,13 @@ class Class:
         self.path = f"api/cpp/{re.sub(r'[^A-Za-z0-9_]+', '-', compound.name).strip('-')}.md"
         self.header = compound.file.rpartition("/")[2]
         self.members = [m for m in compound.members if not m.is_private]
+        self.is_for_sketches = self.header.removesuffix(".h") in SKETCHES and bool(self.members)
 
     def names(self):
         return {self.name: None}
 
     def of(self, *kinds):
         return [m for m in self.members if m.kind in kinds]
-
-
-def of_sketches(header):
-    return header.removesuffix(".h") in SKETCHES
 
 
 def classes(compounds):
@@ -65,7 +62,7 @@ def page(each, known):
     text = f"# {compound.name.replace('<', '&lt;')}\n\n"
     text += code(f"#include <{each.header}>\n\n{template}{compound.kind} {compound.name}{inherits};", "cpp")
     text += block(compound.comment.text)
-    if of_sketches(each.header):
+    if each.is_for_sketches:
         text += f"The guide with sketches: [Arduino](/{GUIDE}).\n\n"
     functions = overloads(each.of("function"))
     if functions:
@@ -94,7 +91,22 @@ def page(each, known):
     if functions:
         text += "## Members\n\n"
         text += "".join(function(name, group, 3) for name, group in functions.items())
-    return text
+    return within(text, [name for name in functions if re.search(r"[a-z][A-Z]", name)])
+
+
+def within(text, names):
+    """Makes links of the members of a class that its comments name. Names like `begin`, which are words too, stay."""
+    if not names:
+        return text
+    pattern = re.compile(rf"\b({'|'.join(map(re.escape, names))})\b(?!</(?:a|code)>)")
+    lines = text.split("\n")
+    for number, line in enumerate(lines):
+        if line.startswith('<div class="entry">'):
+            # Not in tags, and not in what is a link or code already.
+            parts = re.split(r"(<a .*?</a>|<pre>.*?</pre>|<[^>]*>)", line)
+            parts[::2] = [pattern.sub(r'<a href="#\1">\1</a>', part) for part in parts[::2]]
+            lines[number] = "".join(parts)
+    return "\n".join(lines)
 
 
 def typedef(member):
@@ -142,7 +154,7 @@ def index(made, compounds):
             f" `mbm.h`. [guide-arduino.md](/{GUIDE}) has complete sketches.\n\n")
     for title, wanted in [("Classes that a sketch declares", True), ("Classes that these stand on", False)]:
         rows = [[word(each.name), f"<code>{each.header}</code>", each.compound.comment.first] for each in made
-                if of_sketches(each.header) == wanted]
+                if each.is_for_sketches == wanted]
         text += f"## {title}\n\n" + table("sections", ["class", "header", "about"], rows)
     text += "## Headers\n\n"
     for file in sorted((c for c in compounds if c.kind == "file" and "/Modbus" in c.file), key=lambda c: c.name):

@@ -22,11 +22,10 @@ def linker(names):
 
 def declared(kind, name, rest=""):
     """A declaration in C's order, of a type as Doxygen splits it."""
-    kind = re.sub(r"\bstruct (mbm_)", r"\1", re.sub(r"\s*([*&]+)$", r" \1", kind))
-    rest = re.sub(r"\bstruct (mbm_)", r"\1", rest)
+    kind, rest = re.sub(r"\bstruct (mbm_)", r"\1", kind), re.sub(r"\bstruct (mbm_)", r"\1", rest)
     if kind.endswith("(*"):  # a pointer to a function
         return f"{kind[:-2].rstrip()} (*{name}{rest}"
-    kind = kind.replace("(*", " (*")
+    kind = re.sub(r"\s*([*&]+)$", r" \1", kind.replace("(*", " (*"))
     return f"{kind}{name}{rest}" if kind.endswith(("*", "&")) else f"{kind} {name}{rest}".strip()
 
 
