@@ -416,6 +416,23 @@ check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and ch
 	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
 	@scripts/check-pages $(PAGES)
 
+# The documentation site.
+.PHONY: docs
+docs: ## Make the documentation site, build/site, and check its links, entries and search
+	@scripts/need python3 python3-venv doxygen tidy git
+	@CARGO="$(CARGO)" scripts/docs
+
+.PHONY: docs-serve
+docs-serve: docs ## Make the site and serve it at http://127.0.0.1:8000/
+	@python3 -m http.server --bind 127.0.0.1 --directory $(BUILD)/site 8000
+
+.PHONY: check-docs-site
+check-docs-site: docs ## Open the site in Chromium: width of a phone, requests, search; pictures in build/screenshots
+	@scripts/need chromium
+	@scripts/venv $(BUILD)/venv-browser docs/site/browser.txt
+	@$(BUILD)/venv-browser/bin/python -B scripts/check-site-in-browser
+	@$(BUILD)/venv-browser/bin/python -B scripts/screenshots
+
 # Everything for Arduino and the AVR simulator.
 include scripts/arduino.mk
 include firmware-tests/qemu/qemu.mk

@@ -1770,7 +1770,7 @@ typedef struct mbm_clientUnit {
  * @param client      the object; zeroed before the first call
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
- * @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
+ * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1787,7 +1787,7 @@ uint8_t mbm_client_beginRtu(struct mbm_client *client,
  * @param client      the object; zeroed before the first call
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
- * @param frameBytes  bytes of `frame`, at min_frame_bytes 17; 513 hold any frame
+ * @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1803,7 +1803,7 @@ uint8_t mbm_client_beginAscii(struct mbm_client *client,
  * @param client      the object; zeroed before the first call
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
- * @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
+ * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1821,11 +1821,11 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
  * @param port           the port, which is copied; read, write and micros must not be NULL
  * @param incoming       the buffer of received bytes, valid for as long as the client is
  *                       used
- * @param incomingBytes  bytes of `incoming`, at min_frame_bytes 9; 260 hold any frame. A larger
+ * @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger
  *                       buffer takes more responses from one read
  * @param outgoing       the buffer of bytes to send, valid for as long as the client is
  *                       used
- * @param outgoingBytes  bytes of `outgoing`, at min_frame_bytes 12; 260 hold any frame. A larger
+ * @param outgoingBytes  bytes of `outgoing`, at least 12; 260 hold any frame. A larger
  *                       buffer collects more requests for one write
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended

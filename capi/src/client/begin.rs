@@ -89,7 +89,7 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
 /// @param client      the object; zeroed before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
-/// @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
+/// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -110,7 +110,7 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
 /// @param client      the object; zeroed before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
-/// @param frameBytes  bytes of `frame`, at min_frame_bytes 17; 513 hold any frame
+/// @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -158,7 +158,7 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
 /// @param client      the object; zeroed before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
-/// @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
+/// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -180,11 +180,11 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
 /// @param port           the port, which is copied; read, write and micros must not be NULL
 /// @param incoming       the buffer of received bytes, valid for as long as the client is
 ///                       used
-/// @param incomingBytes  bytes of `incoming`, at min_frame_bytes 9; 260 hold any frame. A larger
+/// @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger
 ///                       buffer takes more responses from one read
 /// @param outgoing       the buffer of bytes to send, valid for as long as the client is
 ///                       used
-/// @param outgoingBytes  bytes of `outgoing`, at min_frame_bytes 12; 260 hold any frame. A larger
+/// @param outgoingBytes  bytes of `outgoing`, at least 12; 260 hold any frame. A larger
 ///                       buffer collects more requests for one write
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
