@@ -14,8 +14,8 @@ enum { RX_BUFFER = 1024, TX_BUFFER = 1024 };
  * of 10 would delay each reply. */
 enum { RX_SILENCE = 2 };
 
-/* The fewest bits of a character: start, data, stop. */
-enum { BITS = 10 };
+/* The bits of a character: start, data, parity or a second stop bit, stop. */
+enum { BITS = 11 };
 
 static int16_t line_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
@@ -28,6 +28,13 @@ static int16_t line_read(void *context, uint8_t *bytes, uint16_t capacity)
     return (int16_t)count;
 }
 
+/* Half a character is added, for rates and clocks that are not exact. The device's reply begins
+ * after more than three. */
+static int64_t sending_micros(const mbm_espIdfLine *line, uint16_t length)
+{
+    return (int64_t)(2 * length + 1) * BITS * 500000 / line->baud;
+}
+
 static int16_t line_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     mbm_espIdfLine *line = context;
@@ -35,7 +42,7 @@ static int16_t line_write(void *context, const uint8_t *bytes, uint16_t length)
     if (!line->isOpen)
         return -1;
     length = length < MBM_MAX_FRAME ? length : MBM_MAX_FRAME;
-    line->sentAt = esp_timer_get_time() + (int64_t)length * BITS * 1000000 / line->baud;
+    line->sentAt = esp_timer_get_time() + sending_micros(line, length);
     return (int16_t)uart_write_bytes(line->uart, bytes, length);
 }
 
