@@ -28,7 +28,7 @@ TESTED_EXAMPLES := custom_command gateway guarded_server
 TRACE = $(patsubst %,$(BUILD)/$(1)/linux/%.o,trace_options pcap_file)
 # The files that clang-format formats. The headers in include/ are documentation too, and are
 # formatted by hand.
-C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'firmware-tests/*.[ch]')
+C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'firmware-tests/*.[ch]' 'packaging/*.[ch]')
 HEADERS := $(wildcard include/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
 
 .PHONY: help

@@ -89,16 +89,15 @@ static void line_idle(void *context, mbm_master *master)
 
 static esp_err_t set_driver(const mbm_espIdfLine *line)
 {
+    const gpio_config_t output = {.pin_bit_mask = 1ull << line->driverPin,
+                                  .mode = GPIO_MODE_OUTPUT,
+                                  .intr_type = GPIO_INTR_DISABLE};
     esp_err_t error;
 
     if (line->driver == MBM_ESP_IDF_DRIVER_BY_UART)
         return uart_set_mode(line->uart, UART_MODE_RS485_HALF_DUPLEX);
-    if (line->driver == MBM_ESP_IDF_NO_DRIVER)
-        return ESP_OK;
     error = gpio_set_level((gpio_num_t)line->driverPin, 0);
-    if (error == ESP_OK)
-        error = gpio_set_direction((gpio_num_t)line->driverPin, GPIO_MODE_OUTPUT);
-    return error;
+    return error == ESP_OK ? gpio_config(&output) : error;
 }
 
 static esp_err_t set_line(const mbm_espIdfLine *line)
@@ -118,7 +117,7 @@ static esp_err_t set_line(const mbm_espIdfLine *line)
         error = uart_set_pin(line->uart, line->txPin, line->rxPin, rts, UART_PIN_NO_CHANGE);
     if (error == ESP_OK)
         error = uart_set_rx_timeout(line->uart, RX_SILENCE);
-    if (error == ESP_OK)
+    if (error == ESP_OK && line->driver != MBM_ESP_IDF_NO_DRIVER)
         error = set_driver(line);
     return error;
 }

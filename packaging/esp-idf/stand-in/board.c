@@ -121,9 +121,11 @@ esp_err_t gpio_set_level(gpio_num_t pin, uint32_t level)
     return ESP_OK;
 }
 
-esp_err_t gpio_set_direction(gpio_num_t pin, gpio_mode_t mode)
+esp_err_t gpio_config(const gpio_config_t *config)
 {
-    expect((int)pin == DRIVER_PIN && mode == GPIO_MODE_OUTPUT, "the direction of a GPIO");
+    expect(DRIVER_PIN >= 0 && config->pin_bit_mask == 1ull << DRIVER_PIN &&
+               config->mode == GPIO_MODE_OUTPUT,
+           "another GPIO is set up");
     is_output = 1;
     line_has_driver();
     return ESP_OK;
