@@ -20,10 +20,15 @@ static int16_t line_read(void *context, uint8_t *bytes, uint16_t capacity)
 static int16_t line_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     mbm_rtThreadLine *line = context;
+    int16_t count;
 
     if (line->device == RT_NULL)
         return -1;
-    return (int16_t)rt_device_write(line->device, 0, bytes, length);
+    count = (int16_t)rt_device_write(line->device, 0, bytes, length);
+    if (count > 0)
+        line->held =
+            line->held + count < line->tail ? (rt_uint8_t)(line->held + count) : line->tail;
+    return count;
 }
 
 static uint32_t line_micros(void *context)
@@ -37,7 +42,8 @@ static uint8_t line_flush(void *context)
 {
     mbm_rtThreadLine *line = context;
 
-    rt_hw_us_delay(line->tail * BITS * 1000000u / line->baud);
+    rt_hw_us_delay(line->held * BITS * 1000000u / line->baud);
+    line->held = 0;
     return 1;
 }
 
@@ -72,7 +78,7 @@ static rt_err_t open_device(const mbm_rtThreadLine *line, rt_device_t device)
     config.baud_rate = line->baud;
     config.data_bits = DATA_BITS_8;
     config.stop_bits = line->parity == PARITY_NONE ? STOP_BITS_2 : STOP_BITS_1;
-    config.parity = line->parity;
+    config.parity = line->parity & 3u;
 #ifdef RT_USING_SERIAL_V2
     config.rx_bufsz = MBM_MAX_FRAME;
 #else

@@ -32,6 +32,7 @@ typedef struct mbm_rtThreadLine {
     rt_uint8_t tail;     /**< how many characters the UART may still hold when rt_device_write
                               returns: 0 if its driver waits for the last bit, as that of the
                               STM32 does, 2 without a FIFO, else the bytes of the FIFO and 1 */
+    rt_uint8_t held;     /**< private */
     rt_device_t device;  /**< private; NULL while the line is not open */
 } mbm_rtThreadLine;
 

@@ -2,7 +2,7 @@
  * @file mbm_zephyr.h
  * @brief An mbm_port over Zephyr's interrupt-driven UART API, for RS-232, TTL levels and RS-485.
  *
- * For Zephyr 3.2 and later, with CONFIG_MBM and CONFIG_MBM_UART. A line is used in one thread.
+ * For Zephyr 3.4 and later, with CONFIG_MBM and CONFIG_MBM_UART. A line is used in one thread.
  * Any number of lines may be used side by side.
  *
  * Licence: MIT OR Apache-2.0.
