@@ -20,8 +20,11 @@ from boards import SETS  # noqa: E402
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 # For where no other file says it. packaging/project.toml replaces them.
-PROJECT = {"name": "mbm", "description": "A Modbus stack for firmware and Linux: master, client, server, gateway, sniffer",
-           "authors": ["The mbm authors"], "repository": "https://github.com/mbm-project/mbm"}
+PROJECT = {"description": "A Modbus stack for firmware and Linux: master, client, server, gateway and sniffer",
+           "repository": "https://github.com/mbm-project/mbm"}
+
+# The time of all files in archives, 1980-01-02. Some file systems have no time before 1980.
+TIME = 315619200
 
 
 class Package:
@@ -91,7 +94,7 @@ class Package:
         with tarfile.open(fileobj=packed, mode="w", format=tarfile.USTAR_FORMAT) as archive:
             for name, content, mode in self.entries(top):
                 entry = tarfile.TarInfo(name)
-                entry.size, entry.mode = len(content), mode
+                entry.size, entry.mode, entry.mtime = len(content), mode, TIME
                 archive.addfile(entry, io.BytesIO(content))
         self.written(target, gzip.compress(packed.getvalue(), 9, mtime=0))
 
@@ -100,7 +103,7 @@ class Package:
         packed = io.BytesIO()
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
             for name, content, mode in self.entries(top):
-                entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+                entry = zipfile.ZipInfo(name, (1980, 1, 2, 0, 0, 0))
                 entry.external_attr = mode << 16
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 archive.writestr(entry, content)
