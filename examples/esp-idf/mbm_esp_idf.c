@@ -78,13 +78,16 @@ static void driver_off(void *context)
     gpio_set_level((gpio_num_t)line->driverPin, 0);
 }
 
-/* Gives other tasks the processor while a blocking call waits. A wait shorter than a tick is
- * not worth a sleep. */
+void mbm_espIdf_wait(uint32_t timeoutUs)
+{
+    if (timeoutUs >= portTICK_PERIOD_MS * 1000)
+        vTaskDelay(1);
+}
+
 static void line_idle(void *context, mbm_master *master)
 {
     (void)context;
-    if (mbm_master_pollDelay(master) >= portTICK_PERIOD_MS * 1000)
-        vTaskDelay(1);
+    mbm_espIdf_wait(mbm_master_pollDelay(master));
 }
 
 static esp_err_t set_driver(const mbm_espIdfLine *line)

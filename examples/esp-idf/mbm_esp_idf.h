@@ -57,6 +57,15 @@ esp_err_t mbm_espIdf_open(mbm_espIdfLine *line, mbm_port *port);
  */
 void mbm_espIdf_close(mbm_espIdfLine *line);
 
+/**
+ * Lets other tasks run, for at most a tick. For a program that polls a client or a server: pass
+ * the value that its pollDelay function returned. Does not sleep for less than a tick, so that the
+ * driver of the transceiver goes off in time.
+ *
+ * @param timeoutUs  the longest time to sleep, in microseconds
+ */
+void mbm_espIdf_wait(uint32_t timeoutUs);
+
 #ifdef __cplusplus
 }
 #endif

@@ -61,13 +61,16 @@ static void driver_off(void *context)
     rt_pin_write(line->driverPin, PIN_LOW);
 }
 
-/* Gives other threads the processor while a blocking call waits. A wait shorter than a tick is
- * not worth a sleep. */
+void mbm_rtThread_wait(uint32_t timeoutUs)
+{
+    if (timeoutUs >= MICROS_OF_A_TICK)
+        rt_thread_delay(1);
+}
+
 static void line_idle(void *context, mbm_master *master)
 {
     (void)context;
-    if (mbm_master_pollDelay(master) >= MICROS_OF_A_TICK)
-        rt_thread_delay(1);
+    mbm_rtThread_wait(mbm_master_pollDelay(master));
 }
 
 static rt_err_t open_device(const mbm_rtThreadLine *line, rt_device_t device)

@@ -55,6 +55,15 @@ rt_err_t mbm_rtThread_open(mbm_rtThreadLine *line, mbm_port *port);
  */
 void mbm_rtThread_close(mbm_rtThreadLine *line);
 
+/**
+ * Lets other threads run, for at most a tick. For a program that polls a client or a server: pass
+ * the value that its pollDelay function returned. Does not sleep for less than a tick, so that the
+ * driver of the transceiver goes off in time.
+ *
+ * @param timeoutUs  the longest time to sleep, in microseconds
+ */
+void mbm_rtThread_wait(uint32_t timeoutUs);
+
 #ifdef __cplusplus
 }
 #endif

@@ -7,8 +7,8 @@
 /* The bits of a character: start, data, parity or a second stop bit, stop. */
 enum { BITS = 11 };
 
-/* The longest sleep while a blocking call waits, in microseconds. */
-enum { LONGEST_SLEEP = 1000000 };
+/* The longest sleep, in microseconds. */
+#define LONGEST_SLEEP 1000000u
 
 static uint32_t line_micros(void *context)
 {
@@ -113,14 +113,9 @@ static void driver_off(void *context)
     gpio_pin_set_dt(&line->driver, 0);
 }
 
-/* Sleeps until bytes arrive or the master has something to do. */
 static void line_idle(void *context, mbm_master *master)
 {
-    mbm_zephyrLine *line = context;
-    uint32_t delay = mbm_master_pollDelay(master);
-
-    if (delay > 0)
-        k_sem_take(&line->received, K_USEC(delay < LONGEST_SLEEP ? delay : LONGEST_SLEEP));
+    mbm_zephyr_wait(context, mbm_master_pollDelay(master));
 }
 
 /* --- opening */
@@ -181,6 +176,12 @@ int mbm_zephyr_open(mbm_zephyrLine *line, mbm_port *port)
         port->postTransmission = driver_off;
     }
     return 0;
+}
+
+void mbm_zephyr_wait(mbm_zephyrLine *line, uint32_t timeoutUs)
+{
+    if (line != NULL && timeoutUs > 0)
+        k_sem_take(&line->received, K_USEC(MIN(timeoutUs, LONGEST_SLEEP)));
 }
 
 uint16_t mbm_zephyr_lost(const mbm_zephyrLine *line)

@@ -51,6 +51,15 @@ typedef struct mbm_zephyrLine {
 int mbm_zephyr_open(mbm_zephyrLine *line, mbm_port *port);
 
 /**
+ * Sleeps until bytes arrive or a time is over. For a program that polls a client or a server: pass
+ * the value that its pollDelay function returned.
+ *
+ * @param line       the line, open
+ * @param timeoutUs  the longest time to sleep, in microseconds; the sleep may be shorter
+ */
+void mbm_zephyr_wait(mbm_zephyrLine *line, uint32_t timeoutUs);
+
+/**
  * Returns how many received bytes found no place because the thread read too late.
  *
  * @param line  the line

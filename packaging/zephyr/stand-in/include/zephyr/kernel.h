@@ -16,6 +16,8 @@ struct k_sem {
 /* 10000 ticks a second, the default of most boards, and 64 MHz. */
 enum { STAND_IN_TICK_US = 100, STAND_IN_MHZ = 64 };
 
+#define MIN(a, b) ((a) < (b) ? (a) : (b))
+
 #define K_USEC(micros)                                                                             \
     ((k_timeout_t){(int64_t)((micros) + STAND_IN_TICK_US - 1) / STAND_IN_TICK_US})
 
