@@ -1,14 +1,13 @@
 """The files that the Arduino library and the PlatformIO package share: the headers, the assembler
-source, the licences and the sketches. scripts/arduino and packaging/platformio/pack import this."""
+source and the sketches. scripts/arduino and packaging/platformio/pack import this."""
 
 import pathlib
-import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "scripts"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 sys.dont_write_bytecode = True
 from boards import SETS  # noqa: E402
+from project import ROOT  # noqa: E402
 
 HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterHelpers.h", "ModbusMasterOptions.h",
            "ModbusMasterPorts.h", "ModbusMasterTurn.h", "util/crc16.h", "util/word.h",
@@ -17,10 +16,6 @@ HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterHelpers.h",
            "ModbusCallback.h", "ModbusTransmission.h",
            "ModbusTcpServer.h", "ModbusTcpConnections.h", "ModbusTcpGateway.h", "ModbusSniffer.h",
            "ModbusSnifferText.h"]
-
-
-def version() -> str:
-    return subprocess.run([ROOT / "scripts/version"], check=True, text=True, stdout=subprocess.PIPE).stdout.strip()
 
 
 def write(path: pathlib.Path, text: str) -> None:
@@ -46,15 +41,8 @@ def boards_header() -> str:
 """
 
 
-
 def board_names() -> str:
     return "\n".join(f"- {which.what}" for which in SETS.values())
-
-
-def licence() -> str:
-    mit, apache = ((ROOT / f"LICENSE-{name}").read_text(encoding="utf-8") for name in ("MIT", "APACHE"))
-    return ("mbm is licensed under either of the two licences below, at your choice.\n\n"
-            f"{mit}\n{'-' * 78}\n\n{apache}")
 
 
 def write_sources(folder: pathlib.Path, assembler: pathlib.Path) -> None:

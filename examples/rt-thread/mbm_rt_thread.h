@@ -1,0 +1,71 @@
+/**
+ * @file mbm_rt_thread.h
+ * @brief An mbm_port over RT-Thread's serial and pin devices, for RS-232, TTL levels and RS-485.
+ *
+ * For RT-Thread 4.1 and later, with the serial framework of version 1 or 2. A line is used in one
+ * thread. Any number of lines may be used side by side.
+ *
+ * Licence: MIT OR Apache-2.0.
+ */
+#ifndef MBM_RT_THREAD_H
+#define MBM_RT_THREAD_H
+
+#include "mbm.h"
+
+#include <rtdevice.h>
+#include <rtthread.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** For driverPin: there is no pin to switch. */
+#define MBM_RT_THREAD_NO_PIN (-1)
+
+/** A serial line. Set the public fields, zero the others, and keep it valid while it is used. */
+typedef struct mbm_rtThreadLine {
+    const char *uart;    /**< the device's name, for example "uart2" */
+    rt_base_t driverPin; /**< the pin at DE and /RE of an RS-485 transceiver, as GET_PIN returns
+                              it, or MBM_RT_THREAD_NO_PIN */
+    rt_uint32_t baud;    /**< bits per second */
+    rt_uint32_t parity;  /**< PARITY_EVEN, Modbus's default, PARITY_ODD or PARITY_NONE */
+    rt_uint8_t tail;     /**< how many characters the UART may still hold when rt_device_write
+                              returns: 0 if its driver waits for the last bit, as that of the
+                              STM32 does, 2 without a FIFO, else the bytes of the FIFO and 1 */
+    rt_uint8_t held;     /**< private */
+    rt_device_t device;  /**< private; NULL while the line is not open */
+} mbm_rtThreadLine;
+
+/**
+ * Opens the device: 8 data bits, two stop bits without parity, else one.
+ *
+ * @param line  the settings
+ * @param port  receives the port for the begin functions. Its write waits while the bytes leave,
+ *              as rt_device_write does
+ * @return RT_EOK; -RT_EINVAL for NULL, a rate of 0 or a line that is open; -RT_ENOSYS if there is
+ *         no device of that name; or the error of the function of RT-Thread that failed
+ */
+rt_err_t mbm_rtThread_open(mbm_rtThreadLine *line, mbm_port *port);
+
+/**
+ * Closes the device. Objects that use the port then report a lost link. Does nothing if the line
+ * is not open.
+ *
+ * @param line  the line
+ */
+void mbm_rtThread_close(mbm_rtThreadLine *line);
+
+/**
+ * Lets other threads run, for at most a tick. For a program that polls a client or a server: pass
+ * the value that its pollDelay function returned. Does not sleep for less than a tick, so that the
+ * driver of the transceiver goes off in time.
+ *
+ * @param timeoutUs  the longest time to sleep, in microseconds
+ */
+void mbm_rtThread_wait(uint32_t timeoutUs);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,74 @@
+/**
+ * @file mbm_zephyr.h
+ * @brief An mbm_port over Zephyr's interrupt-driven UART API, for RS-232, TTL levels and RS-485.
+ *
+ * For Zephyr 3.4 and later, with CONFIG_MBM and CONFIG_MBM_UART. A line is used in one thread.
+ * Any number of lines may be used side by side.
+ *
+ * Licence: MIT OR Apache-2.0.
+ */
+#ifndef MBM_ZEPHYR_H
+#define MBM_ZEPHYR_H
+
+#include "mbm.h"
+
+#include <stdbool.h>
+#include <zephyr/drivers/gpio.h>
+#include <zephyr/drivers/uart.h>
+#include <zephyr/kernel.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** A serial line. Set the public fields, zero the others, and keep it valid while it is used. */
+typedef struct mbm_zephyrLine {
+    const struct device *uart;  /**< for example DEVICE_DT_GET(DT_ALIAS(modbus_line)) */
+    struct gpio_dt_spec driver; /**< the pin at DE and /RE of an RS-485 transceiver; zero if none */
+    uint32_t baud;              /**< bits per second */
+    uint8_t parity;             /**< UART_CFG_PARITY_EVEN, Modbus's default, _ODD or _NONE */
+
+    mbm_ring ring;                        /**< private: received bytes */
+    uint8_t ringBytes[MBM_MAX_FRAME + 1]; /**< private */
+    uint8_t toSend[MBM_MAX_FRAME];        /**< private */
+    volatile uint16_t next;               /**< private: the first byte that is not in the FIFO */
+    volatile uint16_t end;                /**< private: the end of the bytes to send */
+    volatile bool isSending;              /**< private */
+    uint32_t beganAt;                     /**< private */
+    uint32_t lasts;                       /**< private */
+    struct k_sem received;                /**< private */
+} mbm_zephyrLine;
+
+/**
+ * Prepares UART and pin: 8 data bits, two stop bits without parity, else one. If the UART has no
+ * runtime configuration (CONFIG_UART_USE_RUNTIME_CONFIGURE), the devicetree sets rate and format.
+ *
+ * @param line  the settings
+ * @param port  receives the port for the begin functions
+ * @return 0; -EINVAL for NULL, a rate of 0 or a frame that is being sent; -ENODEV if a device is
+ *         not ready; or the error of the function of Zephyr that failed
+ */
+int mbm_zephyr_open(mbm_zephyrLine *line, mbm_port *port);
+
+/**
+ * Sleeps until bytes arrive or a time is over. For a program that polls a client or a server: pass
+ * the value that its pollDelay function returned.
+ *
+ * @param line       the line, open
+ * @param timeoutUs  the longest time to sleep, in microseconds; the sleep may be shorter
+ */
+void mbm_zephyr_wait(mbm_zephyrLine *line, uint32_t timeoutUs);
+
+/**
+ * Returns how many received bytes found no place because the thread read too late.
+ *
+ * @param line  the line
+ * @return bytes since mbm_zephyr_open
+ */
+uint16_t mbm_zephyr_lost(const mbm_zephyrLine *line);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

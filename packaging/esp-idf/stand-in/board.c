@@ -1,0 +1,157 @@
+/* Plays ESP-IDF's UART driver, GPIOs and tasks on a line in memory, and starts the example. The
+ * program ends when the device has answered four requests and ignored one.
+ * Licence: MIT OR Apache-2.0. */
+#include "driver/gpio.h"
+#include "driver/uart.h"
+#include "esp_timer.h"
+#include "freertos/task.h"
+#include "line.h"
+#include "mbm_esp_idf.h"
+#include "sdkconfig.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+void app_main(void);
+
+static int is_installed, is_even, rts = UART_PIN_NO_CHANGE, is_rs485, is_output;
+
+static void expect(int fact, const char *what)
+{
+    if (!fact) {
+        printf("board: %s\n", what);
+        exit(1);
+    }
+}
+
+/* In this mode the UART switches the driver itself. */
+static void drive(bool on)
+{
+    if (is_rs485)
+        line_drive(on);
+}
+
+void line_interrupt(void)
+{
+    if (line_unsent() == 0)
+        drive(false);
+}
+
+esp_err_t uart_driver_install(uart_port_t uart, int rx_size, int tx_size, int queue_size,
+                              QueueHandle_t *queue, int flags)
+{
+    expect(!is_installed && uart == CONFIG_METER_UART, "the driver is installed for another UART");
+    expect(rx_size > 128 && tx_size > 2 * MBM_MAX_FRAME, "the buffers are too small");
+    expect(queue_size == 0 && queue == NULL && flags == 0, "the driver is installed with a queue");
+    is_installed = 1;
+    return ESP_OK;
+}
+
+esp_err_t uart_driver_delete(uart_port_t uart)
+{
+    expect(is_installed && uart == CONFIG_METER_UART, "another driver is removed");
+    is_installed = 0;
+    return ESP_OK;
+}
+
+esp_err_t uart_param_config(uart_port_t uart, const uart_config_t *config)
+{
+    expect(uart == CONFIG_METER_UART && config->data_bits == UART_DATA_8_BITS, "the format");
+    expect(config->stop_bits ==
+               (config->parity == UART_PARITY_DISABLE ? UART_STOP_BITS_2 : UART_STOP_BITS_1),
+           "a character does not have 11 bits");
+    is_even = config->parity == UART_PARITY_EVEN;
+    line_begin((uint32_t)config->baud_rate);
+    return ESP_OK;
+}
+
+esp_err_t uart_set_pin(uart_port_t uart, int tx, int rx, int rts_pin, int cts)
+{
+    expect(uart == CONFIG_METER_UART && tx == CONFIG_METER_TX_PIN && rx == CONFIG_METER_RX_PIN,
+           "the pins");
+    expect(cts == UART_PIN_NO_CHANGE, "CTS has a pin");
+    rts = rts_pin;
+    return ESP_OK;
+}
+
+esp_err_t uart_set_mode(uart_port_t uart, uart_mode_t mode)
+{
+    expect(uart == CONFIG_METER_UART && mode == UART_MODE_RS485_HALF_DUPLEX, "the mode");
+    is_rs485 = 1;
+    line_has_driver();
+    return ESP_OK;
+}
+
+esp_err_t uart_set_rx_timeout(uart_port_t uart, const uint8_t characters)
+{
+    (void)uart;
+    return characters > 0 && characters <= 10 ? ESP_OK : ESP_FAIL;
+}
+
+esp_err_t uart_wait_tx_done(uart_port_t uart, TickType_t ticks)
+{
+    expect(uart == CONFIG_METER_UART && ticks == 0, "the port waits");
+    return line_unsent() == 0 ? ESP_OK : ESP_ERR_TIMEOUT;
+}
+
+int uart_write_bytes(uart_port_t uart, const void *bytes, size_t length)
+{
+    expect(uart == CONFIG_METER_UART && is_installed, "no driver to write to");
+    drive(true);
+    expect(line_write(bytes, (uint16_t)length) == length, "the transmit buffer is full");
+    return (int)length;
+}
+
+int uart_read_bytes(uart_port_t uart, void *bytes, uint32_t capacity, TickType_t ticks)
+{
+    expect(uart == CONFIG_METER_UART && is_installed && ticks == 0, "the port waits");
+    return line_read(bytes, (uint16_t)capacity);
+}
+
+#if defined CONFIG_METER_DRIVER_PIN
+#define DRIVER_PIN CONFIG_METER_DRIVER_PIN
+#else
+#define DRIVER_PIN UART_PIN_NO_CHANGE
+#endif
+
+esp_err_t gpio_set_level(gpio_num_t pin, uint32_t level)
+{
+    expect((int)pin == DRIVER_PIN, "another GPIO is set");
+    line_drive(level != 0);
+    return ESP_OK;
+}
+
+esp_err_t gpio_config(const gpio_config_t *config)
+{
+    expect(DRIVER_PIN >= 0 && config->pin_bit_mask == 1ull << DRIVER_PIN &&
+               config->mode == GPIO_MODE_OUTPUT,
+           "another GPIO is set up");
+    is_output = 1;
+    line_has_driver();
+    return ESP_OK;
+}
+
+int64_t esp_timer_get_time(void)
+{
+    return line_micros();
+}
+
+void vTaskDelay(const TickType_t ticks)
+{
+    static int is_checked;
+
+    expect(is_even && (DRIVER_PIN < 0 || is_output || (is_rs485 && rts == DRIVER_PIN)),
+           "the line is not set");
+    if (!is_checked)
+        printf("driver: %s\n", is_rs485 ? "by the UART" : is_output ? "by a pin" : "none");
+    is_checked = 1;
+    line_sleep(ticks * portTICK_PERIOD_MS * 1000);
+}
+
+int main(void)
+{
+    line_ignore_after(2);
+    line_end_after(4);
+    app_main();
+    return 1;
+}

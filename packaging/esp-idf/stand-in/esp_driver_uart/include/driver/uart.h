@@ -1,0 +1,41 @@
+/* See esp_err.h. Licence: MIT OR Apache-2.0. */
+#ifndef UART_H
+#define UART_H
+
+#include "esp_err.h"
+#include "freertos/FreeRTOS.h"
+#include <stddef.h>
+#include <stdint.h>
+
+typedef enum { UART_NUM_0, UART_NUM_1, UART_NUM_MAX } uart_port_t;
+typedef enum { UART_DATA_8_BITS = 3 } uart_word_length_t;
+typedef enum { UART_STOP_BITS_1 = 1, UART_STOP_BITS_2 = 3 } uart_stop_bits_t;
+typedef enum { UART_PARITY_DISABLE, UART_PARITY_EVEN = 2, UART_PARITY_ODD } uart_parity_t;
+typedef enum { UART_HW_FLOWCTRL_DISABLE } uart_hw_flowcontrol_t;
+typedef enum { UART_MODE_UART, UART_MODE_RS485_HALF_DUPLEX } uart_mode_t;
+typedef enum { UART_SCLK_DEFAULT } uart_sclk_t;
+
+typedef struct {
+    int baud_rate;
+    uart_word_length_t data_bits;
+    uart_parity_t parity;
+    uart_stop_bits_t stop_bits;
+    uart_hw_flowcontrol_t flow_ctrl;
+    uint8_t rx_flow_ctrl_thresh;
+    uart_sclk_t source_clk;
+} uart_config_t;
+
+#define UART_PIN_NO_CHANGE (-1)
+
+esp_err_t uart_driver_install(uart_port_t uart, int rx_size, int tx_size, int queue_size,
+                              QueueHandle_t *queue, int flags);
+esp_err_t uart_driver_delete(uart_port_t uart);
+esp_err_t uart_param_config(uart_port_t uart, const uart_config_t *config);
+esp_err_t uart_set_pin(uart_port_t uart, int tx, int rx, int rts, int cts);
+esp_err_t uart_set_mode(uart_port_t uart, uart_mode_t mode);
+esp_err_t uart_set_rx_timeout(uart_port_t uart, const uint8_t characters);
+esp_err_t uart_wait_tx_done(uart_port_t uart, TickType_t ticks);
+int uart_write_bytes(uart_port_t uart, const void *bytes, size_t length);
+int uart_read_bytes(uart_port_t uart, void *bytes, uint32_t capacity, TickType_t ticks);
+
+#endif

@@ -1,0 +1,132 @@
+/* Plays RT-Thread's serial device, pins and clock on a line in memory, and runs the shell command
+ * of the example. Its serial driver returns from a write while the last MBM_EXAMPLE_TAIL
+ * characters still leave. Licence: MIT OR Apache-2.0. */
+#include "line.h"
+
+#include <rtdevice.h>
+#include <rthw.h>
+#include <rtthread.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+extern int (*const stand_in_command)(int, char **);
+
+struct rt_device {
+    bool is_open, is_configured;
+};
+
+static struct rt_device uart;
+static bool is_output;
+
+static void expect(bool fact, const char *what)
+{
+    if (!fact) {
+        printf("board: %s\n", what);
+        exit(1);
+    }
+}
+
+void line_interrupt(void) {}
+
+rt_device_t rt_device_find(const char *name)
+{
+    return strcmp(name, MBM_EXAMPLE_UART) == 0 ? &uart : NULL;
+}
+
+rt_err_t rt_device_control(rt_device_t device, int command, void *argument)
+{
+    const struct serial_configure *config = argument;
+
+    expect(device == &uart && command == RT_DEVICE_CTRL_CONFIG && !uart.is_open, "the control");
+    expect(config->data_bits == DATA_BITS_8 && config->parity == PARITY_EVEN &&
+               config->stop_bits == STOP_BITS_1,
+           "the format");
+#ifdef RT_USING_SERIAL_V2
+    expect(config->rx_bufsz >= 256, "the buffer is too small");
+#else
+    expect(config->bufsz >= 256, "the buffer is too small");
+#endif
+    line_begin(config->baud_rate);
+    uart.is_configured = true;
+    return RT_EOK;
+}
+
+rt_err_t rt_device_open(rt_device_t device, rt_uint16_t flags)
+{
+    expect(device == &uart && uart.is_configured && !uart.is_open, "the device is opened");
+#ifdef RT_USING_SERIAL_V2
+    expect(flags == (RT_DEVICE_FLAG_RX_NON_BLOCKING | RT_DEVICE_FLAG_TX_BLOCKING), "the flags");
+    printf("serial framework: 2\n");
+#else
+    expect(flags == (RT_DEVICE_OFLAG_RDWR | RT_DEVICE_FLAG_INT_RX), "the flags");
+    printf("serial framework: 1\n");
+#endif
+    uart.is_open = true;
+    return RT_EOK;
+}
+
+rt_err_t rt_device_close(rt_device_t device)
+{
+    expect(device == &uart && uart.is_open, "another device is closed");
+    uart.is_open = false;
+    return RT_EOK;
+}
+
+rt_ssize_t rt_device_read(rt_device_t device, rt_off_t position, void *bytes, rt_size_t size)
+{
+    expect(device == &uart && uart.is_open && position == 0, "no device to read from");
+    return line_read(bytes, (uint16_t)size);
+}
+
+rt_ssize_t rt_device_write(rt_device_t device, rt_off_t position, const void *bytes, rt_size_t size)
+{
+    expect(device == &uart && uart.is_open && position == 0, "no device to write to");
+    size = line_write(bytes, (uint16_t)size);
+    while (line_unsent() > MBM_EXAMPLE_TAIL)
+        line_sleep(1);
+    return (rt_ssize_t)size;
+}
+
+void rt_pin_mode(rt_base_t pin, rt_uint8_t mode)
+{
+    expect(pin == MBM_EXAMPLE_DRIVER_PIN && mode == PIN_MODE_OUTPUT, "the mode of a pin");
+    is_output = true;
+    line_has_driver();
+}
+
+void rt_pin_write(rt_base_t pin, rt_ssize_t value)
+{
+    expect(pin == MBM_EXAMPLE_DRIVER_PIN && is_output, "another pin is set");
+    line_drive(value == PIN_HIGH);
+}
+
+rt_tick_t rt_tick_get(void)
+{
+    return line_micros() / (1000000 / RT_TICK_PER_SECOND);
+}
+
+rt_err_t rt_thread_delay(rt_tick_t ticks)
+{
+    line_sleep(ticks * (1000000 / RT_TICK_PER_SECOND));
+    return RT_EOK;
+}
+
+rt_err_t rt_thread_mdelay(rt_int32_t milliseconds)
+{
+    line_sleep((uint32_t)milliseconds * 1000);
+    return RT_EOK;
+}
+
+void rt_hw_us_delay(rt_uint32_t micros)
+{
+    line_sleep(micros);
+}
+
+int main(void)
+{
+    line_ignore_after(2);
+    expect(stand_in_command(0, NULL) == 0, "the command fails");
+    expect(!uart.is_open, "the device is left open");
+    return 0;
+}

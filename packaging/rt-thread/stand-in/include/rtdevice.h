@@ -1,0 +1,40 @@
+/* See rtthread.h. Licence: MIT OR Apache-2.0. */
+#ifndef RTDEVICE_H
+#define RTDEVICE_H
+
+#include <rtthread.h>
+
+#define DATA_BITS_8 8
+#define STOP_BITS_1 0
+#define STOP_BITS_2 1
+#define PARITY_NONE 0
+#define PARITY_ODD 1
+#define PARITY_EVEN 2
+
+#ifdef RT_USING_SERIAL_V2
+struct serial_configure {
+    rt_uint32_t baud_rate;
+    rt_uint32_t data_bits : 4, stop_bits : 2, parity : 2, bit_order : 1, invert : 1;
+    rt_uint32_t rx_bufsz : 16, tx_bufsz : 16;
+};
+#else
+struct serial_configure {
+    rt_uint32_t baud_rate;
+    rt_uint32_t data_bits : 4, stop_bits : 2, parity : 2, bit_order : 1, invert : 1, bufsz : 16;
+};
+#endif
+
+/* 115200 8N1. */
+#define RT_SERIAL_CONFIG_DEFAULT                                                                   \
+    {                                                                                              \
+        .baud_rate = 115200, .data_bits = DATA_BITS_8                                              \
+    }
+
+#define PIN_LOW 0
+#define PIN_HIGH 1
+#define PIN_MODE_OUTPUT 0
+
+void rt_pin_mode(rt_base_t pin, rt_uint8_t mode);
+void rt_pin_write(rt_base_t pin, rt_ssize_t value);
+
+#endif

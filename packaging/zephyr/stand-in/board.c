@@ -1,0 +1,214 @@
+/* Plays Zephyr's UART with a FIFO of 16 bytes, a GPIO and the kernel's clock on a line in memory.
+ * The sample's main runs by itself: this file's constructor prepares the line. The program ends
+ * when the device has answered four requests and ignored one. Licence: MIT OR Apache-2.0. */
+#include "line.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <zephyr/drivers/gpio.h>
+#include <zephyr/drivers/uart.h>
+#include <zephyr/kernel.h>
+
+enum { FIFO = 16 };
+
+const struct device stand_in_uart = {.name = STAND_IN_UART};
+const struct device stand_in_gpio = {.name = STAND_IN_GPIO};
+
+static uart_irq_callback_user_data_t call;
+static void *call_data;
+static bool is_configured, is_output, has_rx, has_tx, is_inside, is_updated;
+
+static void expect(bool fact, const char *what)
+{
+    if (!fact) {
+        printf("board: %s\n", what);
+        exit(1);
+    }
+}
+
+__attribute__((constructor)) static void begin(void)
+{
+    line_ignore_after(2);
+    line_end_after(4);
+}
+
+bool device_is_ready(const struct device *device)
+{
+    return device == &stand_in_uart || device == &stand_in_gpio;
+}
+
+/* --- the UART */
+
+/* The interrupt's level: the handler runs again as long as there is something to do. */
+void line_interrupt(void)
+{
+    int times = 0;
+
+    if (call == NULL || is_inside)
+        return;
+    is_inside = true;
+    while ((has_rx && line_received() > 0) || (has_tx && (line_unsent() < FIFO && times < 2))) {
+        expect(times++ < 100, "the handler does not end");
+        is_updated = false;
+        call(&stand_in_uart, call_data);
+    }
+    is_inside = false;
+}
+
+int uart_configure(const struct device *dev, const struct uart_config *config)
+{
+    expect(dev == &stand_in_uart && config->baudrate == 19200, "the rate");
+    expect(config->parity == UART_CFG_PARITY_EVEN && config->stop_bits == UART_CFG_STOP_BITS_1 &&
+               config->data_bits == UART_CFG_DATA_BITS_8 &&
+               config->flow_ctrl == UART_CFG_FLOW_CTRL_NONE,
+           "the format");
+    line_begin(config->baudrate);
+    is_configured = true;
+    return 0;
+}
+
+int uart_irq_callback_user_data_set(const struct device *dev, uart_irq_callback_user_data_t wanted,
+                                    void *user_data)
+{
+    expect(dev == &stand_in_uart && is_configured, "a handler for another UART");
+    call = wanted;
+    call_data = user_data;
+    return 0;
+}
+
+int uart_irq_update(const struct device *dev)
+{
+    is_updated = dev == &stand_in_uart && is_inside;
+    return is_updated;
+}
+
+int uart_irq_rx_ready(const struct device *dev)
+{
+    (void)dev;
+    expect(is_updated, "the state is read without uart_irq_update");
+    return has_rx && line_received() > 0;
+}
+
+int uart_irq_tx_ready(const struct device *dev)
+{
+    (void)dev;
+    expect(is_updated, "the state is read without uart_irq_update");
+    return has_tx && line_unsent() < FIFO;
+}
+
+int uart_irq_is_pending(const struct device *dev)
+{
+    return uart_irq_rx_ready(dev) || uart_irq_tx_ready(dev);
+}
+
+/* As many UARTs do: the FIFO is empty, but the last byte still leaves. */
+int uart_irq_tx_complete(const struct device *dev)
+{
+    (void)dev;
+    expect(is_updated, "the state is read without uart_irq_update");
+    return line_unsent() <= 1;
+}
+
+void uart_irq_rx_enable(const struct device *dev)
+{
+    has_rx = dev == &stand_in_uart;
+    line_interrupt();
+}
+
+void uart_irq_tx_enable(const struct device *dev)
+{
+    has_tx = dev == &stand_in_uart;
+    line_interrupt();
+}
+
+void uart_irq_tx_disable(const struct device *dev)
+{
+    (void)dev;
+    has_tx = false;
+}
+
+int uart_fifo_read(const struct device *dev, uint8_t *bytes, const int size)
+{
+    expect(dev == &stand_in_uart && is_inside, "the FIFO is read outside of the handler");
+    return line_read(bytes, (uint16_t)size);
+}
+
+int uart_fifo_fill(const struct device *dev, const uint8_t *bytes, int size)
+{
+    int space = FIFO - line_unsent();
+
+    expect(dev == &stand_in_uart && is_inside, "the FIFO is filled outside of the handler");
+    return line_write(bytes, (uint16_t)(size < space ? size : space));
+}
+
+/* --- the GPIO */
+
+int gpio_pin_configure_dt(const struct gpio_dt_spec *pin, gpio_flags_t flags)
+{
+    expect(pin->port == &stand_in_gpio && pin->pin == STAND_IN_PIN &&
+               flags == GPIO_OUTPUT_INACTIVE && !is_output,
+           "another GPIO is set up");
+    is_output = true;
+    line_has_driver();
+    printf("driver: pin %d of %s\n", pin->pin, pin->port->name);
+    return 0;
+}
+
+int gpio_pin_set_dt(const struct gpio_dt_spec *pin, int value)
+{
+    expect(pin->port == &stand_in_gpio && pin->pin == STAND_IN_PIN && is_output,
+           "another GPIO is set");
+    line_drive(value != 0);
+    return 0;
+}
+
+/* --- the kernel */
+
+int64_t k_uptime_ticks(void)
+{
+    return line_micros() / STAND_IN_TICK_US;
+}
+
+uint32_t k_cycle_get_32(void)
+{
+    return line_micros() * STAND_IN_MHZ;
+}
+
+uint32_t k_us_to_cyc_ceil32(uint32_t micros)
+{
+    return micros * STAND_IN_MHZ;
+}
+
+uint64_t k_ticks_to_us_floor64(uint64_t ticks)
+{
+    return ticks * STAND_IN_TICK_US;
+}
+
+int32_t k_msleep(int32_t milliseconds)
+{
+    line_sleep((uint32_t)milliseconds * 1000);
+    return 0;
+}
+
+int k_sem_init(struct k_sem *sem, unsigned count, unsigned limit)
+{
+    sem->count = count;
+    sem->limit = limit;
+    return 0;
+}
+
+void k_sem_give(struct k_sem *sem)
+{
+    if (sem->count < sem->limit)
+        sem->count++;
+}
+
+int k_sem_take(struct k_sem *sem, k_timeout_t timeout)
+{
+    while (sem->count == 0 && timeout.ticks-- > 0)
+        line_sleep(STAND_IN_TICK_US);
+    if (sem->count == 0)
+        return -11; /* EAGAIN */
+    sem->count--;
+    return 0;
+}

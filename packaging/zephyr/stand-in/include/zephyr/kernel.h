@@ -1,0 +1,34 @@
+/* Plays the parts of Zephyr that mbm's port and sample use, with the signatures of Zephyr 3.7.
+ * Licence: MIT OR Apache-2.0. */
+#ifndef KERNEL_H
+#define KERNEL_H
+
+#include <zephyr/device.h>
+
+typedef struct {
+    int64_t ticks;
+} k_timeout_t;
+
+struct k_sem {
+    unsigned count, limit;
+};
+
+/* 10000 ticks a second, the default of most boards, and 64 MHz. */
+enum { STAND_IN_TICK_US = 100, STAND_IN_MHZ = 64 };
+
+#define MIN(a, b) ((a) < (b) ? (a) : (b))
+
+#define K_USEC(micros)                                                                             \
+    ((k_timeout_t){(int64_t)((micros) + STAND_IN_TICK_US - 1) / STAND_IN_TICK_US})
+
+int64_t k_uptime_ticks(void);
+uint32_t k_cycle_get_32(void);
+uint32_t k_us_to_cyc_ceil32(uint32_t micros);
+uint64_t k_ticks_to_us_floor64(uint64_t ticks);
+int32_t k_msleep(int32_t milliseconds);
+
+int k_sem_init(struct k_sem *sem, unsigned count, unsigned limit);
+void k_sem_give(struct k_sem *sem);
+int k_sem_take(struct k_sem *sem, k_timeout_t timeout);
+
+#endif
