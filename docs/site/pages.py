@@ -9,7 +9,7 @@ import subprocess
 
 # The pages beside those of docs/, and their places in the site.
 PLACED = {"README.md": "readme.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md",
-          "SECURITY.md": "reporting-security.md", "CODE_OF_CONDUCT.md": "code-of-conduct.md"}
+          ".github/SECURITY.md": "reporting-a-weakness.md", ".github/CODE_OF_CONDUCT.md": "code-of-conduct.md"}
 LANGUAGES = {".c": "c", ".h": "c", ".ino": "cpp", ".cpp": "cpp", ".rs": "rust", ".py": "python", ".sh": "sh",
              ".toml": "toml", ".yml": "yaml", ".yaml": "yaml", ".json": "json", ".txt": "text", ".cmake": "cmake",
              ".mk": "make", ".ld": "text", ".S": "gas"}
