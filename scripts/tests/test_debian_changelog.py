@@ -1,15 +1,9 @@
 """The changelog of the Debian package, which packaging/debian/changelog makes from CHANGELOG.md."""
-import importlib.machinery
-import importlib.util
-import pathlib
-import sys
 import unittest
 
-SCRIPT = pathlib.Path(__file__).parents[2] / "packaging/debian/changelog"
-sys.dont_write_bytecode = True
-loader = importlib.machinery.SourceFileLoader("debian_changelog", str(SCRIPT))
-module = importlib.util.module_from_spec(importlib.util.spec_from_loader("debian_changelog", loader))
-loader.exec_module(module)
+from scripts_under_test import load
+
+module = load("packaging/debian/changelog")
 
 UNRELEASED = "# Changelog\n\n## [Unreleased]\n\n### Added\n\n- A thing.\n"
 TWO_RELEASES = UNRELEASED + "\n## [0.3.0] - 2027-02-28\n\n- More.\n\n## [0.2.0] - 2026-12-01\n\n- First.\n"
