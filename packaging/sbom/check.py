@@ -14,10 +14,6 @@ from cyclonedx.validation.json import JsonStrictValidator
 OURS = {"mbm", "mbm-c", "mbm-archive"}
 
 
-def fail(message):
-    sys.exit(f"sbom: {message}")
-
-
 def packed_lock(crate):
     """The packages of the lock file in the crate, by name."""
     with tarfile.open(crate) as tar:
@@ -37,42 +33,48 @@ def closure(lock, name):
     return found
 
 
-def main(sbom, crate):
-    text = pathlib.Path(sbom).read_text()
-    if error := JsonStrictValidator(SchemaVersion.V1_6).validate_str(text):
-        fail(f"{sbom} breaks the schema: {error}")
-    data = json.loads(text)
-    components = {(part["purl"].split("/")[0], part["name"], part["version"]): part for part in data["components"]}
-    if len(components) != len(data["components"]):
-        fail("a component is there twice")
+def schema_error(text):
+    return JsonStrictValidator(SchemaVersion.V1_6).validate_str(text)
 
-    lock = packed_lock(crate)
+
+def complaints(data, lock):
+    """What is wrong with the SBOM `data`, beside the lock file of the crate."""
+    crates = {(part["name"], part["version"]): part for part in data["components"] if part["purl"].startswith("pkg:cargo/")}
     for package in lock.values():
         if package["name"] in OURS:
             continue
-        part = components.get(("pkg:cargo", package["name"], package["version"]))
+        part = crates.get((package["name"], package["version"]))
         if part is None:
-            fail(f"{package['name']} {package['version']} is missing, which {crate} was locked to")
-        if package["checksum"] not in [hash["content"] for hash in part["hashes"]]:
-            fail(f"{package['name']} has another hash than in {crate}")
+            yield f"{package['name']} {package['version']} is missing, to which the crate is locked"
+        elif package["checksum"] not in [hash["content"] for hash in part.get("hashes", [])]:
+            yield f"{package['name']} has another hash than in the crate"
 
     inside = {part["name"] for part in data["components"] if part["scope"] == "required"}
     expected = closure(lock, "mbm") | OURS | {"rust-core"}
     if inside != expected:
-        fail(f"the library is said to contain {sorted(inside)}, and contains {sorted(expected)}")
+        yield f"the library is said to contain {sorted(inside)}, and contains {sorted(expected)}"
     for part in data["components"]:
         if part["scope"] == "required" and not part.get("licenses"):
-            fail(f"{part['name']} is in the library and has no licence")
+            yield f"{part['name']} is in the library and has no licence"
         if part["scope"] == "excluded" and not part.get("properties"):
-            fail(f"{part['name']} does not say what it is for")
-        if part["scope"] == "required" and part["name"] not in OURS | {"rust-core"} and not part.get("hashes"):
-            fail(f"{part['name']} has no hash")
+            yield f"{part['name']} does not say what it is for"
+
+
+def main(sbom, crate):
+    text = pathlib.Path(sbom).read_text()
+    if error := schema_error(text):
+        sys.exit(f"sbom: {sbom} breaks the schema: {error}")
+    data = json.loads(text)
     version = data["metadata"]["component"]["version"]
     if not crate.endswith(f"mbm-c-{version}.crate"):
-        fail(f"it is of version {version}, and the crate is {crate}")
+        sys.exit(f"sbom: it is of version {version}, and the crate is {crate}")
+    found = list(complaints(data, packed_lock(crate)))
+    if found:
+        sys.exit("\n".join(f"sbom: {line}" for line in found))
+    inside = sum(part["scope"] == "required" for part in data["components"])
     print(
-        f"sbom: valid CycloneDX {data['specVersion']}; {len(inside)} components in the library, as locked in the crate, "
-        f"and {len(components) - len(inside)} that test and build it"
+        f"sbom: valid CycloneDX {data['specVersion']}; {inside} components in the library, as locked in the crate, "
+        f"and {len(data['components']) - inside} that test and build it"
     )
 
 

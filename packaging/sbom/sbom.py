@@ -34,13 +34,15 @@ MANIFESTS = {
     "model/Cargo.toml": "model checking",
 }
 SHIPPED = "mbm-archive"
+TOOLS = "checking and building"
 TOOL = re.compile(r"scripts/cargo-tool ([a-z][a-z-]*) (\d+\.\d+\.\d+)")
 REQUIREMENT = re.compile(r"^([A-Za-z0-9._-]+)==(\S+)")
 
 
 def component(kind, name, version, *, licence, purpose=None, sha256=(), description=None):
     """A component that is in the library, or, with a purpose, one that is not."""
-    purl = PackageURL(kind, None, name, version)
+    scope, _, short = name.rpartition("/")
+    purl = PackageURL(kind, scope or None, short, version)
     return Component(
         type=ComponentType.LIBRARY,
         name=name,
@@ -114,22 +116,43 @@ def key(package):
     return package["name"], package["version"]
 
 
-def tools(files):
+def files(*patterns):
+    """The files of the sources whose names match, without what was built."""
+    for top in sorted(pathlib.Path().iterdir()):
+        if top.is_dir() and top.name not in ("build", "target", "dist", ".git"):
+            yield from sorted(path for pattern in patterns for path in top.rglob(pattern) if "node_modules" not in path.parts)
+        elif top.is_file() and any(top.match(pattern) for pattern in patterns):
+            yield top
+
+
+def tools():
     """The tools that scripts/cargo-tool builds."""
-    for name, version in sorted({found for file in files for found in TOOL.findall(file.read_text())}):
-        yield component("cargo", name, version, licence=None, purpose="checking and building")
+    scripts = [path for path in pathlib.Path("scripts").iterdir() if path.is_file()]
+    found = {match for path in [*files("Makefile", "*.mk"), *scripts] for match in TOOL.findall(path.read_text())}
+    for name, version in sorted(found):
+        yield component("cargo", name, version, licence=None, purpose=TOOLS)
 
 
-def python_packages(files):
+def python_packages():
     """The packages of lists with hashes, each package once."""
     found = {}
-    for file in files:
+    for path in files("requirements*.txt"):
         # A list continues a line with a backslash.
-        for line in file.read_text().replace("\\\n", " ").splitlines():
+        for line in path.read_text().replace("\\\n", " ").splitlines():
             if match := REQUIREMENT.match(line):
                 found.setdefault(match.groups(), set()).update(re.findall(r"--hash=sha256:([0-9a-f]{64})", line))
     for (name, version), hashes in sorted(found.items()):
-        yield component("pypi", name, version, licence=None, purpose="checking and building", sha256=sorted(hashes))
+        yield component("pypi", name, version, licence=None, purpose=TOOLS, sha256=sorted(hashes))
+
+
+def npm_packages():
+    found = {}
+    for path in files("package-lock.json"):
+        for folder, package in json.loads(path.read_text())["packages"].items():
+            if folder:
+                found[folder.rpartition("node_modules/")[2], package["version"]] = package.get("license")
+    for (name, version), licence in sorted(found.items()):
+        yield component("npm", name, version, licence=licence, purpose=TOOLS)
 
 
 def bom(version, host_rust, firmware_rust, seconds):
@@ -147,13 +170,7 @@ def bom(version, host_rust, firmware_rust, seconds):
                   description=f"Rust's core library, in the archives for {' and '.join(where)}")
         for number, where in rust.items()
     ]  # fmt: skip
-    scripts = [pathlib.Path("Makefile"), *pathlib.Path("scripts").glob("*")]
-    requirements = [*pathlib.Path("tests").rglob("requirements*.txt"), *pathlib.Path("packaging").rglob("requirements*.txt"),
-                    *pathlib.Path("docs").rglob("requirements*.txt"), *pathlib.Path("scripts").rglob("requirements*.txt")]  # fmt: skip
-    every = [
-        *components.values(), *cores,
-        *tools(path for path in scripts if path.is_file()), *python_packages(requirements),
-    ]  # fmt: skip
+    every = [*components.values(), *cores, *tools(), *python_packages(), *npm_packages()]
     for part in every:
         bom.components.add(part)
     bom.register_dependency(product, [part for part in components.values() if part.name == SHIPPED] + cores)
