@@ -35,7 +35,7 @@ MANIFESTS = {
 }
 SHIPPED = "mbm-archive"
 TOOLS = "checking and building"
-TOOL = re.compile(r"scripts/cargo-tool ([a-z][a-z-]*) (\d+\.\d+\.\d+)")
+TOOL = re.compile(r"scripts/cargo-tool ([a-z][a-z-]*) (?:(\d+\.\d+\.\d+)|\$\((\w+)\))")
 REQUIREMENT = re.compile(r"^([A-Za-z0-9._-]+)==(\S+)")
 
 
@@ -125,10 +125,15 @@ def files(*patterns):
             yield top
 
 
+def tools_of(text):
+    """The tools that scripts/cargo-tool builds, with their versions, which may be variables of make."""
+    for name, version, variable in TOOL.findall(text):
+        yield name, version or re.search(rf"^{variable} *:?= *(\S+)$", text, re.M)[1]
+
+
 def tools():
-    """The tools that scripts/cargo-tool builds."""
     scripts = [path for path in pathlib.Path("scripts").iterdir() if path.is_file()]
-    found = {match for path in [*files("Makefile", "*.mk"), *scripts] for match in TOOL.findall(path.read_text())}
+    found = {tool for path in [*files("Makefile", "*.mk"), *scripts] for tool in tools_of(path.read_text())}
     for name, version in sorted(found):
         yield component("cargo", name, version, licence=None, purpose=TOOLS)
 

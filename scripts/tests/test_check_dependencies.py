@@ -21,13 +21,14 @@ PAGE = """# Dependencies
 |---|---|
 | `peer` | a peer |
 """
+LISTS = {"peers/requirements.txt": {"peer", "helper"}}
 REACH = {"vec": {"hash"}, "hash": set(), "new": set()}
 
 
 def complaints(**present):
     kinds = {"crate in the library": {"vec", "hash"}, "Python package": {"peer"}}
     kinds.update({kind.replace("_", " "): names for kind, names in present.items()})
-    return list(module.complaints(module.page(PAGE), kinds, REACH))
+    return list(module.complaints(module.page(PAGE), kinds, REACH, LISTS))
 
 
 class CheckDependencies(unittest.TestCase):
@@ -63,8 +64,22 @@ class CheckDependencies(unittest.TestCase):
         page = module.page(PAGE.replace("`hash`", "`hash` `new`"))
         present = {"crate in the library": {"vec", "hash", "new"}, "Python package": {"peer"}}
         self.assertEqual(
-            list(module.complaints(page, present, REACH)),
+            list(module.complaints(page, present, REACH, LISTS)),
             ["docs/dependencies.md says that `vec` brings `new`, but it does not"],
+        )
+
+    def test_a_list_stands_for_everything_in_it(self):
+        text = PAGE.replace("| package | reason |\n|---|---|", "| package | reason | brings |\n|---|---|---|")
+        page = module.page(text.replace("a peer |", "a peer | `peers/requirements.txt` |"))
+        present = {"Python package": {"peer", "helper"}}
+        self.assertEqual(list(module.complaints(page, present, REACH, LISTS)), [])
+
+    def test_a_list_that_is_not_there_is_refused(self):
+        text = PAGE.replace("| package | reason |\n|---|---|", "| package | reason | brings |\n|---|---|---|")
+        page = module.page(text.replace("a peer |", "a peer | `old/requirements.txt` |"))
+        self.assertEqual(
+            list(module.complaints(page, {"Python package": {"peer"}}, REACH, LISTS)),
+            ["docs/dependencies.md names the Python package `old/requirements.txt`, which is not there any more"],
         )
 
     def test_an_empty_reason_is_refused(self):

@@ -80,6 +80,12 @@ class Check(unittest.TestCase):
         self.assertIsNotNone(check.schema_error('{"bomFormat": "CycloneDX", "specVersion": "1.6", "components": 1}'))
 
 
+class Tools(unittest.TestCase):
+    def test_the_version_of_a_tool_may_be_a_variable_of_make(self):
+        text = "BINDER := 1.2.3\nA = scripts/cargo-tool binder $(BINDER)\nB = scripts/cargo-tool judge 4.5.6 --locked\n"
+        self.assertEqual(list(sbom.tools_of(text)), [("binder", "1.2.3"), ("judge", "4.5.6")])
+
+
 class Shipped(unittest.TestCase):
     def test_only_what_is_compiled_into_the_archive_is_in_the_library(self):
         def dep(name, kind):
