@@ -149,6 +149,10 @@ check-dependencies: ## Check that docs/dependencies.md has a reason for every de
 semver: ## Compare the Rust interface with that of the last release, by cargo-semver-checks
 	@CARGO="$(CARGO)" scripts/semver
 
+.PHONY: check-semver
+check-semver: ## Check that `make semver` finds a change: try it on changed copies of the sources
+	@CARGO="$(CARGO)" scripts/check-semver
+
 .PHONY: test-scripts
 test-scripts: ## Run the tests of the scripts
 	@scripts/need python3 python3-venv
