@@ -94,6 +94,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@scripts/pictures --check
 	@scripts/charts --check
 	@scripts/check-pictures
+	@scripts/check-dependencies
 	@$(MAKE) --no-print-directory check-pages
 	@scripts/check-symbols $(ARCHIVE)
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
@@ -140,9 +141,29 @@ tidy: compile-commands ## Run clang-tidy over C and C++, with the checks in .cla
 
 DENY = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cargo-deny 0.20.2 --no-default-features)
 .PHONY: deny
-deny: ## Check licences and origin of all crates with cargo-deny; the rules are in deny.toml
+deny: ## Check licences and origin of all crates with cargo-deny, with MBM_ADVISORIES=yes known vulnerabilities too
 	@$(DENY) && for lock in . fuzz bench model; do \
-		"$$tool" --workspace --manifest-path $$lock/Cargo.toml check --hide-inclusion-graph licenses bans sources || exit 1; done
+		"$$tool" --workspace --manifest-path $$lock/Cargo.toml check --hide-inclusion-graph licenses bans sources \
+			$(if $(filter yes,$(MBM_ADVISORIES)),advisories) || exit 1; done
+	@$(if $(filter yes,$(MBM_ADVISORIES)),,echo "deny: known vulnerabilities were not looked up: MBM_ADVISORIES=yes does it, with a network")
+
+.PHONY: check-dependencies
+check-dependencies: ## Check that docs/dependencies.md has a reason for every dependency
+	@scripts/check-dependencies
+
+.PHONY: semver
+semver: ## Compare the Rust interface with that of the last release, by cargo-semver-checks
+	@CARGO="$(CARGO)" scripts/semver
+
+.PHONY: check-semver
+check-semver: ## Check that `make semver` finds a change: try it on changed copies of the sources
+	@CARGO="$(CARGO)" scripts/check-semver
+
+.PHONY: test-scripts
+test-scripts: ## Run the tests of the scripts
+	@scripts/need python3 python3-venv
+	@scripts/venv build/sbom packaging/sbom/requirements.txt
+	@build/sbom/bin/python -m unittest discover --start-directory scripts/tests
 
 .PHONY: test
 test: need-test ## Run every test: Rust, C and C++, also with sanitizers and in valgrind

@@ -155,7 +155,7 @@ fn values_in_c(compiler: &mut Command, expressions: &[String], folder: &Path) ->
     let compiled = compiler
         .args(["-std=c11", "-Wall", "-Wextra", "-Werror"])
         .arg("-I")
-        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("../include"))
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("include"))
         .arg(&file)
         .arg("-o")
         .arg(&program)
@@ -190,7 +190,7 @@ fn sizes_offsets_and_constants_agree_with_c() {
 
 #[test]
 fn the_probes_include_every_constant_of_the_header() {
-    let header = include_str!("../../include/mbm.h");
+    let header = include_str!("../include/mbm.h");
     let defined: Vec<_> = header
         .lines()
         .filter_map(|line| line.strip_prefix("#define MBM_"))

@@ -1,0 +1,9 @@
+#include "mbm.h"
+
+#include <stdio.h>
+
+int main(void)
+{
+    printf("mbm %s\n", mbm_version());
+    return 0;
+}

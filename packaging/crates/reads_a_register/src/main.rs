@@ -1,0 +1,49 @@
+//! Reads a register of unit 17, over a port with a simulated device on its line.
+
+use mbm::engine::Buffers;
+use mbm::error::Status;
+use mbm::master::Master;
+use mbm::port::Port;
+
+/// The device answers the only right request with the value 0x1234 of register 2.
+#[derive(Default)]
+struct Line {
+    request: Vec<u8>,
+    arriving: Vec<u8>,
+    now: u32,
+}
+
+const REQUEST: [u8; 8] = [17, 3, 0, 2, 0, 1, 0x27, 0x5A];
+const RESPONSE: [u8; 7] = [17, 3, 2, 0x12, 0x34, 0x74, 0xF0];
+
+impl Port for Line {
+    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+        let count = bytes.len().min(self.arriving.len());
+        bytes[..count].copy_from_slice(&self.arriving[..count]);
+        self.arriving.drain(..count);
+        count as i16
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> i16 {
+        self.request.extend_from_slice(bytes);
+        if self.request == REQUEST {
+            self.arriving.extend_from_slice(&RESPONSE);
+        }
+        bytes.len() as i16
+    }
+
+    fn micros(&mut self) -> u32 {
+        self.now += 100;
+        self.now
+    }
+}
+
+fn main() {
+    let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
+    let mut master = Master::new(17, Line::default(), buffers);
+    master.set_baud_rate(19200);
+    assert_eq!(master.read_holding_registers(2, 1), Status::PENDING);
+    while master.poll() == Status::PENDING {}
+    assert_eq!(master.status(), Status::OK);
+    println!("register 2: {:#06x}", master.response_word(0));
+}
