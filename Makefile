@@ -60,6 +60,17 @@ install: $(ARCHIVE) ## Install library, header, ports, pkg-config and CMake file
 dist: $(ARCHIVE) ## Pack the sources and the archives built so far, dist/mbm-VERSION.tar.gz
 	@scripts/dist
 
+# What a release builds and checks. RELEASE_TARGETS= leaves it out, for a rehearsal in seconds.
+RELEASE_TARGETS ?= check test dist check-dist
+.PHONY: release check-release
+release: ## Prepare a release, VERSION=x.y.z: version, changelog, checks, packages, tag; REHEARSE=yes changes nothing
+	@scripts/need git python3 make gcc libc6-dev abigail-tools
+	@CARGO="$(CARGO)" RELEASE_TARGETS="$(RELEASE_TARGETS)" scripts/release $(VERSION) $(if $(REHEARSE),--rehearse)
+
+check-release: ## Try scripts/release and scripts/check-version in a copy: what they refuse, and a release
+	@scripts/need git python3 make gcc libc6-dev abigail-tools
+	@tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen $(CBINDGEN)) && CARGO="$(CARGO)" scripts/check-release
+
 .PHONY: check-install
 check-install: $(ARCHIVE) ## Install, build and run the README's program; pack twice and compare
 	@scripts/need gcc libc6-dev make cmake pkg-config libmbedtls-dev
@@ -71,7 +82,8 @@ size: ## Measure the flash and RAM that the library adds, and compare with docs/
 
 # The crate with the C functions.
 CAPI := capi
-HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && scripts/header "$$tool"
+CBINDGEN := 0.29.4
+HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen $(CBINDGEN)) && scripts/header "$$tool"
 .PHONY: header
 header: ## Generate include/mbm.h from the source
 	@$(HEADER)
@@ -94,6 +106,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@scripts/check-docs
 	@scripts/check-functions
 	@scripts/check-packages
+	@scripts/check-version
 	@$(MAKE) --no-print-directory check-pages
 	@scripts/check-symbols $(ARCHIVE)
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
@@ -409,6 +422,7 @@ check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and ch
 	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
 	@scripts/check-pages $(PAGES)
 
+include scripts/aarch64.mk
 # Everything for Arduino and the AVR simulator.
 include scripts/arduino.mk
 include firmware-tests/qemu/qemu.mk

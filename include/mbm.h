@@ -78,7 +78,7 @@ struct mbm_registers;
 #define MBM_VERSION_MAJOR 0
 
 /**
- * Version of this header: before 1.0.0 a new minor version may break programs.
+ * Version of this header: before 1.0 a new minor version may break programs.
  */
 #define MBM_VERSION_MINOR 2
 

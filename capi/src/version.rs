@@ -4,7 +4,7 @@ use core::ffi::c_char;
 
 /// Version of this header: a new major version may break programs.
 pub const MBM_VERSION_MAJOR: u8 = number(env!("CARGO_PKG_VERSION_MAJOR"));
-/// Version of this header: before 1.0.0 a new minor version may break programs.
+/// Version of this header: before 1.0 a new minor version may break programs.
 pub const MBM_VERSION_MINOR: u8 = number(env!("CARGO_PKG_VERSION_MINOR"));
 /// Version of this header: a new patch version breaks nothing.
 pub const MBM_VERSION_PATCH: u8 = number(env!("CARGO_PKG_VERSION_PATCH"));
