@@ -68,7 +68,7 @@ release: ## Prepare a release, VERSION=x.y.z: version, changelog, checks, packag
 	@CARGO="$(CARGO)" RELEASE_TARGETS="$(RELEASE_TARGETS)" scripts/release $(VERSION) $(if $(REHEARSE),--rehearse)
 
 check-release: ## Try scripts/release and scripts/check-version in a copy: what they refuse, and a release
-	@scripts/need git python3 make gcc libc6-dev abigail-tools
+	@scripts/need git python3 make gcc libc6-dev binutils abigail-tools
 	@tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen $(CBINDGEN)) && CARGO="$(CARGO)" scripts/check-release
 
 .PHONY: check-install
