@@ -107,6 +107,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@scripts/check-functions
 	@scripts/check-packages
 	@scripts/check-version
+	@CARGO="$(CARGO)" scripts/check-rust-version
 	@$(MAKE) --no-print-directory check-pages
 	@scripts/check-symbols $(ARCHIVE)
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
