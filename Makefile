@@ -34,7 +34,7 @@ HEADERS := $(wildcard include/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/*
 
 .PHONY: help
 help: ## List the targets
-	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 20
+	@grep -hE '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 20
 
 .PHONY: archive
 archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm.a
@@ -85,6 +85,8 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin circles
 	@$(HEADER) --check
+	@scripts/check-version
+	@CARGO="$(CARGO)" scripts/check-rust-version
 	@scripts/abi --check
 	@clang-format --dry-run --Werror $(C_SOURCES)
 	@scripts/check-header
@@ -432,7 +434,7 @@ ARM_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
 check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
 	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev openssl \
 		gcc-avr avr-libc arduino-core-avr \
-		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi) \
+		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi gcc-aarch64-linux-gnu libc6-dev-arm64-cross) \
 		$(ARM_LIBC)
 	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
 	@scripts/check-pages $(PAGES)
@@ -454,6 +456,8 @@ check-docs-site: docs ## Open the site in Chromium: width of a phone, requests, 
 	@$(BUILD)/venv-browser/bin/python -B scripts/check-site-in-browser
 	@$(BUILD)/venv-browser/bin/python -B scripts/screenshots
 
+include scripts/aarch64.mk
+include scripts/release.mk
 # Everything for Arduino and the AVR simulator.
 include scripts/arduino.mk
 include firmware-tests/qemu/qemu.mk

@@ -1,6 +1,7 @@
 /* The port over a terminal. A pty shows the settings that the system makes. A pty has no
  * RS-485 driver: the test's own ioctl plays one. */
 #define _GNU_SOURCE
+#include "emulated.h"
 #include "fails.h"
 #include "mbm_tty.h"
 #include "pty.h"
@@ -102,6 +103,7 @@ static void every_rate_of_termios_can_be_set(void **state)
     size_t i;
 
     (void)state;
+    SKIP_IF_EMULATED();
     for (i = 0; i < COUNT(rows); i++) {
         struct termios settings;
         mbm_tty tty;
@@ -127,11 +129,13 @@ static void any_rate_is_set_if_the_options_allow_it(void **state)
     static const uint32_t rates[] = {76800, 100000, 250000, 19201, 3250000, 9600};
     struct termios before = settings_of(line.theirs), after;
     mbm_tty_options options = PLAIN;
-    uint32_t rate = rate_of(line.theirs);
+    uint32_t rate;
     mbm_tty tty;
     size_t i;
 
     (void)state;
+    SKIP_IF_EMULATED();
+    rate = rate_of(line.theirs);
     options.anyRate = 1;
     for (i = 0; i < COUNT(rates); i++) {
         options.baud = rates[i];
@@ -247,6 +251,7 @@ static void an_exclusive_terminal_is_busy_for_a_second_one(void **state)
     int exclusive = 0;
 
     (void)state;
+    SKIP_IF_EMULATED();
     options.exclusive = 1;
     assert_int_equal(mbm_tty_openWith(&first, line.path, &options), 0);
     assert_int_equal(ioctl(line.theirs, TIOCGEXCL, &exclusive), 0);
@@ -271,6 +276,7 @@ static void without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed(void
     mbm_tty tty;
 
     (void)state;
+    SKIP_IF_EMULATED();
     options.rs485 = 1;
     FAILS(ENOTTY, mbm_tty_openWith(&tty, line.path, &options));
     assert_int_equal(tty.fd, -1);

@@ -12,9 +12,24 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* A path without a slash is looked for in PATH. */
+/* Replaces this process by the program. A path without a slash is looked for in PATH. A program for
+ * another machine needs an emulator. */
+static void run(const char *path, const char **argv, const char *emulator)
+{
+    const char *emulated[33] = {emulator, path};
+
+    if (emulator) {
+        memcpy(emulated + 2, argv + 1, 31 * sizeof *argv);
+        path = emulator;
+        argv = emulated;
+    }
+    execvp(path, (char *const *)argv);
+    perror(path);
+    _exit(127);
+}
+
 static void start(program *p, const char *path, const char *name, const char *const *arguments,
-                  unsigned descriptors)
+                  unsigned descriptors, const char *emulator)
 {
     const struct rlimit limit = {descriptors, descriptors};
     const char *argv[32] = {name};
@@ -37,9 +52,7 @@ static void start(program *p, const char *path, const char *name, const char *co
         close_range(3, ~0u, 0);
         if (descriptors)
             must(setrlimit(RLIMIT_NOFILE, &limit) == 0, "setrlimit");
-        execvp(path, (char *const *)argv);
-        perror(path);
-        _exit(127);
+        run(path, argv, emulator);
     }
     close(in[0]);
     close(out[1]);
@@ -59,7 +72,7 @@ void program_start_limited(program *p, const char *name, const char *const *argu
     end = strrchr(path, '/');
     must(end != NULL && strlen(name) < 48, name);
     sprintf(end, "/linux/%s", name);
-    start(p, path, name, arguments, descriptors);
+    start(p, path, name, arguments, descriptors, getenv("MBM_EMULATOR"));
 }
 
 void program_start(program *p, const char *name, const char *const *arguments)
@@ -69,7 +82,7 @@ void program_start(program *p, const char *name, const char *const *arguments)
 
 void program_start_other(program *p, const char *name, const char *const *arguments)
 {
-    start(p, name, name, arguments, 0);
+    start(p, name, name, arguments, 0, NULL);
 }
 
 size_t program_line(const program *p, char *text, size_t capacity)

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include "tcp_waiting.h"
 #include "await.h"
+#include "emulated.h"
 #include "must.h"
 #include "tcp_server.h"
 
@@ -13,6 +14,7 @@ unsigned tcp_waiting(int listener)
     struct tcp_info info = {0};
     socklen_t size = sizeof info;
 
+    SKIP_IF_EMULATED();
     must(getsockopt(listener, IPPROTO_TCP, TCP_INFO, &info, &size) == 0, "TCP_INFO");
     return info.tcpi_unacked;
 }
