@@ -42,7 +42,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** Version of this header as a text, for example "0.2.0". mbm_version returns that of the archive. */
+/** Version of this header as a text, "MAJOR.MINOR.PATCH". mbm_version returns that of the archive. */
 #define MBM_VERSION MBM_VERSION_OF(MBM_VERSION_MAJOR, MBM_VERSION_MINOR, MBM_VERSION_PATCH)
 /** Private: expands the numbers. */
 #define MBM_VERSION_OF(major, minor, patch) MBM_VERSION_TEXT(major, minor, patch)
@@ -78,7 +78,7 @@ struct mbm_registers;
 #define MBM_VERSION_MAJOR 0
 
 /**
- * Version of this header: before 1.0.0 a new minor version may break programs.
+ * Version of this header: before 1.0 a new minor version may break programs.
  */
 #define MBM_VERSION_MINOR 2
 
@@ -93,7 +93,7 @@ struct mbm_registers;
  *
  * Any thread or interrupt may call it.
  *
- * @return a constant string such as "0.2.0", never NULL
+ * @return a constant string, the three numbers with dots between them, never NULL
  */
 const char *mbm_version(void);
 
