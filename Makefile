@@ -452,7 +452,7 @@ docs-serve: docs ## Make the site and serve it at http://127.0.0.1:8000/
 .PHONY: check-docs-site
 check-docs-site: docs ## Open the site in Chromium: width of a phone, requests, search; pictures in build/screenshots
 	@scripts/need chromium
-	@scripts/venv $(BUILD)/venv-browser docs/site/browser.txt
+	@scripts/venv $(BUILD)/venv-browser docs/site/browser-requirements.txt
 	@$(BUILD)/venv-browser/bin/python -B scripts/check-site-in-browser
 	@$(BUILD)/venv-browser/bin/python -B scripts/screenshots
 
