@@ -52,10 +52,10 @@ static void coils_written(void *context, const mbm_access *access)
 
 static uint8_t is_over(void)
 {
-    enum { END = SERVE_END - SERVE_BASE };
+    const uint16_t end = SERVE_END - SERVE_BASE;
 
     /* The response to the write that ends the program must be sent first. */
-    return ((coil_bits[END / 8] >> (END % 8)) & 1u) != 0u &&
+    return ((coil_bits[end / 8u] >> (end % 8u)) & 1u) != 0u &&
            mbm_server_pollDelay(&server) == UINT32_MAX;
 }
 

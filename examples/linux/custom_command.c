@@ -12,6 +12,7 @@
  * The exit code is 0 if every command succeeded.
  *
  * Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
 #include "mbm_tcp.h"
 #include "trace_options.h"
 
