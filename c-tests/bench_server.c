@@ -169,7 +169,7 @@ int main(int argc, char **argv)
 {
     int is_rtu;
 
-    signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGPIPE, SIG_IGN);
     prepare_tables();
     if (argc == 1) {
         compare_loops();

@@ -29,7 +29,7 @@ int main(int argc, char **argv)
         return 2;
     }
     /* A client may close its connection before it has read the response. */
-    signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGPIPE, SIG_IGN);
     served_prepare(&device);
     if (i < 2) {
         served_on_line(&device, framings[i]);

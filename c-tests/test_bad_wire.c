@@ -75,7 +75,7 @@ static void no_row_of_the_fault_table_gets_worse(void **state)
         worse += fault_report(f, plain, retried, status);
     }
     if (table)
-        fclose(table);
+        (void)fclose(table);
     assert_int_equal(worse, 0);
 }
 

@@ -110,7 +110,7 @@ static void files_are_read_and_written(void **)
                     {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D});
     assert_int_equal(request.status(), MBM_OK);
     const uint8_t groups[] = {6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1};
-    for (uint16_t i = 0; i < sizeof groups; i++)
+    for (uint16_t i = 0; i < static_cast<uint16_t>(sizeof groups); i++)
         assert_int_equal(request.setByte(i, groups[i]), MBM_OK);
     expect_exchange(client, client.readFileRecords(request, sizeof groups),
                     {17, 20, 14, 6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1},
@@ -118,7 +118,7 @@ static void files_are_read_and_written(void **)
     assert_int_equal(request.getByte(2), 0x0D);
     assert_int_equal(request.getByte(7), 0xCD);
     const uint8_t record[] = {6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD};
-    for (uint16_t i = 0; i < sizeof record; i++)
+    for (uint16_t i = 0; i < static_cast<uint16_t>(sizeof record); i++)
         request.setByte(i, record[i]);
     expect_exchange(client, client.writeFileRecords(request, sizeof record),
                     {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD},

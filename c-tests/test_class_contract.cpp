@@ -208,9 +208,9 @@ static void zero_and_nullptr_remove_callbacks(void **)
 {
     ModbusMaster node;
     logs_callbacks(node);
-    node.preTransmission(0);
+    node.preTransmission(nullptr);
     node.postTransmission(nullptr);
-    node.idle(0);
+    node.idle(nullptr);
     Serial.character = 0;
     node.begin(1, Serial);
     Serial.reply(adu({1, 3, 2, 0, 7}));

@@ -1,10 +1,7 @@
 /* Records that are given to a mbm_server_serve function a second time: for the same unit,
  * zeroed before or not, and for another unit. */
-#include "crc.h"
-#include "mbm.h"
-#include "test.h"
+#include "answer.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum { FAMILIES = 11 };
@@ -112,21 +109,6 @@ static const struct {
     {"\x07", 1},         {"\x08\0\0\1\2", 5}, {"\x11", 1},         {"\x14\7\6\0\1\0\0\0\1", 9},
     {"\x18\0\0", 3},     {"\x2B\x0E\1\0", 4}, {"\x41\1", 2},
 };
-
-/* Returns the function code of the unit's response, or 0 if there is none. */
-static unsigned answer(mbm_unit *unit, uint8_t id, const char *pdu, size_t length)
-{
-    uint8_t frame[MBM_MAX_FRAME];
-    uint16_t response = 0xFFFF;
-
-    frame[0] = id;
-    memcpy(frame + 1, pdu, length);
-    length = seal(frame, length + 1);
-    OK(mbm_unit_respond(unit, 1, NULL, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)length,
-                        sizeof frame, &response));
-    assert_int_not_equal(response, 0xFFFF);
-    return response == 0 ? 0 : frame[1];
-}
 
 static unsigned answered(mbm_unit *unit, int family)
 {
@@ -372,125 +354,6 @@ static void switches_can_be_registered_again_like_any_record(void **state)
     all_are_answered(&units[0]);
 }
 
-/* Hooks that change their own table while a request is carried out. The request goes on
- * with the table as it was. */
-static mbm_registerTable *hooked;
-static uint16_t fewer[1];
-
-static uint8_t zero_before(void *context, const mbm_access *access)
-{
-    (void)context;
-    (void)access;
-    memset(hooked, 0, sizeof *hooked);
-    return 0;
-}
-
-static uint8_t shrink_before(void *context, const mbm_access *access)
-{
-    zero_before(context, access);
-    hooked->words = fewer;
-    hooked->size = 1;
-    OK(mbm_unit_serveHoldingRegisters(&units[0], hooked));
-    return 0;
-}
-
-static void shrink_after(void *context, const mbm_access *access)
-{
-    shrink_before(context, access);
-}
-
-static uint8_t become_bits(void *context, const mbm_access *access)
-{
-    static uint8_t bit[1];
-    mbm_bitTable *table = (mbm_bitTable *)(void *)hooked;
-
-    zero_before(context, access);
-    table->bits = bit;
-    table->size = 8;
-    OK(mbm_unit_serveCoils(&units[0], table));
-    return 0;
-}
-
-/* Writes four registers. Returns the exception, or 0. */
-static unsigned written(void)
-{
-    static const char pdu[] = "\x10\0\0\0\4\x08\0\1\0\2\0\3\0\4";
-    uint8_t frame[MBM_MAX_FRAME];
-    uint16_t response;
-    size_t length;
-
-    frame[0] = 17;
-    memcpy(frame + 1, pdu, sizeof pdu - 1);
-    length = seal(frame, sizeof pdu);
-    OK(mbm_unit_respond(units, 1, NULL, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)length,
-                        sizeof frame, &response));
-    return frame[1] & 0x80 ? frame[2] : 0;
-}
-
-static void a_request_goes_on_with_the_old_table_if_its_hook_changes_it(void **state)
-{
-    static const mbm_accessHooks before_hooks[] = {
-        {.beforeWrite = zero_before},
-        {.beforeWrite = shrink_before},
-        {.beforeWrite = become_bits},
-    };
-    static const mbm_accessHooks after_hooks = {.afterWrite = shrink_after};
-    static const mbm_accessHooks read_hooks[] = {
-        {.beforeRead = zero_before},
-        {.beforeRead = shrink_before},
-        {.beforeRead = become_bits},
-    };
-    mbm_registerTable *table = (mbm_registerTable *)malloc(sizeof *table);
-    int i;
-
-    (void)state;
-    memset(units, 0, sizeof units);
-    units[0].id = 17;
-    hooked = table;
-    for (i = 0; i < 3; i++) {
-        memset(table, 0, sizeof *table);
-        table->words = words;
-        table->size = 4;
-        OK(mbm_registerTable_setHooks(table, &before_hooks[i]));
-        OK(mbm_unit_serveHoldingRegisters(units, table));
-        words[3] = 0x7777;
-        assert_int_equal(written(), 0);
-        assert_int_equal(words[3], 4);
-        assert_int_equal(fewer[0], 0);
-        memset(units, 0, sizeof units);
-        units[0].id = 17;
-    }
-    /* Function 17 reads after the `after` hook of its write. */
-    memset(table, 0, sizeof *table);
-    table->words = words;
-    table->size = 4;
-    OK(mbm_registerTable_setHooks(table, &after_hooks));
-    OK(mbm_unit_serveHoldingRegisters(units, table));
-    OK(mbm_registerTable_serveMaskAndReadWrite(table));
-    assert_int_equal(answer(units, 17, "\x17\0\0\0\4\0\0\0\1\2\0\1", 12), 0x17);
-    /* Each function that reads, after a hook that changed the table. */
-    for (i = 0; i < 9; i++) {
-        memset(units, 0, sizeof units);
-        units[0].id = 17;
-        memset(table, 0, sizeof *table);
-        table->words = words;
-        table->size = 4;
-        words[3] = 0x00F0;
-        OK(mbm_registerTable_setHooks(table, &read_hooks[i % 3]));
-        OK(mbm_unit_serveHoldingRegisters(units, table));
-        OK(mbm_registerTable_serveMaskAndReadWrite(table));
-        if (i < 3)
-            assert_int_equal(answer(units, 17, "\3\0\0\0\4", 5), 3);
-        else if (i < 6)
-            assert_int_equal(answer(units, 17, "\x16\0\3\0\xFF\x0F\0", 7), 0x16);
-        else
-            assert_int_equal(answer(units, 17, "\x17\0\0\0\4\0\3\0\1\2\x0F\xF0", 12), 0x17);
-        assert_int_equal(words[3], i < 3 ? 0x00F0 : 0x0FF0);
-        assert_int_equal(fewer[0], 0);
-    }
-    free(table);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -507,7 +370,6 @@ int main(void)
         cmocka_unit_test_setup(a_unit_with_all_places_taken_refuses_other_functions, reset),
         cmocka_unit_test_setup(a_service_without_a_free_place_is_refused, reset),
         cmocka_unit_test_setup(switches_can_be_registered_again_like_any_record, reset),
-        cmocka_unit_test_setup(a_request_goes_on_with_the_old_table_if_its_hook_changes_it, reset),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

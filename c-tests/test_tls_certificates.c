@@ -279,7 +279,7 @@ static void a_file_that_is_missing_empty_or_too_long_is_refused(void **state)
     assert_int_equal(errno, ENODATA);
     for (i = 0; i < MBM_TLS_FILE_BYTES; i++)
         fputc('-', file);
-    fclose(file);
+    (void)fclose(file);
     assert_int_equal(mbm_tls_load(&files, &options, own, path, known), -1);
     assert_int_equal(errno, EFBIG);
     remove(path);

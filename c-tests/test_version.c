@@ -15,7 +15,7 @@ static void read_version(const char *path, char *version)
     while (fgets(line, sizeof line, file))
         if (sscanf(line, "version = \"%19[0-9.]\"", version) == 1)
             break;
-    fclose(file);
+    (void)fclose(file);
 }
 
 static void the_version_is_that_of_the_packages_in_header_and_archive(void **state)

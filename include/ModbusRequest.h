@@ -34,7 +34,7 @@ public:
     }
     /** For `unit`, with `quantity` (0 to 32767) words, which must outlive it. */
     ModbusRequest(uint8_t unit, uint16_t *array, uint16_t quantity)
-        : ModbusValues(array, quantity), request(), callback()
+        : ModbusValues(array, quantity), request()
     {
         request.context = this;
         request.reply = array;

@@ -78,7 +78,7 @@ public:
         return mbm_unit_serveHoldingRegisters(&unit, registers.record());
     }
     /** Serves functions 16 and 17 too. Call holdingRegisters with the same registers before. */
-    uint8_t maskAndReadWrite(ModbusRegisters &registers)
+    static uint8_t maskAndReadWrite(ModbusRegisters &registers)
     {
         return mbm_registerTable_serveMaskAndReadWrite(registers.record());
     }

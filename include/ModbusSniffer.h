@@ -53,7 +53,7 @@
 class ModbusSniffer {
 public:
     /** Uses neither clock nor port. */
-    ModbusSniffer() : stream(), out(), callback(), sniffer() {}
+    ModbusSniffer() : stream(), out(), sniffer() {}
     ModbusSniffer(const ModbusSniffer &) = delete;
     ModbusSniffer &operator=(const ModbusSniffer &) = delete;
 

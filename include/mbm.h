@@ -102,171 +102,171 @@ const char *mbm_version(void);
 /**
  * The call succeeded.
  */
-#define MBM_OK 0
+#define MBM_OK 0u
 
 /**
  * Exception of the device: it does not support the function.
  */
-#define MBM_ILLEGAL_FUNCTION 1
+#define MBM_ILLEGAL_FUNCTION 1u
 
 /**
  * Exception of the device: it has no such address. This library also returns it, and sends
  * nothing, for a range that passes address 65535.
  */
-#define MBM_ILLEGAL_DATA_ADDRESS 2
+#define MBM_ILLEGAL_DATA_ADDRESS 2u
 
 /**
  * Exception of the device: it refuses the quantity or value. This library also returns it,
  * and sends nothing, for a quantity that the standard forbids, and for a write of more than
  * the transmit buffer holds.
  */
-#define MBM_ILLEGAL_DATA_VALUE 3
+#define MBM_ILLEGAL_DATA_VALUE 3u
 
 /**
  * Exception of the device: it failed while it executed the request.
  */
-#define MBM_SLAVE_DEVICE_FAILURE 4
+#define MBM_SLAVE_DEVICE_FAILURE 4u
 
 /**
  * Exception of the device: it accepted the request and needs a long time for it.
  */
-#define MBM_ACKNOWLEDGE 5
+#define MBM_ACKNOWLEDGE 5u
 
 /**
  * Exception of the device: it is busy. Send the request again later.
  */
-#define MBM_SLAVE_DEVICE_BUSY 6
+#define MBM_SLAVE_DEVICE_BUSY 6u
 
 /**
  * Exception of the device: the memory of a file failed its consistency check.
  */
-#define MBM_MEMORY_PARITY_ERROR 8
+#define MBM_MEMORY_PARITY_ERROR 8u
 
 /**
  * Exception of a gateway: it has no path to the device.
  */
-#define MBM_GATEWAY_PATH_UNAVAILABLE 10
+#define MBM_GATEWAY_PATH_UNAVAILABLE 10u
 
 /**
  * Exception of a gateway: it received no response from the device.
  */
-#define MBM_GATEWAY_TARGET_FAILED_TO_RESPOND 11
+#define MBM_GATEWAY_TARGET_FAILED_TO_RESPOND 11u
 
 /**
  * Only frames of other units arrived within the response timeout.
  */
-#define MBM_INVALID_SLAVE_ID 224
+#define MBM_INVALID_SLAVE_ID 224u
 
 /**
  * The unit sent a reply to another function, and no other reply arrived within the
  * response timeout.
  */
-#define MBM_INVALID_FUNCTION 225
+#define MBM_INVALID_FUNCTION 225u
 
 /**
  * No complete reply arrived within the response timeout.
  */
-#define MBM_RESPONSE_TIMED_OUT 226
+#define MBM_RESPONSE_TIMED_OUT 226u
 
 /**
  * The CRC of the reply, or in ASCII its LRC, is wrong.
  */
-#define MBM_INVALID_CRC 227
+#define MBM_INVALID_CRC 227u
 
 /**
  * The function cannot accept an argument: NULL, a number out of range, a port without
  * read, write or micros, a buffer that is too short, or an object of another framing or
  * kind. The comment of the function says which. The call changed nothing.
  */
-#define MBM_INVALID_ARGUMENT 228
+#define MBM_INVALID_ARGUMENT 228u
 
 /**
  * The unit sent a reply of this function with a right CRC, but the reply does not match the
  * request: a wrong byte count, a wrong echo, or an exception code of 0 or from 0x80.
  */
-#define MBM_MALFORMED_REPLY 229
+#define MBM_MALFORMED_REPLY 229u
 
 /**
  * The port's read or write reported that the link is lost.
  */
-#define MBM_LINK_LOST 230
+#define MBM_LINK_LOST 230u
 
 /**
  * The object is in use: it has a request under way, or the call came from a hook that the
  * object called, or the object is a record that serves in another way. The call changed
  * nothing.
  */
-#define MBM_BUSY 231
+#define MBM_BUSY 231u
 
 /**
  * A request that reads cannot be broadcast. Nothing was sent.
  */
-#define MBM_BROADCAST_NOT_ALLOWED 232
+#define MBM_BROADCAST_NOT_ALLOWED 232u
 
 /**
  * One of these: the frame buffer cannot hold the request, and nothing was sent; the frame
  * buffer or the response buffer cannot hold the reply, and the response words are
  * unchanged; a unit cannot take another record.
  */
-#define MBM_BUFFER_TOO_SMALL 233
+#define MBM_BUFFER_TOO_SMALL 233u
 
 /**
  * The object was never begun, or has no buffers.
  */
-#define MBM_NOT_INITIALISED 234
+#define MBM_NOT_INITIALISED 234u
 
 /**
  * The request is under way: call mbm_master_poll again.
  */
-#define MBM_PENDING 235
+#define MBM_PENDING 235u
 
 /**
  * The line was not silent, or the port accepted no bytes, for as long as the response
  * timeout.
  */
-#define MBM_LINE_BUSY 236
+#define MBM_LINE_BUSY 236u
 
 /**
  * A cancel function or a begin function gave the request up.
  */
-#define MBM_CANCELLED 237
+#define MBM_CANCELLED 237u
 
 /**
  * The frame is not complete: more bytes must follow.
  */
-#define MBM_INCOMPLETE_FRAME 238
+#define MBM_INCOMPLETE_FRAME 238u
 
 /**
  * No frame of this framing starts with these bytes, or has this length.
  */
-#define MBM_MALFORMED_FRAME 239
+#define MBM_MALFORMED_FRAME 239u
 
 /**
  * The client has 16 requests already. Nothing was queued.
  */
-#define MBM_QUEUE_FULL 240
+#define MBM_QUEUE_FULL 240u
 
 /**
  * Another pending request of the client has this transaction number. Nothing was queued.
  */
-#define MBM_DUPLICATE_TRANSACTION 241
+#define MBM_DUPLICATE_TRANSACTION 241u
 
 /**
  * The request has ended already, or was never queued on this client.
  */
-#define MBM_NOT_PENDING 242
+#define MBM_NOT_PENDING 242u
 
 /**
  * Two fields of a plan share an address of one unit and table.
  */
-#define MBM_FIELDS_OVERLAP 243
+#define MBM_FIELDS_OVERLAP 243u
 
 /**
  * The device says that more objects of its identification follow, but it sends none, names
  * an object that is not after those that it has sent, or then sends one before the one that
  * it named. Reading on might never end.
  */
-#define MBM_NO_PROGRESS 244
+#define MBM_NO_PROGRESS 244u
 
 /**
  * Explains a status in a few words of English.
@@ -387,27 +387,27 @@ typedef struct mbm_counters {
 /**
  * RTU: serial line, binary, with a CRC-16 (serial line guide V1.02, 2.5.1).
  */
-#define MBM_FRAMING_RTU 0
+#define MBM_FRAMING_RTU 0u
 
 /**
  * ASCII: serial line, hexadecimal characters, with an LRC (serial line guide V1.02, 2.5.2).
  */
-#define MBM_FRAMING_ASCII 1
+#define MBM_FRAMING_ASCII 1u
 
 /**
  * TCP: the PDU follows the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
  */
-#define MBM_FRAMING_TCP 2
+#define MBM_FRAMING_TCP 2u
 
 /**
  * RTU frames in a TCP stream.
  */
-#define MBM_FRAMING_RTU_OVER_TCP 3
+#define MBM_FRAMING_RTU_OVER_TCP 3u
 
 /**
  * No frame: the PDU alone, for the mbm_frame functions.
  */
-#define MBM_FRAMING_NONE 4
+#define MBM_FRAMING_NONE 4u
 
 /**
  * The maximum length of a TCP frame, in bytes.
@@ -422,219 +422,219 @@ typedef struct mbm_counters {
 /**
  * Read Coils (V1.1b3, 6.1).
  */
-#define MBM_FC_READ_COILS 1
+#define MBM_FC_READ_COILS 1u
 
 /**
  * Read Discrete Inputs (V1.1b3, 6.2).
  */
-#define MBM_FC_READ_DISCRETE_INPUTS 2
+#define MBM_FC_READ_DISCRETE_INPUTS 2u
 
 /**
  * Read Holding Registers (V1.1b3, 6.3).
  */
-#define MBM_FC_READ_HOLDING_REGISTERS 3
+#define MBM_FC_READ_HOLDING_REGISTERS 3u
 
 /**
  * Read Input Registers (V1.1b3, 6.4).
  */
-#define MBM_FC_READ_INPUT_REGISTERS 4
+#define MBM_FC_READ_INPUT_REGISTERS 4u
 
 /**
  * Write Single Coil (V1.1b3, 6.5).
  */
-#define MBM_FC_WRITE_SINGLE_COIL 5
+#define MBM_FC_WRITE_SINGLE_COIL 5u
 
 /**
  * Write Single Register (V1.1b3, 6.6).
  */
-#define MBM_FC_WRITE_SINGLE_REGISTER 6
+#define MBM_FC_WRITE_SINGLE_REGISTER 6u
 
 /**
  * Read Exception Status (V1.1b3, 6.7).
  */
-#define MBM_FC_READ_EXCEPTION_STATUS 7
+#define MBM_FC_READ_EXCEPTION_STATUS 7u
 
 /**
  * Diagnostics (V1.1b3, 6.8).
  */
-#define MBM_FC_DIAGNOSTICS 8
+#define MBM_FC_DIAGNOSTICS 8u
 
 /**
  * Get Comm Event Counter (V1.1b3, 6.9).
  */
-#define MBM_FC_GET_COMM_EVENT_COUNTER 11
+#define MBM_FC_GET_COMM_EVENT_COUNTER 11u
 
 /**
  * Get Comm Event Log (V1.1b3, 6.10).
  */
-#define MBM_FC_GET_COMM_EVENT_LOG 12
+#define MBM_FC_GET_COMM_EVENT_LOG 12u
 
 /**
  * Write Multiple Coils (V1.1b3, 6.11).
  */
-#define MBM_FC_WRITE_MULTIPLE_COILS 15
+#define MBM_FC_WRITE_MULTIPLE_COILS 15u
 
 /**
  * Write Multiple Registers (V1.1b3, 6.12).
  */
-#define MBM_FC_WRITE_MULTIPLE_REGISTERS 16
+#define MBM_FC_WRITE_MULTIPLE_REGISTERS 16u
 
 /**
  * Report Server ID (V1.1b3, 6.13).
  */
-#define MBM_FC_REPORT_SERVER_ID 17
+#define MBM_FC_REPORT_SERVER_ID 17u
 
 /**
  * Read File Record (V1.1b3, 6.14).
  */
-#define MBM_FC_READ_FILE_RECORD 20
+#define MBM_FC_READ_FILE_RECORD 20u
 
 /**
  * Write File Record (V1.1b3, 6.15).
  */
-#define MBM_FC_WRITE_FILE_RECORD 21
+#define MBM_FC_WRITE_FILE_RECORD 21u
 
 /**
  * Mask Write Register (V1.1b3, 6.16).
  */
-#define MBM_FC_MASK_WRITE_REGISTER 22
+#define MBM_FC_MASK_WRITE_REGISTER 22u
 
 /**
  * Read/Write Multiple Registers (V1.1b3, 6.17).
  */
-#define MBM_FC_READ_WRITE_MULTIPLE_REGISTERS 23
+#define MBM_FC_READ_WRITE_MULTIPLE_REGISTERS 23u
 
 /**
  * Read FIFO Queue (V1.1b3, 6.18).
  */
-#define MBM_FC_READ_FIFO_QUEUE 24
+#define MBM_FC_READ_FIFO_QUEUE 24u
 
 /**
  * Encapsulated Interface Transport (V1.1b3, 6.19).
  */
-#define MBM_FC_ENCAPSULATED_INTERFACE 43
+#define MBM_FC_ENCAPSULATED_INTERFACE 43u
 
 /**
  * Sub-function of 08: the device returns the data, of any number of words (V1.1b3, 6.8.1).
  */
-#define MBM_DIAGNOSTICS_RETURN_QUERY_DATA 0
+#define MBM_DIAGNOSTICS_RETURN_QUERY_DATA 0u
 
 /**
  * Sub-function of 08: restarts the communications port. The data FF 00 also clear the
  * event log.
  */
-#define MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS 1
+#define MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS 1u
 
 /**
  * Sub-function of 08: the device returns its diagnostic register.
  */
-#define MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER 2
+#define MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER 2u
 
 /**
  * Sub-function of 08: sets the character that ends ASCII frames after CR. The first byte
  * of the data is the character.
  */
-#define MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER 3
+#define MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER 3u
 
 /**
  * Sub-function of 08: the device listens only. It sends no reply.
  */
-#define MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY 4
+#define MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY 4u
 
 /**
  * Sub-function of 08: clears the counters and the diagnostic register.
  */
-#define MBM_DIAGNOSTICS_CLEAR_COUNTERS 10
+#define MBM_DIAGNOSTICS_CLEAR_COUNTERS 10u
 
 /**
  * Sub-function of 08: the number of messages that the device detected on the bus.
  */
-#define MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT 11
+#define MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT 11u
 
 /**
  * Sub-function of 08: the number of messages with a wrong CRC.
  */
-#define MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT 12
+#define MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT 12u
 
 /**
  * Sub-function of 08: the number of exceptions that the device sent.
  */
-#define MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT 13
+#define MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT 13u
 
 /**
  * Sub-function of 08: the number of messages addressed to this device.
  */
-#define MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT 14
+#define MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT 14u
 
 /**
  * Sub-function of 08: the number of messages to which the device sent no reply.
  */
-#define MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT 15
+#define MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT 15u
 
 /**
  * Sub-function of 08: the number of messages to which the device replied with a NAK.
  */
-#define MBM_DIAGNOSTICS_SERVER_NAK_COUNT 16
+#define MBM_DIAGNOSTICS_SERVER_NAK_COUNT 16u
 
 /**
  * Sub-function of 08: the number of messages to which the device replied that it is busy.
  */
-#define MBM_DIAGNOSTICS_SERVER_BUSY_COUNT 17
+#define MBM_DIAGNOSTICS_SERVER_BUSY_COUNT 17u
 
 /**
  * Sub-function of 08: the number of messages that character overruns destroyed.
  */
-#define MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT 18
+#define MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT 18u
 
 /**
  * Sub-function of 08: clears the counter of character overruns.
  */
-#define MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER 20
+#define MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER 20u
 
 /**
  * MEI type of 2B: CANopen General Reference (V1.1b3, 6.20).
  */
-#define MBM_MEI_CANOPEN 13
+#define MBM_MEI_CANOPEN 13u
 
 /**
  * MEI type of 2B: Read Device Identification (V1.1b3, 6.21).
  */
-#define MBM_MEI_READ_DEVICE_IDENTIFICATION 14
+#define MBM_MEI_READ_DEVICE_IDENTIFICATION 14u
 
 /**
  * Read device id code: the basic objects, 00 to 02.
  */
-#define MBM_DEVICE_ID_BASIC 1
+#define MBM_DEVICE_ID_BASIC 1u
 
 /**
  * Read device id code: the regular objects, 00 to 7F.
  */
-#define MBM_DEVICE_ID_REGULAR 2
+#define MBM_DEVICE_ID_REGULAR 2u
 
 /**
  * Read device id code: all objects, 00 to FF.
  */
-#define MBM_DEVICE_ID_EXTENDED 3
+#define MBM_DEVICE_ID_EXTENDED 3u
 
 /**
  * Read device id code: one object.
  */
-#define MBM_DEVICE_ID_INDIVIDUAL 4
+#define MBM_DEVICE_ID_INDIVIDUAL 4u
 
 /**
  * Length rule: the PDU is as long as its frame. On an RTU line silence ends the frame.
  */
-#define MBM_RULE_SILENCE 0
+#define MBM_RULE_SILENCE 0u
 
 /**
  * Length rule: the PDU always has the same number of bytes.
  */
-#define MBM_RULE_FIXED 1
+#define MBM_RULE_FIXED 1u
 
 /**
  * Length rule: a byte of the PDU gives the number of bytes that follow it.
  */
-#define MBM_RULE_COUNTED 2
+#define MBM_RULE_COUNTED 2u
 
 /**
  * The maximum number of registers that one request reads (V1.1b3, 6.3 and 6.4).
@@ -1487,29 +1487,29 @@ uint16_t mbm_master_receive(struct mbm_master *master);
 /**
  * `retryLimit` of mbm_clientRequest and mbm_clientUnit: no repetitions.
  */
-#define MBM_NO_RETRIES 255
+#define MBM_NO_RETRIES 255u
 
 /**
  * mbm_client_setBackoff: the client repeats a request at once.
  */
-#define MBM_BACKOFF_NONE 0
+#define MBM_BACKOFF_NONE 0u
 
 /**
  * mbm_client_setBackoff: the client waits `delayMs` before each repetition.
  */
-#define MBM_BACKOFF_FIXED 1
+#define MBM_BACKOFF_FIXED 1u
 
 /**
  * mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
  * before the second, three times that before the third, but at most `maxDelayMs`.
  */
-#define MBM_BACKOFF_LINEAR 2
+#define MBM_BACKOFF_LINEAR 2u
 
 /**
  * mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
  * before the second, four times that before the third, but at most `maxDelayMs`.
  */
-#define MBM_BACKOFF_EXPONENTIAL 3
+#define MBM_BACKOFF_EXPONENTIAL 3u
 
 /**
  * A client of one serial line or one TCP stream. It queues up to 16 requests.
@@ -2674,72 +2674,72 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
  * A table of the data model (V1.1b3, 4.3): coils. The number of each table is that of the
  * function that reads it.
  */
-#define MBM_TABLE_COILS 1
+#define MBM_TABLE_COILS 1u
 
 /**
  * The discrete inputs.
  */
-#define MBM_TABLE_DISCRETE_INPUTS 2
+#define MBM_TABLE_DISCRETE_INPUTS 2u
 
 /**
  * The holding registers.
  */
-#define MBM_TABLE_HOLDING_REGISTERS 3
+#define MBM_TABLE_HOLDING_REGISTERS 3u
 
 /**
  * The input registers.
  */
-#define MBM_TABLE_INPUT_REGISTERS 4
+#define MBM_TABLE_INPUT_REGISTERS 4u
 
 /**
  * The type of a value: a coil or a discrete input, 0 or 1.
  */
-#define MBM_TYPE_BIT 1
+#define MBM_TYPE_BIT 1u
 
 /**
  * One register, 0 to 65535.
  */
-#define MBM_TYPE_UINT16 2
+#define MBM_TYPE_UINT16 2u
 
 /**
  * One register, -32768 to 32767.
  */
-#define MBM_TYPE_INT16 3
+#define MBM_TYPE_INT16 3u
 
 /**
  * Two registers.
  */
-#define MBM_TYPE_UINT32 4
+#define MBM_TYPE_UINT32 4u
 
 /**
  * Two registers, two's complement.
  */
-#define MBM_TYPE_INT32 5
+#define MBM_TYPE_INT32 5u
 
 /**
  * Four registers.
  */
-#define MBM_TYPE_UINT64 6
+#define MBM_TYPE_UINT64 6u
 
 /**
  * Four registers, two's complement.
  */
-#define MBM_TYPE_INT64 7
+#define MBM_TYPE_INT64 7u
 
 /**
  * Two registers, an IEEE 754 binary32.
  */
-#define MBM_TYPE_FLOAT 8
+#define MBM_TYPE_FLOAT 8u
 
 /**
  * Four registers, an IEEE 754 binary64.
  */
-#define MBM_TYPE_DOUBLE 9
+#define MBM_TYPE_DOUBLE 9u
 
 /**
  * A text, two characters a register, which ends at its first NUL or with its field.
  */
-#define MBM_TYPE_TEXT 10
+#define MBM_TYPE_TEXT 10u
 
 /**
  * The longest interval of a field in milliseconds: a day.
@@ -3219,33 +3219,33 @@ uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
 /**
  * mbm_link_state: there is no link. The client opens it when the wait is over.
  */
-#define MBM_LINK_IS_DOWN 1
+#define MBM_LINK_IS_DOWN 1u
 
 /**
  * mbm_link_state: the connection is being made.
  */
-#define MBM_LINK_IS_CONNECTING 2
+#define MBM_LINK_IS_CONNECTING 2u
 
 /**
  * mbm_link_state: the link is open.
  */
-#define MBM_LINK_IS_UP 3
+#define MBM_LINK_IS_UP 3u
 
 /**
  * An event of a link: it is open now. The status is MBM_OK.
  */
-#define MBM_LINK_EVENT_CONNECTED 0
+#define MBM_LINK_EVENT_CONNECTED 0u
 
 /**
  * An event of a link: it was open and is lost. The status is MBM_LINK_LOST.
  */
-#define MBM_LINK_EVENT_LOST 1
+#define MBM_LINK_EVENT_LOST 1u
 
 /**
  * An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
  * mbm_linkHooks returned; MBM_RESPONSE_TIMED_OUT if the connection took too long.
  */
-#define MBM_LINK_EVENT_FAILED 2
+#define MBM_LINK_EVENT_FAILED 2u
 
 /**
  * A link that opens itself again when it was lost. It belongs to one client:
@@ -3637,24 +3637,24 @@ uint8_t mbm_server_getEchoDiscard(const struct mbm_server *server);
  * A function of yours returns this, or-ed with the exception code (1 to 127), to answer
  * with an exception.
  */
-#define MBM_REPLY_EXCEPTION 256
+#define MBM_REPLY_EXCEPTION 256u
 
 /**
  * A function of yours returns this to send no response.
  */
-#define MBM_REPLY_NONE 512
+#define MBM_REPLY_NONE 512u
 
 /**
  * A function of yours returns this if it has not finished. The next poll calls it again
  * with the same request. The server receives nothing meanwhile.
  */
-#define MBM_REPLY_PENDING 768
+#define MBM_REPLY_PENDING 768u
 
 /**
  * A function of yours returns this to decline the request: the next record of the unit that
  * serves the function code answers, or exception 01 if there is none.
  */
-#define MBM_REPLY_DECLINED 1024
+#define MBM_REPLY_DECLINED 1024u
 
 /**
  * The most records that one unit can serve. Each is one struct that you pass to a
@@ -4454,12 +4454,12 @@ uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table)
 /**
  * The `line` of a route for broadcasts: to all lines, one after the other.
  */
-#define MBM_GATEWAY_ALL_LINES 255
+#define MBM_GATEWAY_ALL_LINES 255u
 
 /**
  * The `line` of a route to the gateway's own units: see mbm_gateway_serveUnits.
  */
-#define MBM_GATEWAY_LOCAL 254
+#define MBM_GATEWAY_LOCAL 254u
 
 /**
  * A gateway: takes requests from Modbus TCP connections, passes each to the line of its unit,
@@ -4814,50 +4814,50 @@ uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
  * Passed to a function: use the order of the mbm_registers. As that order itself:
  * MBM_ORDER_ABCD.
  */
-#define MBM_ORDER_DEFAULT 0
+#define MBM_ORDER_DEFAULT 0u
 
 /**
  * High word first, high byte first, as most devices do. A is the most significant byte.
  * Example: 2923517522, which is 0xAE415652, is transmitted as AE41 5652 (hex).
  */
-#define MBM_ORDER_ABCD 1
+#define MBM_ORDER_ABCD 1u
 
 /**
  * Low word first, high byte first. The example is transmitted as 5652 AE41.
  */
-#define MBM_ORDER_CDAB 2
+#define MBM_ORDER_CDAB 2u
 
 /**
  * High word first, low byte first. The example is transmitted as 41AE 5256.
  */
-#define MBM_ORDER_BADC 3
+#define MBM_ORDER_BADC 3u
 
 /**
  * Low word first, low byte first. The example is transmitted as 5256 41AE.
  */
-#define MBM_ORDER_DCBA 4
+#define MBM_ORDER_DCBA 4u
 
 /**
  * mbm_registers.kind: words that may only be read, for example the response words of
  * mbm_master.
  */
-#define MBM_REGISTERS_OF_WORDS 1
+#define MBM_REGISTERS_OF_WORDS 1u
 
 /**
  * mbm_registers.kind: bytes that may only be read, the high byte of each register first.
  */
-#define MBM_REGISTERS_OF_BYTES 2
+#define MBM_REGISTERS_OF_BYTES 2u
 
 /**
  * mbm_registers.kind: words that may be read and written.
  */
-#define MBM_REGISTERS_INTO_WORDS 3
+#define MBM_REGISTERS_INTO_WORDS 3u
 
 /**
  * mbm_registers.kind: bytes that may be read and written, the high byte of each register
  * first.
  */
-#define MBM_REGISTERS_INTO_BYTES 4
+#define MBM_REGISTERS_INTO_BYTES 4u
 
 /**
  * A view of consecutive registers, with the addresses that the device gives them. The
@@ -5460,17 +5460,17 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
 /**
  * A request: a client sends it.
  */
-#define MBM_PACKET_REQUEST 0
+#define MBM_PACKET_REQUEST 0u
 
 /**
  * A response: a server sends it if the request succeeds.
  */
-#define MBM_PACKET_RESPONSE 1
+#define MBM_PACKET_RESPONSE 1u
 
 /**
  * An exception: a server sends it if the request fails (V1.1b3, clause 7).
  */
-#define MBM_PACKET_EXCEPTION 2
+#define MBM_PACKET_EXCEPTION 2u
 
 /**
  * The longest PDU, function code and data, in bytes (V1.1b3, 4.1).
@@ -5480,24 +5480,24 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
 /**
  * The length is exactly `bytes`.
  */
-#define MBM_LENGTH_EXACT 0
+#define MBM_LENGTH_EXACT 0u
 
 /**
  * The length is at least `bytes`. Call the function again once you have that many bytes.
  */
-#define MBM_LENGTH_AT_LEAST 1
+#define MBM_LENGTH_AT_LEAST 1u
 
 /**
  * Silence on the line ends the frame; in ASCII the end character does. `bytes` is 0.
  */
-#define MBM_LENGTH_SILENCE 2
+#define MBM_LENGTH_SILENCE 2u
 
 /**
  * The length is not known, because the function is not declared: see mbm_function. In
  * RTU over TCP also for a function whose frames silence ends, because a stream has no
  * silence. `bytes` is 0.
  */
-#define MBM_LENGTH_UNKNOWN 3
+#define MBM_LENGTH_UNKNOWN 3u
 
 /**
  * An object of a device identification.
@@ -5977,17 +5977,17 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
 /**
  * The bytes come from a line that carries both directions.
  */
-#define MBM_DIRECTION_BOTH 0
+#define MBM_DIRECTION_BOTH 0u
 
 /**
  * The bytes come from a line or stream on which only the client sends.
  */
-#define MBM_DIRECTION_CLIENT 1
+#define MBM_DIRECTION_CLIENT 1u
 
 /**
  * The bytes come from a line or stream on which only servers send.
  */
-#define MBM_DIRECTION_SERVER 2
+#define MBM_DIRECTION_SERVER 2u
 
 /**
  * The smallest buffer of a sniffer, in bytes.
@@ -6002,39 +6002,39 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
 /**
  * A request.
  */
-#define MBM_EVENT_REQUEST 0
+#define MBM_EVENT_REQUEST 0u
 
 /**
  * The reply to a request.
  */
-#define MBM_EVENT_REPLY 1
+#define MBM_EVENT_REPLY 1u
 
 /**
  * An exception that answers a request.
  */
-#define MBM_EVENT_EXCEPTION 2
+#define MBM_EVENT_EXCEPTION 2u
 
 /**
  * A reply or exception without a matching request: it is late, or its request was not
  * received, or it does not match the request.
  */
-#define MBM_EVENT_UNPAIRED 3
+#define MBM_EVENT_UNPAIRED 3u
 
 /**
  * A request without a reply: none came before the timeout, or on a serial line before
  * the next request.
  */
-#define MBM_EVENT_TIMEOUT 4
+#define MBM_EVENT_TIMEOUT 4u
 
 /**
  * Bytes that look like a frame, but the CRC or LRC is wrong, or bytes are missing.
  */
-#define MBM_EVENT_BAD_CRC 5
+#define MBM_EVENT_BAD_CRC 5u
 
 /**
  * Bytes that are no frame.
  */
-#define MBM_EVENT_NOISE 6
+#define MBM_EVENT_NOISE 6u
 
 /**
  * A sniffer: finds the frames on a bus that others use, and pairs requests with replies.
@@ -6327,12 +6327,12 @@ uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size)
 /**
  * The bytes were received.
  */
-#define MBM_TRACE_RECEIVED 0
+#define MBM_TRACE_RECEIVED 0u
 
 /**
  * The bytes were sent.
  */
-#define MBM_TRACE_SENT 1
+#define MBM_TRACE_SENT 1u
 
 /**
  * A trace: stands between a port and the master, client or server that uses it, passes

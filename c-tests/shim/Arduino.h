@@ -32,6 +32,12 @@ inline void yield()
 {
     board().yields++;
 }
+inline void delay(unsigned long milliseconds)
+{
+    const uint32_t start = board().micros();
+    while (board().micros() - start < milliseconds * 1000)
+        yield();
+}
 
 class Stream : public Print {
 public:

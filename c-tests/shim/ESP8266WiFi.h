@@ -8,7 +8,7 @@ enum wl_status_t { WL_IDLE_STATUS = 0, WL_CONNECTED = 3, WL_DISCONNECTED = 6 };
 
 class WiFiClient : public SocketClient {
 public:
-    WiFiClient() {}
+    WiFiClient() = default;
     explicit WiFiClient(int fd) : SocketClient(fd) {}
 };
 

@@ -6,7 +6,7 @@
 
 class EthernetClient : public SocketClient {
 public:
-    EthernetClient() {}
+    EthernetClient() = default;
     explicit EthernetClient(int fd) : SocketClient(fd) {}
 };
 

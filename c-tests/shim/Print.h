@@ -21,7 +21,7 @@ protected:
     void setWriteError(int error = 1) { writeError = error; }
 
 public:
-    virtual ~Print() {}
+    virtual ~Print() = default;
     int getWriteError() { return writeError; }
     void clearWriteError() { setWriteError(0); }
     virtual size_t write(uint8_t value) = 0;

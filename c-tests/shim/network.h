@@ -30,7 +30,7 @@ class SocketClient : public Client {
 public:
     size_t writeSpace = SIZE_MAX; /* bytes that one write accepts */
 
-    SocketClient() {}
+    SocketClient() = default;
     explicit SocketClient(int fd) : socket(std::make_shared<Socket>(fd)) {}
 
     int connect(IPAddress, uint16_t port) override { return connectTo(networkPort(port)); }

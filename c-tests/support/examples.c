@@ -139,7 +139,8 @@ uint16_t example_load(const example *e, uint8_t *pdu, mbm_packet *packet)
 
 uint8_t example_side(const example *e)
 {
-    return e->packet.kind == MBM_PACKET_REQUEST ? MBM_PACKET_REQUEST : MBM_PACKET_RESPONSE;
+    return (uint8_t)(e->packet.kind == MBM_PACKET_REQUEST ? MBM_PACKET_REQUEST
+                                                          : MBM_PACKET_RESPONSE);
 }
 
 #define SAME(field) assert_int_equal(found->field, wanted->field)

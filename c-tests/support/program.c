@@ -119,7 +119,7 @@ static int is_asleep(const program *p)
     file = fopen(path, "r");
     must(file != NULL, path);
     length = fread(text, 1, sizeof text - 1, file);
-    fclose(file);
+    (void)fclose(file);
     text[length] = 0;
     name = strrchr(text, ')');
     return name && name[1] == ' ' && name[2] == 'S';

@@ -195,7 +195,7 @@ fn the_probes_include_every_constant_of_the_header() {
         .lines()
         .filter_map(|line| line.strip_prefix("#define MBM_"))
         .filter_map(|rest| rest.split_once(' '))
-        .filter(|(_, value)| value.trim().parse::<u64>().is_ok())
+        .filter(|(_, value)| value.trim().trim_end_matches('u').parse::<u64>().is_ok())
         .map(|(name, _)| format!("MBM_{name}"))
         .collect();
     let mut probed: Vec<_> = probes().into_iter().map(|(name, _)| name).collect();

@@ -9,7 +9,7 @@
 /* 8 data bits, no parity, 1 stop bit. The low rate makes the silence after a frame long.
  * QEMU's UARTs have no rate, but a busy computer may pause inside a frame for longer than
  * any wire would. */
-enum { BAUD = 2400 };
+#define BAUD 2400u
 
 /* Sets up clocks and pins. Called before all other functions. */
 void machine_start(void);

@@ -150,15 +150,18 @@ static void note(void *context, mbm_clientRequest *request)
     uint16_t sum = 0;
 
     /* Each word is weighted with its position, so that a wrong order changes the sum. */
-    for (i = 0; i < count; i++)
+    for (i = 0; i < count; i++) {
         sum = (uint16_t)(sum + (i + 1u) * reply[i]);
-    for (i = 0; i < MBM_MAX_READ_REGISTERS; i++)
+    }
+    for (i = 0; i < MBM_MAX_READ_REGISTERS; i++) {
         reply[i] = 0;
+    }
     words[STEP_STATUS] = request->status;
     words[STEP_WORDS] = count;
     words[STEP_SUM] = sum;
-    if (request->status != t->expected)
+    if (request->status != t->expected) {
         report[REPORT_UNEXPECTED]++;
+    }
     ended_at = clock_micros(0);
     console_print(t->name);
     console_print(": ");
@@ -179,8 +182,9 @@ static void carry_out(enum step first, enum step last)
         request->replyBytes = sizeof reply;
         request->done = note;
         request->context = (void *)(uintptr_t)&tasks[step];
-        if (tasks[step].queue(request) != MBM_PENDING)
+        if (tasks[step].queue(request) != MBM_PENDING) {
             note(request->context, request);
+        }
     }
     while (mbm_client_poll(&client) == MBM_PENDING) {
         report[REPORT_POLLS]++;
@@ -206,8 +210,9 @@ static uint8_t send_report(void)
     request->unit = UNIT;
     request->data = report;
     (void)mbm_client_writeMultipleRegisters(&client, request, REPORT_ADDRESS, REPORT_SIZE);
-    while (mbm_client_poll(&client) == MBM_PENDING)
+    while (mbm_client_poll(&client) == MBM_PENDING) {
         sleep_at_most(mbm_client_pollDelay(&client));
+    }
     return request->status;
 }
 
@@ -224,19 +229,20 @@ int main(void)
     port.write = uart_write;
     port.micros = clock_micros;
     port.flush = uart_flush;
-    mbm_client_beginRtu(&client, &port, frame, sizeof frame);
-    mbm_client_setBaudRate(&client, BAUD);
-    mbm_client_setResponseTimeout(&client, TIMEOUT);
-    mbm_client_setCounters(&client, &counters);
+    (void)mbm_client_beginRtu(&client, &port, frame, sizeof frame);
+    (void)mbm_client_setBaudRate(&client, BAUD);
+    (void)mbm_client_setResponseTimeout(&client, TIMEOUT);
+    (void)mbm_client_setCounters(&client, &counters);
 
     carry_out(WRITE_REGISTER, READ_WHAT_WAS_BROADCAST);
-    mbm_client_setResponseTimeout(&client, ABSENT_TIMEOUT);
+    (void)mbm_client_setResponseTimeout(&client, ABSENT_TIMEOUT);
     start = ended_at;
     carry_out(ASK_ABSENT_UNIT, ASK_ABSENT_UNIT);
     report[REPORT_ABSENT_MILLIS] = (uint16_t)((ended_at - start) / 1000u);
-    mbm_client_setResponseTimeout(&client, TIMEOUT);
+    (void)mbm_client_setResponseTimeout(&client, TIMEOUT);
     carry_out(READ_AGAIN, READ_AGAIN);
-    if (send_report() != MBM_OK)
+    if (send_report() != MBM_OK) {
         return 255;
+    }
     return report[REPORT_UNEXPECTED];
 }

@@ -22,13 +22,15 @@ static void note(enum step step, const char *name, uint8_t status, uint8_t expec
     uint16_t sum = 0;
 
     /* Each word is weighted with its position, so that a wrong order changes the sum. */
-    for (i = 0; i < count; i++)
+    for (i = 0; i < count; i++) {
         sum = (uint16_t)(sum + (i + 1u) * mbm_master_receive(&node));
+    }
     words[STEP_STATUS] = status;
     words[STEP_WORDS] = count;
     words[STEP_SUM] = sum;
-    if (status != expected)
+    if (status != expected) {
         report[REPORT_UNEXPECTED]++;
+    }
     console_print(name);
     console_print(": ");
     console_print(mbm_status_text(status));
@@ -40,15 +42,15 @@ static void write(void)
     note(WRITE_REGISTER, "write a register", mbm_master_writeSingleRegister(&node, 100, 0xBEEF),
          MBM_OK);
 
-    mbm_master_beginTransmission(&node, 101);
-    mbm_master_send(&node, 0x1122);
-    mbm_master_send32(&node, 0x33445566);
+    (void)mbm_master_beginTransmission(&node, 101);
+    (void)mbm_master_send(&node, 0x1122);
+    (void)mbm_master_send32(&node, 0x33445566);
     note(WRITE_REGISTERS, "write registers", mbm_master_writeQueuedRegisters(&node), MBM_OK);
 
     note(WRITE_COIL, "write a coil", mbm_master_writeSingleCoil(&node, 40, 1), MBM_OK);
 
-    mbm_master_setTransmitBuffer(&node, 0, 0xA5C3);
-    mbm_master_setTransmitBuffer(&node, 1, 0x0005);
+    (void)mbm_master_setTransmitBuffer(&node, 0, 0xA5C3);
+    (void)mbm_master_setTransmitBuffer(&node, 1, 0x0005);
     note(WRITE_COILS, "write 19 coils", mbm_master_writeMultipleCoils(&node, 50, 19), MBM_OK);
 }
 
@@ -68,8 +70,8 @@ static void write_and_read(void)
     note(MASK_WRITE, "mask a register", mbm_master_maskWriteRegister(&node, 102, 0x00FF, 0x3400),
          MBM_OK);
 
-    mbm_master_setTransmitBuffer(&node, 0, 0xCAFE);
-    mbm_master_setTransmitBuffer(&node, 1, 0xF00D);
+    (void)mbm_master_setTransmitBuffer(&node, 0, 0xCAFE);
+    (void)mbm_master_setTransmitBuffer(&node, 1, 0xF00D);
     note(READ_WRITE, "write 2 registers and read 6",
          mbm_master_readWriteMultipleRegisters(&node, 100, 6, 104, 2), MBM_OK);
 
@@ -84,21 +86,21 @@ static void failing_requests(void)
     note(READ_ABSENT_REGISTER, "read an absent register",
          mbm_master_readHoldingRegisters(&node, 60000, 1), MBM_ILLEGAL_DATA_ADDRESS);
 
-    mbm_master_setSlaveID(&node, 0);
+    (void)mbm_master_setSlaveID(&node, 0);
     note(BROADCAST, "write a register in every unit",
          mbm_master_writeSingleRegister(&node, 130, 0x5A5A), MBM_OK);
-    mbm_master_setSlaveID(&node, UNIT);
+    (void)mbm_master_setSlaveID(&node, UNIT);
     note(READ_WHAT_WAS_BROADCAST, "read it", mbm_master_readHoldingRegisters(&node, 130, 1),
          MBM_OK);
 
-    mbm_master_setSlaveID(&node, ABSENT_UNIT);
-    mbm_master_setResponseTimeout(&node, ABSENT_TIMEOUT);
+    (void)mbm_master_setSlaveID(&node, ABSENT_UNIT);
+    (void)mbm_master_setResponseTimeout(&node, ABSENT_TIMEOUT);
     start = clock_micros(0);
     note(ASK_ABSENT_UNIT, "read from a unit that is absent",
          mbm_master_readHoldingRegisters(&node, 0, 1), MBM_RESPONSE_TIMED_OUT);
     report[REPORT_ABSENT_MILLIS] = (uint16_t)((clock_micros(0) - start) / 1000u);
-    mbm_master_setResponseTimeout(&node, PRESENT_TIMEOUT);
-    mbm_master_setSlaveID(&node, UNIT);
+    (void)mbm_master_setResponseTimeout(&node, PRESENT_TIMEOUT);
+    (void)mbm_master_setSlaveID(&node, UNIT);
     note(READ_AGAIN, "read again", mbm_master_readHoldingRegisters(&node, 100, 2), MBM_OK);
 }
 
@@ -115,8 +117,9 @@ static uint8_t send_report(void)
     report[REPORT_TIMEOUTS] = (uint16_t)counters.timeouts;
     report[REPORT_FOREIGN_FRAMES] = (uint16_t)counters.foreignFrames;
     report[REPORT_RESYNCHRONISATIONS] = (uint16_t)counters.resynchronisations;
-    for (i = 0; i < REPORT_SIZE; i++)
-        mbm_master_setTransmitBuffer(&node, i, report[i]);
+    for (i = 0; i < REPORT_SIZE; i++) {
+        (void)mbm_master_setTransmitBuffer(&node, i, report[i]);
+    }
     return mbm_master_writeMultipleRegisters(&node, REPORT_ADDRESS, REPORT_SIZE);
 }
 
@@ -128,18 +131,19 @@ int main(void)
     uart_start();
     clock_start();
 
-    mbm_master_setBuffers(&node, response, MBM_MAX_READ_REGISTERS, transmit, REPORT_SIZE, frame,
-                          sizeof frame);
-    mbm_master_beginRtu(&node, UNIT, &port);
-    mbm_master_setBaudRate(&node, BAUD);
-    mbm_master_setResponseTimeout(&node, PRESENT_TIMEOUT);
-    mbm_master_setCounters(&node, &counters);
+    (void)mbm_master_setBuffers(&node, response, MBM_MAX_READ_REGISTERS, transmit, REPORT_SIZE,
+                                frame, sizeof frame);
+    (void)mbm_master_beginRtu(&node, UNIT, &port);
+    (void)mbm_master_setBaudRate(&node, BAUD);
+    (void)mbm_master_setResponseTimeout(&node, PRESENT_TIMEOUT);
+    (void)mbm_master_setCounters(&node, &counters);
 
     write();
     read();
     write_and_read();
     failing_requests();
-    if (send_report() != MBM_OK)
+    if (send_report() != MBM_OK) {
         return 255;
+    }
     return report[REPORT_UNEXPECTED];
 }

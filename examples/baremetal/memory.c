@@ -14,8 +14,9 @@ void *memcpy(void *restrict to, const void *restrict from, size_t length)
     unsigned char *out = to;
     const unsigned char *in = from;
 
-    while (length-- > 0)
+    while (length-- > 0) {
         *out++ = *in++;
+    }
     return to;
 }
 
@@ -24,10 +25,12 @@ void *memmove(void *to, const void *from, size_t length)
     unsigned char *out = to;
     const unsigned char *in = from;
 
-    if (out < in)
+    if (out < in) {
         return memcpy(to, from, length);
-    while (length-- > 0)
+    }
+    while (length-- > 0) {
         out[length] = in[length];
+    }
     return to;
 }
 
@@ -35,8 +38,9 @@ void *memset(void *to, int value, size_t length)
 {
     unsigned char *out = to;
 
-    while (length-- > 0)
+    while (length-- > 0) {
         *out++ = (unsigned char)value;
+    }
     return to;
 }
 
@@ -44,9 +48,11 @@ int memcmp(const void *left, const void *right, size_t length)
 {
     const unsigned char *a = left, *b = right;
 
-    for (; length > 0; length--, a++, b++)
-        if (*a != *b)
+    for (; length > 0u; length--, a++, b++) {
+        if (*a != *b) {
             return *a - *b;
+        }
+    }
     return 0;
 }
 
@@ -65,51 +71,51 @@ void __aeabi_memclr8(void *to, size_t length);
 
 void __aeabi_memcpy(void *to, const void *from, size_t length)
 {
-    memcpy(to, from, length);
+    (void)memcpy(to, from, length);
 }
 
 void __aeabi_memcpy4(void *to, const void *from, size_t length)
 {
-    memcpy(to, from, length);
+    (void)memcpy(to, from, length);
 }
 
 void __aeabi_memcpy8(void *to, const void *from, size_t length)
 {
-    memcpy(to, from, length);
+    (void)memcpy(to, from, length);
 }
 
 void __aeabi_memmove(void *to, const void *from, size_t length)
 {
-    memmove(to, from, length);
+    (void)memmove(to, from, length);
 }
 
 void __aeabi_memmove4(void *to, const void *from, size_t length)
 {
-    memmove(to, from, length);
+    (void)memmove(to, from, length);
 }
 
 void __aeabi_memset(void *to, size_t length, int value)
 {
-    memset(to, value, length);
+    (void)memset(to, value, length);
 }
 
 void __aeabi_memset4(void *to, size_t length, int value)
 {
-    memset(to, value, length);
+    (void)memset(to, value, length);
 }
 
 void __aeabi_memclr(void *to, size_t length)
 {
-    memset(to, 0, length);
+    (void)memset(to, 0, length);
 }
 
 void __aeabi_memclr4(void *to, size_t length)
 {
-    memset(to, 0, length);
+    (void)memset(to, 0, length);
 }
 
 void __aeabi_memclr8(void *to, size_t length)
 {
-    memset(to, 0, length);
+    (void)memset(to, 0, length);
 }
 #endif

@@ -21,9 +21,11 @@ static uint8_t registers_before(void *context, const mbm_access *access)
     uint16_t left;
 
     (void)context;
-    for (left = access->quantity; left > 0; left--, data += 2)
-        if ((data[0] << 8 | data[1]) > SERVE_MOST)
+    for (left = access->quantity; left > 0u; left--, data += 2) {
+        if ((data[0] << 8 | data[1]) > SERVE_MOST) {
             return MBM_ILLEGAL_DATA_VALUE;
+        }
+    }
     return 0;
 }
 
@@ -32,8 +34,9 @@ static void registers_written(void *context, const mbm_access *access)
     uint16_t i, first = access->address - SERVE_BASE;
 
     (void)context;
-    for (i = first; i < first + access->quantity; i++)
+    for (i = first; i < first + access->quantity; i++) {
         input_words[i] = (uint16_t)~holding_words[i];
+    }
 }
 
 static void coils_written(void *context, const mbm_access *access)
@@ -42,16 +45,18 @@ static void coils_written(void *context, const mbm_access *access)
 
     (void)context;
     (void)access;
-    for (i = 0; i < sizeof coil_bits; i++)
+    for (i = 0; i < sizeof coil_bits; i++) {
         input_bits[i] = (uint8_t)~coil_bits[i];
+    }
 }
 
 static uint8_t is_over(void)
 {
-    enum { END = SERVE_END - SERVE_BASE };
+    const uint16_t end = SERVE_END - SERVE_BASE;
 
     /* The response to the write that ends the program must be sent first. */
-    return (coil_bits[END / 8] >> END % 8 & 1) && mbm_server_pollDelay(&server) == UINT32_MAX;
+    return ((coil_bits[end / 8u] >> (end % 8u)) & 1u) != 0u &&
+           mbm_server_pollDelay(&server) == UINT32_MAX;
 }
 
 static void fill(void)
@@ -63,14 +68,14 @@ static void fill(void)
     holding.words = holding_words;
     holding.base = SERVE_BASE;
     holding.size = SERVE_CELLS;
-    mbm_registerTable_setHooks(&holding, &register_hooks);
+    (void)mbm_registerTable_setHooks(&holding, &register_hooks);
     inputs.words = input_words;
     inputs.base = SERVE_BASE;
     inputs.size = SERVE_CELLS;
     coils.bits = coil_bits;
     coils.base = SERVE_BASE;
     coils.size = SERVE_CELLS;
-    mbm_bitTable_setHooks(&coils, &coil_hooks);
+    (void)mbm_bitTable_setHooks(&coils, &coil_hooks);
     discrete.bits = input_bits;
     discrete.base = SERVE_BASE;
     discrete.size = SERVE_CELLS;
@@ -91,14 +96,15 @@ int main(void)
 
     fill();
     unit.id = SERVE_UNIT;
-    mbm_unit_serveHoldingRegisters(&unit, &holding);
-    mbm_unit_serveInputRegisters(&unit, &inputs);
-    mbm_unit_serveCoils(&unit, &coils);
-    mbm_unit_serveDiscreteInputs(&unit, &discrete);
-    mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame);
-    mbm_server_setSilence(&server, SERVE_SILENCE);
+    (void)mbm_unit_serveHoldingRegisters(&unit, &holding);
+    (void)mbm_unit_serveInputRegisters(&unit, &inputs);
+    (void)mbm_unit_serveCoils(&unit, &coils);
+    (void)mbm_unit_serveDiscreteInputs(&unit, &discrete);
+    (void)mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame);
+    (void)mbm_server_setSilence(&server, SERVE_SILENCE);
     console_print("serving\n");
-    while (status == MBM_OK && !is_over())
+    while (status == MBM_OK && !is_over()) {
         status = mbm_server_poll(&server);
+    }
     return status;
 }

@@ -12,6 +12,7 @@
  * The exit code is 0 if every command succeeded.
  *
  * Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
 #include "mbm_tcp.h"
 #include "trace_options.h"
 
@@ -173,9 +174,9 @@ static int failed(const char *what, uint8_t status)
 static int numbers(char *words, int base, unsigned long most, uint16_t *values, int capacity)
 {
     int count = 0;
-    char *end, *word;
+    char *end, *word, *rest = NULL;
 
-    for (word = strtok(words, " \t\n"); word; word = strtok(NULL, " \t\n")) {
+    for (word = strtok_r(words, " \t\n", &rest); word; word = strtok_r(NULL, " \t\n", &rest)) {
         unsigned long value = strtoul(word, &end, base);
 
         if (*end || word[0] == '-' || value > most || count == capacity)
@@ -277,7 +278,7 @@ int main(int argc, char **argv)
     trace_options(&argc, argv);
     if (argc > 1)
         return usage(argv[1]);
-    setvbuf(stdout, NULL, _IOLBF, 0);
+    (void)setvbuf(stdout, NULL, _IOLBF, 0);
     if (begin() != 0) {
         perror("custom_command");
         return 2;

@@ -184,7 +184,7 @@ static int add_route(const char *text, uint8_t to)
     mbm_gatewayRoute *route = &routes[config.routeCount];
     unsigned first, last, unit = 0, i;
     char extra;
-    int fields = sscanf(text, "%u-%u%c%u%c", &first, &last, &extra, &unit, &extra);
+    int fields = sscanf(text, "%3u-%3u%c%3u%c", &first, &last, &extra, &unit, &extra);
 
     if ((fields != 2 && (fields != 4 || !strchr(text, '='))) || first > last || last > 255 ||
         unit > 255 || config.routeCount == UINT8_MAX)
@@ -209,9 +209,9 @@ static int add_line(char *text, uint16_t timeout)
     mbm_port port;
 
     if (index == LINES || !(l->path = strtok_r(text, ",", &rest)) ||
-        !(field = strtok_r(NULL, ",", &rest)) || sscanf(field, "%u%c", &baud, &extra) != 1 ||
+        !(field = strtok_r(NULL, ",", &rest)) || sscanf(field, "%9u%c", &baud, &extra) != 1 ||
         !(field = strtok_r(NULL, ",", &rest)) ||
-        sscanf(field, "%c%u%c", &parity, &stop, &extra) != 2 || stop > 2 || baud < 50)
+        sscanf(field, "%c%1u%c", &parity, &stop, &extra) != 2 || stop > 2 || baud < 50)
         return -1;
     l->options.baud = baud;
     l->options.anyRate = 1;

@@ -206,7 +206,7 @@ int main(int argc, char **argv)
                 "       guarded_server PORT     serves clients on PORT\n");
         return is_help ? 0 : 2;
     }
-    setvbuf(stdout, NULL, _IOLBF, 0);
+    (void)setvbuf(stdout, NULL, _IOLBF, 0);
     if (begin(is_demonstration ? "127.0.0.1" : NULL, is_demonstration ? "0" : argv[1]) != 0 ||
         (is_demonstration && demonstrate() != 0)) {
         perror("guarded_server");

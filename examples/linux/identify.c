@@ -109,8 +109,8 @@ int main(int argc, char **argv)
             request.unit = (uint8_t)line_number(optarg, 1, 255);
         else if (option == 'c')
             for (category = MBM_DEVICE_ID_EXTENDED;
-                 category > 0 && strcmp(optarg, categories[category]) != 0; category--)
-                continue;
+                 category > 0 && strcmp(optarg, categories[category]) != 0; category--) {
+            }
         if (option == '?' || category == 0)
             return line_usage(1, USAGE);
     }

@@ -53,7 +53,7 @@ static void write_sample(const struct timespec *when)
     unsigned i;
 
     gmtime_r(&when->tv_sec, &utc);
-    strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
+    (void)strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
     fprintf(csv, "%s.%03ldZ,%ld,%s", text, when->tv_nsec / 1000000, unit,
             line_status(&at, &request));
     for (i = 0; i < quantity; i++) {

@@ -163,19 +163,19 @@ int mbm_tcp_isConnected(mbm_tcp *tcp);
  * Connects anew to the server of mbm_tcp_open, and does not wait for it. A hook for a
  * function that reconnects.
  *
- * @param tcp  an mbm_tcp
+ * @param context  an mbm_tcp
  * @return MBM_OK, MBM_PENDING while the connection is being made, or MBM_LINK_LOST
  *         with errno in its `error`: ENOTCONN if it was never opened
  */
-uint8_t mbm_tcp_connect(void *tcp);
+uint8_t mbm_tcp_connect(void *context);
 
 /**
  * Ends the connection. The link is lost until mbm_tcp_connect. A hook for a function that
  * reconnects.
  *
- * @param tcp  an mbm_tcp
+ * @param context  an mbm_tcp
  */
-void mbm_tcp_disconnect(void *tcp);
+void mbm_tcp_disconnect(void *context);
 
 /**
  * Returns whether there is a connection, as a hook of mbm_linkHooks.

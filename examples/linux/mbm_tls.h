@@ -264,19 +264,19 @@ void mbm_tls_close(mbm_tls *tls);
  * for a function that reconnects. Without a hook of mbm_tls_open the stream below must be
  * connected anew already.
  *
- * @param tls  an mbm_tls
+ * @param context  an mbm_tls
  * @return MBM_PENDING while the connection is being made, or MBM_LINK_LOST
  */
-uint8_t mbm_tls_connect(void *tls);
+uint8_t mbm_tls_connect(void *context);
 
 /**
  * Ends the session as mbm_tls_close does, and closes the stream below by the hook of
  * mbm_tls_open. The link is lost until mbm_tls_connect. A hook for a function that
  * reconnects.
  *
- * @param tls  an mbm_tls
+ * @param context  an mbm_tls
  */
-void mbm_tls_disconnect(void *tls);
+void mbm_tls_disconnect(void *context);
 
 /**
  * Returns a status in words. In mbm_tls_text.c.

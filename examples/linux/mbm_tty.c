@@ -197,7 +197,7 @@ typedef struct rated {
 
 #define GET_RATED _IOR('T', 0x2A, rated)
 #define SET_RATED _IOW('T', 0x2B, rated)
-enum { RATE = 0010017, RATE_IN = 0010017 << 16, OTHER_RATE = 0010000 };
+enum { RATE = 0x100F, RATE_IN = 0x100F << 16, OTHER_RATE = 0x1000 };
 
 static int set_rate(const mbm_tty *tty, uint32_t baud)
 {

@@ -119,7 +119,7 @@ static void publish_value(uint16_t field)
         }
     }
     gmtime_r(&now.tv_sec, &utc);
-    strftime(when, sizeof when, "%Y-%m-%dT%H:%M:%S", &utc);
+    (void)strftime(when, sizeof when, "%Y-%m-%dT%H:%M:%S", &utc);
     snprintf(json, sizeof json, "{\"value\":%s,\"status\":\"%s\",\"time\":\"%s.%03ldZ\"}", value,
              mbm_status_text(what->status), when, now.tv_nsec / 1000000);
     mqtt_broker_publish(&broker, fields.fields[field].name, NULL, json, 1);

@@ -186,7 +186,7 @@ int mqtt_fields_read(mqtt_fields *fields, const char *path)
     if (wrong)
         fprintf(stderr, "%s:%d: %s\n", path, at, wrong);
     free(line);
-    fclose(file);
+    (void)fclose(file);
     return wrong ? -1 : 0;
 }
 

@@ -105,7 +105,7 @@ static void show_reads(void)
     mbm_planReadInfo read;
     uint16_t count = 0;
 
-    printf("the plan reads %u fields with these requests:\n", FIELDS);
+    printf("the plan reads %d fields with these requests:\n", FIELDS);
     for (; mbm_plan_getRead(&plan, count, &read) == MBM_OK; count++)
         printf("  unit %u, %s: %u from %u on, every %" PRIu32 " ms\n", read.unit,
                line_tables(read.table), read.quantity, read.address, read.intervalMs);

@@ -169,13 +169,13 @@ static int replay(void)
     int length;
 
     while (!ended && fgets(text, sizeof text, stdin)) {
-        char *hex = strchr(text, ':'), *end = hex;
-        double line_time = hex ? strtod(text, &end) * 1000.0 : (double)(now + LINE_STEP);
+        char *hex = strchr(text, ':'), *tail = hex;
+        double line_time = hex ? strtod(text, &tail) * 1000.0 : (double)(now + LINE_STEP);
 
         number++;
         if (text[0] == '#')
             continue;
-        if (end != hex || !(line_time >= (double)now && line_time < 1e15)) {
+        if (tail != hex || !(line_time >= (double)now && line_time < 1e15)) {
             fprintf(stderr, "line %u: no time, or a time before that of the line before\n", number);
             return 1;
         }

@@ -31,7 +31,7 @@ static void checked(int result)
     if (result == 0)
         return;
     fprintf(stderr, "%s: %s\n", pcap_path, strerror(errno));
-    fclose(pcap);
+    (void)fclose(pcap);
     pcap = NULL;
 }
 
@@ -44,7 +44,7 @@ static void print_record(const traced *link, const mbm_traceRecord *record, cons
     uint16_t i;
 
     gmtime_r(&seconds, &utc);
-    strftime(clock, sizeof clock, "%H:%M:%S", &utc);
+    (void)strftime(clock, sizeof clock, "%H:%M:%S", &utc);
     fprintf(stderr, "%s.%06u  %s  %-8s  %s [", clock, (unsigned)(time % 1000000u), link->name,
             record->direction == MBM_TRACE_SENT ? "sent" : "received", words);
     for (i = 0; i < record->length; i++)

@@ -6,8 +6,7 @@
 
 /* The smallest, the largest and the sum of the noted values. All zero: there are none. */
 typedef struct span {
-    uint64_t least, most, sum;
-    unsigned count;
+    uint64_t least, most, sum, count; /* of one type: tests compare spans with memcmp */
 } span;
 
 void note(span *s, uint64_t value);

@@ -136,7 +136,7 @@ run machine_finish(running *r, int patient)
     rewind(r->console);
     length = fread(result.console, 1, sizeof result.console - 1, r->console);
     result.console[length] = '\0';
-    fclose(r->console);
+    (void)fclose(r->console);
     r->console = NULL;
     return result;
 }

@@ -17,9 +17,9 @@ void loop() {
   counter++;
   node.setTransmitBuffer(0, lowWord(counter));
   node.setTransmitBuffer(1, highWord(counter));
-  uint8_t result = node.writeMultipleRegisters(0, 2);
+  node.writeMultipleRegisters(0, 2);
 
-  result = node.readHoldingRegisters(2, 6);
+  uint8_t result = node.readHoldingRegisters(2, 6);
   if (result == node.ku8MBSuccess)
     for (uint8_t i = 0; i < 6; i++)
       data[i] = node.getResponseBuffer(i);

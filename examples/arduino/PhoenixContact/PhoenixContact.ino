@@ -11,32 +11,33 @@ void setup() {
 }
 
 void loop() {
+  // Each request returns a status, which this sketch looks at where it matters.
+
   // One request writes one word to the outputs and reads two words of the inputs.
   node.setTransmitBuffer(0, 0xABCD);
-  uint8_t result = node.readWriteMultipleRegisters(8, 2, 4, 1);
+  node.readWriteMultipleRegisters(8, 2, 4, 1);
 
   // Two commands of one register each.
-  result = node.writeSingleRegister(2006, 0);
-  result = node.writeSingleRegister(2006, 1);
+  node.writeSingleRegister(2006, 0);
+  node.writeSingleRegister(2006, 1);
 
   // Writes the words that it has read.
   if (node.readHoldingRegisters(8, 2) == node.ku8MBSuccess) {
     node.setTransmitBuffer(0, node.getResponseBuffer(0));
     node.setTransmitBuffer(1, node.getResponseBuffer(1));
-    result = node.writeMultipleRegisters(4, 2);
+    node.writeMultipleRegisters(4, 2);
   }
 
   // Reads 17 coils. The last is the lowest bit of the second word.
-  result = node.readCoils(0, 17);
+  node.readCoils(0, 17);
 
   // The device refuses 66 registers, and returns 64.
   if (node.readHoldingRegisters(0, 66) == node.ku8MBIllegalDataAddress)
-    result = node.readHoldingRegisters(0, 64);
+    node.readHoldingRegisters(0, 64);
 
-  result = node.readHoldingRegisters(0, 8);
-  result = node.readHoldingRegisters(8, 64);
-  result = node.readHoldingRegisters(72, 8);
-  result = node.readInputRegisters(0, 8);
-  (void)result; // use the status here
+  node.readHoldingRegisters(0, 8);
+  node.readHoldingRegisters(8, 64);
+  node.readHoldingRegisters(72, 8);
+  node.readInputRegisters(0, 8);
   delay(100);
 }

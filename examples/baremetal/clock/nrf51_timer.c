@@ -4,13 +4,14 @@
 #include "counter.h"
 
 #define TIMER0 0x40008000u
-#define START REGISTER(TIMER0 + 0x000)
-#define CAPTURE REGISTER(TIMER0 + 0x040)
-#define BIT_MODE REGISTER(TIMER0 + 0x508)
-#define PRESCALER REGISTER(TIMER0 + 0x510)
-#define CAPTURED REGISTER(TIMER0 + 0x540)
+#define START REGISTER(TIMER0 + 0x000u)
+#define CAPTURE REGISTER(TIMER0 + 0x040u)
+#define BIT_MODE REGISTER(TIMER0 + 0x508u)
+#define PRESCALER REGISTER(TIMER0 + 0x510u)
+#define CAPTURED REGISTER(TIMER0 + 0x540u)
 
-enum { BITS_32 = 3, DIVIDE_BY_16 = 4 };
+#define BITS_32 3u
+#define DIVIDE_BY_16 4u
 
 void counter_start(void)
 {

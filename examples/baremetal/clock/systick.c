@@ -3,11 +3,13 @@
 #include "board.h"
 #include "counter.h"
 
-#define CONTROL REGISTER(0xE000E010)
-#define RELOAD REGISTER(0xE000E014)
-#define VALUE REGISTER(0xE000E018)
+#define CONTROL REGISTER(0xE000E010u)
+#define RELOAD REGISTER(0xE000E014u)
+#define VALUE REGISTER(0xE000E018u)
 
-enum { ENABLE = 1, CPU_CLOCK = 4, LAST = 0xFFFFFF };
+#define ENABLE 1u
+#define CPU_CLOCK 4u
+#define LAST 0xFFFFFFu
 
 void counter_start(void)
 {
@@ -19,5 +21,5 @@ void counter_start(void)
 /* In 256ths of a cycle, so that the 24 bits wrap at 2^32. */
 uint32_t counter_read(void)
 {
-    return (LAST - VALUE) << 8;
+    return (LAST - VALUE) << 8u;
 }

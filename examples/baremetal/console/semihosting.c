@@ -40,6 +40,7 @@ _Noreturn void console_exit(uint8_t code)
 {
     const uint32_t reason[] = {APPLICATION_EXIT, code};
 
-    for (;;)
+    for (;;) {
         call(EXIT, reason);
+    }
 }

@@ -8,15 +8,18 @@ void console_print(const char *text)
     int32_t length = 0;
 
     /* Files 0 to 2 are the serial line, so another file is opened. */
-    if (file < 0)
+    if (file < 0) {
         file = simcall(SIMCALL_OPEN, (int32_t)(uintptr_t) "/dev/stderr", 1, 0);
-    while (text[length] != '\0')
+    }
+    while (text[length] != '\0') {
         length++;
-    simcall(SIMCALL_WRITE, file, (int32_t)(uintptr_t)text, length);
+    }
+    (void)simcall(SIMCALL_WRITE, file, (int32_t)(uintptr_t)text, length);
 }
 
 _Noreturn void console_exit(uint8_t code)
 {
-    for (;;)
-        simcall(SIMCALL_EXIT, code, 0, 0);
+    for (;;) {
+        (void)simcall(SIMCALL_EXIT, code, 0, 0);
+    }
 }

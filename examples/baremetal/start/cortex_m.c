@@ -27,13 +27,15 @@ void reset_handler(void)
 
 #if defined(__ARM_FP)
     /* Full access to the FPU, before the first function that may use it. */
-    REGISTER(0xE000ED88) |= 0xFu << 20;
+    REGISTER(0xE000ED88u) |= 0xFu << 20u;
     __asm__ volatile("dsb\n isb" ::: "memory");
 #endif
-    for (to = data_start; to < data_end; to++)
+    for (to = data_start; to < data_end; to++) {
         *to = *from++;
-    for (to = bss_start; to < bss_end; to++)
+    }
+    for (to = bss_start; to < bss_end; to++) {
         *to = 0;
+    }
     machine_start();
     console_exit((uint8_t)main());
 }

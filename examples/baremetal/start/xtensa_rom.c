@@ -11,8 +11,8 @@ unsigned __udivsi3(unsigned dividend, unsigned divisor)
 {
     unsigned quotient = 0, rest = 0, bit;
 
-    for (bit = 1u << 31; bit != 0; bit >>= 1) {
-        rest = rest << 1 | ((dividend & bit) != 0);
+    for (bit = 0x80000000u; bit != 0u; bit >>= 1) {
+        rest = (rest << 1) | (((dividend & bit) != 0u) ? 1u : 0u);
         if (rest >= divisor) {
             rest -= divisor;
             quotient |= bit;

@@ -3,19 +3,24 @@
 #include "machine.h"
 
 #define REGISTER8(offset) (*(volatile uint8_t *)(uintptr_t)(UART_BASE + (offset)))
-#define DATA REGISTER8(0)
-#define DIVISOR_LOW REGISTER8(0)
-#define DIVISOR_HIGH REGISTER8(1)
-#define FIFO REGISTER8(2)
-#define LINE REGISTER8(3)
-#define STATUS REGISTER8(5)
+#define DATA REGISTER8(0u)
+#define DIVISOR_LOW REGISTER8(0u)
+#define DIVISOR_HIGH REGISTER8(1u)
+#define FIFO REGISTER8(2u)
+#define LINE REGISTER8(3u)
+#define STATUS REGISTER8(5u)
 
-enum { FIFOS_ON = 1, FIFOS_CLEAR = 6, EIGHT_BITS = 3, SET_DIVISOR = 0x80 };
-enum { RX_FULL = 1 << 0, TX_EMPTY = 1 << 5, TX_DONE = 1 << 6 };
+#define FIFOS_ON 1u
+#define FIFOS_CLEAR 6u
+#define EIGHT_BITS 3u
+#define SET_DIVISOR 0x80u
+#define RX_FULL (1u << 0u)
+#define TX_EMPTY (1u << 5u)
+#define TX_DONE (1u << 6u)
 
 void uart_start(void)
 {
-    uint32_t divisor = (UART_HZ / 16u + BAUD / 2u) / BAUD;
+    uint32_t divisor = ((UART_HZ / 16u) + (BAUD / 2u)) / BAUD;
 
     LINE = SET_DIVISOR | EIGHT_BITS;
     DIVISOR_LOW = (uint8_t)divisor;
@@ -24,12 +29,12 @@ void uart_start(void)
     FIFO = FIFOS_ON | FIFOS_CLEAR;
 }
 
-#define HAS_BYTE (STATUS & RX_FULL)
-#define CAN_SEND (STATUS & TX_EMPTY)
+#define HAS_BYTE ((STATUS & RX_FULL) != 0u)
+#define CAN_SEND ((STATUS & TX_EMPTY) != 0u)
 #include "polled.h"
 
 uint8_t uart_flush(void *context)
 {
     (void)context;
-    return (STATUS & TX_DONE) != 0;
+    return (STATUS & TX_DONE) != 0u;
 }

@@ -3,13 +3,15 @@
 #include "board.h"
 #include "machine.h"
 
-#define DATA REGISTER(UART_BASE + 0x00)
-#define STATE REGISTER(UART_BASE + 0x04)
-#define CONTROL REGISTER(UART_BASE + 0x08)
-#define DIVISOR REGISTER(UART_BASE + 0x10)
+#define DATA REGISTER(UART_BASE + 0x00u)
+#define STATE REGISTER(UART_BASE + 0x04u)
+#define CONTROL REGISTER(UART_BASE + 0x08u)
+#define DIVISOR REGISTER(UART_BASE + 0x10u)
 
-enum { TX_FULL = 1 << 0, RX_FULL = 1 << 1 };
-enum { TX_ENABLE = 1 << 0, RX_ENABLE = 1 << 1 };
+#define TX_FULL (1u << 0u)
+#define RX_FULL (1u << 1u)
+#define TX_ENABLE (1u << 0u)
+#define RX_ENABLE (1u << 1u)
 
 void uart_start(void)
 {
@@ -17,8 +19,8 @@ void uart_start(void)
     CONTROL = TX_ENABLE | RX_ENABLE;
 }
 
-#define HAS_BYTE (STATE & RX_FULL)
-#define CAN_SEND !(STATE & TX_FULL)
+#define HAS_BYTE ((STATE & RX_FULL) != 0u)
+#define CAN_SEND ((STATE & TX_FULL) == 0u)
 #include "polled.h"
 
 /* The last byte may still be in the shift register, which this UART does not show. With an
@@ -26,5 +28,5 @@ void uart_start(void)
 uint8_t uart_flush(void *context)
 {
     (void)context;
-    return !(STATE & TX_FULL);
+    return (STATE & TX_FULL) == 0u;
 }

@@ -2,18 +2,18 @@
 #include "board.h"
 #include "machine.h"
 
-#define START_RX REGISTER(UART_BASE + 0x000)
-#define START_TX REGISTER(UART_BASE + 0x008)
-#define RX_READY REGISTER(UART_BASE + 0x108)
-#define TX_READY REGISTER(UART_BASE + 0x11C)
-#define ENABLE REGISTER(UART_BASE + 0x500)
-#define TX_PIN REGISTER(UART_BASE + 0x50C)
-#define RX_PIN REGISTER(UART_BASE + 0x514)
-#define RX_DATA REGISTER(UART_BASE + 0x518)
-#define TX_DATA REGISTER(UART_BASE + 0x51C)
-#define RATE REGISTER(UART_BASE + 0x524)
+#define START_RX REGISTER(UART_BASE + 0x000u)
+#define START_TX REGISTER(UART_BASE + 0x008u)
+#define RX_READY REGISTER(UART_BASE + 0x108u)
+#define TX_READY REGISTER(UART_BASE + 0x11Cu)
+#define ENABLE REGISTER(UART_BASE + 0x500u)
+#define TX_PIN REGISTER(UART_BASE + 0x50Cu)
+#define RX_PIN REGISTER(UART_BASE + 0x514u)
+#define RX_DATA REGISTER(UART_BASE + 0x518u)
+#define TX_DATA REGISTER(UART_BASE + 0x51Cu)
+#define RATE REGISTER(UART_BASE + 0x524u)
 
-enum { ENABLED = 4 };
+#define ENABLED 4u
 
 /* 2^32 times the rate, divided by 16 MHz. The lowest 12 bits are ignored. */
 #define RATE_OF(baud) ((uint32_t)(((uint64_t)(baud) << 32) / 16000000u + 0x800u) & 0xFFFFF000u)
@@ -35,31 +35,33 @@ void uart_start(void)
 
 int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    int16_t count = 0;
+    uint16_t count = 0;
 
     (void)context;
-    while (count < capacity && RX_READY) {
+    while ((count < capacity) && (RX_READY != 0u)) {
         /* In this order, since the next byte may set it as soon as this one is read. */
         RX_READY = 0;
-        bytes[count++] = (uint8_t)RX_DATA;
+        bytes[count] = (uint8_t)RX_DATA;
+        count++;
     }
-    return count;
+    return (int16_t)count;
 }
 
 uint8_t uart_flush(void *context)
 {
     (void)context;
-    if (sending && TX_READY) {
+    if ((sending != 0u) && (TX_READY != 0u)) {
         TX_READY = 0;
         sending = 0;
     }
-    return !sending;
+    return sending == 0u;
 }
 
 int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
 {
-    if (length == 0 || !uart_flush(context))
+    if ((length == 0u) || (uart_flush(context) == 0u)) {
         return 0;
+    }
     sending = 1;
     TX_DATA = bytes[0];
     return 1;

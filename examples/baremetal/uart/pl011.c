@@ -8,12 +8,12 @@ void uart_start(void)
     CONTROL = ENABLE | TX_ENABLE | RX_ENABLE;
 }
 
-#define HAS_BYTE !(FLAGS & RX_EMPTY)
-#define CAN_SEND !(FLAGS & TX_FULL)
+#define HAS_BYTE ((FLAGS & RX_EMPTY) == 0u)
+#define CAN_SEND ((FLAGS & TX_FULL) == 0u)
 #include "polled.h"
 
 uint8_t uart_flush(void *context)
 {
     (void)context;
-    return !(FLAGS & BUSY);
+    return (FLAGS & BUSY) == 0u;
 }

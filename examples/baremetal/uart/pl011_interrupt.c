@@ -5,22 +5,24 @@
 #include "pl011.h"
 #include "sleep.h"
 
-#define FIFO_LEVELS REGISTER(UART_BASE + 0x34)
-#define INTERRUPT_MASK REGISTER(UART_BASE + 0x38)
-#define INTERRUPT_CLEAR REGISTER(UART_BASE + 0x44)
+#define FIFO_LEVELS REGISTER(UART_BASE + 0x34u)
+#define INTERRUPT_MASK REGISTER(UART_BASE + 0x38u)
+#define INTERRUPT_CLEAR REGISTER(UART_BASE + 0x44u)
 #define NVIC_ENABLE REGISTER(0xE000E100u)
 
 /* An interrupt after two bytes of sixteen, or if one byte has been alone for the time of 32
  * bits. */
-enum { AN_EIGHTH = 0, RX = 1 << 4, RX_ALONE = 1 << 6 };
+#define AN_EIGHTH 0u
+#define RX (1u << 4u)
+#define RX_ALONE (1u << 6u)
 
 /* Holds the longest frame: that is how far the handler may be ahead of the main loop. */
-static uint8_t bytes[MBM_MAX_FRAME + 1];
+static uint8_t received[MBM_MAX_FRAME + 1];
 static mbm_ring ring;
 
 void uart_start(void)
 {
-    mbm_ring_begin(&ring, bytes, sizeof bytes);
+    (void)mbm_ring_begin(&ring, received, sizeof received);
     pl011_set_line();
     FIFO_LEVELS = AN_EIGHTH;
     INTERRUPT_MASK = RX | RX_ALONE;
@@ -31,19 +33,20 @@ void uart_start(void)
 void uart_interrupt(void)
 {
     INTERRUPT_CLEAR = RX | RX_ALONE;
-    while (!(FLAGS & RX_EMPTY))
-        mbm_ring_put(&ring, (uint8_t)DATA);
+    while ((FLAGS & RX_EMPTY) == 0u) {
+        (void)mbm_ring_put(&ring, (uint8_t)DATA);
+    }
 }
 
-int16_t uart_read(void *context, uint8_t *to, uint16_t capacity)
+int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     (void)context;
-    return (int16_t)mbm_ring_read(&ring, to, capacity);
+    return (int16_t)mbm_ring_read(&ring, bytes, capacity);
 }
 
 uint8_t uart_has_bytes(void)
 {
-    return mbm_ring_available(&ring) > 0;
+    return mbm_ring_available(&ring) > 0u;
 }
 
 uint16_t uart_lost(void)
@@ -51,18 +54,20 @@ uint16_t uart_lost(void)
     return mbm_ring_lost(&ring);
 }
 
-int16_t uart_write(void *context, const uint8_t *from, uint16_t length)
+int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
 {
-    int16_t count = 0;
+    uint16_t count = 0;
 
     (void)context;
-    while (count < length && !(FLAGS & TX_FULL))
-        DATA = from[count++];
-    return count;
+    while ((count < length) && ((FLAGS & TX_FULL) == 0u)) {
+        DATA = bytes[count];
+        count++;
+    }
+    return (int16_t)count;
 }
 
 uint8_t uart_flush(void *context)
 {
     (void)context;
-    return !(FLAGS & BUSY);
+    return (FLAGS & BUSY) == 0u;
 }

@@ -2,27 +2,31 @@
 #include "board.h"
 #include "machine.h"
 
-#define STATUS REGISTER(UART_BASE + 0x00)
-#define DATA REGISTER(UART_BASE + 0x04)
-#define DIVISOR REGISTER(UART_BASE + 0x08)
-#define CONTROL REGISTER(UART_BASE + 0x0C)
+#define STATUS REGISTER(UART_BASE + 0x00u)
+#define DATA REGISTER(UART_BASE + 0x04u)
+#define DIVISOR REGISTER(UART_BASE + 0x08u)
+#define CONTROL REGISTER(UART_BASE + 0x0Cu)
 
-enum { RX_FULL = 1 << 5, TX_DONE = 1 << 6, TX_EMPTY = 1 << 7 };
-enum { RX_ENABLE = 1 << 2, TX_ENABLE = 1 << 3, ENABLE = 1 << 13 };
+#define RX_FULL (1u << 5u)
+#define TX_DONE (1u << 6u)
+#define TX_EMPTY (1u << 7u)
+#define RX_ENABLE (1u << 2u)
+#define TX_ENABLE (1u << 3u)
+#define ENABLE (1u << 13u)
 
 /* The chip's start-up must set the clocks and pins of the USART. */
 void uart_start(void)
 {
-    DIVISOR = (UART_HZ + BAUD / 2u) / BAUD;
+    DIVISOR = (UART_HZ + (BAUD / 2u)) / BAUD;
     CONTROL = ENABLE | TX_ENABLE | RX_ENABLE;
 }
 
-#define HAS_BYTE (STATUS & RX_FULL)
-#define CAN_SEND (STATUS & TX_EMPTY)
+#define HAS_BYTE ((STATUS & RX_FULL) != 0u)
+#define CAN_SEND ((STATUS & TX_EMPTY) != 0u)
 #include "polled.h"
 
 uint8_t uart_flush(void *context)
 {
     (void)context;
-    return (STATUS & TX_DONE) != 0;
+    return (STATUS & TX_DONE) != 0u;
 }

@@ -5,23 +5,21 @@
 
 #define RUN_CLOCKS REGISTER(0x400FE104u)
 #define TIMER 0x40030000u
-#define CONFIGURATION REGISTER(TIMER + 0x000)
-#define MODE REGISTER(TIMER + 0x004)
-#define CONTROL REGISTER(TIMER + 0x00C)
-#define INTERRUPT_MASK REGISTER(TIMER + 0x018)
-#define INTERRUPT_CLEAR REGISTER(TIMER + 0x024)
-#define TICKS REGISTER(TIMER + 0x028)
+#define CONFIGURATION REGISTER(TIMER + 0x000u)
+#define MODE REGISTER(TIMER + 0x004u)
+#define CONTROL REGISTER(TIMER + 0x00Cu)
+#define INTERRUPT_MASK REGISTER(TIMER + 0x018u)
+#define INTERRUPT_CLEAR REGISTER(TIMER + 0x024u)
+#define TICKS REGISTER(TIMER + 0x028u)
 #define NVIC_ENABLE REGISTER(0xE000E100u)
 
-enum {
-    TIMER_CLOCK = 1 << 16,
-    ONE_COUNTER = 0, /* one counter of 32 bits, not two of 16 */
-    ONCE = 1,
-    ENABLE = 1,
-    TIME_OVER = 1,
-    TIMER_INTERRUPT = 19,
-    LONGEST = 100000 /* microseconds; the clock's counter wraps after 335 ms */
-};
+#define TIMER_CLOCK (1u << 16u)
+#define ONE_COUNTER 0u /* one counter of 32 bits, not two of 16 */
+#define ONCE 1u
+#define ENABLE 1u
+#define TIME_OVER 1u
+#define TIMER_INTERRUPT 19u
+#define LONGEST 100000u /* microseconds; the clock's counter wraps after 335 ms */
 
 uint32_t sleeps;
 static volatile uint8_t is_over;
@@ -46,17 +44,16 @@ void sleep_interrupt(void)
 
 void sleep_at_most(uint32_t micros)
 {
-    if (micros == 0)
+    if (micros == 0u) {
         return;
-    if (micros > LONGEST)
-        micros = LONGEST;
+    }
     is_over = 0;
-    TICKS = micros * (TICKS_PER_MICRO / 256u);
+    TICKS = ((micros > LONGEST) ? LONGEST : micros) * (TICKS_PER_MICRO / 256u);
     CONTROL = ENABLE;
     /* An interrupt between this check and the sleep ends the sleep at once: an interrupt
      * that is held back wakes the core too. */
     __asm__ volatile("cpsid i" ::: "memory");
-    if (!is_over && !uart_has_bytes()) {
+    if ((is_over == 0u) && (uart_has_bytes() == 0u)) {
         sleeps++;
         __asm__ volatile("dsb\n wfi" ::: "memory");
     }
@@ -74,4 +71,5 @@ __attribute__((section(".vectors.machine"), used)) static void (*const vectors[]
     NONE, NONE, NONE, NONE, NONE, uart_interrupt, NONE, NONE, NONE, NONE,
     NONE, NONE, NONE, NONE, NONE, NONE,           NONE, NONE, NONE, sleep_interrupt,
 };
-_Static_assert(sizeof vectors / sizeof vectors[0] == TIMER_INTERRUPT + 1, "a vector an interrupt");
+_Static_assert((sizeof vectors / sizeof vectors[0]) == TIMER_INTERRUPT + 1u,
+               "a vector an interrupt");
