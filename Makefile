@@ -52,6 +52,7 @@ MCUS := $(shell scripts/archive --list)
 archives: ## Build the archives for microcontrollers, build/archives and build/minimal
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
 	@scripts/check-archive
+	@scripts/stack >build/stack.txt && tail -n 1 build/stack.txt
 
 .PHONY: install
 install: $(ARCHIVE) ## Install library, header, ports, pkg-config and CMake files below PREFIX

@@ -48,7 +48,10 @@ if(mbm_TARGET STREQUAL "")
   if(NOT _mbm_fault)
     set(mbm_TARGET "${_mbm_guess}")
     if(mbm_TARGET STREQUAL "unknown")
-      set(_mbm_fault "mbm has no library for the target of this compiler and its options.")
+      string(JOIN " " _mbm_seen ${_mbm_flags} ${_mbm_options})
+      set(_mbm_fault "mbm has no library for the target of this compiler with its options, \"${_mbm_seen}\". Options of a \
+single CMake target are not seen: name the processor in CMAKE_${_mbm_language}_FLAGS, or in add_compile_options before \
+find_package.")
     endif()
   endif()
 endif()

