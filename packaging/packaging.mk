@@ -12,7 +12,7 @@ $(MCU_BUILDS): build-archive-%:
 .PHONY: dist
 dist: $(ARCHIVE) ## Write all packages to dist/, with their SHA-256 sums; builds what they contain
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
-	@$(MAKE) --no-print-directory assembler
+	@$(MAKE) --no-print-directory assembler archive-aarch64
 	@scripts/dist
 
 KINDS ?=
