@@ -292,7 +292,7 @@ void mbm_tcp_disconnect(void *context)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
 
-    if (tcp->state != FREE)
+    if (has_socket(tcp))
         leave_socket(tcp, LOST, ENOTCONN);
 }
 

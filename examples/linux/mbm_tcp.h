@@ -57,7 +57,8 @@ typedef struct mbm_tcp_addresses {
 typedef struct mbm_tcp {
     int fd;          /**< the socket, while there is one */
     int error;       /**< why the link was lost, an errno: EPIPE if the peer closed it, ETIMEDOUT if
-                          mbm_tcp_accept closed it as idle; else 0 */
+                          mbm_tcp_accept closed it as idle, ENOTCONN after mbm_tcp_disconnect;
+                          else 0. It stays until the program connects anew */
     int lookupError; /**< why mbm_tcp_open found no address, for gai_strerror; else 0 */
     uint8_t isBusy;  /**< set by the program: 1 while the peer waits for a response, so that the
                           connection is not idle; needed only for requests that may take longer
