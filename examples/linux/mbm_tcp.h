@@ -110,7 +110,7 @@ typedef struct mbm_tcp_set {
  * @param host       a name or a numeric address; the lookup of a name may block. NULL is
  *                   this machine. Of several addresses the first that answers is used
  * @param service    a port number, for example MBM_TCP_SERVICE
- * @return 0, or -1 with errno set: EBUSY if `tcp` is in use, EADDRNOTAVAIL for an unknown
+ * @return 0, or -1 with errno set: EBUSY if `tcp` is in use, ENXIO for an unknown
  *         name or service, EAGAIN if the lookup may succeed later, or an error of socket
  *         or connect. If the lookup failed, `lookupError` says why
  */
