@@ -165,7 +165,7 @@ static void of_several_addresses_the_one_that_answers_is_used(void **state)
 static void a_failed_open_sets_errno(void **state)
 {
     (void)state;
-    FAILS(EADDRNOTAVAIL, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", "no-such-service"));
+    FAILS(ENXIO, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", "no-such-service"));
     FAILS(EBADF, mbm_tcp_attach(&tcp, -1));
     assert_int_equal(mbm_tcp_connect(&tcp), MBM_LINK_LOST);
     assert_int_equal(tcp.error, ENOTCONN);
@@ -225,6 +225,21 @@ static void a_disconnected_link_is_lost_until_it_is_connected(void **state)
     mbm_tcp_connect(&tcp);
     assert_int_equal(read_register(), 11);
     assert_int_equal(tcp_peer_count(peer).connections, 2);
+}
+
+static void the_error_says_why_the_link_was_lost_until_it_is_opened_again(void **state)
+{
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
+    assert_int_equal(read_register(), -1);
+    mbm_tcp_disconnect(&tcp); /* as a link does before it waits */
+    assert_int_equal(tcp.error, EPIPE);
+    mbm_tcp_connect(&tcp);
+    assert_int_equal(read_register(), 11);
+    assert_int_equal(tcp.error, 0);
+    mbm_tcp_disconnect(&tcp);
+    assert_int_equal(tcp.error, ENOTCONN);
 }
 
 static void a_full_socket_accepts_no_bytes_until_wait_says_so(void **state)
@@ -436,6 +451,7 @@ int main(void)
         TEST(the_end_of_a_stream_and_a_reset_have_different_errors),
         TEST(bytes_before_the_end_of_the_stream_are_still_read),
         TEST(a_disconnected_link_is_lost_until_it_is_connected),
+        TEST(the_error_says_why_the_link_was_lost_until_it_is_opened_again),
         TEST(a_full_socket_accepts_no_bytes_until_wait_says_so),
         TEST(wait_ends_with_the_time_or_with_any_of_its_sockets),
         TEST(a_connection_without_a_place_is_ended_without_a_reset),

@@ -381,7 +381,7 @@ static void calls_out_of_order_are_refused(void **state)
     assert_int_equal(mbm_udp_open(&sender, "127.0.0.1", service), -1);
     assert_int_equal(errno, EBUSY);
     assert_int_equal(mbm_udp_open(&zero, "127.0.0.1", "no such service"), -1);
-    assert_int_equal(errno, EADDRNOTAVAIL);
+    assert_int_equal(errno, ENXIO);
     assert_true(zero.lookupError != 0);
     assert_int_equal(mbm_udp_listen(&zero, "127.0.0.1", service), -1);
     assert_int_equal(errno, EADDRINUSE);

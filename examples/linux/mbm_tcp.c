@@ -194,7 +194,7 @@ int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addr
     case EAI_SYSTEM: *error = 0; return -1;
     case EAI_AGAIN: return refuse(EAGAIN);
     case EAI_MEMORY: return refuse(ENOMEM);
-    default: return refuse(EADDRNOTAVAIL);
+    default: return refuse(ENXIO);
     }
 }
 
@@ -292,7 +292,7 @@ void mbm_tcp_disconnect(void *context)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
 
-    if (tcp->state != FREE)
+    if (has_socket(tcp))
         leave_socket(tcp, LOST, ENOTCONN);
 }
 

@@ -57,7 +57,8 @@ typedef struct mbm_tcp_addresses {
 typedef struct mbm_tcp {
     int fd;          /**< the socket, while there is one */
     int error;       /**< why the link was lost, an errno: EPIPE if the peer closed it, ETIMEDOUT if
-                          mbm_tcp_accept closed it as idle; else 0 */
+                          mbm_tcp_accept closed it as idle, ENOTCONN after mbm_tcp_disconnect;
+                          else 0. It stays until the program connects anew */
     int lookupError; /**< why mbm_tcp_open found no address, for gai_strerror; else 0 */
     uint8_t isBusy;  /**< set by the program: 1 while the peer waits for a response, so that the
                           connection is not idle; needed only for requests that may take longer
@@ -109,7 +110,7 @@ typedef struct mbm_tcp_set {
  * @param host       a name or a numeric address; the lookup of a name may block. NULL is
  *                   this machine. Of several addresses the first that answers is used
  * @param service    a port number, for example MBM_TCP_SERVICE
- * @return 0, or -1 with errno set: EBUSY if `tcp` is in use, EADDRNOTAVAIL for an unknown
+ * @return 0, or -1 with errno set: EBUSY if `tcp` is in use, ENXIO for an unknown
  *         name or service, EAGAIN if the lookup may succeed later, or an error of socket
  *         or connect. If the lookup failed, `lookupError` says why
  */

@@ -66,7 +66,7 @@ static int look_up(mbm_udp *udp, const char *host, const char *service, int flag
     case EAI_SYSTEM: udp->lookupError = 0; return -1;
     case EAI_AGAIN: return refuse(EAGAIN);
     case EAI_MEMORY: return refuse(ENOMEM);
-    default: return refuse(EADDRNOTAVAIL);
+    default: return refuse(ENXIO);
     }
 }
 

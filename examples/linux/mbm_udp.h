@@ -68,7 +68,7 @@ typedef struct mbm_udp {
  * @param host     a name or a numeric address; the lookup of a name may block. NULL is this
  *                 machine. The first address that the system has a route to is used
  * @param service  a port number, for example MBM_UDP_SERVICE
- * @return 0, or -1 with errno set: EBUSY if `udp` is in use, EADDRNOTAVAIL for an unknown
+ * @return 0, or -1 with errno set: EBUSY if `udp` is in use, ENXIO for an unknown
  *         name or service, EAGAIN if the lookup may succeed later, or an error of socket or
  *         connect
  */
