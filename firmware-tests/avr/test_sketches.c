@@ -53,7 +53,7 @@ static void first_read_prints_that_there_is_no_answer(void **state)
     assert_true(board_run(b, 2500 * MS));
     assert_int_equal(bus->frames, 1);
     assert_false(is_high(b, mega.led));
-    assert_string_equal(printed.text, "status 0xE2\r\n");
+    assert_string_equal(printed.text, "no complete reply in time\r\n");
     board_free(b);
 }
 
