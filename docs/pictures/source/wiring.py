@@ -79,7 +79,7 @@ def wired(board, chip, volts, bias, pins, note):
 def draw_all():
     return {
         "wiring-5v": wired(
-            "Arduino Uno, Nano (5 V)", "MAX485", 5.0, 560, ["5V", "TX 1", "2", "RX 0", "GND"],
+            "Arduino Uno, Nano (5 V)", "MAX485", 5.0, 560, ["5V", "11", "2", "10", "GND"],
             "Many modules with a MAX485 have resistors of 120 Ω on them. Only the two ends of a line need one, and "
             "only one place the resistors of 560 Ω."),
         "wiring-3v3": wired(

@@ -1,5 +1,6 @@
 // Reads six holding registers of slave 1 once a second. The LED is on if the last
-// read succeeded. On a board with a second UART the sketch prints the values.
+// read succeeded. On a board with a second UART the sketch prints the values. The example
+// EnergyMeter prints on an Uno too.
 #include <ModbusMaster.h>
 
 #if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
@@ -35,8 +36,7 @@ void loop() {
     }
     Serial.println();
   } else {
-    Serial.print(F("status 0x")); // the codes are in ModbusMasterConstants.h
-    Serial.println(result, HEX);
+    Serial.println(modbusStatusText(result));
   }
 #endif
   delay(1000);

@@ -15,6 +15,8 @@ env.Append(
     CPPDEFINES=[("F_CPU", "$BOARD_F_CPU"), ("ARDUINO", 10819), "ARDUINO_ARCH_AVR",
                 ("DECIMAL_DIG", "__DECIMAL_DIG__")],
     CPPPATH=[os.path.join(CORE, "cores/arduino"), os.path.join(CORE, "variants", board.get("build.variant"))],
+    # Libraries that come with the core, such as SoftwareSerial.
+    LIBSOURCE_DIRS=[os.path.join(CORE, "libraries")],
     LINKFLAGS=["-mmcu=$BOARD_MCU", "-Os", "-flto", "-fuse-linker-plugin", "-Wl,--gc-sections"],
     LIBS=["m"])
 env.Prepend(LIBS=[env.BuildLibrary("$BUILD_DIR/FrameworkArduino", os.path.join(CORE, "cores/arduino"))])
