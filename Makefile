@@ -104,14 +104,6 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
-# --- tests. Compiling and tests that wait run side by side.
-
-# One job more than processors, because the tests in Rust often wait for peers.
-JOBS ?= $(shell echo $$(($$(nproc) + 1)))
-BUILDS := plain sanitized firmware valgrind
-# The programs in valgrind come first, because they take the longest.
-PROGRAMS = $(foreach build,$(filter valgrind,$(BUILDS)) $(filter-out valgrind,$(BUILDS)),$(TESTS:%=$(BUILD)/$(build)/%))
-
 .PHONY: format
 format: ## Format Rust, C and C++ as `make check` requires
 	@scripts/need clang-format
@@ -119,85 +111,18 @@ format: ## Format Rust, C and C++ as `make check` requires
 	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
 	@clang-format -i $(C_SOURCES)
 
-.PHONY: pictures
-pictures: ## Draw the pictures and charts of the pages, docs/pictures
-	@scripts/need python3
-	@scripts/pictures
-	@scripts/charts
-
 .PHONY: abi
 abi: ## Generate packaging/mbm.abi, with which `make check` compares the C interface
 	@scripts/need gcc libc6-dev abigail-tools
 	@scripts/abi
 
-# The programs whose sources clang-tidy reads, and the machines of examples/baremetal whose
-# processor Debian's clang 14 knows.
-TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(UDP) $(SERVE) $(PEERS) $(MQTT) $(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) \
-                $(CLIENTS) $(DEMO) $(SNIFF) $(KEEP_LINK) $(BUILD)/plain/linux/basic $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
-                $(BENCH) $(BENCH_CLIENT) $(BENCH_SERVER) $(BENCH_SNIFFER)
-TIDY_MACHINES = $(filter-out lx106 dc233c,$(MACHINES)) $(VARIANTS)
-# Not the sketches that use an AVR's own registers or libraries.
-SKETCHES_OF_MBM := $(filter-out $(wildcard firmware-tests/avr/sketches/Time*/*.ino firmware-tests/avr/sketches/Soft/*.ino), \
-                   $(wildcard examples/arduino/*/*.ino firmware-tests/avr/sketches/*/*.ino))
+# --- tests. Compiling and tests that wait run side by side.
 
-# The commands that compile these files, and for sketches those with the stand-in for a core.
-.PHONY: print-commands
-print-commands:
-	@$(MAKE) --no-print-directory --dry-run --always-make $(TIDY_PROGRAMS)
-	@for machine in $(TIDY_MACHINES); do for program in main serve; do \
-		$(MAKE) --no-print-directory --dry-run --always-make -f $(BAREMETAL) MACHINE=$$machine PROGRAM=$$program; done; done
-	@for file in $(wildcard firmware-tests/qemu/*.c); do echo "gcc $(QEMU_FLAGS) -c $$file -o $$file.o"; done
-	@for file in $(SKETCHES_OF_MBM); do echo "g++ -x c++ $(CXXFLAGS) $(WARNINGS) -Iinclude -Ic-tests/shim -include Arduino.h -c $$file -o $$file.o"; done
-
-.PHONY: compile-commands
-compile-commands: ## Write compile_commands.json, for editors and clang-tidy
-	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev libmbedtls-dev openssl valgrind libmosquitto-dev libcjson-dev \
-		libsimavr-dev libelf-dev
-	@$(MAKE) --no-print-directory print-commands | scripts/compile-commands
-
-.PHONY: tidy
-tidy: compile-commands ## Run clang-tidy over C, C++ and sketches, with the checks in .clang-tidy
-	@scripts/need clang-tidy
-	@sed -n 's/.*"file": "\([^"]*\)".*/\1/p' compile_commands.json | \
-		xargs -P "$$(nproc)" -n 1 clang-tidy --quiet 2>/dev/null || { echo "tidy: clang-tidy has findings (above)" >&2; exit 1; }
-	@echo "tidy: clang-tidy finds nothing in $$(grep -c '"file"' compile_commands.json) files and their headers"
-
-.PHONY: misra
-misra: ## Run cppcheck, for C with its addon for MISRA C; docs/misra.md lists the accepted findings
-	@scripts/need cppcheck
-	@scripts/misra
-
-.PHONY: spell
-spell: ## Look for misspelled and American words with codespell; scripts/spelling.txt has the exceptions
-	@scripts/need python3 python3-venv
-	@scripts/venv build/codespell scripts/spelling-requirements.txt
-	@build/codespell/bin/python scripts/spell
-
-DENY = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cargo-deny 0.20.2 --no-default-features)
-.PHONY: deny
-deny: ## Check licences and origin of all crates with cargo-deny, with MBM_ADVISORIES=yes known vulnerabilities too
-	@$(DENY) && for lock in . fuzz bench model; do \
-		"$$tool" --workspace --manifest-path $$lock/Cargo.toml check --hide-inclusion-graph licenses bans sources \
-			$(if $(filter yes,$(MBM_ADVISORIES)),advisories) || exit 1; done
-	@$(if $(filter yes,$(MBM_ADVISORIES)),,echo "deny: known vulnerabilities were not looked up: MBM_ADVISORIES=yes does it, with a network")
-
-.PHONY: check-dependencies
-check-dependencies: ## Check that docs/dependencies.md has a reason for every dependency
-	@scripts/check-dependencies
-
-.PHONY: semver
-semver: ## Compare the Rust interface with that of the last release, by cargo-semver-checks
-	@CARGO="$(CARGO)" scripts/semver
-
-.PHONY: check-semver
-check-semver: ## Check that `make semver` finds a change: try it on changed copies of the sources
-	@CARGO="$(CARGO)" scripts/check-semver
-
-.PHONY: test-scripts
-test-scripts: ## Run the tests of the scripts
-	@scripts/need python3 python3-venv
-	@scripts/venv build/sbom packaging/sbom/requirements.txt
-	@build/sbom/bin/python -m unittest discover --start-directory scripts/tests
+# One job more than processors, because the tests in Rust often wait for peers.
+JOBS ?= $(shell echo $$(($$(nproc) + 1)))
+BUILDS := plain sanitized firmware valgrind
+# The programs in valgrind come first, because they take the longest.
+PROGRAMS = $(foreach build,$(filter valgrind,$(BUILDS)) $(filter-out valgrind,$(BUILDS)),$(TESTS:%=$(BUILD)/$(build)/%))
 
 .PHONY: test
 test: need-test ## Run every test: Rust, C and C++, also with sanitizers and in valgrind
@@ -459,35 +384,8 @@ guarded: ## Show a server that refreshes registers at each read and refuses one 
 	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/guarded_server
 	@$(BUILD)/plain/linux/guarded_server
 
-# The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(KEEP_LINK) $(UDP) $(SNIFF) $(CLIENTS) $(SERVE)
-ARM_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
-.PHONY: check-pages
-check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
-	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev openssl \
-		gcc-avr avr-libc arduino-core-avr \
-		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi gcc-aarch64-linux-gnu libc6-dev-arm64-cross) \
-		$(ARM_LIBC)
-	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
-	@scripts/check-pages $(PAGES)
-
-# The documentation site.
-.PHONY: docs
-docs: ## Make the documentation site, build/site, and check its links, entries and search
-	@scripts/need python3 python3-venv doxygen tidy git
-	@CARGO="$(CARGO)" scripts/docs
-
-.PHONY: docs-serve
-docs-serve: docs ## Make the site and serve it at http://127.0.0.1:8000/
-	@python3 -m http.server --bind 127.0.0.1 --directory $(BUILD)/site 8000
-
-.PHONY: check-docs-site
-check-docs-site: docs ## Open the site in Chromium: width of a phone, requests, search; pictures in build/screenshots
-	@scripts/need chromium
-	@scripts/venv $(BUILD)/venv-browser docs/site/browser-requirements.txt
-	@$(BUILD)/venv-browser/bin/python -B scripts/check-site-in-browser
-	@$(BUILD)/venv-browser/bin/python -B scripts/screenshots
-
+include scripts/checks.mk
+include scripts/pages.mk
 include scripts/aarch64.mk
 include scripts/release.mk
 # Everything for Arduino and the AVR simulator.
