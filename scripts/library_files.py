@@ -2,6 +2,7 @@
 source and the sketches. scripts/arduino and packaging/platformio/pack import this."""
 
 import pathlib
+import subprocess
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
@@ -55,6 +56,13 @@ def write_sources(folder: pathlib.Path, assembler: pathlib.Path) -> None:
     write(folder / "ModbusMasterBoards.h", boards_header())
     for which in SETS:
         write(folder / f"mbm_{which}.S", (assembler / f"mbm_{which}.S").read_text(encoding="utf-8"))
+
+
+def linux_ports() -> list:
+    """The ports for Linux, which scripts/library.sh lists."""
+    listed = subprocess.run(["sh", "-c", ". scripts/library.sh; echo $LINUX_PORTS"], cwd=ROOT, check=True, text=True,
+                            stdout=subprocess.PIPE)
+    return listed.stdout.split()
 
 
 def write_sketches(folder: pathlib.Path) -> int:

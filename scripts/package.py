@@ -24,8 +24,9 @@ TIME = 315619200
 class Package:
     """The files of one package: names relative to its top folder, and their bytes."""
 
-    def __init__(self, kind: str):
-        self.kind, self.files, self.executable = kind, {}, set()
+    def __init__(self, kind: str, largest: int = 0):
+        """largest: the most bytes of the archive; 0 for no limit."""
+        self.kind, self.largest, self.files, self.executable = kind, largest, {}, set()
 
     def fail(self, reason: str) -> None:
         sys.exit(f"{self.kind}: {reason}")
@@ -56,6 +57,11 @@ class Package:
         for path in sorted(found):
             self.copy(path, f"{name}/{pathlib.PurePosixPath(path).relative_to(source)}")
 
+    def take(self, folder: pathlib.Path) -> None:
+        """Takes all files of a folder, with names relative to it."""
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            self.write(path.relative_to(folder).as_posix(), path.read_bytes())
+
     def copy_assembler(self, folder: str, kinds: tuple) -> list:
         """Takes the library as assembler source, for these dialects of SETS, the names of
         scripts/boards.py. Returns the names of the files in the package."""
@@ -80,10 +86,10 @@ class Package:
 
     def entries(self, top: str):
         for name in sorted(self.files):
-            yield f"{top}/{name}", self.files[name], 0o755 if name in self.executable else 0o644
+            yield f"{top}/{name}" if top else name, self.files[name], 0o755 if name in self.executable else 0o644
 
     def tar(self, target: pathlib.Path, top: str) -> None:
-        """Writes a .tar.gz with one top folder, and prints the package's line."""
+        """Writes a .tar.gz with one top folder, or none if `top` is empty, and prints the package's line."""
         packed = io.BytesIO()
         with tarfile.open(fileobj=packed, mode="w", format=tarfile.USTAR_FORMAT) as archive:
             for name, content, mode in self.entries(top):
@@ -98,12 +104,15 @@ class Package:
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
             for name, content, mode in self.entries(top):
                 entry = zipfile.ZipInfo(name, (1980, 1, 2, 0, 0, 0))
-                entry.external_attr = mode << 16
+                entry.create_system = 3  # Unix, where external_attr has the permissions
+                entry.external_attr = (0o100000 | mode) << 16
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 archive.writestr(entry, content)
         self.written(target, packed.getvalue())
 
     def written(self, target: pathlib.Path, content: bytes) -> None:
+        if 0 < self.largest < len(content):
+            self.fail(f"{target} would have {len(content)} bytes, more than {self.largest}")
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(content)
         print(f"{self.kind}: {target}, {len(content)} bytes")
