@@ -24,6 +24,13 @@ struct Arguments {
     words: [usize; 4],
 }
 
+impl Arguments {
+    fn two_words(function: FunctionSpec, first: u16, second: u16) -> Arguments {
+        let words = [first.into(), second.into(), 0, 0];
+        Arguments { function, words }
+    }
+}
+
 /// The further steps of a function after [`RequestHeader::set_all`]. It receives the status
 /// of that function, and returns the status of the request.
 type More = unsafe fn(&mut RequestFields, &[usize; 4], Status) -> Status;
@@ -171,13 +178,13 @@ unsafe extern "C" fn two_words(
     second: u16,
     function: FunctionSpec,
 ) -> u8 {
-    let words = [first.into(), second.into(), 0, 0];
-    // SAFETY: as the caller promises.
+    // SAFETY: as the caller promises; the request is free, or `two_words_unknown` checks it.
     unsafe {
-        if !FIRMWARE && !is_free(client, request) {
-            return two_words_unknown(client, request, first, second, function);
+        if !FIRMWARE && is_free(client, request) {
+            let arguments = Arguments::two_words(function, first, second);
+            return submit(client, request, &arguments, None).code();
         }
-        queue_request(client, request, &Arguments { function, words }, None)
+        two_words_unknown(client, request, first, second, function)
     }
 }
 
@@ -186,8 +193,8 @@ unsafe extern "C" fn two_words(
 ///
 /// # Safety
 /// As the header demands.
-#[cold]
-#[inline(never)]
+#[cfg_attr(target_os = "none", inline(always))]
+#[cfg_attr(not(target_os = "none"), cold, inline(never))]
 unsafe extern "C" fn two_words_unknown(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -195,9 +202,9 @@ unsafe extern "C" fn two_words_unknown(
     second: u16,
     function: FunctionSpec,
 ) -> u8 {
-    let words = [first.into(), second.into(), 0, 0];
+    let arguments = Arguments::two_words(function, first, second);
     // SAFETY: as the caller promises.
-    unsafe { queue_unknown(client, request, &Arguments { function, words }, None) }
+    unsafe { queue_request(client, request, &arguments, None) }
 }
 
 /// Queues a read of a table of the data model, by the number of its function, 01 to 04.
