@@ -185,8 +185,8 @@ model: ## Try every order of events around a request for MODEL_SECONDS (300)
 
 .PHONY: fault-table
 fault-table: need-test ## Generate docs/reports/fault-table.md from the test's results
-	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire
-	@scripts/run-c-tests $(BUILD)/plain/test_bad_wire
+	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire $(BUILD)/plain/test_slow_devices
+	@scripts/run-c-tests $(BUILD)/plain/test_bad_wire $(BUILD)/plain/test_slow_devices
 	@scripts/fault-table
 
 # Certificates for tests and examples, build/certificates.

@@ -21,7 +21,7 @@ static void a_transaction_discards_old_bytes_then_sends_then_waits(void **)
     logs_callbacks(node);
     for (int again = 0; again < 2; again++) {
         board().log.clear();
-        Serial.inject(adu({1, 3, 2, 0x66, 0x66}));
+        Serial.inject(adu({1, 4, 2, 0x66, 0x66}));
         Serial.reply(adu({1, 3, 2, 0, 7}));
         assert_int_equal(node.readHoldingRegisters(0, 1), 0);
         assert_int_equal(node.getResponseBuffer(0), 7);

@@ -754,7 +754,7 @@ typedef struct mbm_master {
     /**
      * Private.
      */
-    uint32_t words[21];
+    uint32_t words[23];
 } mbm_master;
 
 /**
@@ -1250,16 +1250,25 @@ uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t delayM
  *
  * After a request without a right reply, the master does two things. It waits for the quiet
  * time before it sends the next request, and discards bytes that arrive meanwhile. Then it
- * holds the next reply of that unit until no byte has arrived for the quiet time. A second
- * reply replaces the held one, because a device answers in order. If the second reply is
- * damaged, the request fails. So a request after a failure takes one quiet time longer; all
- * others take no longer.
+ * holds the next reply of that unit, until no byte has arrived for as long as the failed
+ * request waited: the response timeout after MBM_RESPONSE_TIMED_OUT, the time until the
+ * damaged reply had come after MBM_INVALID_CRC, and at least the quiet time. A second reply
+ * replaces the held one, because a device answers in order. If the second reply is damaged,
+ * the request fails. A right reply that arrives before a request is sent shows that replies
+ * are late; the next reply is then held for the response timeout.
  *
- * The quiet time must be longer than the device needs for a reply. If it is shorter, the
- * master may accept the held reply before the second one arrives.
+ * So a device that answers in order and within the response timeout never gives the data of
+ * another request, whatever its usual latency and however late one of its replies was. The
+ * request after a timeout takes at most one quiet time and one response timeout longer; all
+ * others take no longer. A wrong reading remains possible if the device takes longer than
+ * the response timeout for two requests in a row.
+ *
+ * With a quiet time of 0 the master waits and holds nothing: a reply that is later than the
+ * response timeout may be taken for the reply to the next request, and so may all that
+ * follow.
  *
  * @param master        the object
- * @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
+ * @param quietMs       milliseconds, 0 to 65535; the default is 100
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setQuietTime(struct mbm_master *master,
@@ -1533,7 +1542,7 @@ typedef struct mbm_client {
     /**
      * Private.
      */
-    uint32_t words[25];
+    uint32_t words[27];
 } mbm_client;
 
 /**
@@ -2610,6 +2619,10 @@ uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t delayM
  * Sets the quiet time of a serial line. It prevents that the client accepts a late reply as
  * the reply to a later request: see mbm_master_setQuietTime. It has no effect in TCP frames,
  * whose transaction identifier shows to which request a reply belongs.
+ *
+ * The client does not hold the reply to mbm_client_diagnostics with sub-function 0, which
+ * repeats data of your choice. If no other request has the same data, no late reply can be
+ * taken for it, and after its reply the next replies of that unit are not held either.
  *
  * @param client        the object
  * @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply

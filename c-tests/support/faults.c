@@ -23,7 +23,7 @@ size_t fault_right_reply(uint8_t *frame, const uint8_t *request)
     unsigned i;
 
     memcpy(frame, request, 6);
-    if (request[1] == 6)
+    if (request[1] == 6 || request[1] == 8)
         return seal(frame, 6);
     frame[2] = (uint8_t)(2 * quantity);
     for (i = 0; i < quantity; i++) {

@@ -15,7 +15,8 @@ int request_size(const uint8_t *frame, size_t have)
     case 0x03:
     case 0x04:
     case 0x05:
-    case 0x06: return 8;
+    case 0x06:
+    case 0x08: return 8;
     case 0x16: return 10;
     case 0x0F:
     case 0x10: count_at = 6; break;
@@ -55,6 +56,7 @@ int request_parse(request *r, const uint8_t *frame, size_t length)
     case 0x04: return range(r->address, r->quantity, 125);
     case 0x05: r->written = 1; return r->value == 0 || r->value == 0xFF00;
     case 0x06: r->written = 1; return 1;
+    case 0x08: return r->address == 0; /* Return Query Data, with one word */
     case 0x0F:
         r->written = r->quantity;
         return range(r->address, r->quantity, 1968) && frame[6] == (r->quantity + 7) / 8 &&

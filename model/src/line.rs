@@ -12,7 +12,10 @@ const UNIT: u8 = 17;
 /// Times in ticks of the model's clock. Only their order and their sums matter.
 const SILENCE: u32 = 1;
 pub const QUIET: u32 = 4;
-const TIMEOUT: u32 = 10;
+pub const TIMEOUT: u32 = 10;
+
+/// How many replies of a device with a latency may be late.
+const LATE_REPLIES: u8 = 2;
 
 /// The longest time in ticks that affects the master. Longer times are cut to it.
 const LONGEST: u32 = 100;
@@ -45,6 +48,25 @@ pub enum Event {
     Step(u8),
     /// The user cancels the request.
     Cancel,
+    /// The device with a latency takes this many ticks longer for its reply.
+    Late(u8),
+    /// The user starts the next request.
+    Start,
+}
+
+/// A device with a latency: it takes the same time for each reply, but for a few late ones.
+#[derive(Clone, Hash, Debug)]
+struct Slow {
+    /// Ticks that the device takes for a reply.
+    latency: u32,
+    /// Ticks until the device sends the oldest reply that it owes.
+    left: u32,
+    /// How many more replies may be late.
+    late: u8,
+    /// The oldest reply that it owes may be late: when its request came, the device owed none.
+    may_be_late: bool,
+    /// No request is active, and the user has not started the next one.
+    paused: bool,
 }
 
 /// Everything that determines later events, and everything that the properties check.
@@ -57,7 +79,7 @@ pub struct State {
     number: u8,
     /// How long the active request has lasted, in ticks.
     lasts: u32,
-    /// How long no byte has arrived, in ticks; at most `QUIET`.
+    /// How long no byte has arrived, in ticks; at most `TIMEOUT`.
     silent: u32,
     /// The reply to the active request has arrived damaged.
     own_damaged: bool,
@@ -66,8 +88,12 @@ pub struct State {
     /// The device still owes a reply to a request that succeeded: the device left more than the
     /// quiet time between two replies, or a reply was lost. The master cannot detect this.
     beyond_bound: bool,
+    /// How long the line must be silent before a reply after a failure is accepted, in ticks.
+    hold: u32,
     /// The previous request got its own reply.
     right: bool,
+    /// The device, if it is one with a latency. Otherwise the adversary sends its replies.
+    slow: Option<Slow>,
     /// The fault that was found, if any.
     pub wrong: Option<&'static str>,
 }
@@ -78,6 +104,7 @@ impl Hash for State {
         self.owed.hash(hasher);
         (self.number, self.lasts, self.silent).hash(hasher);
         (self.own_damaged, self.own_exception, self.beyond_bound).hash(hasher);
+        (self.hold, &self.slow).hash(hasher);
         self.wrong.hash(hasher);
     }
 }
@@ -121,20 +148,45 @@ impl State {
             owed: Vec::new(),
             number: 0,
             lasts: 0,
-            silent: QUIET,
+            silent: TIMEOUT,
             own_damaged: false,
             own_exception: false,
             beyond_bound: false,
+            hold: 0,
             right: false,
+            slow: None,
             wrong: None,
         };
         state.start();
         state
     }
 
+    /// As [`State::new`], with a device that takes `latency` ticks for a reply.
+    pub fn with_latency(buffer: usize, retries: u8, latency: u32) -> Self {
+        let mut state = State::new(buffer, retries, QUIET);
+        state.slow = Some(Slow {
+            latency,
+            left: latency,
+            late: LATE_REPLIES,
+            may_be_late: false,
+            paused: false,
+        });
+        state
+    }
+
     /// The events that are possible, with or without noise.
     pub fn events(&self, noise: bool, events: &mut Vec<Event>) {
         if self.wrong.is_some() {
+            return;
+        }
+        if let Some(slow) = &self.slow {
+            events.push(Event::Step(1));
+            if slow.paused {
+                events.push(Event::Start);
+            }
+            if slow.late > 0 && slow.may_be_late {
+                events.extend([1, 5, 11, 25].map(Event::Late));
+            }
             return;
         }
         events.extend([Event::Step(1), Event::Step(4), Event::Step(10)]);
@@ -167,6 +219,15 @@ impl State {
             Event::Cancel => {
                 self.master.cancel();
                 return self.ended();
+            }
+            Event::Start => return self.start(),
+            Event::Late(time) => {
+                if let Some(slow) = &mut self.slow {
+                    slow.left += TIMEOUT - slow.latency + u32::from(time);
+                    slow.late -= 1;
+                    slow.may_be_late = false;
+                }
+                return;
             }
             Event::Zero => return self.arrive(&[0]),
             Event::LooksLikeReply => return self.arrive(&[UNIT, 3]),
@@ -209,6 +270,9 @@ impl State {
     fn start(&mut self) {
         wire::clear(self.master.storage());
         self.number = (self.number + 1) % 16;
+        if let Some(slow) = &mut self.slow {
+            slow.paused = false;
+        }
         self.lasts = 0;
         self.own_damaged = false;
         self.own_exception = false;
@@ -220,11 +284,17 @@ impl State {
     /// Moves the clock on, and polls until the master waits.
     fn step(&mut self, time: u32) {
         self.master.port().now = time;
-        self.lasts += time;
-        self.silent = (self.silent + time).min(QUIET);
+        if !self.slow.as_ref().is_some_and(|slow| slow.paused) {
+            self.lasts += time;
+        }
+        self.silent = (self.silent + time).min(TIMEOUT);
+        self.send_slow_reply(time);
         for _ in 0..16 {
             self.master.poll();
             if !std::mem::take(&mut self.master.port().sent).is_empty() {
+                if let Some(slow) = &mut self.slow {
+                    slow.may_be_late |= self.owed.is_empty();
+                }
                 self.owed.push(self.number);
             }
             if !self.master.is_pending() {
@@ -241,6 +311,20 @@ impl State {
         self.master.port().now = 0;
     }
 
+    /// Lets the device with a latency send the oldest reply that it owes once its time has come.
+    fn send_slow_reply(&mut self, time: u32) {
+        let Some(slow) = &mut self.slow else { return };
+        if self.owed.is_empty() {
+            return;
+        }
+        slow.left -= time;
+        if slow.left == 0 {
+            slow.left = slow.latency;
+            slow.may_be_late = false;
+            self.happen(Event::Reply);
+        }
+    }
+
     /// Checks how the request has ended, and starts the next one.
     fn ended(&mut self) {
         let status = self.master.status();
@@ -255,21 +339,29 @@ impl State {
                 if self.own_damaged {
                     self.wrong =
                         Some("a late reply was taken though the right one arrived damaged");
-                } else if self.silent < QUIET {
-                    self.wrong = Some("a late reply was taken before the quiet time had passed");
+                } else if self.silent < self.hold || self.slow.is_some() {
+                    self.wrong = Some("a late reply was taken before its hold had passed");
                 }
             }
         }
         // Another reply may follow that the master does not expect.
-        self.beyond_bound = answered && !self.owed.is_empty();
-        self.start();
+        self.beyond_bound = answered && !self.owed.is_empty() && self.slow.is_none();
+        self.hold = match status {
+            _ if answered => 0,
+            Status::INVALID_CRC => self.hold.max(QUIET),
+            _ => TIMEOUT,
+        };
+        match &mut self.slow {
+            Some(slow) => slow.paused = true,
+            None => self.start(),
+        }
     }
 
     /// True if the request has not lasted longer than a request may.
     pub fn ends_in_time(&self, retries: u8) -> bool {
-        // Each attempt: the quiet time before it, and the wait for its reply. A poll may come
-        // up to 10 ticks late.
-        let attempt = (TIMEOUT + QUIET) + (2 * TIMEOUT + QUIET) + 3 * 10;
+        // Each attempt: the quiet time before it, the wait for its reply and the hold. A poll may
+        // come up to 10 ticks late.
+        let attempt = (TIMEOUT + QUIET) + 3 * TIMEOUT + 3 * 10;
         self.lasts <= attempt * (u32::from(retries) + 1)
     }
 

@@ -1,13 +1,27 @@
 //! Explores the requests of a real master. At each step an adversary chooses what arrives and
 //! how far the clock moves. The program tries every order of these events, breadth first. Its
-//! argument is the time in seconds, 300 without one.
+//! argument is the time in seconds, 300 without one. It then plays every schedule of late replies
+//! with a client (see `client`).
 
+mod client;
 mod line;
 mod wire;
 
 use line::{Event, State};
 use stateright::{Checker, HasDiscoveries, Model, Path, Property};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// What the adversary may do.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Adversary {
+    /// It chooses when each reply arrives, and damages, cuts and loses replies.
+    Replies,
+    /// It also sends noise, exceptions and frames of other units, and cancels requests.
+    Noise,
+    /// The device takes the same time for each reply; every latency up to the response timeout
+    /// is tried. The adversary delays two replies, and pauses between requests.
+    Latency,
+}
 
 /// A master, and what the adversary may do to it.
 #[derive(Clone, Copy, Debug)]
@@ -17,9 +31,7 @@ struct Line {
     retries: u8,
     /// The quiet time that the master is set to.
     quiet_time: u32,
-    /// Whether the adversary may also send noise, exceptions and frames of other units, and
-    /// cancel requests.
-    noise: bool,
+    adversary: Adversary,
 }
 
 impl Model for Line {
@@ -27,11 +39,16 @@ impl Model for Line {
     type Action = Event;
 
     fn init_states(&self) -> Vec<State> {
+        if self.adversary == Adversary::Latency {
+            return (1..=line::TIMEOUT)
+                .map(|latency| State::with_latency(self.buffer, self.retries, latency))
+                .collect();
+        }
         vec![State::new(self.buffer, self.retries, self.quiet_time)]
     }
 
     fn actions(&self, state: &State, events: &mut Vec<Event>) {
-        state.events(self.noise, events);
+        state.events(self.adversary == Adversary::Noise, events);
     }
 
     fn next_state(&self, state: &State, event: Event) -> Option<State> {
@@ -52,7 +69,9 @@ impl Model for Line {
             ),
             Property::always(
                 "a clean line gives right data within two requests",
-                |_, state: &State| state.recovers(),
+                |line: &Line, state: &State| {
+                    line.adversary == Adversary::Latency || state.recovers()
+                },
             ),
         ]
     }
@@ -64,12 +83,15 @@ struct Explored {
     states: usize,
     /// Every order of this many events was tried.
     events: usize,
+    /// There are no other states.
+    all: bool,
     /// The properties that do not hold, each with the events that break it.
     broken: Vec<(&'static str, Path<State, Event>)>,
 }
 
 /// Explores for the given time, or until a property is broken.
 fn explore(line: Line, time: Duration) -> Explored {
+    let begin = Instant::now();
     let checker = line
         .checker()
         .threads(2)
@@ -81,6 +103,7 @@ fn explore(line: Line, time: Duration) -> Explored {
         states: checker.unique_state_count(),
         // The first state has depth 1, and the last depth may not be complete.
         events: checker.max_depth().saturating_sub(2),
+        all: begin.elapsed() < time,
         broken: checker.discoveries().into_iter().collect(),
     }
 }
@@ -91,7 +114,7 @@ fn main() {
         .and_then(|seconds| seconds.parse().ok());
     let seconds: u64 = seconds.unwrap_or(300);
     let mut lines = Vec::new();
-    for noise in [false, true] {
+    for adversary in [Adversary::Latency, Adversary::Replies, Adversary::Noise] {
         for retries in [0, 1] {
             // The second buffer is too small for a second reply beside a held one.
             for buffer in [20, 12] {
@@ -100,7 +123,7 @@ fn main() {
                     buffer,
                     retries,
                     quiet_time,
-                    noise,
+                    adversary,
                 });
             }
         }
@@ -111,13 +134,23 @@ fn main() {
         let Explored {
             states,
             events,
+            all,
             broken,
         } = explore(line, time);
         println!(
-            "model: {} noise, {} retries, a frame buffer of {} bytes: every order of {events} events, {states} states",
-            if line.noise { "with" } else { "no" },
+            "model: {}, {} retries, a frame buffer of {} bytes: every order of {}, {states} states",
+            match line.adversary {
+                Adversary::Replies => "no noise",
+                Adversary::Noise => "with noise",
+                Adversary::Latency => "a device with a latency",
+            },
             line.retries,
             line.buffer,
+            if all {
+                "any number of events".to_owned()
+            } else {
+                format!("{events} events")
+            },
         );
         for (property, path) in &broken {
             println!("model: broken: {property}: {:?}", path.last_state().wrong);
@@ -127,6 +160,26 @@ fn main() {
         }
         failed += broken.len();
         passed += line.properties().len() - broken.len();
+    }
+    let (mut schedules, mut requests) = (0u32, client::Ended::default());
+    for schedule in client::schedules() {
+        let ended = client::play(schedule, client::QUIET);
+        schedules += 1;
+        requests.right += ended.right;
+        requests.failed += ended.failed;
+        requests.wrong += ended.wrong;
+        if ended.wrong > 0 {
+            println!("model: broken: a late reply was taken: {schedule:?}");
+        }
+    }
+    println!(
+        "model: a client, a device with a latency: {schedules} schedules, {} requests right, {} failed, {} wrong",
+        requests.right, requests.failed, requests.wrong
+    );
+    if requests.wrong > 0 {
+        failed += 1;
+    } else {
+        passed += 1;
     }
     println!("{passed} passed, {failed} failed");
     if failed > 0 {
@@ -145,7 +198,7 @@ mod tests {
             buffer: 20,
             retries: 0,
             quiet_time: 0,
-            noise: false,
+            adversary: Adversary::Replies,
         };
         let broken = explore(line, Duration::from_secs(60)).broken;
         assert!(broken

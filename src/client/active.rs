@@ -94,6 +94,10 @@ impl<P, S: ClientStorage, J: ClientRequest> RequestSpec<P, S> for ActiveRequest<
         self.header().is_answered()
     }
 
+    fn has_unique_reply(&self) -> bool {
+        self.header().returns_query_data()
+    }
+
     #[cfg_attr(target_os = "none", inline(never))]
     fn response_timeout(engine: &mut ClientEngine<P, S, J>) -> u32 {
         let line = engine.settings.response_timeout;

@@ -13,6 +13,8 @@
 //!   sends the next request.
 //! - The next reply of that unit is on probation (see `receive`).
 //!
+//! A reply that arrives while no request has been sent shows that the replies are late, too.
+//!
 //! `inline(never)` keeps the steps apart in firmware. Each step then needs few values at a
 //! time, which fit into the registers, and the code is small.
 
@@ -106,14 +108,12 @@ pub struct Engine<P, S: Storage, Q> {
     pub(crate) held: S::Count,
     /// Whether the next reply may be a late reply.
     probation: Probation,
-    /// The unit that did not answer its last request; 0 if there is none.
-    late_unit: u8,
     /// The last request got no right reply. Its reply may still come.
     late: bool,
     /// The echo of the request is expected before the reply.
     pub(crate) echo: bool,
     /// No byte has arrived since the received bytes were last searched for a reply after an
-    /// incomplete candidate.
+    /// incomplete candidate. Before a request is sent: the frame buffer holds the request.
     resynced: bool,
     /// The most severe fault among the skipped bytes.
     fault: RxFault,
@@ -133,6 +133,11 @@ pub struct Engine<P, S: Storage, Q> {
     last_byte: u32,
     /// The time of the current poll.
     now: u32,
+    /// How long the line must be silent before a reply on probation is accepted.
+    hold: u32,
+    /// The units that did not answer their last request: bit n stands for the units whose
+    /// number is n modulo 32.
+    late_units: u32,
     /// CRC of the bytes skipped since the last frame ended. `crc` continues it over the first
     /// `processed` bytes of the buffer.
     crc_skipped: Crc16,

@@ -3,15 +3,20 @@
 //!
 //! A device that answers in order, but later than the timeout, sends two replies after the
 //! next request: first the late reply, then the right one. So after a request without a right
-//! reply, the engine holds the next reply of that unit until the line has been silent for the
-//! quiet time. A second right reply replaces the held one. If a second reply arrives damaged,
-//! the request fails, because the held reply is then most likely the late one.
+//! reply, the engine holds the next reply of that unit until the line has been silent for as
+//! long as the failed request waited, which is the response timeout after a timeout. A device
+//! that answers within the response timeout sends its second reply before that. The second
+//! right reply replaces the held one. If it arrives damaged, the request fails, because the
+//! held reply is then most likely the late one.
 
-use super::{Count, Counter, Engine, Probation, RequestSpec, RxFault, Storage, Words};
+use super::{
+    Count, Counter, Engine, Phase, Probation, RequestSpec, RxFault, Storage, Words, BROADCAST,
+};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
+use crate::time::elapsed;
 use crate::FIRMWARE;
 
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
@@ -35,9 +40,29 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     }
 
     /// Notes that the reply to the pending request may come late.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn expect_late_reply(&mut self) {
+        let mut hold = Q::response_timeout(self);
+        if self.phase == Phase::Reply && self.fault == RxFault::BAD_CRC {
+            // The reply has come, though damaged. So the unit needs no longer than this.
+            hold = elapsed(self.now, self.phase_start);
+        }
+        if self.late_units == 0 {
+            self.hold = self.settings.quiet_time;
+        }
+        self.hold = self.hold.max(hold);
         self.late = true;
-        self.late_unit = self.unit;
+        self.late_units |= self.late_unit();
+    }
+
+    /// The bit of the pending request's unit in `late_units`.
+    fn late_unit(&self) -> u32 {
+        1 << (self.unit & 31)
+    }
+
+    /// True if the pending request's unit did not answer its last request.
+    fn is_late_unit(&self) -> bool {
+        self.late_units & self.late_unit() != 0
     }
 
     /// Prepares the search for the reply to the request that has just been sent.
@@ -54,11 +79,37 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         if cfg!(feature = "echo") {
             self.echo = self.settings.echo_discard;
         }
-        self.probation = if self.late_unit == self.unit && self.settings.quiet_time > 0 {
+        self.probation = if self.is_late_unit()
+            && self.settings.quiet_time > 0
+            && !self.request.has_unique_reply()
+        {
             Probation::On
         } else {
             Probation::Off
         };
+    }
+
+    /// Searches the `received` bytes that have arrived before the request is sent. A right
+    /// reply among them belongs to an earlier request, so more late replies may come.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn search_unexpected(&mut self, received: S::Count) {
+        if self.resynced {
+            self.begin_reply();
+            self.resynced = false;
+            self.echo = false;
+        }
+        self.end += received;
+        let is_known = self.is_late_unit() || self.unit == BROADCAST;
+        let found = !is_known && Q::find_reply(self);
+        if found {
+            self.exception = 0;
+            self.expect_late_reply();
+        }
+        if found || self.end == self.storage.capacity() {
+            self.end = S::Count::ZERO;
+            self.begin_frame(S::Count::ZERO);
+        }
     }
 
     #[cfg_attr(target_os = "none", inline(never))]
@@ -103,7 +154,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             }
         }
         if self.probation == Probation::Held {
-            over = self.is_silent(self.settings.quiet_time) || self.has_expired();
+            over = self.is_silent(self.hold) || self.has_expired();
         }
         if over {
             let is_held = !LENIENT || self.probation == Probation::Held;
@@ -178,9 +229,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Counts the reply that was found, and returns its status.
     #[cfg_attr(target_os = "none", inline(never))]
     fn found(&mut self) -> Status {
-        if self.late_unit == self.unit {
-            self.late_unit = 0;
-        }
+        self.late_units &= !self.late_unit();
         self.storage.count(Counter::Replies, 1);
         if self.exception != 0 {
             self.storage.count(Counter::Exceptions, 1);
@@ -234,9 +283,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.probation = Probation::Held;
         // If the line is never silent, the wait for a second reply ends at this time.
         let timeout = Q::response_timeout(self);
-        self.wait = timeout
-            .wrapping_add(timeout)
-            .wrapping_add(self.settings.quiet_time);
+        self.wait = timeout.wrapping_add(timeout).wrapping_add(self.hold);
     }
 
     /// Drops the held reply and counts it as a foreign frame.
@@ -259,7 +306,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         if held == S::Count::ZERO
             || self.fault >= RxFault::BAD_CRC
             || self.end > 1u8.into()
-            || !self.is_silent(self.settings.quiet_time)
+            || !self.is_silent(self.hold)
         {
             return false;
         }

@@ -35,6 +35,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     pub(super) fn begin(&mut self) -> Status {
         self.take_back();
         Q::write(self);
+        self.resynced = true;
         let wait = Q::response_timeout(self);
         self.enter(Phase::Gap, wait.wrapping_add(self.required_silence()));
         Status::PENDING
@@ -56,17 +57,25 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn wait_for_silence(&mut self) -> Status {
-        let received = self.read_bytes(S::Count::ZERO);
+        let index = if self.resynced {
+            S::Count::ZERO
+        } else {
+            self.end
+        };
+        let received = self.read_bytes(index);
         if received < 0 {
             return Status::LINK_LOST;
         }
         if received > 0 {
-            // The received bytes have overwritten the request.
-            Q::write(self);
+            self.search_unexpected(S::Count::of(received as usize));
             return self.stalled();
         }
         if !self.is_silent(self.required_silence()) {
             return self.wait();
+        }
+        if !self.resynced {
+            // The received bytes have overwritten the request.
+            Q::write(self);
         }
         self.storage.count(Counter::Requests, 1);
         self.late = false;

@@ -35,6 +35,13 @@ pub trait RequestSpec<P, S: Storage>: Sized {
         true
     }
 
+    /// True if the reply repeats data that are in no other request, so that no late reply can
+    /// be taken for it.
+    #[inline(always)]
+    fn has_unique_reply(&self) -> bool {
+        false
+    }
+
     /// Microseconds that the reply may take, and that the request may wait for the line.
     #[inline(always)]
     fn response_timeout(engine: &mut Engine<P, S, Self>) -> u32 {

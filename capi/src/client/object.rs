@@ -31,7 +31,7 @@ pub struct mbm_client {
     /// Private.
     pointers: [*mut c_void; 46],
     /// Private.
-    words: [u32; 25],
+    words: [u32; 27],
 }
 
 /// The fields in the storage of an `mbm_client`.

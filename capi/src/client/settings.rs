@@ -119,6 +119,10 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
 /// the reply to a later request: see mbm_master_setQuietTime. It has no effect in TCP frames,
 /// whose transaction identifier shows to which request a reply belongs.
 ///
+/// The client does not hold the reply to mbm_client_diagnostics with sub-function 0, which
+/// repeats data of your choice. If no other request has the same data, no late reply can be
+/// taken for it, and after its reply the next replies of that unit are not held either.
+///
 /// @param client        the object
 /// @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED

@@ -17,5 +17,5 @@ pub struct mbm_master {
     /// Private.
     pointers: [*mut c_void; 13],
     /// Private.
-    words: [u32; 21],
+    words: [u32; 23],
 }

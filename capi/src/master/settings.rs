@@ -128,16 +128,25 @@ pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
 ///
 /// After a request without a right reply, the master does two things. It waits for the quiet
 /// time before it sends the next request, and discards bytes that arrive meanwhile. Then it
-/// holds the next reply of that unit until no byte has arrived for the quiet time. A second
-/// reply replaces the held one, because a device answers in order. If the second reply is
-/// damaged, the request fails. So a request after a failure takes one quiet time longer; all
-/// others take no longer.
+/// holds the next reply of that unit, until no byte has arrived for as long as the failed
+/// request waited: the response timeout after MBM_RESPONSE_TIMED_OUT, the time until the
+/// damaged reply had come after MBM_INVALID_CRC, and at least the quiet time. A second reply
+/// replaces the held one, because a device answers in order. If the second reply is damaged,
+/// the request fails. A right reply that arrives before a request is sent shows that replies
+/// are late; the next reply is then held for the response timeout.
 ///
-/// The quiet time must be longer than the device needs for a reply. If it is shorter, the
-/// master may accept the held reply before the second one arrives.
+/// So a device that answers in order and within the response timeout never gives the data of
+/// another request, whatever its usual latency and however late one of its replies was. The
+/// request after a timeout takes at most one quiet time and one response timeout longer; all
+/// others take no longer. A wrong reading remains possible if the device takes longer than
+/// the response timeout for two requests in a row.
+///
+/// With a quiet time of 0 the master waits and holds nothing: a reply that is later than the
+/// response timeout may be taken for the reply to the next request, and so may all that
+/// follow.
 ///
 /// @param master        the object
-/// @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
+/// @param quietMs       milliseconds, 0 to 65535; the default is 100
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, quietMs: u16) -> u8 {

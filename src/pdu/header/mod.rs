@@ -63,6 +63,14 @@ impl RequestHeader {
         self.head[0]
     }
 
+    /// True for Return Query Data (clause 6.8.1), whose response repeats data of the caller's
+    /// choice.
+    pub fn returns_query_data(&self) -> bool {
+        const SUB_FUNCTION: [u8; 2] = diagnostics::sub_function::RETURN_QUERY_DATA.to_be_bytes();
+        self.head
+            .starts_with(&[diagnostics::DIAGNOSTICS, SUB_FUNCTION[0], SUB_FUNCTION[1]])
+    }
+
     /// Bytes of the caller's data that are sent.
     pub const fn data_length(&self) -> u8 {
         self.data_length

@@ -1,0 +1,188 @@
+//! A client and a device with a latency. The client cannot be copied, so each schedule of late
+//! replies and pauses is played from its beginning: every latency up to the response timeout,
+//! one or two late replies, every pause between the requests.
+
+#[allow(dead_code)]
+#[path = "../../tests/common/wire.rs"]
+mod wire;
+
+use mbm::client::{Client, Serial};
+use mbm::error::Status;
+use mbm::frame::rtu;
+use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::header::RequestHeader;
+use std::collections::VecDeque;
+use wire::{End, Lent, Task};
+
+const UNIT: u8 = 17;
+
+/// Times in ticks, which are microseconds of the simulated clock.
+const SILENCE: u32 = 1;
+pub const QUIET: u32 = 4;
+const TIMEOUT: u32 = 10;
+
+/// How many ticks a reply may be late.
+const LATEST: u32 = 3 * TIMEOUT;
+
+/// How many requests each schedule has.
+const REQUESTS: u8 = 12;
+
+/// When replies are late, and how long the user pauses.
+#[derive(Clone, Copy, Debug)]
+pub struct Schedule {
+    /// Ticks that the device takes for a reply.
+    latency: u32,
+    /// The first late reply: the index of its request, and by how many ticks it is later than
+    /// the response timeout.
+    first: (usize, u32),
+    /// The second one; no tick means that there is none. It comes after all replies that the
+    /// first one has delayed.
+    second: (usize, u32),
+    /// Ticks from the end of a request to the start of the next.
+    pause: u32,
+}
+
+/// All schedules.
+pub fn schedules() -> impl Iterator<Item = Schedule> {
+    let seconds = (0..=LATEST).flat_map(|late| (4..=6).map(move |index| (index, late)));
+    (1..=TIMEOUT).flat_map(move |latency| {
+        let seconds = seconds.clone();
+        (1..=LATEST).flat_map(move |late| {
+            seconds.clone().flat_map(move |second| {
+                (0..=TIMEOUT + 2).step_by(2).map(move |pause| Schedule {
+                    latency,
+                    first: (1, late),
+                    second,
+                    pause,
+                })
+            })
+        })
+    })
+}
+
+/// How the requests of a schedule ended.
+#[derive(Default, Debug)]
+pub struct Ended {
+    pub right: u32,
+    pub failed: u32,
+    /// Requests that succeeded with the data of another request.
+    pub wrong: u32,
+}
+
+fn frame(pdu: &[u8]) -> Vec<u8> {
+    let mut buffer = [0; 16];
+    let length = rtu::emit(&mut buffer, UNIT, |place| {
+        place[..pdu.len()].copy_from_slice(pdu);
+        Ok(pdu.len())
+    });
+    buffer[..length.expect("the frame fits")].to_vec()
+}
+
+/// The device: the numbers of the requests that it has not answered, in order.
+#[derive(Default)]
+struct Device {
+    owed: VecDeque<u8>,
+    /// Ticks until it sends the oldest reply.
+    left: u32,
+    /// Late replies that are still to come.
+    late: VecDeque<(usize, u32)>,
+}
+
+impl Device {
+    /// Receives a request. Its reply can only be late if the device owes no other.
+    fn receive(&mut self, number: u8, latency: u32) {
+        if self.owed.is_empty() {
+            self.left = latency;
+            if let Some((index, late)) = self.late.front() {
+                if usize::from(number) >= *index && *late > 0 {
+                    self.left = TIMEOUT + *late;
+                    self.late.pop_front();
+                }
+            }
+        }
+        self.owed.push_back(number);
+    }
+
+    /// Lets a tick pass.
+    fn tick(&mut self, latency: u32, end: &End) {
+        if self.owed.is_empty() {
+            return;
+        }
+        self.left -= 1;
+        if self.left == 0 {
+            self.left = latency;
+            if let Some(number) = self.owed.pop_front() {
+                end.deliver(0, &frame(&[3, 2, 0, number]));
+            }
+        }
+    }
+}
+
+/// Plays a schedule with a client that is set to this quiet time.
+pub fn play(schedule: Schedule, quiet_time: u32) -> Ended {
+    let end = End::default();
+    let mut line = Serial::new(end.clone(), Lent::default());
+    let settings = &mut line.engine.settings;
+    settings.gap = SILENCE;
+    settings.silence = SILENCE;
+    settings.response_timeout = TIMEOUT;
+    settings.quiet_time = quiet_time;
+    let mut client: Client<_, Task, 4> = Client::new(line);
+    let mut device = Device {
+        late: [schedule.first, schedule.second].into(),
+        ..Device::default()
+    };
+    let mut ended = Ended::default();
+    let tick = |device: &mut Device| {
+        end.pass(1);
+        device.tick(schedule.latency, &end);
+    };
+    for number in 0..REQUESTS {
+        let read = |header: &mut RequestHeader| {
+            header.set(FunctionSpec::READ_HOLDING_REGISTERS, number.into(), 1)
+        };
+        let queued = client.queue(Task::new(UNIT, 0, &[], read));
+        assert!(queued.is_ok(), "the request was refused");
+        let mut waited = 0;
+        let task = loop {
+            if let Some(task) = client.poll(end.now(), true) {
+                break task;
+            }
+            if !end.sent().is_empty() {
+                device.receive(number, schedule.latency);
+            }
+            tick(&mut device);
+            waited += 1;
+            assert!(waited < 10 * TIMEOUT, "a request does not end");
+        };
+        match task.state.status {
+            Status::OK if task.received() == [0, number] => ended.right += 1,
+            Status::OK => ended.wrong += 1,
+            _ => ended.failed += 1,
+        }
+        for _ in 0..schedule.pause {
+            tick(&mut device);
+        }
+    }
+    ended
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_late_reply_costs_no_more_than_the_requests_that_are_sent_until_it_comes() {
+        for schedule in schedules().filter(|schedule| schedule.second.1 == 0) {
+            let ended = play(schedule, QUIET);
+            assert_eq!(ended.wrong, 0, "{schedule:?}");
+            assert!(ended.failed <= 4, "{schedule:?}: {ended:?}");
+        }
+    }
+
+    /// Without a quiet time the client does not hold a reply, and so takes a late one.
+    #[test]
+    fn the_schedules_find_a_late_reply_that_is_taken_for_the_right_one() {
+        assert!(schedules().any(|schedule| play(schedule, 0).wrong > 0));
+    }
+}
