@@ -271,7 +271,7 @@ static void add_reads(outcome *sum, int has_client, lateness kind, uint32_t late
 static const uint32_t latencies[] = {3, 50, 90, 105, 150, 450, 1900};
 static const uint32_t timeouts[] = {500, 2000};
 static const uint32_t pauses[] = {0, 60, 700};
-static const uint32_t lates[] = {1, 20, 90, 250, 1000, 2600, 7000};
+static const uint32_t late_by[] = {1, 20, 90, 250, 1000, 2600, 7000};
 
 /* All kinds of lateness, for the master and the client. */
 static outcome outcome_of(uint32_t latency, uint32_t timeout, uint32_t pause, int mixed)
@@ -281,10 +281,10 @@ static outcome outcome_of(uint32_t latency, uint32_t timeout, uint32_t pause, in
     int has_client;
 
     for (kind = 0; kind < LATENESSES; kind++)
-        for (late = 0; late < COUNT(lates); late++)
+        for (late = 0; late < COUNT(late_by); late++)
             for (has_client = 0; has_client < 2; has_client++)
                 add_reads(&sum, has_client, (lateness)kind, latency * MS, timeout * MS,
-                          lates[late] * MS, pause * MS, mixed);
+                          late_by[late] * MS, pause * MS, mixed);
     return sum;
 }
 
