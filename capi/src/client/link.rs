@@ -51,6 +51,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
             let release = (*(*object).kind).release;
             pointers::with_hooks(client, || release(object, None));
             queue(object).interrupt();
+            queue(object).connected = true;
             Status::OK
         });
         if status != Status::OK.code() || link.is_null() {
