@@ -1538,7 +1538,7 @@ typedef struct mbm_client {
     /**
      * Private.
      */
-    void *pointers[46];
+    void *pointers[47];
     /**
      * Private.
      */
@@ -1992,7 +1992,8 @@ uint8_t mbm_client_isConnected(const struct mbm_client *client);
 
 /**
  * Suspends the client, so that a master can use its port. The client's requests wait until
- * mbm_client_resume. Until then the master uses the client's storage: do not zero it.
+ * mbm_client_resume. Until then the master uses the client's storage, and the client remembers
+ * the master: keep both.
  *
  * @param client  the object. If `master` is not NULL, it must use RTU or RTU over TCP
  * @param master  a master with buffers, which then uses the client's port; NULL if you use
@@ -2005,12 +2006,13 @@ uint8_t mbm_client_suspend(struct mbm_client *client,
 
 /**
  * Resumes the client. The master then has no port: its functions that make a request return
- * MBM_NOT_INITIALISED.
+ * MBM_NOT_INITIALISED. A master that was begun on another port meanwhile keeps that port.
  *
  * @param client  the object
  * @param master  the master that was passed to mbm_client_suspend; NULL if none was
  * @return MBM_OK; MBM_BUSY while the master has a request under way;
- *         MBM_INVALID_ARGUMENT if the client was not suspended; MBM_NOT_INITIALISED
+ *         MBM_INVALID_ARGUMENT if the client was not suspended, and for any other master;
+ *         MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_resume(struct mbm_client *client,
                           struct mbm_master *master);
@@ -3309,6 +3311,8 @@ typedef struct mbm_linkCounters {
  * - It opens the link again, after a wait that grows with each attempt that fails.
  * - When the link is lost, requests under way end with MBM_LINK_LOST, because the device may
  *   have carried them out. The others end too, or wait: see mbm_link_setRequestsWait.
+ * - Requests that are under way when the link begins go on if `status` finds the link open, and
+ *   end with MBM_LINK_LOST if not. No byte of an ended request is sent over a new link.
  *
  * mbm_client_pollDelay returns when the next poll is due, for an idle client at most one
  * second. A wait for bytes that also ends when the link is lost, as mbm_tcp_wait and

@@ -176,9 +176,11 @@ impl PortRef {
         self.context = context;
     }
 
-    /// Refers to no port.
-    pub(super) fn clear(&mut self) {
-        self.port = null();
+    /// Refers to no port, if it refers to `port`.
+    pub(super) fn clear_if(&mut self, port: *const mbm_port) {
+        if self.port == port {
+            self.port = null();
+        }
     }
 
     /// Calls the hook `idle`.

@@ -130,6 +130,7 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     pub fn reconnect(&mut self) {
         self.line.release(None);
         self.queue.interrupt();
+        self.queue.connected = true;
     }
 
     /// Leaves the line to another user of the port until [`Client::take_back`]. Returns

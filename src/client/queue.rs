@@ -156,7 +156,6 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
             self.put_first(request);
         }
         self.mark_lost(|request| request.state().is_sent());
-        self.connected = true;
     }
 
     /// True if no request is in flight.

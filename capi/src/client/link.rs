@@ -51,6 +51,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
             let release = (*(*object).kind).release;
             pointers::with_hooks(client, || release(object, None));
             queue(object).interrupt();
+            queue(object).connected = true;
             Status::OK
         });
         if status != Status::OK.code() || link.is_null() {
@@ -87,7 +88,8 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
 }
 
 /// Suspends the client, so that a master can use its port. The client's requests wait until
-/// mbm_client_resume. Until then the master uses the client's storage: do not zero it.
+/// mbm_client_resume. Until then the master uses the client's storage, and the client remembers
+/// the master: keep both.
 ///
 /// @param client  the object. If `master` is not NULL, it must use RTU or RTU over TCP
 /// @param master  a master with buffers, which then uses the client's port; NULL if you use
@@ -118,6 +120,7 @@ pub unsafe extern "C" fn mbm_client_suspend(
             if !on_transport!(object, transport => transport.suspend(&mut (*object).queue)) {
                 return Status::BUSY;
             }
+            (*object).borrower = master;
             if !master.is_null() {
                 master::prepare(master);
                 let port = (*(*object).kind).port(object);
@@ -136,18 +139,19 @@ pub unsafe extern "C" fn mbm_client_suspend(
 }
 
 /// Resumes the client. The master then has no port: its functions that make a request return
-/// MBM_NOT_INITIALISED.
+/// MBM_NOT_INITIALISED. A master that was begun on another port meanwhile keeps that port.
 ///
 /// @param client  the object
 /// @param master  the master that was passed to mbm_client_suspend; NULL if none was
 /// @return MBM_OK; MBM_BUSY while the master has a request under way;
-///         MBM_INVALID_ARGUMENT if the client was not suspended; MBM_NOT_INITIALISED
+///         MBM_INVALID_ARGUMENT if the client was not suspended, and for any other master;
+///         MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if !queue(object).suspended {
+            if !queue(object).suspended || (*object).borrower != master {
                 return Status::INVALID_ARGUMENT;
             }
             match pointers::check(master) {
@@ -156,10 +160,10 @@ pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, master: *mut
                     if core.is_pending() {
                         return Status::BUSY;
                     }
-                    core.port().clear();
+                    core.port().clear_if((*(*object).kind).port(object));
                 }
                 Status::BUSY => return Status::BUSY,
-                // There is no master, or it does not use the port.
+                // There is no master, or it was zeroed.
                 _ => {}
             }
             queue(object).suspended = false;

@@ -3,6 +3,7 @@
 use super::request::RequestPtr;
 use super::storage::ClientBuffers;
 use super::MBM_CLIENT_DEPTH;
+use crate::master::mbm_master;
 use crate::pointers::CObject;
 use crate::port::mbm_port;
 use core::ffi::c_void;
@@ -29,7 +30,7 @@ pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 #[repr(C)]
 pub struct mbm_client {
     /// Private.
-    pointers: [*mut c_void; 46],
+    pointers: [*mut c_void; 47],
     /// Private.
     words: [u32; 27],
 }
@@ -42,6 +43,8 @@ pub struct Object {
     /// `kind` is the first field of a [`LinkedKind`].
     pub(crate) linked: bool,
     pub(crate) kind: *const TransportKind,
+    /// The master that uses the port while the client is suspended; NULL if none does.
+    pub(super) borrower: *mut mbm_master,
     pub(crate) queue: RequestQueue<RequestPtr, DEPTH>,
     pub(super) transport: Transports,
 }

@@ -45,6 +45,8 @@ const _: () = {
 /// - It opens the link again, after a wait that grows with each attempt that fails.
 /// - When the link is lost, requests under way end with MBM_LINK_LOST, because the device may
 ///   have carried them out. The others end too, or wait: see mbm_link_setRequestsWait.
+/// - Requests that are under way when the link begins go on if `status` finds the link open, and
+///   end with MBM_LINK_LOST if not. No byte of an ended request is sent over a new link.
 ///
 /// mbm_client_pollDelay returns when the next poll is due, for an idle client at most one
 /// second. A wait for bytes that also ends when the link is lost, as mbm_tcp_wait and

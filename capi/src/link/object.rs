@@ -105,8 +105,10 @@ impl LinkHooks for Hooks {
     }
 
     fn connect(&mut self) -> Status {
-        // SAFETY: see above.
+        // SAFETY: see above. Closing uses no hook of the link, and not its core.
         unsafe {
+            // In the first step nothing was closed yet.
+            close(self.link);
             count(self.link, |counters| &mut counters.attempts);
             match self.hooks.connect {
                 Some(connect) => Status::from_code(connect(self.hooks.context)),
@@ -132,6 +134,20 @@ impl LinkHooks for Hooks {
                 None => 0,
             }
         }
+    }
+}
+
+/// Gives up what the client has sent and received in part, because bytes of it must not get into
+/// the next connection. Its requests under way end with [`Status::LINK_LOST`].
+///
+/// # Safety
+/// `link` is that of its client; the port's hooks that this calls must not use either.
+unsafe fn close(link: *mut Object) {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let object = (*link).client.cast();
+        ((*(*link).transport).release)(object, None);
+        client::queue(object).interrupt();
     }
 }
 
@@ -215,11 +231,10 @@ unsafe fn advance_linked(
             link,
         };
         let happened = (*link).core.step(now, fresh, &mut hooks);
+        if (*link).core.state() == LinkState::Down {
+            close(link);
+        }
         if let Some((event, status)) = happened {
-            if event == LinkEvent::Lost {
-                ((*(*link).transport).release)(object, None);
-                client::queue(object).interrupt();
-            }
             client::queue(object).connected = event == LinkEvent::Connected;
             return note(link, event, status);
         }

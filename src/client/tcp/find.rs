@@ -67,6 +67,10 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     ) -> Option<J> {
         self.resyncing = false;
         self.in_flight = self.in_flight.wrapping_sub(1);
+        if self.sent < self.filled {
+            // The bytes that wait for the port may be this request: the response is a false one.
+            self.remove_unsent(queue.queue.get(at)?.state().wire);
+        }
         queue.connected = true;
         if is_answer(status) {
             self.storage.count(Counter::Replies, 1);

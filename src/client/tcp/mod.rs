@@ -326,7 +326,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     /// Removes the frame with the transaction identifier `wire` from the transmit buffer, if
     /// none of its bytes were sent. True if the frame was not sent, or only partly.
     #[cold]
-    fn remove_unsent(&mut self, wire: u16) -> bool {
+    pub(super) fn remove_unsent(&mut self, wire: u16) -> bool {
         let (bytes, mut at) = (self.storage.to_send(0, self.filled), 0);
         while let Some(rest) = bytes.get_mut(at..) {
             let Ok(header) = tcp::header(rest) else {

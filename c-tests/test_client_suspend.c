@@ -1,0 +1,200 @@
+/* A client that gives its line away takes it back from the one to whom it was given, and from no
+ * other. After that the master has no line: nothing of the client is used any more. */
+#include "memory_port.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "refused.h"
+
+static memory_port m, other_m;
+static mbm_client *client; /* on the heap, so that the sanitizer finds each use after its end */
+static mbm_master master, other;
+static mbm_link *kept;
+static uint8_t frame[256], master_frame[256], other_frame[256];
+static uint16_t words[4], other_words[4];
+
+static uint8_t opened(void *context)
+{
+    (void)context;
+    return MBM_OK;
+}
+
+static const mbm_linkHooks hooks = {.connect = opened, .status = opened};
+
+static void begin(int framing, int has_link)
+{
+    const mbm_port port = memory_port_of(&m);
+
+    memset(&m, 0, sizeof m);
+    memset(&other_m, 0, sizeof other_m);
+    memset(&master, 0, sizeof master);
+    memset(&other, 0, sizeof other);
+    client = (mbm_client *)calloc(1, sizeof *client);
+    kept = (mbm_link *)calloc(1, sizeof *kept);
+    if (framing == MBM_FRAMING_RTU)
+        OK(mbm_client_beginRtu(client, &port, frame, sizeof frame));
+    else
+        OK(mbm_client_beginRtuOverTcp(client, &port, frame, sizeof frame));
+    if (has_link) {
+        OK(mbm_link_begin(kept, client, &hooks));
+        OK(mbm_client_poll(client));
+    }
+    OK(mbm_master_setBuffers(&master, words, 4, words, 4, master_frame, sizeof master_frame));
+    OK(mbm_master_setBuffers(&other, other_words, 4, NULL, 0, other_frame, sizeof other_frame));
+    OK(mbm_master_setBlocking(&master, 0));
+    OK(mbm_master_setBlocking(&other, 0));
+}
+
+static void end(void)
+{
+    free(client);
+    free(kept);
+}
+
+static void each_variant(void (*test)(void))
+{
+    static const int framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_RTU_OVER_TCP};
+    unsigned i;
+
+    for (i = 0; i < 4; i++) {
+        begin(framings[i / 2], i % 2);
+        test();
+        end();
+    }
+}
+
+static void resume_in_turn(void)
+{
+    static mbm_master fresh;
+
+    OK(mbm_client_suspend(client, &master));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &other));
+    REFUSED(MBM_INVALID_ARGUMENT, other, mbm_client_resume(client, &other));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &fresh));
+    /* The master still has the line. */
+    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, NULL));
+    REFUSED(MBM_BUSY, *client, mbm_client_resume(client, &master));
+    OK(mbm_master_cancel(&master));
+    IS(MBM_BUSY, mbm_client_poll(client));
+    OK(mbm_client_resume(client, &master));
+    OK(mbm_client_poll(client));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &master));
+
+    OK(mbm_client_suspend(client, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &master));
+    OK(mbm_client_resume(client, NULL));
+    /* The next one to whom the line is given counts, not the one before. */
+    OK(mbm_client_suspend(client, &other));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &master));
+    OK(mbm_client_resume(client, &other));
+}
+
+static void a_client_resumes_only_from_the_one_who_has_its_line(void **state)
+{
+    (void)state;
+    each_variant(resume_in_turn);
+}
+
+static void lend_and_end(void)
+{
+    OK(mbm_client_suspend(client, &master));
+    (void)mbm_client_resume(client, NULL);
+    OK(mbm_client_resume(client, &master));
+    end();
+    client = NULL;
+    kept = NULL;
+    IS(MBM_NOT_INITIALISED, mbm_master_readCoils(&master, 0, 1));
+    assert_int_equal(mbm_master_pollDelay(&master), UINT32_MAX);
+    OK(mbm_master_lineUsed(&master));
+    OK(mbm_master_cancel(&master));
+}
+
+static void a_master_uses_nothing_of_a_client_that_has_resumed(void **state)
+{
+    (void)state;
+    each_variant(lend_and_end);
+}
+
+static void begin_the_master(void)
+{
+    const mbm_port port = memory_port_of(&other_m);
+
+    OK(mbm_client_suspend(client, &master));
+    OK(mbm_master_beginRtu(&master, 17, &port));
+    OK(mbm_client_resume(client, &master));
+    end();
+    client = NULL;
+    kept = NULL;
+    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
+    while (other_m.sent_count == 0 && mbm_master_poll(&master) == MBM_PENDING)
+        other_m.now += 100;
+    assert_int_equal(other_m.sent_count, 8);
+}
+
+static void a_master_that_began_on_a_port_of_its_own_keeps_that_port(void **state)
+{
+    (void)state;
+    each_variant(begin_the_master);
+}
+
+static void lend_to_the_master_of_another(void)
+{
+    const mbm_port port = memory_port_of(&other_m);
+    static mbm_client second;
+    static uint8_t second_frame[256];
+
+    memset(&second, 0, sizeof second);
+    OK(mbm_client_beginRtu(&second, &port, second_frame, sizeof second_frame));
+    OK(mbm_client_suspend(client, &master));
+    OK(mbm_client_suspend(&second, &master));
+    OK(mbm_client_resume(client, &master));
+    end();
+    client = NULL;
+    kept = NULL;
+    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
+    while (other_m.sent_count == 0 && mbm_master_poll(&master) == MBM_PENDING)
+        other_m.now += 100;
+    assert_int_equal(other_m.sent_count, 8);
+    OK(mbm_master_cancel(&master));
+    OK(mbm_client_resume(&second, &master));
+    IS(MBM_NOT_INITIALISED, mbm_master_readCoils(&master, 0, 1));
+}
+
+static void a_master_with_the_lines_of_two_clients_keeps_the_second(void **state)
+{
+    (void)state;
+    each_variant(lend_to_the_master_of_another);
+}
+
+static void forget_the_master(void)
+{
+    OK(mbm_client_suspend(client, &master));
+    memset(&master, 0, sizeof master);
+    IS(MBM_INVALID_ARGUMENT, mbm_client_resume(client, NULL));
+    OK(mbm_client_resume(client, &master));
+    OK(mbm_client_poll(client));
+    IS(MBM_NOT_INITIALISED, mbm_master_cancel(&master));
+}
+
+static void a_client_resumes_from_a_master_that_was_zeroed(void **state)
+{
+    (void)state;
+    each_variant(forget_the_master);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_client_resumes_only_from_the_one_who_has_its_line),
+        cmocka_unit_test(a_master_uses_nothing_of_a_client_that_has_resumed),
+        cmocka_unit_test(a_master_that_began_on_a_port_of_its_own_keeps_that_port),
+        cmocka_unit_test(a_master_with_the_lines_of_two_clients_keeps_the_second),
+        cmocka_unit_test(a_client_resumes_from_a_master_that_was_zeroed),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
