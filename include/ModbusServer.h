@@ -201,8 +201,9 @@ public:
     uint8_t poll() { return mbm_server_poll(&state.server); }
 
     /**
-     * How many microseconds poll has nothing to do unless a byte arrives: 0 for now,
-     * 0xFFFFFFFF until a byte arrives, 1000 while a function of yours is pending.
+     * How many microseconds poll has nothing to do unless bytes arrive: 0 for now,
+     * 0xFFFFFFFF until bytes arrive, 1000 while a function of yours is pending. After
+     * begin it is 0 until poll has read the Stream.
      */
     uint32_t pollDelay() const { return mbm_server_pollDelay(&state.server); }
 
