@@ -55,6 +55,8 @@
  *
  * A member that serves an object returns MBM_OK; MBM_BUFFER_TOO_SMALL if the unit
  * serves MBM_MAX_SERVICES (16) already; MBM_BUSY if a table is served as another kind.
+ * A unit may serve several tables of one kind: the first one that has all cells of a
+ * request answers it.
  * It may be called before begin or after it. Objects are not copied: they must outlive
  * the unit. Several units may serve the same object.
  */

@@ -3757,6 +3757,12 @@ typedef struct mbm_diagnostics {
  * more returns MBM_BUFFER_TOO_SMALL. You may pass a record again, also after you have
  * zeroed and refilled it; it keeps its place. A zeroed record serves nothing until you
  * pass it again. Any number of units may share one record.
+ *
+ * A unit may have several tables of one kind, for example holding registers 0 to 9 and
+ * 40000 to 40099; the same holds for callbacks, files and FIFO queues. The unit asks them
+ * in the order in which they were registered. The first one that has all cells of a request
+ * answers it. If none has all of them, the unit answers with exception 02, also where
+ * several have them together.
  */
 typedef struct mbm_unit {
     /**
@@ -3944,7 +3950,8 @@ typedef struct mbm_request {
  * A unit asks its records in the order in which they were registered. So a function that is
  * registered before the record that serves the same code is asked first. It answers the
  * request itself, for example with an exception, or it returns MBM_REPLY_DECLINED: then the
- * record after it answers.
+ * record after it answers. A function that is registered after tables with its code is asked
+ * for the cells that they lack; a function with code 0 is not.
  */
 typedef struct mbm_custom {
     /**
@@ -4320,8 +4327,9 @@ uint8_t mbm_unit_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
  *
  * @param unit    the unit
  * @param status  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
- *         unit has MBM_MAX_SERVICES records already
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
+ *         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+ *         records already
  */
 uint8_t mbm_unit_serveExceptionStatus(struct mbm_unit *unit,
                                       struct mbm_exceptionStatus *status);
@@ -4331,8 +4339,9 @@ uint8_t mbm_unit_serveExceptionStatus(struct mbm_unit *unit,
  *
  * @param unit  the unit
  * @param id    must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
- *         unit has MBM_MAX_SERVICES records already
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
+ *         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+ *         records already
  */
 uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
 
@@ -4344,8 +4353,9 @@ uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
  *
  * @param unit            the unit
  * @param identification  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
- *         unit has MBM_MAX_SERVICES records already
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
+ *         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+ *         records already
  */
 uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
                                      struct mbm_serverIdentification *identification);
