@@ -74,6 +74,7 @@ static void a_sketch_may_sleep_for_the_time_of_pollDelay(void **)
 {
     ModbusServer server;
     server.begin(17, Serial, 19200);
+    server.poll();
     assert_int_equal(server.pollDelay(), 0xFFFFFFFF);
     Serial.inject(raw({17}));
     server.poll();

@@ -252,14 +252,32 @@ static void a_table_that_is_served_as_one_kind_is_refused_as_another(void **stat
     assert_int_equal(answered(&units[1], 3), 4);
 }
 
-static void a_second_record_of_diagnostics_is_refused(void **state)
+/* A unit would call only the first of two. */
+static void a_second_record_of_a_kind_that_a_unit_has_once_is_refused(void **state)
 {
-    static mbm_diagnostics second;
+    static records second;
+    static const int once[] = {4, 5, 6, 9};
     mbm_unit before = units[0];
+    size_t i;
 
     (void)state;
-    IS(MBM_BUSY, mbm_unit_serveDiagnostics(&units[0], &second));
-    assert_memory_equal(&before, &units[0], sizeof before);
+    for (i = 0; i < COUNT(once); i++) {
+        memset(&second, 0, sizeof second);
+        IS(MBM_BUSY, serve(&units[0], &second, once[i]));
+        assert_int_equal(second.status.service.kind | second.diagnostics.service.kind |
+                             second.id.service.kind | second.identification.service.kind,
+                         0);
+        assert_memory_equal(&before, &units[0], sizeof before);
+        all_are_answered(&units[0]);
+        /* Another unit may serve it. */
+        OK(serve(&units[1], &second, once[i]));
+        memset(&units[1], 0, sizeof units[1]);
+        units[1].id = 18;
+    }
+    /* So may this one, instead of the first. */
+    zero(&first, 6);
+    memset(&second, 0, sizeof second);
+    OK(serve(&units[0], &second, 6));
     all_are_answered(&units[0]);
 }
 
@@ -366,8 +384,8 @@ int main(void)
         cmocka_unit_test_setup(functions_16_and_17_stay_when_another_unit_is_given_the_table,
                                reset),
         cmocka_unit_test_setup(a_table_that_is_served_as_one_kind_is_refused_as_another, reset),
-        cmocka_unit_test_setup(a_second_record_of_diagnostics_is_refused, reset),
         cmocka_unit_test_setup(a_unit_with_all_places_taken_refuses_other_functions, reset),
+        cmocka_unit_test_setup(a_second_record_of_a_kind_that_a_unit_has_once_is_refused, reset),
         cmocka_unit_test_setup(a_service_without_a_free_place_is_refused, reset),
         cmocka_unit_test_setup(switches_can_be_registered_again_like_any_record, reset),
     };

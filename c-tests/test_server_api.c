@@ -463,6 +463,7 @@ static void a_lost_link_is_reported_and_poll_delay_is_the_silence(void **state)
     (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_setSilence(&server, 5000));
+    OK(mbm_server_poll(&server));
     assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
     wire.arriving[0] = 17;
     wire.last = 1;

@@ -1,6 +1,6 @@
 /* A million requests to the tables of a server, most of them nearly right, compared with a
  * model of the test's own: every response agrees, and so does every register and bit
- * afterwards. */
+ * afterwards. The cells are in one record of each kind, or in several. */
 #include "crc.h"
 #include "mbm.h"
 #include "test.h"
@@ -38,6 +38,21 @@ static mbm_registerTable holding, inputs;
 static mbm_bitTable coils, discrete;
 static uint8_t valid[CELLS / 8];
 
+/* The records of a unit that has several of each kind. They begin at these cells, where the bytes
+ * of bits begin too. */
+enum { PIECES = 3 };
+static const unsigned first_of[PIECES + 1] = {0, 8, 32, CELLS};
+static int is_split;
+
+static int is_in_one_piece(unsigned first, unsigned quantity)
+{
+    unsigned i = 0;
+
+    while (first >= first_of[i + 1])
+        i++;
+    return first + quantity <= first_of[i + 1];
+}
+
 static int exists(unsigned address, unsigned quantity)
 {
     unsigned i;
@@ -47,7 +62,17 @@ static int exists(unsigned address, unsigned quantity)
     for (i = address - BASE; i < address - BASE + quantity; i++)
         if (i == 20 || i == 33)
             return 0;
-    return 1;
+    return !is_split || quantity == 0 || is_in_one_piece(address - BASE, quantity);
+}
+
+/* Both ranges exist, and one record has them. */
+static int exist(unsigned one, unsigned quantity, unsigned other, unsigned others)
+{
+    unsigned first = one < other ? one : other;
+    unsigned end = one + quantity > other + others ? one + quantity : other + others;
+
+    return exists(one, quantity) && exists(other, others) &&
+           (!is_split || is_in_one_piece(first - BASE, end - first));
 }
 
 static unsigned word(const uint8_t *bytes)
@@ -143,7 +168,7 @@ static size_t expected_response(const uint8_t *pdu, size_t length, uint8_t *out)
         if (length < 10 || quantity < 1 || quantity > 125 || written < 1 || written > 121 ||
             pdu[9] != 2 * written || length != 10 + 2 * written)
             return refuse(out, function, 3);
-        if (!exists(address, quantity) || !exists(to, written))
+        if (!exist(address, quantity, to, written))
             return refuse(out, function, 2);
         for (i = 0; i < written; i++)
             model.words[0][to - BASE + i] = (uint16_t)word(pdu + 10 + 2 * i);
@@ -304,6 +329,69 @@ static int prepare_callbacks(void **state)
     return status;
 }
 
+/* The same memory in several records: two tables of each kind, then callback functions. */
+static mbm_unit split;
+static mbm_registerTable word_pieces[2][2];
+static mbm_bitTable bit_pieces[2][2];
+static mbm_dataCallbacks last_pieces[4];
+
+static uint8_t is_in_last_piece(void *context, uint16_t address)
+{
+    (void)context;
+    return address >= BASE + first_of[2] && exists(address, 1);
+}
+
+static uint8_t serve_piece(unsigned i)
+{
+    const unsigned first = first_of[i];
+    uint8_t status = MBM_OK;
+    unsigned kind;
+
+    for (kind = 0; kind < 2; kind++) {
+        mbm_registerTable *words = &word_pieces[kind][i];
+        mbm_bitTable *bits = &bit_pieces[kind][i];
+
+        words->words = (kind == 0 ? memory.holding : memory.inputs) + first;
+        bits->bits = (kind == 0 ? memory.coils : memory.discrete) + first / 8;
+        words->valid = bits->valid = valid + first / 8;
+        words->base = bits->base = (uint16_t)(BASE + first);
+        words->size = bits->size = (uint16_t)(first_of[i + 1] - first);
+    }
+    status |= mbm_unit_serveHoldingRegisters(&split, &word_pieces[0][i]);
+    status |= mbm_registerTable_serveMaskAndReadWrite(&word_pieces[0][i]);
+    status |= mbm_unit_serveInputRegisters(&split, &word_pieces[1][i]);
+    status |= mbm_unit_serveCoils(&split, &bit_pieces[0][i]);
+    return status | mbm_unit_serveDiscreteInputs(&split, &bit_pieces[1][i]);
+}
+
+static int prepare_pieces(void **state)
+{
+    uint8_t i, status = MBM_OK;
+
+    (void)state;
+    split.id = UNIT;
+    for (i = 0; i < 4; i++) {
+        callbacks[i].context = &callbacks[i];
+        last_pieces[i] = (mbm_dataCallbacks){.isValid = is_in_last_piece, .get = get};
+        last_pieces[i].context = &callbacks[i];
+        if (i % 2 == 0)
+            last_pieces[i].set = set;
+    }
+    status |= serve_piece(1);
+    for (i = 0; i < 4; i++)
+        status |= mbm_unit_serveCallbacks(&split, &last_pieces[i], (uint8_t)(i + 1));
+    status |= serve_piece(0);
+    is_split = 1;
+    return status;
+}
+
+static int end_pieces(void **state)
+{
+    (void)state;
+    is_split = 0;
+    return 0;
+}
+
 static int untouched(const void *guard, size_t bytes)
 {
     const uint8_t *byte = (const uint8_t *)guard;
@@ -371,11 +459,19 @@ static void only_valid_writes_reach_a_callback(void **state)
     compare_with_model(&called);
 }
 
+static void only_the_record_with_the_cells_changes_them(void **state)
+{
+    (void)state;
+    compare_with_model(&split);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(only_valid_writes_change_an_array),
         cmocka_unit_test_setup(only_valid_writes_reach_a_callback, prepare_callbacks),
+        cmocka_unit_test_setup_teardown(only_the_record_with_the_cells_changes_them, prepare_pieces,
+                                        end_pieces),
     };
 
     return cmocka_run_group_tests(tests, prepare, NULL);

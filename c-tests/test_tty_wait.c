@@ -73,6 +73,23 @@ static void bytes_that_are_not_read_do_not_end_the_next_wait(void **state)
     mbm_tty_close(&tty);
 }
 
+/* A program that has sent something waits for what comes back, also if it has not read before. */
+static void after_a_write_bytes_end_the_wait_again(void **state)
+{
+    mbm_port port;
+    mbm_tty tty;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    port = mbm_tty_port(&tty);
+    assert_int_equal(write(line.ours, "a", 1), 1);
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
+    assert_int_equal(mbm_tty_wait(&tty, 1000), 0);
+    assert_int_equal(port.write(port.context, (const uint8_t *)"b", 1), 1);
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
+    mbm_tty_close(&tty);
+}
+
 static uint16_t pending(void *context, const mbm_request *request, uint8_t *response,
                         uint16_t capacity)
 {
@@ -158,6 +175,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(wait_ends_with_a_byte_with_the_time_or_with_the_line),
         TEST(bytes_that_are_not_read_do_not_end_the_next_wait),
+        TEST(after_a_write_bytes_end_the_wait_again),
         TEST(a_server_with_a_pending_function_sleeps_between_polls),
         TEST(a_signal_ends_the_wait),
     };

@@ -55,6 +55,8 @@
  *
  * A member that serves an object returns MBM_OK; MBM_BUFFER_TOO_SMALL if the unit
  * serves MBM_MAX_SERVICES (16) already; MBM_BUSY if a table is served as another kind.
+ * A unit may serve several tables of one kind: the first one that has all cells of a
+ * request answers it.
  * It may be called before begin or after it. Objects are not copied: they must outlive
  * the unit. Several units may serve the same object.
  */
@@ -201,8 +203,9 @@ public:
     uint8_t poll() { return mbm_server_poll(&state.server); }
 
     /**
-     * How many microseconds poll has nothing to do unless a byte arrives: 0 for now,
-     * 0xFFFFFFFF until a byte arrives, 1000 while a function of yours is pending.
+     * How many microseconds poll has nothing to do unless bytes arrive: 0 for now,
+     * 0xFFFFFFFF until bytes arrive, 1000 while a function of yours is pending. After
+     * begin it is 0 until poll has read the Stream.
      */
     uint32_t pollDelay() const { return mbm_server_pollDelay(&state.server); }
 

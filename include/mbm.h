@@ -3582,16 +3582,18 @@ uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
 uint8_t mbm_server_poll(struct mbm_server *server);
 
 /**
- * Returns how long the program may sleep before the next mbm_server_poll, unless a byte
- * arrives earlier.
+ * Returns how long the program may sleep before the next mbm_server_poll, unless bytes
+ * arrive earlier.
  *
  * @param server  the object
  * @return microseconds. 0: poll now; a call from within a hook of this server returns 0
- *         too. 0xFFFFFFFF: sleep until a byte arrives; also for NULL and for a server
- *         that was never begun. 1000: a function of yours has returned
+ *         too. 0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for
+ *         a server that was never begun. 1000: a function of yours has returned
  *         MBM_REPLY_PENDING, or a connection does not accept the response yet; the
  *         server receives no bytes meanwhile, so do not wait for one, but poll earlier
- *         if you know that the function or the connection is ready
+ *         if you know that the function or the connection is ready. Afterwards, and after
+ *         a begin function, it is 0 until mbm_server_poll has read the port, so bytes that
+ *         arrived meanwhile need not end a sleep
  */
 uint32_t mbm_server_pollDelay(const struct mbm_server *server);
 
@@ -3772,6 +3774,12 @@ typedef struct mbm_diagnostics {
  * more returns MBM_BUFFER_TOO_SMALL. You may pass a record again, also after you have
  * zeroed and refilled it; it keeps its place. A zeroed record serves nothing until you
  * pass it again. Any number of units may share one record.
+ *
+ * A unit may have several tables of one kind, for example holding registers 0 to 9 and
+ * 40000 to 40099; the same holds for callbacks, files and FIFO queues. The unit asks them
+ * in the order in which they were registered. The first one that has all cells of a request
+ * answers it. If none has all of them, the unit answers with exception 02, also where
+ * several have them together.
  */
 typedef struct mbm_unit {
     /**
@@ -3959,7 +3967,8 @@ typedef struct mbm_request {
  * A unit asks its records in the order in which they were registered. So a function that is
  * registered before the record that serves the same code is asked first. It answers the
  * request itself, for example with an exception, or it returns MBM_REPLY_DECLINED: then the
- * record after it answers.
+ * record after it answers. A function that is registered after tables with its code is asked
+ * for the cells that they lack; a function with code 0 is not.
  */
 typedef struct mbm_custom {
     /**
@@ -4335,8 +4344,9 @@ uint8_t mbm_unit_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
  *
  * @param unit    the unit
  * @param status  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
- *         unit has MBM_MAX_SERVICES records already
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
+ *         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+ *         records already
  */
 uint8_t mbm_unit_serveExceptionStatus(struct mbm_unit *unit,
                                       struct mbm_exceptionStatus *status);
@@ -4346,8 +4356,9 @@ uint8_t mbm_unit_serveExceptionStatus(struct mbm_unit *unit,
  *
  * @param unit  the unit
  * @param id    must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
- *         unit has MBM_MAX_SERVICES records already
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
+ *         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+ *         records already
  */
 uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
 
@@ -4359,8 +4370,9 @@ uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
  *
  * @param unit            the unit
  * @param identification  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
- *         unit has MBM_MAX_SERVICES records already
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
+ *         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+ *         records already
  */
 uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
                                      struct mbm_serverIdentification *identification);

@@ -217,6 +217,7 @@ fn a_lost_link_is_reported_and_the_server_continues_when_the_line_is_back() {
 #[test]
 fn the_poll_delay_is_the_rest_of_the_silence() {
     let mut line = Line::new(Framing::Rtu);
+    line.poll();
     assert_eq!(line.server.poll_delay(0xFFFF_0000), u32::MAX);
     line.arrive(0, &[17]);
     line.poll();

@@ -1,10 +1,11 @@
 //! A million requests, most of them nearly valid, to the server and to an independent model. All
-//! responses and all registers and bits must be equal.
+//! responses and all registers and bits must be equal. The cells of each kind are in one table or
+//! in several.
 
 use mbm::server::storage::{
     BitArray, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, RegisterArray,
 };
-use mbm::server::{Reply, Service};
+use mbm::server::{RequestInfo, Service, Unit, Units};
 
 const BASE: u16 = 0xFFC0;
 const CELLS: usize = 48;
@@ -30,6 +31,8 @@ struct Model {
     inputs: Vec<u16>,
     coils: Vec<bool>,
     discrete: Vec<bool>,
+    /// The indexes at which a table ends and the next one begins.
+    edges: &'static [usize],
 }
 
 /// True for the two registers and bits that do not exist.
@@ -41,7 +44,13 @@ impl Model {
     fn range(&self, address: u16, quantity: usize) -> Option<std::ops::Range<usize>> {
         let first = usize::from(address).checked_sub(usize::from(BASE))?;
         let last = first + quantity;
-        (last <= CELLS && !(first..last).any(hole)).then_some(first..last)
+        (last <= CELLS && !(first..last).any(hole) && self.is_in_one_table(first, last))
+            .then_some(first..last)
+    }
+
+    fn is_in_one_table(&self, first: usize, last: usize) -> bool {
+        let is_inside = |edge: &usize| first < *edge && *edge < last;
+        !self.edges.iter().any(is_inside)
     }
 
     /// The response that the standard requires.
@@ -154,6 +163,9 @@ impl Model {
                 let (Some(from), Some(to)) = (from, to) else {
                     return refuse(2);
                 };
+                if !self.is_in_one_table(from.start.min(to.start), from.end.max(to.end)) {
+                    return refuse(2);
+                }
                 for (at, cell) in self.holding[to].iter_mut().enumerate() {
                     *cell = word(10 + 2 * at);
                 }
@@ -225,14 +237,60 @@ fn request(random: &mut Random) -> Vec<u8> {
     pdu
 }
 
+/// Cuts the cells at the edges. Returns the piece that begins at each index.
+fn cut<'a, T>(edges: &[usize], per_cell: usize, cells: &'a mut [T]) -> Vec<(usize, &'a mut [T])> {
+    let (mut first, mut rest, mut pieces) = (0, cells, Vec::new());
+    for edge in edges {
+        let (piece, following) = rest.split_at_mut((edge - first) / per_cell);
+        pieces.push((first, piece));
+        (first, rest) = (*edge, following);
+    }
+    pieces.push((first, rest));
+    pieces
+}
+
+fn registers<'a>(
+    edges: &[usize],
+    words: &'a mut [u16],
+    valid: &'a [u8],
+) -> impl Iterator<Item = RegisterArray<'a>> {
+    cut(edges, 1, words).into_iter().map(|(first, words)| {
+        let mut table = RegisterArray::new(BASE + first as u16, words);
+        table.valid = Some(&valid[first / 8..]);
+        table
+    })
+}
+
+fn bits<'a>(
+    edges: &[usize],
+    bytes: &'a mut [u8],
+    valid: &'a [u8],
+) -> impl Iterator<Item = BitArray<'a>> {
+    cut(edges, 8, bytes).into_iter().map(|(first, bytes)| {
+        let mut table = BitArray::new(BASE + first as u16, bytes);
+        table.valid = Some(&valid[first / 8..]);
+        table
+    })
+}
+
 #[test]
 fn a_million_requests_have_the_same_effects_as_on_the_model() {
+    compare_with_model(&[]);
+}
+
+#[test]
+fn requests_to_several_tables_have_the_same_effects_as_on_the_model() {
+    compare_with_model(&[8, 32]);
+}
+
+fn compare_with_model(edges: &'static [usize]) {
     let mut random = Random(0x9E37_79B9_7F4A_7C15);
     let mut model = Model {
         holding: (0..CELLS).map(|_| random.next() as u16).collect(),
         inputs: (0..CELLS).map(|_| random.next() as u16).collect(),
         coils: (0..CELLS).map(|_| random.below(2) == 1).collect(),
         discrete: (0..CELLS).map(|_| random.below(2) == 1).collect(),
+        edges,
     };
     let pack = |bits: &[bool]| {
         let mut bytes = [0u8; CELLS / 8];
@@ -251,23 +309,35 @@ fn a_million_requests_have_the_same_effects_as_on_the_model() {
         let pdu = request(&mut random);
         let mut buffer = [0; 253];
         buffer[..pdu.len()].copy_from_slice(&pdu);
-        let mut words = HoldingRegisters(RegisterArray::new(BASE, &mut holding));
-        words.0.valid = Some(&valid);
-        let mut input_words = InputRegisters(RegisterArray::new(BASE, &mut inputs));
-        input_words.0.valid = Some(&valid);
-        let mut bits = Coils(BitArray::new(BASE, &mut coils));
-        bits.0.valid = Some(&valid);
-        let mut input_bits = DiscreteInputs(BitArray::new(BASE, &mut discrete));
-        input_bits.0.valid = Some(&valid);
-        let services: [&mut dyn Service; 4] =
-            [&mut words, &mut input_words, &mut bits, &mut input_bits];
-        let mut reply = Reply::NOT_HANDLED;
-        for service in services {
-            if reply == Reply::NOT_HANDLED {
-                reply = service.serve(&mut buffer, pdu.len());
-            }
-        }
-        let length = reply.write_exception(&mut buffer);
+        let mut holding_tables: Vec<_> = registers(edges, &mut holding, &valid)
+            .map(HoldingRegisters)
+            .collect();
+        let mut input_tables: Vec<_> = registers(edges, &mut inputs, &valid)
+            .map(InputRegisters)
+            .collect();
+        let mut coil_tables: Vec<_> = bits(edges, &mut coils, &valid).map(Coils).collect();
+        let mut discrete_tables: Vec<_> = bits(edges, &mut discrete, &valid)
+            .map(DiscreteInputs)
+            .collect();
+        let mut services: Vec<&mut dyn Service> = Vec::new();
+        services.extend(holding_tables.iter_mut().map(|t| t as &mut dyn Service));
+        services.extend(input_tables.iter_mut().map(|t| t as &mut dyn Service));
+        services.extend(coil_tables.iter_mut().map(|t| t as &mut dyn Service));
+        services.extend(discrete_tables.iter_mut().map(|t| t as &mut dyn Service));
+        let info = RequestInfo {
+            to: 17,
+            length: pdu.len() as u16,
+            space: 253,
+            ..RequestInfo::NONE
+        };
+        let unit = Unit {
+            id: 17,
+            services: &mut services,
+            diagnostics: None,
+        };
+        let length = [unit]
+            .serve(&info, &mut buffer)
+            .write_exception(&mut buffer);
         let before = model.clone();
         let expected = model.answer(&pdu);
         writes += u32::from(before != model);

@@ -399,6 +399,7 @@ static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
         return not_open(tty);
     if (length == 0)
         return 0;
+    tty->events = POLLIN;
     count = write(tty->fd, bytes, at_most(length));
     return count > 0 ? (int16_t)count : none_moved(tty, count);
 }

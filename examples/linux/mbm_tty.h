@@ -116,7 +116,7 @@ void mbm_tty_detach(mbm_tty *tty);
  * Sleeps until there is something to read or a time is over. Pass the value that a
  * pollDelay function returned.
  *
- * Bytes or a hang-up end one wait. They end the next one only after the port was read:
+ * Bytes or a hang-up end one wait. They end the next one only after the port was read or written:
  * a server whose function is pending reads nothing, and its program sleeps.
  *
  * @param tty     the terminal

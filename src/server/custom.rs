@@ -66,6 +66,10 @@ impl<F: FnMut(u8, &[u8], &mut [u8]) -> Outcome> Service for Custom<F> {
             _ => Reply::NOT_HANDLED,
         }
     }
+
+    fn is_custom(&self) -> bool {
+        true
+    }
 }
 
 /// Responds with exception 01 to disabled functions. It comes before the services that would

@@ -84,7 +84,7 @@ fn read(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
         Err(refused) => return refusal(refused),
     };
     if !reads.iter().all(|record| files.contains(record)) {
-        return Reply::ILLEGAL_DATA_ADDRESS;
+        return Reply::ABSENT;
     }
     let total = reads.response_length();
     let Some([_, count, rest @ ..]) = pdu.get_mut(..total) else {
@@ -117,7 +117,7 @@ fn write(files: &mut impl Files, request: &[u8], length: usize) -> Reply {
         Err(refused) => return refusal(refused),
     };
     if !writes.iter().all(|(record, _)| files.contains(record)) {
-        return Reply::ILLEGAL_DATA_ADDRESS;
+        return Reply::ABSENT;
     }
     for (record, data) in writes.iter() {
         let refused = files.before_write(record, data);
@@ -144,7 +144,7 @@ pub fn serve_fifos(fifos: &impl Fifos, pdu: &mut [u8], length: usize) -> Reply {
         _ => return Reply::ILLEGAL_DATA_VALUE,
     };
     let Some(count) = fifos.count(address) else {
-        return Reply::ILLEGAL_DATA_ADDRESS;
+        return Reply::ABSENT;
     };
     if count > MAX_FIFO {
         return Reply::ILLEGAL_DATA_VALUE;

@@ -1,7 +1,7 @@
 //! How each framing finds a request in the received bytes, and encodes a response.
 
 use super::info::SERIAL;
-use super::line::{EncodeAdu, Receive, Server, ServerStorage};
+use super::line::{EncodeAdu, Receive, Server, ServerPhase, ServerStorage};
 use crate::error::Status;
 use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::checksum::Crc16;
@@ -188,6 +188,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             self.listen();
         } else if self.is_silent() {
             self.sent = 0;
+        } else {
+            // No sleep may hide the end of the silence from the server.
+            self.phase = ServerPhase::Unread;
         }
         Status::OK
     }

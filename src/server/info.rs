@@ -18,6 +18,9 @@ pub struct RequestInfo {
     pub head: u8,
     /// The frame was served before, and the service returned that it is not finished.
     pub again: bool,
+    /// The exception code if no service of the unit answers: 01, or 02 as soon as a service has
+    /// returned [`Reply::ABSENT`](super::Reply::ABSENT).
+    pub refusal: u8,
     /// Length of the PDU; 0 if the frame is damaged.
     pub length: u16,
     /// Greatest length of the response PDU.
@@ -64,6 +67,7 @@ impl RequestInfo {
         overrun: false,
         head: 1,
         again: false,
+        refusal: 1,
         length: 0,
         space: 0,
     };

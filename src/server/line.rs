@@ -73,9 +73,11 @@ impl<const N: usize> ServerStorage for [u8; N] {
 /// The phase of a server.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
-enum ServerPhase {
+pub(super) enum ServerPhase {
     /// The server waits for a request.
     Listen,
+    /// As `Listen`, but the port was not read since the last request. It may have bytes already.
+    Unread,
     /// A request was found. The server waits for its reply.
     Request,
     /// The port sends the response. The driver of the line is enabled.
@@ -93,7 +95,7 @@ pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 // The small fields come first: see `Engine`.
 #[repr(C)]
 pub struct Server<P, B> {
-    phase: ServerPhase,
+    pub(super) phase: ServerPhase,
     /// In a stream of RTU frames: the received bytes are not a frame of known length. With echo
     /// discard: the wait for the echo has begun.
     pub(super) resyncing: bool,
@@ -193,7 +195,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn listen(&mut self) {
-        self.phase = ServerPhase::Listen;
+        self.phase = ServerPhase::Unread;
         self.end = 0;
         self.request.overrun = false;
         self.resyncing = false;
@@ -232,15 +234,16 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     pub fn look(&mut self, now: u32) -> Status {
         self.now = now;
         match self.phase {
-            ServerPhase::Listen if !FIRMWARE && !self.keeps_time() && self.end == 0 => {
-                self.receive_first()
-            }
-            ServerPhase::Listen => match self.receive {
-                Some(receive) => receive(self),
-                None => Status::NOT_INITIALISED,
-            },
-            ServerPhase::Request => Status::PENDING,
-            ServerPhase::Send => Status::OK,
+            ServerPhase::Request => return Status::PENDING,
+            ServerPhase::Send => return Status::OK,
+            ServerPhase::Listen | ServerPhase::Unread => self.phase = ServerPhase::Listen,
+        }
+        if !FIRMWARE && !self.keeps_time() && self.end == 0 {
+            return self.receive_first();
+        }
+        match self.receive {
+            Some(receive) => receive(self),
+            None => Status::NOT_INITIALISED,
         }
     }
 
@@ -318,11 +321,13 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         time::has_elapsed(self.silence, self.now, self.last_byte)
     }
 
-    /// Microseconds from `now` for which poll has nothing to do unless a byte arrives. It is 1000
-    /// while a service is not finished, or while a stream accepts no bytes of the response: poll
-    /// earlier if that changes.
+    /// Microseconds from `now` for which poll has nothing to do unless the port has bytes to read.
+    /// It is 1000 while a service is not finished, or while a stream accepts no bytes of the
+    /// response: poll earlier if that changes. It is 0 after that, until poll has read the port:
+    /// bytes that arrived meanwhile may have ended a wait already.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.phase {
+            ServerPhase::Unread => 0,
             ServerPhase::Listen if self.end == 0 || !self.keeps_time() => u32::MAX,
             ServerPhase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
             // On a serial line, neither the next byte nor switching off the driver may be late.
@@ -440,6 +445,10 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             return Some(self.sent_partly(end, sent));
         }
         self.end_transmission();
+        // The poll that read the request has sent the response too.
+        if !self.request.again {
+            self.phase = ServerPhase::Listen;
+        }
         Some(Status::OK)
     }
 

@@ -20,10 +20,19 @@ impl Reply {
     pub const ILLEGAL_FUNCTION: Reply = Reply::exception(1);
     /// Exception 02.
     pub const ILLEGAL_DATA_ADDRESS: Reply = Reply::exception(2);
+    /// The service serves this function, but it lacks cells, records or a queue of the request.
+    /// Another service may have them. Exception 02 if none has.
+    pub const ABSENT: Reply = Reply(0x0302);
     /// Exception 03.
     pub const ILLEGAL_DATA_VALUE: Reply = Reply::exception(3);
     /// Exception 04; also if the response does not fit into the buffer.
     pub const SERVER_DEVICE_FAILURE: Reply = Reply::exception(4);
+
+    /// True for [`Reply::ABSENT`].
+    #[inline(always)]
+    pub const fn is_absent(self) -> bool {
+        self.0 >> 8 == Reply::ABSENT.0 >> 8
+    }
 
     /// A response PDU of 1 to 253 bytes has overwritten the request.
     pub const fn length(bytes: usize) -> Reply {

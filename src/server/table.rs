@@ -95,7 +95,7 @@ pub trait TableAccess {
     /// byte of `pdu` is the function code of the request. The address of the cells follows it,
     /// and unless one cell is written the quantity; `operation` says where the data are.
     ///
-    /// Returns [`Reply::ILLEGAL_DATA_ADDRESS`] if a cell does not exist. A read of 0 bytes only
+    /// Returns [`Reply::ABSENT`] if a cell does not exist. A read of 0 bytes only
     /// checks that: it returns [`Reply::SERVER_DEVICE_FAILURE`] if all cells exist.
     fn access(
         &mut self,
@@ -121,7 +121,7 @@ impl<T: DataModel> TableAccess for T {
         };
         let (address, quantity) = (word(high, low) as u16, quantity as u16);
         if !self.contains(address, quantity) {
-            return Reply::ILLEGAL_DATA_ADDRESS;
+            return Reply::ABSENT;
         }
         let (mut direction, mut at) = (Direction::Read, TableOperation::READ.data());
         if !operation.reads() {
@@ -357,7 +357,7 @@ fn read_write(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: u
         bytes = 0;
     }
     let exists = cells.access(TableOperation::READ, written, 0, write_part(pdu));
-    if exists == Reply::ILLEGAL_DATA_ADDRESS {
+    if exists == Reply::ABSENT {
         return exists;
     }
     let refused = cells.access(TableOperation::ASK, quantity, bytes, pdu);

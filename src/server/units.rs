@@ -9,6 +9,12 @@ pub trait Service {
     /// first `length` bytes of `pdu`; the PDU of the response overwrites it. Returns
     /// [`Reply::NOT_HANDLED`] for any other function.
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply;
+
+    /// True for a function of the user. It serves no request for cells that an earlier service
+    /// lacks: it is for functions that no earlier service serves.
+    fn is_custom(&self) -> bool {
+        false
+    }
 }
 
 /// The units that serve the frames of a line.
@@ -21,7 +27,8 @@ pub trait Units {
 pub struct Unit<'a> {
     /// The unit id, 1 to 247; 0 in a stream responds to every id.
     pub id: u8,
-    /// The services, in this order: the first one that handles a function serves it.
+    /// The services, in this order: the first one that handles a function serves it. If it lacks
+    /// the cells of the request, the services after it are asked for them.
     pub services: &'a mut [&'a mut dyn Service],
     /// The counters of the line, if any: serve functions 08, 0B and 0C.
     pub diagnostics: Option<&'a mut Diagnostics>,
@@ -68,16 +75,29 @@ pub fn dispatch(units: &mut impl Dispatch, mut all: Addressing) -> Reply {
     answer
 }
 
-/// The first of `replies` that is not [`Reply::NOT_HANDLED`]; [`Reply::ILLEGAL_FUNCTION`] if there
-/// is none. `replies` calls the services one after the other.
+/// Lets `services` serve a request one after the other, until one of them answers it.
+/// [`Reply::ILLEGAL_FUNCTION`] if none serves the function, [`Reply::ABSENT`] if none has the cells
+/// of the request. Once a service lacks them, those for which `is_custom` is true are not asked.
 #[inline(always)]
-pub fn first_reply(replies: impl IntoIterator<Item = Reply>) -> Reply {
-    for reply in replies {
+pub fn first_reply<S>(
+    services: impl IntoIterator<Item = S>,
+    is_custom: impl Fn(&S) -> bool,
+    mut serve: impl FnMut(S) -> Reply,
+) -> Reply {
+    let mut answer = Reply::ILLEGAL_FUNCTION;
+    for service in services {
+        if answer.is_absent() && is_custom(&service) {
+            continue;
+        }
+        let reply = serve(service);
         if reply != Reply::NOT_HANDLED {
-            return reply;
+            answer = reply;
+            if !reply.is_absent() {
+                break;
+            }
         }
     }
-    Reply::ILLEGAL_FUNCTION
+    answer
 }
 
 impl Service for Diagnostics {
@@ -92,9 +112,9 @@ impl Unit<'_> {
         let line = self.diagnostics.as_deref_mut();
         let line = line.map(|line| line as &mut dyn Service);
         first_reply(
-            services
-                .chain(line)
-                .map(|service| service.serve(pdu, length)),
+            services.chain(line),
+            |service| service.is_custom(),
+            |service| service.serve(pdu, length),
         )
     }
 

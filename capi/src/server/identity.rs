@@ -1,7 +1,7 @@
 //! What a device reports about itself: exception status, server id and device
 //! identification.
 
-use super::units::{add, request};
+use super::units::{add_only, request};
 use super::{mbm_service, mbm_unit};
 use crate::packet::mbm_object;
 use core::ffi::c_void;
@@ -135,27 +135,29 @@ unsafe extern "C" fn serve_identification(
 ///
 /// @param unit    the unit
 /// @param status  must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
-///         unit has MBM_MAX_SERVICES records already
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
+///         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+///         records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
     unit: *mut mbm_unit,
     status: *mut mbm_exceptionStatus,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { add(unit, status.cast(), serve_exception_status) }
+    unsafe { add_only(unit, status.cast(), serve_exception_status) }
 }
 
 /// Serves function 11 (hex), Report Server ID.
 ///
 /// @param unit  the unit
 /// @param id    must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
-///         unit has MBM_MAX_SERVICES records already
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
+///         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+///         records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mbm_serverId) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { add(unit, id.cast(), serve_server_id) }
+    unsafe { add_only(unit, id.cast(), serve_server_id) }
 }
 
 /// Serves function 2B/0E (hex), Read Device Identification: streams of objects, and
@@ -165,13 +167,14 @@ pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mb
 ///
 /// @param unit            the unit
 /// @param identification  must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
-///         unit has MBM_MAX_SERVICES records already
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
+///         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+///         records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveIdentification(
     unit: *mut mbm_unit,
     identification: *mut mbm_serverIdentification,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { add(unit, identification.cast(), serve_identification) }
+    unsafe { add_only(unit, identification.cast(), serve_identification) }
 }

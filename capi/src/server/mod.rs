@@ -227,16 +227,18 @@ unsafe fn poll(core: *mut Core, mark: *const u8) -> Status {
     Status::OK
 }
 
-/// Returns how long the program may sleep before the next mbm_server_poll, unless a byte
-/// arrives earlier.
+/// Returns how long the program may sleep before the next mbm_server_poll, unless bytes
+/// arrive earlier.
 ///
 /// @param server  the object
 /// @return microseconds. 0: poll now; a call from within a hook of this server returns 0
-///         too. 0xFFFFFFFF: sleep until a byte arrives; also for NULL and for a server
-///         that was never begun. 1000: a function of yours has returned
+///         too. 0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for
+///         a server that was never begun. 1000: a function of yours has returned
 ///         MBM_REPLY_PENDING, or a connection does not accept the response yet; the
 ///         server receives no bytes meanwhile, so do not wait for one, but poll earlier
-///         if you know that the function or the connection is ready
+///         if you know that the function or the connection is ready. Afterwards, and after
+///         a begin function, it is 0 until mbm_server_poll has read the port, so bytes that
+///         arrived meanwhile need not end a sleep
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 {
     // SAFETY: as the header requires; no reference lives while the clock is read.

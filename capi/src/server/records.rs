@@ -48,7 +48,8 @@ pub struct mbm_request {
 /// A unit asks its records in the order in which they were registered. So a function that is
 /// registered before the record that serves the same code is asked first. It answers the
 /// request itself, for example with an exception, or it returns MBM_REPLY_DECLINED: then the
-/// record after it answers.
+/// record after it answers. A function that is registered after tables with its code is asked
+/// for the cells that they lack; a function with code 0 is not.
 #[repr(C)]
 pub struct mbm_custom {
     /// Private.

@@ -110,7 +110,7 @@ impl TableAccess for Table {
             let address = usize::from(*pdu.add(1)) << 8 | usize::from(*pdu.add(2));
             let first = address.wrapping_sub((*table).base.into());
             if cells.is_null() || !contains(table, first, quantity) {
-                return Reply::ILLEGAL_DATA_ADDRESS;
+                return Reply::ABSENT;
             }
             let kind = TableKind::from_code((*table).service.kind);
             let place = Place::of_cells(cells, kind, first);
@@ -188,7 +188,7 @@ impl TableAccess for TableSnapshot {
             let reply = Table(table, info).access(part, quantity, count, pdu);
             (*table).hooks.call = call;
             // Without bytes to read, the reply says whether the cells exist.
-            if count == bytes || reply == Reply::ILLEGAL_DATA_ADDRESS {
+            if count == bytes || reply == Reply::ABSENT {
                 return reply;
             }
             match access_with_hooks(table) {

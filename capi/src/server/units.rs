@@ -5,9 +5,7 @@ use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::Status;
-use mbm::server::{
-    dispatch, first_reply, only_writes, Addressing, Dispatch, Reply, RequestInfo, ANY,
-};
+use mbm::server::{dispatch, only_writes, Addressing, Dispatch, Reply, RequestInfo, ANY};
 use mbm::FIRMWARE;
 
 /// The most records that one unit can serve. Each is one struct that you pass to a
@@ -22,6 +20,12 @@ pub const MBM_MAX_SERVICES: u8 = 16;
 /// more returns MBM_BUFFER_TOO_SMALL. You may pass a record again, also after you have
 /// zeroed and refilled it; it keeps its place. A zeroed record serves nothing until you
 /// pass it again. Any number of units may share one record.
+///
+/// A unit may have several tables of one kind, for example holding registers 0 to 9 and
+/// 40000 to 40099; the same holds for callbacks, files and FIFO queues. The unit asks them
+/// in the order in which they were registered. The first one that has all cells of a request
+/// answers it. If none has all of them, the unit answers with exception 02, also where
+/// several have them together.
 #[repr(C)]
 pub struct mbm_unit {
     /// Private: the records in the order in which the unit calls them. NULL follows the
@@ -94,6 +98,25 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
     unsafe { add_as(unit, service, 1, serve) }.code()
 }
 
+/// As [`add`], for a family of which a unit serves one record: the unit would never call a second
+/// one. Returns [`Status::BUSY`] for it.
+///
+/// # Safety
+/// As for [`add`].
+pub(super) unsafe fn add_only(unit: *mut mbm_unit, service: *mut mbm_service, serve: Serve) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let is_other = |known: *mut mbm_service| {
+            let same = |other| core::ptr::fn_addr_eq(other, serve);
+            known != service && (*known).serve.is_some_and(same)
+        };
+        if !unit.is_null() && Services::new(unit).any(is_other) {
+            return Status::BUSY.code();
+        }
+        add(unit, service, serve)
+    }
+}
+
 /// The services of a unit, one after the other, up to the first free place. The code that
 /// runs for one service may add others.
 pub(super) struct Services {
@@ -147,8 +170,7 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, info: *const c_void) -> (&'a mut 
     }
 }
 
-/// Calls the services of a unit one after the other until one of them handles the
-/// request.
+/// Calls the services of a unit one after the other until one of them answers the request.
 ///
 /// # Safety
 /// `unit` is a unit; `pdu` has the length and the space that `info` gives.
@@ -159,8 +181,14 @@ pub(super) unsafe fn call_services(
 ) -> usize {
     // SAFETY: as the caller promises; a PDU has at least one byte.
     unsafe {
-        let replies = Services::new(unit).map(|service| call_service(service, info, pdu));
-        first_reply(replies.map(Reply::from_number)).code()
+        begin_refusal(info);
+        for service in Services::new(unit) {
+            let reply = call_service(service, info, pdu);
+            if is_answer(reply, info) {
+                return reply;
+            }
+        }
+        refusal(info)
     }
 }
 
@@ -176,13 +204,14 @@ unsafe fn call_services_alone(unit: *mut mbm_unit, info: *const c_void, pdu: *mu
     // NULL follows the services. If a hook adds diagnostics to the unit, the service that
     // called the hook handles the request, which ends the loop.
     unsafe {
+        begin_refusal(info);
         let mut place = unit
             .byte_add(offset_of!(mbm_unit, services))
             .cast::<*mut mbm_service>();
         while !(*place).is_null() {
             let service = *place;
             let reply = call_service(service, info, pdu);
-            if reply != Reply::NOT_HANDLED.code() {
+            if is_answer(reply, info) {
                 return reply;
             }
             place = place.add(1);
@@ -191,8 +220,64 @@ unsafe fn call_services_alone(unit: *mut mbm_unit, info: *const c_void, pdu: *mu
                 place = skip_custom(unit, place, *pdu);
             }
         }
+        refusal(info)
     }
-    Reply::ILLEGAL_FUNCTION.code()
+}
+
+/// The field `refusal` of the request.
+///
+/// # Safety
+/// As for [`Serve`].
+#[inline(always)]
+unsafe fn refusal_field(info: *const c_void) -> *mut u8 {
+    // SAFETY: as the caller promises; `info` is part of a server, which is not constant.
+    unsafe { &raw mut (*info.cast::<RequestInfo>().cast_mut()).refusal }
+}
+
+/// Before the services of a unit are called.
+///
+/// # Safety
+/// As for [`Serve`].
+#[inline(always)]
+unsafe fn begin_refusal(info: *const c_void) {
+    // SAFETY: as the caller promises.
+    unsafe { refusal_field(info).write(Reply::ILLEGAL_FUNCTION.exception_code()) }
+}
+
+/// False if the services after the one that returned `reply` are called too.
+///
+/// # Safety
+/// As for [`Serve`].
+#[inline(always)]
+unsafe fn is_answer(reply: usize, info: *const c_void) -> bool {
+    if reply == Reply::NOT_HANDLED.code() {
+        return false;
+    }
+    if !Reply::from_number(reply).is_absent() {
+        return true;
+    }
+    // SAFETY: as the caller promises.
+    unsafe { refusal_field(info).write(Reply::ILLEGAL_DATA_ADDRESS.exception_code()) }
+    false
+}
+
+/// The reply if no service answers.
+///
+/// # Safety
+/// As for [`Serve`].
+#[inline(always)]
+unsafe fn refusal(info: *const c_void) -> usize {
+    // SAFETY: as the caller promises.
+    Reply::exception(unsafe { refusal_field(info).read() }).code()
+}
+
+/// True if a service before this one serves the function, but lacks cells of the request.
+///
+/// # Safety
+/// As for [`Serve`].
+pub(super) unsafe fn are_absent(info: *const c_void) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe { refusal_field(info).read() != Reply::ILLEGAL_FUNCTION.exception_code() }
 }
 
 /// Returns the first place, from `place` on, that is not a user's function with another
