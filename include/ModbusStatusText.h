@@ -85,6 +85,8 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
         return F("two fields of the plan overlap");
     case MBM_NO_PROGRESS:
         return F("the device repeats itself without an end");
+    case MBM_OUT_OF_RANGE:
+        return F("the value is out of the range of its type");
     default:
         break;
     }

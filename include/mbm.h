@@ -269,6 +269,11 @@ const char *mbm_version(void);
 #define MBM_NO_PROGRESS 244u
 
 /**
+ * A value is out of the range of the type in which the program reads it.
+ */
+#define MBM_OUT_OF_RANGE 246u
+
+/**
  * Explains a status in a few words of English.
  *
  * On an AVR, constants are in RAM, and a program that calls this function has about 1100
@@ -3084,7 +3089,7 @@ uint8_t mbm_plan_getStatus(struct mbm_plan *plan,
  * @param field  the index of the field, of a bit or an integer
  * @param index  which of its values, 0 for the first
  * @param value  gets the number
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL if it is not in the range of `value`;
+ * @return MBM_OK; MBM_OUT_OF_RANGE if it is not in the range of `value`;
  *         MBM_INVALID_ARGUMENT, also for a float or a text; MBM_NOT_INITIALISED; if no value
  *         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
  *         only
@@ -3101,7 +3106,7 @@ uint8_t mbm_plan_getInteger(const struct mbm_plan *plan,
  * @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
  * @param index  which of its values, 0 for the first
  * @param value  gets the number
- * @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL also if the value, multiplied, plus half
+ * @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half
  *         of the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of
  *         64 bits
  */

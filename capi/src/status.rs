@@ -97,6 +97,8 @@ pub const MBM_FIELDS_OVERLAP: u8 = 0xF3;
 /// an object that is not after those that it has sent, or then sends one before the one that
 /// it named. Reading on might never end.
 pub const MBM_NO_PROGRESS: u8 = 0xF4;
+/// A value is out of the range of the type in which the program reads it.
+pub const MBM_OUT_OF_RANGE: u8 = 0xF6;
 
 statuses! {
     MBM_OK = Status::OK, c"success";
@@ -130,6 +132,7 @@ statuses! {
     MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
     MBM_FIELDS_OVERLAP = Status::FIELDS_OVERLAP, c"two fields of the plan overlap";
     MBM_NO_PROGRESS = Status::NO_PROGRESS, c"the device repeats itself without an end";
+    MBM_OUT_OF_RANGE = Status::OUT_OF_RANGE, c"the value is out of the range of its type";
 }
 
 /// Explains a status in a few words of English.
