@@ -6,7 +6,8 @@
  *
  * Rules of every function:
  * - A pointer is NULL or valid. For NULL a function returns MBM_INVALID_ARGUMENT, for an
- *   object that was never begun MBM_NOT_INITIALISED. It never crashes.
+ *   object that was never begun MBM_NOT_INITIALISED. It never crashes. Data that
+ *   a function only reads may be NULL if their length is 0.
  * - Objects are your storage. Zero it before first use. The library uses no heap and no
  *   global variables.
  * - No function is re-entrant on one object. Call no function from an interrupt unless its
@@ -42,7 +43,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** Version of this header as a text, "MAJOR.MINOR.PATCH". mbm_version returns that of the archive. */
+/** Version of this header, "MAJOR.MINOR.PATCH". mbm_version returns that of the archive. */
 #define MBM_VERSION MBM_VERSION_OF(MBM_VERSION_MAJOR, MBM_VERSION_MINOR, MBM_VERSION_PATCH)
 /** Private: expands the numbers. */
 #define MBM_VERSION_OF(major, minor, patch) MBM_VERSION_TEXT(major, minor, patch)
@@ -1697,9 +1698,9 @@ typedef struct mbm_linkHooks {
      */
     void (*disconnect)(void *context);
     /**
-     * Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the link is open,
-     * MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
-     * or another status.
+     * Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the
+     * link is open, MBM_PENDING if the connection is still being made and the port accepts no
+     * bytes yet, or another status.
      */
     uint8_t (*connect)(void *context);
     /**
@@ -2900,8 +2901,9 @@ typedef struct mbm_planSetup {
      */
     uint16_t *data;
     /**
-     * Storage: the requests with which the plan reads, zeroed; they are the plan's alone. With one it sends one read after
-     * the other; more are for Modbus TCP, where several may be under way at once.
+     * Storage: the requests with which the plan reads, zeroed; they are the plan's alone. With
+     * one it sends one read after the other; more are for Modbus TCP, where several may be
+     * under way at once.
      */
     struct mbm_clientRequest *requests;
     /**
@@ -5081,11 +5083,11 @@ uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
  *
  * @param registers  the view to fill in; without data after an error
  * @param words      the words, for example the response words of mbm_master; must stay
- *                   valid while the view is used
+ *                   valid while the view is used. NULL only if `count` is 0
  * @param count      how many words
  * @param first      the device's address of the first register, 0 to 65535
  * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
- *         MBM_INVALID_ARGUMENT for a NULL pointer
+ *         MBM_INVALID_ARGUMENT for NULL
  */
 uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
                               const uint16_t *words,
@@ -5101,7 +5103,7 @@ uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
  * @param length     how many bytes, an even number
  * @param first      the device's address of the first register, 0 to 65535
  * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
- *         MBM_INVALID_ARGUMENT for a NULL pointer or an odd length
+ *         MBM_INVALID_ARGUMENT for NULL or an odd length
  */
 uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
                               const uint8_t *bytes,
@@ -5300,7 +5302,7 @@ uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
  * @param registers  the registers
  * @param address    the device's address of the register whose high byte is compared
  *                   with the first byte
- * @param bytes      the bytes to compare with
+ * @param bytes      the bytes to compare with; NULL only if `length` is 0
  * @param length     how many bytes, two for each register; may be odd
  * @param equal      receives 1 if all bytes are equal, else 0
  * @return MBM_OK; or with `equal` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
@@ -5543,9 +5545,12 @@ typedef struct mbm_object {
  * 16 | address, andMask, orMask | address, andMask, orMask
  * 17 | address, quantity, writeAddress, writeQuantity, data | data
  * 18 | address | data (registers)
- * 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | meiType, readDeviceIdCode, conformity, moreFollows, nextObjectId, objectCount, data (objects)
+ * 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | see below
  * 2B, others | meiType, data | meiType, data
  * your own | data | data
+ *
+ * A response of 2B with MEI type 0E has meiType, readDeviceIdCode, conformity, moreFollows,
+ * nextObjectId, objectCount and data (objects).
  *
  * An exception has exceptionCode, and the function code of the request. Register data are
  * as on the wire, the high byte of each register first. Bits begin with the lowest bit of
@@ -5966,7 +5971,7 @@ uint8_t mbm_packet_addObject(struct mbm_packet *packet,
  * @param frame        the frame, from its first byte to its last
  * @param frameLength  the number of bytes of `frame`
  * @param text         receives the line. A zero byte always ends it
- * @param size         bytes of `text`; 200 suffice for most frames, 1200 for all
+ * @param size         bytes of `text`; 200 suffice for most frames, 2295 for all
  * @return MBM_OK; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
  *         MBM_INVALID_ARGUMENT, also for MBM_FRAMING_NONE
  */
