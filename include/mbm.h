@@ -3013,13 +3013,17 @@ typedef struct mbm_planReadInfo {
  * bits or registers. All reads are due at once; the rounds after the first are spread, so that
  * reads of one interval follow each other at equal distances.
  *
- * @param plan    the object, zeroed
+ * You may call it again at any time, also from `update`, but not from a hook of the client's
+ * port. The plan then first ends, as by mbm_plan_end, unless the call is refused for NULL, a
+ * count out of range or a client that was never begun.
+ *
+ * @param plan    the object, zeroed before the first call
  * @param client  the client that sends the reads, begun; the program may use it too, and other
  *                plans
- * @param setup   table, limits and storage; it stays valid and as it is until mbm_plan_end
+ * @param setup   table, limits and storage; it stays valid and as it is until the plan ends
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
- * @return MBM_OK; MBM_BUSY if it was begun already; of a field MBM_INVALID_ARGUMENT for an
- *         unknown table, type or order, a type that the table does not have, an interval out
+ * @return MBM_OK; MBM_BUSY from within a hook of the client's port; of a field
+ *         MBM_INVALID_ARGUMENT for an unknown table, type or order, a type that the table does not have, an interval out
  *         of range, a negative divisor or a scale of a text, MBM_BROADCAST_NOT_ALLOWED for
  *         unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded
  *         range, MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP
