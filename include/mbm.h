@@ -3023,15 +3023,16 @@ typedef struct mbm_planReadInfo {
  * @param setup   table, limits and storage; it stays valid and as it is until the plan ends
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
  * @return MBM_OK; MBM_BUSY from within a hook of the client's port; of a field
- *         MBM_INVALID_ARGUMENT for an unknown table, type or order, a type that the table does not have, an interval out
- *         of range, a negative divisor or a scale of a text, MBM_BROADCAST_NOT_ALLOWED for
- *         unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded
- *         range, MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP
- *         for the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first
- *         without storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL
- *         pointers and counts out of range; MBM_NOT_INITIALISED for a client that was never
- *         begun. The object is changed on MBM_OK only; `positions` and `reads` may be changed
- *         always
+ *         MBM_INVALID_ARGUMENT for an unknown table, type or order, a type that the table does
+ *         not have, an interval out of range, a negative divisor or a scale of a text,
+ *         MBM_BROADCAST_NOT_ALLOWED for unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
+ *         address 65535 or into an excluded range, MBM_ILLEGAL_DATA_VALUE if it is longer than
+ *         a read may be, MBM_FIELDS_OVERLAP for the later of two that share an address,
+ *         MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data;
+ *         MBM_INVALID_ARGUMENT also for NULL pointers and counts out of range;
+ *         MBM_NOT_INITIALISED for a client that was never begun. After the status of a field
+ *         the plan has ended, and `positions` and `reads` may be changed; after any other
+ *         nothing is
  */
 uint8_t mbm_plan_begin(struct mbm_plan *plan,
                        struct mbm_client *client,
@@ -3039,8 +3040,7 @@ uint8_t mbm_plan_begin(struct mbm_plan *plan,
                        uint16_t *field);
 
 /**
- * Ends a plan: gives its requests up and lets go of its storage. To begin it again, call
- * mbm_plan_begin.
+ * Ends a plan: gives its requests up and lets go of its storage.
  *
  * @param plan  the object
  * @return MBM_OK; MBM_BUSY from within a hook of the client's port, with nothing changed;
@@ -3606,7 +3606,7 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
  * that mbm_server_setBaudRate set, or the default of the framing.
  *
  * @param server  the object
- * @return microseconds; 0 for an object that was never begun
+ * @return microseconds; 0 in TCP and for an object that was never begun
  */
 uint32_t mbm_server_getSilence(const struct mbm_server *server);
 
