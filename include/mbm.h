@@ -326,7 +326,9 @@ typedef struct mbm_port {
     uint32_t (*micros)(void *context);
     /**
      * Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
-     * also wait until the last bit was sent, and return 1.
+     * also wait until the last bit was sent, and return 1. Without it, a master and a client
+     * that know the baud rate wait for a reply longer by the time of the request's characters,
+     * since bytes may remain to be sent after `write` has taken them.
      */
     uint8_t (*flush)(void *context);
     /**
