@@ -1,6 +1,7 @@
 /* Each function for frames and packets is held to its comment in mbm.h: results, limits, NULL. */
 #include "crc.h"
 #include "examples.h"
+#include "hooked_port.h"
 #include "test.h"
 
 #include <string.h>
@@ -27,7 +28,7 @@ static mbm_packet read_of(uint16_t quantity)
     return packet;
 }
 
-/* --- mbm_version, mbm_status_text --- */
+/* --- mbm_version, mbm_status_text, mbm_status_textOf --- */
 
 static void the_archive_is_that_of_the_header(void **state)
 {
@@ -48,6 +49,55 @@ static void every_number_has_a_text(void **state)
     }
     assert_string_equal(mbm_status_text(MBM_OK), "success");
     assert_string_equal(mbm_status_text(200), "not a status");
+}
+
+static void a_request_that_was_refused_here_is_no_exception_of_the_device(void **state)
+{
+    static mbm_client client;
+    static mbm_clientRequest request;
+    static mbm_master master;
+    static uint8_t buffer[MBM_MAX_FRAME];
+    static uint16_t words[1];
+    static hooked_port wire;
+    const mbm_port port = hooked_port_of(&wire);
+    unsigned status, code;
+    uint8_t refused;
+
+    (void)state;
+    for (status = 0; status < 256; status++) {
+        for (code = 0; code < 256; code++) {
+            const char *text = mbm_status_textOf((uint8_t)status, (uint8_t)code);
+            int is_refused = code == 0 && status >= 1 && status <= 3;
+
+            assert_int_equal(strstr(text, "nothing was sent") != NULL, is_refused);
+            assert_true(is_refused || text == mbm_status_text((uint8_t)status));
+            assert_true(!is_refused || strstr(text, "exception") == NULL);
+        }
+    }
+    /* As a master and a client fill both in. */
+    wire.step = 500;
+    OK(mbm_master_beginRtu(&master, 17, &port));
+    OK(mbm_master_setBuffers(&master, words, 1, NULL, 0, buffer, sizeof buffer));
+    refused = mbm_master_readHoldingRegisters(&master, 0, 126);
+    IS(MBM_ILLEGAL_DATA_VALUE, refused);
+    assert_string_equal(
+        mbm_status_textOf(refused, mbm_master_getExceptionCode(&master)),
+        "refused, nothing was sent: the standard or a buffer does not allow the quantity or value");
+    OK(mbm_client_beginRtu(&client, &port, buffer, sizeof buffer));
+    request.unit = 17;
+    request.exception = MBM_ILLEGAL_DATA_ADDRESS;
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_client_readHoldingRegisters(&client, &request, 65535, 2));
+    assert_string_equal(mbm_status_textOf(request.status, request.exception),
+                        "refused, nothing was sent: the addresses pass 65535");
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 65535, 1));
+    while (wire.length == 0)
+        IS(MBM_PENDING, mbm_client_poll(&client));
+    hooked_port_arrive_rtu(&wire, 17, "\x83\2", 2);
+    while (mbm_client_poll(&client) == MBM_PENDING)
+        wire.now += 500;
+    IS(MBM_ILLEGAL_DATA_ADDRESS, request.status);
+    assert_string_equal(mbm_status_textOf(request.status, request.exception),
+                        "exception 02: illegal data address");
 }
 
 /* --- mbm_frame_build, parse, exception, expectedLength, replyLength --- */
@@ -527,6 +577,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_archive_is_that_of_the_header),
         cmocka_unit_test(every_number_has_a_text),
+        cmocka_unit_test(a_request_that_was_refused_here_is_no_exception_of_the_device),
         cmocka_unit_test(the_longest_frames_fit_into_the_buffers_that_are_named),
         cmocka_unit_test(a_frame_is_never_built_malformed),
         cmocka_unit_test(every_null_is_refused),

@@ -275,7 +275,8 @@ const char *mbm_version(void);
 #define MBM_OUT_OF_RANGE 246u
 
 /**
- * Explains a status in a few words of English.
+ * Explains a status in a few words of English. For 1 to 3 these are the words of the device's
+ * exception; mbm_status_textOf tells a request that was refused before it was sent apart.
  *
  * On an AVR, constants are in RAM, and a program that calls this function has about 1100
  * bytes of RAM less. There, show the number; or in a sketch call modbusStatusText of
@@ -287,6 +288,21 @@ const char *mbm_version(void);
  * @return a constant string, never NULL
  */
 const char *mbm_status_text(uint8_t status);
+
+/**
+ * Explains how a request ended: as mbm_status_text, but for a request that a master or a client
+ * refused itself, the text says so, and that nothing was sent.
+ *
+ * Any thread or interrupt may call it. As for mbm_status_text, the texts take RAM on an AVR: a
+ * sketch calls modbusStatusText with both numbers.
+ *
+ * @param status         the status of the request
+ * @param exceptionCode  `exception` of the mbm_clientRequest, or what
+ *                       mbm_master_getExceptionCode returns: 0 if the device sent no exception
+ * @return a constant string, never NULL
+ */
+const char *mbm_status_textOf(uint8_t status,
+                              uint8_t exceptionCode);
 
 /* ==== 3. Port ======================================================================= */
 
