@@ -352,6 +352,11 @@ static void every_status_has_the_same_text_as_in_c(void **)
         const __FlashStringHelper *text = modbusStatusText(number);
 
         assert_string_equal(reinterpret_cast<const char *>(text), mbm_status_text(number));
+        text = modbusStatusText(number, 0);
+        assert_string_equal(reinterpret_cast<const char *>(text), mbm_status_textOf(number, 0));
+        text = modbusStatusText(number, number);
+        assert_string_equal(reinterpret_cast<const char *>(text),
+                            mbm_status_textOf(number, number));
     }
 }
 

@@ -111,7 +111,7 @@ static void check_values(const modbus_mapping_t *memory)
             if (f->table == MBM_TABLE_INPUT_REGISTERS)
                 wanted = memory->tab_input_registers[f->address + i];
             if (wanted > INT64_MAX) {
-                IS(MBM_BUFFER_TOO_SMALL, mbm_plan_getInteger(&plan, field, i, &value));
+                IS(MBM_OUT_OF_RANGE, mbm_plan_getInteger(&plan, field, i, &value));
             } else {
                 OK(mbm_plan_getInteger(&plan, field, i, &value));
                 assert_true((uint64_t)value == wanted);

@@ -137,18 +137,78 @@ static void what_was_never_begun_is_refused(void **state)
     assert_string_equal(text, "abc");
 }
 
-static void a_plan_is_begun_once(void **state)
+static void a_plan_that_begins_again_gives_its_requests_up(void **state)
+{
+    mbm_clientRequest more[2];
+
+    (void)state;
+    memset(more, 0, sizeof more);
+    add(MBM_TYPE_UINT16, 0);
+    plan_device_start(&d);
+    OK(mbm_plan_poll(&d.plan));
+    assert_int_equal(mbm_client_pending(&d.client), 1);
+    plan_device_start(&d);
+    assert_int_equal(mbm_client_pending(&d.client), 0);
+    assert_int_equal(d.requests[0].status, MBM_CANCELLED);
+    OK(mbm_plan_poll(&d.plan));
+    assert_int_equal(mbm_client_pending(&d.client), 1);
+    /* A setup that is not complete is refused before anything is given up. */
+    d.setup.requestCount = 0;
+    REFUSED(MBM_INVALID_ARGUMENT, d.plan, plan_device_try(&d, NULL));
+    d.setup.requestCount = 1;
+    REFUSED(MBM_INVALID_ARGUMENT, d.plan, mbm_plan_begin(&d.plan, &d.client, NULL, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, d.plan, mbm_plan_begin(&d.plan, NULL, &d.setup, NULL));
+    assert_int_equal(mbm_client_pending(&d.client), 1);
+    plan_device_run(&d, 200);
+    assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[0]);
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_refresh(&d.plan, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getStatus(&d.plan, 1, NULL));
+}
+
+static void a_plan_whose_new_table_is_wrong_has_ended(void **state)
 {
     uint16_t field = 0;
 
     (void)state;
     add(MBM_TYPE_UINT16, 0);
     plan_device_start(&d);
-    REFUSED(MBM_BUSY, d.plan, plan_device_try(&d, &field));
+    OK(mbm_plan_poll(&d.plan));
+    d.fields[0].unit = 0;
+    IS(MBM_BROADCAST_NOT_ALLOWED, plan_device_try(&d, &field));
+    assert_int_equal(field, 0);
+    assert_int_equal(mbm_client_pending(&d.client), 0);
+    IS(MBM_NOT_INITIALISED, mbm_plan_poll(&d.plan));
+    d.fields[0].unit = 1;
+    plan_device_start(&d);
     plan_device_run(&d, 200);
     assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[0]);
-    IS(MBM_INVALID_ARGUMENT, mbm_plan_refresh(&d.plan, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_plan_getStatus(&d.plan, 1, NULL));
+}
+
+/* Begins again, with one field of two, in the update of the first. */
+static unsigned updates;
+
+static void begin_again(void *context, mbm_plan *plan, uint16_t field)
+{
+    (void)context;
+    (void)field;
+    if (updates++ == 0) {
+        d.setup.fieldCount = 1;
+        OK(mbm_plan_begin(plan, &d.client, &d.setup, NULL));
+    }
+}
+
+static void a_plan_may_begin_again_in_its_update(void **state)
+{
+    (void)state;
+    updates = 0;
+    add(MBM_TYPE_UINT16, 0);
+    add(MBM_TYPE_UINT16, 1);
+    d.setup.update = begin_again;
+    plan_device_start(&d);
+    plan_device_run(&d, 200);
+    /* Once for the first field of the old plan, once for the new plan. */
+    assert_int_equal(updates, 2);
+    assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[0]);
 }
 
 int main(void)
@@ -157,7 +217,9 @@ int main(void)
         cmocka_unit_test_setup(a_wrong_field_is_named, rtu),
         cmocka_unit_test_setup(a_setup_that_is_not_complete_is_refused, rtu),
         cmocka_unit_test_setup(what_was_never_begun_is_refused, rtu),
-        cmocka_unit_test_setup(a_plan_is_begun_once, rtu),
+        cmocka_unit_test_setup(a_plan_that_begins_again_gives_its_requests_up, rtu),
+        cmocka_unit_test_setup(a_plan_whose_new_table_is_wrong_has_ended, rtu),
+        cmocka_unit_test_setup(a_plan_may_begin_again_in_its_update, rtu),
     };
 
     return cmocka_run_group_tests_name("plan_refused", tests, NULL, NULL);

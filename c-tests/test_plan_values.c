@@ -57,7 +57,7 @@ static void integers_have_their_sign_in_every_order(void **state)
         {MBM_TYPE_INT32, 2, 0xAE415652, -1371449774},
         {MBM_TYPE_UINT64, 4, 0x0123456789ABCDEF, 0x0123456789ABCDEF},
         {MBM_TYPE_INT64, 4, 0xFFFFFFFFFFFFFFFE, -2},
-        {MBM_TYPE_INT64, 4, 0x8000000000000001, -INT64_MAX},
+        {MBM_TYPE_INT64, 4, 0x8000000000000000, INT64_MIN},
     };
     uint8_t order;
     unsigned i;
@@ -174,13 +174,16 @@ static void a_number_beyond_32_bits_is_too_large_for_int32(void **state)
         int32_t value;
     } numbers[] = {
         {MBM_TYPE_UINT32, INT32_MAX, 0, 0, MBM_OK, INT32_MAX},
-        {MBM_TYPE_UINT32, 0x80000000, 0, 0, MBM_BUFFER_TOO_SMALL, 0},
-        {MBM_TYPE_UINT32, UINT32_MAX, 0, 4, MBM_BUFFER_TOO_SMALL, 0},
+        {MBM_TYPE_UINT32, 0x80000000, 0, 0, MBM_OUT_OF_RANGE, 0},
+        {MBM_TYPE_UINT32, UINT32_MAX, 0, 4, MBM_OUT_OF_RANGE, 0},
         {MBM_TYPE_UINT32, UINT32_MAX - 2, 0, 4, MBM_OK, 1073741823},
         {MBM_TYPE_INT32, 0x80000001, 0, 0, MBM_OK, -INT32_MAX},
-        {MBM_TYPE_INT32, 0x80000000, 0, 0, MBM_BUFFER_TOO_SMALL, 0},
+        {MBM_TYPE_INT32, 0x80000000, 0, 0, MBM_OK, INT32_MIN},
+        {MBM_TYPE_INT32, 0x80000000, -1, 0, MBM_OUT_OF_RANGE, 0},
+        {MBM_TYPE_UINT32, 0x80000000, -1, 0, MBM_OK, INT32_MIN},
+        {MBM_TYPE_UINT32, 0x80000001, -1, 0, MBM_OUT_OF_RANGE, 0},
         {MBM_TYPE_INT32, 0xFFFFFFFF, 7, 2, MBM_OK, -4},
-        {MBM_TYPE_INT16, 0x8000, INT32_MIN, 0, MBM_BUFFER_TOO_SMALL, 0},
+        {MBM_TYPE_INT16, 0x8000, INT32_MIN, 0, MBM_OUT_OF_RANGE, 0},
         {MBM_TYPE_UINT64, 1, 0, 0, MBM_INVALID_ARGUMENT, 0},
         {MBM_TYPE_FLOAT, 1, 0, 0, MBM_INVALID_ARGUMENT, 0},
     };
@@ -264,15 +267,49 @@ static void a_number_beyond_64_bits_is_too_large(void **state)
     add(MBM_TYPE_UINT64, 0);
     add(MBM_TYPE_INT64, 4)->multiplier = 3;
     add(MBM_TYPE_UINT64, 8)->divisor = 2;
+    add(MBM_TYPE_INT64, 12)->multiplier = -1;
+    add(MBM_TYPE_UINT64, 16)->multiplier = -1;
     put(0, UINT64_MAX, 4, MBM_ORDER_ABCD);
     put(4, INT64_MAX, 4, MBM_ORDER_ABCD);
     put(8, UINT64_MAX - 1, 4, MBM_ORDER_ABCD);
+    put(12, 0x8000000000000000, 4, MBM_ORDER_ABCD);
+    put(16, 0x8000000000000001, 4, MBM_ORDER_ABCD);
     read_all();
-    IS(MBM_BUFFER_TOO_SMALL, mbm_plan_getInteger(&d.plan, 0, 0, &value));
-    IS(MBM_BUFFER_TOO_SMALL, mbm_plan_getInteger(&d.plan, 1, 0, &value));
+    IS(MBM_OUT_OF_RANGE, mbm_plan_getInteger(&d.plan, 0, 0, &value));
+    IS(MBM_OUT_OF_RANGE, mbm_plan_getInteger(&d.plan, 1, 0, &value));
+    IS(MBM_OUT_OF_RANGE, mbm_plan_getInteger(&d.plan, 3, 0, &value));
+    IS(MBM_OUT_OF_RANGE, mbm_plan_getInteger(&d.plan, 4, 0, &value));
     assert_int_equal(value, 77);
     OK(mbm_plan_getInteger(&d.plan, 2, 0, &value));
     assert_true(value == INT64_MAX);
+}
+
+static void the_least_integer_is_an_integer(void **state)
+{
+    int64_t value = 77;
+    int32_t short_value = 77;
+
+    (void)state;
+    add(MBM_TYPE_INT64, 0);
+    add(MBM_TYPE_UINT64, 4)->multiplier = -1;
+    add(MBM_TYPE_INT32, 8);
+    add(MBM_TYPE_INT64, 12)->divisor = 3;
+    put(0, 0x8000000000000000, 4, MBM_ORDER_ABCD);
+    put(4, 0x8000000000000000, 4, MBM_ORDER_ABCD);
+    put(8, 0x80000000, 2, MBM_ORDER_ABCD);
+    put(12, 0x8000000000000000, 4, MBM_ORDER_ABCD);
+    read_all();
+    OK(mbm_plan_getInteger(&d.plan, 0, 0, &value));
+    assert_true(value == INT64_MIN);
+    value = 77;
+    OK(mbm_plan_getInteger(&d.plan, 1, 0, &value));
+    assert_true(value == INT64_MIN);
+    OK(mbm_plan_getInteger(&d.plan, 2, 0, &value));
+    assert_true(value == INT32_MIN);
+    OK(mbm_plan_getInt32(&d.plan, 2, 0, &short_value));
+    assert_true(short_value == INT32_MIN);
+    OK(mbm_plan_getInteger(&d.plan, 3, 0, &value));
+    assert_true(value == -3074457345618258603);
 }
 
 static void a_field_may_have_many_values(void **state)
@@ -377,6 +414,7 @@ int main(void)
         cmocka_unit_test_setup(a_number_beyond_32_bits_is_too_large_for_int32, rtu),
         cmocka_unit_test_setup(a_scaled_number_is_the_nearest_double, rtu),
         cmocka_unit_test_setup(a_number_beyond_64_bits_is_too_large, rtu),
+        cmocka_unit_test_setup(the_least_integer_is_an_integer, rtu),
         cmocka_unit_test_setup(a_field_may_have_many_values, rtu),
         cmocka_unit_test_setup(a_text_ends_at_its_nul_or_with_its_field, rtu),
         cmocka_unit_test_setup(the_registers_of_a_field_are_a_view, rtu),

@@ -380,6 +380,8 @@ static void null_and_bad_arguments_return_a_status(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(NULL, &word, 1, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(&r, NULL, 1, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, NULL, 2, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_ofBytes(&r, NULL, 1, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, NULL, 1, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint16(NULL, 0, 0, &word));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(NULL, 0, 0, 1));
     IS(MBM_NOT_INITIALISED, mbm_registers_getUint16(&none, 0, 0, &word));

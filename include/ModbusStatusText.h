@@ -85,12 +85,36 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
         return F("two fields of the plan overlap");
     case MBM_NO_PROGRESS:
         return F("the device repeats itself without an end");
+    case MBM_OUT_OF_RANGE:
+        return F("the value is out of the range of its type");
     default:
         break;
     }
     if (status < 0x80)
         return F("the device sent an exception code that the standard does not name");
     return F("not a status");
+}
+
+/**
+ * The texts of mbm_status_textOf: as modbusStatusText, but of a request that was refused before it
+ * was sent, the text says so.
+ *
+ * @param status         the status of the request
+ * @param exceptionCode  the exception code of the reply, 0 if there was none
+ * @return a constant text
+ */
+inline const __FlashStringHelper *modbusStatusText(uint8_t status, uint8_t exceptionCode)
+{
+    if (exceptionCode == 0) {
+        if (status == MBM_ILLEGAL_FUNCTION)
+            return F("refused, nothing was sent: no such function code");
+        if (status == MBM_ILLEGAL_DATA_ADDRESS)
+            return F("refused, nothing was sent: the addresses pass 65535");
+        if (status == MBM_ILLEGAL_DATA_VALUE)
+            return F("refused, nothing was sent: the standard or a buffer does not allow the "
+                     "quantity or value");
+    }
+    return modbusStatusText(status);
 }
 
 #endif

@@ -6,7 +6,8 @@
  *
  * Rules of every function:
  * - A pointer is NULL or valid. For NULL a function returns MBM_INVALID_ARGUMENT, for an
- *   object that was never begun MBM_NOT_INITIALISED. It never crashes.
+ *   object that was never begun MBM_NOT_INITIALISED. It never crashes. Data that
+ *   a function only reads may be NULL if their length is 0.
  * - Objects are your storage. Zero it before first use. The library uses no heap and no
  *   global variables.
  * - No function is re-entrant on one object. Call no function from an interrupt unless its
@@ -42,7 +43,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** Version of this header as a text, "MAJOR.MINOR.PATCH". mbm_version returns that of the archive. */
+/** Version of this header, "MAJOR.MINOR.PATCH". mbm_version returns that of the archive. */
 #define MBM_VERSION MBM_VERSION_OF(MBM_VERSION_MAJOR, MBM_VERSION_MINOR, MBM_VERSION_PATCH)
 /** Private: expands the numbers. */
 #define MBM_VERSION_OF(major, minor, patch) MBM_VERSION_TEXT(major, minor, patch)
@@ -269,7 +270,13 @@ const char *mbm_version(void);
 #define MBM_NO_PROGRESS 244u
 
 /**
- * Explains a status in a few words of English.
+ * A value is out of the range of the type in which the program reads it.
+ */
+#define MBM_OUT_OF_RANGE 246u
+
+/**
+ * Explains a status in a few words of English. For 1 to 3 these are the words of the device's
+ * exception; mbm_status_textOf tells a request that was refused before it was sent apart.
  *
  * On an AVR, constants are in RAM, and a program that calls this function has about 1100
  * bytes of RAM less. There, show the number; or in a sketch call modbusStatusText of
@@ -281,6 +288,21 @@ const char *mbm_version(void);
  * @return a constant string, never NULL
  */
 const char *mbm_status_text(uint8_t status);
+
+/**
+ * Explains how a request ended: as mbm_status_text, but for a request that a master or a client
+ * refused itself, the text says so, and that nothing was sent.
+ *
+ * Any thread or interrupt may call it. As for mbm_status_text, the texts take RAM on an AVR: a
+ * sketch calls modbusStatusText with both numbers.
+ *
+ * @param status         the status of the request
+ * @param exceptionCode  `exception` of the mbm_clientRequest, or what
+ *                       mbm_master_getExceptionCode returns: 0 if the device sent no exception
+ * @return a constant string, never NULL
+ */
+const char *mbm_status_textOf(uint8_t status,
+                              uint8_t exceptionCode);
 
 /* ==== 3. Port ======================================================================= */
 
@@ -320,7 +342,9 @@ typedef struct mbm_port {
     uint32_t (*micros)(void *context);
     /**
      * Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
-     * also wait until the last bit was sent, and return 1.
+     * also wait until the last bit was sent, and return 1. Without it, a master and a client
+     * that know the baud rate wait for a reply longer by the time of the request's characters,
+     * since bytes may remain to be sent after `write` has taken them.
      */
     uint8_t (*flush)(void *context);
     /**
@@ -1701,9 +1725,9 @@ typedef struct mbm_linkHooks {
      */
     void (*disconnect)(void *context);
     /**
-     * Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the link is open,
-     * MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
-     * or another status.
+     * Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the
+     * link is open, MBM_PENDING if the connection is still being made and the port accepts no
+     * bytes yet, or another status.
      */
     uint8_t (*connect)(void *context);
     /**
@@ -2910,8 +2934,9 @@ typedef struct mbm_planSetup {
      */
     uint16_t *data;
     /**
-     * Storage: the requests with which the plan reads, zeroed; they are the plan's alone. With one it sends one read after
-     * the other; more are for Modbus TCP, where several may be under way at once.
+     * Storage: the requests with which the plan reads, zeroed; they are the plan's alone. With
+     * one it sends one read after the other; more are for Modbus TCP, where several may be
+     * under way at once.
      */
     struct mbm_clientRequest *requests;
     /**
@@ -3021,21 +3046,26 @@ typedef struct mbm_planReadInfo {
  * bits or registers. All reads are due at once; the rounds after the first are spread, so that
  * reads of one interval follow each other at equal distances.
  *
- * @param plan    the object, zeroed
+ * You may call it again at any time, also from `update`, but not from a hook of the client's
+ * port. The plan then first ends, as by mbm_plan_end, unless the call is refused for NULL, a
+ * count out of range or a client that was never begun.
+ *
+ * @param plan    the object, zeroed before the first call
  * @param client  the client that sends the reads, begun; the program may use it too, and other
  *                plans
- * @param setup   table, limits and storage; it stays valid and as it is until mbm_plan_end
+ * @param setup   table, limits and storage; it stays valid and as it is until the plan ends
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
- * @return MBM_OK; MBM_BUSY if it was begun already; of a field MBM_INVALID_ARGUMENT for an
- *         unknown table, type or order, a type that the table does not have, an interval out
- *         of range, a negative divisor or a scale of a text, MBM_BROADCAST_NOT_ALLOWED for
- *         unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded
- *         range, MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP
- *         for the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first
- *         without storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL
- *         pointers and counts out of range; MBM_NOT_INITIALISED for a client that was never
- *         begun. The object is changed on MBM_OK only; `positions` and `reads` may be changed
- *         always
+ * @return MBM_OK; MBM_BUSY from within a hook of the client's port; of a field
+ *         MBM_INVALID_ARGUMENT for an unknown table, type or order, a type that the table does
+ *         not have, an interval out of range, a negative divisor or a scale of a text,
+ *         MBM_BROADCAST_NOT_ALLOWED for unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
+ *         address 65535 or into an excluded range, MBM_ILLEGAL_DATA_VALUE if it is longer than
+ *         a read may be, MBM_FIELDS_OVERLAP for the later of two that share an address,
+ *         MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data;
+ *         MBM_INVALID_ARGUMENT also for NULL pointers and counts out of range;
+ *         MBM_NOT_INITIALISED for a client that was never begun. After the status of a field
+ *         the plan has ended, and `positions` and `reads` may be changed; after any other
+ *         nothing is
  */
 uint8_t mbm_plan_begin(struct mbm_plan *plan,
                        struct mbm_client *client,
@@ -3043,8 +3073,7 @@ uint8_t mbm_plan_begin(struct mbm_plan *plan,
                        uint16_t *field);
 
 /**
- * Ends a plan: gives its requests up and lets go of its storage. To begin it again, call
- * mbm_plan_begin.
+ * Ends a plan: gives its requests up and lets go of its storage.
  *
  * @param plan  the object
  * @return MBM_OK; MBM_BUSY from within a hook of the client's port, with nothing changed;
@@ -3099,7 +3128,7 @@ uint8_t mbm_plan_getStatus(struct mbm_plan *plan,
  * @param field  the index of the field, of a bit or an integer
  * @param index  which of its values, 0 for the first
  * @param value  gets the number
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL if it is not in the range of `value`;
+ * @return MBM_OK; MBM_OUT_OF_RANGE if it is not in the range of `value`;
  *         MBM_INVALID_ARGUMENT, also for a float or a text; MBM_NOT_INITIALISED; if no value
  *         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
  *         only
@@ -3116,7 +3145,7 @@ uint8_t mbm_plan_getInteger(const struct mbm_plan *plan,
  * @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
  * @param index  which of its values, 0 for the first
  * @param value  gets the number
- * @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL also if the value, multiplied, plus half
+ * @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half
  *         of the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of
  *         64 bits
  */
@@ -3614,7 +3643,7 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
  * that mbm_server_setBaudRate set, or the default of the framing.
  *
  * @param server  the object
- * @return microseconds; 0 for an object that was never begun
+ * @return microseconds; 0 in TCP and for an object that was never begun
  */
 uint32_t mbm_server_getSilence(const struct mbm_server *server);
 
@@ -5105,11 +5134,11 @@ uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
  *
  * @param registers  the view to fill in; without data after an error
  * @param words      the words, for example the response words of mbm_master; must stay
- *                   valid while the view is used
+ *                   valid while the view is used. NULL only if `count` is 0
  * @param count      how many words
  * @param first      the device's address of the first register, 0 to 65535
  * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
- *         MBM_INVALID_ARGUMENT for a NULL pointer
+ *         MBM_INVALID_ARGUMENT for NULL
  */
 uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
                               const uint16_t *words,
@@ -5125,7 +5154,7 @@ uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
  * @param length     how many bytes, an even number
  * @param first      the device's address of the first register, 0 to 65535
  * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
- *         MBM_INVALID_ARGUMENT for a NULL pointer or an odd length
+ *         MBM_INVALID_ARGUMENT for NULL or an odd length
  */
 uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
                               const uint8_t *bytes,
@@ -5324,7 +5353,7 @@ uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
  * @param registers  the registers
  * @param address    the device's address of the register whose high byte is compared
  *                   with the first byte
- * @param bytes      the bytes to compare with
+ * @param bytes      the bytes to compare with; NULL only if `length` is 0
  * @param length     how many bytes, two for each register; may be odd
  * @param equal      receives 1 if all bytes are equal, else 0
  * @return MBM_OK; or with `equal` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
@@ -5567,9 +5596,12 @@ typedef struct mbm_object {
  * 16 | address, andMask, orMask | address, andMask, orMask
  * 17 | address, quantity, writeAddress, writeQuantity, data | data
  * 18 | address | data (registers)
- * 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | meiType, readDeviceIdCode, conformity, moreFollows, nextObjectId, objectCount, data (objects)
+ * 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | see below
  * 2B, others | meiType, data | meiType, data
  * your own | data | data
+ *
+ * A response of 2B with MEI type 0E has meiType, readDeviceIdCode, conformity, moreFollows,
+ * nextObjectId, objectCount and data (objects).
  *
  * An exception has exceptionCode, and the function code of the request. Register data are
  * as on the wire, the high byte of each register first. Bits begin with the lowest bit of
@@ -5990,7 +6022,7 @@ uint8_t mbm_packet_addObject(struct mbm_packet *packet,
  * @param frame        the frame, from its first byte to its last
  * @param frameLength  the number of bytes of `frame`
  * @param text         receives the line. A zero byte always ends it
- * @param size         bytes of `text`; 200 suffice for most frames, 1200 for all
+ * @param size         bytes of `text`; 200 suffice for most frames, 2295 for all
  * @return MBM_OK; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
  *         MBM_INVALID_ARGUMENT, also for MBM_FRAMING_NONE
  */

@@ -72,6 +72,8 @@ impl Status {
     pub const FIELDS_OVERLAP: Status = Status(0xF3);
     /// A device says that more follows, but what it sends or names does not come next.
     pub const NO_PROGRESS: Status = Status(0xF4);
+    /// A value does not fit into the type that the caller asked for.
+    pub const OUT_OF_RANGE: Status = Status(0xF6);
 
     /// The status for an exception code of the remote device.
     ///

@@ -23,6 +23,12 @@ pub trait Port {
         true
     }
 
+    /// True if [`Port::flush`] knows when the last byte has left. If not, and if the baud rate
+    /// is known, a request counts as sent once its characters can have been sent.
+    fn knows_when_sent(&self) -> bool {
+        true
+    }
+
     /// Called before the first byte of a request or response: switches the RS-485 driver on.
     fn pre_transmission(&mut self) {}
 

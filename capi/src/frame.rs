@@ -4,7 +4,7 @@ use super::framing::mbm_framing;
 use super::packet::{
     mbm_length, mbm_packet, own, put_expected, reply_length, side, MBM_PACKET_REQUEST,
 };
-use super::pointers::{array, buffer, get, put, put_length};
+use super::pointers::{array, array_or_empty, buffer, get, put, put_length};
 use mbm::error::Status;
 use mbm::frame::checksum::{crc16, lrc, Crc16};
 use mbm::frame::{Adu, Framing};
@@ -241,7 +241,7 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
     unsafe {
         let measure = || {
             let pdu_kind = side(kind)?;
-            let bytes = array(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
+            let bytes = array_or_empty(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
             let format = format(framing, |framing| function(framing, bytes))?;
             let own = format.own.as_slice();
             match format.framing {
@@ -322,7 +322,7 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let bytes = array(bytes, have.into()).filter(|_| !expected.is_null());
+        let bytes = array_or_empty(bytes, have.into()).filter(|_| !expected.is_null());
         let length = match bytes {
             Some(bytes) => length::looks_like_tcp(bytes, allowUnknown != 0, &[]),
             None => Err(Status::INVALID_ARGUMENT),

@@ -34,7 +34,9 @@ pub struct mbm_port {
     /// millisecond tick returns `tick * 1000`.
     pub micros: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
     /// Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
-    /// also wait until the last bit was sent, and return 1.
+    /// also wait until the last bit was sent, and return 1. Without it, a master and a client
+    /// that know the baud rate wait for a reply longer by the time of the request's characters,
+    /// since bytes may remain to be sent after `write` has taken them.
     pub flush: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
     /// Optional: called before the first byte of a frame is sent (RS-485 driver on).
     pub preTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
@@ -133,6 +135,10 @@ impl Port for mbm_port {
             Some(flush) => unsafe { flush(self.context) != 0 },
             None => true,
         }
+    }
+
+    fn knows_when_sent(&self) -> bool {
+        self.flush.is_some()
     }
 
     fn pre_transmission(&mut self) {
@@ -237,6 +243,11 @@ impl Port for PortRef {
                 None => true,
             }
         }
+    }
+
+    fn knows_when_sent(&self) -> bool {
+        // SAFETY: see above.
+        unsafe { (*self.port).flush.is_some() }
     }
 
     fn pre_transmission(&mut self) {

@@ -97,6 +97,8 @@ pub const MBM_FIELDS_OVERLAP: u8 = 0xF3;
 /// an object that is not after those that it has sent, or then sends one before the one that
 /// it named. Reading on might never end.
 pub const MBM_NO_PROGRESS: u8 = 0xF4;
+/// A value is out of the range of the type in which the program reads it.
+pub const MBM_OUT_OF_RANGE: u8 = 0xF6;
 
 statuses! {
     MBM_OK = Status::OK, c"success";
@@ -130,9 +132,11 @@ statuses! {
     MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
     MBM_FIELDS_OVERLAP = Status::FIELDS_OVERLAP, c"two fields of the plan overlap";
     MBM_NO_PROGRESS = Status::NO_PROGRESS, c"the device repeats itself without an end";
+    MBM_OUT_OF_RANGE = Status::OUT_OF_RANGE, c"the value is out of the range of its type";
 }
 
-/// Explains a status in a few words of English.
+/// Explains a status in a few words of English. For 1 to 3 these are the words of the device's
+/// exception; mbm_status_textOf tells a request that was refused before it was sent apart.
 ///
 /// On an AVR, constants are in RAM, and a program that calls this function has about 1100
 /// bytes of RAM less. There, show the number; or in a sketch call modbusStatusText of
@@ -145,4 +149,27 @@ statuses! {
 #[no_mangle]
 pub extern "C" fn mbm_status_text(status: u8) -> *const c_char {
     text(status).as_ptr()
+}
+
+/// Explains how a request ended: as mbm_status_text, but for a request that a master or a client
+/// refused itself, the text says so, and that nothing was sent.
+///
+/// Any thread or interrupt may call it. As for mbm_status_text, the texts take RAM on an AVR: a
+/// sketch calls modbusStatusText with both numbers.
+///
+/// @param status         the status of the request
+/// @param exceptionCode  `exception` of the mbm_clientRequest, or what
+///                       mbm_master_getExceptionCode returns: 0 if the device sent no exception
+/// @return a constant string, never NULL
+#[no_mangle]
+pub extern "C" fn mbm_status_textOf(status: u8, exceptionCode: u8) -> *const c_char {
+    let text = match (status, exceptionCode) {
+        (MBM_ILLEGAL_FUNCTION, 0) => c"refused, nothing was sent: no such function code",
+        (MBM_ILLEGAL_DATA_ADDRESS, 0) => c"refused, nothing was sent: the addresses pass 65535",
+        (MBM_ILLEGAL_DATA_VALUE, 0) => {
+            c"refused, nothing was sent: the standard or a buffer does not allow the quantity or value"
+        }
+        _ => text(status),
+    };
+    text.as_ptr()
 }

@@ -42,7 +42,7 @@ pub(super) fn outcome(written: Result<TextWriter, Status>) -> u8 {
 /// @param frame        the frame, from its first byte to its last
 /// @param frameLength  the number of bytes of `frame`
 /// @param text         receives the line. A zero byte always ends it
-/// @param size         bytes of `text`; 200 suffice for most frames, 1200 for all
+/// @param size         bytes of `text`; 200 suffice for most frames, 2295 for all
 /// @return MBM_OK; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
 ///         MBM_INVALID_ARGUMENT, also for MBM_FRAMING_NONE
 #[no_mangle]

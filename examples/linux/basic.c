@@ -20,7 +20,8 @@ static uint8_t frame[MBM_FRAME_BYTES(READ_WORDS)];
 static int failed(const char *what, uint8_t status)
 {
     if (status != MBM_OK)
-        fprintf(stderr, "%s: %s\n", what, mbm_status_text(status));
+        fprintf(stderr, "%s: %s\n", what,
+                mbm_status_textOf(status, mbm_master_getExceptionCode(&node)));
     return status != MBM_OK;
 }
 

@@ -157,7 +157,7 @@ static void show(unsigned i, const char *what, mbm_clientRequest *request)
         mbm_tcp_wait(places, CONNECTIONS + CLIENTS, &listener, -1,
                      mbm_client_pollDelay(&clients[i]));
     }
-    printf("%s: %s", what, mbm_status_text(request->status));
+    printf("%s: %s", what, mbm_status_textOf(request->status, request->exception));
     if (request->status == MBM_OK)
         printf(", %u %u", values[0], values[1]);
     printf("\n");

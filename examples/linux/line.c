@@ -180,7 +180,7 @@ const char *line_reason(const line *l)
 
 const char *line_status(line *l, const mbm_clientRequest *request)
 {
-    const char *text = mbm_status_text(request->status);
+    const char *text = mbm_status_textOf(request->status, request->exception);
 
     if (request->status != MBM_LINK_LOST || l->lost_by == 0)
         return text;

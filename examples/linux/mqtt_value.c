@@ -36,7 +36,7 @@ static int print_number(const mbm_plan *plan, const mqtt_field *field, const mbm
         return status == MBM_OK;
     }
     status = mbm_plan_getInteger(plan, at, index, &integer);
-    if (status == MBM_BUFFER_TOO_SMALL) {
+    if (status == MBM_OUT_OF_RANGE) {
         /* A uint64 above the range of int64_t. */
         mbm_registers registers;
         uint64_t large = 0;

@@ -38,7 +38,7 @@ static void print_result(const mbm_clientRequest *request)
         printf("unit %3u: %s; two with one address?\n", unit, mbm_status_text(request->status));
         break;
     default:
-        printf("unit %3u: %s\n", unit, mbm_status_text(request->status));
+        printf("unit %3u: %s\n", unit, mbm_status_textOf(request->status, request->exception));
         answering += request->exception != 0;
         fflush(stdout);
         return;

@@ -68,7 +68,7 @@ static int ask(const char *host, const char *service)
     (void)mbm_client_readHoldingRegisters(&client, &request, FIRST, WORDS);
     while (mbm_client_poll(&client) == MBM_PENDING && !is_over)
         (void)mbm_udp_wait(&udp, 1, -1, mbm_client_pollDelay(&client));
-    printf("%s\n", mbm_status_text(request.status));
+    printf("%s\n", mbm_status_textOf(request.status, request.exception));
     for (i = 0; i < WORDS && request.status == MBM_OK; i++)
         printf("register %d: %u\n", FIRST + i, words[i]);
     return request.status != MBM_OK;

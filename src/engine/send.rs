@@ -111,7 +111,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             // The longest frame takes 256 characters.
             self.wait = self
                 .wait
-                .wrapping_add(u32::from(self.settings.character) << 8);
+                .wrapping_add(u32::from(self.settings.any_character()) << 8);
         }
         if cfg!(feature = "hold") && self.phase == Phase::PostFlush {
             if !self.has_expired() {
@@ -125,20 +125,27 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             if cfg!(feature = "hold") && hold_reply > 0 {
                 self.enter(
                     Phase::PostFlush,
-                    characters(self.settings.character, hold_reply),
+                    characters(self.settings.any_character(), hold_reply),
                 );
                 return Status::PENDING;
             }
         }
         // The request has been sent: the driver goes off, and the wait for the reply begins.
+        let sent: u16 = self.end.into();
         self.begin_reply();
         self.port.post_transmission();
-        if self.unit == BROADCAST || !self.request.is_answered() {
-            self.enter(Phase::Turnaround, self.settings.turnaround_delay);
+        let (phase, mut time) = if self.unit == BROADCAST || !self.request.is_answered() {
+            (Phase::Turnaround, self.settings.turnaround_delay)
         } else {
-            let timeout = Q::response_timeout(self);
-            self.enter(Phase::Reply, timeout);
+            (Phase::Reply, Q::response_timeout(self))
+        };
+        if !self.port.knows_when_sent() {
+            // The port may have bytes left to send.
+            let [low, high] = sent.to_le_bytes();
+            time += characters(self.settings.character, low);
+            time += characters(self.settings.character, high) << 8;
         }
+        self.enter(phase, time);
         self.wait()
     }
 }

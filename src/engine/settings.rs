@@ -18,7 +18,7 @@ pub struct Settings {
     /// Quiet time: the silence before the next request after a request without a reply, so
     /// that a late reply can pass.
     pub quiet_time: u32,
-    /// Time of one character.
+    /// Time of one character; 0 if the baud rate is unknown.
     pub character: u16,
     /// How often an unanswered request is repeated.
     pub retries: u8,
@@ -36,7 +36,7 @@ impl Settings {
         response_timeout: millis(2000),
         turnaround_delay: millis(100),
         quiet_time: millis(100),
-        character: time::DEFAULT_CHARACTER,
+        character: 0,
         retries: 0,
         post_flush_hold: 0,
         echo_discard: false,
@@ -52,7 +52,16 @@ impl Settings {
     pub const fn set_baud_rate(&mut self, baud: u32) {
         self.silence = time::silence(baud);
         self.gap = self.silence;
-        self.character = time::character(baud);
+        self.character = if baud == 0 { 0 } else { time::character(baud) };
+    }
+
+    /// Time of one character, also if the baud rate is unknown.
+    pub const fn any_character(&self) -> u16 {
+        if self.character == 0 {
+            time::DEFAULT_CHARACTER
+        } else {
+            self.character
+        }
     }
 
     /// Turns zeroed settings into the default settings. Field by field, because a constant
@@ -64,7 +73,6 @@ impl Settings {
         self.response_timeout = Settings::DEFAULT.response_timeout;
         self.turnaround_delay = Settings::DEFAULT.turnaround_delay;
         self.quiet_time = Settings::DEFAULT.quiet_time;
-        self.character = Settings::DEFAULT.character;
     }
 }
 

@@ -179,8 +179,7 @@ impl Words<'_> {
     ///
     /// # Errors
     /// [`Status::INVALID_ARGUMENT`] for a float or a text;
-    /// [`Status::BUFFER_TOO_SMALL`] if the result is out of range; the least number of the range
-    /// counts as out of it.
+    /// [`Status::OUT_OF_RANGE`] if the result is out of range.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn integer(&self) -> Result<i64, Status> {
         let field = self.field;
@@ -191,19 +190,24 @@ impl Words<'_> {
         let (multiplier, divisor) = scale(field);
         let whole = quotient(multiplier, divisor);
         let part = multiplier.wrapping_sub(whole.wrapping_mul(divisor));
-        let scaled = times(raw, whole, part, divisor).ok_or(Status::BUFFER_TOO_SMALL)?;
-        Ok(if is_below != (field.multiplier < 0) {
-            -scaled
+        let scaled = times(raw, whole, part, divisor).ok_or(Status::OUT_OF_RANGE)?;
+        let is_below = is_below != (field.multiplier < 0);
+        if scaled > i64::MAX as u64 + u64::from(is_below) {
+            return Err(Status::OUT_OF_RANGE);
+        }
+        Ok(if is_below {
+            scaled.wrapping_neg()
         } else {
             scaled
-        })
+        }
+        .cast_signed())
     }
 
     /// As [`Words::integer`], with 32 bits throughout.
     ///
     /// # Errors
     /// As [`Words::integer`]; [`Status::INVALID_ARGUMENT`] also for an integer of 64 bits, and
-    /// [`Status::BUFFER_TOO_SMALL`] also if the product before the division is out of range.
+    /// [`Status::OUT_OF_RANGE`] also if the product before the division does not fit into 32 bits.
     pub fn int32(&self) -> Result<i32, Status> {
         let field = self.field;
         if field.value_type > INT32 {
@@ -222,22 +226,29 @@ impl Words<'_> {
         let (multiplier, divisor) = scale(field);
         let half = divisor / 2;
         if raw > quotient(u32::MAX - half, multiplier) {
-            return Err(Status::BUFFER_TOO_SMALL);
+            return Err(Status::OUT_OF_RANGE);
         }
         let scaled = quotient(raw * multiplier + half, divisor);
-        let scaled = i32::try_from(scaled).map_err(|_| Status::BUFFER_TOO_SMALL)?;
-        Ok(if is_below { -scaled } else { scaled })
+        if scaled > i32::MAX as u32 + u32::from(is_below) {
+            return Err(Status::OUT_OF_RANGE);
+        }
+        Ok(if is_below {
+            scaled.wrapping_neg()
+        } else {
+            scaled
+        }
+        .cast_signed())
     }
 }
 
 /// `magnitude` times the sum of `whole` and `part / divisor`, rounded to the nearest, halves
-/// up. `part` is less than `divisor`, and that less than 2^31. `None` if it is out of range.
+/// up. `part` is less than `divisor`, and that less than 2^31. `None` only if it exceeds 2^63.
 /// (Bit by bit: firmware has no other use for a multiplication and a division of this width.)
 #[inline(always)]
-fn times(mut magnitude: u64, whole: u32, part: u32, divisor: u32) -> Option<i64> {
+fn times(mut magnitude: u64, whole: u32, part: u32, divisor: u32) -> Option<u64> {
     let (mut product, mut rest) = (0u64, 0);
     for _ in 0..u64::BITS {
-        if product >> 62 != 0 {
+        if product > 1 << 62 {
             return None;
         }
         product <<= 1;
@@ -259,5 +270,5 @@ fn times(mut magnitude: u64, whole: u32, part: u32, divisor: u32) -> Option<i64>
     if rest >= divisor - rest {
         product += 1;
     }
-    i64::try_from(product).ok()
+    Some(product)
 }

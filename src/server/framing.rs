@@ -97,6 +97,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             Self::receive_tcp,
             |server, length| server.encode_tcp(length),
         );
+        self.set_silence(0);
     }
 
     /// Receives an RTU frame, which is the bytes between two silences. If poll is called late, the

@@ -17,9 +17,9 @@ pub struct mbm_linkHooks {
     pub context: *mut c_void,
     /// Optional: closes the link, if it is open.
     pub disconnect: Option<unsafe extern "C" fn(context: *mut c_void)>,
-    /// Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the link is open,
-    /// MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
-    /// or another status.
+    /// Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the
+    /// link is open, MBM_PENDING if the connection is still being made and the port accepts no
+    /// bytes yet, or another status.
     pub connect: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
     /// For mbm_link_begin only; optional if `connect` never returns MBM_PENDING. Returns MBM_OK
     /// if the link is open, MBM_PENDING while the connection is still being made, or another

@@ -82,9 +82,12 @@ impl From<Length> for mbm_length {
 /// 16 | address, andMask, orMask | address, andMask, orMask
 /// 17 | address, quantity, writeAddress, writeQuantity, data | data
 /// 18 | address | data (registers)
-/// 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | meiType, readDeviceIdCode, conformity, moreFollows, nextObjectId, objectCount, data (objects)
+/// 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | see below
 /// 2B, others | meiType, data | meiType, data
 /// your own | data | data
+///
+/// A response of 2B with MEI type 0E has meiType, readDeviceIdCode, conformity, moreFollows,
+/// nextObjectId, objectCount and data (objects).
 ///
 /// An exception has exceptionCode, and the function code of the request. Register data are
 /// as on the wire, the high byte of each register first. Bits begin with the lowest bit of

@@ -16,21 +16,26 @@ use mbm::plan::{group, schedule};
 /// bits or registers. All reads are due at once; the rounds after the first are spread, so that
 /// reads of one interval follow each other at equal distances.
 ///
-/// @param plan    the object, zeroed
+/// You may call it again at any time, also from `update`, but not from a hook of the client's
+/// port. The plan then first ends, as by mbm_plan_end, unless the call is refused for NULL, a
+/// count out of range or a client that was never begun.
+///
+/// @param plan    the object, zeroed before the first call
 /// @param client  the client that sends the reads, begun; the program may use it too, and other
 ///                plans
-/// @param setup   table, limits and storage; it stays valid and as it is until mbm_plan_end
+/// @param setup   table, limits and storage; it stays valid and as it is until the plan ends
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
-/// @return MBM_OK; MBM_BUSY if it was begun already; of a field MBM_INVALID_ARGUMENT for an
-///         unknown table, type or order, a type that the table does not have, an interval out
-///         of range, a negative divisor or a scale of a text, MBM_BROADCAST_NOT_ALLOWED for
-///         unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded
-///         range, MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP
-///         for the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first
-///         without storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL
-///         pointers and counts out of range; MBM_NOT_INITIALISED for a client that was never
-///         begun. The object is changed on MBM_OK only; `positions` and `reads` may be changed
-///         always
+/// @return MBM_OK; MBM_BUSY from within a hook of the client's port; of a field
+///         MBM_INVALID_ARGUMENT for an unknown table, type or order, a type that the table does
+///         not have, an interval out of range, a negative divisor or a scale of a text,
+///         MBM_BROADCAST_NOT_ALLOWED for unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
+///         address 65535 or into an excluded range, MBM_ILLEGAL_DATA_VALUE if it is longer than
+///         a read may be, MBM_FIELDS_OVERLAP for the later of two that share an address,
+///         MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data;
+///         MBM_INVALID_ARGUMENT also for NULL pointers and counts out of range;
+///         MBM_NOT_INITIALISED for a client that was never begun. After the status of a field
+///         the plan has ended, and `positions` and `reads` may be changed; after any other
+///         nothing is
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_begin(
     plan: *mut mbm_plan,
@@ -57,10 +62,8 @@ unsafe fn begin(
 ) -> Status {
     // SAFETY: as the caller promises. Nothing uses the storage of a plan that is not begun.
     unsafe {
-        match pointers::check(plan) {
-            Status::NOT_INITIALISED => {}
-            Status::INVALID_ARGUMENT => return Status::INVALID_ARGUMENT,
-            _ => return Status::BUSY,
+        if plan.is_null() {
+            return Status::INVALID_ARGUMENT;
         }
         let usable = pointers::check(client);
         if usable != Status::OK {
@@ -69,6 +72,9 @@ unsafe fn begin(
         let Some(given) = setup.as_ref().filter(|setup| setup.is_complete()) else {
             return Status::INVALID_ARGUMENT;
         };
+        if mbm_plan_end(plan) == Status::BUSY.code() {
+            return Status::BUSY;
+        }
         let count = usize::from(given.fieldCount);
         let positions = from_raw_parts_mut(given.positions.cast(), count);
         let reads = from_raw_parts_mut(given.reads.cast(), given.readCount.into());
@@ -86,6 +92,7 @@ unsafe fn begin(
         (*object).read_count = count;
         (*object).setup = setup;
         (*object).client = client;
+        (*object).begins = (*object).begins.wrapping_add(1);
         (*object).millis = 0;
         (*object).micros = client::clock(client);
         (*object).mark = pointers::BEGUN;
@@ -94,8 +101,7 @@ unsafe fn begin(
     }
 }
 
-/// Ends a plan: gives its requests up and lets go of its storage. To begin it again, call
-/// mbm_plan_begin.
+/// Ends a plan: gives its requests up and lets go of its storage.
 ///
 /// @param plan  the object
 /// @return MBM_OK; MBM_BUSY from within a hook of the client's port, with nothing changed;

@@ -12,6 +12,8 @@ use mbm::plan::Read;
 #[repr(C)]
 pub struct Object {
     pub(super) mark: u8,
+    /// How often the plan has begun; it wraps.
+    pub(super) begins: u8,
     pub(super) read_count: u16,
     pub(super) setup: *const mbm_planSetup,
     pub(super) client: *mut mbm_client,

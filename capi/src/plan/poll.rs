@@ -89,11 +89,13 @@ unsafe fn queue(object: *const Object, request: *mut mbm_clientRequest, read: &R
 /// Calls `update` for the fields of each read whose status is news.
 ///
 /// # Safety
-/// `plan` is begun; no reference into it lives, for `update` may use it, end it and zero it.
+/// `plan` is begun; no reference into it lives, for `update` may use it, begin it again,
+/// end it and zero it.
 unsafe fn update(plan: *mut mbm_plan) {
     // SAFETY: as the caller promises; looked at again after every call of `update`.
     unsafe {
         let object = pointers::object(plan);
+        let begins = (*object).begins;
         let mut index = 0;
         while let Some(read) = (*object).reads().get(index) {
             index += 1;
@@ -106,7 +108,7 @@ unsafe fn update(plan: *mut mbm_plan) {
                     (setup.update, setup.positions().get(position))
                 {
                     update(setup.context, plan, position.field() as u16);
-                    if pointers::check(plan) != Status::OK {
+                    if pointers::check(plan) != Status::OK || (*object).begins != begins {
                         return;
                     }
                 }

@@ -176,7 +176,7 @@ pub unsafe extern "C" fn mbm_plan_getStatus(
 /// @param field  the index of the field, of a bit or an integer
 /// @param index  which of its values, 0 for the first
 /// @param value  gets the number
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL if it is not in the range of `value`;
+/// @return MBM_OK; MBM_OUT_OF_RANGE if it is not in the range of `value`;
 ///         MBM_INVALID_ARGUMENT, also for a float or a text; MBM_NOT_INITIALISED; if no value
 ///         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
 ///         only
@@ -197,7 +197,7 @@ pub unsafe extern "C" fn mbm_plan_getInteger(
 /// @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
 /// @param index  which of its values, 0 for the first
 /// @param value  gets the number
-/// @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL also if the value, multiplied, plus half
+/// @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half
 ///         of the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of
 ///         64 bits
 #[no_mangle]

@@ -286,7 +286,7 @@ pub unsafe extern "C" fn mbm_registers_getBytes(
 /// @param registers  the registers
 /// @param address    the device's address of the register whose high byte is compared
 ///                   with the first byte
-/// @param bytes      the bytes to compare with
+/// @param bytes      the bytes to compare with; NULL only if `length` is 0
 /// @param length     how many bytes, two for each register; may be odd
 /// @param equal      receives 1 if all bytes are equal, else 0
 /// @return MBM_OK; or with `equal` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the

@@ -149,7 +149,8 @@ const fn machine_order_mask(size: usize) -> usize {
     }
 }
 
-/// Fills a view in. If the arguments are invalid, the view has no data.
+/// Fills a view in. If the arguments are invalid, the view has no data. `data` may be NULL only
+/// if `length`, in words or bytes, is 0.
 ///
 /// # Safety
 /// `registers` is NULL or points to an `mbm_registers`, with any content.
@@ -157,13 +158,20 @@ unsafe fn fill(
     registers: *mut mbm_registers,
     data: *const c_void,
     kind: u8,
-    count: u16,
+    length: u16,
     first: u16,
 ) -> u8 {
     if registers.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
-    let status = if data.is_null() {
+    let mut data = data;
+    if length == 0 && data.is_null() {
+        // A view of no registers, from which nothing is ever read.
+        data = core::ptr::dangling();
+    }
+    let in_bytes = matches!(kind, MBM_REGISTERS_OF_BYTES | MBM_REGISTERS_INTO_BYTES);
+    let count = if in_bytes { length / 2 } else { length };
+    let status = if data.is_null() || in_bytes && !length.is_multiple_of(2) {
         Status::INVALID_ARGUMENT
     } else if count > 1 && count - 1 > u16::MAX - first {
         Status::ILLEGAL_DATA_ADDRESS
@@ -195,11 +203,11 @@ unsafe fn fill(
 ///
 /// @param registers  the view to fill in; without data after an error
 /// @param words      the words, for example the response words of mbm_master; must stay
-///                   valid while the view is used
+///                   valid while the view is used. NULL only if `count` is 0
 /// @param count      how many words
 /// @param first      the device's address of the first register, 0 to 65535
 /// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
-///         MBM_INVALID_ARGUMENT for a NULL pointer
+///         MBM_INVALID_ARGUMENT for NULL
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_ofWords(
     registers: *mut mbm_registers,
@@ -227,7 +235,7 @@ pub unsafe extern "C" fn mbm_registers_ofWords(
 /// @param length     how many bytes, an even number
 /// @param first      the device's address of the first register, 0 to 65535
 /// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
-///         MBM_INVALID_ARGUMENT for a NULL pointer or an odd length
+///         MBM_INVALID_ARGUMENT for NULL or an odd length
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_ofBytes(
     registers: *mut mbm_registers,
@@ -235,18 +243,13 @@ pub unsafe extern "C" fn mbm_registers_ofBytes(
     length: u16,
     first: u16,
 ) -> u8 {
-    let bytes = if length.is_multiple_of(2) {
-        bytes
-    } else {
-        core::ptr::null()
-    };
     // SAFETY: as the header demands.
     unsafe {
         fill(
             registers,
             bytes.cast(),
             MBM_REGISTERS_OF_BYTES,
-            length / 2,
+            length,
             first,
         )
     }
@@ -293,18 +296,13 @@ pub unsafe extern "C" fn mbm_registers_intoBytes(
     length: u16,
     first: u16,
 ) -> u8 {
-    let bytes = if length.is_multiple_of(2) {
-        bytes
-    } else {
-        core::ptr::null_mut()
-    };
     // SAFETY: as the header demands.
     unsafe {
         fill(
             registers,
             bytes.cast(),
             MBM_REGISTERS_INTO_BYTES,
-            length / 2,
+            length,
             first,
         )
     }

@@ -205,7 +205,7 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceU
 /// that mbm_server_setBaudRate set, or the default of the framing.
 ///
 /// @param server  the object
-/// @return microseconds; 0 for an object that was never begun
+/// @return microseconds; 0 in TCP and for an object that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_getSilence(server: *const mbm_server) -> u32 {
     // SAFETY: as the header demands.

@@ -105,9 +105,16 @@ pub fn begin(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
     } else {
         w.unset::<u16>()
     };
-    let status = refused_changes_nothing(w, &[span(plan)], "mbm_plan_begin", || {
-        call!(w, plan, mbm_plan_begin(plan, client, setup, wrong))
-    });
+    let begin = || call!(w, plan, mbm_plan_begin(plan, client, setup, wrong));
+    // A plan that runs ends before its new table is checked.
+    let runs = super::check::bytes(span(plan))
+        .first()
+        .is_some_and(|mark| *mark != 0);
+    let status = if runs {
+        checked_call(w, span(plan), "mbm_plan_begin", begin)
+    } else {
+        refused_changes_nothing(w, &[span(plan)], "mbm_plan_begin", begin)
+    };
     if !wrong.is_null() {
         // SAFETY: not NULL.
         let index = usize::from(unsafe { *wrong });

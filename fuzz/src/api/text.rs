@@ -32,6 +32,9 @@ pub fn step(w: &World) {
     // SAFETY: a constant string.
     let text = unsafe { std::ffi::CStr::from_ptr(text.cast()) };
     assert!(!text.is_empty() && text.to_bytes().is_ascii());
+    let code = w.byte();
+    let text = call!(w, std::ptr::null::<u8>(), mbm_status_textOf(status, code));
+    assert!(!text.is_null());
     let version = call!(w, std::ptr::null::<u8>(), mbm_version());
     assert!(!version.is_null());
 }

@@ -1,0 +1,598 @@
+/* Each function for frames and packets is held to its comment in mbm.h: results, limits, NULL. */
+#include "crc.h"
+#include "examples.h"
+#include "hooked_port.h"
+#include "test.h"
+
+#include <string.h>
+
+#include "refused.h"
+
+enum { TEXT_SUFFICES = 2295 };
+
+static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
+static const mbm_framing ascii = {.kind = MBM_FRAMING_ASCII};
+static const mbm_framing tcp = {.kind = MBM_FRAMING_TCP};
+
+static const mbm_framing *const framings[] = {&rtu, &ascii, &tcp};
+static const uint16_t longest[] = {MBM_MAX_FRAME, MBM_MAX_ASCII_FRAME, MBM_MAX_TCP_FRAME};
+
+static mbm_packet read_of(uint16_t quantity)
+{
+    const mbm_packet packet = {.kind = MBM_PACKET_REQUEST,
+                               .function = MBM_FC_READ_HOLDING_REGISTERS,
+                               .unit = 17,
+                               .transaction = 0x1234,
+                               .address = 107,
+                               .quantity = quantity};
+    return packet;
+}
+
+/* --- mbm_version, mbm_status_text, mbm_status_textOf --- */
+
+static void the_archive_is_that_of_the_header(void **state)
+{
+    (void)state;
+    assert_string_equal(mbm_version(), MBM_VERSION);
+}
+
+static void every_number_has_a_text(void **state)
+{
+    unsigned status;
+
+    (void)state;
+    for (status = 0; status < 256; status++) {
+        const char *text = mbm_status_text((uint8_t)status);
+
+        assert_non_null(text);
+        assert_in_range(strlen(text), 1, 80);
+    }
+    assert_string_equal(mbm_status_text(MBM_OK), "success");
+    assert_string_equal(mbm_status_text(200), "not a status");
+}
+
+static void a_request_that_was_refused_here_is_no_exception_of_the_device(void **state)
+{
+    static mbm_client client;
+    static mbm_clientRequest request;
+    static mbm_master master;
+    static uint8_t buffer[MBM_MAX_FRAME];
+    static uint16_t words[1];
+    static hooked_port wire;
+    const mbm_port port = hooked_port_of(&wire);
+    unsigned status, code;
+    uint8_t refused;
+
+    (void)state;
+    for (status = 0; status < 256; status++) {
+        for (code = 0; code < 256; code++) {
+            const char *text = mbm_status_textOf((uint8_t)status, (uint8_t)code);
+            int is_refused = code == 0 && status >= 1 && status <= 3;
+
+            assert_int_equal(strstr(text, "nothing was sent") != NULL, is_refused);
+            assert_true(is_refused || text == mbm_status_text((uint8_t)status));
+            assert_true(!is_refused || strstr(text, "exception") == NULL);
+        }
+    }
+    /* As a master and a client fill both in. */
+    wire.step = 500;
+    OK(mbm_master_beginRtu(&master, 17, &port));
+    OK(mbm_master_setBuffers(&master, words, 1, NULL, 0, buffer, sizeof buffer));
+    refused = mbm_master_readHoldingRegisters(&master, 0, 126);
+    IS(MBM_ILLEGAL_DATA_VALUE, refused);
+    assert_string_equal(
+        mbm_status_textOf(refused, mbm_master_getExceptionCode(&master)),
+        "refused, nothing was sent: the standard or a buffer does not allow the quantity or value");
+    OK(mbm_client_beginRtu(&client, &port, buffer, sizeof buffer));
+    request.unit = 17;
+    request.exception = MBM_ILLEGAL_DATA_ADDRESS;
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_client_readHoldingRegisters(&client, &request, 65535, 2));
+    assert_string_equal(mbm_status_textOf(request.status, request.exception),
+                        "refused, nothing was sent: the addresses pass 65535");
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 65535, 1));
+    while (wire.length == 0)
+        IS(MBM_PENDING, mbm_client_poll(&client));
+    hooked_port_arrive_rtu(&wire, 17, "\x83\2", 2);
+    while (mbm_client_poll(&client) == MBM_PENDING)
+        wire.now += 500;
+    IS(MBM_ILLEGAL_DATA_ADDRESS, request.status);
+    assert_string_equal(mbm_status_textOf(request.status, request.exception),
+                        "exception 02: illegal data address");
+}
+
+/* --- mbm_frame_build, parse, exception, expectedLength, replyLength --- */
+
+static void the_longest_frames_fit_into_the_buffers_that_are_named(void **state)
+{
+    uint8_t data[MBM_MAX_PDU] = {0}, frame[MBM_MAX_ASCII_FRAME];
+    uint16_t length;
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        /* 08, return query data, may have any number of data bytes. */
+        mbm_packet packet = {
+            .function = MBM_FC_DIAGNOSTICS, .unit = 1, .data = data, .dataLength = MBM_MAX_PDU - 3};
+
+        OK(mbm_frame_build(framings[i], &packet, frame, longest[i], &length));
+        assert_int_equal(length, longest[i]);
+        IS(MBM_BUFFER_TOO_SMALL,
+           mbm_frame_build(framings[i], &packet, frame, longest[i] - 1, &length));
+        assert_int_equal(length, 0);
+        packet.dataLength++;
+        assert_int_not_equal(mbm_frame_build(framings[i], &packet, frame, sizeof frame, &length),
+                             MBM_OK);
+        assert_int_equal(length, 0);
+    }
+}
+
+static void a_frame_is_never_built_malformed(void **state)
+{
+    static const struct {
+        uint16_t address, quantity;
+        uint8_t status;
+    } rows[] = {{0, 1, MBM_OK},
+                {0, 125, MBM_OK},
+                {0, 0, MBM_ILLEGAL_DATA_VALUE},
+                {0, 126, MBM_ILLEGAL_DATA_VALUE},
+                {65535, 1, MBM_OK},
+                {65535, 2, MBM_ILLEGAL_DATA_ADDRESS},
+                {65411, 125, MBM_OK},
+                {65412, 125, MBM_ILLEGAL_DATA_ADDRESS}};
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
+    mbm_packet packet = read_of(0);
+    mbm_length expected;
+    uint16_t length;
+    unsigned i, f;
+
+    (void)state;
+    for (f = 0; f < COUNT(framings); f++) {
+        for (i = 0; i < COUNT(rows); i++) {
+            packet.address = rows[i].address;
+            packet.quantity = rows[i].quantity;
+            IS(rows[i].status, mbm_frame_build(framings[f], &packet, frame, sizeof frame, &length));
+            assert_int_equal(length == 0, rows[i].status != MBM_OK);
+            IS(rows[i].status, mbm_frame_replyLength(framings[f], &packet, &expected));
+            if (rows[i].status == MBM_OK) {
+                mbm_packet parsed;
+
+                OK(mbm_frame_parse(framings[f], MBM_PACKET_REQUEST, frame, length, &parsed));
+                assert_int_equal(parsed.quantity, rows[i].quantity);
+            } else {
+                assert_int_equal(expected.kind, MBM_LENGTH_UNKNOWN);
+                assert_int_equal(expected.bytes, 0);
+            }
+        }
+    }
+}
+
+static void every_null_is_refused(void **state)
+{
+    uint8_t frame[MBM_MAX_ASCII_FRAME] = {17, 3, 0, 107, 0, 3, 0x76, 0x87};
+    mbm_packet packet = read_of(3), kept;
+    mbm_length expected;
+    uint16_t length = 9, end;
+    char text[80];
+
+    (void)state;
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(NULL, &packet, frame, 99, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, NULL, frame, 99, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, NULL, 99, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, frame + 20, 99, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(NULL, 0, frame, 8, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&rtu, 2, frame, 8, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&rtu, 0, NULL, 8, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(&rtu, 0, frame, 8, NULL));
+    kept = packet;
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(NULL, &packet, 1, frame, 11, &length));
+    assert_int_equal(length, 0);
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, NULL, 1, frame, 11, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 1, NULL, 11, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 1, frame, 11, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(PDU(NULL, 0), &packet, 1, frame, 11, &length));
+    assert_memory_equal(&kept, &packet, sizeof packet);
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(NULL, 0, frame, 2, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 2, frame, 2, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 0, NULL, 2, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 0, frame, 2, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(NULL, &packet, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, NULL, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, &packet, NULL));
+    packet.kind = MBM_PACKET_RESPONSE;
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, &packet, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(NULL, 8, 0, &end));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(frame, 8, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_text(NULL, 0, frame, 8, text, sizeof text));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_text(&rtu, 2, frame, 8, text, sizeof text));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_text(&rtu, 0, NULL, 8, text, sizeof text));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_text(&rtu, 0, frame, 8, NULL, sizeof text));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_text(PDU(NULL, 0), 0, frame, 8, text, sizeof text));
+    IS(MBM_INVALID_ARGUMENT, mbm_event_text(NULL, text, sizeof text));
+}
+
+static void an_exception_has_the_length_and_the_codes_that_are_named(void **state)
+{
+    static const uint16_t lengths[] = {5, 11, 9};
+    mbm_packet request = read_of(3), parsed;
+    uint8_t frame[11];
+    mbm_length expected;
+    uint16_t length;
+    unsigned code, f;
+
+    (void)state;
+    for (f = 0; f < COUNT(framings); f++) {
+        for (code = 0; code < 256; code++) {
+            uint8_t status =
+                mbm_frame_exception(framings[f], &request, (uint8_t)code, frame, 11, &length);
+
+            IS(code >= 1 && code <= 127 ? MBM_OK : MBM_INVALID_ARGUMENT, status);
+            assert_int_equal(length, status == MBM_OK ? lengths[f] : 0);
+            if (status != MBM_OK)
+                continue;
+            OK(mbm_frame_expectedLength(framings[f], MBM_PACKET_RESPONSE, frame, length,
+                                        &expected));
+            assert_true(framings[f] == &ascii || expected.bytes == length);
+            OK(mbm_frame_parse(framings[f], MBM_PACKET_RESPONSE, frame, length, &parsed));
+            assert_int_equal(parsed.kind, MBM_PACKET_EXCEPTION);
+            assert_int_equal(parsed.exceptionCode, code);
+            assert_int_equal(parsed.function, request.function);
+        }
+        IS(MBM_BUFFER_TOO_SMALL,
+           mbm_frame_exception(framings[f], &request, 2, frame, lengths[f] - 1, &length));
+        assert_int_equal(length, 0);
+        request.function = 0x80;
+        IS(MBM_ILLEGAL_FUNCTION, mbm_frame_exception(framings[f], &request, 2, frame, 11, &length));
+        request = read_of(3);
+        request.unit = 0;
+        IS(framings[f] == &tcp ? MBM_OK : MBM_BROADCAST_NOT_ALLOWED,
+           mbm_frame_exception(framings[f], &request, 2, frame, 11, &length));
+        OK(mbm_frame_replyLength(framings[f], &request, &expected));
+        assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
+        assert_int_equal(expected.bytes == 0, framings[f] != &tcp);
+        request.unit = 17;
+    }
+}
+
+static void a_listen_only_request_has_no_reply(void **state)
+{
+    static const uint8_t zero[2];
+    mbm_packet request = {.function = MBM_FC_DIAGNOSTICS,
+                          .unit = 17,
+                          .subFunction = MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY,
+                          .data = zero,
+                          .dataLength = 2};
+    mbm_length expected;
+    unsigned f;
+
+    (void)state;
+    for (f = 0; f < COUNT(framings); f++) {
+        OK(mbm_frame_replyLength(framings[f], &request, &expected));
+        assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
+        assert_int_equal(expected.bytes, 0);
+    }
+}
+
+static void a_frame_that_does_not_hold_fills_in_what_is_known(void **state)
+{
+    /* Quantity 0 in a right frame, then a wrong CRC. */
+    uint8_t frame[8] = {17, 3, 0, 107, 0, 0};
+    mbm_packet packet;
+
+    (void)state;
+    seal(frame, 6);
+    memset(&packet, 0x77, sizeof packet);
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_frame_parse(&rtu, MBM_PACKET_REQUEST, frame, 8, &packet));
+    assert_int_equal(packet.kind, MBM_PACKET_REQUEST);
+    assert_int_equal(packet.unit, 17);
+    assert_int_equal(packet.function, 3);
+    assert_int_equal(packet.address, 0);
+    frame[7] ^= 1;
+    memset(&packet, 0x77, sizeof packet);
+    IS(MBM_INVALID_CRC, mbm_frame_parse(&rtu, MBM_PACKET_REQUEST, frame, 8, &packet));
+    assert_int_equal(packet.unit, 0);
+    assert_int_equal(packet.function, 0);
+    frame[1] = 0x63;
+    seal(frame, 6);
+    IS(MBM_INVALID_FUNCTION, mbm_frame_parse(&rtu, MBM_PACKET_RESPONSE, frame, 8, &packet));
+    IS(MBM_INCOMPLETE_FRAME, mbm_frame_parse(&rtu, MBM_PACKET_REQUEST, frame, 0, &packet));
+    IS(MBM_ILLEGAL_FUNCTION, mbm_frame_parse(&rtu, MBM_PACKET_REQUEST, frame, 8, &packet));
+}
+
+static void bytes_look_like_tcp_from_the_eighth_on(void **state)
+{
+    uint8_t bytes[12] = {0x12, 0x34, 0, 0, 0, 6, 17, 3, 0, 107, 0, 3};
+    uint16_t length, have;
+
+    (void)state;
+    for (have = 0; have < 8; have++) {
+        IS(MBM_INCOMPLETE_FRAME, mbm_frame_looksLikeTcp(bytes, have, 0, &length));
+        assert_int_equal(length, 0);
+    }
+    OK(mbm_frame_looksLikeTcp(bytes, 8, 0, &length));
+    assert_int_equal(length, 12);
+    bytes[7] = 0x63; /* reserved by the standard */
+    IS(MBM_MALFORMED_FRAME, mbm_frame_looksLikeTcp(bytes, 8, 0, &length));
+    assert_int_equal(length, 0);
+    OK(mbm_frame_looksLikeTcp(bytes, 8, 1, &length));
+    bytes[7] = 0;
+    IS(MBM_MALFORMED_FRAME, mbm_frame_looksLikeTcp(bytes, 8, 1, &length));
+    bytes[7] = 3;
+    bytes[2] = 1; /* the protocol identifier */
+    IS(MBM_MALFORMED_FRAME, mbm_frame_looksLikeTcp(bytes, 12, 0, &length));
+}
+
+static void the_first_bytes_may_be_none(void **state)
+{
+    mbm_length expected;
+    uint16_t length = 9;
+    unsigned f;
+
+    (void)state;
+    for (f = 0; f < COUNT(framings); f++) {
+        OK(mbm_frame_expectedLength(framings[f], MBM_PACKET_REQUEST, NULL, 0, &expected));
+        assert_int_equal(expected.kind, MBM_LENGTH_AT_LEAST);
+    }
+    IS(MBM_INCOMPLETE_FRAME, mbm_frame_looksLikeTcp(NULL, 0, 0, &length));
+    assert_int_equal(length, 0);
+}
+
+static void the_checksums_of_nothing_are_their_start(void **state)
+{
+    const uint8_t bytes[] = {2, 7};
+
+    (void)state;
+    assert_int_equal(mbm_frame_crc16(NULL, 9), 0xFFFF);
+    assert_int_equal(mbm_frame_crc16(bytes, 0), 0xFFFF);
+    /* Serial line guide V1.02, 6.2.2: the frame ends with 41 12. */
+    assert_int_equal(mbm_frame_crc16(bytes, 2), 0x1241);
+    assert_int_equal(mbm_frame_lrc(NULL, 9), 0);
+    assert_int_equal(mbm_frame_lrc(bytes, 0), 0);
+    assert_int_equal(mbm_frame_lrc(bytes, 2), 0xF7);
+}
+
+/* --- mbm_frame_text --- */
+
+/* Writes a PDU of `length` bytes, of a shape, that is valid for some function. */
+enum { SHAPES = 14 };
+
+static void shape_pdu(uint8_t *pdu, uint16_t length, unsigned shape)
+{
+    static const uint8_t query[] = {0, 0}, group[] = {6, 0xFF, 0xFF, 0x27, 0x0F, 0xFF, 0xFF},
+                         one[] = {6, 0xFF, 0xFF, 0x27, 0x0F, 0, 1, 0xFF, 0xFF},
+                         objects[] = {0x0E, 3, 0x83, 0xFF, 0xFF};
+    unsigned i, step = shape == 5 ? sizeof group : sizeof one;
+    uint8_t count = (uint8_t)(length - 2);
+
+    memset(pdu + 1, 0xFF, length - 1u);
+    switch (shape) {
+    case 1: pdu[1] = count; break;
+    case 2: memcpy(pdu + 1, query, 2); break;
+    case 3: pdu[1] = count, pdu[length - 1] = 0; break;
+    case 4: /* groups of the reply of function 14 */
+        for (pdu[1] = count, i = 2; i + 4 <= length; i += 4)
+            pdu[i] = 3, pdu[i + 1] = 6;
+        break;
+    case 5:
+    case 6: /* groups of requests of functions 14 and 15 */
+        for (pdu[1] = count, i = 2; i + step <= length; i += step)
+            memcpy(pdu + i, shape == 5 ? group : one, step);
+        break;
+    case 7:
+    case 8: /* objects without and with one byte */
+        memcpy(pdu + 1, objects, 5);
+        pdu[6] = (uint8_t)((length - 7) / (shape - 5));
+        for (i = 7; i + shape - 5 <= length; i += shape - 5)
+            pdu[i] = 0xFF, pdu[i + 1] = (uint8_t)(shape - 7);
+        break;
+    case 9:
+    case 10: /* 0F and 10 */
+        pdu[3] = 0;
+        pdu[1] = pdu[2] = 0;
+        pdu[4] = (uint8_t)((length - 6) / 2);
+        if (shape == 10) {
+            pdu[3] = (uint8_t)((8 * (length - 6)) >> 8);
+            pdu[4] = (uint8_t)(8 * (length - 6));
+        }
+        pdu[5] = (uint8_t)(length - 6);
+        break;
+    case 11: /* 17 */
+        memset(pdu + 1, 0, 8);
+        pdu[1] = pdu[5] = 0xFF;
+        pdu[4] = 125;
+        pdu[8] = (uint8_t)((length - 10) / 2);
+        pdu[9] = (uint8_t)(length - 10);
+        break;
+    case 12: /* the reply of 18 */
+        pdu[1] = pdu[3] = 0;
+        pdu[2] = count - 1;
+        pdu[4] = (uint8_t)((length - 5) / 2);
+        break;
+    case 13: pdu[1] = 0x0D; break; /* another MEI type */
+    default: break;
+    }
+}
+
+static void no_text_of_a_frame_is_longer_than_its_comment_says(void **state)
+{
+    static char text[8192];
+    uint8_t frame[MBM_MAX_FRAME];
+    size_t most = 0;
+    unsigned function, shape;
+    uint16_t length;
+    uint8_t side;
+
+    (void)state;
+    for (function = 0; function < 129; function++) {
+        for (shape = 0; shape < SHAPES; shape++) {
+            for (length = MBM_MAX_PDU - 16; length <= MBM_MAX_PDU; length++) {
+                uint16_t size;
+
+                frame[0] = 255;
+                frame[1] = (uint8_t)function;
+                shape_pdu(frame + 1, length, shape);
+                size = (uint16_t)seal(frame, length + 1u);
+                for (side = MBM_PACKET_REQUEST; side <= MBM_PACKET_RESPONSE; side++) {
+                    OK(mbm_frame_text(&rtu, side, frame, size, text, sizeof text));
+                    if (strlen(text) > most)
+                        most = strlen(text);
+                }
+            }
+        }
+    }
+    /* 2000 discrete inputs. */
+    assert_int_equal(most + 1, TEXT_SUFFICES);
+    frame[0] = 255;
+    frame[1] = MBM_FC_READ_DISCRETE_INPUTS;
+    shape_pdu(frame + 1, 252, 1);
+    length = (uint16_t)seal(frame, 253);
+    OK(mbm_frame_text(&rtu, MBM_PACKET_RESPONSE, frame, length, text, TEXT_SUFFICES));
+    IS(MBM_BUFFER_TOO_SMALL,
+       mbm_frame_text(&rtu, MBM_PACKET_RESPONSE, frame, length, text, TEXT_SUFFICES - 1));
+    assert_int_equal(strlen(text), TEXT_SUFFICES - 2);
+}
+
+static void the_longest_text_of_an_event_fits_too(void **state)
+{
+    static char text[2400];
+    static mbm_sniffer sniffer;
+    static uint8_t buffer[2 * MBM_MAX_FRAME];
+    uint8_t frame[MBM_MAX_FRAME] = {255, 2, 0xF8, 0x30, 0x07, 0xD0};
+    mbm_event event;
+
+    (void)state;
+    OK(mbm_sniffer_beginRtu(&sniffer, buffer, sizeof buffer));
+    mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, frame, (uint16_t)seal(frame, 6), 0);
+    assert_int_equal(mbm_sniffer_next(&sniffer, 10000, &event), 1);
+    shape_pdu(frame + 1, 252, 1);
+    mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, frame, (uint16_t)seal(frame, 253), 20000);
+    assert_int_equal(mbm_sniffer_next(&sniffer, 90000, &event), 1);
+    OK(mbm_event_text(&event, text, sizeof text));
+    assert_in_range(strlen(text), TEXT_SUFFICES, sizeof text - 1);
+    IS(MBM_BUFFER_TOO_SMALL, mbm_event_text(&event, text, 9));
+    assert_string_equal(text, "unit 255");
+    IS(MBM_INVALID_ARGUMENT, mbm_event_text(&event, NULL, 9));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_event_text(&event, text, 0));
+}
+
+/* --- mbm_packet_* --- */
+
+static void packets_without_records_or_objects_have_none(void **state)
+{
+    mbm_packet packet = read_of(3);
+    uint16_t cursor = 5;
+    mbm_record record;
+    mbm_object object;
+
+    (void)state;
+    memset(&record, 0x77, sizeof record);
+    memset(&object, 0x77, sizeof object);
+    REFUSED(0, record, mbm_packet_nextRecord(&packet, &cursor, &record));
+    REFUSED(0, object, mbm_packet_nextObject(&packet, &cursor, &object));
+    REFUSED(0, record, mbm_packet_nextRecord(NULL, &cursor, &record));
+    REFUSED(0, object, mbm_packet_nextObject(NULL, &cursor, &object));
+    IS(0, mbm_packet_nextRecord(&packet, NULL, &record));
+    IS(0, mbm_packet_nextRecord(&packet, &cursor, NULL));
+    IS(0, mbm_packet_nextObject(&packet, NULL, &object));
+    IS(0, mbm_packet_nextObject(&packet, &cursor, NULL));
+    assert_int_equal(cursor, 5);
+}
+
+static void records_are_added_within_their_limits(void **state)
+{
+    static const uint8_t words[300];
+    uint8_t storage[251];
+    mbm_packet packet = {.kind = MBM_PACKET_REQUEST, .function = MBM_FC_WRITE_FILE_RECORD};
+    mbm_record record = {.data = words, .file = 1, .record = 9999, .length = 1};
+
+    (void)state;
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, NULL, 251, &record));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, storage, 251, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_addRecord(NULL, storage, 251, &record));
+    packet.function = MBM_FC_READ_COILS;
+    REFUSED(MBM_ILLEGAL_FUNCTION, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
+    packet.function = MBM_FC_WRITE_FILE_RECORD;
+    packet.kind = MBM_PACKET_EXCEPTION;
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
+    packet.kind = MBM_PACKET_REQUEST;
+    record.file = 0;
+    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
+    record.file = 1;
+    record.record = 10000;
+    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
+    record.record = 9999;
+    record.data = storage + 10;
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
+    record.data = words;
+    REFUSED(MBM_BUFFER_TOO_SMALL, packet, mbm_packet_addRecord(&packet, storage, 8, &record));
+    OK(mbm_packet_addRecord(&packet, storage, 9, &record));
+    assert_int_equal(packet.dataLength, 9);
+    assert_ptr_equal(packet.data, storage);
+    packet.data = words;
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
+    /* As many as fit into a frame: 27 of one register, and 251 bytes are enough. */
+    packet.data = storage;
+    while (mbm_packet_addRecord(&packet, storage, sizeof storage, &record) == MBM_OK)
+        assert_in_range(packet.dataLength, 18, 251);
+    assert_int_equal(packet.dataLength, 27 * 9);
+}
+
+static void objects_are_added_within_their_limits(void **state)
+{
+    static const uint8_t value[] = "value";
+    uint8_t storage[246];
+    mbm_packet packet = {.kind = MBM_PACKET_RESPONSE,
+                         .function = MBM_FC_ENCAPSULATED_INTERFACE,
+                         .meiType = MBM_MEI_READ_DEVICE_IDENTIFICATION};
+    mbm_object object = {.data = value, .length = 5, .id = 0x80};
+
+    (void)state;
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, NULL, 246, &object));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, storage, 246, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_addObject(NULL, storage, 246, &object));
+    packet.meiType = MBM_MEI_CANOPEN;
+    REFUSED(MBM_ILLEGAL_FUNCTION, packet, mbm_packet_addObject(&packet, storage, 246, &object));
+    packet.meiType = MBM_MEI_READ_DEVICE_IDENTIFICATION;
+    packet.kind = MBM_PACKET_REQUEST;
+    REFUSED(MBM_ILLEGAL_FUNCTION, packet, mbm_packet_addObject(&packet, storage, 246, &object));
+    packet.kind = MBM_PACKET_RESPONSE;
+    object.data = storage;
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, storage, 246, &object));
+    object.data = value;
+    REFUSED(MBM_BUFFER_TOO_SMALL, packet, mbm_packet_addObject(&packet, storage, 6, &object));
+    OK(mbm_packet_addObject(&packet, storage, 7, &object));
+    assert_int_equal(packet.dataLength, 7);
+    assert_int_equal(packet.objectCount, 1);
+    packet.data = value;
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, storage, 246, &object));
+    packet.data = storage;
+    while (mbm_packet_addObject(&packet, storage, sizeof storage, &object) == MBM_OK)
+        assert_in_range(packet.dataLength, 14, 246);
+    assert_int_equal(packet.objectCount, 35);
+    REFUSED(MBM_BUFFER_TOO_SMALL, packet,
+            mbm_packet_addObject(&packet, storage, sizeof storage, &object));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_archive_is_that_of_the_header),
+        cmocka_unit_test(every_number_has_a_text),
+        cmocka_unit_test(a_request_that_was_refused_here_is_no_exception_of_the_device),
+        cmocka_unit_test(the_longest_frames_fit_into_the_buffers_that_are_named),
+        cmocka_unit_test(a_frame_is_never_built_malformed),
+        cmocka_unit_test(every_null_is_refused),
+        cmocka_unit_test(an_exception_has_the_length_and_the_codes_that_are_named),
+        cmocka_unit_test(a_listen_only_request_has_no_reply),
+        cmocka_unit_test(a_frame_that_does_not_hold_fills_in_what_is_known),
+        cmocka_unit_test(bytes_look_like_tcp_from_the_eighth_on),
+        cmocka_unit_test(the_first_bytes_may_be_none),
+        cmocka_unit_test(the_checksums_of_nothing_are_their_start),
+        cmocka_unit_test(no_text_of_a_frame_is_longer_than_its_comment_says),
+        cmocka_unit_test(the_longest_text_of_an_event_fits_too),
+        cmocka_unit_test(packets_without_records_or_objects_have_none),
+        cmocka_unit_test(records_are_added_within_their_limits),
+        cmocka_unit_test(objects_are_added_within_their_limits),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,450 @@
+/* Each function of the master is held to its comment in mbm.h: results, limits, defaults.
+ * test_bad_input calls each with NULL and with an object that was never begun. */
+#include "crc.h"
+#include "hooked_port.h"
+#include "mbm.h"
+#include "test.h"
+
+#include <string.h>
+
+#include "refused.h"
+
+enum { RESPONSE = 125, TRANSMIT = 123 };
+
+static hooked_port wire;
+static mbm_port port;
+static mbm_master m;
+static uint16_t response[RESPONSE], transmit[TRANSMIT];
+static uint8_t frame[MBM_MAX_FRAME];
+
+static int setup(void **state)
+{
+    (void)state;
+    memset(&wire, 0, sizeof wire);
+    memset(&m, 0, sizeof m);
+    memset(response, 0x55, sizeof response);
+    memset(transmit, 0x55, sizeof transmit);
+    port = hooked_port_of(&wire);
+    OK(mbm_master_beginRtu(&m, 17, &port));
+    OK(mbm_master_setBuffers(&m, response, RESPONSE, transmit, TRANSMIT, frame, sizeof frame));
+    OK(mbm_master_setBlocking(&m, 0));
+    return 0;
+}
+
+/* Polls until the request has ended, and lets the time of pollDelay pass. */
+static uint8_t run(void)
+{
+    uint8_t status;
+
+    while ((status = mbm_master_poll(&m)) == MBM_PENDING)
+        wire.now += mbm_master_pollDelay(&m) + 1;
+    return status;
+}
+
+/* --- requests --- */
+
+typedef uint8_t (*request)(uint16_t address, uint16_t quantity);
+
+static uint8_t write_coils(uint16_t address, uint16_t quantity)
+{
+    return mbm_master_writeMultipleCoils(&m, address, quantity);
+}
+
+static uint8_t write_registers(uint16_t address, uint16_t quantity)
+{
+    return mbm_master_writeMultipleRegisters(&m, address, quantity);
+}
+
+static uint8_t read_coils(uint16_t address, uint16_t quantity)
+{
+    return mbm_master_readCoils(&m, address, quantity);
+}
+
+static uint8_t read_inputs(uint16_t address, uint16_t quantity)
+{
+    return mbm_master_readDiscreteInputs(&m, address, quantity);
+}
+
+static uint8_t read_holding(uint16_t address, uint16_t quantity)
+{
+    return mbm_master_readHoldingRegisters(&m, address, quantity);
+}
+
+static uint8_t read_input(uint16_t address, uint16_t quantity)
+{
+    return mbm_master_readInputRegisters(&m, address, quantity);
+}
+
+static uint8_t read_of_both(uint16_t address, uint16_t quantity)
+{
+    return mbm_master_readWriteMultipleRegisters(&m, address, quantity, 0, 1);
+}
+
+static uint8_t write_of_both(uint16_t address, uint16_t quantity)
+{
+    return mbm_master_readWriteMultipleRegisters(&m, 0, 1, address, quantity);
+}
+
+static uint8_t read_queued(uint16_t address, uint16_t quantity)
+{
+    OK(mbm_master_beginTransmission(&m, 0));
+    OK(mbm_master_send(&m, 1));
+    return mbm_master_readWriteQueuedRegisters(&m, address, quantity);
+}
+
+static uint8_t write_queued(uint16_t address, uint16_t quantity)
+{
+    OK(mbm_master_beginTransmission(&m, address));
+    while (quantity-- > 0)
+        if (mbm_master_send(&m, quantity) != MBM_OK)
+            return MBM_ILLEGAL_DATA_VALUE; /* the buffer ends where the function does */
+    return mbm_master_writeQueuedRegisters(&m);
+}
+
+static uint8_t write_queued_coils(uint16_t address, uint16_t quantity)
+{
+    OK(mbm_master_beginTransmission(&m, address));
+    while (quantity-- > 0)
+        if (mbm_master_sendBit(&m, 1) != MBM_OK)
+            return MBM_ILLEGAL_DATA_VALUE;
+    return mbm_master_writeQueuedCoils(&m);
+}
+
+static const struct {
+    request call;
+    uint16_t most;
+} requests[] = {{read_coils, 2000},       {read_inputs, 2000},       {read_holding, 125},
+                {read_input, 125},        {write_coils, 1968},       {write_registers, 123},
+                {read_of_both, 125},      {write_of_both, 121},      {read_queued, 125},
+                {write_queued, TRANSMIT}, {write_queued_coils, 1968}};
+
+static void a_quantity_and_an_address_have_the_limits_of_the_header(void **state)
+{
+    unsigned i, nth;
+
+    for (i = 0; i < COUNT(requests); i++) {
+        uint16_t most = requests[i].most;
+        const struct {
+            uint16_t address, quantity;
+            uint8_t status;
+        } rows[] = {{0, 1, MBM_PENDING},
+                    {0, most, MBM_PENDING},
+                    {(uint16_t)(65536 - most), most, MBM_PENDING},
+                    {65535, 1, MBM_PENDING},
+                    {0, 0, MBM_ILLEGAL_DATA_VALUE},
+                    {0, (uint16_t)(most + 1), MBM_ILLEGAL_DATA_VALUE},
+                    {0, 65535, MBM_ILLEGAL_DATA_VALUE},
+                    {65535, 2, MBM_ILLEGAL_DATA_ADDRESS},
+                    {(uint16_t)(65537 - most), most, MBM_ILLEGAL_DATA_ADDRESS}};
+
+        for (nth = 0; nth < COUNT(rows); nth++) {
+            setup(state);
+            IS(rows[nth].status, requests[i].call(rows[nth].address, rows[nth].quantity));
+            if (rows[nth].status == MBM_PENDING) {
+                IS(MBM_RESPONSE_TIMED_OUT, run());
+                assert_in_range(wire.length, 8, MBM_MAX_FRAME);
+            } else {
+                assert_int_equal(wire.length, 0);
+                assert_int_equal(mbm_master_getExceptionCode(&m), 0);
+                assert_int_equal(response[0], 0x5555);
+                assert_int_equal(mbm_master_pollDelay(&m), 0xFFFFFFFF);
+            }
+        }
+    }
+}
+
+static void single_writes_store_their_arguments(void **state)
+{
+    (void)state;
+    IS(MBM_PENDING, mbm_master_writeSingleRegister(&m, 65535, 0x1234));
+    assert_int_equal(transmit[0], 0x1234);
+    OK(mbm_master_cancel(&m));
+    IS(MBM_PENDING, mbm_master_maskWriteRegister(&m, 65535, 0x0F0F, 0xF0F0));
+    assert_true(transmit[0] == 0x0F0F && transmit[1] == 0xF0F0);
+    OK(mbm_master_cancel(&m));
+    IS(MBM_PENDING, mbm_master_writeSingleCoil(&m, 65535, 77));
+    IS(MBM_RESPONSE_TIMED_OUT, run());
+    assert_int_equal(wire.sent[4], 0xFF);
+}
+
+static void requests_that_read_are_not_broadcast(void **state)
+{
+    (void)state;
+    OK(mbm_master_setSlaveID(&m, 0));
+    IS(MBM_BROADCAST_NOT_ALLOWED, read_coils(0, 1));
+    IS(MBM_BROADCAST_NOT_ALLOWED, read_inputs(0, 1));
+    IS(MBM_BROADCAST_NOT_ALLOWED, read_holding(0, 1));
+    IS(MBM_BROADCAST_NOT_ALLOWED, read_input(0, 1));
+    IS(MBM_BROADCAST_NOT_ALLOWED, read_of_both(0, 1));
+    IS(MBM_BROADCAST_NOT_ALLOWED, mbm_master_status(&m));
+    assert_int_equal(mbm_master_requestFrom(&m, 0, 1), 0);
+    assert_int_equal(wire.length, 0);
+    IS(MBM_PENDING, write_coils(0, 1));
+    OK(run());
+    IS(MBM_PENDING, mbm_master_maskWriteRegister(&m, 0, 1, 1));
+    OK(run());
+}
+
+/* --- words --- */
+
+static void words_end_where_their_buffers_end(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    OK(mbm_master_setTransmitBuffer(&m, TRANSMIT - 1, 7));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_setTransmitBuffer(&m, TRANSMIT, 7));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_setTransmitBuffer(&m, 255, 7));
+    assert_int_equal(transmit[TRANSMIT - 1], 7);
+    assert_int_equal(mbm_master_getResponseBuffer(&m, RESPONSE - 1), 0x5555);
+    assert_int_equal(mbm_master_getResponseBuffer(&m, RESPONSE), 0xFFFF);
+    assert_int_equal(mbm_master_getResponseBuffer(&m, 255), 0xFFFF);
+    assert_int_equal(mbm_master_available(&m), 0);
+    assert_int_equal(mbm_master_receive(&m), 0xFFFF);
+    OK(mbm_master_clearTransmitBuffer(&m));
+    OK(mbm_master_clearResponseBuffer(&m));
+    for (i = 0; i < TRANSMIT; i++)
+        assert_true(transmit[i] == 0 && response[i] == 0);
+    for (i = 0; i + 1 < TRANSMIT; i++)
+        OK(mbm_master_send(&m, (uint16_t)i));
+    /* Only the low word fits. */
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_send32(&m, 0xAAAABBBB));
+    assert_int_equal(transmit[TRANSMIT - 1], 0xBBBB);
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_send(&m, 1));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_sendBit(&m, 1));
+    OK(mbm_master_beginTransmission(&m, 9));
+    OK(mbm_master_sendBit(&m, 1));
+    OK(mbm_master_send(&m, 5)); /* after a word with bits */
+    assert_true((transmit[0] & 1) == 1 && transmit[1] == 5);
+}
+
+static void the_words_of_a_read_are_received_once(void **state)
+{
+    (void)state;
+    IS(MBM_PENDING, read_holding(0, 2));
+    while (wire.length == 0) {
+        IS(MBM_PENDING, mbm_master_poll(&m));
+        wire.now += 100;
+    }
+    hooked_port_arrive_rtu(&wire, 17, "\3\4\1\2\3\4", 6);
+    OK(run());
+    assert_int_equal(mbm_master_available(&m), 2);
+    assert_int_equal(mbm_master_receive(&m), 0x0102);
+    assert_int_equal(mbm_master_receive(&m), 0x0304);
+    assert_int_equal(mbm_master_receive(&m), 0xFFFF);
+    assert_int_equal(mbm_master_available(&m), 0);
+    assert_int_equal(response[2], 0x5555);
+}
+
+/* --- begin, buffers, turns, views --- */
+
+static void a_begin_is_refused_without_a_change(void **state)
+{
+    mbm_port lacking = port;
+
+    (void)state;
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtu(&m, 1, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtuWith(&m, 1, NULL, &wire));
+    lacking.read = NULL;
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtu(&m, 1, &lacking));
+    lacking = port;
+    lacking.write = NULL;
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtuWith(&m, 1, &lacking, &wire));
+    lacking = port;
+    lacking.micros = NULL;
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtu(&m, 1, &lacking));
+#define BUFFERS(status, r, rs, t, ts, f, fs)                                                       \
+    REFUSED(status, m, mbm_master_setBuffers(&m, r, rs, t, ts, f, fs))
+    BUFFERS(MBM_INVALID_ARGUMENT, NULL, 1, transmit, 1, frame, 8);
+    BUFFERS(MBM_INVALID_ARGUMENT, response, 1, NULL, 1, frame, 8);
+    BUFFERS(MBM_INVALID_ARGUMENT, response, 1, transmit, 1, NULL, 8);
+    BUFFERS(MBM_INVALID_ARGUMENT, response, 1, transmit, 1, frame, 7);
+    BUFFERS(MBM_INVALID_ARGUMENT, response, 256, transmit, 1, frame, 8);
+    BUFFERS(MBM_INVALID_ARGUMENT, response, 1, transmit, 256, frame, 8);
+    IS(MBM_PENDING, read_holding(0, 1));
+    BUFFERS(MBM_BUSY, response, 1, transmit, 1, frame, 8);
+    OK(mbm_master_cancel(&m));
+    OK(mbm_master_setBuffers(&m, NULL, 0, NULL, 0, frame, 8));
+    IS(MBM_ILLEGAL_DATA_VALUE, write_registers(0, 1));
+}
+
+static void what_begin_keeps_and_drops(void **state)
+{
+    (void)state;
+    OK(mbm_master_setRetries(&m, 3));
+    OK(mbm_master_send(&m, 0x77));
+    IS(MBM_PENDING, read_holding(0, 1));
+    OK(mbm_master_beginRtuWith(&m, 255, &port, &wire));
+    IS(MBM_CANCELLED, mbm_master_status(&m));
+    IS(MBM_CANCELLED, mbm_master_poll(&m));
+    assert_int_equal(mbm_master_getSlaveID(&m), 255);
+    assert_int_equal(mbm_master_getRetries(&m), 3);
+    assert_int_equal(transmit[0], 0x77);
+    /* The queue is empty. */
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_master_writeQueuedRegisters(&m));
+}
+
+static void turns_and_views_check_their_arguments(void **state)
+{
+    static mbm_turn turn;
+    static mbm_master other;
+    static uint8_t own_frame[8];
+    mbm_registers view;
+
+    (void)state;
+    memset(&turn, 0, sizeof turn);
+    memset(&other, 0, sizeof other);
+    memset(&view, 0x77, sizeof view);
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_takeTurn(&m, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_endTurn(&m, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, turn, mbm_master_takeTurn(NULL, &turn));
+    REFUSED(MBM_NOT_INITIALISED, turn, mbm_master_takeTurn(&other, &turn));
+    OK(mbm_master_setBuffers(&other, NULL, 0, NULL, 0, own_frame, 8));
+    OK(mbm_master_takeTurn(&m, &turn));
+    IS(MBM_PENDING, read_holding(0, 1));
+    REFUSED(MBM_BUSY, turn, mbm_master_takeTurn(&other, &turn));
+    OK(mbm_master_cancel(&m));
+    OK(mbm_master_takeTurn(&other, &turn));
+    REFUSED(MBM_OK, turn, mbm_master_endTurn(&m, &turn)); /* it does not have the turn */
+    OK(mbm_master_endTurn(&other, &turn));
+    assert_null(turn.master);
+    REFUSED(MBM_INVALID_ARGUMENT, view, mbm_master_getResponseRegisters(NULL, 0, &view));
+    REFUSED(MBM_INVALID_ARGUMENT, view, mbm_master_getTransmitRegisters(NULL, 0, &view));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_getResponseRegisters(&m, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_getTransmitRegisters(&m, 0, NULL));
+    OK(mbm_master_getResponseRegisters(&m, 40, &view));
+    assert_true(view.data == response && view.first == 40 && view.count == RESPONSE);
+    OK(mbm_master_getTransmitRegisters(&m, 41, &view));
+    assert_true(view.data == transmit && view.first == 41 && view.count == TRANSMIT);
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setWordOrder(&m, 5));
+}
+
+/* --- settings --- */
+
+static void settings_have_the_defaults_and_ranges_of_the_header(void **state)
+{
+    static mbm_counters counters;
+
+    (void)state;
+    memset(&m, 0, sizeof m);
+    OK(mbm_master_beginRtu(&m, 1, &port));
+    assert_int_equal(mbm_master_getResponseTimeout(&m), 2000);
+    assert_int_equal(mbm_master_getTurnaroundDelay(&m), 100);
+    assert_int_equal(mbm_master_getQuietTime(&m), 100);
+    assert_int_equal(mbm_master_getGap(&m), 4000);
+    assert_int_equal(mbm_master_getRetries(&m), 0);
+    assert_int_equal(mbm_master_getEchoDiscard(&m), 0);
+    assert_int_equal(mbm_master_getLenient(&m), 0);
+    assert_int_equal(mbm_master_getPostFlushHold(&m), 0);
+    assert_int_equal(mbm_master_getBlocking(&m), 1);
+    assert_int_equal(mbm_master_getWordOrder(&m), MBM_ORDER_ABCD);
+    OK(mbm_master_setGap(&m, 0xFFFFFFFF));
+    assert_int_equal(mbm_master_getGap(&m), 0x80000000);
+    OK(mbm_master_setBaudRate(&m, 19200));
+    assert_int_equal(mbm_master_getGap(&m), 2006);
+    OK(mbm_master_setBaudRate(&m, 0));
+    assert_int_equal(mbm_master_getGap(&m), 4000);
+    OK(mbm_master_setRetries(&m, 255));
+    assert_int_equal(mbm_master_getRetries(&m), 255);
+    OK(mbm_master_setPostFlushHold(&m, 255));
+    assert_int_equal(mbm_master_getPostFlushHold(&m), 255);
+    OK(mbm_master_setEchoDiscard(&m, 1));
+    assert_int_equal(mbm_master_getEchoDiscard(&m), 1);
+    OK(mbm_master_setLenient(&m, 1));
+    assert_int_equal(mbm_master_getLenient(&m), 1);
+    OK(mbm_master_setCounters(&m, &counters));
+    OK(mbm_master_setCounters(&m, NULL));
+    OK(mbm_master_lineUsed(&m));
+    OK(mbm_master_lineUsedAt(&m, 5));
+}
+
+static void lenient_is_refused_while_a_request_is_under_way(void **state)
+{
+    (void)state;
+    IS(MBM_PENDING, read_holding(0, 1));
+    REFUSED(MBM_BUSY, m, mbm_master_setLenient(&m, 1));
+    REFUSED(MBM_BUSY, m, mbm_master_readHoldingRegisters(&m, 0, 1));
+    assert_int_equal(mbm_master_requestFrom(&m, 0, 1), 0);
+}
+
+/* --- the response timeout --- */
+
+/* Sends 123 registers, lets the device answer so many milliseconds later, and returns the
+ * status. */
+static uint8_t answered_after(uint32_t ms)
+{
+    uint32_t sent;
+
+    wire.length = 0;
+    IS(MBM_PENDING, write_registers(0, 123));
+    while (wire.length < 255) {
+        IS(MBM_PENDING, mbm_master_poll(&m));
+        wire.now += 100;
+    }
+    sent = wire.now;
+    while (wire.now - sent < 1000 * ms) {
+        uint32_t delay = mbm_master_pollDelay(&m), left = sent + 1000 * ms - wire.now;
+        uint8_t status = mbm_master_poll(&m);
+
+        if (status != MBM_PENDING)
+            return status;
+        wire.now += delay < left ? delay + 1 : left;
+    }
+    hooked_port_arrive_rtu(&wire, 17, "\x10\0\0\0\x7B", 5);
+    return run();
+}
+
+static void without_flush_a_timeout_counts_from_when_the_request_is_sent(void **state)
+{
+    (void)state;
+    port.flush = NULL;
+    OK(mbm_master_beginRtu(&m, 17, &port));
+    OK(mbm_master_setBaudRate(&m, 1200));
+    /* 255 characters of 11 bits take 2337 ms, the timeout is 2000 ms. */
+    OK(answered_after(2400));
+    OK(answered_after(4300));
+    IS(MBM_RESPONSE_TIMED_OUT, answered_after(4400));
+}
+
+static void a_port_that_knows_when_the_request_is_sent_adds_nothing(void **state)
+{
+    (void)state;
+    OK(mbm_master_setBaudRate(&m, 1200));
+    OK(answered_after(1990));
+    IS(MBM_RESPONSE_TIMED_OUT, answered_after(2010));
+}
+
+static void without_a_baud_rate_nothing_is_added(void **state)
+{
+    (void)state;
+    port.flush = NULL;
+    OK(mbm_master_beginRtu(&m, 17, &port));
+    OK(answered_after(1990));
+    IS(MBM_RESPONSE_TIMED_OUT, answered_after(2010));
+    OK(mbm_master_setBaudRate(&m, 1200));
+    OK(mbm_master_setBaudRate(&m, 0));
+    IS(MBM_RESPONSE_TIMED_OUT, answered_after(2010));
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, setup)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_quantity_and_an_address_have_the_limits_of_the_header),
+        TEST(single_writes_store_their_arguments),
+        TEST(requests_that_read_are_not_broadcast),
+        TEST(words_end_where_their_buffers_end),
+        TEST(the_words_of_a_read_are_received_once),
+        TEST(a_begin_is_refused_without_a_change),
+        TEST(what_begin_keeps_and_drops),
+        TEST(turns_and_views_check_their_arguments),
+        TEST(settings_have_the_defaults_and_ranges_of_the_header),
+        TEST(lenient_is_refused_while_a_request_is_under_way),
+        TEST(without_flush_a_timeout_counts_from_when_the_request_is_sent),
+        TEST(a_port_that_knows_when_the_request_is_sent_adds_nothing),
+        TEST(without_a_baud_rate_nothing_is_added),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,134 @@
+/* Each function of the ring is held to its comment in mbm.h: results, limits, NULL. */
+#include "mbm.h"
+#include "test.h"
+
+#include <string.h>
+
+#include "refused.h"
+
+static mbm_ring ring;
+static uint8_t storage[65535];
+
+static int setup(void **state)
+{
+    (void)state;
+    memset(&ring, 0, sizeof ring);
+    return 0;
+}
+
+static void a_ring_that_was_never_begun_is_empty_and_takes_nothing(void **state)
+{
+    uint8_t bytes[4] = {1, 2, 3, 4};
+    mbm_ring *rings[] = {&ring, NULL};
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rings); i++) {
+        assert_int_equal(mbm_ring_put(rings[i], 1), 0);
+        assert_int_equal(mbm_ring_write(rings[i], bytes, 4), 0);
+        assert_int_equal(mbm_ring_read(rings[i], bytes, 4), 0);
+        assert_int_equal(mbm_ring_available(rings[i]), 0);
+        assert_int_equal(mbm_ring_lost(rings[i]), 0);
+        mbm_ring_clear(rings[i]);
+    }
+    assert_int_equal(bytes[0], 1);
+}
+
+static void a_refused_begin_changes_nothing(void **state)
+{
+    (void)state;
+    OK(mbm_ring_begin(&ring, storage, 8));
+    mbm_ring_put(&ring, 5);
+    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, NULL, 8));
+    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, storage, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, storage, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_ring_begin(NULL, storage, 8));
+    assert_int_equal(mbm_ring_available(&ring), 1);
+}
+
+static void a_ring_holds_one_byte_less_than_its_storage(void **state)
+{
+    static const uint16_t sizes[] = {2, 3, 255, 256, 257, 65535};
+    static uint8_t bytes[65535], back[65535];
+    unsigned i, at;
+
+    (void)state;
+    for (at = 0; at < sizeof bytes; at++)
+        bytes[at] = (uint8_t)(7 * at);
+    for (i = 0; i < COUNT(sizes); i++) {
+        uint16_t holds = (uint16_t)(sizes[i] - 1);
+
+        OK(mbm_ring_begin(&ring, storage, sizes[i]));
+        assert_int_equal(mbm_ring_available(&ring), 0);
+        assert_int_equal(mbm_ring_write(&ring, bytes, sizes[i]), holds);
+        assert_int_equal(mbm_ring_available(&ring), holds);
+        assert_int_equal(mbm_ring_lost(&ring), 1);
+        assert_int_equal(mbm_ring_put(&ring, 1), 0);
+        assert_int_equal(mbm_ring_lost(&ring), 2);
+        assert_int_equal(mbm_ring_read(&ring, back, 1), 1);
+        assert_int_equal(mbm_ring_put(&ring, 0xAB), 1);
+        assert_int_equal(mbm_ring_read(&ring, back + 1, 65534), holds);
+        assert_memory_equal(back, bytes, holds);
+        assert_int_equal(back[holds], 0xAB);
+        assert_int_equal(mbm_ring_lost(&ring), 2);
+    }
+}
+
+static void no_bytes_may_be_null(void **state)
+{
+    (void)state;
+    OK(mbm_ring_begin(&ring, storage, 4));
+    assert_int_equal(mbm_ring_write(&ring, NULL, 0), 0);
+    mbm_ring_put(&ring, 1);
+    assert_int_equal(mbm_ring_read(&ring, NULL, 0), 0);
+    assert_int_equal(mbm_ring_available(&ring), 1);
+    assert_int_equal(mbm_ring_lost(&ring), 0);
+}
+
+static void a_cleared_ring_is_empty_and_goes_on_counting(void **state)
+{
+    uint8_t byte = 0;
+
+    (void)state;
+    OK(mbm_ring_begin(&ring, storage, 2));
+    mbm_ring_put(&ring, 1);
+    mbm_ring_put(&ring, 2);
+    mbm_ring_clear(&ring);
+    assert_int_equal(mbm_ring_available(&ring), 0);
+    assert_int_equal(mbm_ring_lost(&ring), 1);
+    assert_int_equal(mbm_ring_put(&ring, 3), 1);
+    assert_int_equal(mbm_ring_read(&ring, &byte, 1), 1);
+    assert_int_equal(byte, 3);
+    OK(mbm_ring_begin(&ring, storage, 2));
+    assert_int_equal(mbm_ring_lost(&ring), 0);
+}
+
+static void the_count_of_lost_bytes_wraps_at_65536(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    OK(mbm_ring_begin(&ring, storage, 2));
+    mbm_ring_put(&ring, 1);
+    for (i = 0; i < 65535; i++)
+        assert_int_equal(mbm_ring_put(&ring, 2), 0);
+    assert_int_equal(mbm_ring_lost(&ring), 65535);
+    mbm_ring_put(&ring, 2);
+    assert_int_equal(mbm_ring_lost(&ring), 0);
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, setup)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_ring_that_was_never_begun_is_empty_and_takes_nothing),
+        TEST(a_refused_begin_changes_nothing),
+        TEST(a_ring_holds_one_byte_less_than_its_storage),
+        TEST(no_bytes_may_be_null),
+        TEST(a_cleared_ring_is_empty_and_goes_on_counting),
+        TEST(the_count_of_lost_bytes_wraps_at_65536),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,384 @@
+/* Each function for registers and bits is held to its comment in mbm.h: results, limits, NULL. */
+#include "mbm.h"
+#include "test.h"
+
+#include <string.h>
+
+#include "refused.h"
+
+enum { FIRST = 65530, WORDS = 6, VALUE = 0x5A };
+
+static uint16_t words[WORDS];
+static mbm_registers r;
+
+/* A value of any type, large enough for each. */
+static union {
+    uint8_t bytes[16];
+    uint16_t uint16;
+    uint32_t uint32;
+    uint64_t uint64;
+    float single;
+    double wide;
+    char text[16];
+} value;
+
+static int setup(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < WORDS; i++)
+        words[i] = (uint16_t)(0x4142 + 0x0202 * i);
+    memset(&value, VALUE, sizeof value);
+    return mbm_registers_intoWords(&r, words, WORDS, FIRST);
+}
+
+/* A function that gets or sets values of so many registers, at an address, in an order. */
+typedef struct accessor {
+    const char *name;
+    uint8_t (*call)(const mbm_registers *registers, uint16_t address, uint8_t order);
+    uint8_t (*null)(const mbm_registers *registers);
+    uint16_t registers;
+    uint8_t has_order, sets;
+} accessor;
+
+#define GETS(name, with_value, with_null)                                                          \
+    static uint8_t call_##name(const mbm_registers *v, uint16_t address, uint8_t order)            \
+    {                                                                                              \
+        (void)order;                                                                               \
+        return mbm_registers_##name with_value;                                                    \
+    }                                                                                              \
+    static uint8_t null_##name(const mbm_registers *v)                                             \
+    {                                                                                              \
+        return mbm_registers_##name with_null;                                                     \
+    }
+
+GETS(getBit, (v, address, 15, value.bytes), (v, FIRST, 15, NULL))
+GETS(getUint8, (v, address, 1, value.bytes), (v, FIRST, 0, NULL))
+GETS(getUint16, (v, address, order, &value.uint16), (v, FIRST, 0, NULL))
+GETS(getUint32, (v, address, order, &value.uint32), (v, FIRST, 0, NULL))
+GETS(getUint64, (v, address, order, &value.uint64), (v, FIRST, 0, NULL))
+GETS(getFloat, (v, address, order, &value.single), (v, FIRST, 0, NULL))
+GETS(getDouble, (v, address, order, &value.wide), (v, FIRST, 0, NULL))
+GETS(getString, (v, address, 5, order, value.text, 6), (v, FIRST, 5, 0, NULL, 6))
+GETS(getBytes, (v, address, order, value.bytes, 5), (v, FIRST, 0, NULL, 5))
+GETS(isEqual, (v, address, value.bytes + 1, 5, value.bytes), (v, FIRST, NULL, 5, value.bytes))
+GETS(setBit, (v, address, 15, 1), (NULL, FIRST, 15, v != NULL))
+GETS(setUint8, (v, address, 1, 9), (NULL, FIRST, 0, v != NULL))
+GETS(setUint16, (v, address, order, 9), (NULL, FIRST, 0, v != NULL))
+GETS(setUint32, (v, address, order, 9), (NULL, FIRST, 0, v != NULL))
+GETS(setUint64, (v, address, order, &value.uint64), (v, FIRST, 0, NULL))
+GETS(setFloat, (v, address, order, &value.single), (v, FIRST, 0, NULL))
+GETS(setDouble, (v, address, order, &value.wide), (v, FIRST, 0, NULL))
+GETS(setString, (v, address, 5, order, "text"), (v, FIRST, 5, 0, NULL))
+GETS(setBytes, (v, address, order, value.bytes, 5), (v, FIRST, 0, NULL, 5))
+
+#define ROW(name, count, has_order, sets)                                                          \
+    {                                                                                              \
+#name, call_##name, null_##name, count, has_order, sets                                    \
+    }
+
+static const accessor accessors[] = {
+    ROW(getBit, 1, 0, 0),    ROW(getUint8, 1, 0, 0),  ROW(getUint16, 1, 1, 0),
+    ROW(getUint32, 2, 1, 0), ROW(getUint64, 4, 1, 0), ROW(getFloat, 2, 1, 0),
+    ROW(getDouble, 4, 1, 0), ROW(getString, 3, 1, 0), ROW(getBytes, 3, 1, 0),
+    ROW(isEqual, 3, 0, 0),   ROW(setBit, 1, 0, 1),    ROW(setUint8, 1, 0, 1),
+    ROW(setUint16, 1, 1, 1), ROW(setUint32, 2, 1, 1), ROW(setUint64, 4, 1, 1),
+    ROW(setFloat, 2, 1, 1),  ROW(setDouble, 4, 1, 1), ROW(setString, 3, 1, 1),
+    ROW(setBytes, 3, 1, 1)};
+
+/* Asserts that a call returns a status, and changes neither value, words nor view. */
+#define NOTHING(status, what)                                                                      \
+    do {                                                                                           \
+        uint16_t kept[WORDS];                                                                      \
+        mbm_registers view = r;                                                                    \
+                                                                                                   \
+        memcpy(kept, words, sizeof words);                                                         \
+        REFUSED(status, value, what);                                                              \
+        assert_memory_equal(kept, words, sizeof words);                                            \
+        assert_memory_equal(&view, &r, sizeof r);                                                  \
+    } while (0)
+
+static void values_end_where_the_registers_end(void **state)
+{
+    unsigned i;
+
+    for (i = 0; i < COUNT(accessors); i++) {
+        const accessor *a = &accessors[i];
+        uint16_t last = (uint16_t)(FIRST + WORDS - a->registers);
+
+        setup(state);
+        OK(a->call(&r, FIRST, 0));
+        OK(a->call(&r, last, 0));
+        NOTHING(MBM_ILLEGAL_DATA_ADDRESS, a->call(&r, (uint16_t)(last + 1), 0));
+        NOTHING(MBM_ILLEGAL_DATA_ADDRESS, a->call(&r, FIRST - 1, 0));
+        NOTHING(MBM_ILLEGAL_DATA_ADDRESS, a->call(&r, 0, 0));
+        r.count = (uint16_t)(a->registers - 1);
+        NOTHING(MBM_ILLEGAL_DATA_ADDRESS, a->call(&r, FIRST, 0));
+    }
+}
+
+static void null_and_views_without_data_are_refused(void **state)
+{
+    unsigned i;
+
+    for (i = 0; i < COUNT(accessors); i++) {
+        const accessor *a = &accessors[i];
+
+        setup(state);
+        NOTHING(MBM_INVALID_ARGUMENT, a->call(NULL, FIRST, 0));
+        NOTHING(MBM_INVALID_ARGUMENT, a->null(&r));
+        r.data = NULL;
+        NOTHING(MBM_NOT_INITIALISED, a->call(&r, FIRST, 0));
+    }
+    setup(state);
+    NOTHING(MBM_INVALID_ARGUMENT, mbm_registers_isEqual(&r, FIRST, value.bytes, 5, NULL));
+}
+
+static void only_the_orders_and_kinds_of_the_header_are_accepted(void **state)
+{
+    unsigned i, order, kind;
+
+    for (i = 0; i < COUNT(accessors); i++) {
+        const accessor *a = &accessors[i];
+
+        for (order = 0; order < 256; order++) {
+            setup(state);
+            if (order <= MBM_ORDER_DCBA)
+                OK(a->call(&r, FIRST, (uint8_t)order));
+            else if (a->has_order)
+                NOTHING(MBM_INVALID_ARGUMENT, a->call(&r, FIRST, (uint8_t)order));
+            setup(state);
+            r.order = (uint8_t)order;
+            if (order <= MBM_ORDER_DCBA)
+                OK(a->call(&r, FIRST, 0));
+            else
+                NOTHING(MBM_INVALID_ARGUMENT, a->call(&r, FIRST, 0));
+        }
+        for (kind = 0; kind < 256; kind++) {
+            setup(state);
+            r.kind = (uint8_t)kind;
+            if (kind == MBM_REGISTERS_INTO_WORDS || kind == MBM_REGISTERS_INTO_BYTES ||
+                (!a->sets && (kind == MBM_REGISTERS_OF_WORDS || kind == MBM_REGISTERS_OF_BYTES)))
+                OK(a->call(&r, FIRST, 0));
+            else
+                NOTHING(MBM_INVALID_ARGUMENT, a->call(&r, FIRST, 0));
+        }
+    }
+}
+
+static void a_register_has_sixteen_bits_and_two_bytes(void **state)
+{
+    unsigned bit;
+    uint8_t on;
+
+    (void)state;
+    for (bit = 0; bit < 256; bit++) {
+        if (bit < 16) {
+            words[1] = (uint16_t) ~(1u << bit);
+            OK(mbm_registers_setBit(&r, FIRST + 1, (uint8_t)bit, 200));
+            assert_int_equal(words[1], 0xFFFF);
+            OK(mbm_registers_setBit(&r, FIRST + 1, (uint8_t)bit, 0));
+            assert_int_equal(words[1], (uint16_t) ~(1u << bit));
+            OK(mbm_registers_getBit(&r, FIRST + 1, (uint8_t)bit, &on));
+            assert_int_equal(on, 0);
+        } else {
+            NOTHING(MBM_INVALID_ARGUMENT, mbm_registers_setBit(&r, FIRST + 1, (uint8_t)bit, 1));
+            NOTHING(MBM_INVALID_ARGUMENT,
+                    mbm_registers_getBit(&r, FIRST + 1, (uint8_t)bit, value.bytes));
+        }
+    }
+    OK(mbm_registers_setUint8(&r, FIRST, 0, 0x11));
+    OK(mbm_registers_setUint8(&r, FIRST, 77, 0x22));
+    assert_int_equal(words[0], 0x2211);
+    OK(mbm_registers_getUint8(&r, FIRST, 0, &on));
+    assert_int_equal(on, 0x11);
+    OK(mbm_registers_getUint8(&r, FIRST, 255, &on));
+    assert_int_equal(on, 0x22);
+}
+
+static void a_text_ends_at_its_nul_or_with_its_field(void **state)
+{
+    (void)state;
+    OK(mbm_registers_getString(&r, FIRST, 5, 0, value.text, 6));
+    assert_string_equal(value.text, "ABCDE");
+    NOTHING(MBM_BUFFER_TOO_SMALL, mbm_registers_getString(&r, FIRST, 5, 0, value.text, 5));
+    NOTHING(MBM_BUFFER_TOO_SMALL, mbm_registers_getString(&r, FIRST, 0, 0, value.text, 0));
+    OK(mbm_registers_getString(&r, FIRST, 0, 0, value.text, 1));
+    assert_string_equal(value.text, "");
+    NOTHING(MBM_BUFFER_TOO_SMALL, mbm_registers_setString(&r, FIRST, 5, 0, "longer"));
+    OK(mbm_registers_setString(&r, FIRST, 5, 0, "12345"));
+    /* An odd length: the byte after the field becomes 0 too. */
+    assert_int_equal(words[2], '5' << 8);
+    OK(mbm_registers_setString(&r, FIRST, 6, 0, "ab"));
+    assert_true(words[0] == ('a' << 8 | 'b') && words[1] == 0 && words[2] == 0);
+    OK(mbm_registers_getString(&r, FIRST, 6, 0, value.text, 3));
+    assert_string_equal(value.text, "ab");
+}
+
+static void an_odd_number_of_bytes_leaves_the_other_byte(void **state)
+{
+    static const uint8_t three[] = {1, 2, 3};
+    uint8_t equal = 7;
+
+    (void)state;
+    words[1] = 0xAAAA;
+    OK(mbm_registers_setBytes(&r, FIRST, 0, three, 3));
+    assert_int_equal(words[0], 0x0102);
+    assert_int_equal(words[1], 0x03AA);
+    OK(mbm_registers_isEqual(&r, FIRST, three, 3, &equal));
+    assert_int_equal(equal, 1);
+    r.order = MBM_ORDER_DCBA;
+    OK(mbm_registers_isEqual(&r, FIRST, three, 3, &equal));
+    assert_int_equal(equal, 1);
+    words[1] = 0x04AA;
+    OK(mbm_registers_isEqual(&r, FIRST, three, 3, &equal));
+    assert_int_equal(equal, 0);
+}
+
+/* --- views --- */
+
+static void data_of_no_length_may_be_null(void **state)
+{
+    uint8_t equal = 7;
+
+    (void)state;
+    OK(mbm_registers_isEqual(&r, FIRST, NULL, 0, &equal));
+    assert_int_equal(equal, 1);
+    OK(mbm_registers_getBytes(&r, FIRST, 0, NULL, 0));
+    OK(mbm_registers_setBytes(&r, FIRST, 0, NULL, 0));
+#define EMPTY(view)                                                                                \
+    do {                                                                                           \
+        memset(&r, 0, sizeof r);                                                                   \
+        OK(view);                                                                                  \
+        NOTHING(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getUint16(&r, 5, 0, &value.uint16));       \
+        OK(mbm_registers_isEqual(&r, 5, NULL, 0, &equal));                                         \
+    } while (0)
+    EMPTY(mbm_registers_ofWords(&r, NULL, 0, 5));
+    EMPTY(mbm_registers_ofBytes(&r, NULL, 0, 5));
+    EMPTY(mbm_registers_intoWords(&r, NULL, 0, 5));
+    EMPTY(mbm_registers_intoBytes(&r, NULL, 0, 5));
+    OK(mbm_bits_pack(NULL, 0, NULL, 0));
+    OK(mbm_bits_unpack(NULL, 0, NULL, 0));
+    OK(mbm_bits_packWords(NULL, 0, NULL, 0));
+    OK(mbm_bits_unpackWords(NULL, 0, NULL, 0));
+}
+
+static void a_view_ends_at_address_65535(void **state)
+{
+    static uint8_t bytes[4];
+
+    (void)state;
+#define VIEW(status, call)                                                                         \
+    do {                                                                                           \
+        memset(&r, 0x77, sizeof r);                                                                \
+        IS(status, call);                                                                          \
+        assert_int_equal(r.data == NULL, (status) != MBM_OK);                                      \
+        if ((status) == MBM_OK)                                                                    \
+            assert_int_equal(r.order, MBM_ORDER_ABCD);                                             \
+    } while (0)
+    VIEW(MBM_OK, mbm_registers_ofWords(&r, words, 2, 65534));
+    VIEW(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_ofWords(&r, words, 2, 65535));
+    VIEW(MBM_OK, mbm_registers_intoWords(&r, words, 2, 65534));
+    VIEW(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_intoWords(&r, words, 2, 65535));
+    VIEW(MBM_OK, mbm_registers_ofBytes(&r, bytes, 4, 65534));
+    VIEW(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_ofBytes(&r, bytes, 4, 65535));
+    VIEW(MBM_OK, mbm_registers_intoBytes(&r, bytes, 4, 65534));
+    VIEW(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_intoBytes(&r, bytes, 4, 65535));
+    VIEW(MBM_INVALID_ARGUMENT, mbm_registers_ofBytes(&r, bytes, 3, 0));
+    VIEW(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, bytes, 3, 0));
+    VIEW(MBM_INVALID_ARGUMENT, mbm_registers_ofBytes(&r, NULL, 1, 0));
+    VIEW(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, NULL, 1, 0));
+    VIEW(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(&r, NULL, 1, 0));
+    VIEW(MBM_INVALID_ARGUMENT, mbm_registers_intoWords(&r, NULL, 1, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(NULL, words, 1, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_ofBytes(NULL, bytes, 2, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_intoWords(NULL, words, 1, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(NULL, bytes, 2, 0));
+}
+
+/* --- bits --- */
+
+static void bits_are_packed_from_the_lowest_on(void **state)
+{
+    static const uint8_t coils[] = {1, 0, 200, 0, 0, 0, 0, 0, 0, 1};
+    uint8_t bytes[3] = {0xEE, 0xEE, 0xEE}, back[10];
+    uint16_t wide[2] = {0xEEEE, 0xEEEE};
+
+    (void)state;
+    REFUSED(MBM_BUFFER_TOO_SMALL, bytes, mbm_bits_pack(coils, 10, bytes, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, bytes, mbm_bits_pack(NULL, 10, bytes, 3));
+    IS(MBM_INVALID_ARGUMENT, mbm_bits_pack(coils, 10, NULL, 3));
+    OK(mbm_bits_pack(coils, 10, bytes, 3));
+    assert_true(bytes[0] == 5 && bytes[1] == 2 && bytes[2] == 0xEE);
+    memset(back, 0xEE, sizeof back);
+    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, back, mbm_bits_unpack(bytes, 1, back, 10));
+    REFUSED(MBM_INVALID_ARGUMENT, back, mbm_bits_unpack(NULL, 2, back, 10));
+    IS(MBM_INVALID_ARGUMENT, mbm_bits_unpack(bytes, 2, NULL, 10));
+    OK(mbm_bits_unpack(bytes, 2, back, 10));
+    assert_true(back[0] == 1 && back[1] == 0 && back[2] == 1 && back[9] == 1);
+    REFUSED(MBM_BUFFER_TOO_SMALL, wide, mbm_bits_packWords(coils, 10, wide, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, wide, mbm_bits_packWords(NULL, 10, wide, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_bits_packWords(coils, 10, NULL, 2));
+    OK(mbm_bits_packWords(coils, 10, wide, 2));
+    assert_true(wide[0] == 0x0205 && wide[1] == 0xEEEE);
+    memset(back, 0xEE, sizeof back);
+    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, back, mbm_bits_unpackWords(wide, 0, back, 10));
+    REFUSED(MBM_INVALID_ARGUMENT, back, mbm_bits_unpackWords(NULL, 1, back, 10));
+    IS(MBM_INVALID_ARGUMENT, mbm_bits_unpackWords(wide, 1, NULL, 10));
+    OK(mbm_bits_unpackWords(wide, 1, back, 10));
+    assert_true(back[0] == 1 && back[1] == 0 && back[2] == 1 && back[9] == 1);
+}
+
+static void a_bit_is_found_by_its_address(void **state)
+{
+    uint8_t bytes[2] = {0, 0}, on = 7;
+    uint16_t wide[1] = {0};
+
+    (void)state;
+    OK(mbm_bits_set(bytes, 65526, 10, 65535, 3));
+    assert_true(bytes[0] == 0 && bytes[1] == 2);
+    OK(mbm_bits_isSet(bytes, 65526, 10, 65535, &on));
+    assert_int_equal(on, 1);
+    OK(mbm_bits_setInWords(wide, 65526, 10, 65535, 3));
+    assert_int_equal(wide[0], 0x0200);
+    OK(mbm_bits_isSetInWords(wide, 65526, 10, 65534, &on));
+    assert_int_equal(on, 0);
+#define OUTSIDE(status, first, quantity, address)                                                  \
+    do {                                                                                           \
+        REFUSED(status, bytes, mbm_bits_set(bytes, first, quantity, address, 1));                  \
+        REFUSED(status, wide, mbm_bits_setInWords(wide, first, quantity, address, 1));             \
+        REFUSED(status, on, mbm_bits_isSet(bytes, first, quantity, address, &on));                 \
+        REFUSED(status, on, mbm_bits_isSetInWords(wide, first, quantity, address, &on));           \
+    } while (0)
+    OUTSIDE(MBM_ILLEGAL_DATA_ADDRESS, 10, 10, 9);
+    OUTSIDE(MBM_ILLEGAL_DATA_ADDRESS, 10, 10, 20);
+    OUTSIDE(MBM_ILLEGAL_DATA_ADDRESS, 10, 0, 10);
+    OUTSIDE(MBM_ILLEGAL_DATA_ADDRESS, 65527, 10, 65530);
+    IS(MBM_INVALID_ARGUMENT, mbm_bits_set(NULL, 10, 10, 10, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_bits_setInWords(NULL, 10, 10, 10, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, on, mbm_bits_isSet(NULL, 10, 10, 10, &on));
+    REFUSED(MBM_INVALID_ARGUMENT, on, mbm_bits_isSetInWords(NULL, 10, 10, 10, &on));
+    IS(MBM_INVALID_ARGUMENT, mbm_bits_isSet(bytes, 10, 10, 10, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_bits_isSetInWords(wide, 10, 10, 10, NULL));
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, setup)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(values_end_where_the_registers_end),
+        TEST(null_and_views_without_data_are_refused),
+        TEST(only_the_orders_and_kinds_of_the_header_are_accepted),
+        TEST(a_register_has_sixteen_bits_and_two_bytes),
+        TEST(a_text_ends_at_its_nul_or_with_its_field),
+        TEST(an_odd_number_of_bytes_leaves_the_other_byte),
+        TEST(data_of_no_length_may_be_null),
+        TEST(a_view_ends_at_address_65535),
+        TEST(bits_are_packed_from_the_lowest_on),
+        TEST(a_bit_is_found_by_its_address),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
