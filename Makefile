@@ -6,6 +6,10 @@ BUILD := build
 ARCHIVE := target/release/libmbm.a
 # The same archive, with the code that only firmware runs.
 FIRMWARE_ARCHIVE := $(BUILD)/firmware/libmbm.a
+# The same archive, for tests with the address sanitizer: instrumented, with debug assertions and
+# overflow checks. Optimised less, so that a report names the functions of the source.
+SANITIZED_ARCHIVE := $(BUILD)/sanitized/libmbm.a
+RUST_SANITIZERS := -Zsanitizer=address -Cdebug-assertions -Coverflow-checks -Copt-level=1 -Cdebuginfo=line-tables-only
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
 INCLUDES := -Iinclude -Iexamples/linux -Ic-tests/support -Ic-tests/shim
@@ -41,11 +45,13 @@ archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm
 	@echo "archive: $(ARCHIVE)"
 
 # Phony, because Cargo decides what is out of date.
-.PHONY: $(ARCHIVE) $(FIRMWARE_ARCHIVE)
+.PHONY: $(ARCHIVE) $(FIRMWARE_ARCHIVE) $(SANITIZED_ARCHIVE)
 $(ARCHIVE):
 	@CARGO="$(CARGO)" scripts/archive-host $@
 $(FIRMWARE_ARCHIVE):
 	@CARGO="$(CARGO)" scripts/archive-host $@ --cfg mbm_firmware
+$(SANITIZED_ARCHIVE):
+	@CARGO="$(CARGO)" scripts/archive-host $@ $(RUST_SANITIZERS)
 
 MCUS := $(shell scripts/archive --list)
 .PHONY: archives
@@ -195,6 +201,10 @@ certificates:
 	@scripts/need openssl
 	@scripts/certificates $(BUILD)/certificates
 
+.PHONY: corruption
+corruption: ## Compute which damage CRC-16 lets through; writes docs/reliability.md; REPLIES (40000000)
+	@CARGO="$(CARGO)" REPLIES="$(REPLIES)" scripts/corruption
+
 .PHONY: need-check need-test
 need-check:
 	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools python3
@@ -224,7 +234,7 @@ $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)
 $(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage: | $(BUILD)/$(1)/linux/gateway
 endef
 $(eval $(call variant,plain,gcc,g++,))
-$(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
+$(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS),$(SANITIZED_ARCHIVE)))
 # scripts/coverage builds the archive with counters first. It is not trimmed, so its unwind tables
 # refer to rust_eh_personality, which is defined as 0 because nothing calls it.
 COUNTERS := --coverage -Wl$(comma)-u$(comma)__llvm_profile_runtime -Wl$(comma)--defsym$(comma)rust_eh_personality=0

@@ -20,7 +20,7 @@ use mbm::plan::{group, schedule};
 /// port. The plan then first ends, as by mbm_plan_end, unless the call is refused for NULL, a
 /// count out of range or a client that was never begun.
 ///
-/// @param plan    the object, zeroed before the first call
+/// @param plan    the object; initialised with MBM_INIT before the first call
 /// @param client  the client that sends the reads, begun; the program may use it too, and other
 ///                plans
 /// @param setup   table, limits and storage; it stays valid and as it is until the plan ends
