@@ -228,6 +228,7 @@ $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(pa
 	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
+$(BUILD)/$(1)/test_mqtt_payload: $(BUILD)/$(1)/linux/mqtt_payload.o
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
@@ -250,6 +251,7 @@ $(FIRMWARE_TESTS): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(patsubst c-tests/%.
 	@g++ $(filter %.o,$^) $(FIRMWARE_ARCHIVE) $(LIBS) -o $@
 $(TLS_TESTS:%=$(BUILD)/firmware/%): $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/firmware/%): LIBS += $(TLS_LIBS)
+$(BUILD)/firmware/test_mqtt_payload: $(BUILD)/plain/linux/mqtt_payload.o
 $(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tcp_listener.o $(BUILD)/plain/linux/mbm_tty.o $(call TRACE,plain) $(FIRMWARE_ARCHIVE)
 	@mkdir -p $(@D)
 	@gcc $(filter %.o,$^) $(FIRMWARE_ARCHIVE) -Wl,--gc-sections -o $@
@@ -379,7 +381,7 @@ plan: ## A plan of ten fields at work against a libmodbus server
 	@scripts/demo-plan $(BUILD)/plain
 
 MQTT := $(BUILD)/plain/linux/mqtt_bridge
-$(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fields mqtt_value line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
+$(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fields mqtt_payload mqtt_value line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmosquitto -lcjson -lm -lpthread -o $@
 
 .PHONY: mqtt

@@ -27,6 +27,7 @@ static mbm_tcp_listener listener;
 static mbm_tcp tcps[MANY];
 static int peers[MANY];
 static unsigned peer_count;
+static int taken = -1; /* the listener's spare descriptor, if the test took it away */
 static struct rlimit found;
 static time_t ahead;            /* seconds by which the clock of the port is fast */
 static struct timespec stopped; /* the time at which it stands still, or 0: it runs */
@@ -73,6 +74,9 @@ static int end(void **state)
     for (i = 0; i < peer_count; i++)
         close(peers[i]);
     mbm_tcp_closeListener(&listener);
+    if (taken >= 0)
+        close(taken);
+    taken = -1;
     mbm_tcp_closeSet(&set);
     mbm_tcp_closeSet(&set);
     alarm(0);
@@ -405,7 +409,8 @@ static void of_connections_with_equal_idle_times_the_first_is_closed(void **stat
     assert_int_equal(is_lost(1), 0);
 }
 
-/* Lowers the limit so that the next descriptor would exceed it. */
+/* Takes the listener's spare descriptor away, and lowers the limit so that the next descriptor
+ * would exceed it. */
 static void leave_no_descriptor(void)
 {
     const int next = dup(0);
@@ -413,6 +418,9 @@ static void leave_no_descriptor(void)
 
     assert_true(next >= 0);
     close(next);
+    taken = dup2(0, listener.spare);
+    assert_true(taken > 0);
+    listener.spare = 0;
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
 }
 

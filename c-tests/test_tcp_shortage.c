@@ -156,14 +156,57 @@ static void a_place_is_in_use_until_it_is_closed(void **state)
     assert_int_equal(mbm_tcp_isInUse(&place), 0);
 }
 
-/* Accepts one connection. Two more wait, for which there is no descriptor. */
+/* Accepts one connection. Two more wait, for which there is no descriptor, not even in place of
+ * the listener's spare one. */
 static void accept_one_and_let_two_wait(void)
 {
     connect_some(1);
     assert_int_equal(accept_one(), 0);
     connect_some(2);
-    leave_no_descriptor();
+    limit_descriptors((rlim_t)listener.spare);
     expect_none(EMFILE);
+}
+
+static void a_connection_without_a_descriptor_is_closed_at_once(void **state)
+{
+    unsigned i;
+    char byte;
+
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    connect_some(1);
+    assert_int_equal(accept_one(), 0);
+    connect_some(2);
+    leave_no_descriptor();
+    expect_none(EAGAIN);
+    assert_int_equal(listener.refused, 2);
+    for (i = 1; i < 3; i++)
+        assert_int_equal(read(clients[i], &byte, 1), 0);
+    assert_int_equal(wait_for(1000), 0);
+    exchange_byte(0);
+    /* The spare descriptor is there for the next one, which gets the first free descriptor. */
+    limit_descriptors(found.rlim_cur);
+    connect_some(1);
+    assert_int_equal(accept_one(), 1);
+    connect_some(1);
+    leave_no_descriptor();
+    expect_none(EAGAIN);
+    assert_int_equal(listener.refused, 3);
+    assert_int_equal(read(clients[client_count - 1], &byte, 1), 0);
+}
+
+static void a_flood_without_descriptors_is_closed_in_parts(void **state)
+{
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    connect_some(FLOOD);
+    leave_no_descriptor();
+    expect_none(EAGAIN);
+    assert_int_equal(listener.refused, TURNED_AWAY);
+    assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
+    expect_none(EAGAIN);
+    assert_int_equal(listener.refused, FLOOD);
+    assert_int_equal(wait_for(1000), 0);
 }
 
 static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
@@ -186,16 +229,18 @@ static void a_waiting_connection_is_accepted_once_a_descriptor_is_free(void **st
     (void)state;
     SKIP_WITHOUT_LIMITS();
     accept_one_and_let_two_wait();
-    mbm_tcp_close(&places[0]);
-    assert_int_equal(accept_one(), 0);
-    expect_none(EMFILE);
     limit_descriptors(found.rlim_cur);
     assert_int_equal(accept_one(), 1);
+    assert_int_equal(accept_one(), 2);
     expect_none(EAGAIN);
-    /* The listener ends the wait as before. */
+    assert_int_equal(listener.refused, 0);
+    /* The listener ends the wait as before, and has its spare descriptor. */
+    mbm_tcp_close(&places[0]);
     connect_some(1);
     assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
-    assert_int_equal(accept_one(), 2);
+    leave_no_descriptor();
+    expect_none(EAGAIN);
+    assert_int_equal(listener.refused, 1);
 }
 
 static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
@@ -208,7 +253,6 @@ static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
     assert_int_equal(accept_one(), 1);
     connect_some(1);
     leave_no_descriptor();
-    expect_none(EMFILE);
     ahead = 61;
     exchange_byte(0);
     assert_int_equal(accept_one(), 2);
@@ -360,6 +404,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         TEST(a_place_is_in_use_until_it_is_closed),
+        TEST(a_connection_without_a_descriptor_is_closed_at_once),
+        TEST(a_flood_without_descriptors_is_closed_in_parts),
         TEST(a_listener_without_a_descriptor_lets_the_program_sleep),
         TEST(a_waiting_connection_is_accepted_once_a_descriptor_is_free),
         TEST(an_idle_connection_gives_its_descriptor_to_a_new_one),

@@ -72,16 +72,19 @@ typedef struct mbm_tcp {
     struct mbm_tcp *next;         /**< private */
 } mbm_tcp;
 
-/** A socket that listens for connections. Initialise it with MBM_INIT. */
+/** A socket that listens for connections. Initialise it with MBM_INIT. It takes two descriptors, one
+ *  of them as a spare. */
 typedef struct mbm_tcp_listener {
     int fd;                  /**< the socket, while `port` is not 0 */
+    int spare;               /**< private */
     int lookupError;         /**< why mbm_tcp_listen found no address, for gai_strerror; else 0 */
     uint16_t port;           /**< where it listens */
     uint8_t events;          /**< what to poll it for: POLLIN, or 0 while connections must wait */
     uint8_t nothingToAccept; /**< private */
     uint32_t idleTimeMs; /**< set by the program: milliseconds without a byte read or written after
                             which a connection may be closed for a new one; 0: never */
-    uint32_t refused;    /**< number of connections that were closed for lack of a place */
+    uint32_t refused;    /**< number of connections that were closed for lack of a place or of a
+                            descriptor */
     uint32_t idle;       /**< number of connections that were closed because they were idle */
     int64_t retryAt;     /**< private */
     struct mbm_tcp_set *set; /**< private */
@@ -243,8 +246,10 @@ int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *ser
  * closed, so that their clients know at once.
  *
  * If the system has no descriptor or no memory for a connection, the connection that has
- * been idle for longest is closed in the same way. If none is idle, connections wait in the
- * system's queue, and mbm_tcp_wait sleeps for at most MBM_TCP_RETRY.
+ * been idle for longest is closed in the same way. If none is idle, the waiting connections
+ * are closed too: for them the listener has a spare descriptor. Only if the system refuses
+ * even this, connections wait in its queue, and mbm_tcp_wait sleeps for at most
+ * MBM_TCP_RETRY.
  *
  * @param listener  where connections arrive
  * @param tcps      the places for connections

@@ -61,6 +61,25 @@ static int listen_at(const struct addrinfo *address)
     return refuse(error);
 }
 
+/* Opens the spare descriptor, if there is none: with it, connections for which the system has no
+ * descriptor can be accepted and closed. */
+static void keep_spare(mbm_tcp_listener *listener)
+{
+    if (listener->spare == 0)
+        listener->spare = fcntl(listener->fd, F_DUPFD_CLOEXEC, 1);
+    if (listener->spare < 0)
+        listener->spare = 0;
+}
+
+/* Closes the spare descriptor. Returns 0 if there was none. */
+static int free_spare(mbm_tcp_listener *listener)
+{
+    const int spare = listener->spare;
+
+    listener->spare = 0;
+    return spare > 0 && close(spare) == 0;
+}
+
 int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *service)
 {
     struct addrinfo *found, *one;
@@ -78,6 +97,8 @@ int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *ser
     if (fd < 0)
         return refuse(error);
     listener->fd = fd;
+    listener->spare = 0;
+    keep_spare(listener);
     listener->port = port_of(fd);
     listener->events = POLLIN;
     listener->nothingToAccept = 0;
@@ -134,12 +155,29 @@ static int is_shortage(int error)
     return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
 }
 
-/* Returns the descriptor of the next connection. */
-static int take_next(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
+/* Accepts a connection in place of the spare descriptor, and closes it. Returns 0 if the system
+ * refuses that too. */
+static int reject_by_spare(mbm_tcp_listener *listener)
+{
+    int fd = -1;
+
+    if (free_spare(listener))
+        fd = accept(listener->fd, NULL, NULL);
+    if (fd >= 0) {
+        listener->refused++;
+        reject(fd);
+    }
+    keep_spare(listener);
+    return fd >= 0;
+}
+
+/* Returns the descriptor of the next connection. Closes up to `rejects` connections for which the
+ * system has no descriptor, and counts them off. */
+static int take_next(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count, int *rejects)
 {
     int fd;
 
-    for (;;) {
+    while (*rejects > 0) {
         fd = accept(listener->fd, NULL, NULL);
         if (fd >= 0)
             return fd;
@@ -155,10 +193,15 @@ static int take_next(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
                 return refuse(EAGAIN);
             if (close_oldest(listener, tcps, count))
                 continue;
+            if (reject_by_spare(listener)) {
+                --*rejects;
+                continue;
+            }
             errno = error;
         }
         return -1;
     }
+    return refuse(EAGAIN);
 }
 
 /* Makes a connection a port in a place, or closes it. */
@@ -182,22 +225,20 @@ static int put_in_place(const mbm_tcp_listener *listener, mbm_tcp *tcp, int fd)
 static int take_connection(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 {
     size_t place = 0;
-    int fd, rounds;
+    int fd, rejects = MAX_REJECTED;
 
     while (place < count && mbm_tcp_isInUse(&tcps[place]))
         place++;
     if (place == count && is_connection_waiting(listener) && close_oldest(listener, tcps, count))
         return refuse(EAGAIN);
-    for (rounds = 0; rounds < MAX_REJECTED; rounds++) {
-        fd = take_next(listener, tcps, count);
-        if (fd < 0)
-            return -1;
+    while ((fd = take_next(listener, tcps, count, &rejects)) >= 0) {
         if (place < count)
             return put_in_place(listener, &tcps[place], fd) < 0 ? -1 : (int)place;
         listener->refused++;
+        rejects--;
         reject(fd);
     }
-    return refuse(EAGAIN);
+    return -1;
 }
 
 int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
@@ -210,6 +251,7 @@ int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         return refuse(EAGAIN);
     place = take_connection(listener, tcps, count);
     error = errno;
+    keep_spare(listener);
     /* A connection that must wait would end every wait at once. */
     set_events(listener, place >= 0 || error == EAGAIN ? POLLIN : 0);
     if (place < 0 && listener->set) {
@@ -224,6 +266,7 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener)
 {
     if (listener->port != 0) {
         set_events(listener, 0);
+        (void)free_spare(listener);
         close(listener->fd);
     }
     if (listener->set)

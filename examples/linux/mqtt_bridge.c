@@ -175,7 +175,7 @@ static void on_written(void *context, mbm_clientRequest *request)
 }
 
 /* Begins the write of a payload. Returns NULL, or why it is refused. */
-static const char *begin_write(uint16_t field, const char *payload)
+static const char *begin_write(uint16_t field, const char *payload, size_t length)
 {
     const mbm_planField *planned = &fields.planned[field];
     write_request *write = writes;
@@ -188,7 +188,8 @@ static const char *begin_write(uint16_t field, const char *payload)
     if (write == writes + WRITES)
         return "too many writes wait";
     memset(write, 0, sizeof *write);
-    count = mqtt_value_parse(&fields, field, payload, write->words, &wrong);
+    count =
+        mqtt_payload_parse(&fields.fields[field], planned, payload, length, write->words, &wrong);
     if (count == 0)
         return wrong;
     write->field = field;
@@ -216,17 +217,15 @@ static void take_events(void)
     mqtt_event event;
 
     while (mqtt_broker_next(&broker, &event)) {
-        const uint16_t field = (uint16_t)event.field;
-        const char *wrong = event.kind == MQTT_REFUSED ? event.reason : NULL;
+        const char *wrong;
 
         if (event.kind == MQTT_CONNECTED) {
             publish_all();
             continue;
         }
-        if (event.kind == MQTT_WRITE)
-            wrong = begin_write(field, event.payload);
+        wrong = begin_write(event.field, event.payload, event.length);
         if (wrong)
-            publish_result(field, wrong);
+            publish_result(event.field, wrong);
     }
 }
 

@@ -12,71 +12,94 @@
 /* Bytes of the longest topic. */
 enum { LONGEST_TOPIC = 512 };
 
-/* The mark of a subscription: every field's topic to write. */
-static const char WRITES[] = "/set";
+/* The ends of the topics of a write and of its result. */
+static const char SET[] = "/set", RESULT[] = "/result";
 
 static void join(char topic[LONGEST_TOPIC], const char *first, const char *name, const char *last)
 {
     snprintf(topic, LONGEST_TOPIC, "%s/%s%s%s", first, name, last ? "/" : "", last ? last : "");
 }
 
-/* Called by libmosquitto's thread. A pipe takes less than PIPE_BUF bytes whole or not at all. */
-static void send_event(mqtt_broker *broker, const mqtt_event *event)
+/* Called by libmosquitto's thread. A pipe takes less than PIPE_BUF bytes whole or not at all.
+ * Returns 0 if it is full. */
+static int send_event(mqtt_broker *broker, const mqtt_event *event)
 {
-    if (write(broker->events[1], event, sizeof *event) != (ssize_t)sizeof *event)
-        atomic_fetch_add(&broker->lost, 1);
+    return write(broker->events[1], event, sizeof *event) == (ssize_t)sizeof *event;
+}
+
+/* Subscribes to the topics of writes: for the answers to writes to unknown fields, to those of each
+ * name with up to MQTT_LEVELS levels. */
+static void subscribe(mqtt_broker *broker)
+{
+    char topic[LONGEST_TOPIC], levels[2 * MQTT_LEVELS + 1] = "";
+    int count;
+
+    for (count = 0; count < MQTT_LEVELS; count++) {
+        strcat(levels, count > 0 ? "/+" : "+");
+        join(topic, broker->topic, levels, SET + 1);
+        mosquitto_subscribe(broker->mosquitto, NULL, topic, 1);
+    }
 }
 
 static void on_connect(struct mosquitto *mosquitto, void *context, int refused)
 {
     mqtt_broker *broker = (mqtt_broker *)context;
     const mqtt_event event = {.kind = MQTT_CONNECTED};
-    int field;
 
+    (void)mosquitto;
     if (refused) {
         fprintf(stderr, "the broker refuses: %s\n", mosquitto_connack_string(refused));
         return;
     }
-    for (field = 0; field < broker->fields->count; field++) {
-        char topic[LONGEST_TOPIC];
-
-        if (!broker->fields->fields[field].is_writable)
-            continue;
-        join(topic, broker->topic, broker->fields->fields[field].name, WRITES + 1);
-        mosquitto_subscribe(mosquitto, NULL, topic, 1);
-    }
+    subscribe(broker);
     mqtt_broker_publish(broker, "status", NULL, "online", 1);
-    send_event(broker, &event);
+    (void)send_event(broker, &event);
+}
+
+/* Hands a write on to the program. Returns NULL, or why it is refused. */
+static const char *take_write(mqtt_broker *broker, const char *name,
+                              const struct mosquitto_message *message)
+{
+    const int field = mqtt_fields_find(broker->fields, name);
+    mqtt_event event = {.kind = MQTT_WRITE};
+
+    if (field < 0)
+        return "there is no such field";
+    if (!broker->fields->fields[field].is_writable)
+        return "the field is not writable";
+    if (message->retain)
+        return "a retained write is not carried out: it would be repeated";
+    if (message->payloadlen > MQTT_LONGEST_WRITE)
+        return "the payload is too long";
+    event.field = (uint16_t)field;
+    event.length = (uint16_t)message->payloadlen;
+    memcpy(event.payload, message->payload, event.length);
+    if (send_event(broker, &event))
+        return NULL;
+    atomic_fetch_add(&broker->lost, 1);
+    return "too many writes wait";
 }
 
 static void on_message(struct mosquitto *mosquitto, void *context,
                        const struct mosquitto_message *message)
 {
     mqtt_broker *broker = (mqtt_broker *)context;
-    mqtt_event event = {.kind = MQTT_WRITE};
-    const size_t first = strlen(broker->topic) + 1;
+    const size_t first = strlen(broker->topic) + 1, length = strlen(message->topic);
+    const char *wrong;
     char name[LONGEST_TOPIC];
-    size_t length = strlen(message->topic);
 
     (void)mosquitto;
-    if (length < first + sizeof WRITES - 1 || length - first >= sizeof name)
+    /* A publisher clears a retained message with an empty one. */
+    if (message->payloadlen <= 0)
         return;
-    length -= first + sizeof WRITES - 1;
-    memcpy(name, message->topic + first, length);
-    name[length] = '\0';
-    event.field = mqtt_fields_find(broker->fields, name);
-    if (event.field < 0)
+    /* A name whose result would have too long a topic is no field's. */
+    if (length < first + sizeof SET - 1 || length + sizeof RESULT > sizeof name)
         return;
-    if (message->retain) {
-        event.kind = MQTT_REFUSED;
-        event.reason = "a retained write is not carried out: it would be repeated";
-    } else if (message->payloadlen > MQTT_LONGEST_WRITE) {
-        event.kind = MQTT_REFUSED;
-        event.reason = "the payload is too long";
-    } else if (message->payloadlen > 0) {
-        memcpy(event.payload, message->payload, (size_t)message->payloadlen);
-    }
-    send_event(broker, &event);
+    snprintf(name, sizeof name, "%.*s", (int)(length - first - (sizeof SET - 1)),
+             message->topic + first);
+    wrong = take_write(broker, name, message);
+    if (wrong)
+        mqtt_broker_publish(broker, name, RESULT + 1, wrong, 0);
 }
 
 /* Applies the options. Returns MOSQ_ERR_SUCCESS or the error of libmosquitto. */
@@ -106,6 +129,10 @@ int mqtt_broker_begin(mqtt_broker *broker, const mqtt_options *options, const mq
     broker->topic = options->topic;
     if (pipe2(broker->events, O_NONBLOCK | O_CLOEXEC) != 0) {
         perror("pipe");
+        return -1;
+    }
+    if (strlen(options->topic) > MQTT_LONGEST_NAME) {
+        fprintf(stderr, "%s: a topic has at most %d bytes\n", options->topic, MQTT_LONGEST_NAME);
         return -1;
     }
     mosquitto_lib_init();

@@ -6,14 +6,11 @@
 #ifndef MQTT_BROKER_H
 #define MQTT_BROKER_H
 
-#include "mqtt_fields.h"
+#include "mqtt_payload.h"
 
 #include <stdatomic.h>
 
 struct mosquitto;
-
-/* The longest payload of a write, in bytes. */
-enum { MQTT_LONGEST_WRITE = 128 };
 
 typedef struct mqtt_options {
     const char *host;
@@ -25,12 +22,12 @@ typedef struct mqtt_options {
     const char *identity; /* files of the client's certificate and key, CERTIFICATE,KEY; or NULL */
 } mqtt_options;
 
-/* A message from the broker. */
+/* What the broker sends: that it is connected, or a write to a field that may be written. */
 typedef struct mqtt_event {
-    enum { MQTT_CONNECTED, MQTT_WRITE, MQTT_REFUSED } kind;
-    int field;          /* MQTT_WRITE, MQTT_REFUSED: the index of the field */
-    const char *reason; /* MQTT_REFUSED: why */
-    char payload[MQTT_LONGEST_WRITE + 1];
+    enum { MQTT_CONNECTED, MQTT_WRITE } kind;
+    uint16_t field;  /* MQTT_WRITE: the index of the field */
+    uint16_t length; /* MQTT_WRITE: bytes of the payload */
+    char payload[MQTT_LONGEST_WRITE];
 } mqtt_event;
 
 typedef struct mqtt_broker {
@@ -39,7 +36,7 @@ typedef struct mqtt_broker {
     const char *topic;
     int events[2]; /* a pipe: poll events[0] for POLLIN */
     atomic_ulong published;
-    atomic_ulong lost; /* events that the pipe did not take */
+    atomic_ulong lost; /* writes that the pipe did not take */
 } mqtt_broker;
 
 /* Begins to connect, and does not wait for it. Returns 0, or -1 after printing the reason. */

@@ -1,8 +1,9 @@
 #define _GNU_SOURCE
 #include "mqtt_fields.h"
 
+#include "mqtt_payload.h"
+
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,18 +42,16 @@ static int number(const char *word, unsigned long least, unsigned long most, uns
 static const char *read_option(char *word, mqtt_field *field, mbm_planField *planned)
 {
     unsigned long value;
-    char *rest;
 
     if (strcmp(word, "write") == 0) {
         field->is_writable = 1;
         return NULL;
     }
     if (strncmp(word, "scale=", 6) == 0) {
-        field->scale = strtod(word + 6, &rest);
         field->is_scaled = 1;
-        return rest == word + 6 || *rest || !isfinite(field->scale) || field->scale == 0
-                   ? "the scale is no number, or 0"
-                   : NULL;
+        return mqtt_payload_scale(word + 6, &field->scale)
+                   ? NULL
+                   : "the scale is no decimal number of up to 18 digits, or 0";
     }
     if (strncmp(word, "order=", 6) == 0) {
         planned->order = position(ORDERS, word + 6);
@@ -67,13 +66,34 @@ static const char *read_option(char *word, mqtt_field *field, mbm_planField *pla
     return "unknown option";
 }
 
+/* Returns NULL, or what is wrong with a name: it is the middle of topics. */
+static const char *check_name(const char *name)
+{
+    const char *last = strrchr(name, '/'), *at = name;
+    int levels = 1;
+
+    last = last ? last + 1 : name;
+    if (strpbrk(name, "+#") || name[0] == '/')
+        return "a name must not have + or # in it, nor begin with /";
+    for (; *at; at++)
+        levels += *at == '/';
+    if (levels > MQTT_LEVELS || at - name > MQTT_LONGEST_NAME)
+        return "a name has at most 200 bytes and 8 levels";
+    if (strcmp(last, "set") == 0 || strcmp(last, "result") == 0 || strcmp(name, "status") == 0 ||
+        (levels == 3 && strncmp(name, "unit/", 5) == 0 && strcmp(last, "status") == 0))
+        return "the name is that of a topic of the bridge: NAME/set, NAME/result, status or "
+               "unit/N/status";
+    return NULL;
+}
+
 /* Reads the words of one line. Returns NULL, or what is wrong with them. */
 static const char *read_words(char *words[WORDS], mqtt_field *field, mbm_planField *planned)
 {
     unsigned long unit, address, interval;
+    const char *wrong = check_name(words[NAME]);
 
-    if (strpbrk(words[NAME], "+#") || words[NAME][0] == '/')
-        return "a name must not have + or # in it, nor begin with /";
+    if (wrong)
+        return wrong;
     if (!number(words[UNIT], 1, 255, &unit))
         return "the unit is not a number from 1 to 255";
     planned->unit = (uint8_t)unit;
@@ -89,7 +109,7 @@ static const char *read_words(char *words[WORDS], mqtt_field *field, mbm_planFie
     if (!number(words[INTERVAL], 1, MBM_PLAN_LONGEST_INTERVAL, &interval))
         return "the interval is not a number of milliseconds from 1 to a day";
     planned->intervalMs = (uint32_t)interval;
-    field->scale = 1;
+    field->scale = (mqtt_scale){.digits = 1, .value = 1};
     field->name = strdup(words[NAME]);
     return field->name ? NULL : strerror(ENOMEM);
 }

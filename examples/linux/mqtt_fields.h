@@ -8,9 +8,9 @@
  * wire, decimal or 0x and hexadecimal. type: bit, uint16, int16, uint32, int32, uint64, int64,
  * float, double or text. interval: milliseconds.
  *
- * options: scale=NUMBER (the value is the register's number times this), order=ABCD, CDAB, BADC or
- * DCBA (ABCD if left out), count=NUMBER (values, or characters of a text), write (MQTT may write
- * the field).
+ * options: scale=NUMBER (the value is the register's number times this decimal number), order=ABCD,
+ * CDAB, BADC or DCBA (ABCD if left out), count=NUMBER (values, or characters of a text), write
+ * (MQTT may write the field).
  *
  * Licence: MIT OR Apache-2.0. */
 #ifndef MQTT_FIELDS_H
@@ -18,9 +18,20 @@
 
 #include "mbm.h"
 
+/* The factor of an option scale=NUMBER: (-)digits * 10^exponent, exactly; 1 without the option. */
+typedef struct mqtt_scale {
+    uint64_t digits;
+    long exponent;
+    double value; /* the same, rounded */
+    uint8_t is_negative;
+} mqtt_scale;
+
+/* The most levels of a field's name: a/b/c has three. And the most bytes of it. */
+enum { MQTT_LEVELS = 8, MQTT_LONGEST_NAME = 200 };
+
 typedef struct mqtt_field {
     char *name;
-    double scale;
+    mqtt_scale scale;
     uint8_t is_scaled;
     uint8_t is_writable;
 } mqtt_field;

@@ -31,7 +31,7 @@ static int print_number(const mbm_plan *plan, const mqtt_field *field, const mbm
     if (planned->type == MBM_TYPE_FLOAT || planned->type == MBM_TYPE_DOUBLE) {
         status = mbm_plan_getDouble(plan, at, index, &real);
         if (status == MBM_OK)
-            print_real(text, real * field->scale, planned->type == MBM_TYPE_FLOAT ? 7 : 15,
+            print_real(text, real * field->scale.value, planned->type == MBM_TYPE_FLOAT ? 7 : 15,
                        is_json);
         return status == MBM_OK;
     }
@@ -46,7 +46,7 @@ static int print_number(const mbm_plan *plan, const mqtt_field *field, const mbm
             status = mbm_registers_getUint64(&registers, (uint16_t)(planned->address + 4 * index),
                                              planned->order, &large);
         if (field->is_scaled)
-            print_real(text, (double)large * field->scale, 15, is_json);
+            print_real(text, (double)large * field->scale.value, 15, is_json);
         else
             snprintf(text, LONGEST_NUMBER, "%" PRIu64, large);
         return status == MBM_OK;
@@ -56,7 +56,7 @@ static int print_number(const mbm_plan *plan, const mqtt_field *field, const mbm
     if (planned->type == MBM_TYPE_BIT && is_json)
         strcpy(text, integer ? "true" : "false");
     else if (field->is_scaled)
-        print_real(text, (double)integer * field->scale, 15, is_json);
+        print_real(text, (double)integer * field->scale.value, 15, is_json);
     else
         snprintf(text, LONGEST_NUMBER, "%" PRId64, integer);
     return 1;
@@ -112,91 +112,4 @@ int mqtt_value_text(const mbm_plan *plan, const mqtt_fields *fields, uint16_t fi
     if (is_array)
         strcpy(text + length, "]");
     return 1;
-}
-
-/* Reads a payload. Returns 0 if it is no number and no truth value. */
-static int parse_payload(const char *payload, double *value)
-{
-    static const char *const WORDS[] = {"off", "on", "OFF", "ON"};
-    cJSON *json = cJSON_Parse(payload);
-    const cJSON *item =
-        cJSON_IsObject(json) ? cJSON_GetObjectItemCaseSensitive(json, "value") : json;
-    int is_right = 1, at;
-
-    if (cJSON_IsNumber(item))
-        *value = item->valuedouble;
-    else if (cJSON_IsBool(item))
-        *value = cJSON_IsTrue(item);
-    else
-        is_right = 0;
-    cJSON_Delete(json);
-    for (at = 0; at < 4 && !is_right; at++) {
-        is_right = strcmp(payload, WORDS[at]) == 0;
-        *value = at & 1;
-    }
-    return is_right && isfinite(*value);
-}
-
-/* Converts a number to the integer of a field. Returns 0 if it is out of range. */
-static int to_integer(double value, uint8_t type, uint64_t *integer)
-{
-    /* A double holds each integer up to 2^53. */
-    static const double EXACT = 9007199254740992.0;
-    static const struct {
-        double least, most;
-    } RANGES[] = {
-        [MBM_TYPE_BIT] = {0, 1},
-        [MBM_TYPE_UINT16] = {0, UINT16_MAX},
-        [MBM_TYPE_INT16] = {INT16_MIN, INT16_MAX},
-        [MBM_TYPE_UINT32] = {0, UINT32_MAX},
-        [MBM_TYPE_INT32] = {INT32_MIN, INT32_MAX},
-        [MBM_TYPE_UINT64] = {0, EXACT},
-        [MBM_TYPE_INT64] = {-EXACT, EXACT},
-    };
-
-    value = round(value);
-    if (value < RANGES[type].least || value > RANGES[type].most)
-        return 0;
-    *integer = (uint64_t)(int64_t)value;
-    return 1;
-}
-
-uint16_t mqtt_value_parse(const mqtt_fields *fields, uint16_t field, const char *payload,
-                          uint16_t words[MQTT_WRITE_WORDS], const char **wrong)
-{
-    const mbm_planField *planned = &fields->planned[field];
-    const uint8_t order = planned->order;
-    mbm_registers registers;
-    uint64_t integer = 0;
-    double value;
-    float single;
-
-    *wrong = "the payload is no number";
-    if (!parse_payload(payload, &value))
-        return 0;
-    *wrong = "the number is out of range";
-    value /= fields->fields[field].scale;
-    (void)mbm_registers_intoWords(&registers, words, MQTT_WRITE_WORDS, 0);
-    switch (planned->type) {
-    case MBM_TYPE_FLOAT:
-        single = (float)value;
-        if (!isfinite(single))
-            return 0;
-        (void)mbm_registers_setFloat(&registers, 0, order, &single);
-        return 2;
-    case MBM_TYPE_DOUBLE: (void)mbm_registers_setDouble(&registers, 0, order, &value); return 4;
-    default: break;
-    }
-    if (!to_integer(value, planned->type, &integer))
-        return 0;
-    switch (planned->type) {
-    case MBM_TYPE_UINT32:
-    case MBM_TYPE_INT32:
-        (void)mbm_registers_setUint32(&registers, 0, order, (uint32_t)integer);
-        return 2;
-    case MBM_TYPE_UINT64:
-    case MBM_TYPE_INT64: (void)mbm_registers_setUint64(&registers, 0, order, &integer); return 4;
-    case MBM_TYPE_BIT: words[0] = (uint16_t)integer; return 1;
-    default: (void)mbm_registers_setUint16(&registers, 0, order, (uint16_t)integer); return 1;
-    }
 }
