@@ -296,7 +296,7 @@ bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs
 
 # Programs with TLS or UDP, which pymodbus talks with too.
 SECURE := $(BUILD)/plain/linux/secure
-$(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure mbm_tls mbm_tls_identity mbm_tls_linux mbm_tls_text mbm_tcp mbm_tcp_listener) $(ARCHIVE)
+$(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure mbm_tls mbm_tls_identity mbm_tls_linux mbm_tls_listener mbm_tls_text mbm_tcp mbm_tcp_listener) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections $(TLS_LIBS) -o $@
 UDP := $(BUILD)/plain/linux/udp
 $(UDP): $(patsubst %,$(BUILD)/plain/linux/%.o,udp mbm_udp) $(ARCHIVE)
@@ -307,6 +307,12 @@ secure: ## Show Modbus/TCP Security: roles, and who is refused; certificates are
 	@scripts/need python3 python3-venv gcc libc6-dev libmbedtls-dev openssl
 	@$(MAKE) --no-print-directory venv certificates $(SECURE)
 	@$(BUILD)/venv/bin/python scripts/check-secure $(SECURE) $(BUILD)/certificates
+
+.PHONY: measure-secure
+measure-secure: ## Measure what handshakes cost other clients of that server, and who gets in under attack
+	@scripts/need python3 gcc libc6-dev libmbedtls-dev openssl
+	@$(MAKE) --no-print-directory certificates $(SECURE)
+	@python3 scripts/measure-secure $(SECURE) $(BUILD)/certificates
 
 .PHONY: udp
 udp: ## Build and check the example over UDP, build/plain/linux/udp

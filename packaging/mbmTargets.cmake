@@ -25,7 +25,7 @@ endif()
 
 if(_mbm_tls AND NOT TARGET mbm::tls)
   add_library(mbm::tls INTERFACE IMPORTED ${_mbm_global})
-  set(_mbm_sources mbm_tls.c mbm_tls_identity.c mbm_tls_linux.c mbm_tls_text.c)
+  set(_mbm_sources mbm_tls.c mbm_tls_identity.c mbm_tls_linux.c mbm_tls_listener.c mbm_tls_text.c)
   list(TRANSFORM _mbm_sources PREPEND "${_mbm_tls}/")
   set_target_properties(mbm::tls PROPERTIES
     INTERFACE_SOURCES "${_mbm_sources}"

@@ -4,7 +4,7 @@
 # The ports for Linux, and the port inside TLS, which needs a library and so has its own folder.
 LINUX_PORTS="mbm_tty.h mbm_tty.c mbm_tcp.h mbm_tcp.c mbm_tcp_listener.c mbm_tcp_set.c mbm_call.h mbm_call.c
     mbm_udp.h mbm_udp.c"
-TLS_PORTS="mbm_tls.h mbm_tls_linux.h mbm_tls.c mbm_tls_identity.c mbm_tls_linux.c mbm_tls_text.c"
+TLS_PORTS="mbm_tls.h mbm_tls_linux.h mbm_tls.c mbm_tls_identity.c mbm_tls_linux.c mbm_tls_listener.c mbm_tls_text.c"
 
 # fill TEMPLATE OUTPUT: replaces the placeholders of a template by these variables of the shell:
 #   prefix          the folder of the library, as pkg-config sees it

@@ -135,6 +135,12 @@ size_t tls_step(size_t usual, size_t slow)
     return getenv("MBM_TRANSACTIONS") ? slow : usual;
 }
 
+/* Whether the handshake goes on without further bytes. */
+static int is_due(mbm_tls *tls)
+{
+    return tls->status == MBM_TLS_HANDSHAKE && mbm_tls_pollDelay(tls) == 0;
+}
+
 void tls_pair_run(tls_pair *pair)
 {
     size_t before;
@@ -145,7 +151,8 @@ void tls_pair_run(tls_pair *pair)
         (void)mbm_tls_poll(&pair->client.tls);
         (void)mbm_tls_poll(&pair->server.tls);
     } while (before != pair->to_server.moved + pair->to_client.moved + pair->to_server.count +
-                           pair->to_client.count);
+                           pair->to_client.count ||
+             is_due(&pair->client.tls) || is_due(&pair->server.tls));
 }
 
 int tls_lane_carried(const tls_lane *lane, const void *bytes, size_t length)

@@ -220,17 +220,32 @@ static uint32_t now(const mbm_tls *tls)
     return tls->below.micros(tls->below.context);
 }
 
-/* How long the handshake has been under way. A clock that steps back is not far ahead. */
-static uint32_t elapsed(const mbm_tls *tls)
+/* A clock that steps back is not far ahead. */
+uint32_t mbm_tls_age(const mbm_tls *tls)
 {
     const uint32_t time = now(tls) - tls->startedAt;
 
     return time <= INT32_MAX ? time : 0;
 }
 
+static int state_of(const mbm_tls *tls)
+{
+    return tls->ssl.MBEDTLS_PRIVATE(state);
+}
+
+uint8_t mbm_tls_progress(const mbm_tls *tls)
+{
+    if (tls->status != MBM_TLS_HANDSHAKE)
+        return MBM_TLS_PROVEN;
+    if (tls->isSeen && tls->flags == 0)
+        return MBM_TLS_CERTIFIED;
+    return state_of(tls) > MBEDTLS_SSL_CLIENT_HELLO ? MBM_TLS_GREETED : MBM_TLS_SILENT;
+}
+
 static void begin_handshake(mbm_tls *tls)
 {
-    tls->alert = tls->isLost = tls->isSeen = tls->hasBadRole = tls->isTold = tls->hasAhead = 0;
+    tls->alert = tls->isLost = tls->isSeen = tls->hasBadRole = tls->isTold = tls->isDue =
+        tls->hasAhead = 0;
     tls->isFirst = 1;
     tls->error = 0;
     tls->flags = 0;
@@ -240,19 +255,28 @@ static void begin_handshake(mbm_tls *tls)
     tls->status = MBM_TLS_HANDSHAKE;
 }
 
+/* One message at a time, because each may take a computation that other connections of the
+ * program must wait for. */
 static void shake_hands(mbm_tls *tls)
 {
-    int result = mbedtls_ssl_handshake(&tls->ssl);
+    int result = 0, is_over;
 
+    /* The first step moves no message. */
+    if (state_of(tls) == MBEDTLS_SSL_HELLO_REQUEST)
+        result = mbedtls_ssl_handshake_step(&tls->ssl);
+    if (result == 0)
+        result = mbedtls_ssl_handshake_step(&tls->ssl);
+    is_over = result == 0 && state_of(tls) == MBEDTLS_SSL_HANDSHAKE_OVER;
+    tls->isDue = result == 0;
     /* Mbed TLS demands a verified certificate of the peer. This makes sure of it. */
-    if (result == 0 &&
+    if (is_over &&
         (!tls->isSeen || tls->flags != 0 || mbedtls_ssl_get_verify_result(&tls->ssl) != 0))
         result = MBEDTLS_ERR_X509_CERT_VERIFY_FAILED;
     if (result != 0 && !must_wait(result))
         fail(tls, result);
-    else if (tls->status == MBM_TLS_HANDSHAKE && result == 0)
+    else if (tls->status == MBM_TLS_HANDSHAKE && is_over)
         tls->status = MBM_TLS_OPEN;
-    else if (tls->status == MBM_TLS_HANDSHAKE && elapsed(tls) >= tls->identity->handshakeUs)
+    else if (tls->status == MBM_TLS_HANDSHAKE && mbm_tls_age(tls) >= tls->identity->handshakeUs)
         tls->status = MBM_TLS_TIMED_OUT;
 }
 
@@ -411,9 +435,9 @@ uint8_t mbm_tls_poll(mbm_tls *tls)
 uint32_t mbm_tls_pollDelay(mbm_tls *tls)
 {
     if (tls->status == MBM_TLS_HANDSHAKE) {
-        const uint32_t past = elapsed(tls), longest = tls->identity->handshakeUs;
+        const uint32_t past = mbm_tls_age(tls), longest = tls->identity->handshakeUs;
 
-        return past < longest ? longest - past : 0;
+        return tls->isDue || past >= longest ? 0 : longest - past;
     }
     if (tls->status != MBM_TLS_OPEN || tls->isTold || mbedtls_ssl_get_bytes_avail(&tls->ssl) == 0)
         return UINT32_MAX;

@@ -13,8 +13,10 @@
  * too. This port allocates no memory, but Mbed TLS does: see docs/security.md.
  *
  * No function waits for the peer. The handshake goes on in the port's read and write, and in
- * mbm_tls_poll. Until it has succeeded, and after any failure, the port neither reads nor
- * sends a byte of Modbus. A computation of the handshake may take long on a microcontroller.
+ * mbm_tls_poll: each call takes it on by one message at most, so that other connections wait
+ * for one computation and no more. That may take long on a microcontroller. Until the
+ * handshake has succeeded, and after any failure, the port neither reads nor sends a byte of
+ * Modbus.
  * No function is re-entrant on one object, nor are two connections of one mbm_tls_identity
  * to be used in two threads.
  *
@@ -149,6 +151,7 @@ typedef struct mbm_tls {
     uint8_t hasBadRole;                 /**< private */
     uint8_t isTold;                     /**< private */
     uint8_t isFirst;                    /**< private */
+    uint8_t isDue;                      /**< private */
     uint8_t hasAhead;                   /**< private */
     uint8_t ahead[7];                   /**< private */
     uint8_t sending[MBM_MAX_TCP_FRAME]; /**< private */
@@ -222,8 +225,9 @@ uint8_t mbm_tls_poll(mbm_tls *tls);
 
 /**
  * Returns how long the port needs no call, unless the stream below accepts bytes again or
- * bytes arrive there. It is 0 if received bytes are in the port that no wait for the stream
- * below would report; it says so once, until the port's read or write was called again.
+ * bytes arrive there. It is 0 while a handshake can go on with the bytes that are in the port.
+ * It is 0 too if received bytes are in the port that no wait for the stream below would report;
+ * it says so once, until the port's read or write was called again.
  *
  * @param tls  the connection
  * @return microseconds, UINT32_MAX without a limit
@@ -297,6 +301,14 @@ const char *mbm_tls_alertText(uint8_t alert);
 /* Private: shared by the sources of this port. */
 enum { MBM_TLS_NO_ROLE, MBM_TLS_ONE_ROLE, MBM_TLS_WRONG_ROLE };
 int mbm_tls_findRole(const mbedtls_x509_buf *extensions, char *role);
+
+/* How far a server's handshake has come: nothing understood of the client yet; its first message;
+ * a certificate of an authority, though not yet that the client has its key; everything. */
+enum { MBM_TLS_SILENT, MBM_TLS_GREETED, MBM_TLS_CERTIFIED, MBM_TLS_PROVEN };
+uint8_t mbm_tls_progress(const mbm_tls *tls);
+
+/* For how many microseconds the handshake has been under way. */
+uint32_t mbm_tls_age(const mbm_tls *tls);
 
 #ifdef __cplusplus
 }

@@ -58,6 +58,40 @@ int mbm_tls_load(mbm_tls_files *files, mbm_tls_options *options, const char *cer
 void mbm_tls_forgetKey(mbm_tls_files *files);
 
 /**
+ * Begins to listen for clients of Modbus/TCP Security, as mbm_tcp_listen does. The system keeps
+ * a connection back until its client has sent something, if it can, as Linux does. In
+ * mbm_tls_listener.c.
+ *
+ * @param listener  as for mbm_tcp_listen
+ * @param host      as for mbm_tcp_listen
+ * @param service   as for mbm_tcp_listen, for example MBM_TLS_SERVICE
+ * @return as mbm_tcp_listen
+ */
+int mbm_tls_listen(mbm_tcp_listener *listener, const char *host, const char *service);
+
+/**
+ * Accepts a connection that waits, and begins its handshake. Call it once in every round of
+ * the program's loop: then a flood of connections does not keep the program from those that
+ * it serves. In mbm_tls_listener.c.
+ *
+ * If a connection waits and every place is in use, one whose handshake is not finished is
+ * closed for it. Of the address that has the most of them (of IPv6 the network of 64 bits), it
+ * is the one that has come least far, and of these the oldest. A finished connection
+ * is closed only as mbm_tcp_accept does it, after the listener's `idleTimeMs`. If there is
+ * none of either, the new connection is closed.
+ *
+ * @param listener  where connections arrive
+ * @param identity  a server's; must outlive the connections
+ * @param tlss      the connections
+ * @param tcps      their sockets, in the same order: the places
+ * @param count     number of both
+ * @return the index of the place, whose server the program begins anew; or -1 with errno set
+ *         as by mbm_tcp_accept, ENOMEM also if Mbed TLS got no memory
+ */
+int mbm_tls_accept(mbm_tcp_listener *listener, const mbm_tls_identity *identity, mbm_tls *tlss,
+                   mbm_tcp *tcps, size_t count);
+
+/**
  * Sleeps as mbm_tcp_wait does, but not while a connection has received bytes that no socket
  * would report, and not longer than a handshake may take.
  *

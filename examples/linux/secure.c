@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PLACES = 16, FIRST = 100, WORDS = 10, IDLE_MS = 60000 };
+enum { PLACES = 8, FIRST = 100, WORDS = 10, IDLE_MS = 60000 };
 
 /* All storage is the program's own, but for what Mbed TLS allocates. */
 static mbm_tls_identity identity = MBM_INIT;
@@ -75,20 +75,16 @@ static mbm_custom every_function = {.serve = authorise};
 static mbm_registerTable holding = {.words = words, .base = FIRST, .size = WORDS};
 static mbm_unit unit = {.id = 17};
 
-static void take_connections(void)
+/* One in each round, so that the others are served between two. */
+static void take_connection(void)
 {
-    int i;
+    const int i = mbm_tls_accept(&listener, &identity, tlss, tcps, PLACES);
+    mbm_port port;
 
-    while ((i = mbm_tcp_accept(&listener, tcps, PLACES)) >= 0) {
-        const mbm_port socket = mbm_tcp_port(&tcps[i]), port = mbm_tls_port(&tlss[i]);
-
-        if (mbm_tls_open(&tlss[i], &identity, &socket, NULL, NULL) != MBM_TLS_HANDSHAKE ||
-            mbm_server_beginTcp(&servers[i], &port, &unit, 1, frames[i], MBM_MAX_TCP_FRAME) !=
-                MBM_OK) {
-            mbm_tls_close(&tlss[i]);
-            mbm_tcp_close(&tcps[i]);
-        }
-    }
+    if (i < 0)
+        return;
+    port = mbm_tls_port(&tlss[i]);
+    (void)mbm_server_beginTcp(&servers[i], &port, &unit, 1, frames[i], MBM_MAX_TCP_FRAME);
 }
 
 static void drop_connection(int i)
@@ -111,6 +107,24 @@ static void poll_connection(int i)
         drop_connection(i);
 }
 
+/* A step of a handshake may take milliseconds. After each, those whose handshake is over are
+ * served, so that they wait for one step and no more. */
+static void poll_all(void)
+{
+    int i, j;
+
+    for (i = 0; i < PLACES; i++) {
+        const uint8_t before = tlss[i].status;
+
+        if (!mbm_tcp_isInUse(&tcps[i]))
+            continue;
+        poll_connection(i);
+        for (j = 0; before == MBM_TLS_HANDSHAKE && j < PLACES; j++)
+            if (mbm_tcp_isInUse(&tcps[j]) && tlss[j].status != MBM_TLS_HANDSHAKE)
+                poll_connection(j);
+    }
+}
+
 static int serve(const char *service, char **paths)
 {
     int i;
@@ -121,7 +135,7 @@ static int serve(const char *service, char **paths)
         return 1;
     for (i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(1000 + i);
-    if (mbm_tcp_listen(&listener, NULL, service) != 0) {
+    if (mbm_tls_listen(&listener, NULL, service) != 0) {
         fprintf(stderr, "%s: %s\n", service,
                 listener.lookupError ? gai_strerror(listener.lookupError) : strerror(errno));
         return 1;
@@ -130,10 +144,8 @@ static int serve(const char *service, char **paths)
     while (!is_over) {
         fflush(stdout);
         (void)mbm_tls_wait(tlss, tcps, PLACES, &listener, -1, MBM_TCP_FOREVER);
-        take_connections();
-        for (i = 0; i < PLACES; i++)
-            if (mbm_tcp_isInUse(&tcps[i]))
-                poll_connection(i);
+        take_connection();
+        poll_all();
     }
     for (i = 0; i < PLACES; i++)
         if (mbm_tcp_isInUse(&tcps[i]))
