@@ -72,8 +72,8 @@ typedef struct mbm_tcp {
     struct mbm_tcp *next;         /**< private */
 } mbm_tcp;
 
-/** A socket that listens for connections. Initialise it with MBM_INIT. It takes two descriptors, one
- *  of them as a spare. */
+/** A socket that listens for connections. Initialise it with MBM_INIT. It takes two descriptors,
+ * one of them as a spare. */
 typedef struct mbm_tcp_listener {
     int fd;                  /**< the socket, while `port` is not 0 */
     int spare;               /**< private */
