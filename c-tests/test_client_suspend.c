@@ -186,6 +186,54 @@ static void a_client_resumes_from_a_master_that_was_zeroed(void **state)
     each_variant(forget_the_master);
 }
 
+/* --- from within `done` --- */
+
+static mbm_clientRequest requests[2];
+static unsigned ended;
+
+static void lend(void *context, mbm_clientRequest *request)
+{
+    (void)context;
+    (void)request;
+    ended++;
+    OK(mbm_client_suspend(client, &master));
+}
+
+static void suspend_when_done(void)
+{
+    static const uint8_t reply[] = {17, 6, 0, 1, 0, 2};
+    unsigned i;
+
+    memset(requests, 0, sizeof requests);
+    ended = 0;
+    requests[0].done = lend;
+    for (i = 0; i < 2; i++) {
+        requests[i].unit = 17;
+        IS(MBM_PENDING, mbm_client_writeSingleRegister(client, &requests[i], 1, 2));
+    }
+    memory_port_send(&m, client);
+    assert_int_equal(m.sent_count, 8);
+    memory_port_rtu(&m, reply, sizeof reply);
+    for (i = 0; i < 100 && ended == 0; i++, m.now += 10000)
+        IS(MBM_PENDING, mbm_client_poll(client));
+    assert_int_equal(ended, 1);
+    /* The line is the master's: the next request waits. */
+    assert_int_equal(m.sent_count, 8);
+    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
+    OK(mbm_master_cancel(&master));
+    OK(mbm_client_resume(client, &master));
+    IS(MBM_PENDING, requests[1].status);
+    for (i = 0; i < 100 && m.sent_count == 8; i++, m.now += 10000)
+        IS(MBM_PENDING, mbm_client_poll(client));
+    assert_int_equal(m.sent_count, 16);
+}
+
+static void a_client_that_is_suspended_when_a_request_is_done_sends_nothing(void **state)
+{
+    (void)state;
+    each_variant(suspend_when_done);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -194,6 +242,7 @@ int main(void)
         cmocka_unit_test(a_master_that_began_on_a_port_of_its_own_keeps_that_port),
         cmocka_unit_test(a_master_with_the_lines_of_two_clients_keeps_the_second),
         cmocka_unit_test(a_client_resumes_from_a_master_that_was_zeroed),
+        cmocka_unit_test(a_client_that_is_suspended_when_a_request_is_done_sends_nothing),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

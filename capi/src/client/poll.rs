@@ -69,7 +69,8 @@ pub(crate) unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> S
         let now = pointers::with_hooks(client, || now(object));
         (*object).polling = true;
         let mut rounds = MBM_CLIENT_DEPTH + 1;
-        while rounds > 0 {
+        // `done` may have given the line away.
+        while rounds > 0 && !(*object).queue.suspended {
             let fresh = rounds > MBM_CLIENT_DEPTH;
             match pointers::with_hooks(client, || advance(object, now, fresh)) {
                 Some(request) => request.call_done(),
