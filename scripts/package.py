@@ -64,13 +64,24 @@ class Package:
 
     def copy_assembler(self, folder: str, kinds: tuple) -> list:
         """Takes the library as assembler source, for these dialects of SETS, the names of
-        scripts/boards.py. Returns the names of the files in the package."""
-        names = []
-        for which, row in SETS.items():
-            if row.kind in kinds:
-                names.append(f"{folder}/mbm_{which}.S")
-                self.copy(f"build/assembler/mbm_{which}.S", names[-1], "make assembler")
-        return names
+        scripts/boards.py, and a file that refuses any other core: each assembler file would
+        compile to nothing there. Returns the names of the files in the package."""
+        sets = {which: row for which, row in SETS.items() if row.kind in kinds}
+        names = [f"{folder}/mbm_{which}.S" for which in sets]
+        for which, name in zip(sets, names):
+            self.copy(f"build/assembler/mbm_{which}.S", name, "make assembler")
+        condition = " \\\n    || ".join(f"({row.guard})" for row in sets.values())
+        cores = "; ".join(re.sub(r" \(.*", "", row.what) for row in sets.values())
+        self.write(f"{folder}/mbm_core.c", f"""\
+/* Refuses a core for which this package has no code. Licence: MIT OR Apache-2.0. */
+#if !({condition})
+#error "mbm has no code for this core. It has code for: {cores}"
+#endif
+
+/* ISO C wants a declaration in every file. */
+typedef int mbm_core_has_code;
+""")
+        return [f"{folder}/mbm_core.c", *names]
 
     def copy_licence(self) -> None:
         self.write("LICENSE", licence())

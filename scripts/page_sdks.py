@@ -14,7 +14,8 @@ PAGES = {
     "guide-esp-idf.md": (["examples/esp-idf", *(f"packaging/esp-idf/stand-in/{part}/include" for part in
                                                 ("common", "esp_driver_uart", "esp_driver_gpio", "esp_timer"))], {}),
     "guide-zephyr.md": (["examples/zephyr", "packaging/zephyr/stand-in/include"],
-                        {"devicetree.h": "#define STAND_IN_PIN 6\n#define STAND_IN_FLAGS 0\n"}),
+                        {"devicetree.h": "#define STAND_IN_PIN 6\n#define STAND_IN_FLAGS 0\n"
+                         "#define STAND_IN_CURRENT_SPEED 19200\n"}),
     "guide-rt-thread.md": (["examples/rt-thread", "packaging/rt-thread/stand-in/include"],
                            {"rtconfig.h": "#define RT_TICK_PER_SECOND 1000\n"}),
 }

@@ -6,6 +6,11 @@
 /* The bits of a character: start, data, parity or a second stop bit, stop. */
 enum { BITS = 11 };
 
+/* RT-Thread 4 has no such number. */
+#ifndef RT_ENOENT
+#define RT_ENOENT RT_ERROR
+#endif
+
 enum { MICROS_OF_A_TICK = 1000000 / RT_TICK_PER_SECOND };
 
 static int16_t line_read(void *context, uint8_t *bytes, uint16_t capacity)
@@ -112,7 +117,7 @@ rt_err_t mbm_rtThread_open(mbm_rtThreadLine *line, mbm_port *port)
         return -RT_EINVAL;
     device = rt_device_find(line->uart);
     if (device == RT_NULL)
-        return -RT_ENOSYS;
+        return -RT_ENOENT;
     error = open_device(line, device);
     if (error != RT_EOK)
         return error;

@@ -42,8 +42,9 @@ typedef struct mbm_rtThreadLine {
  * @param line  the settings
  * @param port  receives the port for the begin functions. Its write waits while the bytes leave,
  *              as rt_device_write does
- * @return RT_EOK; -RT_EINVAL for NULL, a rate of 0 or a line that is open; -RT_ENOSYS if there is
- *         no device of that name; or the error of the function of RT-Thread that failed
+ * @return RT_EOK; -RT_EINVAL for NULL, a rate of 0 or a line that is open; -RT_ENOENT if there is
+ *         no device of that name, in RT-Thread 4 -RT_ERROR; or the error of the function of
+ *         RT-Thread that failed
  */
 rt_err_t mbm_rtThread_open(mbm_rtThreadLine *line, mbm_port *port);
 

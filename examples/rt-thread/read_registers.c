@@ -34,7 +34,10 @@ static int read_registers(int argc, char **argv)
     (void)argc;
     (void)argv;
     if (error != RT_EOK) {
-        rt_kprintf("%s does not open: %d\n", line.uart, (int)error);
+        if (rt_device_find(line.uart) == RT_NULL)
+            rt_kprintf("there is no device %s; the command list_device shows all\n", line.uart);
+        else
+            rt_kprintf("%s does not open: %d\n", line.uart, (int)error);
         return (int)error;
     }
     mbm_master_setBuffers(&master, response, COUNT, RT_NULL, 0, frame, sizeof frame);

@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <string.h>
+#include <zephyr/sys/printk.h>
 
 /* The bits of a character: start, data, parity or a second stop bit, stop. */
 enum { BITS = 11 };
@@ -120,9 +121,31 @@ static void line_idle(void *context, mbm_master *master)
 
 /* --- opening */
 
-static int configure(const mbm_zephyrLine *line)
+/* The UART has the rate and the format of the devicetree. The driver may know them. */
+static void keep_configuration(mbm_zephyrLine *line, const struct uart_config *wanted)
 {
+    struct uart_config now = *wanted;
+
+    now.baudrate = line->currentSpeed;
 #ifdef CONFIG_UART_USE_RUNTIME_CONFIGURE
+    if (uart_config_get(line->uart, &now) != 0) {
+        now = *wanted;
+        now.baudrate = line->currentSpeed;
+    }
+#endif
+    if (now.baudrate != 0 && now.baudrate != line->baud) {
+        printk("mbm: %s keeps the %u baud of its devicetree, not %u: set current-speed\n",
+               line->uart->name, (unsigned)now.baudrate, (unsigned)line->baud);
+        line->baud = now.baudrate;
+    }
+    if (now.parity != wanted->parity || now.stop_bits != wanted->stop_bits ||
+        now.data_bits != wanted->data_bits)
+        printk("mbm: %s keeps the parity and the data and stop bits of its devicetree\n",
+               line->uart->name);
+}
+
+static int configure(mbm_zephyrLine *line)
+{
     const struct uart_config config = {
         .baudrate = line->baud,
         .parity = line->parity,
@@ -132,11 +155,15 @@ static int configure(const mbm_zephyrLine *line)
         .flow_ctrl = UART_CFG_FLOW_CTRL_NONE,
     };
 
-    return uart_configure(line->uart, &config);
-#else
-    (void)line;
-    return 0;
+#ifdef CONFIG_UART_USE_RUNTIME_CONFIGURE
+    /* -ENOSYS comes from a driver without this function. */
+    int error = uart_configure(line->uart, &config);
+
+    if (error != -ENOSYS)
+        return error;
 #endif
+    keep_configuration(line, &config);
+    return 0;
 }
 
 int mbm_zephyr_open(mbm_zephyrLine *line, mbm_port *port)

@@ -21,11 +21,21 @@
 extern "C" {
 #endif
 
+/**
+ * The first fields of a line from the devicetree's node of its UART, for example
+ * MBM_ZEPHYR_UART(DT_ALIAS(modbus_line)).
+ */
+#define MBM_ZEPHYR_UART(node)                                                                      \
+    .uart = DEVICE_DT_GET(node), .currentSpeed = DT_PROP_OR(node, current_speed, 0)
+
 /** A serial line. Set the public fields, zero the others, and keep it valid while it is used. */
 typedef struct mbm_zephyrLine {
-    const struct device *uart;  /**< for example DEVICE_DT_GET(DT_ALIAS(modbus_line)) */
+    const struct device *uart;  /**< MBM_ZEPHYR_UART sets it */
     struct gpio_dt_spec driver; /**< the pin at DE and /RE of an RS-485 transceiver; zero if none */
-    uint32_t baud;              /**< bits per second */
+    uint32_t currentSpeed;      /**< the rate that the devicetree gives the UART; 0 if unknown.
+                                     MBM_ZEPHYR_UART sets it. It counts only for a UART that
+                                     cannot be configured at run time */
+    uint32_t baud;              /**< bits per second; see mbm_zephyr_open */
     uint8_t parity;             /**< UART_CFG_PARITY_EVEN, Modbus's default, _ODD or _NONE */
 
     mbm_ring ring;                        /**< private: received bytes */
@@ -40,8 +50,12 @@ typedef struct mbm_zephyrLine {
 } mbm_zephyrLine;
 
 /**
- * Prepares UART and pin: 8 data bits, two stop bits without parity, else one. If the UART has no
- * runtime configuration (CONFIG_UART_USE_RUNTIME_CONFIGURE), the devicetree sets rate and format.
+ * Prepares UART and pin: 8 data bits, two stop bits without parity, else one.
+ *
+ * A UART without runtime configuration keeps the rate and the format of the devicetree: one whose
+ * driver lacks uart_configure, as that of qemu_cortex_m3 does, and every UART without
+ * CONFIG_UART_USE_RUNTIME_CONFIGURE. If they are known to differ from those of the line, printk
+ * says so, and `baud` becomes the devicetree's rate. So give the object `baud`, not a number.
  *
  * @param line  the settings
  * @param port  receives the port for the begin functions

@@ -1,8 +1,11 @@
-/* Plays Zephyr's UART with a FIFO of 16 bytes, a GPIO and the kernel's clock on a line in memory.
+/* STAND_IN_UART_KIND is what the UART's driver can do: CONFIGURABLE, READABLE or FIXED.
+ *
+ * Plays Zephyr's UART with a FIFO of 16 bytes, a GPIO and the kernel's clock on a line in memory.
  * The sample's main runs by itself: this file's constructor prepares the line. The program ends
  * when the device has answered four requests and ignored one. Licence: MIT OR Apache-2.0. */
 #include "line.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <zephyr/drivers/gpio.h>
@@ -10,13 +13,15 @@
 #include <zephyr/kernel.h>
 
 enum { FIFO = 16 };
+enum { CONFIGURABLE, READABLE, FIXED };
 
 const struct device stand_in_uart = {.name = STAND_IN_UART};
 const struct device stand_in_gpio = {.name = STAND_IN_GPIO};
 
 static uart_irq_callback_user_data_t call;
 static void *call_data;
-static bool is_configured, is_output, has_rx, has_tx, is_inside, is_updated;
+static bool is_configured = STAND_IN_UART_KIND != CONFIGURABLE;
+static bool is_output, has_rx, has_tx, is_inside, is_updated;
 
 static void expect(bool fact, const char *what)
 {
@@ -30,6 +35,8 @@ __attribute__((constructor)) static void begin(void)
 {
     line_ignore_after(2);
     line_end_after(4);
+    if (STAND_IN_UART_KIND != CONFIGURABLE)
+        line_begin(STAND_IN_CURRENT_SPEED);
 }
 
 bool device_is_ready(const struct device *device)
@@ -58,12 +65,25 @@ void line_interrupt(void)
 int uart_configure(const struct device *dev, const struct uart_config *config)
 {
     expect(dev == &stand_in_uart && config->baudrate == 19200, "the rate");
+    if (STAND_IN_UART_KIND != CONFIGURABLE)
+        return -ENOSYS;
     expect(config->parity == UART_CFG_PARITY_EVEN && config->stop_bits == UART_CFG_STOP_BITS_1 &&
                config->data_bits == UART_CFG_DATA_BITS_8 &&
                config->flow_ctrl == UART_CFG_FLOW_CTRL_NONE,
            "the format");
     line_begin(config->baudrate);
     is_configured = true;
+    return 0;
+}
+
+int uart_config_get(const struct device *dev, struct uart_config *config)
+{
+    expect(dev == &stand_in_uart, "the settings of another UART");
+    if (STAND_IN_UART_KIND == FIXED)
+        return -ENOSYS;
+    *config =
+        (struct uart_config){STAND_IN_CURRENT_SPEED, UART_CFG_PARITY_NONE, UART_CFG_STOP_BITS_1,
+                             UART_CFG_DATA_BITS_8, UART_CFG_FLOW_CTRL_NONE};
     return 0;
 }
 

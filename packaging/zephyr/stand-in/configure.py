@@ -59,6 +59,7 @@ def devicetree(stand_in: pathlib.Path, application: pathlib.Path, out: pathlib.P
     (out / "devicetree.h").write_text(
         f'#define STAND_IN_UART "{uart.path}"\n'
         f'#define STAND_IN_GPIO "{controller.path}"\n'
+        f"#define STAND_IN_CURRENT_SPEED {uart.props['current-speed'].to_num()}\n"
         f"#define STAND_IN_PIN {cells[1]}\n#define STAND_IN_FLAGS {cells[2]}\n")
 
 

@@ -8,7 +8,7 @@
 enum { UNIT = 17, FIRST = 100, COUNT = 2, BAUD = 19200 };
 
 static mbm_zephyrLine line = {
-    .uart = DEVICE_DT_GET(DT_ALIAS(modbus_line)),
+    MBM_ZEPHYR_UART(DT_ALIAS(modbus_line)),
     .driver = GPIO_DT_SPEC_GET_OR(DT_PATH(zephyr_user), modbus_driver_gpios, {0}),
     .baud = BAUD,
     .parity = UART_CFG_PARITY_EVEN,
@@ -29,7 +29,7 @@ int main(void)
     }
     mbm_master_setBuffers(&master, response, COUNT, NULL, 0, frame, sizeof frame);
     mbm_master_beginRtu(&master, UNIT, &port);
-    mbm_master_setBaudRate(&master, BAUD);
+    mbm_master_setBaudRate(&master, line.baud);
     mbm_master_setResponseTimeout(&master, 500); /* milliseconds */
     for (;;) {
         status = mbm_master_readHoldingRegisters(&master, FIRST, COUNT);

@@ -23,6 +23,7 @@ typedef struct rt_device *rt_device_t;
 #define RT_ERROR 1
 #define RT_ENOSYS 6
 #define RT_EINVAL 10
+#define RT_ENOENT 11
 
 #define RT_DEVICE_FLAG_INT_RX 0x100
 #define RT_DEVICE_OFLAG_RDWR 0x003

@@ -20,6 +20,11 @@ extern const struct device stand_in_uart, stand_in_gpio;
 #define DEVICE_OF(node) (&node##_device)
 #define stand_in_alias_modbus_line_device stand_in_uart
 
+/* The only property that a line reads. */
+#define DT_PROP_OR(node, property, otherwise) PROPERTY_OF(node, property)
+#define PROPERTY_OF(node, property) node##_##property
+#define stand_in_alias_modbus_line_current_speed STAND_IN_CURRENT_SPEED
+
 bool device_is_ready(const struct device *device);
 
 #endif

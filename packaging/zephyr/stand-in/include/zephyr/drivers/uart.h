@@ -20,6 +20,7 @@ struct uart_config {
 typedef void (*uart_irq_callback_user_data_t)(const struct device *dev, void *user_data);
 
 int uart_configure(const struct device *dev, const struct uart_config *config);
+int uart_config_get(const struct device *dev, struct uart_config *config);
 #ifdef CONFIG_UART_INTERRUPT_DRIVEN
 int uart_irq_callback_user_data_set(const struct device *dev, uart_irq_callback_user_data_t call,
                                     void *user_data);

@@ -1,6 +1,7 @@
 # Plays Zephyr's build for an application: configure.py reads module, options and devicetree, the
 # module is added, and application, module, board.c and the module's line in memory are linked.
-# STAND_IN_MODULE is the module's folder, STAND_IN_CORE cortex-m or riscv.
+# STAND_IN_MODULE is the module's folder, STAND_IN_CORE cortex-m or riscv, STAND_IN_UART_KIND what
+# the UART's driver can do: see board.c.
 get_filename_component(STAND_IN ${CMAKE_CURRENT_LIST_DIR}/../../.. ABSOLUTE)
 project(Zephyr-Kernel C ASM)
 set(STAND_IN_OUT ${CMAKE_BINARY_DIR}/generated)
@@ -47,5 +48,6 @@ add_subdirectory(${STAND_IN_MODULE}/zephyr mbm)
 add_library(app STATIC)
 target_link_libraries(app PUBLIC zephyr_interface)
 add_executable(zephyr.elf ${STAND_IN}/board.c ${STAND_IN_MODULE}/tests/line.c)
+target_compile_definitions(zephyr.elf PRIVATE STAND_IN_UART_KIND=${STAND_IN_UART_KIND})
 target_include_directories(zephyr.elf PRIVATE ${STAND_IN_MODULE}/tests)
 target_link_libraries(zephyr.elf PRIVATE zephyr_interface -Wl,--start-group app mbm -Wl,--end-group)
