@@ -74,23 +74,23 @@ fn set(w: &World, client: *mut mbm_client) {
         2 => call!(
             w,
             client,
-            mbm_client_setResponseTimeout(client, word.into())
+            mbm_client_setResponseTimeout(client, u32::from(word))
         ),
         3 => call!(w, client, mbm_client_setBaudRate(client, long)),
         4 => call!(w, client, mbm_client_setGap(client, long)),
         5 => call!(
             w,
             client,
-            mbm_client_setTurnaroundDelay(client, word.into())
+            mbm_client_setTurnaroundDelay(client, u32::from(word))
         ),
-        6 => call!(w, client, mbm_client_setQuietTime(client, word.into())),
+        6 => call!(w, client, mbm_client_setQuietTime(client, u32::from(word))),
         7 => call!(w, client, mbm_client_setEchoDiscard(client, byte & 3)),
         8 => call!(w, client, mbm_client_setPostFlushHold(client, byte)),
         9 => call!(w, client, mbm_client_setRetries(client, byte)),
         10 => call!(
             w,
             client,
-            mbm_client_setBackoff(client, byte % 6, word.into(), more.into())
+            mbm_client_setBackoff(client, byte % 6, u32::from(word), u32::from(more))
         ),
         11 => call!(
             w,
@@ -102,7 +102,7 @@ fn set(w: &World, client: *mut mbm_client) {
         14 => call!(
             w,
             client,
-            mbm_client_setBusyRetries(client, byte, word.into())
+            mbm_client_setBusyRetries(client, byte, u32::from(word))
         ),
         _ => call!(w, client, mbm_client_setUnits(client, none, byte)),
     });

@@ -68,16 +68,16 @@ fn set(w: &World, master: *mut mbm_master) {
         1 => call!(
             w,
             master,
-            mbm_master_setResponseTimeout(master, word.into())
+            mbm_master_setResponseTimeout(master, u32::from(word))
         ),
         2 => call!(w, master, mbm_master_setBaudRate(master, long)),
         3 => call!(w, master, mbm_master_setGap(master, long)),
         4 => call!(
             w,
             master,
-            mbm_master_setTurnaroundDelay(master, word.into())
+            mbm_master_setTurnaroundDelay(master, u32::from(word))
         ),
-        5 => call!(w, master, mbm_master_setQuietTime(master, word.into())),
+        5 => call!(w, master, mbm_master_setQuietTime(master, u32::from(word))),
         6 => call!(w, master, mbm_master_setRetries(master, byte)),
         7 => call!(w, master, mbm_master_setEchoDiscard(master, byte & 3)),
         8 => call!(w, master, mbm_master_setPostFlushHold(master, byte)),

@@ -54,12 +54,12 @@ fn set(w: &World, sniffer: *mut mbm_sniffer) {
         1 => call!(
             w,
             sniffer,
-            mbm_sniffer_setResponseTimeout(sniffer, word.into())
+            mbm_sniffer_setResponseTimeout(sniffer, u32::from(word))
         ),
         _ => call!(
             w,
             sniffer,
-            mbm_sniffer_setFrameTimeout(sniffer, word.into())
+            mbm_sniffer_setFrameTimeout(sniffer, u32::from(word))
         ),
     });
     call!(w, sniffer, mbm_sniffer_getResponseTimeout(sniffer));
