@@ -426,6 +426,28 @@ static void without_a_baud_rate_nothing_is_added(void **state)
     IS(MBM_RESPONSE_TIMED_OUT, answered_after(2010));
 }
 
+static void a_time_that_is_too_long_is_refused_and_not_cut(void **state)
+{
+    (void)state;
+    OK(mbm_master_setResponseTimeout(&m, 100000));
+    assert_int_equal(mbm_master_getResponseTimeout(&m), 100000);
+    OK(mbm_master_setResponseTimeout(&m, 1000000));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setResponseTimeout(&m, 1000001));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setResponseTimeout(&m, 0xFFFFFFFF));
+    assert_int_equal(mbm_master_getResponseTimeout(&m), 1000000);
+    OK(mbm_master_setTurnaroundDelay(&m, 65535));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setTurnaroundDelay(&m, 65536));
+    assert_int_equal(mbm_master_getTurnaroundDelay(&m), 65535);
+    OK(mbm_master_setQuietTime(&m, 65535));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setQuietTime(&m, 65536));
+    assert_int_equal(mbm_master_getQuietTime(&m), 65535);
+    /* A timeout of 100 s is one. */
+    OK(mbm_master_setResponseTimeout(&m, 100000));
+    IS(MBM_RESPONSE_TIMED_OUT, answered_after(100100));
+    OK(mbm_master_setQuietTime(&m, 0));
+    OK(answered_after(99900));
+}
+
 #define TEST(test) cmocka_unit_test_setup(test, setup)
 
 int main(void)
@@ -444,6 +466,7 @@ int main(void)
         TEST(without_flush_a_timeout_counts_from_when_the_request_is_sent),
         TEST(a_port_that_knows_when_the_request_is_sent_adds_nothing),
         TEST(without_a_baud_rate_nothing_is_added),
+        TEST(a_time_that_is_too_long_is_refused_and_not_cut),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

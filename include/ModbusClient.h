@@ -99,11 +99,11 @@ public:
     /** The silence in effect: of setGap, or t3.5 of setBaudRate. */
     uint32_t getGap() const { return mbm_client_getGap(&client); }
     /** Milliseconds from a broadcast to the next request; 100 at first. */
-    uint8_t setTurnaroundDelay(uint16_t ms) { return mbm_client_setTurnaroundDelay(&client, ms); }
+    uint8_t setTurnaroundDelay(uint32_t ms) { return mbm_client_setTurnaroundDelay(&client, ms); }
     /** What setTurnaroundDelay has set. */
     uint16_t getTurnaroundDelay() const { return mbm_client_getTurnaroundDelay(&client); }
     /** Milliseconds after a failed request before the next one is sent; 100 at first. */
-    uint8_t setQuietTime(uint16_t ms) { return mbm_client_setQuietTime(&client, ms); }
+    uint8_t setQuietTime(uint32_t ms) { return mbm_client_setQuietTime(&client, ms); }
     /** What setQuietTime has set. */
     uint16_t getQuietTime() const { return mbm_client_getQuietTime(&client); }
     /** Discards the local echo, if the receiver receives what the driver sends; off at first. */

@@ -236,10 +236,10 @@ public:
         return mbm_client_forward(&client, withWords(request), function, body, bytes);
     }
 
-    /** Milliseconds that a reply may take, 0 to 65535; 2000 at first. */
-    uint8_t setResponseTimeout(uint16_t ms) { return mbm_client_setResponseTimeout(&client, ms); }
+    /** Milliseconds that a reply may take, 0 to 1000000; 2000 at first. */
+    uint8_t setResponseTimeout(uint32_t ms) { return mbm_client_setResponseTimeout(&client, ms); }
     /** What setResponseTimeout has set. */
-    uint16_t getResponseTimeout() const { return mbm_client_getResponseTimeout(&client); }
+    uint32_t getResponseTimeout() const { return mbm_client_getResponseTimeout(&client); }
     /** How often a request is repeated if its reply is missing, damaged or malformed, 0 to 255; 0 at first. */
     uint8_t setRetries(uint8_t retries) { return mbm_client_setRetries(&client, retries); }
     /** What setRetries has set. */
@@ -249,7 +249,7 @@ public:
      * refuses because it is busy (exception 06), or that only reads and that the device
      * answers with exception 05; 0 to 255. See mbm_client_setBusyRetries.
      */
-    uint8_t setBusyRetries(uint8_t retries, uint16_t waitMs)
+    uint8_t setBusyRetries(uint8_t retries, uint32_t waitMs)
     {
         return mbm_client_setBusyRetries(&client, retries, waitMs);
     }
@@ -257,7 +257,7 @@ public:
      * Milliseconds before a repetition: MBM_BACKOFF_NONE (at first), _FIXED, _LINEAR or
      * _EXPONENTIAL, the first wait and the longest. Other requests are sent meanwhile.
      */
-    uint8_t setBackoff(uint8_t backoff, uint16_t ms, uint16_t mostMs)
+    uint8_t setBackoff(uint8_t backoff, uint32_t ms, uint32_t mostMs)
     {
         return mbm_client_setBackoff(&client, backoff, ms, mostMs);
     }

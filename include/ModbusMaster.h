@@ -276,10 +276,11 @@ public:
         return request(mbm_master_readWriteQueuedRegisters, readAddress, readQuantity);
     }
 
-    /** Milliseconds from the end of a request to the end of its reply; 2000 at first. */
-    void setResponseTimeout(uint16_t ms) { mbm_master_setResponseTimeout(&state.master, ms); }
+    /** Milliseconds from the end of a request to the end of its reply, 0 to 1000000; 2000 at
+        first. A longer time changes nothing. */
+    void setResponseTimeout(uint32_t ms) { mbm_master_setResponseTimeout(&state.master, ms); }
     /** What setResponseTimeout has set. */
-    uint16_t getResponseTimeout() const { return mbm_master_getResponseTimeout(&state.master); }
+    uint32_t getResponseTimeout() const { return mbm_master_getResponseTimeout(&state.master); }
     /** The unit of later requests: 1 to 247; 248 to 255 are sent as they are, 0 broadcasts. */
     void setSlaveID(uint8_t slave) { mbm_master_setSlaveID(&state.master, slave); }
     /** The unit of later requests. */
@@ -291,11 +292,11 @@ public:
     /** The silence in effect: of setGap, or t3.5 of setBaudRate. */
     uint32_t getGap() const { return mbm_master_getGap(&state.master); }
     /** Milliseconds from a broadcast to the next request; 100 at first. */
-    void setTurnaroundDelay(uint16_t ms) { mbm_master_setTurnaroundDelay(&state.master, ms); }
+    void setTurnaroundDelay(uint32_t ms) { mbm_master_setTurnaroundDelay(&state.master, ms); }
     /** What setTurnaroundDelay has set. */
     uint16_t getTurnaroundDelay() const { return mbm_master_getTurnaroundDelay(&state.master); }
     /** Milliseconds after a failed request before the next one is sent; 100 at first. */
-    void setQuietTime(uint16_t ms) { mbm_master_setQuietTime(&state.master, ms); }
+    void setQuietTime(uint32_t ms) { mbm_master_setQuietTime(&state.master, ms); }
     /** What setQuietTime has set. */
     uint16_t getQuietTime() const { return mbm_master_getQuietTime(&state.master); }
     /** How often a request is repeated if its reply is missing, damaged or malformed; 0 at first. */

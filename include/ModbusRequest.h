@@ -59,13 +59,15 @@ public:
     /**
      * Sets the response timeout of later calls in milliseconds, instead of the client's; 0
      * (at first): the client's. Returns MBM_OK; MBM_BUSY, with nothing changed, while the
-     * request is pending.
+     * request is pending; MBM_INVALID_ARGUMENT above 65535.
      */
-    uint8_t setResponseTimeout(uint16_t ms)
+    uint8_t setResponseTimeout(uint32_t ms)
     {
+        if (ms > 65535)
+            return MBM_INVALID_ARGUMENT;
         if (pending())
             return MBM_BUSY;
-        request.timeoutMs = ms;
+        request.timeoutMs = static_cast<uint16_t>(ms);
         return MBM_OK;
     }
     /**

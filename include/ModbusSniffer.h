@@ -93,14 +93,14 @@ public:
     void onEvent(void (*function)(const mbm_event &)) { callback.set(function); }
 
     /** Milliseconds after which a request counts as one without a reply, 1 to 65535; 1000 at first. */
-    uint8_t setResponseTimeout(uint16_t ms)
+    uint8_t setResponseTimeout(uint32_t ms)
     {
         return mbm_sniffer_setResponseTimeout(&sniffer, ms);
     }
     /** What setResponseTimeout has set. */
     uint16_t getResponseTimeout() const { return mbm_sniffer_getResponseTimeout(&sniffer); }
     /** Milliseconds that the rest of a frame may take, 1 to 65535; 50 in RTU, 1000 in ASCII at first. */
-    uint8_t setFrameTimeout(uint16_t ms) { return mbm_sniffer_setFrameTimeout(&sniffer, ms); }
+    uint8_t setFrameTimeout(uint32_t ms) { return mbm_sniffer_setFrameTimeout(&sniffer, ms); }
     /** What setFrameTimeout has set. */
     uint16_t getFrameTimeout() const { return mbm_sniffer_getFrameTimeout(&sniffer); }
 

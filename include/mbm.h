@@ -942,7 +942,7 @@ uint8_t mbm_master_getExceptionCode(const struct mbm_master *master);
  * @param master  the object
  * @return milliseconds; 0 for an object that was never begun
  */
-uint16_t mbm_master_getResponseTimeout(const struct mbm_master *master);
+uint32_t mbm_master_getResponseTimeout(const struct mbm_master *master);
 
 /**
  * Returns the silence before a request that is in effect: what mbm_master_setGap set, or t3.5
@@ -1239,11 +1239,11 @@ uint8_t mbm_master_getSlaveID(const struct mbm_master *master);
  * byte of the reply.
  *
  * @param master        the object
- * @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
+ * @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setResponseTimeout(struct mbm_master *master,
-                                      uint16_t timeoutMs);
+                                      uint32_t timeoutMs);
 
 /**
  * Sets the baud rate from which the master computes the gap before a request (t3.5, serial
@@ -1278,7 +1278,7 @@ uint8_t mbm_master_setGap(struct mbm_master *master,
  * @param delayMs       milliseconds, 0 to 65535; the default is 100
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t delayMs);
+uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint32_t delayMs);
 
 /**
  * Sets the quiet time. It prevents that the master accepts a late reply as the reply to a
@@ -1309,7 +1309,7 @@ uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t delayM
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setQuietTime(struct mbm_master *master,
-                                uint16_t quietMs);
+                                uint32_t quietMs);
 
 /**
  * Sets how often the master repeats a request whose reply is missing, damaged or malformed.
@@ -1916,7 +1916,7 @@ uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
  * @param client  the object
  * @return milliseconds; 0 for an object that was never begun
  */
-uint16_t mbm_client_getResponseTimeout(const struct mbm_client *client);
+uint32_t mbm_client_getResponseTimeout(const struct mbm_client *client);
 
 /**
  * Returns the silence before a request on an RTU line that is in effect: what
@@ -2150,7 +2150,7 @@ uint8_t mbm_client_setRetries(struct mbm_client *client,
  */
 uint8_t mbm_client_setBusyRetries(struct mbm_client *client,
                                   uint8_t retries,
-                                  uint16_t waitMs);
+                                  uint32_t waitMs);
 
 /**
  * Sets how long a request waits before the client repeats it. Meanwhile the client sends
@@ -2158,14 +2158,14 @@ uint8_t mbm_client_setBusyRetries(struct mbm_client *client,
  *
  * @param client            the object
  * @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
- * @param delayMs           the wait before the first repetition, in milliseconds
- * @param maxDelayMs        the longest wait, in milliseconds
+ * @param delayMs           the wait before the first repetition, in milliseconds, 0 to 1000000
+ * @param maxDelayMs        the longest wait, in milliseconds, 0 to 1000000
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setBackoff(struct mbm_client *client,
                               uint8_t backoff,
-                              uint16_t delayMs,
-                              uint16_t maxDelayMs);
+                              uint32_t delayMs,
+                              uint32_t maxDelayMs);
 
 /**
  * Shortens each wait before a repetition by a random part, so that several clients do not
@@ -2613,11 +2613,11 @@ uint8_t mbm_client_forward(struct mbm_client *client,
  * replaces this time.
  *
  * @param client        the object
- * @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
+ * @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setResponseTimeout(struct mbm_client *client,
-                                      uint16_t timeoutMs);
+                                      uint32_t timeoutMs);
 
 /**
  * Sets the baud rate from which the client computes the gap before an RTU request (t3.5,
@@ -2652,7 +2652,7 @@ uint8_t mbm_client_setGap(struct mbm_client *client,
  * @param delayMs       milliseconds, 0 to 65535; the default is 100
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t delayMs);
+uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint32_t delayMs);
 
 /**
  * Sets the quiet time of a serial line. It prevents that the client accepts a late reply as
@@ -2668,7 +2668,7 @@ uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t delayM
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setQuietTime(struct mbm_client *client,
-                                uint16_t quietMs);
+                                uint32_t quietMs);
 
 /**
  * Switches echo discarding on or off. Switch it on if the receiver also receives what the
@@ -3414,8 +3414,8 @@ uint8_t mbm_link_reconnect(struct mbm_link *link);
  */
 uint8_t mbm_link_setBackoff(struct mbm_link *link,
                             uint8_t backoff,
-                            uint16_t delayMs,
-                            uint16_t maxDelayMs);
+                            uint32_t delayMs,
+                            uint32_t maxDelayMs);
 
 /**
  * Shortens each wait before an attempt by a random part, so that many clients that lost their
@@ -3437,12 +3437,12 @@ uint8_t mbm_link_setJitter(struct mbm_link *link,
  * Sets how long a connection may take to be made. Then the attempt has failed.
  *
  * @param link       the object
- * @param timeoutMs  milliseconds, 1 to 65535; 0: as long as `status` returns MBM_PENDING. The
- *                   default is 10000
+ * @param timeoutMs  milliseconds, 1 to 1000000 (16 minutes); 0: as long as `status` returns
+ *                   MBM_PENDING. The default is 10000
  * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_link_setConnectTimeout(struct mbm_link *link,
-                                   uint16_t timeoutMs);
+                                   uint32_t timeoutMs);
 
 /**
  * Sets whether requests wait for the link. By default they do not: while the link is down,
@@ -4829,11 +4829,12 @@ uint16_t mbm_gateway_inFlight(const struct mbm_gateway *gateway);
  * its client has given up.
  *
  * @param gateway  the object
- * @param timeMs   milliseconds; 0, the default, lets requests wait for any time
+ * @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait for any
+ *                 time
  * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway,
-                                 uint16_t timeMs);
+                                 uint32_t timeMs);
 
 /**
  * Returns the time that mbm_gateway_setQueueTime has set.
@@ -4841,7 +4842,7 @@ uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway,
  * @param gateway  the object
  * @return milliseconds; 0 also if the gateway was never begun
  */
-uint16_t mbm_gateway_queueTime(const struct mbm_gateway *gateway);
+uint32_t mbm_gateway_queueTime(const struct mbm_gateway *gateway);
 
 /**
  * Serves units of the gateway itself: those that a route to MBM_GATEWAY_LOCAL leads to. The
@@ -6309,7 +6310,7 @@ uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
  * @param timeoutMs  1 to 65535 ms
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
+uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint32_t timeoutMs);
 
 /**
  * Returns the response timeout: see mbm_sniffer_setResponseTimeout.
@@ -6328,7 +6329,7 @@ uint16_t mbm_sniffer_getResponseTimeout(const struct mbm_sniffer *sniffer);
  * @param timeoutMs  1 to 65535 ms
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
+uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint32_t timeoutMs);
 
 /**
  * Returns the frame timeout: see mbm_sniffer_setFrameTimeout.
@@ -6562,7 +6563,7 @@ const struct mbm_port *mbm_trace_innerPort(const struct mbm_trace *trace);
  * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_trace_setFrameTimeout(struct mbm_trace *trace,
-                                  uint16_t timeoutMs);
+                                  uint32_t timeoutMs);
 
 /**
  * Returns the frame timeout: see mbm_trace_setFrameTimeout.

@@ -58,9 +58,23 @@ pub const fn millis(milliseconds: u16) -> u32 {
     milliseconds as u32 * 1000
 }
 
+/// The longest timeout that a caller may set, in milliseconds, about 16 minutes. Twice that time
+/// still is less than [`LONGEST`].
+const LONGEST_TIMEOUT_MS: u32 = 1_000_000;
+
+/// Converts a timeout in milliseconds to microseconds. `None` above 1 000 000.
+#[cfg_attr(target_os = "none", inline(never))]
+pub const fn timeout(milliseconds: u32) -> Option<u32> {
+    if milliseconds > LONGEST_TIMEOUT_MS {
+        None
+    } else {
+        Some(milliseconds * 1000)
+    }
+}
+
 /// Converts microseconds to whole milliseconds.
-pub const fn to_millis(microseconds: u32) -> u16 {
-    (microseconds / 1000) as u16
+pub const fn to_millis(microseconds: u32) -> u32 {
+    microseconds / 1000
 }
 
 /// The length of a character of 11 bits, in microseconds, rounded up, at most 65535.

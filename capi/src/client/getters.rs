@@ -25,7 +25,7 @@ unsafe fn get<T: Default>(client: *const mbm_client, getter: impl FnOnce(&Settin
 /// @param client  the object
 /// @return milliseconds; 0 for an object that was never begun
 #[no_mangle]
-pub unsafe extern "C" fn mbm_client_getResponseTimeout(client: *const mbm_client) -> u16 {
+pub unsafe extern "C" fn mbm_client_getResponseTimeout(client: *const mbm_client) -> u32 {
     // SAFETY: as the header demands.
     unsafe { get(client, |settings| to_millis(settings.response_timeout)) }
 }
@@ -48,7 +48,11 @@ pub unsafe extern "C" fn mbm_client_getGap(client: *const mbm_client) -> u32 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getTurnaroundDelay(client: *const mbm_client) -> u16 {
     // SAFETY: as the header demands.
-    unsafe { get(client, |settings| to_millis(settings.turnaround_delay)) }
+    unsafe {
+        get(client, |settings| {
+            to_millis(settings.turnaround_delay) as u16
+        })
+    }
 }
 
 /// Returns the quiet time: see mbm_client_setQuietTime.
@@ -58,7 +62,7 @@ pub unsafe extern "C" fn mbm_client_getTurnaroundDelay(client: *const mbm_client
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getQuietTime(client: *const mbm_client) -> u16 {
     // SAFETY: as the header demands.
-    unsafe { get(client, |settings| to_millis(settings.quiet_time)) }
+    unsafe { get(client, |settings| to_millis(settings.quiet_time) as u16) }
 }
 
 /// Returns how often a request is repeated: see mbm_client_setRetries.

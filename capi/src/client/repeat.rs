@@ -8,7 +8,7 @@ use mbm::client::{
     again, again_when_busy, Backoff, ClientStorage as _, Policy, RequestState, NO_RETRIES,
 };
 use mbm::error::Status;
-use mbm::time::millis;
+use mbm::time::timeout;
 
 /// `retryLimit` of mbm_clientRequest and mbm_clientUnit: no repetitions.
 pub const MBM_NO_RETRIES: u8 = 255;
@@ -96,13 +96,16 @@ fn again_after_failure(
 pub unsafe extern "C" fn mbm_client_setBusyRetries(
     client: *mut mbm_client,
     retries: u8,
-    waitMs: u16,
+    waitMs: u32,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
+            let Ok(wait) = u16::try_from(waitMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
             parts.queue.policy.busy_retries = retries;
-            parts.queue.policy.busy_wait_ms = waitMs;
+            parts.queue.policy.busy_wait_ms = wait;
             parts.storage.again = Some(|storage, policy, state, status| {
                 again_when_busy(policy, state, status)
                     .or_else(|| again_after_failure(storage, policy, state, status))
@@ -118,15 +121,15 @@ pub unsafe extern "C" fn mbm_client_setBusyRetries(
 ///
 /// @param client            the object
 /// @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
-/// @param delayMs           the wait before the first repetition, in milliseconds
-/// @param maxDelayMs        the longest wait, in milliseconds
+/// @param delayMs           the wait before the first repetition, in milliseconds, 0 to 1000000
+/// @param maxDelayMs        the longest wait, in milliseconds, 0 to 1000000
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setBackoff(
     client: *mut mbm_client,
     backoff: u8,
-    delayMs: u16,
-    maxDelayMs: u16,
+    delayMs: u32,
+    maxDelayMs: u32,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
@@ -134,7 +137,9 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
             let Some(backoff) = Backoff::from_code(backoff) else {
                 return Status::INVALID_ARGUMENT;
             };
-            let (wait, most) = (millis(delayMs), millis(maxDelayMs));
+            let (Some(wait), Some(most)) = (timeout(delayMs), timeout(maxDelayMs)) else {
+                return Status::INVALID_ARGUMENT;
+            };
             parts.queue.policy.set_backoff(backoff, wait, most);
             Status::OK
         })

@@ -8,7 +8,7 @@ use crate::storage::mbm_counters;
 use mbm::client::RequestQueue;
 use mbm::engine::Settings;
 use mbm::error::Status;
-use mbm::time::millis;
+use mbm::time::{millis, timeout};
 
 /// The parts of a client that the settings change.
 pub(super) struct Parts<'a> {
@@ -42,17 +42,20 @@ pub(super) unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> 
 /// replaces this time.
 ///
 /// @param client        the object
-/// @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
+/// @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setResponseTimeout(
     client: *mut mbm_client,
-    timeoutMs: u16,
+    timeoutMs: u32,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.response_timeout = millis(timeoutMs);
+            let Some(timeout) = timeout(timeoutMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            parts.settings.response_timeout = timeout;
             Status::OK
         })
     }
@@ -104,12 +107,15 @@ pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, gapUs: u32) 
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
     client: *mut mbm_client,
-    delayMs: u16,
+    delayMs: u32,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.turnaround_delay = millis(delayMs);
+            let Ok(delay) = u16::try_from(delayMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            parts.settings.turnaround_delay = millis(delay);
             Status::OK
         })
     }
@@ -127,11 +133,14 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
 /// @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietMs: u16) -> u8 {
+pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietMs: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.quiet_time = millis(quietMs);
+            let Ok(quiet) = u16::try_from(quietMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            parts.settings.quiet_time = millis(quiet);
             Status::OK
         })
     }

@@ -14,7 +14,7 @@ use mbm::error::Status;
 use mbm::frame::tcp;
 use mbm::pdu::is_public;
 use mbm::pdu::length::{self, Length};
-use mbm::time::millis;
+use mbm::time::timeout;
 
 /// Sets how many requests of one connection may be under way at once
 /// (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 4.4.1). The next
@@ -54,14 +54,18 @@ pub unsafe extern "C" fn mbm_gateway_inFlight(gateway: *const mbm_gateway) -> u1
 /// its client has given up.
 ///
 /// @param gateway  the object
-/// @param timeMs   milliseconds; 0, the default, lets requests wait for any time
+/// @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait for any
+///                 time
 /// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, timeMs: u16) -> u8 {
+pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, timeMs: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(gateway, |core| {
-            (*core).set_queue_time(millis(timeMs));
+            let Some(time) = timeout(timeMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            (*core).set_queue_time(time);
             Status::OK
         })
     }
@@ -72,9 +76,9 @@ pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, tim
 /// @param gateway  the object
 /// @return milliseconds; 0 also if the gateway was never begun
 #[no_mangle]
-pub unsafe extern "C" fn mbm_gateway_queueTime(gateway: *const mbm_gateway) -> u16 {
+pub unsafe extern "C" fn mbm_gateway_queueTime(gateway: *const mbm_gateway) -> u32 {
     // SAFETY: as the header demands.
-    unsafe { pointers::read(gateway, 0, |core| ((*core).queue_time() / 1000) as u16) }
+    unsafe { pointers::read(gateway, 0, |core| (*core).queue_time() / 1000) }
 }
 
 /// Serves units of the gateway itself: those that a route to MBM_GATEWAY_LOCAL leads to. The

@@ -11,7 +11,7 @@ use crate::pointers::{self, CObject as _};
 use core::ffi::c_void;
 use mbm::client::{Backoff, LinkEvent, LinkState};
 use mbm::error::Status;
-use mbm::time::millis;
+use mbm::time::timeout;
 use object::{report, Object, KIND};
 
 /// mbm_link_state: there is no link. The client opens it when the wait is over.
@@ -226,8 +226,8 @@ pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
 pub unsafe extern "C" fn mbm_link_setBackoff(
     link: *mut mbm_link,
     backoff: u8,
-    delayMs: u16,
-    maxDelayMs: u16,
+    delayMs: u32,
+    maxDelayMs: u32,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
@@ -235,8 +235,10 @@ pub unsafe extern "C" fn mbm_link_setBackoff(
             let Some(backoff) = Backoff::from_code(backoff) else {
                 return Status::INVALID_ARGUMENT;
             };
-            let policy = &mut (*object).core.policy;
-            policy.set_backoff(backoff, millis(delayMs), millis(maxDelayMs));
+            let (Some(wait), Some(most)) = (timeout(delayMs), timeout(maxDelayMs)) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            (*object).core.policy.set_backoff(backoff, wait, most);
             Status::OK
         })
     }
@@ -274,15 +276,18 @@ pub unsafe extern "C" fn mbm_link_setJitter(
 /// Sets how long a connection may take to be made. Then the attempt has failed.
 ///
 /// @param link       the object
-/// @param timeoutMs  milliseconds, 1 to 65535; 0: as long as `status` returns MBM_PENDING. The
-///                   default is 10000
+/// @param timeoutMs  milliseconds, 1 to 1000000 (16 minutes); 0: as long as `status` returns
+///                   MBM_PENDING. The default is 10000
 /// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeoutMs: u16) -> u8 {
+pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeoutMs: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(link, |object| {
-            (*object).core.connect_timeout = millis(timeoutMs);
+            let Some(timeout) = timeout(timeoutMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            (*object).core.connect_timeout = timeout;
             Status::OK
         })
     }

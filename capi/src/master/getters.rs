@@ -10,7 +10,7 @@ use mbm::time::to_millis;
 /// @param master  the object
 /// @return milliseconds; 0 for an object that was never begun
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_getResponseTimeout(master: *const mbm_master) -> u16 {
+pub unsafe extern "C" fn mbm_master_getResponseTimeout(master: *const mbm_master) -> u32 {
     // SAFETY: as the header demands.
     unsafe {
         read(master, 0, |master| {
@@ -39,7 +39,7 @@ pub unsafe extern "C" fn mbm_master_getTurnaroundDelay(master: *const mbm_master
     // SAFETY: as the header demands.
     unsafe {
         read(master, 0, |master| {
-            to_millis(master.core.settings().turnaround_delay)
+            to_millis(master.core.settings().turnaround_delay) as u16
         })
     }
 }
@@ -53,7 +53,7 @@ pub unsafe extern "C" fn mbm_master_getQuietTime(master: *const mbm_master) -> u
     // SAFETY: as the header demands.
     unsafe {
         read(master, 0, |master| {
-            to_millis(master.core.settings().quiet_time)
+            to_millis(master.core.settings().quiet_time) as u16
         })
     }
 }

@@ -5,7 +5,7 @@ use super::{mbm_master, Core};
 use crate::pointers::{check, read, with};
 use crate::storage::mbm_counters;
 use mbm::error::Status;
-use mbm::time::millis;
+use mbm::time::{millis, timeout};
 
 /// Makes a change if the archive contains the code for it; otherwise refuses it.
 #[inline(always)]
@@ -49,17 +49,20 @@ pub unsafe extern "C" fn mbm_master_getSlaveID(master: *const mbm_master) -> u8 
 /// byte of the reply.
 ///
 /// @param master        the object
-/// @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
+/// @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setResponseTimeout(
     master: *mut mbm_master,
-    timeoutMs: u16,
+    timeoutMs: u32,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().response_timeout = millis(timeoutMs);
+            let Some(timeout) = timeout(timeoutMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            master.core.settings().response_timeout = timeout;
             Status::OK
         })
     }
@@ -111,12 +114,15 @@ pub unsafe extern "C" fn mbm_master_setGap(master: *mut mbm_master, gapUs: u32) 
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
     master: *mut mbm_master,
-    delayMs: u16,
+    delayMs: u32,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().turnaround_delay = millis(delayMs);
+            let Ok(delay) = u16::try_from(delayMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            master.core.settings().turnaround_delay = millis(delay);
             Status::OK
         })
     }
@@ -149,11 +155,14 @@ pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
 /// @param quietMs       milliseconds, 0 to 65535; the default is 100
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, quietMs: u16) -> u8 {
+pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, quietMs: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().quiet_time = millis(quietMs);
+            let Ok(quiet) = u16::try_from(quietMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            master.core.settings().quiet_time = millis(quiet);
             Status::OK
         })
     }

@@ -278,13 +278,14 @@ pub unsafe extern "C" fn mbm_sniffer_setBaudRate(sniffer: *mut mbm_sniffer, baud
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
     sniffer: *mut mbm_sniffer,
-    timeoutMs: u16,
+    timeoutMs: u32,
 ) -> u8 {
-    if timeoutMs == 0 {
-        return Status::INVALID_ARGUMENT.code();
-    }
+    let timeout = match u16::try_from(timeoutMs) {
+        Ok(timeout) if timeout > 0 => millis(timeout),
+        _ => return Status::INVALID_ARGUMENT.code(),
+    };
     // SAFETY: as the header demands.
-    unsafe { with(sniffer, |core| core.set_timeout(millis(timeoutMs))) }
+    unsafe { with(sniffer, |core| core.set_timeout(timeout)) }
 }
 
 /// Returns the response timeout: see mbm_sniffer_setResponseTimeout.
@@ -294,7 +295,7 @@ pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_getResponseTimeout(sniffer: *const mbm_sniffer) -> u16 {
     // SAFETY: as the header demands.
-    unsafe { pointers::read(sniffer, 0, |object| to_millis(object.core.timeout())) }
+    unsafe { pointers::read(sniffer, 0, |object| to_millis(object.core.timeout()) as u16) }
 }
 
 /// Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
@@ -307,13 +308,14 @@ pub unsafe extern "C" fn mbm_sniffer_getResponseTimeout(sniffer: *const mbm_snif
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
     sniffer: *mut mbm_sniffer,
-    timeoutMs: u16,
+    timeoutMs: u32,
 ) -> u8 {
-    if timeoutMs == 0 {
-        return Status::INVALID_ARGUMENT.code();
-    }
+    let timeout = match u16::try_from(timeoutMs) {
+        Ok(timeout) if timeout > 0 => millis(timeout),
+        _ => return Status::INVALID_ARGUMENT.code(),
+    };
     // SAFETY: as the header demands.
-    unsafe { with(sniffer, |core| core.set_frame_timeout(millis(timeoutMs))) }
+    unsafe { with(sniffer, |core| core.set_frame_timeout(timeout)) }
 }
 
 /// Returns the frame timeout: see mbm_sniffer_setFrameTimeout.
@@ -323,7 +325,11 @@ pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_getFrameTimeout(sniffer: *const mbm_sniffer) -> u16 {
     // SAFETY: as the header demands.
-    unsafe { pointers::read(sniffer, 0, |object| to_millis(object.core.frame_timeout())) }
+    unsafe {
+        pointers::read(sniffer, 0, |object| {
+            to_millis(object.core.frame_timeout()) as u16
+        })
+    }
 }
 
 /// Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.

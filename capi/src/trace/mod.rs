@@ -401,14 +401,15 @@ pub unsafe extern "C" fn mbm_trace_innerPort(trace: *const mbm_trace) -> *const 
 /// @param timeoutMs  1 to 65535 ms
 /// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
-pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeoutMs: u16) -> u8 {
-    if timeoutMs == 0 {
-        return Status::INVALID_ARGUMENT.code();
-    }
+pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeoutMs: u32) -> u8 {
+    let timeout = match u16::try_from(timeoutMs) {
+        Ok(timeout) if timeout > 0 => millis(timeout),
+        _ => return Status::INVALID_ARGUMENT.code(),
+    };
     // SAFETY: as the header demands.
     unsafe {
         with(trace, |core| {
-            (*core).set_frame_timeout(millis(timeoutMs));
+            (*core).set_frame_timeout(timeout);
             Status::OK
         })
     }

@@ -71,18 +71,26 @@ fn set(w: &World, client: *mut mbm_client) {
     refused_changes_nothing(w, &[span(client)], "mbm_client_set", || match choice {
         0 => call!(w, client, mbm_client_setDelimiter(client, byte)),
         1 => call!(w, client, mbm_client_setInFlight(client, byte % 20)),
-        2 => call!(w, client, mbm_client_setResponseTimeout(client, word)),
+        2 => call!(
+            w,
+            client,
+            mbm_client_setResponseTimeout(client, u32::from(word))
+        ),
         3 => call!(w, client, mbm_client_setBaudRate(client, long)),
         4 => call!(w, client, mbm_client_setGap(client, long)),
-        5 => call!(w, client, mbm_client_setTurnaroundDelay(client, word)),
-        6 => call!(w, client, mbm_client_setQuietTime(client, word)),
+        5 => call!(
+            w,
+            client,
+            mbm_client_setTurnaroundDelay(client, u32::from(word))
+        ),
+        6 => call!(w, client, mbm_client_setQuietTime(client, u32::from(word))),
         7 => call!(w, client, mbm_client_setEchoDiscard(client, byte & 3)),
         8 => call!(w, client, mbm_client_setPostFlushHold(client, byte)),
         9 => call!(w, client, mbm_client_setRetries(client, byte)),
         10 => call!(
             w,
             client,
-            mbm_client_setBackoff(client, byte % 6, word, more)
+            mbm_client_setBackoff(client, byte % 6, u32::from(word), u32::from(more))
         ),
         11 => call!(
             w,
@@ -91,7 +99,11 @@ fn set(w: &World, client: *mut mbm_client) {
         ),
         12 => call!(w, client, mbm_client_setCounters(client, counters)),
         13 => call!(w, client, mbm_client_setUnits(client, units, byte % 8)),
-        14 => call!(w, client, mbm_client_setBusyRetries(client, byte, word)),
+        14 => call!(
+            w,
+            client,
+            mbm_client_setBusyRetries(client, byte, u32::from(word))
+        ),
         _ => call!(w, client, mbm_client_setUnits(client, none, byte)),
     });
     get(w, client);

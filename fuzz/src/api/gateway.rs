@@ -137,7 +137,11 @@ fn set(w: &World, gateway: *mut mbm_gateway) {
     refused_changes_nothing(w, &[span(gateway)], "mbm_gateway_set", || {
         match byte >> 2 & 3 {
             0 => call!(w, gateway, mbm_gateway_setInFlight(gateway, word % 8)),
-            1 => call!(w, gateway, mbm_gateway_setQueueTime(gateway, word)),
+            1 => call!(
+                w,
+                gateway,
+                mbm_gateway_setQueueTime(gateway, u32::from(word))
+            ),
             2 => call!(w, gateway, mbm_gateway_serveUnits(gateway, units, count)),
             _ => call!(
                 w,

@@ -74,14 +74,14 @@ fn set(w: &World, link: *mut mbm_link) {
         0 => call!(
             w,
             link,
-            mbm_link_setBackoff(link, byte % 6, word % 50, more)
+            mbm_link_setBackoff(link, byte % 6, u32::from(word % 50), u32::from(more))
         ),
         1 => call!(
             w,
             link,
             mbm_link_setJitter(link, byte % 128, chance, context)
         ),
-        2 => call!(w, link, mbm_link_setConnectTimeout(link, word)),
+        2 => call!(w, link, mbm_link_setConnectTimeout(link, u32::from(word))),
         3 => call!(w, link, mbm_link_setRequestsWait(link, byte & 3)),
         4 => call!(w, link, mbm_link_setCounters(link, counters)),
         _ => call!(w, link, mbm_link_setCallback(link, callback, context)),

@@ -65,11 +65,19 @@ fn set(w: &World, master: *mut mbm_master) {
     };
     refused_changes_nothing(w, &[span(master)], "mbm_master_set", || match choice {
         0 => call!(w, master, mbm_master_setSlaveID(master, byte)),
-        1 => call!(w, master, mbm_master_setResponseTimeout(master, word)),
+        1 => call!(
+            w,
+            master,
+            mbm_master_setResponseTimeout(master, u32::from(word))
+        ),
         2 => call!(w, master, mbm_master_setBaudRate(master, long)),
         3 => call!(w, master, mbm_master_setGap(master, long)),
-        4 => call!(w, master, mbm_master_setTurnaroundDelay(master, word)),
-        5 => call!(w, master, mbm_master_setQuietTime(master, word)),
+        4 => call!(
+            w,
+            master,
+            mbm_master_setTurnaroundDelay(master, u32::from(word))
+        ),
+        5 => call!(w, master, mbm_master_setQuietTime(master, u32::from(word))),
         6 => call!(w, master, mbm_master_setRetries(master, byte)),
         7 => call!(w, master, mbm_master_setEchoDiscard(master, byte & 3)),
         8 => call!(w, master, mbm_master_setPostFlushHold(master, byte)),

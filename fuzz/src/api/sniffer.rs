@@ -51,8 +51,16 @@ fn set(w: &World, sniffer: *mut mbm_sniffer) {
             sniffer,
             mbm_sniffer_setFunctions(sniffer, functions, count)
         ),
-        1 => call!(w, sniffer, mbm_sniffer_setResponseTimeout(sniffer, word)),
-        _ => call!(w, sniffer, mbm_sniffer_setFrameTimeout(sniffer, word)),
+        1 => call!(
+            w,
+            sniffer,
+            mbm_sniffer_setResponseTimeout(sniffer, u32::from(word))
+        ),
+        _ => call!(
+            w,
+            sniffer,
+            mbm_sniffer_setFrameTimeout(sniffer, u32::from(word))
+        ),
     });
     call!(w, sniffer, mbm_sniffer_getResponseTimeout(sniffer));
     call!(w, sniffer, mbm_sniffer_getFrameTimeout(sniffer));

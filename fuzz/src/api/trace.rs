@@ -71,7 +71,11 @@ pub fn step(w: &World) {
             let timeout = w.word();
             let status =
                 refused_changes_nothing(w, &[span(trace)], "mbm_trace_setFrameTimeout", || {
-                    call!(w, trace, mbm_trace_setFrameTimeout(trace, timeout))
+                    call!(
+                        w,
+                        trace,
+                        mbm_trace_setFrameTimeout(trace, u32::from(timeout))
+                    )
                 });
             let found = call!(w, trace, mbm_trace_getFrameTimeout(trace));
             assert!(status != MBM_OK || found == timeout);
