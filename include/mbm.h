@@ -7,8 +7,8 @@
  * Rules of every function:
  * - A pointer is NULL or valid. For NULL a function returns MBM_INVALID_ARGUMENT, for an
  *   object that was never begun MBM_NOT_INITIALISED. It never crashes.
- * - Objects are your storage. Zero it before first use. The library uses no heap and no
- *   global variables.
+ * - Objects are your storage. Initialise each object and each struct with MBM_INIT where you
+ *   declare it. The library uses no heap and no global variables.
  * - No function is re-entrant on one object. Call no function from an interrupt unless its
  *   comment allows it. You may use any number of objects side by side, each from one thread.
  * - You may call a begin function again at any time, but not from a hook of the object. The
@@ -41,6 +41,20 @@
 
 #include <stddef.h>
 #include <stdint.h>
+
+/**
+ * Initialises any object, struct or array of this header with zeros, for example
+ * `mbm_client client = MBM_INIT;` or `mbm_clientRequest requests[16] = MBM_INIT;`.
+ *
+ * A designated initialiser, `{.unit = 17}`, and calloc set all other fields to zero too. A
+ * static object is zero without an initialiser. A local object is not: a begin function may
+ * take the bytes that were in that memory before for an object that was begun.
+ */
+#ifdef __cplusplus
+#define MBM_INIT {}
+#else
+#define MBM_INIT {0}
+#endif
 
 /** Version of this header as a text, "MAJOR.MINOR.PATCH". mbm_version returns that of the archive. */
 #define MBM_VERSION MBM_VERSION_OF(MBM_VERSION_MAJOR, MBM_VERSION_MINOR, MBM_VERSION_PATCH)
@@ -669,7 +683,7 @@ typedef struct mbm_counters {
 
 /**
  * The length rule for the PDUs of a function of your own. A length includes the function
- * code. A zeroed rule is MBM_RULE_SILENCE.
+ * code. As MBM_INIT, it is MBM_RULE_SILENCE.
  */
 typedef struct mbm_rule {
     /**
@@ -709,7 +723,7 @@ typedef struct mbm_function {
 } mbm_function;
 
 /**
- * Describes frames: their framing, and the functions of your own in them. Zeroed, it
+ * Describes frames: their framing, and the functions of your own in them. As MBM_INIT, it
  * means RTU with the functions of the standard only.
  */
 typedef struct mbm_framing {
@@ -737,11 +751,11 @@ typedef struct mbm_framing {
 /**
  * A Modbus RTU master: one line, one request at a time.
  *
- * You own the storage. It must be zero before first use, as a static object is
- * (`static mbm_master node;`). Before you use settings and words, call mbm_master_beginRtu
- * or mbm_master_setBuffers; before you make requests, call both. Use an object from one
- * thread only, and never from an interrupt. Several objects are independent of each other.
- * mbm_port says which functions the hooks of the port may call.
+ * You own the storage. Initialise it with MBM_INIT (`mbm_master node = MBM_INIT;`). Before
+ * you use settings and words, call mbm_master_beginRtu or mbm_master_setBuffers; before you
+ * make requests, call both. Use an object from one thread only, and never from an interrupt.
+ * Several objects are independent of each other. mbm_port says which functions the hooks of
+ * the port may call.
  *
  * A call that is refused changes nothing. Exceptions are the functions that make a request,
  * as mbm_master_readCoils describes, and mbm_master_send32.
@@ -759,7 +773,7 @@ typedef struct mbm_master {
 
 /**
  * Records which of several masters uses a shared line, or a shared frame buffer. You own the
- * storage. It must be zero before first use.
+ * storage. Initialise it with MBM_INIT.
  *
  * Use all objects of one turn from one thread. Call mbm_master_endTurn before you release the
  * storage of an object.
@@ -784,7 +798,7 @@ typedef struct mbm_turn {
  * the port: that must be open already. The first request waits for no gap, unless bytes
  * arrive or mbm_master_lineUsed was called.
  *
- * @param master  the object; zeroed before the first call
+ * @param master  the object; initialised with MBM_INIT before the first call
  * @param slave   the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
  *                2.2). The master also sends to 248 to 255, which the standard reserves
  * @param port    the port. It is not copied: it must stay valid and unchanged for as long as
@@ -800,7 +814,7 @@ uint8_t mbm_master_beginRtu(struct mbm_master *master,
  * As mbm_master_beginRtu, but with a separate context. Several objects can then share one
  * port, which may be a constant, and each object has its own context.
  *
- * @param master   the object; zeroed before the first call
+ * @param master   the object; initialised with MBM_INIT before the first call
  * @param slave    as for mbm_master_beginRtu
  * @param port     as for mbm_master_beginRtu; its `context` is not used
  * @param context  your pointer, passed to every hook; may be NULL
@@ -831,7 +845,7 @@ uint8_t mbm_master_beginTransmission(struct mbm_master *master,
  * that number of words. If a request or a reply does not fit into a smaller buffer, the
  * function that makes the request returns a status. Data are never cut off.
  *
- * @param master         the object; zeroed before the first call
+ * @param master         the object; initialised with MBM_INIT before the first call
  * @param response       the words that reads fill; NULL only if `responseWords` is 0
  * @param responseWords  0 to 255; 125 hold any reply
  * @param transmit       the words that writes send; NULL only if `transmitWords` is 0
@@ -1336,7 +1350,7 @@ uint8_t mbm_master_setBlocking(struct mbm_master *master,
  * zero the counters at any time, but not from an interrupt.
  *
  * @param master    the object
- * @param counters  your counters, zeroed; NULL stops counting
+ * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setCounters(struct mbm_master *master,
@@ -1515,9 +1529,9 @@ uint16_t mbm_master_receive(struct mbm_master *master);
  * A client of one serial line or one TCP stream. It queues up to 16 requests.
  * mbm_client_poll sends and receives; no function ever waits.
  *
- * You own the storage. It must be zero before first use, as a static object is. Call one of
- * the mbm_client_begin functions first. Use an object from one thread only, and never from
- * an interrupt. Several objects are independent of each other.
+ * You own the storage. Initialise it with MBM_INIT. Call one of the mbm_client_begin
+ * functions first. Use an object from one thread only, and never from an interrupt. Several
+ * objects are independent of each other.
  *
  * The `done` function of a request may call every function on the client that calls it,
  * except mbm_client_poll, which then returns MBM_BUSY. A hook of the port, and the `random`
@@ -1537,7 +1551,7 @@ typedef struct mbm_client {
 } mbm_client;
 
 /**
- * A request to a device, and its result. You own the storage. Zero it before first use, and
+ * A request to a device, and its result. You own the storage. Initialise it with MBM_INIT,
  * then set the fields that you need. You may use it for any number of requests.
  *
  * From the call that queues it until it has ended, do not use or change it, nor what it
@@ -1619,7 +1633,7 @@ typedef struct mbm_clientRequest {
 
 /**
  * Reads the objects that identify a device (function 2B/0E, V1.1b3, 6.21), with as many
- * requests as the device needs. You own the storage. Zero it before first use, set `unit`,
+ * requests as the device needs. You own the storage. Initialise it with MBM_INIT, set `unit`,
  * `reply` and `replyBytes` of `request`, and `object`, and pass it to
  * mbm_identification_read. You may use it for any number of devices.
  *
@@ -1767,7 +1781,7 @@ typedef struct mbm_clientUnit {
  * their status is MBM_CANCELLED and `done` is not called. All settings return to their
  * defaults. A call that is refused changes nothing.
  *
- * @param client      the object; zeroed before the first call
+ * @param client      the object; initialised with MBM_INIT before the first call
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
  * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
@@ -1784,7 +1798,7 @@ uint8_t mbm_client_beginRtu(struct mbm_client *client,
  * keeps no gap between frames. If no character arrives for one second, the client discards
  * an incomplete frame.
  *
- * @param client      the object; zeroed before the first call
+ * @param client      the object; initialised with MBM_INIT before the first call
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
  * @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
@@ -1800,7 +1814,7 @@ uint8_t mbm_client_beginAscii(struct mbm_client *client,
  * Begins a client that sends RTU frames through a TCP stream, for converters that pass
  * bytes from TCP to a serial line unchanged. It keeps no gap and does not broadcast.
  *
- * @param client      the object; zeroed before the first call
+ * @param client      the object; initialised with MBM_INIT before the first call
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
  * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
@@ -1817,7 +1831,7 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
  * TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at once. The client matches
  * responses to requests by the transaction identifier, in any order.
  *
- * @param client         the object; zeroed before the first call
+ * @param client         the object; initialised with MBM_INIT before the first call
  * @param port           the port, which is copied; read, write and micros must not be NULL
  * @param incoming       the buffer of received bytes, valid for as long as the client is
  *                       used
@@ -2647,7 +2661,7 @@ uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t character
  * resynchronisations counts sequences of bytes that were not a frame.
  *
  * @param client    the object
- * @param counters  your counters, zeroed; NULL stops counting
+ * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setCounters(struct mbm_client *client,
@@ -2659,8 +2673,8 @@ uint8_t mbm_client_setCounters(struct mbm_client *client,
  * and `retryLimit` replace those of the client. You may change these three at any time.
  *
  * @param client  the object
- * @param units   your array of records, zeroed except for the fields that you set; NULL for
- *                none
+ * @param units   your array of records, initialised with MBM_INIT except for the fields that
+ *                you set; NULL for none
  * @param count   the number of records, 0 to 255
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
@@ -2754,9 +2768,9 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
 /**
  * A plan: a table of fields that a client reads from units again and again.
  *
- * Storage is yours and must be zero before first use, which a static object is.
- * mbm_plan_begin comes first. Use it from the thread that uses its client, and never from an
- * interrupt. It stays where it is until mbm_plan_end.
+ * You own the storage. Initialise it with MBM_INIT. Call mbm_plan_begin first. Use it from
+ * the thread that uses its client, and never from an interrupt. It stays where it is until
+ * mbm_plan_end.
  */
 typedef struct mbm_plan {
     /**
@@ -2895,8 +2909,9 @@ typedef struct mbm_planSetup {
      */
     uint16_t *data;
     /**
-     * Storage: the requests with which the plan reads, zeroed; they are the plan's alone. With one it sends one read after
-     * the other; more are for Modbus TCP, where several may be under way at once.
+     * Storage: the requests with which the plan reads, initialised with MBM_INIT; they are the
+     * plan's alone. With one it sends one read after the other; more are for Modbus TCP, where
+     * several may be under way at once.
      */
     struct mbm_clientRequest *requests;
     /**
@@ -3006,7 +3021,7 @@ typedef struct mbm_planReadInfo {
  * bits or registers. All reads are due at once; the rounds after the first are spread, so that
  * reads of one interval follow each other at equal distances.
  *
- * @param plan    the object, zeroed
+ * @param plan    the object; initialised with MBM_INIT before the first call
  * @param client  the client that sends the reads, begun; the program may use it too, and other
  *                plans
  * @param setup   table, limits and storage; it stays valid and as it is until mbm_plan_end
@@ -3251,8 +3266,8 @@ uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
  * A link that opens itself again when it was lost. It belongs to one client:
  * mbm_client_poll polls both.
  *
- * You own the storage. It must be zero before first use, as a static object is, and must stay
- * where it is until mbm_link_end or until the client was begun again.
+ * You own the storage. Initialise it with MBM_INIT. It must stay where it is until
+ * mbm_link_end or until the client was begun again.
  */
 typedef struct mbm_link {
     /**
@@ -3310,7 +3325,7 @@ typedef struct mbm_linkCounters {
  * All settings of the link return to their defaults. The call may be repeated at any time,
  * also with another client. A begin function of the client ends the link.
  *
- * @param link    the object; zeroed before the first call
+ * @param link    the object; initialised with MBM_INIT before the first call
  * @param client  the client, begun; it must not have another link
  * @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
  *                hooks must not use the client or the link: each function returns MBM_BUSY
@@ -3417,7 +3432,7 @@ uint8_t mbm_link_setCallback(struct mbm_link *link,
  * Sets your storage for counters, in which the link counts from now on.
  *
  * @param link      the object
- * @param counters  your counters, zeroed; NULL stops counting
+ * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
  * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_link_setCounters(struct mbm_link *link, struct mbm_linkCounters *counters);
@@ -3436,11 +3451,10 @@ uint8_t mbm_link_state(const struct mbm_link *link);
 /**
  * A Modbus server on one serial line or one connection.
  *
- * You provide the storage. It must be zero before first use; a static object is zero. A
- * server serves units. Several servers may share units: for example, a server on a
- * serial line and four servers on TCP connections are five servers with the same units.
- * Use a server and its units from one thread, and never from an interrupt. Use all
- * servers that share units from the same thread.
+ * You provide the storage. Initialise it with MBM_INIT. A server serves units. Several
+ * servers may share units: for example, a server on a serial line and four servers on TCP
+ * connections are five servers with the same units. Use a server and its units from one
+ * thread, and never from an interrupt. Use all servers that share units from the same thread.
  *
  * mbm_server_poll calls your hooks and your functions. If they call a function on the
  * server that is being polled, it returns MBM_BUSY and changes nothing; call it after
@@ -3469,7 +3483,7 @@ typedef struct mbm_server {
  * stay valid, at the same address, for as long as the server is used. Several servers
  * may share units. The buffer holds no data between requests.
  *
- * @param server  the object; zero it before the first call
+ * @param server  the object; initialised with MBM_INIT before the first call
  * @param port    is copied; its hooks read, write and micros are required
  * @param units   the units to serve: one unit, or an array of units
  * @param count   how many units
@@ -3678,9 +3692,9 @@ typedef struct mbm_service {
 } mbm_service;
 
 /**
- * The counters, the event log and the listen only mode of a unit. Zero the struct and
- * pass it to mbm_unit_serveDiagnostics. The counters wrap at 65536; you may read them at
- * any time. The sub-functions below are those of function 08 (V1.1b3, 6.8), in hex.
+ * The counters, the event log and the listen only mode of a unit. Initialise the struct with
+ * MBM_INIT and pass it to mbm_unit_serveDiagnostics. The counters wrap at 65536; you may read
+ * them at any time. The sub-functions below are those of function 08 (V1.1b3, 6.8), in hex.
  */
 typedef struct mbm_diagnostics {
     /**
@@ -3747,8 +3761,8 @@ typedef struct mbm_diagnostics {
 } mbm_diagnostics;
 
 /**
- * A unit that servers answer for. Zero it, set `id`, and call the mbm_unit_serve
- * functions, for example mbm_unit_serveCoils, for what it serves.
+ * A unit that servers answer for. Initialise it with MBM_INIT, set `id`, and call the
+ * mbm_unit_serve functions, for example mbm_unit_serveCoils, for what it serves.
  *
  * Each mbm_unit_serve function takes a record: a struct of yours, which must stay valid
  * for as long as the unit is used. A unit has places for MBM_MAX_SERVICES records; one
@@ -3872,8 +3886,8 @@ typedef struct mbm_recordHooks {
 
 /**
  * Cells that your functions get and set one by one, in place of an array. A cell is a
- * register, a coil or a discrete input. Zero the struct, set the fields that you need,
- * and pass it to mbm_unit_serveCallbacks.
+ * register, a coil or a discrete input. Initialise the struct with MBM_INIT, set the fields
+ * that you need, and pass it to mbm_unit_serveCallbacks.
  */
 typedef struct mbm_dataCallbacks {
     /**
@@ -3936,8 +3950,8 @@ typedef struct mbm_request {
 } mbm_request;
 
 /**
- * A function of yours. Zero the struct, set the fields that you need, and pass it to
- * mbm_unit_serveCustom.
+ * A function of yours. Initialise the struct with MBM_INIT, set the fields that you need, and
+ * pass it to mbm_unit_serveCustom.
  *
  * A unit asks its records in the order in which they were registered. So a function that is
  * registered before the record that serves the same code is asked first. It answers the
@@ -4010,8 +4024,8 @@ typedef struct mbm_file {
 } mbm_file;
 
 /**
- * Files of yours. Zero the struct, set the fields that you need, and pass it to
- * mbm_unit_serveFiles.
+ * Files of yours. Initialise the struct with MBM_INIT, set the fields that you need, and pass
+ * it to mbm_unit_serveFiles.
  */
 typedef struct mbm_files {
     /**
@@ -4052,8 +4066,8 @@ typedef struct mbm_fifo {
 } mbm_fifo;
 
 /**
- * FIFO queues of yours. Zero the struct, set `fifos` and `count`, and pass it to
- * mbm_unit_serveFifos.
+ * FIFO queues of yours. Initialise the struct with MBM_INIT, set `fifos` and `count`, and
+ * pass it to mbm_unit_serveFifos.
  */
 typedef struct mbm_fifos {
     /**
@@ -4072,8 +4086,8 @@ typedef struct mbm_fifos {
 } mbm_fifos;
 
 /**
- * The eight exception status outputs of function 07. Zero the struct and pass it to
- * mbm_unit_serveExceptionStatus.
+ * The eight exception status outputs of function 07. Initialise the struct with MBM_INIT and
+ * pass it to mbm_unit_serveExceptionStatus.
  */
 typedef struct mbm_exceptionStatus {
     /**
@@ -4087,10 +4101,10 @@ typedef struct mbm_exceptionStatus {
 } mbm_exceptionStatus;
 
 /**
- * The response of function 11 (hex), Report Server ID. Zero the struct, set the fields
- * that you need, and pass it to mbm_unit_serveServerId. The id, the run indicator (1
- * byte) and the additional data together have at most 251 bytes, fewer if the frame
- * buffer holds less than a whole frame. If they are longer, the server answers with
+ * The response of function 11 (hex), Report Server ID. Initialise the struct with MBM_INIT,
+ * set the fields that you need, and pass it to mbm_unit_serveServerId. The id, the run
+ * indicator (1 byte) and the additional data together have at most 251 bytes, fewer if the
+ * frame buffer holds less than a whole frame. If they are longer, the server answers with
  * exception 04.
  */
 typedef struct mbm_serverId {
@@ -4121,8 +4135,8 @@ typedef struct mbm_serverId {
 } mbm_serverId;
 
 /**
- * A device identification. Zero the struct, set `objects` and `count`, and pass it to
- * mbm_unit_serveIdentification.
+ * A device identification. Initialise the struct with MBM_INIT, set `objects` and `count`,
+ * and pass it to mbm_unit_serveIdentification.
  */
 typedef struct mbm_serverIdentification {
     /**
@@ -4143,12 +4157,12 @@ typedef struct mbm_serverIdentification {
 } mbm_serverIdentification;
 
 /**
- * Holding registers or input registers in an array of yours. Zero the struct, set the
- * fields that you need, and pass it to mbm_unit_serveHoldingRegisters or
- * mbm_unit_serveInputRegisters. You may change the registers at any time, and the fields
- * too, except from within a hook of this table: the server finishes a request with the
- * `words` that the table had when the request came. To serve the struct as another kind
- * of table, zero it first.
+ * Holding registers or input registers in an array of yours. Initialise the struct with
+ * MBM_INIT, set the fields that you need, and pass it to mbm_unit_serveHoldingRegisters or
+ * mbm_unit_serveInputRegisters. You may change the registers at any time, and the fields too,
+ * except from within a hook of this table: the server finishes a request with the `words`
+ * that the table had when the request came. To serve the struct as another kind of table,
+ * zero it first.
  */
 typedef struct mbm_registerTable {
     /**
@@ -4252,8 +4266,8 @@ uint8_t mbm_unit_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
  * exception 01, even if a record serves it.
  *
  * @param unit  the unit
- * @param mask  must stay valid for as long as the unit is used; zero it before the first
- *              call. Units that share a mask have the same functions off
+ * @param mask  must stay valid for as long as the unit is used; initialised with MBM_INIT.
+ *              Units that share a mask have the same functions off
  * @param code  the function code, 1 to 127
  * @param on    0 switches the function off, anything else switches it on
  * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a code out of range;
@@ -4465,9 +4479,8 @@ uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table)
  * A gateway: takes requests from Modbus TCP connections, passes each to the line of its unit,
  * and sends the reply back. mbm_gateway_poll does all of it; no function ever waits.
  *
- * You provide the storage. It must be zero before first use; a static object is zero. Call
- * mbm_gateway_begin first. Use a gateway, its lines' clients and its own units from one
- * thread, and never from an interrupt.
+ * You provide the storage. Initialise it with MBM_INIT. Call mbm_gateway_begin first. Use a
+ * gateway, its lines' clients and its own units from one thread, and never from an interrupt.
  *
  * mbm_gateway_poll calls the hooks of the connections' ports and of the lines' ports,
  * `isReady` of the lines, and the functions of the gateway's own units. If one of them calls a
@@ -4519,7 +4532,7 @@ typedef struct mbm_gatewayRoute {
 } mbm_gatewayRoute;
 
 /**
- * A line of a gateway. Zero it, then set the fields that you need.
+ * A line of a gateway. Initialise it with MBM_INIT, then set the fields that you need.
  */
 typedef struct mbm_gatewayLine {
     /**
@@ -4631,10 +4644,10 @@ typedef struct mbm_gatewayConfig {
  * connections and their requests; it cancels those that a line has, and its settings return
  * to their defaults. A call that is refused changes nothing.
  *
- * @param gateway  the object; zero it before the first call
+ * @param gateway  the object; initialised with MBM_INIT before the first call
  * @param config   what the gateway consists of. What it points to must stay valid, and must
- *                 be used by one gateway only, for as long as the gateway is used; lines and
- *                 requests must be zero before first use
+ *                 be used by one gateway only, for as long as the gateway is used; lines,
+ *                 connections and requests are initialised with MBM_INIT
  * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a count out of range, fewer
  *         requests than connections, a route to a line that does not exist or to a unit id
  *         above 255, and a line without client; MBM_NOT_INITIALISED if the client of a line
@@ -6040,9 +6053,9 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
  * A sniffer: finds the frames on a bus that others use, and pairs requests with replies.
  * It never sends and has no port: you pass it the bytes that you receive.
  *
- * You provide the storage. It must be zero before first use; a static object is zero. Call
- * one of the mbm_sniffer_begin functions first. Not re-entrant: use one object from one
- * thread, and never from an interrupt; pass bytes from an interrupt through an mbm_ring.
+ * You provide the storage. Initialise it with MBM_INIT. Call one of the mbm_sniffer_begin
+ * functions first. Not re-entrant: use one object from one thread, and never from an
+ * interrupt; pass bytes from an interrupt through an mbm_ring.
  */
 typedef struct mbm_sniffer {
     /**
@@ -6146,7 +6159,7 @@ typedef struct mbm_event {
  * You may call it again at any time. The sniffer then discards received bytes and
  * unanswered requests without an event, and its settings return to their defaults.
  *
- * @param sniffer  the object; zero it before the first call
+ * @param sniffer  the object; initialised with MBM_INIT before the first call
  * @param buffer   holds received bytes until the sniffer has reported them; must stay
  *                 valid for as long as the sniffer is used
  * @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER.
@@ -6341,11 +6354,11 @@ uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size)
  * A trace: stands between a port and the master, client or server that uses it, passes
  * everything on, and calls your hook for each frame that is sent or received.
  *
- * You provide the storage. It must be zero before first use; a static object is zero. Call
- * mbm_trace_beginClient or mbm_trace_beginServer, then begin the master, client or server
- * with mbm_trace_port instead of your port. The object must not move while its port is in
- * use. A program that begins no trace contains no part of it. Not re-entrant: use it from
- * the thread of the object that uses its port.
+ * You provide the storage. Initialise it with MBM_INIT. Call mbm_trace_beginClient or
+ * mbm_trace_beginServer, then begin the master, client or server with mbm_trace_port instead
+ * of your port. The object must not move while its port is in use. A program that begins no
+ * trace contains no part of it. Not re-entrant: use it from the thread of the object that
+ * uses its port.
  */
 typedef struct mbm_trace {
     /**
@@ -6411,7 +6424,7 @@ typedef struct mbm_traceRecord {
  * You may call this function again at any time, but not from within the hook. The trace then
  * drops the bytes that it has not handed out, and its frame timeout is the default.
  *
- * @param trace    the object; zero it before the first call
+ * @param trace    the object; initialised with MBM_INIT before the first call
  * @param port     is copied; its hooks read, write and micros are required. Its optional
  *                 hooks are passed on. It must not be the port of this trace, nor
  *                 that of a trace that passes everything on to this one

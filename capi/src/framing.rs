@@ -29,7 +29,7 @@ const _: () = {
     assert!(MBM_MAX_ASCII_FRAME as usize == ascii::MAX_FRAME);
 };
 
-/// Describes frames: their framing, and the functions of your own in them. Zeroed, it
+/// Describes frames: their framing, and the functions of your own in them. As MBM_INIT, it
 /// means RTU with the functions of the standard only.
 #[repr(C)]
 #[derive(Clone, Copy)]

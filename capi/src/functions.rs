@@ -142,7 +142,7 @@ const _: () = {
 };
 
 /// The length rule for the PDUs of a function of your own. A length includes the function
-/// code. A zeroed rule is MBM_RULE_SILENCE.
+/// code. As MBM_INIT, it is MBM_RULE_SILENCE.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_rule {

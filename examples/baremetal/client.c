@@ -18,9 +18,9 @@ typedef struct task {
 } task;
 
 /* All storage is the program's own; mbm allocates nothing. */
-static mbm_client client;
-static mbm_counters counters;
-static mbm_clientRequest requests[STEPS + 1];
+static mbm_client client = MBM_INIT;
+static mbm_counters counters = MBM_INIT;
+static mbm_clientRequest requests[STEPS + 1] = MBM_INIT;
 static uint8_t frame[MBM_MAX_FRAME];
 
 /* One buffer for all replies: a serial line has one request under way at a time, and the

@@ -6,8 +6,8 @@
 #include "report.h"
 
 /* All storage is the program's own; mbm allocates nothing. */
-static mbm_master node;
-static mbm_counters counters;
+static mbm_master node = MBM_INIT;
+static mbm_counters counters = MBM_INIT;
 static uint16_t response[MBM_MAX_READ_REGISTERS];
 static uint16_t transmit[REPORT_SIZE];
 static uint8_t frame[MBM_FRAME_BYTES(MBM_MAX_READ_REGISTERS)];

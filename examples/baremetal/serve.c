@@ -5,14 +5,14 @@
 #include "board.h"
 #include "mbm.h"
 
-static mbm_server server;
-static mbm_unit unit;
+static mbm_server server = MBM_INIT;
+static mbm_unit unit = MBM_INIT;
 static uint8_t frame[MBM_MAX_FRAME];
 
 static uint16_t holding_words[SERVE_CELLS], input_words[SERVE_CELLS];
 static uint8_t coil_bits[(SERVE_CELLS + 7) / 8], input_bits[(SERVE_CELLS + 7) / 8];
-static mbm_registerTable holding, inputs;
-static mbm_bitTable coils, discrete;
+static mbm_registerTable holding = MBM_INIT, inputs = MBM_INIT;
+static mbm_bitTable coils = MBM_INIT, discrete = MBM_INIT;
 
 /* Refuses a write if one of its values is too high. */
 static uint8_t registers_before(void *context, const mbm_access *access)

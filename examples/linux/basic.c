@@ -12,7 +12,7 @@
 enum { READ_WORDS = 6, WRITE_WORDS = 2 };
 
 /* All storage is the program's own; mbm allocates nothing. */
-static mbm_master node;
+static mbm_master node = MBM_INIT;
 static uint16_t response[READ_WORDS];
 static uint16_t transmit[WRITE_WORDS];
 static uint8_t frame[MBM_FRAME_BYTES(READ_WORDS)];
@@ -26,7 +26,7 @@ static int failed(const char *what, uint8_t status)
 
 int main(int argc, char **argv)
 {
-    mbm_tty tty;
+    mbm_tty tty = MBM_INIT;
     mbm_port port;
     uint32_t baud;
     uint8_t i;

@@ -12,12 +12,12 @@
 enum { FIRST = 100, COUNT = 4 };
 
 /* All storage is the program's own; mbm allocates nothing. */
-static mbm_client client;
-static mbm_clientRequest words, bits;
+static mbm_client client = MBM_INIT;
+static mbm_clientRequest words = MBM_INIT, bits = MBM_INIT;
 static uint8_t incoming[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME];
 static uint16_t registers[COUNT];
 static uint8_t coils[1];
-static mbm_tcp tcp;
+static mbm_tcp tcp = MBM_INIT;
 static mbm_tcp_addresses addresses;
 
 static int failed(const char *what, uint8_t status)

@@ -87,19 +87,19 @@ static uint16_t serve_write(void *context, const mbm_request *request, uint8_t *
     return 4;
 }
 
-static mbm_unit unit;
-static mbm_custom services[2];
-static mbm_server server;
-static mbm_tcp_listener listener;
+static mbm_unit unit = MBM_INIT;
+static mbm_custom services[2] = MBM_INIT;
+static mbm_server server = MBM_INIT;
+static mbm_tcp_listener listener = MBM_INIT;
 
 /* --- the client --- */
 
-static mbm_client client;
-static mbm_clientRequest request;
+static mbm_client client = MBM_INIT;
+static mbm_clientRequest request = MBM_INIT;
 static uint8_t data[DATA], reply[DATA];
 
 /* Both ends of the connection, in one array for mbm_tcp_wait. */
-static mbm_tcp ends[2];
+static mbm_tcp ends[2] = MBM_INIT;
 static mbm_tcp_addresses addresses;
 static mbm_tcp *const client_end = &ends[0], *const server_end = &ends[1];
 

@@ -19,12 +19,12 @@ typedef struct recording {
 } recording;
 
 static server device;
-static mbm_trace wire;
+static mbm_trace wire = MBM_INIT;
 static uint8_t incomplete[2 * MBM_MAX_FRAME];
 static recording sent, received;
 static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
-static mbm_master node;
-static mbm_counters counters;
+static mbm_master node = MBM_INIT;
+static mbm_counters counters = MBM_INIT;
 static uint16_t response[WORDS];
 static uint16_t transmit[WORDS];
 static uint8_t frame[MBM_FRAME_BYTES(WORDS)];
@@ -129,7 +129,7 @@ static int read_bits(const uint8_t *there, unsigned count)
 
 static void begin(void)
 {
-    static mbm_tty tty;
+    static mbm_tty tty = MBM_INIT;
     mbm_port port;
 
     server_start(&device, UNIT);

@@ -71,11 +71,11 @@ typedef struct line {
 
 /* All storage is the program's own; mbm allocates nothing. */
 static line lines[LINES];
-static mbm_gateway gateway;
-static mbm_gatewayLine gateway_lines[LINES];
+static mbm_gateway gateway = MBM_INIT;
+static mbm_gatewayLine gateway_lines[LINES] = MBM_INIT;
 static mbm_gatewayRoute routes[256];
-static mbm_gatewayConnection connections[CONNECTIONS];
-static mbm_gatewayRequest requests[REQUESTS];
+static mbm_gatewayConnection connections[CONNECTIONS] = MBM_INIT;
+static mbm_gatewayRequest requests[REQUESTS] = MBM_INIT;
 static mbm_gatewayConfig config = {
     .routes = routes,
     .lines = gateway_lines,
@@ -84,8 +84,8 @@ static mbm_gatewayConfig config = {
     .requestCount = REQUESTS,
     .connectionCount = CONNECTIONS,
 };
-static mbm_tcp tcps[CONNECTIONS];
-static mbm_tcp_listener listener;
+static mbm_tcp tcps[CONNECTIONS] = MBM_INIT;
+static mbm_tcp_listener listener = MBM_INIT;
 static long quiet = 100; /* milliseconds; the client's default */
 static volatile sig_atomic_t is_over;
 static sigset_t awake; /* the signal mask during a sleep, which SIGINT and SIGTERM may end */

@@ -21,16 +21,16 @@
 enum { CONNECTIONS = 4, REGISTERS = 10, READ_ONLY = 2, UNIT = 1, CLIENTS = 2 };
 
 static uint16_t words[REGISTERS];
-static mbm_registerTable holding;
-static mbm_custom watch;
-static mbm_unit unit;
-static mbm_server servers[CONNECTIONS];
+static mbm_registerTable holding = MBM_INIT;
+static mbm_custom watch = MBM_INIT;
+static mbm_unit unit = MBM_INIT;
+static mbm_server servers[CONNECTIONS] = MBM_INIT;
 static uint8_t frames[CONNECTIONS][MBM_MAX_TCP_FRAME];
-static mbm_tcp_listener listener;
+static mbm_tcp_listener listener = MBM_INIT;
 
 /* The server's connections, and after them the ends of the demonstration's clients, in one array
  * for mbm_tcp_wait. */
-static mbm_tcp places[CONNECTIONS + CLIENTS];
+static mbm_tcp places[CONNECTIONS + CLIENTS] = MBM_INIT;
 
 /* --- the hooks --- */
 
@@ -124,7 +124,7 @@ static void serve(void)
 
 /* --- the demonstration --- */
 
-static mbm_client clients[CLIENTS];
+static mbm_client clients[CLIENTS] = MBM_INIT;
 static mbm_tcp_addresses addresses[CLIENTS];
 static uint8_t incoming[CLIENTS][MBM_MAX_TCP_FRAME], outgoing[CLIENTS][MBM_MAX_TCP_FRAME];
 static uint16_t values[2];

@@ -23,7 +23,7 @@ static const uint32_t times[] = {1000, 2000, 3000, 4000};
 enum { UNIT = 1 };
 
 /* Both ends of the connection, in one array for mbm_tcp_wait. */
-static mbm_tcp ends[2];
+static mbm_tcp ends[2] = MBM_INIT;
 static mbm_tcp *const client_end = &ends[0], *const server_end = &ends[1];
 
 static uint32_t milliseconds(void)
@@ -50,10 +50,10 @@ static void print(const char *what, const char *detail)
 
 /* --- the server --- */
 
-static mbm_tcp_listener listener;
-static mbm_server server;
-static mbm_unit unit;
-static mbm_registerTable table;
+static mbm_tcp_listener listener = MBM_INIT;
+static mbm_server server = MBM_INIT;
+static mbm_unit unit = MBM_INIT;
+static mbm_registerTable table = MBM_INIT;
 static uint16_t registers[1];
 static uint8_t frame[MBM_MAX_TCP_FRAME];
 static char service[8] = "0";
@@ -88,10 +88,10 @@ static void serve(void)
 
 /* --- the client --- */
 
-static mbm_client client;
-static mbm_link kept;
-static mbm_linkCounters counters;
-static mbm_clientRequest request;
+static mbm_client client = MBM_INIT;
+static mbm_link kept = MBM_INIT;
+static mbm_linkCounters counters = MBM_INIT;
+static mbm_clientRequest request = MBM_INIT;
 static mbm_tcp_addresses addresses;
 static uint8_t incoming[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME];
 static uint16_t word;

@@ -22,7 +22,7 @@ enum { MOST = 125 };
 
 static line at;
 static FILE *csv;
-static mbm_clientRequest request;
+static mbm_clientRequest request = MBM_INIT;
 static uint16_t reply[MOST];
 static long unit = 1, function = 3, interval = 1000, samples;
 static uint16_t address, quantity;

@@ -53,7 +53,7 @@ typedef struct mbm_tcp_addresses {
     struct sockaddr_storage list[MBM_TCP_ADDRESSES]; /**< private */
 } mbm_tcp_addresses;
 
-/** A socket in use as a port; zero before first use. */
+/** A socket in use as a port. Initialise it with MBM_INIT. */
 typedef struct mbm_tcp {
     int fd;          /**< the socket, while there is one */
     int error;       /**< why the link was lost, an errno: EPIPE if the peer closed it, ETIMEDOUT if
@@ -72,7 +72,7 @@ typedef struct mbm_tcp {
     struct mbm_tcp *next;         /**< private */
 } mbm_tcp;
 
-/** A socket that listens for connections; zero before first use. */
+/** A socket that listens for connections. Initialise it with MBM_INIT. */
 typedef struct mbm_tcp_listener {
     int fd;                  /**< the socket, while `port` is not 0 */
     int lookupError;         /**< why mbm_tcp_listen found no address, for gai_strerror; else 0 */
@@ -87,7 +87,7 @@ typedef struct mbm_tcp_listener {
     struct mbm_tcp_set *set; /**< private */
 } mbm_tcp_listener;
 
-/** Any number of sockets. One wait finds those that are ready. Zero before first use. */
+/** Any number of sockets. One wait finds those that are ready. Initialise it with MBM_INIT. */
 typedef struct mbm_tcp_set {
     int fd;                     /**< the descriptor of epoll: a program that polls other descriptors
                                      too polls it for POLLIN, and then calls mbm_tcp_waitSet */
@@ -105,7 +105,7 @@ typedef struct mbm_tcp_set {
  * Begins to connect to a server, and does not wait for it. Until it is connected the port
  * reads and accepts no bytes. If the connection fails, the link is lost.
  *
- * @param tcp        zeroed, or closed before
+ * @param tcp        initialised with MBM_INIT, or closed before
  * @param addresses  filled here; must stay until `tcp` is closed, for one `tcp` only
  * @param host       a name or a numeric address; the lookup of a name may block. NULL is
  *                   this machine. Of several addresses the first that answers is used
@@ -119,7 +119,7 @@ int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host, c
 /**
  * Uses a stream socket that is connected already; makes it non-blocking.
  *
- * @param tcp  zeroed, or closed before
+ * @param tcp  initialised with MBM_INIT, or closed before
  * @param fd   belongs to `tcp` from now on, if this succeeds
  * @return 0, or -1 with errno set
  */
@@ -223,7 +223,7 @@ mbm_port mbm_tcp_port(mbm_tcp *tcp);
 /**
  * Begins to listen for connections.
  *
- * @param listener  zeroed, or closed before
+ * @param listener  initialised with MBM_INIT, or closed before
  * @param host      the address to listen at; NULL for all addresses of the machine
  * @param service   a port number; "0" for a free one, which is then in `port`
  * @return 0, or -1 with errno set: EBUSY if the listener is in use, EADDRINUSE, EACCES for
@@ -287,7 +287,7 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
 /**
  * Begins a set without sockets. It takes one descriptor.
  *
- * @param set  zeroed, or closed before
+ * @param set  initialised with MBM_INIT, or closed before
  * @return 0, or -1 with errno set: EBUSY if the set is open, or an error of epoll_create1
  */
 int mbm_tcp_openSet(mbm_tcp_set *set);

@@ -121,7 +121,7 @@ typedef struct mbm_tls_options {
     uint8_t isServer;     /**< 1 for a server's connections, 0 for a client's */
 } mbm_tls_options;
 
-/** Certificates and rules that any number of connections share; zero before first use. */
+/** Certificates and rules that any number of connections share. Initialise them with MBM_INIT. */
 typedef struct mbm_tls_identity {
     int error;                    /**< the number of Mbed TLS for what mbm_tls_begin refused */
     uint8_t isReady;              /**< private */
@@ -134,7 +134,7 @@ typedef struct mbm_tls_identity {
     mbedtls_pk_context key;       /**< private */
 } mbm_tls_identity;
 
-/** A connection; zero before first use. It is the `context` of its port, so a server's hooks
+/** A connection. Initialise it with MBM_INIT. It is the `context` of its port, so a server's hooks
  *  that get the connection's context get a pointer to it. */
 typedef struct mbm_tls {
     uint8_t status; /**< MBM_TLS_CLOSED to MBM_TLS_CLOSING, or why the connection ended */
@@ -163,7 +163,7 @@ typedef struct mbm_tls {
 /**
  * Reads certificates and key. It computes, and does not wait.
  *
- * @param identity  zeroed, or ended before
+ * @param identity  initialised with MBM_INIT, or ended before
  * @param options   certificate, key, authorities and random must be given
  * @return 0, or MBM_TLS_OWN_CERTIFICATE, MBM_TLS_OWN_KEY, MBM_TLS_OWN_AUTHORITIES,
  *         MBM_TLS_OWN_REVOKED, MBM_TLS_NO_MEMORY, MBM_TLS_IN_USE, MBM_TLS_INVALID_ARGUMENT
@@ -184,7 +184,7 @@ void mbm_tls_end(mbm_tls_identity *identity);
  * Begins a connection over a stream, whose port is copied. The handshake goes on in
  * mbm_tls_poll, and in the port's read and write.
  *
- * @param tls       zeroed, or closed before
+ * @param tls       initialised with MBM_INIT, or closed before
  * @param identity  says whether this is the server's side; must outlive the connection
  * @param below     the port of the stream, which may still be connecting
  * @param name      a client's: the name or address that must be in the server's certificate

@@ -37,7 +37,7 @@ typedef struct mbm_tty_options {
     uint16_t rtsDelayAfter;  /**< with rs485: from the last bit to RTS, milliseconds */
 } mbm_tty_options;
 
-/** A terminal in use as a port; zeroed, open or closed. */
+/** A terminal in use as a port. Initialise it with MBM_INIT. */
 typedef struct mbm_tty {
     int fd;               /**< the terminal, while isOpen is 1; -1 once closed */
     int error;            /**< why the link was lost, an errno; 0 while there is a link */

@@ -40,7 +40,7 @@ extern "C" {
 /** Most datagrams that one read drops. The next one drops the others. */
 #define MBM_UDP_DROPS 16
 
-/** A socket in use as a port; zero before first use. */
+/** A socket in use as a port. Initialise it with MBM_INIT. */
 typedef struct mbm_udp {
     int fd;           /**< the socket, while `port` is not 0 */
     int error;        /**< why the link was lost, or why a datagram was not sent or its receiver
@@ -64,7 +64,7 @@ typedef struct mbm_udp {
 /**
  * Opens a client's socket for one server. It does not find out whether there is one.
  *
- * @param udp      zeroed, or closed before
+ * @param udp      initialised with MBM_INIT, or closed before
  * @param host     a name or a numeric address; the lookup of a name may block. NULL is this
  *                 machine. The first address that the system has a route to is used
  * @param service  a port number, for example MBM_UDP_SERVICE
@@ -79,7 +79,7 @@ int mbm_udp_open(mbm_udp *udp, const char *host, const char *service);
  * sender of the request before it. On a machine with several addresses, listen at one of
  * them: clients drop a response that comes from another.
  *
- * @param udp      zeroed, or closed before
+ * @param udp      initialised with MBM_INIT, or closed before
  * @param host     the address to receive at; NULL for all addresses of the machine
  * @param service  a port number; "0" for a free one, which is then in `port`
  * @return 0, or -1 with errno set, as of mbm_udp_open, or an error of bind

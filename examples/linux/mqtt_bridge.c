@@ -47,7 +47,7 @@ typedef struct write_request {
 } write_request;
 
 static line at;
-static mbm_plan plan;
+static mbm_plan plan = MBM_INIT;
 static mbm_planSetup setup;
 static mqtt_fields fields;
 static mqtt_broker broker;

@@ -72,7 +72,7 @@ static const char *const names[FIELDS] = {
 
 static mbm_planPosition positions[FIELDS];
 static mbm_planRead reads[FIELDS];
-static mbm_clientRequest requests[REQUESTS];
+static mbm_clientRequest requests[REQUESTS] = MBM_INIT;
 static uint16_t data[WORDS];
 static unsigned updates;
 
@@ -97,7 +97,7 @@ static const mbm_planSetup setup = {.fields = fields,
                                     .bitGap = 16,
                                     .registerGap = 8,
                                     .requestCount = REQUESTS};
-static mbm_plan plan;
+static mbm_plan plan = MBM_INIT;
 static line at;
 
 static void show_reads(void)

@@ -20,7 +20,7 @@
 enum { UNITS = 256 };
 
 static line at;
-static mbm_clientRequest requests[UNITS];
+static mbm_clientRequest requests[UNITS] = MBM_INIT;
 static uint16_t words[UNITS];
 static unsigned first = 1, last = 247, asked, reported, answering;
 

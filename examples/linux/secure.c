@@ -13,12 +13,12 @@
 enum { PLACES = 16, FIRST = 100, WORDS = 10, IDLE_MS = 60000 };
 
 /* All storage is the program's own, but for what Mbed TLS allocates. */
-static mbm_tls_identity identity;
+static mbm_tls_identity identity = MBM_INIT;
 static mbm_tls_files files;
 static mbm_tcp_listener listener = {.idleTimeMs = IDLE_MS};
-static mbm_tcp tcps[PLACES];
-static mbm_tls tlss[PLACES];
-static mbm_server servers[PLACES];
+static mbm_tcp tcps[PLACES] = MBM_INIT;
+static mbm_tls tlss[PLACES] = MBM_INIT;
+static mbm_server servers[PLACES] = MBM_INIT;
 static uint8_t frames[PLACES][MBM_MAX_TCP_FRAME];
 static uint16_t words[WORDS];
 static volatile sig_atomic_t is_over;
@@ -144,7 +144,7 @@ static int serve(const char *service, char **paths)
 
 /* --- the client --- */
 
-static mbm_client client;
+static mbm_client client = MBM_INIT;
 static uint8_t incoming[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME];
 static mbm_clientRequest request = {.unit = 17};
 

@@ -31,7 +31,7 @@ enum {
     SELDOM_STEP = 600000000
 };
 
-static mbm_sniffer sniffer;
+static mbm_sniffer sniffer = MBM_INIT;
 static uint8_t buffer[MBM_MAX_ASCII_FRAME];
 static unsigned long totals[KINDS];
 static uint64_t first, now; /* microseconds that do not wrap, unlike the sniffer's */
@@ -99,7 +99,7 @@ static void feed(const uint8_t *bytes, uint16_t length)
 /* Returns 0 after Ctrl-C, 1 if the line was lost, -1 if it could not be opened. */
 static int watch(const char *path, const mbm_tty_options *options)
 {
-    mbm_tty tty;
+    mbm_tty tty = MBM_INIT;
     uint8_t bytes[256];
     ssize_t length;
     int failed = 0;

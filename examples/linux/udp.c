@@ -11,7 +11,7 @@
 
 enum { FIRST = 100, WORDS = 10, TIMEOUT_MS = 500, RETRIES = 9 };
 
-static mbm_udp udp;
+static mbm_udp udp = MBM_INIT;
 static uint16_t words[WORDS];
 static volatile sig_atomic_t is_over;
 
@@ -32,7 +32,7 @@ static int serve(const char *service)
 {
     static mbm_registerTable holding = {.words = words, .base = FIRST, .size = WORDS};
     static mbm_unit unit = {.id = 17};
-    static mbm_server server;
+    static mbm_server server = MBM_INIT;
     static uint8_t frame[MBM_MAX_TCP_FRAME];
     const mbm_port port = mbm_udp_port(&udp);
     int i;
@@ -56,7 +56,7 @@ static int ask(const char *host, const char *service)
 {
     static uint8_t incoming[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME];
     static mbm_clientRequest request = {.unit = 17, .reply = words, .replyBytes = sizeof words};
-    static mbm_client client;
+    static mbm_client client = MBM_INIT;
     const mbm_port port = mbm_udp_port(&udp);
     int i;
 

@@ -12,7 +12,7 @@ static mbm_rtThreadLine line = {
     .tail = MBM_EXAMPLE_TAIL,
 };
 static mbm_port port;
-static mbm_master master;
+static mbm_master master = MBM_INIT;
 static uint16_t response[COUNT];
 static uint8_t frame[MBM_FRAME_BYTES(COUNT)];
 

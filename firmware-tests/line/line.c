@@ -21,7 +21,7 @@ static uint32_t now, byte_us;
 static bool has_driver, is_driving;
 static unsigned answers, ignored, ignore_after, end_after;
 
-static mbm_server device;
+static mbm_server device = MBM_INIT;
 static mbm_unit unit = {.id = LINE_UNIT};
 static uint16_t words[] = {LINE_FIRST, LINE_SECOND};
 static mbm_registerTable table = {.words = words, .base = LINE_ADDRESS, .size = 2};

@@ -64,16 +64,17 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
     // except `kind`, which is set before it is used.
     unsafe {
         let status = pointers::check(client);
-        if status != Status::OK {
+        if status == Status::OK {
+            let object = pointers::object(client);
+            if (*object).queue.suspended {
+                return Status::BUSY;
+            }
+            mbm_client::mark(client).write(pointers::IN_HOOK);
+            ((*(*object).kind).release)(object, None);
+            queue(object).cancel_all();
+        } else if status != Status::NOT_INITIALISED {
             return status;
         }
-        let object = pointers::object(client);
-        if (*object).queue.suspended {
-            return Status::BUSY;
-        }
-        mbm_client::mark(client).write(pointers::IN_HOOK);
-        ((*(*object).kind).release)(object, None);
-        queue(object).cancel_all();
         pointers::zero(client);
         Status::NOT_INITIALISED
     }
@@ -86,7 +87,7 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
 /// their status is MBM_CANCELLED and `done` is not called. All settings return to their
 /// defaults. A call that is refused changes nothing.
 ///
-/// @param client      the object; zeroed before the first call
+/// @param client      the object; initialised with MBM_INIT before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
 /// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
@@ -107,7 +108,7 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
 /// keeps no gap between frames. If no character arrives for one second, the client discards
 /// an incomplete frame.
 ///
-/// @param client      the object; zeroed before the first call
+/// @param client      the object; initialised with MBM_INIT before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
 /// @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
@@ -155,7 +156,7 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
 /// Begins a client that sends RTU frames through a TCP stream, for converters that pass
 /// bytes from TCP to a serial line unchanged. It keeps no gap and does not broadcast.
 ///
-/// @param client      the object; zeroed before the first call
+/// @param client      the object; initialised with MBM_INIT before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
 /// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
@@ -176,7 +177,7 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
 /// TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at once. The client matches
 /// responses to requests by the transaction identifier, in any order.
 ///
-/// @param client         the object; zeroed before the first call
+/// @param client         the object; initialised with MBM_INIT before the first call
 /// @param port           the port, which is copied; read, write and micros must not be NULL
 /// @param incoming       the buffer of received bytes, valid for as long as the client is
 ///                       used

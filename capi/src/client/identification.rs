@@ -14,7 +14,7 @@ use mbm::pdu::identification::IdentificationReply;
 use mbm::pdu::identification_stream::{Next, ObjectStream};
 
 /// Reads the objects that identify a device (function 2B/0E, V1.1b3, 6.21), with as many
-/// requests as the device needs. You own the storage. Zero it before first use, set `unit`,
+/// requests as the device needs. You own the storage. Initialise it with MBM_INIT, set `unit`,
 /// `reply` and `replyBytes` of `request`, and `object`, and pass it to
 /// mbm_identification_read. You may use it for any number of devices.
 ///

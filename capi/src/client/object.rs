@@ -17,9 +17,9 @@ pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 /// A client of one serial line or one TCP stream. It queues up to 16 requests.
 /// mbm_client_poll sends and receives; no function ever waits.
 ///
-/// You own the storage. It must be zero before first use, as a static object is. Call one of
-/// the mbm_client_begin functions first. Use an object from one thread only, and never from
-/// an interrupt. Several objects are independent of each other.
+/// You own the storage. Initialise it with MBM_INIT. Call one of the mbm_client_begin
+/// functions first. Use an object from one thread only, and never from an interrupt. Several
+/// objects are independent of each other.
 ///
 /// The `done` function of a request may call every function on the client that calls it,
 /// except mbm_client_poll, which then returns MBM_BUSY. A hook of the port, and the `random`

@@ -7,7 +7,7 @@ use core::ptr::NonNull;
 use mbm::bytes::copy_words;
 use mbm::client::{ClientRequest, RequestState};
 
-/// A request to a device, and its result. You own the storage. Zero it before first use, and
+/// A request to a device, and its result. You own the storage. Initialise it with MBM_INIT,
 /// then set the fields that you need. You may use it for any number of requests.
 ///
 /// From the call that queues it until it has ended, do not use or change it, nor what it

@@ -191,7 +191,7 @@ fn if_built_in(built_in: bool, change: impl FnOnce()) -> Status {
 /// resynchronisations counts sequences of bytes that were not a frame.
 ///
 /// @param client    the object
-/// @param counters  your counters, zeroed; NULL stops counting
+/// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setCounters(

@@ -54,8 +54,8 @@ const _: () = {
 /// and `retryLimit` replace those of the client. You may change these three at any time.
 ///
 /// @param client  the object
-/// @param units   your array of records, zeroed except for the fields that you set; NULL for
-///                none
+/// @param units   your array of records, initialised with MBM_INIT except for the fields that
+///                you set; NULL for none
 /// @param count   the number of records, 0 to 255
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]

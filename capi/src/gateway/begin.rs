@@ -11,10 +11,10 @@ use mbm::error::Status;
 /// connections and their requests; it cancels those that a line has, and its settings return
 /// to their defaults. A call that is refused changes nothing.
 ///
-/// @param gateway  the object; zero it before the first call
+/// @param gateway  the object; initialised with MBM_INIT before the first call
 /// @param config   what the gateway consists of. What it points to must stay valid, and must
-///                 be used by one gateway only, for as long as the gateway is used; lines and
-///                 requests must be zero before first use
+///                 be used by one gateway only, for as long as the gateway is used; lines,
+///                 connections and requests are initialised with MBM_INIT
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a count out of range, fewer
 ///         requests than connections, a route to a line that does not exist or to a unit id
 ///         above 255, and a line without client; MBM_NOT_INITIALISED if the client of a line

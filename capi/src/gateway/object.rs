@@ -8,9 +8,8 @@ use mbm::gateway::Gateway;
 /// A gateway: takes requests from Modbus TCP connections, passes each to the line of its unit,
 /// and sends the reply back. mbm_gateway_poll does all of it; no function ever waits.
 ///
-/// You provide the storage. It must be zero before first use; a static object is zero. Call
-/// mbm_gateway_begin first. Use a gateway, its lines' clients and its own units from one
-/// thread, and never from an interrupt.
+/// You provide the storage. Initialise it with MBM_INIT. Call mbm_gateway_begin first. Use a
+/// gateway, its lines' clients and its own units from one thread, and never from an interrupt.
 ///
 /// mbm_gateway_poll calls the hooks of the connections' ports and of the lines' ports,
 /// `isReady` of the lines, and the functions of the gateway's own units. If one of them calls a

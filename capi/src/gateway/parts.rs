@@ -39,7 +39,7 @@ pub struct mbm_gatewayRoute {
     pub unit: u8,
 }
 
-/// A line of a gateway. Zero it, then set the fields that you need.
+/// A line of a gateway. Initialise it with MBM_INIT, then set the fields that you need.
 #[repr(C)]
 pub struct mbm_gatewayLine {
     /// The client of the line, in any framing. Begin it before the gateway, with a frame

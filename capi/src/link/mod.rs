@@ -59,7 +59,7 @@ const _: () = {
 /// All settings of the link return to their defaults. The call may be repeated at any time,
 /// also with another client. A begin function of the client ends the link.
 ///
-/// @param link    the object; zeroed before the first call
+/// @param link    the object; initialised with MBM_INIT before the first call
 /// @param client  the client, begun; it must not have another link
 /// @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
 ///                hooks must not use the client or the link: each function returns MBM_BUSY
@@ -333,7 +333,7 @@ pub unsafe extern "C" fn mbm_link_setCallback(
 /// Sets your storage for counters, in which the link counts from now on.
 ///
 /// @param link      the object
-/// @param counters  your counters, zeroed; NULL stops counting
+/// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
 /// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setCounters(

@@ -15,8 +15,8 @@ use mbm::error::Status;
 /// A link that opens itself again when it was lost. It belongs to one client:
 /// mbm_client_poll polls both.
 ///
-/// You own the storage. It must be zero before first use, as a static object is, and must stay
-/// where it is until mbm_link_end or until the client was begun again.
+/// You own the storage. Initialise it with MBM_INIT. It must stay where it is until
+/// mbm_link_end or until the client was begun again.
 #[repr(C)]
 pub struct mbm_link {
     /// Private.

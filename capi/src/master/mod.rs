@@ -23,6 +23,7 @@ use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::master::Master;
 use mbm::pdu::master_request::MasterSpec;
+use mbm::FIRMWARE;
 
 /// The fields in the storage of an `mbm_master`.
 #[repr(C)]
@@ -90,6 +91,10 @@ pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
     unsafe {
         match pointers::check(master) {
             Status::NOT_INITIALISED => {
+                // Hosts tolerate storage that was not zeroed.
+                if !FIRMWARE {
+                    pointers::zero(master);
+                }
                 let object = mbm_master::access(master);
                 object.core.set_default_if_zero();
                 object.mark = pointers::BEGUN;
@@ -122,7 +127,7 @@ pub(super) unsafe fn with_hooks<T>(
 /// the port: that must be open already. The first request waits for no gap, unless bytes
 /// arrive or mbm_master_lineUsed was called.
 ///
-/// @param master  the object; zeroed before the first call
+/// @param master  the object; initialised with MBM_INIT before the first call
 /// @param slave   the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
 ///                2.2). The master also sends to 248 to 255, which the standard reserves
 /// @param port    the port. It is not copied: it must stay valid and unchanged for as long as
@@ -145,7 +150,7 @@ pub unsafe extern "C" fn mbm_master_beginRtu(
 /// As mbm_master_beginRtu, but with a separate context. Several objects can then share one
 /// port, which may be a constant, and each object has its own context.
 ///
-/// @param master   the object; zeroed before the first call
+/// @param master   the object; initialised with MBM_INIT before the first call
 /// @param slave    as for mbm_master_beginRtu
 /// @param port     as for mbm_master_beginRtu; its `context` is not used
 /// @param context  your pointer, passed to every hook; may be NULL
@@ -179,7 +184,7 @@ pub unsafe extern "C" fn mbm_master_beginRtuWith(
 /// that number of words. If a request or a reply does not fit into a smaller buffer, the
 /// function that makes the request returns a status. Data are never cut off.
 ///
-/// @param master         the object; zeroed before the first call
+/// @param master         the object; initialised with MBM_INIT before the first call
 /// @param response       the words that reads fill; NULL only if `responseWords` is 0
 /// @param responseWords  0 to 255; 125 hold any reply
 /// @param transmit       the words that writes send; NULL only if `transmitWords` is 0

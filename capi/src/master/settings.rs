@@ -261,7 +261,7 @@ pub unsafe extern "C" fn mbm_master_setBlocking(master: *mut mbm_master, on: u8)
 /// zero the counters at any time, but not from an interrupt.
 ///
 /// @param master    the object
-/// @param counters  your counters, zeroed; NULL stops counting
+/// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setCounters(

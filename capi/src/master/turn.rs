@@ -6,7 +6,7 @@ use core::ptr::null_mut;
 use mbm::error::Status;
 
 /// Records which of several masters uses a shared line, or a shared frame buffer. You own the
-/// storage. It must be zero before first use.
+/// storage. Initialise it with MBM_INIT.
 ///
 /// Use all objects of one turn from one thread. Call mbm_master_endTurn before you release the
 /// storage of an object.

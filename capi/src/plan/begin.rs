@@ -16,7 +16,7 @@ use mbm::plan::{group, schedule};
 /// bits or registers. All reads are due at once; the rounds after the first are spread, so that
 /// reads of one interval follow each other at equal distances.
 ///
-/// @param plan    the object, zeroed
+/// @param plan    the object; initialised with MBM_INIT before the first call
 /// @param client  the client that sends the reads, begun; the program may use it too, and other
 ///                plans
 /// @param setup   table, limits and storage; it stays valid and as it is until mbm_plan_end

@@ -85,8 +85,9 @@ pub struct mbm_planSetup {
     pub reads: *mut mbm_planRead,
     /// Storage: the registers of all reads and the bits of all reads, 16 to a word.
     pub data: *mut u16,
-    /// Storage: the requests with which the plan reads, zeroed; they are the plan's alone. With one it sends one read after
-    /// the other; more are for Modbus TCP, where several may be under way at once.
+    /// Storage: the requests with which the plan reads, initialised with MBM_INIT; they are the
+    /// plan's alone. With one it sends one read after the other; more are for Modbus TCP, where
+    /// several may be under way at once.
     pub requests: *mut mbm_clientRequest,
     /// Units with limits of their own; NULL for none.
     pub units: *const mbm_planUnitLimits,

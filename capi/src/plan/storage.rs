@@ -4,9 +4,9 @@ use core::ffi::c_void;
 
 /// A plan: a table of fields that a client reads from units again and again.
 ///
-/// Storage is yours and must be zero before first use, which a static object is.
-/// mbm_plan_begin comes first. Use it from the thread that uses its client, and never from an
-/// interrupt. It stays where it is until mbm_plan_end.
+/// You own the storage. Initialise it with MBM_INIT. Call mbm_plan_begin first. Use it from
+/// the thread that uses its client, and never from an interrupt. It stays where it is until
+/// mbm_plan_end.
 #[repr(C)]
 pub struct mbm_plan {
     /// Private.

@@ -3,10 +3,11 @@
 use super::buffers::Core;
 use super::{mbm_server, mbm_unit};
 use crate::framing::MBM_MAX_TCP_FRAME;
-use crate::pointers::{check, object, read, with_hooks, CObject, IN_HOOK};
+use crate::pointers::{check, object, read, with_hooks, CObject, BEGUN, IN_HOOK};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 use mbm::time;
+use mbm::FIRMWARE;
 
 /// The shortest frame buffer for RTU, in bytes.
 const MIN_FRAME: u16 = 16;
@@ -36,13 +37,15 @@ unsafe fn begin(
         if !(*port).is_complete() {
             return Status::INVALID_ARGUMENT;
         }
-        if mbm_server::mark(server).read() == IN_HOOK {
+        let mark = mbm_server::mark(server).read();
+        if mark == IN_HOOK {
             return Status::BUSY;
         }
         let core = object(server);
         with_hooks(server, || {
-            // The previous port must not keep its driver switched on.
-            if (*core).is_sending() {
+            // The previous port must not keep its driver switched on. Hosts tolerate storage
+            // that was not zeroed.
+            if (FIRMWARE || mark == BEGUN) && (*core).is_sending() {
                 if let Some(post) = (*core).port.postTransmission {
                     post((*core).port.context);
                 }
@@ -68,7 +71,7 @@ unsafe fn begin(
 /// stay valid, at the same address, for as long as the server is used. Several servers
 /// may share units. The buffer holds no data between requests.
 ///
-/// @param server  the object; zero it before the first call
+/// @param server  the object; initialised with MBM_INIT before the first call
 /// @param port    is copied; its hooks read, write and micros are required
 /// @param units   the units to serve: one unit, or an array of units
 /// @param count   how many units

@@ -10,8 +10,8 @@ use mbm::server::table::{self, DataModel, Direction, TableAccess, TableKind};
 use mbm::server::Reply;
 
 /// Cells that your functions get and set one by one, in place of an array. A cell is a
-/// register, a coil or a discrete input. Zero the struct, set the fields that you need,
-/// and pass it to mbm_unit_serveCallbacks.
+/// register, a coil or a discrete input. Initialise the struct with MBM_INIT, set the fields
+/// that you need, and pass it to mbm_unit_serveCallbacks.
 #[repr(C)]
 pub struct mbm_dataCallbacks {
     /// Private.

@@ -183,8 +183,8 @@ unsafe fn mask_byte(mask: *mut mbm_functionMask, code: u8) -> *mut u8 {
 /// exception 01, even if a record serves it.
 ///
 /// @param unit  the unit
-/// @param mask  must stay valid for as long as the unit is used; zero it before the first
-///              call. Units that share a mask have the same functions off
+/// @param mask  must stay valid for as long as the unit is used; initialised with MBM_INIT.
+///              Units that share a mask have the same functions off
 /// @param code  the function code, 1 to 127
 /// @param on    0 switches the function off, anything else switches it on
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a code out of range;

@@ -20,8 +20,8 @@ pub struct mbm_file {
     pub number: u16,
 }
 
-/// Files of yours. Zero the struct, set the fields that you need, and pass it to
-/// mbm_unit_serveFiles.
+/// Files of yours. Initialise the struct with MBM_INIT, set the fields that you need, and pass
+/// it to mbm_unit_serveFiles.
 #[repr(C)]
 pub struct mbm_files {
     /// Private.
@@ -46,8 +46,8 @@ pub struct mbm_fifo {
     pub count: u16,
 }
 
-/// FIFO queues of yours. Zero the struct, set `fifos` and `count`, and pass it to
-/// mbm_unit_serveFifos.
+/// FIFO queues of yours. Initialise the struct with MBM_INIT, set `fifos` and `count`, and
+/// pass it to mbm_unit_serveFifos.
 #[repr(C)]
 pub struct mbm_fifos {
     /// Private.

@@ -8,8 +8,8 @@ use core::ffi::c_void;
 use core::slice::from_raw_parts;
 use mbm::server::identity::{self, Objects};
 
-/// The eight exception status outputs of function 07. Zero the struct and pass it to
-/// mbm_unit_serveExceptionStatus.
+/// The eight exception status outputs of function 07. Initialise the struct with MBM_INIT and
+/// pass it to mbm_unit_serveExceptionStatus.
 #[repr(C)]
 pub struct mbm_exceptionStatus {
     /// Private.
@@ -18,10 +18,10 @@ pub struct mbm_exceptionStatus {
     pub outputs: u8,
 }
 
-/// The response of function 11 (hex), Report Server ID. Zero the struct, set the fields
-/// that you need, and pass it to mbm_unit_serveServerId. The id, the run indicator (1
-/// byte) and the additional data together have at most 251 bytes, fewer if the frame
-/// buffer holds less than a whole frame. If they are longer, the server answers with
+/// The response of function 11 (hex), Report Server ID. Initialise the struct with MBM_INIT,
+/// set the fields that you need, and pass it to mbm_unit_serveServerId. The id, the run
+/// indicator (1 byte) and the additional data together have at most 251 bytes, fewer if the
+/// frame buffer holds less than a whole frame. If they are longer, the server answers with
 /// exception 04.
 #[repr(C)]
 pub struct mbm_serverId {
@@ -39,8 +39,8 @@ pub struct mbm_serverId {
     pub running: u8,
 }
 
-/// A device identification. Zero the struct, set `objects` and `count`, and pass it to
-/// mbm_unit_serveIdentification.
+/// A device identification. Initialise the struct with MBM_INIT, set `objects` and `count`,
+/// and pass it to mbm_unit_serveIdentification.
 #[repr(C)]
 pub struct mbm_serverIdentification {
     /// Private.

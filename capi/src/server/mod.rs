@@ -40,11 +40,10 @@ use mbm::FIRMWARE;
 
 /// A Modbus server on one serial line or one connection.
 ///
-/// You provide the storage. It must be zero before first use; a static object is zero. A
-/// server serves units. Several servers may share units: for example, a server on a
-/// serial line and four servers on TCP connections are five servers with the same units.
-/// Use a server and its units from one thread, and never from an interrupt. Use all
-/// servers that share units from the same thread.
+/// You provide the storage. Initialise it with MBM_INIT. A server serves units. Several
+/// servers may share units: for example, a server on a serial line and four servers on TCP
+/// connections are five servers with the same units. Use a server and its units from one
+/// thread, and never from an interrupt. Use all servers that share units from the same thread.
 ///
 /// mbm_server_poll calls your hooks and your functions. If they call a function on the
 /// server that is being polled, it returns MBM_BUSY and changes nothing; call it after

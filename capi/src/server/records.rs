@@ -42,8 +42,8 @@ pub struct mbm_request {
     pub function: u8,
 }
 
-/// A function of yours. Zero the struct, set the fields that you need, and pass it to
-/// mbm_unit_serveCustom.
+/// A function of yours. Initialise the struct with MBM_INIT, set the fields that you need, and
+/// pass it to mbm_unit_serveCustom.
 ///
 /// A unit asks its records in the order in which they were registered. So a function that is
 /// registered before the record that serves the same code is asked first. It answers the
@@ -104,9 +104,9 @@ pub(super) unsafe fn is_other_custom(service: *const mbm_service, function: u8) 
     }
 }
 
-/// The counters, the event log and the listen only mode of a unit. Zero the struct and
-/// pass it to mbm_unit_serveDiagnostics. The counters wrap at 65536; you may read them at
-/// any time. The sub-functions below are those of function 08 (V1.1b3, 6.8), in hex.
+/// The counters, the event log and the listen only mode of a unit. Initialise the struct with
+/// MBM_INIT and pass it to mbm_unit_serveDiagnostics. The counters wrap at 65536; you may read
+/// them at any time. The sub-functions below are those of function 08 (V1.1b3, 6.8), in hex.
 #[repr(C)]
 pub struct mbm_diagnostics {
     /// Private.

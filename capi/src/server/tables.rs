@@ -12,12 +12,12 @@ use mbm::server::table::{self, TableAccess, TableKind, TableOperation};
 use mbm::server::Reply;
 use mbm::FIRMWARE;
 
-/// Holding registers or input registers in an array of yours. Zero the struct, set the
-/// fields that you need, and pass it to mbm_unit_serveHoldingRegisters or
-/// mbm_unit_serveInputRegisters. You may change the registers at any time, and the fields
-/// too, except from within a hook of this table: the server finishes a request with the
-/// `words` that the table had when the request came. To serve the struct as another kind
-/// of table, zero it first.
+/// Holding registers or input registers in an array of yours. Initialise the struct with
+/// MBM_INIT, set the fields that you need, and pass it to mbm_unit_serveHoldingRegisters or
+/// mbm_unit_serveInputRegisters. You may change the registers at any time, and the fields too,
+/// except from within a hook of this table: the server finishes a request with the `words`
+/// that the table had when the request came. To serve the struct as another kind of table,
+/// zero it first.
 #[repr(C)]
 pub struct mbm_registerTable {
     /// Private.

@@ -35,9 +35,9 @@ const _: () = {
 /// A sniffer: finds the frames on a bus that others use, and pairs requests with replies.
 /// It never sends and has no port: you pass it the bytes that you receive.
 ///
-/// You provide the storage. It must be zero before first use; a static object is zero. Call
-/// one of the mbm_sniffer_begin functions first. Not re-entrant: use one object from one
-/// thread, and never from an interrupt; pass bytes from an interrupt through an mbm_ring.
+/// You provide the storage. Initialise it with MBM_INIT. Call one of the mbm_sniffer_begin
+/// functions first. Not re-entrant: use one object from one thread, and never from an
+/// interrupt; pass bytes from an interrupt through an mbm_ring.
 #[repr(C)]
 pub struct mbm_sniffer {
     /// Private.
@@ -143,7 +143,7 @@ unsafe fn begin(sniffer: *mut mbm_sniffer, buffer: *mut u8, size: u16, framing: 
 /// You may call it again at any time. The sniffer then discards received bytes and
 /// unanswered requests without an event, and its settings return to their defaults.
 ///
-/// @param sniffer  the object; zero it before the first call
+/// @param sniffer  the object; initialised with MBM_INIT before the first call
 /// @param buffer   holds received bytes until the sniffer has reported them; must stay
 ///                 valid for as long as the sniffer is used
 /// @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER.

@@ -31,11 +31,11 @@ const _: () = assert!(MBM_MIN_TRACE_BUFFER as usize == MIN_BUFFER);
 /// A trace: stands between a port and the master, client or server that uses it, passes
 /// everything on, and calls your hook for each frame that is sent or received.
 ///
-/// You provide the storage. It must be zero before first use; a static object is zero. Call
-/// mbm_trace_beginClient or mbm_trace_beginServer, then begin the master, client or server
-/// with mbm_trace_port instead of your port. The object must not move while its port is in
-/// use. A program that begins no trace contains no part of it. Not re-entrant: use it from
-/// the thread of the object that uses its port.
+/// You provide the storage. Initialise it with MBM_INIT. Call mbm_trace_beginClient or
+/// mbm_trace_beginServer, then begin the master, client or server with mbm_trace_port instead
+/// of your port. The object must not move while its port is in use. A program that begins no
+/// trace contains no part of it. Not re-entrant: use it from the thread of the object that
+/// uses its port.
 #[repr(C)]
 pub struct mbm_trace {
     /// Private.
@@ -301,7 +301,7 @@ fn code(result: Result<(), Status>) -> u8 {
 /// You may call this function again at any time, but not from within the hook. The trace then
 /// drops the bytes that it has not handed out, and its frame timeout is the default.
 ///
-/// @param trace    the object; zero it before the first call
+/// @param trace    the object; initialised with MBM_INIT before the first call
 /// @param port     is copied; its hooks read, write and micros are required. Its optional
 ///                 hooks are passed on. It must not be the port of this trace, nor
 ///                 that of a trace that passes everything on to this one

@@ -18,7 +18,7 @@
 
 /* Holds the longest frame: that is how far the handler may be ahead of the main loop. */
 static uint8_t received[MBM_MAX_FRAME + 1];
-static mbm_ring ring;
+static mbm_ring ring = MBM_INIT;
 
 void uart_start(void)
 {

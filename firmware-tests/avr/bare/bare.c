@@ -60,12 +60,12 @@ static uint32_t micros(void *context)
 }
 
 static usart served = {&UCSR0A, &UDR0, 0}, asked = {&UCSR1A, &UDR1, 0};
-static mbm_server server;
-static mbm_unit unit;
-static mbm_master master;
+static mbm_server server = MBM_INIT;
+static mbm_unit unit = MBM_INIT;
+static mbm_master master = MBM_INIT;
 static uint8_t frame[MBM_MAX_FRAME], request[MBM_FRAME_BYTES(CELLS)];
 static uint16_t words[CELLS], replies[CELLS];
-static mbm_registerTable table;
+static mbm_registerTable table = MBM_INIT;
 static uint8_t is_wanted;
 
 static void written(void *context, const mbm_access *access)

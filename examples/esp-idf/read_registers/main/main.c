@@ -29,7 +29,7 @@ static mbm_espIdfLine line = {
     .parity = UART_PARITY_EVEN,
 };
 static mbm_port port;
-static mbm_master master;
+static mbm_master master = MBM_INIT;
 static uint16_t response[COUNT];
 static uint8_t frame[MBM_FRAME_BYTES(COUNT)];
 

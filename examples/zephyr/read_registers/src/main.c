@@ -14,7 +14,7 @@ static mbm_zephyrLine line = {
     .parity = UART_CFG_PARITY_EVEN,
 };
 static mbm_port port;
-static mbm_master master;
+static mbm_master master = MBM_INIT;
 static uint16_t response[COUNT];
 static uint8_t frame[MBM_FRAME_BYTES(COUNT)];
 

@@ -77,7 +77,7 @@ static uint32_t clock_micros(void *context)
 }
 
 static const mbm_port port = {.read = uart_read, .write = uart_write, .micros = clock_micros};
-static mbm_master master;
+static mbm_master master = MBM_INIT;
 static uint16_t response[COUNT];
 static uint8_t frame[MBM_FRAME_BYTES(COUNT)];
 

@@ -5,7 +5,7 @@
 #include "mbm.h"
 
 /* All memory is the program's own: mbm allocates nothing. */
-static mbm_master master;
+static mbm_master master = MBM_INIT;
 static uint16_t response[1];
 static uint8_t frame[MBM_FRAME_BYTES(1)];
 

@@ -8,13 +8,13 @@
 #include <stdio.h>
 
 /* All memory is the program's own: mbm allocates nothing. */
-static mbm_master master;
+static mbm_master master = MBM_INIT;
 static uint16_t response[1];
 static uint8_t frame[MBM_FRAME_BYTES(1)];
 
 int main(int argc, char **argv)
 {
-    mbm_tty tty = {0};
+    mbm_tty tty = MBM_INIT;
     mbm_port port;
     uint8_t status;
 
