@@ -201,6 +201,10 @@ certificates:
 	@scripts/need openssl
 	@scripts/certificates $(BUILD)/certificates
 
+.PHONY: corruption
+corruption: ## Compute which damage CRC-16 lets through; writes docs/reliability.md; REPLIES (40000000)
+	@CARGO="$(CARGO)" REPLIES="$(REPLIES)" scripts/corruption
+
 .PHONY: need-check need-test
 need-check:
 	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools python3
