@@ -85,6 +85,8 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
         return F("two fields of the plan overlap");
     case MBM_NO_PROGRESS:
         return F("the device repeats itself without an end");
+    case MBM_CONNECT_TIMED_OUT:
+        return F("the connection was not made in time");
     default:
         break;
     }

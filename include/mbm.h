@@ -269,6 +269,12 @@ const char *mbm_version(void);
 #define MBM_NO_PROGRESS 244u
 
 /**
+ * The connection was not made in time. Of a link: within its connect timeout. Of a request on
+ * Modbus TCP without a link: the port accepted no byte within the response timeout.
+ */
+#define MBM_CONNECT_TIMED_OUT 247u
+
+/**
  * Explains a status in a few words of English.
  *
  * On an AVR, constants are in RAM, and a program that calls this function has about 1100
@@ -2184,7 +2190,8 @@ uint8_t mbm_client_reply(const struct mbm_clientRequest *request,
  * request has ended when its `status` is no longer MBM_PENDING. Then `status` is MBM_OK, an
  * exception of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
  * MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST,
- * MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes only if it is MBM_OK.
+ * MBM_LINE_BUSY, MBM_CONNECT_TIMED_OUT, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes
+ * only if it is MBM_OK.
  *
  * @param client   the object
  * @param request  the request
@@ -3243,7 +3250,7 @@ uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
 
 /**
  * An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
- * mbm_linkHooks returned; MBM_RESPONSE_TIMED_OUT if the connection took too long.
+ * mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long.
  */
 #define MBM_LINK_EVENT_FAILED 2u
 
@@ -3375,7 +3382,8 @@ uint8_t mbm_link_setJitter(struct mbm_link *link,
                            void *context);
 
 /**
- * Sets how long a connection may take to be made. Then the attempt has failed.
+ * Sets how long a connection may take to be made. Then the attempt has failed, with
+ * MBM_CONNECT_TIMED_OUT.
  *
  * @param link       the object
  * @param timeoutMs  milliseconds, 1 to 65535; 0: as long as `status` returns MBM_PENDING. The
@@ -3387,7 +3395,8 @@ uint8_t mbm_link_setConnectTimeout(struct mbm_link *link,
 
 /**
  * Sets whether requests wait for the link. By default they do not: while the link is down,
- * every request ends with MBM_LINK_LOST at the next poll. (A program whose `done` queues the
+ * every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took longer
+ * than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
  * request again at once then polls without a pause: let it wait.) If requests wait, they stay
  * in the queue until the link is open again or until you cancel them; their response timeout
  * begins when they are sent. While a connection is being made, requests always wait.

@@ -72,6 +72,8 @@ impl Status {
     pub const FIELDS_OVERLAP: Status = Status(0xF3);
     /// A device says that more follows, but what it sends or names does not come next.
     pub const NO_PROGRESS: Status = Status(0xF4);
+    /// The connection was not made in time: the port has accepted no byte.
+    pub const CONNECT_TIMED_OUT: Status = Status(0xF7);
 
     /// The status for an exception code of the remote device.
     ///

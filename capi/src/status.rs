@@ -97,6 +97,9 @@ pub const MBM_FIELDS_OVERLAP: u8 = 0xF3;
 /// an object that is not after those that it has sent, or then sends one before the one that
 /// it named. Reading on might never end.
 pub const MBM_NO_PROGRESS: u8 = 0xF4;
+/// The connection was not made in time. Of a link: within its connect timeout. Of a request on
+/// Modbus TCP without a link: the port accepted no byte within the response timeout.
+pub const MBM_CONNECT_TIMED_OUT: u8 = 0xF7;
 
 statuses! {
     MBM_OK = Status::OK, c"success";
@@ -130,6 +133,7 @@ statuses! {
     MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
     MBM_FIELDS_OVERLAP = Status::FIELDS_OVERLAP, c"two fields of the plan overlap";
     MBM_NO_PROGRESS = Status::NO_PROGRESS, c"the device repeats itself without an end";
+    MBM_CONNECT_TIMED_OUT = Status::CONNECT_TIMED_OUT, c"the connection was not made in time";
 }
 
 /// Explains a status in a few words of English.
