@@ -467,6 +467,141 @@ static void many_connections_keep_their_roles_apart(void **state)
         mbm_tls_end(&who[i]);
 }
 
+/* --- a link --- */
+
+typedef struct linked {
+    asker a;
+    mbm_tcp_addresses addresses;
+    mbm_link kept;
+    mbm_linkCounters counters;
+    uint8_t tls_status, status; /* what the callback found when an attempt had failed */
+} linked;
+
+static void note_failure(void *context, uint8_t event, uint8_t status)
+{
+    linked *l = (linked *)context;
+
+    if (event == MBM_LINK_EVENT_CONNECTED)
+        return;
+    l->tls_status = l->a.tls.status;
+    l->status = status;
+}
+
+static void keep(linked *l, const mbm_tls_identity *who, uint16_t at)
+{
+    const mbm_port socket = mbm_tcp_port(&l->a.tcp), port = mbm_tls_port(&l->a.tls);
+    const mbm_linkHooks below = mbm_tcp_link(&l->a.tcp), hooks = mbm_tls_link(&l->a.tls);
+    char service[8];
+
+    memset(l, 0, sizeof *l);
+    snprintf(service, sizeof service, "%u", at);
+    assert_int_equal(mbm_tcp_openLater(&l->a.tcp, &l->addresses, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tls_open(&l->a.tls, who, &socket, "localhost", &below), MBM_TLS_HANDSHAKE);
+    OK(mbm_client_beginTcp(&l->a.client, &port, l->a.incoming, sizeof l->a.incoming, l->a.outgoing,
+                           sizeof l->a.outgoing));
+    OK(mbm_client_setResponseTimeout(&l->a.client, UINT16_MAX));
+    OK(mbm_link_begin(&l->kept, &l->a.client, &hooks));
+    OK(mbm_link_setBackoff(&l->kept, MBM_BACKOFF_FIXED, 5, 5));
+    OK(mbm_link_setConnectTimeout(&l->kept, 0));
+    OK(mbm_link_setRequestsWait(&l->kept, 1));
+    OK(mbm_link_setCounters(&l->kept, &l->counters));
+    OK(mbm_link_setCallback(&l->kept, note_failure, l));
+}
+
+/* One round of the client's program and of the server's. */
+static void go_both(linked *l)
+{
+    const uint32_t delay = mbm_client_pollDelay(&l->a.client);
+
+    (void)mbm_tls_wait(&l->a.tls, &l->a.tcp, 1, NULL, -1, delay < 1000 ? delay : 1000);
+    (void)mbm_client_poll(&l->a.client);
+    go_round_after(-1, AT_ONCE);
+}
+
+#define UNTIL(linked_, condition)                                                                  \
+    do {                                                                                           \
+        unsigned rounds_ = 0;                                                                      \
+                                                                                                   \
+        while (!(condition)) {                                                                     \
+            if (rounds_++ == PATIENCE_MS)                                                          \
+                fail_msg("this did not happen: %s; %s", #condition,                                \
+                         mbm_tls_text((linked_)->a.tls.status));                                   \
+            go_both(linked_);                                                                      \
+        }                                                                                          \
+    } while (0)
+
+static void read_by_link(linked *l)
+{
+    memset(l->a.words, 0, sizeof l->a.words);
+    l->a.request =
+        (mbm_clientRequest){.unit = 17, .reply = l->a.words, .replyBytes = sizeof l->a.words};
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&l->a.client, &l->a.request, FIRST, 3));
+    UNTIL(l, l->a.request.status != MBM_PENDING);
+    IS(MBM_OK, l->a.request.status);
+    assert_memory_equal(l->a.words, words, sizeof l->a.words);
+}
+
+static void a_link_opens_a_session_anew_when_it_was_lost(void **state)
+{
+    static linked l;
+    mbm_tls_identity who = {0};
+    uint16_t at;
+    const int reserved = tcp_reserve(&at);
+    char service[8];
+    unsigned i, k;
+
+    (void)state;
+    snprintf(service, sizeof service, "%u", at);
+    tls_identify(&who, "operator", "authority", 0);
+    /* Before there is a server. */
+    mbm_tcp_closeListener(&listener);
+    keep(&l, &who, at);
+    UNTIL(&l, l.counters.failed == 2);
+    assert_int_equal(l.tls_status, MBM_TLS_LINK_LOST);
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", service), 0);
+    for (i = 1; i <= 3; i++) {
+        read_by_link(&l);
+        assert_int_equal(l.counters.connected, i);
+        assert_string_equal(role, "Operator");
+        for (k = 0; k < PLACES; k++)
+            leave(k);
+        UNTIL(&l, l.counters.lost == i);
+        assert_int_equal(l.tls_status, MBM_TLS_PEER_CLOSED);
+    }
+    stop_asking(&l.a);
+    mbm_tls_end(&who);
+    close(reserved);
+}
+
+static void a_peer_that_never_answers_is_a_timeout_of_the_connection(void **state)
+{
+    const char *const reasons[] = {"the connection was not made in time",
+                                   "the handshake took too long"};
+    static linked l;
+    mbm_tls_identity who = {0};
+    int silent;
+    uint16_t at;
+
+    (void)state;
+    silent = tcp_listen(&at);
+    tls_identify(&who, "operator", "authority", 0);
+    who.handshakeUs = 20000;
+    keep(&l, &who, at);
+    OK(mbm_link_setRequestsWait(&l.kept, 0));
+    l.a.request =
+        (mbm_clientRequest){.unit = 17, .reply = l.a.words, .replyBytes = sizeof l.a.words};
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&l.a.client, &l.a.request, FIRST, 3));
+    UNTIL(&l, l.a.request.status != MBM_PENDING);
+    IS(MBM_CONNECT_TIMED_OUT, l.a.request.status);
+    IS(MBM_CONNECT_TIMED_OUT, l.status);
+    assert_int_equal(l.tls_status, MBM_TLS_TIMED_OUT);
+    assert_string_equal(mbm_status_text(l.status), reasons[0]);
+    assert_string_equal(mbm_tls_text(l.tls_status), reasons[1]);
+    stop_asking(&l.a);
+    mbm_tls_end(&who);
+    close(silent);
+}
+
 #define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
 
 int main(void)
@@ -482,6 +617,8 @@ int main(void)
         TEST(a_server_without_a_right_certificate_gets_no_request),
         TEST(a_server_that_refuses_the_client_says_why),
         TEST(many_connections_keep_their_roles_apart),
+        TEST(a_link_opens_a_session_anew_when_it_was_lost),
+        TEST(a_peer_that_never_answers_is_a_timeout_of_the_connection),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -87,6 +87,8 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
         return F("the device repeats itself without an end");
     case MBM_OUT_OF_RANGE:
         return F("the value is out of the range of its type");
+    case MBM_CONNECT_TIMED_OUT:
+        return F("the connection was not made in time");
     default:
         break;
     }

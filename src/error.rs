@@ -74,6 +74,8 @@ impl Status {
     pub const NO_PROGRESS: Status = Status(0xF4);
     /// A value does not fit into the type that the caller asked for.
     pub const OUT_OF_RANGE: Status = Status(0xF6);
+    /// The connection was not made in time: the port has accepted no byte.
+    pub const CONNECT_TIMED_OUT: Status = Status(0xF7);
 
     /// The status for an exception code of the remote device.
     ///

@@ -50,7 +50,7 @@ fn set_stuck(end: &End, stuck: bool) {
 }
 
 #[test]
-fn requests_that_wait_for_buffer_space_end_if_the_port_accepts_nothing() {
+fn requests_end_if_the_port_never_accepts_a_byte() {
     let (end, mut client) = client();
     client.line.storage.outgoing = vec![0; REQUEST];
     set_stuck(&end, true);
@@ -62,8 +62,8 @@ fn requests_that_wait_for_buffer_space_end_if_the_port_accepts_nothing() {
         ended.extend(poll(&end, &mut client));
         end.pass(TIMEOUT / 2);
     }
-    let busy = |number| (number, Status::LINE_BUSY);
-    assert_eq!(ended, [busy(1), busy(2), busy(3)]);
+    let failed = |number| (number, Status::CONNECT_TIMED_OUT);
+    assert_eq!(ended, [failed(1), failed(2), failed(3)]);
 }
 
 #[test]

@@ -435,13 +435,29 @@ fn a_cancelled_request_frees_its_place_for_the_next() {
 }
 
 #[test]
-fn a_request_that_the_port_never_accepts_ends_with_line_busy() {
+fn a_port_that_never_accepts_a_byte_is_a_connection_that_was_not_made_in_time() {
     let (end, mut client) = client();
-    end.0.borrow_mut().stuck = true;
-    assert!(client.queue(read(1, 1)).is_ok());
-    poll(&end, &mut client);
-    end.pass(2_000_000);
-    assert_eq!(poll(&end, &mut client)[0].state.status, Status::LINE_BUSY);
+    for _ in 0..2 {
+        end.0.borrow_mut().stuck = true;
+        assert!(client.queue(read(1, 1)).is_ok());
+        poll(&end, &mut client);
+        end.pass(2_000_000);
+        let status = poll(&end, &mut client)[0].state.status;
+        assert_eq!(status, Status::CONNECT_TIMED_OUT);
+
+        // Once it has accepted one, there is a connection.
+        end.0.borrow_mut().stuck = false;
+        assert!(client.queue(read(1, 1)).is_ok());
+        poll(&end, &mut client);
+        end.deliver(0, &response(requests(&end.sent())[0]));
+        assert_right(&poll(&end, &mut client)[0]);
+        end.0.borrow_mut().stuck = true;
+        assert!(client.queue(read(1, 1)).is_ok());
+        poll(&end, &mut client);
+        end.pass(2_000_000);
+        assert_eq!(poll(&end, &mut client)[0].state.status, Status::LINE_BUSY);
+        client.reconnect();
+    }
 }
 
 proptest! {

@@ -99,6 +99,9 @@ pub const MBM_FIELDS_OVERLAP: u8 = 0xF3;
 pub const MBM_NO_PROGRESS: u8 = 0xF4;
 /// A value is out of the range of the type in which the program reads it.
 pub const MBM_OUT_OF_RANGE: u8 = 0xF6;
+/// The connection was not made in time. Of a link: within its connect timeout. Of a request on
+/// Modbus TCP without a link: the port accepted no byte within the response timeout.
+pub const MBM_CONNECT_TIMED_OUT: u8 = 0xF7;
 
 statuses! {
     MBM_OK = Status::OK, c"success";
@@ -133,6 +136,7 @@ statuses! {
     MBM_FIELDS_OVERLAP = Status::FIELDS_OVERLAP, c"two fields of the plan overlap";
     MBM_NO_PROGRESS = Status::NO_PROGRESS, c"the device repeats itself without an end";
     MBM_OUT_OF_RANGE = Status::OUT_OF_RANGE, c"the value is out of the range of its type";
+    MBM_CONNECT_TIMED_OUT = Status::CONNECT_TIMED_OUT, c"the connection was not made in time";
 }
 
 /// Explains a status in a few words of English. For 1 to 3 these are the words of the device's

@@ -103,8 +103,8 @@ static void changed(void *context, uint8_t event, uint8_t status)
     (void)status;
     switch (event) {
     case MBM_LINK_EVENT_CONNECTED: print("link: connected", ""); break;
-    case MBM_LINK_EVENT_LOST: print("link: lost: ", strerror(client_end->error)); break;
-    default: print("link: not connected: ", strerror(client_end->error)); break;
+    case MBM_LINK_EVENT_LOST: print("link: lost: ", mbm_tcp_text(client_end)); break;
+    default: print("link: not connected: ", mbm_tcp_text(client_end)); break;
     }
 }
 
@@ -127,7 +127,7 @@ static int begin(void)
     table.words = registers;
     table.size = 1;
     if (mbm_unit_serveHoldingRegisters(&unit, &table) != MBM_OK || come() != 0 ||
-        mbm_tcp_open(client_end, &addresses, "127.0.0.1", service) != 0)
+        mbm_tcp_openLater(client_end, &addresses, "127.0.0.1", service) != 0)
         return -1;
     port = mbm_tcp_port(client_end);
     hooks = mbm_tcp_link(client_end);

@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
 volatile sig_atomic_t line_ended;
 
@@ -29,32 +28,26 @@ uint32_t line_milliseconds(void)
 
 static int open_tty(line *l, char *path, int ascii)
 {
-    const mbm_tty_options options = {
+    mbm_tty_options options = {
         .baud = 19200, .anyRate = 1, .parity = 'N', .stop = 1, .data = ascii ? 7 : 8};
     char *baud = strchr(path, ','), *parity = baud ? strchr(baud + 1, ',') : NULL;
     mbm_port port;
 
-    l->options = options;
     if (parity) {
         *parity = '\0';
-        l->options.parity = parity[1] && !parity[2] ? parity[1] : '?';
+        options.parity = parity[1] && !parity[2] ? parity[1] : '?';
     }
     if (baud) {
         *baud = '\0';
-        l->options.baud = (uint32_t)line_number(baud + 1, 50, 4000000);
+        options.baud = (uint32_t)line_number(baud + 1, 50, 4000000);
     }
-    if (strlen(path) >= sizeof l->path) {
-        errno = ENAMETOOLONG;
-        return -1;
-    }
-    strcpy(l->path, path);
-    if (mbm_tty_openWith(&l->tty, path, &l->options) != 0)
+    if (mbm_tty_openWith(&l->tty, path, &options) != 0)
         return -1;
     port = trace_client(mbm_tty_port(&l->tty), ascii ? MBM_FRAMING_ASCII : MBM_FRAMING_RTU, path);
     if (ascii)
         return mbm_client_beginAscii(&l->client, &port, l->incoming, sizeof l->incoming);
     mbm_client_beginRtu(&l->client, &port, l->incoming, sizeof l->incoming);
-    return mbm_client_setBaudRate(&l->client, l->options.baud);
+    return mbm_client_setBaudRate(&l->client, options.baud);
 }
 
 static int open_tcp(line *l, char *host, int rtu)
@@ -75,26 +68,6 @@ static int open_tcp(line *l, char *host, int rtu)
                                sizeof l->outgoing);
 }
 
-static void close_tty(void *context)
-{
-    mbm_tty_close(&((line *)context)->tty);
-}
-
-static uint8_t open_tty_again(void *context)
-{
-    line *l = (line *)context;
-
-    if (mbm_tty_openWith(&l->tty, l->path, &l->options) == 0)
-        return MBM_OK;
-    l->lost_by = errno;
-    return MBM_LINK_LOST;
-}
-
-static uint8_t tty_status(void *context)
-{
-    return ((line *)context)->tty.isOpen ? MBM_OK : MBM_LINK_LOST;
-}
-
 /* Keeps the reason why the link was lost or not opened, since the next attempt clears it. */
 static void keep_reason(void *context, uint8_t event, uint8_t status)
 {
@@ -108,10 +81,9 @@ static void keep_reason(void *context, uint8_t event, uint8_t status)
 
 static void keep_open(line *l)
 {
-    const mbm_linkHooks terminal = {l, close_tty, open_tty_again, tty_status};
-    const mbm_linkHooks socket = mbm_tcp_link(&l->tcp);
+    const mbm_linkHooks hooks = l->is_tcp ? mbm_tcp_link(&l->tcp) : mbm_tty_link(&l->tty);
 
-    (void)mbm_link_begin(&l->kept, &l->client, l->is_tcp ? &socket : &terminal);
+    (void)mbm_link_begin(&l->kept, &l->client, &hooks);
     (void)mbm_link_setBackoff(&l->kept, MBM_BACKOFF_FIXED, 1000, 1000);
     (void)mbm_link_setCallback(&l->kept, keep_reason, l);
 }
@@ -199,10 +171,8 @@ void line_rest(line *l, uint32_t milliseconds)
         micros = milliseconds * 1000;
     if (l->is_tcp)
         (void)mbm_tcp_wait(&l->tcp, 1, NULL, -1, micros);
-    else if (l->tty.isOpen)
-        (void)mbm_tty_wait(&l->tty, micros);
     else
-        (void)usleep(micros < 999999 ? micros : 999999);
+        (void)mbm_tty_wait(&l->tty, micros);
 }
 
 int line_usage(int wrong, const char *usage)

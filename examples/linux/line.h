@@ -31,8 +31,6 @@ typedef struct line {
     mbm_tty tty;
     mbm_tcp tcp;
     mbm_tcp_addresses addresses;
-    mbm_tty_options options;
-    char path[256];
     uint8_t is_tcp;
     int lost_by;      /* errno of the last loss of the link */
     char status[128]; /* text of line_status */

@@ -29,6 +29,12 @@ extern "C" {
  *  just before a sleep does not end that sleep. */
 #define MBM_CALL_SLEEP 100000u
 
+/** The longest call in milliseconds, if `timeoutMs` of the caller is 0. */
+#define MBM_CALL_TIMEOUT_MS 30000u
+
+/** For `timeoutMs` of a caller: no limit. */
+#define MBM_CALL_FOREVER UINT32_MAX
+
 /** A client, its request, and how to sleep on its link. mbm_call_overTty and mbm_call_overTcp
  *  fill it in. It may be copied. */
 typedef struct mbm_caller {
@@ -39,6 +45,12 @@ typedef struct mbm_caller {
      *  the time is over; it may return earlier. Returns -1 if it cannot sleep. */
     int (*wait)(void *port, uint32_t timeoutUs);
     void *port; /**< passed to `wait`; the port that the client uses */
+    /** Returns what the link does, as of mbm_linkHooks: MBM_OK, MBM_PENDING while the connection
+     *  is being made, or another status. Then the call can say why the request was not sent.
+     *  NULL if the link is always there. */
+    uint8_t (*status)(void *port);
+    uint32_t timeoutMs; /**< the longest that a call takes, in milliseconds; 0:
+                             MBM_CALL_TIMEOUT_MS */
     /** NULL, or a variable that ends a call when it becomes other than 0, for example one that
      *  a signal handler sets. */
     const volatile sig_atomic_t *stop;
@@ -48,9 +60,11 @@ typedef struct mbm_caller {
  * Waits until a request has ended. Meanwhile it polls the client: other requests go on, and
  * `done` of all that end is called. Between two polls it sleeps.
  *
- * The settings of the client say how long that takes at most: response timeout, retries,
- * backoff, and the requests that were queued before. A signal ends the call only by `stop`.
- * When the call returns, the request is not pending any more, except in a hook of the port.
+ * The settings of the client say how long that takes: response timeout, retries, backoff, and
+ * the requests that were queued before; and of its link, how long a connection takes. However
+ * long that is, the call ends after `timeoutMs`. Only a hook that blocks can make it longer:
+ * mbm_tcp_connect while it looks up a name. A signal ends the call only by `stop`. When the
+ * call returns, the request is not pending any more, except in a hook of the port.
  *
  * If `done` of the request queues it again, the call goes on until it has ended again. So the
  * `request` of an mbm_identification has ended when all objects are read.
@@ -59,11 +73,14 @@ typedef struct mbm_caller {
  * @param queued  the status of the function that queued the request; MBM_PENDING if it was
  *                queued before
  * @return `queued` if it is not MBM_PENDING: the request was refused. Otherwise the status of
- *         the request; if `request` is NULL, MBM_OK when no request is pending. MBM_CANCELLED
- *         if `stop` is set. MBM_BUSY from within `done` or a hook of the port, and while the
- *         client is suspended. MBM_INVALID_ARGUMENT for NULL, and for a request of another
- *         client; MBM_NOT_INITIALISED. For MBM_CANCELLED and MBM_BUSY the request is cancelled;
- *         if `request` is NULL, none is
+ *         the request; if `request` is NULL, MBM_OK when no request is pending. After
+ *         `timeoutMs` MBM_RESPONSE_TIMED_OUT, while a connection is being made
+ *         MBM_CONNECT_TIMED_OUT, without a link what its `status` says. A request that could not be
+ * sent because the connection is being made is MBM_CONNECT_TIMED_OUT too. MBM_CANCELLED if `stop`
+ * is set. MBM_BUSY from within `done` or a hook of the port, and while the client is suspended.
+ * MBM_INVALID_ARGUMENT for NULL, and for a request of another client; MBM_NOT_INITIALISED. After
+ * `timeoutMs`, for MBM_CANCELLED and MBM_BUSY the request is cancelled; if `request` is NULL, none
+ * is
  */
 uint8_t mbm_call(const mbm_caller *caller, uint8_t queued);
 
@@ -82,7 +99,7 @@ static inline int mbm_call_waitTcp(void *tcp, uint32_t timeoutUs)
 static inline mbm_caller mbm_call_overTty(mbm_tty *tty, mbm_client *client,
                                           mbm_clientRequest *request)
 {
-    mbm_caller caller = {client, request, mbm_call_waitTty, tty, NULL};
+    mbm_caller caller = {client, request, mbm_call_waitTty, tty, mbm_tty_status, 0, NULL};
     return caller;
 }
 
@@ -90,7 +107,7 @@ static inline mbm_caller mbm_call_overTty(mbm_tty *tty, mbm_client *client,
 static inline mbm_caller mbm_call_overTcp(mbm_tcp *tcp, mbm_client *client,
                                           mbm_clientRequest *request)
 {
-    mbm_caller caller = {client, request, mbm_call_waitTcp, tcp, NULL};
+    mbm_caller caller = {client, request, mbm_call_waitTcp, tcp, mbm_tcp_status, 0, NULL};
     return caller;
 }
 

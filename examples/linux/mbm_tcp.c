@@ -169,7 +169,7 @@ static int try_next(mbm_tcp *tcp, int error)
 
             if (!failed || errno == EINPROGRESS || errno == EINTR) {
                 tcp->fd = fd;
-                tcp->error = 0;
+                tcp->error = failed ? ETIMEDOUT : 0;
                 enter(tcp, failed ? CONNECTING : CONNECTED);
                 return has_socket(tcp) ? 0 : -1;
             }
@@ -198,29 +198,63 @@ int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addr
     }
 }
 
-int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host, const char *service)
+/* Finds the server's addresses. If that fails, those that were found before stay. */
+static int look_up(mbm_tcp *tcp)
 {
+    mbm_tcp_addresses *all = tcp->addresses;
     struct addrinfo *found, *one;
 
-    if (tcp->state != FREE)
-        return refuse(EBUSY);
-    if (mbm_tcp_lookUp(host, service, 0, &found, &tcp->lookupError) < 0)
-        return -1;
-    memset(tcp, 0, sizeof *tcp);
-    tcp->addresses = addresses;
-    addresses->next = addresses->count = 0;
-    for (one = found; one && addresses->count < MBM_TCP_ADDRESSES; one = one->ai_next) {
-        if (one->ai_addrlen > sizeof addresses->list[0])
+    if (mbm_tcp_lookUp(all->isLocal ? NULL : all->host, all->service, 0, &found,
+                       &tcp->lookupError) < 0) {
+        if (all->count == 0)
+            return -1;
+        tcp->lookupError = 0;
+        return 0;
+    }
+    all->count = 0;
+    for (one = found; one && all->count < MBM_TCP_ADDRESSES; one = one->ai_next) {
+        if (one->ai_addrlen > sizeof all->list[0])
             continue;
-        memcpy(&addresses->list[addresses->count], one->ai_addr, one->ai_addrlen);
-        addresses->lengths[addresses->count++] = one->ai_addrlen;
+        memcpy(&all->list[all->count], one->ai_addr, one->ai_addrlen);
+        all->lengths[all->count++] = one->ai_addrlen;
     }
     freeaddrinfo(found);
-    if (try_next(tcp, EADDRNOTAVAIL) < 0) {
+    return 0;
+}
+
+int mbm_tcp_openLater(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host,
+                      const char *service)
+{
+    if (tcp->state != FREE)
+        return refuse(EBUSY);
+    if ((host && strlen(host) >= sizeof addresses->host) ||
+        strlen(service) >= sizeof addresses->service)
+        return refuse(ENAMETOOLONG);
+    memset(tcp, 0, sizeof *tcp);
+    tcp->addresses = addresses;
+    addresses->next = addresses->count = addresses->first = 0;
+    addresses->isLocal = host == NULL;
+    strcpy(addresses->host, host ? host : "");
+    strcpy(addresses->service, service);
+    leave_socket(tcp, LOST, ENOTCONN);
+    return 0;
+}
+
+int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host, const char *service)
+{
+    if (mbm_tcp_openLater(tcp, addresses, host, service) < 0)
+        return -1;
+    if (mbm_tcp_connect(tcp) == MBM_LINK_LOST) {
         leave_socket(tcp, FREE, tcp->error);
+        tcp->addresses = NULL;
         return refuse(tcp->error);
     }
     return 0;
+}
+
+const char *mbm_tcp_text(const mbm_tcp *tcp)
+{
+    return tcp->lookupError ? gai_strerror(tcp->lookupError) : strerror(tcp->error);
 }
 
 int mbm_tcp_attach(mbm_tcp *tcp, int fd)
@@ -269,6 +303,7 @@ static int progress(mbm_tcp *tcp)
             return 0;
         if (getsockopt(tcp->fd, SOL_SOCKET, SO_ERROR, &error, &size) < 0)
             error = errno;
+        tcp->error = 0;
         if (error == 0)
             enter(tcp, CONNECTED);
         else
@@ -280,10 +315,17 @@ static int progress(mbm_tcp *tcp)
 uint8_t mbm_tcp_connect(void *context)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
+    mbm_tcp_addresses *all = tcp->addresses;
 
-    if (tcp->addresses)
-        tcp->addresses->next = 0;
-    if (try_next(tcp, ENOTCONN) < 0)
+    if (all) {
+        if (look_up(tcp) < 0) {
+            leave_socket(tcp, LOST, errno);
+            return MBM_LINK_LOST;
+        }
+        all->next = all->first < all->count ? all->first : 0;
+        all->first = 0;
+    }
+    if (try_next(tcp, all ? EADDRNOTAVAIL : ENOTCONN) < 0)
         return MBM_LINK_LOST;
     return tcp->state == CONNECTED ? MBM_OK : MBM_PENDING;
 }
@@ -292,8 +334,12 @@ void mbm_tcp_disconnect(void *context)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
 
-    if (has_socket(tcp))
-        leave_socket(tcp, LOST, ENOTCONN);
+    if (!has_socket(tcp))
+        return;
+    /* An address that does not answer must not keep the next attempt from those after it. */
+    if (tcp->state == CONNECTING && tcp->addresses)
+        tcp->addresses->first = tcp->addresses->next;
+    leave_socket(tcp, LOST, tcp->state == CONNECTING ? ETIMEDOUT : ENOTCONN);
 }
 
 /* No bytes were moved. Returns 0 for a signal or if there are none yet, -1 for a lost link. */
@@ -319,6 +365,15 @@ int mbm_tcp_isConnected(mbm_tcp *tcp)
             return none_moved(tcp, count) < 0 ? -1 : 1;
     }
     return link;
+}
+
+uint8_t mbm_tcp_status(void *tcp)
+{
+    const int there = mbm_tcp_isConnected((mbm_tcp *)tcp);
+
+    if (there >= 0)
+        return there > 0 ? MBM_OK : MBM_PENDING;
+    return ((const mbm_tcp *)tcp)->error == ETIMEDOUT ? MBM_CONNECT_TIMED_OUT : MBM_LINK_LOST;
 }
 
 /* 1 if a read or write can go ahead: only a connected socket polls for POLLIN alone. */

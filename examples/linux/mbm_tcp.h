@@ -6,8 +6,9 @@
  * connections, on Linux, also needs mbm_tcp_set.c.
  *
  * Only mbm_tcp_wait, mbm_tcp_waitSet, and the lookup of a name that is no numeric address
- * block. Functions that return int return -1 with errno set when they fail. No function
- * is re-entrant on one mbm_tcp. Any number of mbm_tcp may be used side by side.
+ * block: it is done by mbm_tcp_open and mbm_tcp_connect. Functions that return int return -1 with
+ * errno set when they fail. No function is re-entrant on one mbm_tcp. Any number of mbm_tcp may be
+ * used side by side.
  *
  * Sockets send at once (TCP_NODELAY). They find a peer that is gone within about 30 s, if
  * the system has the options for it.
@@ -44,9 +45,17 @@ extern "C" {
 /** Microseconds after which to call mbm_tcp_accept again if it found no descriptor. */
 #define MBM_TCP_RETRY 100000u
 
-/** The addresses of a server, for a client that connects to it. The program provides the
- *  memory, mbm_tcp_open fills it. */
+/** The longest name of a host, and of a service, with the terminating zero. */
+#define MBM_TCP_HOST_BYTES 256
+#define MBM_TCP_SERVICE_BYTES 32
+
+/** A server and its addresses, for a client that connects to it. The program provides the
+ *  memory, mbm_tcp_open or mbm_tcp_openLater fills it. */
 typedef struct mbm_tcp_addresses {
+    char host[MBM_TCP_HOST_BYTES];                   /**< private */
+    char service[MBM_TCP_SERVICE_BYTES];             /**< private */
+    uint8_t isLocal;                                 /**< private */
+    uint8_t first;                                   /**< private */
     uint8_t count;                                   /**< private */
     uint8_t next;                                    /**< private */
     socklen_t lengths[MBM_TCP_ADDRESSES];            /**< private */
@@ -56,10 +65,12 @@ typedef struct mbm_tcp_addresses {
 /** A socket in use as a port. Initialise it with MBM_INIT. */
 typedef struct mbm_tcp {
     int fd;          /**< the socket, while there is one */
-    int error;       /**< why the link was lost, an errno: EPIPE if the peer closed it, ETIMEDOUT if
-                          mbm_tcp_accept closed it as idle, ENOTCONN after mbm_tcp_disconnect;
-                          else 0. It stays until the program connects anew */
-    int lookupError; /**< why mbm_tcp_open found no address, for gai_strerror; else 0 */
+    int error;       /**< why there is no link, an errno: ETIMEDOUT while the connection is being
+                          made, and if it was given up meanwhile, since nothing has answered;
+                          EPIPE if the peer closed it, ETIMEDOUT if mbm_tcp_accept closed it as
+                          idle, ENOTCONN after mbm_tcp_disconnect; 0 while there is a link. It
+                          stays until the program connects anew */
+    int lookupError; /**< why no address was found, for gai_strerror; else 0 */
     uint8_t isBusy;  /**< set by the program: 1 while the peer waits for a response, so that the
                           connection is not idle; needed only for requests that may take longer
                           than the idle time */
@@ -106,18 +117,41 @@ typedef struct mbm_tcp_set {
 
 /**
  * Begins to connect to a server, and does not wait for it. Until it is connected the port
- * reads and accepts no bytes. If the connection fails, the link is lost.
+ * reads and accepts no bytes. If the connection fails, the link is lost. A program with a link
+ * calls mbm_tcp_openLater instead, which does not fail while there is no network.
  *
  * @param tcp        initialised with MBM_INIT, or closed before
  * @param addresses  filled here; must stay until `tcp` is closed, for one `tcp` only
  * @param host       a name or a numeric address; the lookup of a name may block. NULL is
  *                   this machine. Of several addresses the first that answers is used
  * @param service    a port number, for example MBM_TCP_SERVICE
- * @return 0, or -1 with errno set: EBUSY if `tcp` is in use, ENXIO for an unknown
- *         name or service, EAGAIN if the lookup may succeed later, or an error of socket
- *         or connect. If the lookup failed, `lookupError` says why
+ * @return 0, or -1 with errno set: EBUSY if `tcp` is in use, ENAMETOOLONG, ENXIO for an
+ *         unknown name or service, EAGAIN if the lookup may succeed later, or an error of
+ *         socket or connect. If the lookup failed, `lookupError` says why
  */
 int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host, const char *service);
+
+/**
+ * Notes a server, and leaves the connecting to mbm_tcp_connect, which a link calls
+ * (mbm_tcp_link). So a program can begin before the network is there, and before the name of
+ * the server is known.
+ *
+ * @param tcp        zeroed, or closed before. It is in use, and its link is lost
+ * @param addresses  as for mbm_tcp_open
+ * @param host       as for mbm_tcp_open; copied
+ * @param service    as for mbm_tcp_open; copied
+ * @return 0, or -1 with errno set: EBUSY if `tcp` is in use, or ENAMETOOLONG
+ */
+int mbm_tcp_openLater(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host,
+                      const char *service);
+
+/**
+ * Returns in words why there is no link: `lookupError`, or `error`.
+ *
+ * @param tcp  the socket
+ * @return a text of the system; strerror of 0 if there is a link
+ */
+const char *mbm_tcp_text(const mbm_tcp *tcp);
 
 /**
  * Uses a stream socket that is connected already; makes it non-blocking.
@@ -164,7 +198,8 @@ int64_t mbm_tcp_idleFor(const mbm_tcp *tcp);
 int mbm_tcp_isConnected(mbm_tcp *tcp);
 
 /**
- * Connects anew to the server of mbm_tcp_open, and does not wait for it. A hook for a
+ * Connects to the server of mbm_tcp_open or mbm_tcp_openLater, and does not wait for it. Looks
+ * up a name anew. If that fails, it uses the addresses of the last lookup. A hook for a
  * function that reconnects.
  *
  * @param context  an mbm_tcp
@@ -174,7 +209,8 @@ int mbm_tcp_isConnected(mbm_tcp *tcp);
 uint8_t mbm_tcp_connect(void *context);
 
 /**
- * Ends the connection. The link is lost until mbm_tcp_connect. A hook for a function that
+ * Ends the connection, or the attempt to make it. The link is lost until mbm_tcp_connect. A
+ * hook for a function that
  * reconnects.
  *
  * @param context  an mbm_tcp
@@ -185,18 +221,15 @@ void mbm_tcp_disconnect(void *context);
  * Returns whether there is a connection, as a hook of mbm_linkHooks.
  *
  * @param tcp  an mbm_tcp
- * @return MBM_OK, MBM_PENDING while the connection is being made, or MBM_LINK_LOST
+ * @return MBM_OK, MBM_PENDING while the connection is being made, MBM_CONNECT_TIMED_OUT if
+ *         nothing has answered, or MBM_LINK_LOST
  */
-static inline uint8_t mbm_tcp_status(void *tcp)
-{
-    const int there = mbm_tcp_isConnected((mbm_tcp *)tcp);
-
-    return there > 0 ? MBM_OK : there == 0 ? MBM_PENDING : MBM_LINK_LOST;
-}
+uint8_t mbm_tcp_status(void *tcp);
 
 /**
- * Returns the hooks for mbm_link_begin, for a client of the server of mbm_tcp_open. In the
- * callback of the link, `error` of the mbm_tcp says why a connection was lost or not made.
+ * Returns the hooks for mbm_link_begin, for a client of the server of mbm_tcp_openLater or
+ * mbm_tcp_open. In the callback of the link, mbm_tcp_text says why a connection was lost or
+ * not made.
  *
  * @param tcp  in use; must outlive the link
  * @return the hooks

@@ -516,3 +516,13 @@ void mbm_tls_disconnect(void *context)
     if (tls->link.disconnect)
         tls->link.disconnect(tls->link.context);
 }
+
+uint8_t mbm_tls_status(void *context)
+{
+    switch (mbm_tls_poll((mbm_tls *)context)) {
+    case MBM_TLS_OPEN: return MBM_OK;
+    case MBM_TLS_HANDSHAKE: return MBM_PENDING;
+    case MBM_TLS_TIMED_OUT: return MBM_CONNECT_TIMED_OUT;
+    default: return MBM_LINK_LOST;
+    }
+}

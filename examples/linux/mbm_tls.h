@@ -283,6 +283,36 @@ uint8_t mbm_tls_connect(void *context);
 void mbm_tls_disconnect(void *context);
 
 /**
+ * Returns what the session is doing, as a hook of mbm_linkHooks. Takes the handshake on.
+ *
+ * @param context  an mbm_tls
+ * @return MBM_OK if the session is open, MBM_PENDING during the handshake,
+ *         MBM_CONNECT_TIMED_OUT if it took longer than its time, or MBM_LINK_LOST
+ */
+uint8_t mbm_tls_status(void *context);
+
+/**
+ * Returns the hooks for mbm_link_begin, for a client's connection of mbm_tls_open. The link is
+ * open when the handshake is over: `handshakeMs` and the link's connect timeout both limit it.
+ * In the callback of the link, `status` of the mbm_tls says why a session ended or was not
+ * made.
+ *
+ * @param tls  opened with the hooks of the stream below, for example those of mbm_tcp_link; must
+ *             outlive the link
+ * @return the hooks
+ */
+static inline mbm_linkHooks mbm_tls_link(mbm_tls *tls)
+{
+    mbm_linkHooks hooks;
+
+    hooks.context = tls;
+    hooks.disconnect = mbm_tls_disconnect;
+    hooks.connect = mbm_tls_connect;
+    hooks.status = mbm_tls_status;
+    return hooks;
+}
+
+/**
  * Returns a status in words. In mbm_tls_text.c.
  *
  * @param status  an MBM_TLS_ value

@@ -277,18 +277,26 @@ static void release(mbm_tty *tty)
 
 void mbm_tty_detach(mbm_tty *tty)
 {
+    tty->path[0] = '\0';
     if (tty->isOpen)
         release(tty);
 }
 
-void mbm_tty_close(mbm_tty *tty)
+void mbm_tty_disconnect(void *context)
 {
+    mbm_tty *tty = (mbm_tty *)context;
     int fd = tty->fd;
 
     if (!tty->isOpen)
         return;
     release(tty);
     close(fd);
+}
+
+void mbm_tty_close(mbm_tty *tty)
+{
+    tty->path[0] = '\0';
+    mbm_tty_disconnect(tty);
 }
 
 /* TIOCEXCL keeps other programs out except those of root. The lock of the file keeps root's
@@ -320,15 +328,21 @@ static int set(const mbm_tty *tty, const mbm_tty_options *options)
     return tcflush(tty->fd, TCIOFLUSH);
 }
 
-int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *options)
+/* Notes how the terminal is opened. A path that is too long cannot be opened again. */
+static void note(mbm_tty *tty, const char *path, const mbm_tty_options *options)
 {
-    struct termios unused = {0};
-    int fd, error;
-
     memset(tty, 0, sizeof *tty);
     tty->fd = -1;
-    if (mbm_tty_settings(&unused, options) < 0)
-        return -1;
+    tty->options = *options;
+    if (strlen(path) < sizeof tty->path)
+        strcpy(tty->path, path);
+}
+
+static int open_noted(mbm_tty *tty, const char *path)
+{
+    const mbm_tty_options *options = &tty->options;
+    int fd, error;
+
     fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0)
         return -1;
@@ -343,6 +357,46 @@ int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *opti
         return refuse(error);
     }
     return 0;
+}
+
+int mbm_tty_openLater(mbm_tty *tty, const char *path, const mbm_tty_options *options)
+{
+    struct termios unused = {0};
+
+    if (mbm_tty_settings(&unused, options) < 0)
+        return -1;
+    if (strlen(path) >= sizeof tty->path)
+        return refuse(ENAMETOOLONG);
+    note(tty, path, options);
+    return 0;
+}
+
+int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *options)
+{
+    struct termios unused = {0};
+
+    note(tty, path, options);
+    if (mbm_tty_settings(&unused, options) == 0 && open_noted(tty, path) == 0)
+        return 0;
+    tty->path[0] = '\0';
+    return -1;
+}
+
+uint8_t mbm_tty_connect(void *context)
+{
+    mbm_tty *tty = (mbm_tty *)context;
+    const mbm_tty before = *tty;
+
+    if (before.path[0] == '\0') {
+        tty->error = EBADF;
+        return MBM_LINK_LOST;
+    }
+    mbm_tty_disconnect(tty);
+    note(tty, before.path, &before.options);
+    if (open_noted(tty, before.path) == 0)
+        return MBM_OK;
+    tty->error = errno;
+    return MBM_LINK_LOST;
 }
 
 int mbm_tty_open(mbm_tty *tty, const char *path, uint32_t baud, char parity, int stop)
@@ -438,11 +492,11 @@ int mbm_tty_wait(mbm_tty *tty, uint32_t timeoutUs)
     struct pollfd line = {tty->fd, POLLIN, 0};
     int ready;
 
-    if (!tty->isOpen)
+    if (!tty->isOpen && tty->path[0] == '\0')
         return refuse(EBADF);
     /* An awaited event of 0 would still make a hang-up end the wait, so the list is empty
-     * then. */
-    ready = sleep_on(&line, tty->events != 0, timeoutUs);
+     * then, and while the terminal is closed. */
+    ready = sleep_on(&line, tty->isOpen && tty->events != 0, timeoutUs);
     if (ready < 0)
         return errno == EINTR ? 0 : -1;
     if (ready > 0)

@@ -22,6 +22,9 @@ extern "C" {
 /** For mbm_tty_wait: no time limit. */
 #define MBM_TTY_FOREVER UINT32_MAX
 
+/** The longest path of a terminal, with the terminating zero. */
+#define MBM_TTY_PATH_BYTES 256
+
 /** The settings of a serial line. */
 typedef struct mbm_tty_options {
     uint32_t baud;           /**< bits per second: any rate for which termios has a constant */
@@ -48,8 +51,10 @@ typedef struct mbm_tty {
     uint8_t is_exclusive; /**< private */
     uint8_t is_rs485;     /**< private */
     int flags_before;     /**< private */
-    uint32_t rs485_before[8]; /**< private */
-    struct termios before;    /**< private */
+    uint32_t rs485_before[8];      /**< private */
+    struct termios before;         /**< private */
+    mbm_tty_options options;       /**< private */
+    char path[MBM_TTY_PATH_BYTES]; /**< private */
 } mbm_tty;
 
 /**
@@ -77,6 +82,17 @@ int mbm_tty_open(mbm_tty *tty, const char *path, uint32_t baud, char parity, int
 int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *options);
 
 /**
+ * Notes a terminal, and leaves the opening to mbm_tty_connect, which a link calls
+ * (mbm_tty_link). So a program can begin before the adapter is plugged in.
+ *
+ * @param tty      closed; it stays so
+ * @param path     as for mbm_tty_openWith; copied
+ * @param options  as for mbm_tty_openWith; copied
+ * @return 0, or -1 with errno set: EINVAL for options that no terminal has, ENAMETOOLONG
+ */
+int mbm_tty_openLater(mbm_tty *tty, const char *path, const mbm_tty_options *options);
+
+/**
  * Uses a descriptor that is open already, and makes it raw and non-blocking. A descriptor
  * that is no terminal, for example a socket or a pipe, becomes non-blocking only.
  *
@@ -99,7 +115,7 @@ int mbm_tty_settings(struct termios *settings, const mbm_tty_options *options);
 
 /**
  * Closes the terminal and restores its settings. Waits until all bytes are sent. Does
- * nothing if it is closed already.
+ * nothing if it is closed already, except that mbm_tty_connect then opens it no more.
  *
  * @param tty  the terminal
  */
@@ -113,17 +129,66 @@ void mbm_tty_close(mbm_tty *tty);
 void mbm_tty_detach(mbm_tty *tty);
 
 /**
+ * Opens the terminal of mbm_tty_open, mbm_tty_openWith or mbm_tty_openLater again, with the same
+ * options. If it is open, closes it before. A hook for a function that reconnects.
+ *
+ * @param context  an mbm_tty
+ * @return MBM_OK, or MBM_LINK_LOST with errno in its `error`: EBADF if there is no path, after
+ *         mbm_tty_attach or mbm_tty_close
+ */
+uint8_t mbm_tty_connect(void *context);
+
+/**
+ * Closes the terminal until mbm_tty_connect. A hook for a function that reconnects.
+ *
+ * @param context  an mbm_tty
+ */
+void mbm_tty_disconnect(void *context);
+
+/**
+ * Returns whether the terminal is open, as a hook of mbm_linkHooks.
+ *
+ * @param tty  an mbm_tty
+ * @return MBM_OK or MBM_LINK_LOST
+ */
+static inline uint8_t mbm_tty_status(void *tty)
+{
+    return ((const mbm_tty *)tty)->isOpen ? MBM_OK : MBM_LINK_LOST;
+}
+
+/**
+ * Returns the hooks for mbm_link_begin, for a client on a terminal of mbm_tty_openLater,
+ * mbm_tty_openWith or mbm_tty_open. In the callback of the link, `error` of the mbm_tty says
+ * why the terminal was lost or not opened.
+ *
+ * @param tty  must outlive the link
+ * @return the hooks
+ */
+static inline mbm_linkHooks mbm_tty_link(mbm_tty *tty)
+{
+    mbm_linkHooks hooks;
+
+    hooks.context = tty;
+    hooks.disconnect = mbm_tty_disconnect;
+    hooks.connect = mbm_tty_connect;
+    hooks.status = mbm_tty_status;
+    return hooks;
+}
+
+/**
  * Sleeps until there is something to read or a time is over. Pass the value that a
  * pollDelay function returned.
  *
- * Bytes or a hang-up end one wait. They end the next one only after the port was read or written:
- * a server whose function is pending reads nothing, and its program sleeps.
+ * Bytes or a hang-up end one wait. They end the next one only after the port was read or
+ * written: a server whose function is pending reads nothing, and its program sleeps. While a
+ * link has closed the terminal, the wait is the time alone.
  *
  * @param tty     the terminal
  * @param timeoutUs  the longest time to sleep, in microseconds, from 100000 on rounded up to the
  * next millisecond, or MBM_TTY_FOREVER
  * @return 1 if bytes have arrived or the link is lost, which the next read reports;
- *         0 if the time is over or a signal came; -1 with errno set
+ *         0 if the time is over or a signal came; -1 with errno set: EBADF if the terminal is
+ *         closed and no link can open it
  */
 int mbm_tty_wait(mbm_tty *tty, uint32_t timeoutUs);
 

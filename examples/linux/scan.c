@@ -71,7 +71,8 @@ static int scan(void)
         while (reported < asked && requests[reported].status != MBM_PENDING) {
             if (isatty(2))
                 fprintf(stderr, "\r%u of %u \r", reported - first + 1, last - first + 1);
-            if (requests[reported].status == MBM_LINK_LOST) {
+            if (requests[reported].status == MBM_LINK_LOST ||
+                requests[reported].status == MBM_CONNECT_TIMED_OUT) {
                 fprintf(stderr, "unit %u: the link was lost: %s\n", reported, line_reason(&at));
                 return -1;
             }

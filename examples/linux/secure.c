@@ -178,16 +178,14 @@ static int ask(const char *host, const char *service, const char *name, char **p
 {
     static mbm_tcp_addresses addresses;
     static uint16_t value = 2000;
-    const mbm_linkHooks link = {
-        .context = tcps, .disconnect = mbm_tcp_disconnect, .connect = mbm_tcp_connect};
+    const mbm_linkHooks link = mbm_tcp_link(tcps);
     const mbm_port socket = mbm_tcp_port(tcps), port = mbm_tls_port(tlss);
     int status, i;
 
     if (begin_identity(paths, 0) != 0)
         return 1;
     if (mbm_tcp_open(tcps, &addresses, host, service) != 0) {
-        fprintf(stderr, "%s: %s\n", host,
-                tcps->lookupError ? gai_strerror(tcps->lookupError) : strerror(errno));
+        fprintf(stderr, "%s: %s\n", host, mbm_tcp_text(tcps));
         return 1;
     }
     (void)mbm_tls_open(tlss, &identity, &socket, *name ? name : NULL, &link);

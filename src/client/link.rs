@@ -70,6 +70,8 @@ pub struct Link {
     at_once: bool,
     /// The port has reported that the link is lost.
     pub is_lost: bool,
+    /// The last attempt to open the link took too long.
+    pub has_timed_out: bool,
     /// Requests wait for the link instead of failing.
     pub keeps_requests: bool,
     /// The wait before an attempt, its growth and jitter.
@@ -159,9 +161,7 @@ impl Link {
                 _ => hooks.connect(),
             },
             LinkState::Connecting => match hooks.status() {
-                Status::PENDING if is_over && self.connect_timeout > 0 => {
-                    Status::RESPONSE_TIMED_OUT
-                }
+                Status::PENDING if is_over && self.connect_timeout > 0 => Status::CONNECT_TIMED_OUT,
                 status => status,
             },
         };
@@ -198,6 +198,7 @@ impl Link {
         self.state = LinkState::Down;
         self.is_to_close = true;
         self.is_lost = false;
+        self.has_timed_out = status == Status::CONNECT_TIMED_OUT;
         self.since = now;
         self.wait = 0;
         if !self.at_once {

@@ -38,7 +38,10 @@ impl<S: GatewayStorage> Gateway<S> {
             Status::OK if self.is_unanswered(request) => self.release(request),
             Status::OK => self.answer(request, outcome.length + 1),
             _ if outcome.exception != 0 => self.refuse(request, outcome.exception),
-            Status::LINK_LOST | Status::LINE_BUSY | Status::CANCELLED => {
+            Status::LINK_LOST
+            | Status::CONNECT_TIMED_OUT
+            | Status::LINE_BUSY
+            | Status::CANCELLED => {
                 self.refuse(request, PATH_UNAVAILABLE);
             }
             _ => self.refuse(request, TARGET_FAILED),

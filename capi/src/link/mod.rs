@@ -26,7 +26,7 @@ pub const MBM_LINK_EVENT_CONNECTED: u8 = 0;
 /// An event of a link: it was open and is lost. The status is MBM_LINK_LOST.
 pub const MBM_LINK_EVENT_LOST: u8 = 1;
 /// An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
-/// mbm_linkHooks returned; MBM_RESPONSE_TIMED_OUT if the connection took too long.
+/// mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long.
 pub const MBM_LINK_EVENT_FAILED: u8 = 2;
 
 const _: () = {
@@ -273,7 +273,8 @@ pub unsafe extern "C" fn mbm_link_setJitter(
     }
 }
 
-/// Sets how long a connection may take to be made. Then the attempt has failed.
+/// Sets how long a connection may take to be made. Then the attempt has failed, with
+/// MBM_CONNECT_TIMED_OUT.
 ///
 /// @param link       the object
 /// @param timeoutMs  milliseconds, 1 to 1000000 (16 minutes); 0: as long as `status` returns
@@ -294,7 +295,8 @@ pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeout
 }
 
 /// Sets whether requests wait for the link. By default they do not: while the link is down,
-/// every request ends with MBM_LINK_LOST at the next poll. (A program whose `done` queues the
+/// every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took longer
+/// than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
 /// request again at once then polls without a pause: let it wait.) If requests wait, they stay
 /// in the queue until the link is open again or until you cancel them; their response timeout
 /// begins when they are sent. While a connection is being made, requests always wait.

@@ -246,7 +246,11 @@ unsafe fn advance_linked(
         if (*link).core.fails_requests() {
             queue.fail_all();
         }
-        queue.end_lost(now, (*(*link).transport).storage(object))
+        let mut ended = queue.end_lost(now, (*(*link).transport).storage(object))?;
+        if (*link).core.has_timed_out {
+            ended.state_mut().status = Status::CONNECT_TIMED_OUT;
+        }
+        Some(ended)
     }
 }
 

@@ -37,6 +37,8 @@ pub struct Tcp<P, S> {
     /// The frame boundaries are lost. Until they are found, only a right response to a
     /// request counts as a frame.
     resyncing: bool,
+    /// The port has accepted bytes, so there is or was a connection.
+    accepts: bool,
     /// A queued request waits until another ends or the transmit buffer has space.
     blocked: bool,
     /// The byte stream.
@@ -61,6 +63,7 @@ impl<P, S> Tcp<P, S> {
             in_flight: 0,
             max_in_flight: u8::MAX,
             resyncing: false,
+            accepts: false,
             blocked: false,
             port,
             storage,
@@ -86,6 +89,7 @@ impl<P, S> Tcp<P, S> {
         self.sent = 0;
         self.in_flight = 0;
         self.resyncing = false;
+        self.accepts = false;
     }
 }
 
@@ -295,6 +299,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             return false;
         }
         let sent = sent as u16;
+        self.accepts |= sent > 0;
         self.storage.count(Counter::BytesSent, sent);
         self.sent += sent;
         if self.sent == self.filled {
@@ -359,7 +364,11 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         }
         self.storage.count(Counter::Timeouts, 1);
         if self.remove_unsent(state.wire) {
-            Status::LINE_BUSY
+            if self.accepts {
+                Status::LINE_BUSY
+            } else {
+                Status::CONNECT_TIMED_OUT
+            }
         } else if state.is(Stage::OtherUnit) {
             Status::INVALID_SLAVE_ID
         } else {

@@ -12,7 +12,8 @@ use mbm::pdu::function_spec::FunctionSpec;
 /// request has ended when its `status` is no longer MBM_PENDING. Then `status` is MBM_OK, an
 /// exception of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
 /// MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST,
-/// MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes only if it is MBM_OK.
+/// MBM_LINE_BUSY, MBM_CONNECT_TIMED_OUT, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes
+/// only if it is MBM_OK.
 ///
 /// @param client   the object
 /// @param request  the request
