@@ -162,7 +162,7 @@ static const char *const NO_NUMBERS[] = {
     "{\"a\":\"\\x\",\"value\":9}",
     "{\"a\":\"\\u12g4\",\"value\":9}",
     "{\"a\":\"\n\",\"value\":9}",
-    "{\"a\":tru,\"value\":9}",
+    "{\"a\":truth,\"value\":9}",
     "{\"a\":[1,],\"value\":9}",
     "{\"a\":[1}],\"value\":9}",
     "{\"a\":\"b,\"value\":9}",
