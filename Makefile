@@ -231,8 +231,9 @@ $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_mqtt_payload: $(BUILD)/$(1)/linux/mqtt_payload.o
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
+$(BUILD)/$(1)/linux/gateway: $(BUILD)/$(1)/linux/gateway_line.o
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
-$(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage: | $(BUILD)/$(1)/linux/gateway
+$(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage $(BUILD)/$(1)/test_gateway_tcp: | $(BUILD)/$(1)/linux/gateway
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS),$(SANITIZED_ARCHIVE)))
@@ -255,8 +256,9 @@ $(BUILD)/firmware/test_mqtt_payload: $(BUILD)/plain/linux/mqtt_payload.o
 $(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tcp_listener.o $(BUILD)/plain/linux/mbm_tty.o $(call TRACE,plain) $(FIRMWARE_ARCHIVE)
 	@mkdir -p $(@D)
 	@gcc $(filter %.o,$^) $(FIRMWARE_ARCHIVE) -Wl,--gc-sections -o $@
+$(BUILD)/firmware/linux/gateway: $(BUILD)/plain/linux/gateway_line.o
 $(TESTED_EXAMPLES:%=$(BUILD)/firmware/test_%): $(BUILD)/firmware/test_%: | $(BUILD)/firmware/linux/%
-$(BUILD)/firmware/test_gateway_replies $(BUILD)/firmware/test_gateway_shortage: | $(BUILD)/firmware/linux/gateway
+$(BUILD)/firmware/test_gateway_replies $(BUILD)/firmware/test_gateway_shortage $(BUILD)/firmware/test_gateway_tcp: | $(BUILD)/firmware/linux/gateway
 
 # mbm's server, for the tests with pymodbus's client.
 SERVE := $(BUILD)/plain/serve

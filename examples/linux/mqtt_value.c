@@ -2,6 +2,7 @@
 #include "mqtt_value.h"
 
 #include <cjson/cJSON.h>
+#include <float.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,7 +12,24 @@
 /* The longest text field: 125 registers. */
 enum { LONGEST_TEXT = 250, LONGEST_NUMBER = 40 };
 
-/* JSON has no word for infinity and not-a-number. */
+/* Writes the value of a float or double with as many digits as it takes to read the same value
+ * back. JSON has no word for infinity and not-a-number. */
+static void print_exact(char *text, double value, int is_float, int is_json)
+{
+    int digits = is_float ? FLT_DIG + 1 : DBL_DIG;
+    const int most = is_float ? FLT_DECIMAL_DIG : DBL_DECIMAL_DIG;
+
+    if (is_json && !isfinite(value)) {
+        strcpy(text, "null");
+        return;
+    }
+    do
+        snprintf(text, LONGEST_NUMBER, "%.*g", digits, value);
+    while (digits++ < most &&
+           (is_float ? strtof(text, NULL) != (float)value : strtod(text, NULL) != value));
+}
+
+/* Writes a scaled value. */
 static void print_real(char *text, double value, int digits, int is_json)
 {
     if (is_json && !isfinite(value))
@@ -24,16 +42,20 @@ static void print_real(char *text, double value, int digits, int is_json)
 static int print_number(const mbm_plan *plan, const mqtt_field *field, const mbm_planField *planned,
                         uint16_t at, uint16_t index, int is_json, char text[LONGEST_NUMBER])
 {
+    const int is_float = planned->type == MBM_TYPE_FLOAT;
     int64_t integer;
     double real;
     uint8_t status;
 
     if (planned->type == MBM_TYPE_FLOAT || planned->type == MBM_TYPE_DOUBLE) {
         status = mbm_plan_getDouble(plan, at, index, &real);
-        if (status == MBM_OK)
-            print_real(text, real * field->scale.value, planned->type == MBM_TYPE_FLOAT ? 7 : 15,
-                       is_json);
-        return status == MBM_OK;
+        if (status != MBM_OK)
+            return 0;
+        if (field->is_scaled)
+            print_real(text, real * field->scale.value, is_float ? 7 : 15, is_json);
+        else
+            print_exact(text, real, is_float, is_json);
+        return 1;
     }
     status = mbm_plan_getInteger(plan, at, index, &integer);
     if (status == MBM_OUT_OF_RANGE) {

@@ -1,0 +1,358 @@
+/* The gateway example with lines over TCP: a libmodbus server, and devices that the test plays,
+ * whose connections come and go. And its places for clients. */
+#define _GNU_SOURCE
+#include "asked.h"
+#include "await.h"
+#include "crc.h"
+#include "program.h"
+#include "server.h"
+#include "tcp_server.h"
+#include "test.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum { UNIT = 5, NO_LINE = 200, MANY = 40 };
+
+/* Longer than a busy machine takes to run the other end of a connection. */
+#define TIMEOUT "8000"
+
+static program gateway;
+static uint16_t port;
+static int listener, client = -1;
+static uint16_t device_port;
+
+/* Starts a gateway with one line at a TCP port: `kind` is tcp or rtuovertcp. */
+static void start_without_client(const char *kind, uint16_t to, const char *const *options)
+{
+    char text[64], line[64];
+    const char *arguments[8];
+    unsigned number, count = 0;
+
+    snprintf(line, sizeof line, "%s:127.0.0.1,%u,1-30,100-100=%d", kind, to, UNIT);
+    while (options && *options)
+        arguments[count++] = *options++;
+    arguments[count++] = "0";
+    arguments[count++] = TIMEOUT;
+    arguments[count++] = line;
+    arguments[count] = NULL;
+    program_start(&gateway, "gateway", arguments);
+    program_line(&gateway, text, sizeof text);
+    assert_int_equal(sscanf(text, "ready %u", &number), 1);
+    port = (uint16_t)number;
+}
+
+static void start(const char *kind, uint16_t to, const char *const *options)
+{
+    start_without_client(kind, to, options);
+    client = tcp_connect(port);
+}
+
+static void stop(void)
+{
+    if (client >= 0)
+        close(client);
+    client = -1;
+    kill(gateway.pid, SIGTERM);
+    assert_int_equal(program_end(&gateway), 0);
+}
+
+static int begin(void **state)
+{
+    (void)state;
+    alarm(6 * PATIENCE_MS / 1000);
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    alarm(0);
+    return 0;
+}
+
+/* The next connection of the gateway to the device. */
+static int accept_gateway(void)
+{
+    struct pollfd waiting = {listener, POLLIN, 0};
+    int fd;
+
+    assert_int_equal(poll(&waiting, 1, PATIENCE_MS), 1);
+    fd = accept(listener, NULL, NULL);
+    assert_true(fd >= 0);
+    return fd;
+}
+
+static void get(int fd, uint8_t *bytes, size_t count)
+{
+    struct pollfd readable = {fd, POLLIN, 0};
+
+    while (count > 0) {
+        ssize_t got;
+
+        assert_int_equal(poll(&readable, 1, PATIENCE_MS), 1);
+        got = read(fd, bytes, count);
+        assert_true(got > 0);
+        bytes += got;
+        count -= (size_t)got;
+    }
+}
+
+/* The client asks for one register at an address; the address is the transaction identifier too. */
+static void ask(uint8_t address)
+{
+    const uint8_t request[] = {0, address, 0, 0, 0, 6, UNIT, 3, 0, address, 0, 1};
+
+    assert_int_equal(send(client, request, sizeof request, MSG_NOSIGNAL), sizeof request);
+}
+
+/* The device takes a request for one register, and returns the transaction identifier. */
+static uint16_t take(int device, uint8_t address)
+{
+    const uint8_t wanted[] = {0, 0, 0, 6, UNIT, 3, 0, address, 0, 1};
+    uint8_t request[12];
+
+    get(device, request, sizeof request);
+    assert_memory_equal(request + 2, wanted, sizeof wanted);
+    return (uint16_t)(request[0] << 8 | request[1]);
+}
+
+static void reply(int device, uint16_t transaction, uint8_t value)
+{
+    const uint8_t response[] = {
+        (uint8_t)(transaction >> 8), (uint8_t)transaction, 0, 0, 0, 5, UNIT, 3, 2, 0, value};
+
+    assert_int_equal(write(device, response, sizeof response), sizeof response);
+}
+
+static void expect_register(uint8_t address, uint8_t value)
+{
+    const uint8_t wanted[] = {0, address, 0, 0, 0, 5, UNIT, 3, 2, 0, value};
+    uint8_t response[11];
+
+    get(client, response, 9);
+    assert_memory_equal(response, wanted, 9);
+    get(client, response + 9, 2);
+    assert_memory_equal(response, wanted, sizeof wanted);
+}
+
+static void expect_exception(uint8_t address, uint8_t exception)
+{
+    const uint8_t wanted[] = {0, address, 0, 0, 0, 3, UNIT, 0x83, exception};
+    uint8_t response[9];
+
+    get(client, response, sizeof response);
+    assert_memory_equal(response, wanted, sizeof wanted);
+}
+
+static void libmodbus_reaches_a_libmodbus_server_over_tcp(void **state)
+{
+    uint16_t words[125], values[] = {1, 0xFFFE, 0x1234};
+    tcp_server far;
+    modbus_t *peer;
+    int i;
+
+    (void)state;
+    memset(&far, 0, sizeof far);
+    tcp_server_start(&far);
+    start("tcp", far.port, NULL);
+    peer = modbus_new_tcp("127.0.0.1", port);
+    assert_non_null(peer);
+    assert_int_equal(modbus_connect(peer), 0);
+    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
+    for (i = 1; i <= 100; i += 99) {
+        modbus_set_slave(peer, i);
+        assert_int_equal(modbus_read_registers(peer, 3, 125, words), 125);
+        assert_memory_equal(words, far.mapping->tab_registers + 3, sizeof words);
+        assert_int_equal(modbus_write_registers(peer, 20, 3, values), 3);
+        assert_memory_equal(far.mapping->tab_registers + 20, values, sizeof values);
+    }
+    assert_int_equal(modbus_read_registers(peer, SERVER_REGISTERS, 1, words), -1);
+    assert_int_equal(errno, EMBXILADD);
+    modbus_close(peer);
+    modbus_free(peer);
+    stop();
+    tcp_server_stop(&far);
+}
+
+static void a_line_of_rtu_over_tcp_has_frames_of_rtu(void **state)
+{
+    uint8_t request[] = {UNIT, 3, 0, 7, 0, 1, 0, 0}, response[] = {UNIT, 3, 2, 0, 9, 0, 0};
+    uint8_t found[sizeof request];
+    int device;
+
+    (void)state;
+    listener = tcp_listen(&device_port);
+    start("rtuovertcp", device_port, NULL);
+    device = accept_gateway();
+    ask(7);
+    get(device, found, sizeof found);
+    seal(request, sizeof request - 2);
+    assert_memory_equal(found, request, sizeof request);
+    seal(response, sizeof response - 2);
+    assert_int_equal(write(device, response, sizeof response), sizeof response);
+    expect_register(7, 9);
+    close(device);
+    stop();
+    close(listener);
+}
+
+static void a_device_that_closes_an_idle_connection_costs_no_request(void **state)
+{
+    uint8_t round;
+    int device;
+
+    (void)state;
+    listener = tcp_listen(&device_port);
+    start("tcp", device_port, NULL);
+    for (round = 1; round < 6; round++) {
+        device = accept_gateway();
+        ask(round);
+        reply(device, take(device, round), round);
+        expect_register(round, round);
+        close(device);
+        /* The gateway has seen it in every other round. */
+        if (round % 2)
+            AWAIT(program_sleeps(&gateway));
+        ask((uint8_t)(round + 100));
+        device = accept_gateway();
+        reply(device, take(device, (uint8_t)(round + 100)), round);
+        expect_register((uint8_t)(round + 100), round);
+        close(device);
+    }
+    stop();
+    close(listener);
+}
+
+static void a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again(void **state)
+{
+    int device;
+
+    (void)state;
+    listener = tcp_listen(&device_port);
+    start("tcp", device_port, NULL);
+    device = accept_gateway();
+    ask(1);
+    (void)take(device, 1);
+    close(device);
+    expect_exception(1, 0x0A);
+    /* The first request on the next connection is the next one. */
+    ask(2);
+    device = accept_gateway();
+    reply(device, take(device, 2), 22);
+    expect_register(2, 22);
+    close(device);
+    stop();
+    close(listener);
+}
+
+static void requests_to_a_device_that_does_not_listen_get_0a_until_it_does(void **state)
+{
+    int device, reserved = tcp_reserve(&device_port);
+
+    (void)state;
+    start("tcp", device_port, NULL);
+    ask(1);
+    expect_exception(1, 0x0A);
+    ask(2);
+    expect_exception(2, 0x0A);
+    assert_int_equal(listen(reserved, 4), 0);
+    listener = reserved;
+    /* The link connects by itself, also without a request. */
+    device = accept_gateway();
+    ask(3);
+    reply(device, take(device, 3), 33);
+    expect_register(3, 33);
+    close(device);
+    stop();
+    close(listener);
+}
+
+static void a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says(void **state)
+{
+    static const char *const options[] = {"-n", "4", NULL};
+    uint16_t transactions[4];
+    uint8_t byte;
+    int device, i;
+
+    (void)state;
+    listener = tcp_listen(&device_port);
+    start("tcp", device_port, options);
+    device = accept_gateway();
+    for (i = 0; i < 6; i++)
+        ask((uint8_t)(10 + i));
+    for (i = 0; i < 4; i++)
+        transactions[i] = take(device, (uint8_t)(10 + i));
+    assert_int_equal(recv(device, &byte, 1, MSG_DONTWAIT), -1);
+    /* The device replies to the last one first. */
+    for (i = 3; i >= 0; i--) {
+        reply(device, transactions[i], (uint8_t)(50 + i));
+        expect_register((uint8_t)(10 + i), (uint8_t)(50 + i));
+    }
+    for (i = 4; i < 6; i++)
+        reply(device, take(device, (uint8_t)(10 + i)), (uint8_t)i);
+    for (i = 4; i < 6; i++)
+        expect_register((uint8_t)(10 + i), (uint8_t)i);
+    close(device);
+    stop();
+    close(listener);
+}
+
+/* Connects many clients, of which the first `places` are served and the others closed. */
+static void expect_places(const char *const *options, unsigned places)
+{
+    int fds[MANY];
+    unsigned i;
+
+    listener = tcp_listen(&device_port);
+    start_without_client("tcp", device_port, options);
+    for (i = 0; i < MANY; i++)
+        fds[i] = tcp_connect(port);
+    for (i = 0; i < MANY; i++)
+        assert_int_equal(asked_is_served(fds[i], NO_LINE, 0x0A), i < places);
+    for (i = 0; i < MANY; i++)
+        close(fds[i]);
+    stop();
+    close(listener);
+}
+
+static void forty_clients_are_served_if_there_are_places_for_them(void **state)
+{
+    static const char *const options[] = {"-c", "40", NULL};
+
+    (void)state;
+    expect_places(options, MANY);
+}
+
+static void of_forty_clients_those_without_a_place_are_closed_at_once(void **state)
+{
+    static const char *const one[] = {"-c", "1", NULL}, *const three[] = {"-c", "3", NULL};
+
+    (void)state;
+    expect_places(NULL, 16);
+    expect_places(three, 3);
+    expect_places(one, 1);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(libmodbus_reaches_a_libmodbus_server_over_tcp),
+        TEST(a_line_of_rtu_over_tcp_has_frames_of_rtu),
+        TEST(a_device_that_closes_an_idle_connection_costs_no_request),
+        TEST(a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again),
+        TEST(requests_to_a_device_that_does_not_listen_get_0a_until_it_does),
+        TEST(a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says),
+        TEST(forty_clients_are_served_if_there_are_places_for_them),
+        TEST(of_forty_clients_those_without_a_place_are_closed_at_once),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,51 @@
+/* A line of the gateway example: a serial line, or a device or gateway on TCP. A link opens it, and
+ * opens it again when it was lost.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef GATEWAY_LINE_H
+#define GATEWAY_LINE_H
+
+#include "mbm_tcp.h"
+#include "mbm_tty.h"
+
+#include <poll.h>
+
+typedef struct gateway_line {
+    mbm_client client;
+    mbm_link link;
+    mbm_tty tty;
+    mbm_tty_options options; /* of a serial line */
+    mbm_tcp tcp;
+    mbm_tcp_addresses addresses;
+    const char *place;   /* the terminal or the host */
+    const char *service; /* of TCP: the port */
+    char reason[80];     /* why it is not open, as printed */
+    int reserve;         /* a descriptor that is kept for the line while it is not open; 0: none */
+    uint32_t tried;      /* when the last attempt began */
+    uint8_t framing;
+    uint8_t is_tcp;
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
+    uint8_t outgoing[MBM_MAX_TCP_FRAME]; /* of Modbus TCP */
+} gateway_line;
+
+/* Reads the place of a line, which is in the text up to the first range of units:
+ *
+ *     [rtu:]PATH,BAUD,PARITY+STOP   ascii:PATH,BAUD,PARITY+STOP
+ *     tcp:HOST[,PORT]               rtuovertcp:HOST[,PORT]
+ *
+ * Keeps pointers into the text. Returns the ranges, or NULL if the text is wrong. */
+char *gateway_line_read(gateway_line *line, char *text);
+
+/* Begins the client and the link, which opens the line in the first poll of the client. */
+int gateway_line_begin(gateway_line *line, uint16_t timeoutMs, uint16_t quietMs);
+
+/* `isReady` of mbm_gatewayLine. A line that is not open is opened for a request, but at most once a
+ * second. */
+uint8_t gateway_line_isReady(void *line);
+
+/* What to poll for the line. Returns 0 if it has no descriptor. */
+int gateway_line_wait(const gateway_line *line, struct pollfd *wait);
+
+void gateway_line_close(gateway_line *line);
+
+#endif
