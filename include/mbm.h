@@ -44,11 +44,12 @@
 #include <stdint.h>
 
 /**
- * Initialises any object, struct or array of this header, with zeros: `mbm_client client =
- * MBM_INIT;`, `mbm_clientRequest requests[16] = MBM_INIT;`. Designated initialisers, `{.unit = 17}`,
- * set all other fields to zero too, as does calloc. A static object without an initialiser is zero.
- * A local object without one is not: a begin function may take what was in that memory before for an
- * object that was begun.
+ * Initialises any object, struct or array of this header with zeros, for example
+ * `mbm_client client = MBM_INIT;` or `mbm_clientRequest requests[16] = MBM_INIT;`.
+ *
+ * A designated initialiser, `{.unit = 17}`, and calloc set all other fields to zero too. A
+ * static object is zero without an initialiser. A local object is not: a begin function may
+ * take the bytes that were in that memory before for an object that was begun.
  */
 #ifdef __cplusplus
 #define MBM_INIT {}
@@ -286,6 +287,12 @@ const char *mbm_version(void);
  * A value is out of the range of the type in which the program reads it.
  */
 #define MBM_OUT_OF_RANGE 246u
+
+/**
+ * The connection was not made in time. Of a link: within its connect timeout. Of a request on
+ * Modbus TCP without a link: the port accepted no byte within the response timeout.
+ */
+#define MBM_CONNECT_TIMED_OUT 247u
 
 /**
  * Explains a status in a few words of English. For 1 to 3 these are the words of the device's
@@ -2232,7 +2239,8 @@ uint8_t mbm_client_reply(const struct mbm_clientRequest *request,
  * request has ended when its `status` is no longer MBM_PENDING. Then `status` is MBM_OK, an
  * exception of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
  * MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST,
- * MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes only if it is MBM_OK.
+ * MBM_LINE_BUSY, MBM_CONNECT_TIMED_OUT, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes
+ * only if it is MBM_OK.
  *
  * @param client   the object
  * @param request  the request
@@ -3300,7 +3308,7 @@ uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
 
 /**
  * An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
- * mbm_linkHooks returned; MBM_RESPONSE_TIMED_OUT if the connection took too long.
+ * mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long.
  */
 #define MBM_LINK_EVENT_FAILED 2u
 
@@ -3434,7 +3442,8 @@ uint8_t mbm_link_setJitter(struct mbm_link *link,
                            void *context);
 
 /**
- * Sets how long a connection may take to be made. Then the attempt has failed.
+ * Sets how long a connection may take to be made. Then the attempt has failed, with
+ * MBM_CONNECT_TIMED_OUT.
  *
  * @param link       the object
  * @param timeoutMs  milliseconds, 1 to 1000000 (16 minutes); 0: as long as `status` returns
@@ -3446,7 +3455,8 @@ uint8_t mbm_link_setConnectTimeout(struct mbm_link *link,
 
 /**
  * Sets whether requests wait for the link. By default they do not: while the link is down,
- * every request ends with MBM_LINK_LOST at the next poll. (A program whose `done` queues the
+ * every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took longer
+ * than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
  * request again at once then polls without a pause: let it wait.) If requests wait, they stay
  * in the queue until the link is open again or until you cancel them; their response timeout
  * begins when they are sent. While a connection is being made, requests always wait.
