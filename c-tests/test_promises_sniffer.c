@@ -1,0 +1,212 @@
+/* Each function of the sniffer and of the trace is held to its comment in mbm.h: results, limits,
+ * defaults, NULL. test_promises_frame has mbm_event_text. */
+#include "hooked_port.h"
+#include "mbm.h"
+#include "test.h"
+
+#include <string.h>
+
+#include "refused.h"
+
+static mbm_sniffer s, never;
+static mbm_trace t, no_trace;
+static hooked_port wire;
+static mbm_port port;
+static uint8_t buffer[2 * MBM_MAX_ASCII_FRAME];
+
+static int setup(void **state)
+{
+    (void)state;
+    memset(&s, 0, sizeof s);
+    memset(&never, 0, sizeof never);
+    memset(&t, 0, sizeof t);
+    memset(&no_trace, 0, sizeof no_trace);
+    memset(&wire, 0, sizeof wire);
+    port = hooked_port_of(&wire);
+    return 0;
+}
+
+/* --- sniffer --- */
+
+typedef uint8_t (*begins_sniffer)(mbm_sniffer *sniffer, uint8_t *bytes, uint16_t size);
+
+static const struct {
+    begins_sniffer begin;
+} sniffers[] = {{mbm_sniffer_beginRtu},
+                {mbm_sniffer_beginAscii},
+                {mbm_sniffer_beginTcp},
+                {mbm_sniffer_beginRtuOverTcp}};
+
+static void a_sniffer_begins_in_every_framing_or_changes_nothing(void **state)
+{
+    unsigned i;
+
+    for (i = 0; i < COUNT(sniffers); i++) {
+        setup(state);
+        OK(sniffers[i].begin(&s, buffer, MBM_MIN_SNIFFER_BUFFER));
+        IS(MBM_INVALID_ARGUMENT, sniffers[i].begin(NULL, buffer, 300));
+        REFUSED(MBM_INVALID_ARGUMENT, s, sniffers[i].begin(&s, NULL, 300));
+        REFUSED(MBM_BUFFER_TOO_SMALL, s, sniffers[i].begin(&s, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
+        assert_int_equal(mbm_sniffer_getResponseTimeout(&s), 1000);
+        OK(mbm_sniffer_setResponseTimeout(&s, 5));
+        OK(mbm_sniffer_setFrameTimeout(&s, 65535));
+        OK(sniffers[i].begin(&s, buffer, 300));
+        assert_int_equal(mbm_sniffer_getResponseTimeout(&s), 1000);
+        assert_int_not_equal(mbm_sniffer_getFrameTimeout(&s), 65535);
+    }
+}
+
+static void times_and_declarations_of_a_sniffer_have_limits(void **state)
+{
+    static const mbm_function wrong = {.code = 200};
+    mbm_function right[MBM_MAX_SNIFFER_FUNCTIONS + 1];
+    unsigned i;
+
+    (void)state;
+    memset(right, 0, sizeof right);
+    for (i = 0; i < COUNT(right); i++)
+        right[i].code = (uint8_t)(65 + i);
+    OK(mbm_sniffer_beginRtu(&s, buffer, 300));
+    REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setResponseTimeout(&s, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setResponseTimeout(&s, 65536));
+    REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setFrameTimeout(&s, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setFrameTimeout(&s, 65536));
+    OK(mbm_sniffer_setResponseTimeout(&s, 65535));
+    assert_int_equal(mbm_sniffer_getResponseTimeout(&s), 65535);
+    OK(mbm_sniffer_setFrameTimeout(&s, 65535));
+    assert_int_equal(mbm_sniffer_getFrameTimeout(&s), 65535);
+    OK(mbm_sniffer_setBaudRate(&s, 9600));
+    OK(mbm_sniffer_setBaudRate(&s, 0));
+    OK(mbm_sniffer_setFunctions(&s, NULL, 0));
+    OK(mbm_sniffer_setFunctions(&s, right, MBM_MAX_SNIFFER_FUNCTIONS));
+    REFUSED(MBM_INVALID_ARGUMENT, s,
+            mbm_sniffer_setFunctions(&s, right, MBM_MAX_SNIFFER_FUNCTIONS + 1));
+    REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setFunctions(&s, NULL, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setFunctions(&s, &wrong, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setDelimiter(&s, ':'));
+    for (i = 0; i < 256; i++) {
+        int is_digit = (i >= '0' && i <= '9') || (i >= 'A' && i <= 'F') || (i >= 'a' && i <= 'f');
+
+        OK(mbm_sniffer_beginAscii(&s, buffer, 300));
+        IS(i == 0 || i > 127 || i == '\r' || i == ':' || is_digit ? MBM_INVALID_ARGUMENT : MBM_OK,
+           mbm_sniffer_setDelimiter(&s, (uint8_t)i));
+    }
+}
+
+static void a_sniffer_that_was_never_begun_reports_nothing(void **state)
+{
+    mbm_sniffer *const both[] = {NULL, &never};
+    mbm_event event;
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(both); i++) {
+        uint8_t status = both[i] == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
+
+        IS(status, mbm_sniffer_setResponseTimeout(both[i], 1));
+        IS(status, mbm_sniffer_setFrameTimeout(both[i], 1));
+        IS(status, mbm_sniffer_setBaudRate(both[i], 1));
+        IS(status, mbm_sniffer_setFunctions(both[i], NULL, 0));
+        IS(status, mbm_sniffer_setDelimiter(both[i], '\n'));
+        assert_int_equal(mbm_sniffer_getResponseTimeout(both[i]), 0);
+        assert_int_equal(mbm_sniffer_getFrameTimeout(both[i]), 0);
+        assert_int_equal(mbm_sniffer_feed(both[i], 0, buffer, 4, 0), 0);
+        memset(&event, 0x77, sizeof event);
+        REFUSED(0, event, mbm_sniffer_next(both[i], 0, &event));
+    }
+    OK(mbm_sniffer_beginRtu(&s, buffer, 300));
+    REFUSED(0, event, mbm_sniffer_next(&s, 0, &event));
+    assert_int_equal(mbm_sniffer_next(&s, 0, NULL), 0);
+    assert_int_equal(mbm_sniffer_feed(&s, 0, NULL, 0, 0), 0);
+}
+
+/* --- trace --- */
+
+static void hook(void *context, const mbm_traceRecord *record)
+{
+    (void)context;
+    (void)record;
+}
+
+typedef uint8_t (*begins_trace)(mbm_trace *trace, const mbm_port *on, const mbm_framing *framing,
+                                uint8_t *bytes, uint16_t size,
+                                void (*called)(void *context, const mbm_traceRecord *record),
+                                void *context);
+
+static void a_trace_begins_or_changes_nothing(void **state)
+{
+    static const begins_trace begins[] = {mbm_trace_beginClient, mbm_trace_beginServer};
+    static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = MBM_FRAMING_NONE};
+    mbm_port lacking;
+    unsigned i;
+
+    for (i = 0; i < COUNT(begins); i++) {
+        begins_trace begin = begins[i];
+
+        setup(state);
+        OK(begin(&t, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER, hook, NULL));
+        IS(MBM_INVALID_ARGUMENT, begin(NULL, &port, &rtu, buffer, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, NULL, &rtu, buffer, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &port, NULL, buffer, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &port, &none, buffer, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &port, &rtu, NULL, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &port, &rtu, buffer, 600, NULL, NULL));
+        REFUSED(MBM_BUFFER_TOO_SMALL, t,
+                begin(&t, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER - 1, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t,
+                begin(&t, mbm_trace_port(&t), &rtu, buffer, 600, hook, NULL));
+        lacking = port;
+        lacking.write = NULL;
+        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &lacking, &rtu, buffer, 600, hook, NULL));
+        assert_non_null(mbm_trace_port(&t));
+        assert_ptr_equal(mbm_trace_innerPort(&t)->context, &wire);
+        assert_int_equal(mbm_trace_getFrameTimeout(&t), 50);
+        OK(mbm_trace_setFrameTimeout(&t, 65535));
+        assert_int_equal(mbm_trace_getFrameTimeout(&t), 65535);
+        REFUSED(MBM_INVALID_ARGUMENT, t, mbm_trace_setFrameTimeout(&t, 0));
+        REFUSED(MBM_INVALID_ARGUMENT, t, mbm_trace_setFrameTimeout(&t, 65536));
+        OK(mbm_trace_flush(&t));
+        OK(begin(&t, &port, FRAMING(MBM_FRAMING_TCP), buffer, 600, hook, NULL));
+        assert_int_equal(mbm_trace_getFrameTimeout(&t), 1000);
+    }
+}
+
+static void a_trace_that_was_never_begun_has_no_port(void **state)
+{
+    mbm_trace *const both[] = {NULL, &no_trace};
+    mbm_traceRecord record;
+    mbm_event event;
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(both); i++) {
+        uint8_t status = both[i] == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
+
+        assert_null(mbm_trace_port(both[i]));
+        assert_null(mbm_trace_innerPort(both[i]));
+        IS(status, mbm_trace_setFrameTimeout(both[i], 1));
+        assert_int_equal(mbm_trace_getFrameTimeout(both[i]), 0);
+        IS(status, mbm_trace_flush(both[i]));
+    }
+    memset(&record, 0x77, sizeof record);
+    memset(&event, 0, sizeof event);
+    event.kind = MBM_EVENT_TIMEOUT;
+    REFUSED(MBM_INVALID_ARGUMENT, record, mbm_trace_ofEvent(&event, &record));
+    REFUSED(MBM_INVALID_ARGUMENT, record, mbm_trace_ofEvent(NULL, &record));
+    IS(MBM_INVALID_ARGUMENT, mbm_trace_ofEvent(&event, NULL));
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, setup)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_sniffer_begins_in_every_framing_or_changes_nothing),
+        TEST(times_and_declarations_of_a_sniffer_have_limits),
+        TEST(a_sniffer_that_was_never_begun_reports_nothing),
+        TEST(a_trace_begins_or_changes_nothing),
+        TEST(a_trace_that_was_never_begun_has_no_port),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
