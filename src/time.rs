@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn milliseconds_come_back_as_they_were() {
         for milliseconds in 0..=u16::MAX {
-            assert_eq!(to_millis(millis(milliseconds)), milliseconds);
+            assert_eq!(to_millis(millis(milliseconds)), milliseconds.into());
         }
     }
 
