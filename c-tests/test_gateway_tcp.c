@@ -27,14 +27,14 @@ static uint16_t port;
 static int listener, client = -1;
 static uint16_t device_port;
 
-/* Starts a gateway with one line at a TCP port: `kind` is tcp or rtuovertcp. */
-static void start_without_client(const char *kind, uint16_t to, const char *const *options)
+/* Starts a gateway with one line at a TCP port: `host` is tcp:HOST or rtuovertcp:HOST. */
+static void start_without_client(const char *host, uint16_t to, const char *const *options)
 {
     char text[64], line[64];
     const char *arguments[8];
     unsigned number, count = 0;
 
-    snprintf(line, sizeof line, "%s:127.0.0.1,%u,1-30,100-100=%d", kind, to, UNIT);
+    snprintf(line, sizeof line, "%s,%u,1-30,100-100=%d", host, to, UNIT);
     while (options && *options)
         arguments[count++] = *options++;
     arguments[count++] = "0";
@@ -47,9 +47,9 @@ static void start_without_client(const char *kind, uint16_t to, const char *cons
     port = (uint16_t)number;
 }
 
-static void start(const char *kind, uint16_t to, const char *const *options)
+static void start(const char *host, uint16_t to, const char *const *options)
 {
-    start_without_client(kind, to, options);
+    start_without_client(host, to, options);
     client = tcp_connect(port);
 }
 
@@ -160,7 +160,7 @@ static void libmodbus_reaches_a_libmodbus_server_over_tcp(void **state)
     (void)state;
     memset(&far, 0, sizeof far);
     tcp_server_start(&far);
-    start("tcp", far.port, NULL);
+    start("tcp:127.0.0.1", far.port, NULL);
     peer = modbus_new_tcp("127.0.0.1", port);
     assert_non_null(peer);
     assert_int_equal(modbus_connect(peer), 0);
@@ -188,7 +188,7 @@ static void a_line_of_rtu_over_tcp_has_frames_of_rtu(void **state)
 
     (void)state;
     listener = tcp_listen(&device_port);
-    start("rtuovertcp", device_port, NULL);
+    start("rtuovertcp:127.0.0.1", device_port, NULL);
     device = accept_gateway();
     ask(7);
     get(device, found, sizeof found);
@@ -209,7 +209,7 @@ static void a_device_that_closes_an_idle_connection_costs_no_request(void **stat
 
     (void)state;
     listener = tcp_listen(&device_port);
-    start("tcp", device_port, NULL);
+    start("tcp:127.0.0.1", device_port, NULL);
     for (round = 1; round < 6; round++) {
         device = accept_gateway();
         ask(round);
@@ -235,7 +235,7 @@ static void a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again(voi
 
     (void)state;
     listener = tcp_listen(&device_port);
-    start("tcp", device_port, NULL);
+    start("tcp:127.0.0.1", device_port, NULL);
     device = accept_gateway();
     ask(1);
     (void)take(device, 1);
@@ -256,7 +256,7 @@ static void requests_to_a_device_that_does_not_listen_get_0a_until_it_does(void 
     int device, reserved = tcp_reserve(&device_port);
 
     (void)state;
-    start("tcp", device_port, NULL);
+    start("tcp:127.0.0.1", device_port, NULL);
     ask(1);
     expect_exception(1, 0x0A);
     ask(2);
@@ -273,6 +273,20 @@ static void requests_to_a_device_that_does_not_listen_get_0a_until_it_does(void 
     close(listener);
 }
 
+static void requests_to_a_host_that_is_not_found_get_0a(void **state)
+{
+    uint8_t i;
+
+    (void)state;
+    start("tcp:no such host", 502, NULL);
+    for (i = 0; i < 3; i++) {
+        ask(i);
+        expect_exception(i, 0x0A);
+    }
+    AWAIT(program_sleeps(&gateway));
+    stop();
+}
+
 static void a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says(void **state)
 {
     static const char *const options[] = {"-n", "4", NULL};
@@ -282,7 +296,7 @@ static void a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says(void *
 
     (void)state;
     listener = tcp_listen(&device_port);
-    start("tcp", device_port, options);
+    start("tcp:127.0.0.1", device_port, options);
     device = accept_gateway();
     for (i = 0; i < 6; i++)
         ask((uint8_t)(10 + i));
@@ -310,7 +324,7 @@ static void expect_places(const char *const *options, unsigned places)
     unsigned i;
 
     listener = tcp_listen(&device_port);
-    start_without_client("tcp", device_port, options);
+    start_without_client("tcp:127.0.0.1", device_port, options);
     for (i = 0; i < MANY; i++)
         fds[i] = tcp_connect(port);
     for (i = 0; i < MANY; i++)
@@ -349,6 +363,7 @@ int main(void)
         TEST(a_device_that_closes_an_idle_connection_costs_no_request),
         TEST(a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again),
         TEST(requests_to_a_device_that_does_not_listen_get_0a_until_it_does),
+        TEST(requests_to_a_host_that_is_not_found_get_0a),
         TEST(a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says),
         TEST(forty_clients_are_served_if_there_are_places_for_them),
         TEST(of_forty_clients_those_without_a_place_are_closed_at_once),

@@ -11,7 +11,8 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { REOPEN_MS = 1000 };
+/* A lookup of a host may block the gateway, so there is a longer pause between two of them. */
+enum { REOPEN_MS = 1000, LOOKUP_MS = 10000 };
 
 static uint32_t micros(void)
 {
@@ -127,20 +128,34 @@ static uint8_t line_status(void *context)
     return line->tty.isOpen ? MBM_OK : MBM_LINK_LOST;
 }
 
+/* Looks a host up, and begins to connect. */
+static uint8_t open_tcp(gateway_line *line)
+{
+    mbm_tcp *tcp = &line->tcp;
+
+    if (mbm_tcp_isInUse(tcp))
+        return mbm_tcp_connect(tcp);
+    if (tcp->lookupError && micros() - line->looked_up < LOOKUP_MS * 1000u)
+        return MBM_LINK_LOST;
+    if (mbm_tcp_open(tcp, &line->addresses, line->place, line->service) == 0)
+        return mbm_tcp_status(tcp);
+    tcp->error = errno;
+    line->looked_up = micros();
+    return MBM_LINK_LOST;
+}
+
 static uint8_t open_line(void *context)
 {
     gateway_line *line = (gateway_line *)context;
 
     line->tried = micros();
     free_reserve(line);
-    if (line->is_tcp && mbm_tcp_isInUse(&line->tcp))
-        return mbm_tcp_connect(&line->tcp);
-    if (line->is_tcp ? mbm_tcp_open(&line->tcp, &line->addresses, line->place, line->service) != 0
-                     : mbm_tty_openWith(&line->tty, line->place, &line->options) != 0) {
-        line->tcp.error = line->tty.error = errno;
-        return MBM_LINK_LOST;
-    }
-    return line_status(line);
+    if (line->is_tcp)
+        return open_tcp(line);
+    if (mbm_tty_openWith(&line->tty, line->place, &line->options) == 0)
+        return MBM_OK;
+    line->tty.error = errno;
+    return MBM_LINK_LOST;
 }
 
 /* Prints why a line was lost or not opened, once for each reason. */

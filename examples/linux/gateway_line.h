@@ -22,6 +22,7 @@ typedef struct gateway_line {
     char reason[80];     /* why it is not open, as printed */
     int reserve;         /* a descriptor that is kept for the line while it is not open; 0: none */
     uint32_t tried;      /* when the last attempt began */
+    uint32_t looked_up;  /* when the host was last looked up and not found */
     uint8_t framing;
     uint8_t is_tcp;
     uint8_t frame[MBM_MAX_ASCII_FRAME];
