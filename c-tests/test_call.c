@@ -450,126 +450,14 @@ static void the_longest_response_timeout_is_passed_on_whole(void **state)
     end_pair();
 }
 
-/* --- the limit of a call, and links that are not there --- */
-
-enum { SOON_MS = 30 };
-
-static mbm_link kept;
-static int error_in_callback;
-static uint8_t status_in_callback;
-
-static void note_failure(void *context, uint8_t event, uint8_t status)
-{
-    (void)context;
-    if (event != MBM_LINK_EVENT_FAILED)
-        return;
-    error_in_callback = tcp.error;
-    status_in_callback = status;
-}
-
-static void keep_link(void)
-{
-    const mbm_linkHooks hooks = mbm_tcp_link(&tcp);
-
-    memset(&kept, 0, sizeof kept);
-    error_in_callback = 0;
-    OK(mbm_link_begin(&kept, &client, &hooks));
-    OK(mbm_link_setCallback(&kept, note_failure, NULL));
-}
-
-/* A host that never answers: a listener whose queue is full. Returns its descriptors. */
-static void find_silent_host(int *listener, int *filler, char *service)
-{
-    uint16_t port;
-
-    *listener = tcp_listen(&port);
-    assert_int_equal(listen(*listener, 0), 0);
-    *filler = tcp_connect(port);
-    sprintf(service, "%u", port);
-}
-
-static void a_call_ends_at_its_own_limit_while_requests_wait_for_a_link(void **state)
-{
-    uint16_t port;
-    const int nobody = tcp_reserve(&port);
-    char service[8];
-
-    (void)state;
-    sprintf(service, "%u", port);
-    memset(&tcp, 0, sizeof tcp);
-    assert_int_equal(mbm_tcp_openLater(&tcp, &addresses, "127.0.0.1", service), 0);
-    begin_on_tcp();
-    keep_link();
-    OK(mbm_link_setRequestsWait(&kept, 1));
-    caller.timeoutMs = SOON_MS;
-    IS(MBM_LINK_LOST, mbm_call(&caller, read_words(1)));
-    IS(MBM_LINK_LOST, request.status);
-    assert_int_equal(tcp.error, ECONNREFUSED);
-    assert_int_equal(mbm_client_pending(&client), 0);
-    /* All requests: they go on waiting. */
-    IS(MBM_PENDING, read_words(1));
-    caller.request = NULL;
-    IS(MBM_LINK_LOST, mbm_call(&caller, MBM_PENDING));
-    assert_int_equal(mbm_client_pending(&client), 1);
-    mbm_tcp_close(&tcp);
-    close(nobody);
-}
-
 static void a_call_ends_at_its_own_limit_before_the_device_answers(void **state)
 {
     (void)state;
     begin_on_pair();
-    caller.timeoutMs = SOON_MS;
+    caller.timeoutMs = 30;
     IS(MBM_RESPONSE_TIMED_OUT, mbm_call(&caller, read_words(1)));
     IS(MBM_RESPONSE_TIMED_OUT, request.status);
     end_pair();
-}
-
-/* Each limit alone: that of the call, the link's, and without a link the response timeout. */
-static void a_host_that_never_answers_is_a_timeout_of_the_connection(void **state)
-{
-    int listener, filler;
-    char service[8];
-
-    (void)state;
-    find_silent_host(&listener, &filler, service);
-    memset(&tcp, 0, sizeof tcp);
-    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    begin_on_tcp();
-    OK(mbm_client_setResponseTimeout(&client, SOON_MS));
-    IS(MBM_CONNECT_TIMED_OUT, mbm_call(&caller, read_words(1)));
-    IS(MBM_CONNECT_TIMED_OUT, request.status);
-    assert_int_equal(tcp.error, ETIMEDOUT);
-    assert_string_equal(mbm_tcp_text(&tcp), strerror(ETIMEDOUT));
-    assert_string_equal(mbm_status_text(request.status), "the connection was not made in time");
-
-    /* RTU over TCP, whose client cannot tell this from a line that is never silent. */
-    {
-        mbm_port port = mbm_tcp_port(&tcp);
-
-        OK(mbm_client_beginRtuOverTcp(&client, &port, incoming, sizeof incoming));
-        OK(mbm_client_setResponseTimeout(&client, SOON_MS));
-        IS(MBM_CONNECT_TIMED_OUT, mbm_call(&caller, read_words(1)));
-        IS(MBM_CONNECT_TIMED_OUT, request.status);
-    }
-
-    begin_on_tcp();
-    keep_link();
-    OK(mbm_link_setConnectTimeout(&kept, SOON_MS));
-    IS(MBM_CONNECT_TIMED_OUT, mbm_call(&caller, read_words(1)));
-    IS(MBM_CONNECT_TIMED_OUT, status_in_callback);
-    assert_int_equal(error_in_callback, ETIMEDOUT);
-    assert_int_equal(tcp.error, ETIMEDOUT);
-
-    OK(mbm_link_setConnectTimeout(&kept, 0));
-    OK(mbm_link_setRequestsWait(&kept, 1));
-    caller.timeoutMs = SOON_MS;
-    IS(MBM_CONNECT_TIMED_OUT, mbm_call(&caller, read_words(1)));
-    IS(MBM_CONNECT_TIMED_OUT, request.status);
-    assert_int_equal(tcp.error, ETIMEDOUT);
-    mbm_tcp_close(&tcp);
-    close(filler);
-    close(listener);
 }
 
 int main(void)
@@ -587,9 +475,7 @@ int main(void)
         cmocka_unit_test(a_call_that_cannot_go_on_is_refused),
         cmocka_unit_test(a_link_that_cannot_be_waited_for_ends_by_the_timeout),
         cmocka_unit_test(the_longest_response_timeout_is_passed_on_whole),
-        cmocka_unit_test(a_call_ends_at_its_own_limit_while_requests_wait_for_a_link),
         cmocka_unit_test(a_call_ends_at_its_own_limit_before_the_device_answers),
-        cmocka_unit_test(a_host_that_never_answers_is_a_timeout_of_the_connection),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

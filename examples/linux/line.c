@@ -57,8 +57,15 @@ static int open_tcp(line *l, char *host, int rtu)
 
     if (service)
         *service++ = '\0';
-    if (mbm_tcp_open(&l->tcp, &l->addresses, host, service ? service : MBM_TCP_SERVICE) != 0)
+    if (mbm_tcp_openLater(&l->tcp, &l->addresses, host, service ? service : MBM_TCP_SERVICE) != 0)
         return -1;
+    /* A name that does not exist is a mistake of the user. A network that is not there yet is not:
+     * the link waits for it. */
+    if (mbm_tcp_connect(&l->tcp) == MBM_LINK_LOST && l->tcp.error == ENXIO) {
+        mbm_tcp_close(&l->tcp);
+        errno = ENXIO;
+        return -1;
+    }
     l->is_tcp = 1;
     port =
         trace_client(mbm_tcp_port(&l->tcp), rtu ? MBM_FRAMING_RTU_OVER_TCP : MBM_FRAMING_TCP, host);
@@ -141,13 +148,13 @@ int line_connect(line *l)
     while (l->is_tcp && !line_ended && (there = mbm_tcp_isConnected(&l->tcp)) == 0)
         (void)mbm_tcp_wait(&l->tcp, 1, NULL, -1, 1000000);
     if (there < 0)
-        fprintf(stderr, "%s\n", strerror(l->tcp.error));
+        fprintf(stderr, "%s\n", mbm_tcp_text(&l->tcp));
     return there < 0 ? -1 : 0;
 }
 
 const char *line_reason(const line *l)
 {
-    return strerror(l->lost_by);
+    return l->tcp.lookupError ? mbm_tcp_text(&l->tcp) : strerror(l->lost_by);
 }
 
 const char *line_status(line *l, const mbm_clientRequest *request)

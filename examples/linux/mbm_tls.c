@@ -437,7 +437,11 @@ uint32_t mbm_tls_pollDelay(mbm_tls *tls)
     if (tls->status == MBM_TLS_HANDSHAKE) {
         const uint32_t past = mbm_tls_age(tls), longest = tls->identity->handshakeUs;
 
-        return tls->isDue || past >= longest ? 0 : longest - past;
+        if (tls->isDue) {
+            tls->isDue = 0;
+            return 0;
+        }
+        return past < longest ? longest - past : 0;
     }
     if (tls->status != MBM_TLS_OPEN || tls->isTold || mbedtls_ssl_get_bytes_avail(&tls->ssl) == 0)
         return UINT32_MAX;

@@ -225,9 +225,9 @@ uint8_t mbm_tls_poll(mbm_tls *tls);
 
 /**
  * Returns how long the port needs no call, unless the stream below accepts bytes again or
- * bytes arrive there. It is 0 while a handshake can go on with the bytes that are in the port.
- * It is 0 too if received bytes are in the port that no wait for the stream below would report;
- * it says so once, until the port's read or write was called again.
+ * bytes arrive there. It is 0 if received bytes are in the port that no wait for the stream
+ * below would report, or if a handshake can go on without further bytes; it says so once,
+ * until the port's read or write, or mbm_tls_poll, was called again.
  *
  * @param tls  the connection
  * @return microseconds, UINT32_MAX without a limit
