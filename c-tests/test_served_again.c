@@ -321,6 +321,36 @@ static uint16_t give_diagnostics(void *context, const mbm_request *request, uint
     return 0;
 }
 
+/* It takes the last place, and the unit gets a function that counts frames. */
+static uint16_t give_diagnostics_and_decline(void *context, const mbm_request *request,
+                                             uint8_t *response, uint16_t capacity)
+{
+    (void)give_diagnostics(context, request, response, capacity);
+    return MBM_REPLY_DECLINED;
+}
+
+static void a_function_that_declines_may_fill_the_last_place(void **state)
+{
+    static mbm_custom all[MBM_MAX_SERVICES - 1];
+    static mbm_unit full;
+    int i;
+
+    (void)state;
+    memset(all, 0, sizeof all);
+    memset(&full, 0, sizeof full);
+    memset(&late, 0, sizeof late);
+    full.id = 17;
+    for (i = 0; i < MBM_MAX_SERVICES - 1; i++) {
+        all[i].serve = echo;
+        all[i].code = (uint8_t)(66 + i);
+        OK(mbm_unit_serveCustom(&full, &all[i]));
+    }
+    all[0].serve = give_diagnostics_and_decline;
+    all[0].context = &full;
+    assert_int_equal(answer(&full, 17, "\x42", 1), 0xC2);
+    assert_int_equal(answer(&full, 17, "\x43", 1), 0x43);
+}
+
 static void a_unit_with_all_places_taken_refuses_other_functions(void **state)
 {
     static mbm_custom all[MBM_MAX_SERVICES];
@@ -384,6 +414,7 @@ int main(void)
         cmocka_unit_test_setup(functions_16_and_17_stay_when_another_unit_is_given_the_table,
                                reset),
         cmocka_unit_test_setup(a_table_that_is_served_as_one_kind_is_refused_as_another, reset),
+        cmocka_unit_test_setup(a_function_that_declines_may_fill_the_last_place, reset),
         cmocka_unit_test_setup(a_unit_with_all_places_taken_refuses_other_functions, reset),
         cmocka_unit_test_setup(a_second_record_of_a_kind_that_a_unit_has_once_is_refused, reset),
         cmocka_unit_test_setup(a_service_without_a_free_place_is_refused, reset),

@@ -43,6 +43,12 @@ void line_drive(bool on);
 /* Called whenever a byte has left or arrived. The player of the operating system defines it. */
 void line_interrupt(void);
 
+/* Replaces the device by a function, before line_begin. The line calls it with the time in
+ * microseconds, at least once for each byte. It reads what the program has sent, and writes. */
+void line_replace_device(void (*step)(uint32_t now));
+uint16_t line_read_as_device(uint8_t *bytes, uint16_t capacity);
+uint16_t line_write_as_device(const uint8_t *bytes, uint16_t length);
+
 /* Ends the program with success in the first sleep of half a second or more after the device has
  * answered so many requests. */
 void line_end_after(unsigned answers);

@@ -192,23 +192,22 @@ pub(super) unsafe fn call_services(
     }
 }
 
-/// As [`call_services`], for a unit without diagnostics. The loop needs no count: if all
-/// places are taken, it ends at the next field, the pointer to the monitor function,
-/// which is NULL in such a unit.
+/// As [`call_services`], for a unit without diagnostics, with a shortcut for a host.
 ///
 /// # Safety
-/// As for [`call_services`]; the unit has no `monitor`.
+/// As for [`call_services`].
 #[inline(always)]
 unsafe fn call_services_alone(unit: *mut mbm_unit, info: *const c_void, pdu: *mut u8) -> usize {
-    // SAFETY: as the caller promises. The loop reads only fields of the unit, because
-    // NULL follows the services. If a hook adds diagnostics to the unit, the service that
-    // called the hook handles the request, which ends the loop.
+    // SAFETY: as the caller promises. The loop ends at the next field, the pointer to the
+    // monitor function: see the assertion below. It is not NULL if a service that declines
+    // has added diagnostics to the unit.
     unsafe {
         begin_refusal(info);
         let mut place = unit
             .byte_add(offset_of!(mbm_unit, services))
             .cast::<*mut mbm_service>();
-        while !(*place).is_null() {
+        let end = (&raw mut (*unit).monitor).cast();
+        while place != end && !(*place).is_null() {
             let service = *place;
             let reply = call_service(service, info, pdu);
             if is_answer(reply, info) {
@@ -284,7 +283,7 @@ pub(super) unsafe fn are_absent(info: *const c_void) -> bool {
 /// code. A host skips those without a call, four at a time.
 ///
 /// # Safety
-/// `place` is a place of the unit or its end, where NULL is.
+/// `place` is a place of the unit or its end.
 #[inline(never)]
 unsafe fn skip_custom(
     unit: *const mbm_unit,
@@ -305,7 +304,8 @@ unsafe fn skip_custom(
         {
             place = place.add(4);
         }
-        while !(*place).is_null() && is_skipped(place) {
+        let end = last.add(4);
+        while place.cast_const() != end && !(*place).is_null() && is_skipped(place) {
             place = place.add(1);
         }
     }

@@ -55,7 +55,8 @@ macro(project name)
     endforeach()
     add_subdirectory(main)
 
-    add_executable(${name}.elf EXCLUDE_FROM_ALL ${STAND_IN}/board.c ${library}/tests/line.c)
+    add_executable(${name}.elf EXCLUDE_FROM_ALL ${STAND_IN}/board.c ${library}/tests/line.c
+        ${library}/tests/late.c)
     target_include_directories(${name}.elf PRIVATE ${library}/tests)
     target_compile_options(${name}.elf PRIVATE -Wall -Wextra -Werror)
     target_link_libraries(${name}.elf PRIVATE -Wl,--start-group main mbm -Wl,--end-group esp_timer)

@@ -47,7 +47,8 @@ add_subdirectory(${STAND_IN_MODULE}/zephyr mbm)
 
 add_library(app STATIC)
 target_link_libraries(app PUBLIC zephyr_interface)
-add_executable(zephyr.elf ${STAND_IN}/board.c ${STAND_IN_MODULE}/tests/line.c)
+add_executable(zephyr.elf ${STAND_IN}/board.c ${STAND_IN_MODULE}/tests/line.c
+    ${STAND_IN_MODULE}/tests/late.c)
 target_compile_definitions(zephyr.elf PRIVATE STAND_IN_UART_KIND=${STAND_IN_UART_KIND})
 target_include_directories(zephyr.elf PRIVATE ${STAND_IN_MODULE}/tests)
 target_link_libraries(zephyr.elf PRIVATE zephyr_interface -Wl,--start-group app mbm -Wl,--end-group)
