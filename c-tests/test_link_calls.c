@@ -138,6 +138,25 @@ static void a_client_that_is_begun_again_has_no_link(void **state)
     assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
 }
 
+static void a_link_uses_nothing_of_a_client_that_was_begun_again(void **state)
+{
+    static mbm_client linked, next;
+    const mbm_port port = memory_port_of(&m);
+
+    (void)state;
+    begin_up(MBM_FRAMING_TCP);
+    memcpy(&linked, &client, sizeof client);
+    begin_client(MBM_FRAMING_RTU);
+    /* The client has ended. Its storage has other content, which looks like a client. */
+    memcpy(&client, &linked, sizeof client);
+    memset(&next, 0, sizeof next);
+    OK(mbm_client_beginRtu(&next, &port, frame, sizeof frame));
+    OK(mbm_link_begin(&kept, &next, &hooks));
+    assert_memory_equal(&client, &linked, sizeof client);
+    OK(mbm_client_poll(&next));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+}
+
 static void a_link_begun_again_has_its_default_settings(void **state)
 {
     (void)state;
@@ -311,6 +330,7 @@ int main(void)
         cmocka_unit_test(the_callback_may_use_link_and_client),
         cmocka_unit_test(a_client_without_its_link_works_as_before),
         cmocka_unit_test(a_client_that_is_begun_again_has_no_link),
+        cmocka_unit_test(a_link_uses_nothing_of_a_client_that_was_begun_again),
         cmocka_unit_test(a_link_begun_again_has_its_default_settings),
         cmocka_unit_test(a_suspended_client_leaves_its_link_alone),
         cmocka_unit_test(a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link),

@@ -1,10 +1,13 @@
 //! The begin functions of the client, one for each framing, and the settings of one framing.
 
 use super::kind;
-use super::object::{mbm_client, queue, transport, SerialTransport, TcpTransport, TransportKind};
+use super::object::{
+    mbm_client, queue, transport, LinkedKind, SerialTransport, TcpTransport, TransportKind,
+};
 use crate::framing::{is_delimiter, MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::pointers::{self, CObject};
 use crate::port::{countable, mbm_port};
+use core::ptr::null_mut;
 use mbm::error::Status;
 
 /// Begins a client of one kind of transport. A client that was begun before first gives up
@@ -72,6 +75,9 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
             mbm_client::mark(client).write(pointers::IN_HOOK);
             ((*(*object).kind).release)(object, None);
             queue(object).cancel_all();
+            if (*object).linked {
+                (*(*object).kind.cast::<LinkedKind>().cast_mut()).client = null_mut();
+            }
         } else if status != Status::NOT_INITIALISED {
             return status;
         }

@@ -123,6 +123,8 @@ pub(crate) struct LinkedKind {
     pub(crate) kind: TransportKind,
     /// Microseconds until the next poll is due; `delay` is that of the transport.
     pub(crate) delay: unsafe fn(*mut Object, now: u32, delay: u32) -> u32,
+    /// The client; NULL once it was begun again, because the link may then outlive it.
+    pub(crate) client: *mut mbm_client,
 }
 
 impl TransportKind {

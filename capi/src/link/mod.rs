@@ -114,7 +114,6 @@ unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHo
         }
         pointers::zero(link);
         let transport = (*target).kind;
-        (*object).client = client;
         (*object).transport = transport;
         (*object).hooks = *hooks;
         (*object).port.copy(&*(*transport).port(target));
@@ -123,7 +122,7 @@ unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHo
         (*object).core.begin();
         let port = port::port(object);
         (*(*transport).port(target)).copy(&port);
-        (&raw mut (*object).kind).write(linked(&*transport));
+        (&raw mut (*object).kind).write(linked(&*transport, client));
         (*target).kind = (&raw const (*object).kind).cast();
         (*target).linked = true;
         mbm_link::mark(link).write(pointers::BEGUN);
@@ -131,9 +130,9 @@ unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHo
     }
 }
 
-/// The functions and numbers of a client that has a link, whose transport is `transport`.
+/// The functions and numbers of `client`, which gets a link and whose transport is `transport`.
 #[inline(always)]
-fn linked(transport: &TransportKind) -> LinkedKind {
+fn linked(transport: &TransportKind, client: *mut mbm_client) -> LinkedKind {
     LinkedKind {
         kind: TransportKind {
             advance: KIND.advance,
@@ -142,6 +141,7 @@ fn linked(transport: &TransportKind) -> LinkedKind {
             ..*transport
         },
         delay: KIND.delay,
+        client,
     }
 }
 
@@ -161,11 +161,15 @@ unsafe fn is_of(link: *mut Object, client: *mut client::Object) -> bool {
 unsafe fn end(link: *mut Object) -> Status {
     // SAFETY: as the caller promises.
     unsafe {
-        let object = pointers::object((*link).client);
+        let client = (*link).kind.client;
+        if client.is_null() {
+            return Status::OK;
+        }
+        let object = pointers::object(client);
         if !is_of(link, object) {
             return Status::OK;
         }
-        if pointers::check((*link).client) != Status::OK || (*object).queue.suspended {
+        if pointers::check(client) != Status::OK || (*object).queue.suspended {
             return Status::BUSY;
         }
         let transport = (*link).transport;

@@ -1,11 +1,11 @@
 //! The link object, and how a client with a link is polled.
 
+use crate::client::mbm_clientRequest;
 use crate::client::mbm_linkHooks;
 use crate::client::object::{self as client, LinkedKind, TransportKind};
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use crate::client::poll::advance_all;
 use crate::client::request::RequestPtr;
-use crate::client::{mbm_client, mbm_clientRequest};
 use crate::pointers::{self, CObject};
 use crate::port::mbm_port;
 use core::ffi::c_void;
@@ -48,7 +48,6 @@ pub struct Object {
     /// A LinkEvent, and its status.
     pub(super) event: u8,
     pub(super) status: u8,
-    pub(super) client: *mut mbm_client,
     /// What the client had before.
     pub(super) transport: *const TransportKind,
     pub(super) port: mbm_port,
@@ -145,7 +144,7 @@ impl LinkHooks for Hooks {
 unsafe fn close(link: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
-        let object = (*link).client.cast();
+        let object = (*link).kind.client.cast();
         ((*(*link).transport).release)(object, None);
         client::queue(object).interrupt();
     }
@@ -177,14 +176,14 @@ pub(super) const KIND: LinkedFunctions = LinkedFunctions {
 pub(super) struct LinkedFunctions {
     pub(super) advance: client::Advance,
     #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    pub(super) poll: unsafe fn(*mut mbm_client) -> Status,
+    pub(super) poll: unsafe fn(*mut crate::client::mbm_client) -> Status,
     pub(super) delay: unsafe fn(*mut client::Object, now: u32, delay: u32) -> u32,
 }
 
 /// # Safety
 /// As for [`advance_all`], with a client that has a link.
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
-unsafe fn poll(object: *mut mbm_client) -> Status {
+unsafe fn poll(object: *mut crate::client::mbm_client) -> Status {
     // SAFETY: as the caller promises.
     unsafe { advance_all(object, advance) }
 }

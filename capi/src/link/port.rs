@@ -66,7 +66,7 @@ unsafe fn moved(context: *mut c_void, action: impl FnOnce(&mbm_port) -> i16) -> 
             }
             (*link).core.is_lost = true;
         }
-        match client::queue((*link).client.cast()).suspended {
+        match client::queue((*link).kind.client.cast()).suspended {
             true => -1,
             false => 0,
         }
