@@ -4789,8 +4789,8 @@ uint16_t mbm_gateway_inFlight(const struct mbm_gateway *gateway);
  * its client has given up.
  *
  * @param gateway  the object
- * @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait for any
- *                 time
+ * @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait
+ *                 for any time
  * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway,

@@ -54,8 +54,8 @@ pub unsafe extern "C" fn mbm_gateway_inFlight(gateway: *const mbm_gateway) -> u1
 /// its client has given up.
 ///
 /// @param gateway  the object
-/// @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait for any
-///                 time
+/// @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait
+///                 for any time
 /// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, timeMs: u32) -> u8 {
