@@ -160,8 +160,16 @@ mod tests {
     #[test]
     fn milliseconds_come_back_as_they_were() {
         for milliseconds in 0..=u16::MAX {
-            assert_eq!(to_millis(millis(milliseconds)), milliseconds);
+            assert_eq!(to_millis(millis(milliseconds)), milliseconds.into());
         }
+    }
+
+    #[test]
+    fn a_timeout_is_refused_above_a_million_milliseconds() {
+        assert_eq!(timeout(0), Some(0));
+        assert_eq!(timeout(LONGEST_TIMEOUT_MS), Some(1_000_000_000));
+        assert_eq!(timeout(LONGEST_TIMEOUT_MS + 1), None);
+        assert_eq!(timeout(u32::MAX), None);
     }
 
     #[test]
