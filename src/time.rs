@@ -165,6 +165,14 @@ mod tests {
     }
 
     #[test]
+    fn a_timeout_is_refused_above_a_million_milliseconds() {
+        assert_eq!(timeout(0), Some(0));
+        assert_eq!(timeout(LONGEST_TIMEOUT_MS), Some(1_000_000_000));
+        assert_eq!(timeout(LONGEST_TIMEOUT_MS + 1), None);
+        assert_eq!(timeout(u32::MAX), None);
+    }
+
+    #[test]
     fn elapsed_survives_the_wrap() {
         assert_eq!(elapsed(5, u32::MAX - 4), 10);
     }
