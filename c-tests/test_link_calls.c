@@ -262,6 +262,38 @@ static void a_reconnection_on_demand_closes_the_link_and_opens_it_at_once(void *
     assert_int_equal(next_attempt(), 0);
 }
 
+static void queued_requests_wait_for_a_reconnection_on_demand(void **state)
+{
+    unsigned is_down;
+
+    (void)state;
+    for (is_down = 0; is_down < 2; is_down++) {
+        mbm_clientRequest queued = {.unit = 17};
+
+        begin_up(MBM_FRAMING_RTU);
+        if (is_down) {
+            connects_with = status_is = MBM_LINK_LOST;
+            OK(mbm_link_reconnect(&kept));
+            OK(mbm_client_poll(&client));
+            OK(mbm_client_poll(&client));
+            assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
+            connects_with = MBM_OK;
+        }
+        IS(MBM_PENDING, mbm_client_readCoils(&client, &queued, 0, 1));
+        OK(mbm_link_reconnect(&kept));
+        (void)mbm_client_poll(&client);
+        (void)mbm_client_poll(&client);
+        IS(MBM_PENDING, queued.status);
+        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+        /* If the attempt fails, they end. */
+        connects_with = status_is = MBM_LINK_LOST;
+        OK(mbm_link_reconnect(&kept));
+        (void)mbm_client_poll(&client);
+        (void)mbm_client_poll(&client);
+        IS(MBM_LINK_LOST, queued.status);
+    }
+}
+
 static void queue_again(void *context, mbm_clientRequest *ended)
 {
     (void)context;
@@ -335,6 +367,7 @@ int main(void)
         cmocka_unit_test(a_suspended_client_leaves_its_link_alone),
         cmocka_unit_test(a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link),
         cmocka_unit_test(a_reconnection_on_demand_closes_the_link_and_opens_it_at_once),
+        cmocka_unit_test(queued_requests_wait_for_a_reconnection_on_demand),
         cmocka_unit_test(a_request_of_done_fails_or_waits_as_all_do),
         cmocka_unit_test(a_call_that_is_refused_changes_nothing),
     };

@@ -3401,7 +3401,8 @@ uint8_t mbm_link_end(struct mbm_link *link);
 
 /**
  * Closes the link and opens it again, at the next poll of the client and without a wait. Call
- * it when you know better than the link: the network is back, the address has changed.
+ * it when you know better than the link: the network is back, the address has changed. Requests
+ * that are under way end with MBM_LINK_LOST; queued ones wait for this attempt.
  *
  * @param link  the object
  * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED

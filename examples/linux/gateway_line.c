@@ -167,8 +167,6 @@ static void report(void *context, uint8_t event, uint8_t status)
                          : status == MBM_RESPONSE_TIMED_OUT || error == 0 ? mbm_status_text(status)
                                                                           : strerror(error);
 
-    if (event != MBM_LINK_EVENT_LOST)
-        (void)mbm_link_setRequestsWait(&line->link, 0);
     if (event == MBM_LINK_EVENT_CONNECTED) {
         line->reason[0] = '\0';
         return;
@@ -236,7 +234,6 @@ uint8_t gateway_line_isReady(void *context)
     if ((state == MBM_LINK_IS_UP && mbm_client_pending(&line->client) == 0 && has_hung_up(line)) ||
         (state == MBM_LINK_IS_DOWN && micros() - line->tried >= REOPEN_MS * 1000u)) {
         /* The request waits for this attempt, and ends if it fails. */
-        (void)mbm_link_setRequestsWait(&line->link, 1);
         (void)mbm_link_reconnect(&line->link);
         return 1;
     }

@@ -66,7 +66,7 @@ pub struct Link {
     attempts: u8,
     /// The link was lost or not opened, and [`LinkHooks::disconnect`] was not called since.
     is_to_close: bool,
-    /// The next attempt follows at once.
+    /// The caller has asked for the next attempt: it follows at once, and requests wait for it.
     at_once: bool,
     /// The port has reported that the link is lost.
     pub is_lost: bool,
@@ -105,17 +105,15 @@ impl Link {
 
     /// True if pending requests end now, because there is no link.
     pub fn fails_requests(&self) -> bool {
-        self.state == LinkState::Down && !self.keeps_requests
+        self.state == LinkState::Down && !self.keeps_requests && !self.at_once
     }
 
     /// Closes the link and opens it again without a wait.
     pub fn restart(&mut self) {
         self.attempts = 0;
+        self.at_once = true;
         match self.state {
-            LinkState::Up => {
-                self.is_lost = true;
-                self.at_once = true;
-            }
+            LinkState::Up => self.is_lost = true,
             LinkState::Connecting => {
                 self.state = LinkState::Down;
                 self.is_to_close = true;
@@ -152,14 +150,18 @@ impl Link {
                 if !fresh || !is_over {
                     return None;
                 }
+                self.at_once = false;
                 hooks.connect()
             }
             _ if !fresh => return None,
-            LinkState::Unknown => match hooks.status() {
-                Status::OK => Status::OK,
-                Status::PENDING => Status::PENDING,
-                _ => hooks.connect(),
-            },
+            LinkState::Unknown => {
+                self.at_once = false;
+                match hooks.status() {
+                    Status::OK => Status::OK,
+                    Status::PENDING => Status::PENDING,
+                    _ => hooks.connect(),
+                }
+            }
             LinkState::Connecting => match hooks.status() {
                 Status::PENDING if is_over && self.connect_timeout > 0 => Status::CONNECT_TIMED_OUT,
                 status => status,
@@ -205,7 +207,6 @@ impl Link {
             self.attempts = self.attempts.saturating_add(1);
             self.wait = self.policy.wait(self.attempts, || hooks.random());
         }
-        self.at_once = false;
         Some((event, status))
     }
 
