@@ -29,11 +29,13 @@ int main(int argc, char **argv)
 {
     mbm_tty tty = MBM_INIT;
     mbm_port port;
+    unsigned long slave;
     uint32_t baud;
     uint8_t i;
 
     trace_options(&argc, argv);
-    if (argc != 4) {
+    slave = argc == 4 ? strtoul(argv[3], NULL, 10) : 0;
+    if (slave < 1 || slave > 247) {
         fprintf(stderr, "usage: %s path baud slave\n%s", argv[0], TRACE_HELP);
         return 2;
     }
@@ -44,7 +46,7 @@ int main(int argc, char **argv)
     }
     port = trace_client(mbm_tty_port(&tty), MBM_FRAMING_RTU, argv[1]);
     mbm_master_setBuffers(&node, response, READ_WORDS, transmit, WRITE_WORDS, frame, sizeof frame);
-    mbm_master_beginRtu(&node, (uint8_t)strtoul(argv[3], NULL, 10), &port);
+    mbm_master_beginRtu(&node, (uint8_t)slave, &port);
     mbm_master_setBaudRate(&node, baud);
 
     /* Two words to registers 0 and 1, then six words from register 2 on. */

@@ -32,9 +32,10 @@ int main(int argc, char **argv)
     const mbm_caller read_words = mbm_call_overTcp(&tcp, &client, &words);
     const mbm_caller read_bits = mbm_call_overTcp(&tcp, &client, &bits);
     const mbm_port port = mbm_tcp_port(&tcp);
+    const unsigned long unit = argc == 4 ? strtoul(argv[3], NULL, 10) : 0;
     int i;
 
-    if (argc != 4) {
+    if (unit < 1 || unit > 255) {
         fprintf(stderr, "usage: %s host port unit\n", argv[0]);
         return 2;
     }
@@ -43,7 +44,7 @@ int main(int argc, char **argv)
         return 1;
     }
     mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing, sizeof outgoing);
-    words.unit = bits.unit = (uint8_t)strtoul(argv[3], NULL, 10);
+    words.unit = bits.unit = (uint8_t)unit;
     words.reply = registers;
     words.replyBytes = sizeof registers;
     bits.reply = coils;
