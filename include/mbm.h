@@ -3391,7 +3391,8 @@ uint8_t mbm_link_begin(struct mbm_link *link,
 
 /**
  * Ends a link. The client and its requests stay; the link itself stays open or closed as it
- * is. The storage is free, and begins anew with mbm_link_begin.
+ * is. If its callback has just reported a loss, open it anew before the client sends again: half
+ * a frame may have been sent. The storage is free, and begins anew with mbm_link_begin.
  *
  * @param link  the object; the client's storage must still be valid
  * @return MBM_OK; MBM_BUSY from within a hook and while the client is suspended;
