@@ -264,6 +264,27 @@ after_a_damaged_reply_the_next_one_is_held_as_long_as_the_failed_request_waited(
     assert_in_range(s->now - s->last_byte, 300000, 330000);
 }
 
+static void a_program_that_polls_late_does_not_lengthen_the_hold(void **state)
+{
+    DEVICE;
+
+    device.takes[0] = 0;
+    device.damaged = 1;
+    OK(mbm_master_setBlocking(n, 0));
+    assert_int_equal(read_at(s, 0), MBM_PENDING);
+    while (s->sent == 0 || s->now < s->frames[0].end + 1000) {
+        assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+        s->now += 100;
+    }
+    s->now += 600000000;
+    while (mbm_master_poll(n) == MBM_PENDING)
+        s->now += 100;
+    assert_int_equal(mbm_master_status(n), MBM_INVALID_CRC);
+    OK(mbm_master_setBlocking(n, 1));
+    assert_reads(s, 1, 1);
+    assert_in_range(s->now - s->last_byte, QUIET, 1000 * TIMEOUT_MS + SIM_SLACK);
+}
+
 /* The line is free, so the reply belongs to an earlier request, and another may follow. */
 static void a_right_reply_before_a_request_lets_the_next_one_be_held(void **state)
 {
@@ -445,6 +466,7 @@ int main(void)
         SIM_TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else),
         SIM_TEST(after_a_damaged_reply_the_next_reply_costs_one_quiet_time),
         SIM_TEST(after_a_damaged_reply_the_next_one_is_held_as_long_as_the_failed_request_waited),
+        SIM_TEST(a_program_that_polls_late_does_not_lengthen_the_hold),
         SIM_TEST(a_right_reply_before_a_request_lets_the_next_one_be_held),
         SIM_TEST(noise_and_other_replies_before_a_request_let_no_reply_be_held),
         SIM_TEST(without_a_quiet_time_no_reply_is_held),

@@ -152,8 +152,9 @@ static void a_poll_reports_what_its_comment_says(void **state)
 
     (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, 256));
-    assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFF);
+    assert_int_equal(mbm_server_pollDelay(&server), 0);
     OK(mbm_server_poll(&server));
+    assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFF);
     hooked_port_arrive_rtu(&wire, 17, "\3\0\0\0\1", 5);
     OK(mbm_server_poll(&server));
     assert_int_equal(mbm_server_pollDelay(&server), 4000);

@@ -45,7 +45,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         let mut hold = Q::response_timeout(self);
         if self.phase == Phase::Reply && self.fault == RxFault::BAD_CRC {
             // The reply has come, though damaged. So the unit needs no longer than this.
-            hold = elapsed(self.now, self.phase_start);
+            hold = hold.min(elapsed(self.now, self.phase_start));
         }
         if self.late_units == 0 {
             self.hold = self.settings.quiet_time;
