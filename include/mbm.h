@@ -1294,9 +1294,8 @@ uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint32_t delayM
  *
  * After a request without a right reply, the master does two things. It waits for the quiet
  * time before it sends the next request, and discards bytes that arrive meanwhile. Then it
- * holds the next reply of that unit, until no byte has arrived for as long as the failed
- * request waited: the response timeout after MBM_RESPONSE_TIMED_OUT, the time until the
- * damaged reply had come after MBM_INVALID_CRC, and at least the quiet time. A second reply
+ * holds the next reply of that unit, until no byte has arrived for the response timeout; after
+ * MBM_INVALID_CRC for the quiet time, because the damaged reply is not late. A second reply
  * replaces the held one, because a device answers in order. If the second reply is damaged,
  * the request fails. A right reply that arrives before a request is sent shows that replies
  * are late; the next reply is then held for the response timeout.

@@ -92,7 +92,8 @@ pub const fn character(baud: u32) -> u16 {
 }
 
 /// The length of `count` characters, if one lasts `character` microseconds.
-#[inline(always)]
+#[cfg_attr(target_arch = "avr", inline(never))]
+#[cfg_attr(not(target_arch = "avr"), inline(always))]
 pub const fn characters(character: u16, count: u8) -> u32 {
     if cfg!(any(test, target_arch = "avr")) {
         // An AVR multiplies bytes in hardware. A 32-bit product would need 84 bytes of

@@ -110,6 +110,8 @@ pub struct Engine<P, S: Storage, Q> {
     probation: Probation,
     /// The last request got no right reply. Its reply may still come.
     late: bool,
+    /// One of the late units sent no reply, not only a damaged one.
+    has_slow_unit: bool,
     /// The echo of the request is expected before the reply.
     pub(crate) echo: bool,
     /// No byte has arrived since the received bytes were last searched for a reply after an
@@ -133,11 +135,9 @@ pub struct Engine<P, S: Storage, Q> {
     last_byte: u32,
     /// The time of the current poll.
     now: u32,
-    /// How long the line must be silent before a reply on probation is accepted.
-    hold: u32,
-    /// The units that did not answer their last request: bit n stands for the units whose
-    /// number is n modulo 32.
-    late_units: u32,
+    /// The units that did not answer their last request. Each bit stands for the units whose
+    /// numbers are equal modulo 32.
+    late_units: [u8; 4],
     /// CRC of the bytes skipped since the last frame ended. `crc` continues it over the first
     /// `processed` bytes of the buffer.
     crc_skipped: Crc16,

@@ -38,8 +38,8 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             wait: 0,
             last_byte: 0,
             now: 0,
-            hold: 0,
-            late_units: 0,
+            has_slow_unit: false,
+            late_units: [0; 4],
             storage,
             settings: Settings::DEFAULT,
             port,
@@ -272,7 +272,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         } else if self.phase == Phase::Turnaround {
             (self.wait, self.phase_start)
         } else if self.probation == Probation::Held {
-            (self.hold, self.last_byte)
+            (self.hold(), self.last_byte)
         } else if !self.resynced {
             (self.settings.silence, self.last_byte)
         } else {

@@ -3,11 +3,11 @@
 //!
 //! A device that answers in order, but later than the timeout, sends two replies after the
 //! next request: first the late reply, then the right one. So after a request without a right
-//! reply, the engine holds the next reply of that unit until the line has been silent for as
-//! long as the failed request waited, which is the response timeout after a timeout. A device
-//! that answers within the response timeout sends its second reply before that. The second
-//! right reply replaces the held one. If it arrives damaged, the request fails, because the
-//! held reply is then most likely the late one.
+//! reply, the engine holds the next reply of that unit until the line has been silent for the
+//! response timeout. A device that answers within the response timeout sends its second reply
+//! before that. The second right reply replaces the held one. If it arrives damaged, the
+//! request fails, because the held reply is then most likely the late one. If only damaged
+//! replies came since the last right one, the quiet time suffices, because none is late.
 
 use super::{
     Count, Counter, Engine, Phase, Probation, RequestSpec, RxFault, Storage, Words, BROADCAST,
@@ -16,7 +16,6 @@ use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
-use crate::time::elapsed;
 use crate::FIRMWARE;
 
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
@@ -42,27 +41,43 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Notes that the reply to the pending request may come late.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn expect_late_reply(&mut self) {
-        let mut hold = Q::response_timeout(self);
-        if self.phase == Phase::Reply && self.fault == RxFault::BAD_CRC {
-            // The reply has come, though damaged. So the unit needs no longer than this.
-            hold = hold.min(elapsed(self.now, self.phase_start));
-        }
-        if self.late_units == 0 {
-            self.hold = self.settings.quiet_time;
-        }
-        self.hold = self.hold.max(hold);
+        // A damaged reply has come, so none is late.
+        let is_damaged = self.phase == Phase::Reply && self.fault == RxFault::BAD_CRC;
+        self.has_slow_unit &= self.late_units != [0; 4];
+        self.has_slow_unit |= !is_damaged;
         self.late = true;
-        self.late_units |= self.late_unit();
+        let (byte, bit) = self.late_unit();
+        *byte |= bit;
     }
 
-    /// The bit of the pending request's unit in `late_units`.
-    fn late_unit(&self) -> u32 {
-        1 << (self.unit & 31)
+    /// How long the line must be silent before a held reply is accepted.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn hold(&mut self) -> u32 {
+        let quiet_time = self.settings.quiet_time;
+        if self.has_slow_unit {
+            quiet_time.max(Q::response_timeout(self))
+        } else {
+            quiet_time
+        }
+    }
+
+    /// The byte of `late_units` that has the bit of the pending request's unit, and that bit.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn late_unit(&mut self) -> (&mut u8, u8) {
+        let [zero, one, two, three] = &mut self.late_units;
+        let byte = match self.unit & 3 {
+            0 => zero,
+            1 => one,
+            2 => two,
+            _ => three,
+        };
+        (byte, 1 << (self.unit >> 2 & 7))
     }
 
     /// True if the pending request's unit did not answer its last request.
-    fn is_late_unit(&self) -> bool {
-        self.late_units & self.late_unit() != 0
+    fn is_late_unit(&mut self) -> bool {
+        let (byte, bit) = self.late_unit();
+        *byte & bit != 0
     }
 
     /// Prepares the search for the reply to the request that has just been sent.
@@ -154,7 +169,8 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             }
         }
         if self.probation == Probation::Held {
-            over = self.is_silent(self.hold) || self.has_expired();
+            let hold = self.hold();
+            over = self.is_silent(hold) || self.has_expired();
         }
         if over {
             let is_held = !LENIENT || self.probation == Probation::Held;
@@ -229,7 +245,8 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Counts the reply that was found, and returns its status.
     #[cfg_attr(target_os = "none", inline(never))]
     fn found(&mut self) -> Status {
-        self.late_units &= !self.late_unit();
+        let (byte, bit) = self.late_unit();
+        *byte &= !bit;
         self.storage.count(Counter::Replies, 1);
         if self.exception != 0 {
             self.storage.count(Counter::Exceptions, 1);
@@ -283,7 +300,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.probation = Probation::Held;
         // If the line is never silent, the wait for a second reply ends at this time.
         let timeout = Q::response_timeout(self);
-        self.wait = timeout.wrapping_add(timeout).wrapping_add(self.hold);
+        self.wait = timeout.wrapping_add(timeout).wrapping_add(self.hold());
     }
 
     /// Drops the held reply and counts it as a foreign frame.
@@ -301,12 +318,12 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// it may have been the answer.
     #[cfg_attr(target_os = "none", inline(never))]
     fn accept_held(&mut self) -> bool {
-        let held = self.held;
+        let (held, hold) = (self.held, self.hold());
         // A single byte may be noise; more bytes may be the beginning of a reply.
         if held == S::Count::ZERO
             || self.fault >= RxFault::BAD_CRC
             || self.end > 1u8.into()
-            || !self.is_silent(self.hold)
+            || !self.is_silent(hold)
         {
             return false;
         }

@@ -22,7 +22,7 @@ def draw():
     drawing = Drawing(
         "The states of a request on a serial line",
         "A request is queued (client only), waits for the gap, is sent, flushed, held for the post-flush hold, and "
-        "waits for its reply. A reply that may be a late one is held until the line was silent for as long as the failed request waited. "
+        "waits for its reply. A reply that may be a late one is held until the line was silent for the response timeout. "
         "Ends: LINE_BUSY from gap, send and flush; LINK_LOST from queued, gap, send, reply and held; OK or an exception from reply "
         "and held; a timeout or damage from reply and held, with a repetition if a retry is left; a broadcast ends "
         "after the turnaround delay; CANCELLED from every state.")
