@@ -109,10 +109,8 @@ static const char *const NO_NUMBERS[] = {
     "{}",
     "5;",
     "5\n6",
-    "\xef\xbb\xbf"
-    "5",
-    "\xc2\xa0"
-    "5",
+    "\357\273\2775", /* a byte order mark, as octal digits end after three */
+    "\302\2405",     /* a space that does not break */
     "\xd9\xa5",
     "1\v",
     "\f1",

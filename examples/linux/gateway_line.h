@@ -42,7 +42,7 @@ int gateway_line_begin(gateway_line *line, uint16_t timeoutMs, uint16_t quietMs)
 
 /* `isReady` of mbm_gatewayLine. A line that is not open is opened for a request, but at most once a
  * second. */
-uint8_t gateway_line_isReady(void *line);
+uint8_t gateway_line_isReady(void *context);
 
 /* What to poll for the line. Returns 0 if it has no descriptor. */
 int gateway_line_wait(const gateway_line *line, struct pollfd *wait);

@@ -35,10 +35,14 @@ static int is_digit(const cursor *in)
     return in->at < in->end && *in->at >= '0' && *in->at <= '9';
 }
 
+static int is_space(char one)
+{
+    return one == ' ' || one == '\t' || one == '\r' || one == '\n';
+}
+
 static void skip_space(cursor *in)
 {
-    while (in->at < in->end &&
-           (*in->at == ' ' || *in->at == '\t' || *in->at == '\r' || *in->at == '\n'))
+    while (in->at < in->end && is_space(*in->at))
         in->at++;
 }
 
@@ -318,7 +322,7 @@ static cursor find_value(const char *payload, size_t length)
     cursor in = {payload, payload + length}, value = {NULL, NULL};
 
     skip_space(&in);
-    while (in.at < in.end && memchr(" \t\r\n", in.end[-1], 4))
+    while (in.at < in.end && is_space(in.end[-1]))
         in.end--;
     if (!skip_char(&in, '{'))
         return in;
