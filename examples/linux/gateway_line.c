@@ -119,7 +119,7 @@ static void close_line(void *context)
     keep_reserve(line);
 }
 
-static uint8_t line_status(void *context)
+static uint8_t link_status(void *context)
 {
     gateway_line *line = (gateway_line *)context;
 
@@ -203,7 +203,7 @@ static uint8_t begin_client(gateway_line *line)
 
 int gateway_line_begin(gateway_line *line, uint16_t timeoutMs, uint16_t quietMs)
 {
-    const mbm_linkHooks hooks = {line, close_line, open_line, line_status};
+    const mbm_linkHooks hooks = {line, close_line, open_line, link_status};
 
     keep_reserve(line);
     return begin_client(line) == MBM_OK &&

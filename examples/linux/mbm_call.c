@@ -77,7 +77,8 @@ uint8_t mbm_call(const mbm_caller *caller, uint8_t queued)
         return queued;
     if (!caller || !caller->client || !caller->wait)
         return MBM_INVALID_ARGUMENT;
-    for (end = end_of(caller);;) {
+    end = end_of(caller);
+    for (;;) {
         const uint8_t polled = mbm_client_poll(caller->client);
         int64_t left;
 

@@ -206,9 +206,11 @@ static int read_decimal(cursor in, decimal *number)
         is_negative = skip_char(&in, '-');
         if (!is_negative)
             (void)skip_char(&in, '+');
-        for (; is_digit(&in); in.at++)
+        while (is_digit(&in)) {
             if (exponent < FAR)
                 exponent = exponent * 10 + (*in.at - '0');
+            in.at++;
+        }
         number->exponent += is_negative ? -exponent : exponent;
     }
     return 1;
@@ -274,7 +276,7 @@ static const char *to_integer(const decimal *number, const mqtt_scale *scale, ui
 {
     static const struct {
         uint64_t below_zero, most;
-    } RANGES[] = {
+    } RANGES[MBM_TYPE_INT64 + 1] = {
         [MBM_TYPE_BIT] = {0, 1},
         [MBM_TYPE_UINT16] = {0, UINT16_MAX},
         [MBM_TYPE_INT16] = {(uint64_t)INT16_MAX + 1, INT16_MAX},
@@ -291,7 +293,7 @@ static const char *to_integer(const decimal *number, const mqtt_scale *scale, ui
     if (*integer > (is_negative ? RANGES[type].below_zero : RANGES[type].most))
         return OUT_OF_RANGE;
     if (is_negative)
-        *integer = 0 - *integer;
+        *integer = ~*integer + 1;
     return NULL;
 }
 
