@@ -198,15 +198,23 @@ pub fn set(life: &Life, at: usize) {
     match w.byte() % 12 {
         0 => {
             limits.timeout = limits.timeout.max(us);
-            call!(w, client, mbm_client_setResponseTimeout(client, word));
+            call!(
+                w,
+                client,
+                mbm_client_setResponseTimeout(client, u32::from(word))
+            );
         }
         1 => {
             limits.quiet = limits.quiet.max(us);
-            call!(w, client, mbm_client_setQuietTime(client, word));
+            call!(w, client, mbm_client_setQuietTime(client, u32::from(word)));
         }
         2 => {
             limits.turnaround = limits.turnaround.max(us);
-            call!(w, client, mbm_client_setTurnaroundDelay(client, word));
+            call!(
+                w,
+                client,
+                mbm_client_setTurnaroundDelay(client, u32::from(word))
+            );
         }
         3 => {
             let gap = u32::from(word) * 100;
@@ -226,14 +234,18 @@ pub fn set(life: &Life, at: usize) {
         6 => {
             limits.busy_retries = limits.busy_retries.max(u64::from(byte % 3));
             limits.backoff = limits.backoff.max(us);
-            call!(w, client, mbm_client_setBusyRetries(client, byte % 3, word));
+            call!(
+                w,
+                client,
+                mbm_client_setBusyRetries(client, byte % 3, u32::from(word))
+            );
         }
         7 => {
             limits.backoff = limits.backoff.max(2 * us);
             call!(
                 w,
                 client,
-                mbm_client_setBackoff(client, byte % 4, word, 2 * word)
+                mbm_client_setBackoff(client, byte % 4, u32::from(word), 2 * u32::from(word))
             );
         }
         8 => {

@@ -232,7 +232,11 @@ pub fn act(life: &Life) {
         3 | 4 => open(life, connection),
         5 => {
             let time = u16::from(w.byte());
-            call!(w, gateway, mbm_gateway_setQueueTime(gateway, time));
+            call!(
+                w,
+                gateway,
+                mbm_gateway_setQueueTime(gateway, u32::from(time))
+            );
         }
         6 => {
             let most = 1 + u16::from(w.byte()) % 6;

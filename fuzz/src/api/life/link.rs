@@ -116,11 +116,11 @@ pub fn set(life: &Life, at: usize) {
             call!(
                 w,
                 link,
-                mbm_link_setBackoff(link, byte >> 2 & 3, word, 2 * word)
+                mbm_link_setBackoff(link, byte >> 2 & 3, u32::from(word), 2 * u32::from(word))
             );
         }
         1 => {
-            if call!(w, link, mbm_link_setConnectTimeout(link, word)) == OK {
+            if call!(w, link, mbm_link_setConnectTimeout(link, u32::from(word))) == OK {
                 line.connects_for_ever.set(word == 0);
             }
         }
