@@ -369,7 +369,7 @@ static void lenient_is_refused_while_a_request_is_under_way(void **state)
 
 /* --- the response timeout --- */
 
-/* Sends 123 registers, lets the device answer so many milliseconds later, and returns the
+/* Sends 123 registers, lets the device answer after the given milliseconds, and returns the
  * status. */
 static uint8_t answered_after(uint32_t ms)
 {

@@ -33,7 +33,7 @@ static int setup(void **state)
     return mbm_registers_intoWords(&r, words, WORDS, FIRST);
 }
 
-/* A function that gets or sets values of so many registers, at an address, in an order. */
+/* A function that gets or sets a value of `registers` registers, at an address, in an order. */
 typedef struct accessor {
     const char *name;
     uint8_t (*call)(const mbm_registers *registers, uint16_t address, uint8_t order);

@@ -285,7 +285,7 @@ static void one_poll_takes_the_handshake_on_by_one_message(void **state)
     assert_int_equal(mbm_tls_progress(&pair.server.tls), MBM_TLS_GREETED);
     assert_int_equal(pair.to_client.moved, 0);
     while (mbm_tls_pollDelay(&pair.server.tls) == 0) {
-        /* Told once: a program that does not poll the connection sleeps. */
+        /* pollDelay says so once: a program that does not poll the connection sleeps. */
         assert_int_equal(mbm_tls_pollDelay(&pair.server.tls), TLS_HANDSHAKE_US);
         (void)mbm_tls_poll(&pair.server.tls);
         polls++;

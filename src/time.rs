@@ -58,8 +58,8 @@ pub const fn millis(milliseconds: u16) -> u32 {
     milliseconds as u32 * 1000
 }
 
-/// The longest timeout that a caller may set, in milliseconds, about 16 minutes. Twice that time
-/// still is less than [`LONGEST`].
+/// The longest timeout that a caller may set, in milliseconds, about 16 minutes. A request may
+/// wait for three times as long for a second reply, which still fits into 32 bits.
 const LONGEST_TIMEOUT_MS: u32 = 1_000_000;
 
 /// Converts a timeout in milliseconds to microseconds. `None` above 1 000 000.
