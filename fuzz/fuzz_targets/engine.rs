@@ -34,6 +34,8 @@ struct Line {
     requests: Vec<Vec<u8>>,
     /// The bytes read since the last request.
     received: Vec<u8>,
+    /// The bytes read before that, while the request waited for silence.
+    unexpected: Vec<u8>,
     lost: bool,
 }
 
@@ -92,6 +94,7 @@ impl Port for Line {
         assert!(!self.driver);
         self.driver = true;
         self.sent.clear();
+        self.unexpected = std::mem::take(&mut self.received);
     }
 
     fn post_transmission(&mut self) {
@@ -119,6 +122,7 @@ fuzz_target!(|data: &[u8]| {
         sent: Vec::new(),
         requests: Vec::new(),
         received: Vec::new(),
+        unexpected: Vec::new(),
         lost: false,
     };
     let frame = vec![0; 4 + usize::from(input.u8()) % 253];
@@ -206,10 +210,11 @@ fn check_no_reply_missed(engine: &mut MasterEngine, asked: &Asked, space: usize,
         Status::LINE_BUSY | Status::LINK_LOST | Status::BUFFER_TOO_SMALL
     );
     let settings = engine.settings;
-    // After an attempt without a right reply, the master may hold the next reply, because it
-    // may be a late one.
+    // After an attempt without a right reply, and after a right reply that arrived before the
+    // request was sent, the master may hold the next reply, because it may be a late one.
     let attempts = engine.storage.counters[Counter::Requests as usize];
-    let held = settings.quiet_time > 0 && attempts > 1;
+    let unexpected = right_replies(&engine.port.unexpected, asked).next();
+    let held = settings.quiet_time > 0 && (attempts > 1 || unexpected.is_some());
     if other || held || settings.echo_discard {
         return;
     }
@@ -225,6 +230,15 @@ fn check_no_reply_missed(engine: &mut MasterEngine, asked: &Asked, space: usize,
         None,
         "the engine missed a reply after noise"
     );
+}
+
+/// The right replies among the bytes.
+fn right_replies<'a>(bytes: &'a [u8], asked: &'a Asked) -> impl Iterator<Item = &'a [u8]> {
+    (0..bytes.len()).filter_map(|at| {
+        let rest = &bytes[at..];
+        let reply = rest.get(..asked.frame_length(rest)?)?;
+        asked.is_answered_by(reply).then_some(reply)
+    })
 }
 
 fn validate(engine: &mut MasterEngine, asked: &Asked, status: Status) {
@@ -248,13 +262,7 @@ fn validate(engine: &mut MasterEngine, asked: &Asked, status: Status) {
         assert!(!status.is_exception());
         return;
     }
-    let replies = || {
-        (0..port.received.len()).filter_map(|at| {
-            let rest = &port.received[at..];
-            let reply = rest.get(..asked.frame_length(rest)?)?;
-            asked.is_answered_by(reply).then_some(reply)
-        })
-    };
+    let replies = || right_replies(&port.received, asked);
     if !success {
         assert!((0xE0..=0xEC).contains(&status.code()), "{status:?}");
         return;
