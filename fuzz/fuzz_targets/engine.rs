@@ -141,6 +141,8 @@ fuzz_target!(|data: &[u8]| {
         post_flush_hold: input.u8() % 4,
         echo_discard: input.u8() & 1 == 1,
     };
+    // A right reply arrived before a request was sent.
+    let mut is_early = false;
     for _ in 0..2 {
         let Some(asked) = Asked::new(input) else {
             return;
@@ -157,17 +159,18 @@ fuzz_target!(|data: &[u8]| {
             port.script.push_back((delay, next));
         }
         let step = 20 + u32::from(input.u8()) * 8;
-        run(&mut engine, &asked, space, step);
+        run(&mut engine, &asked, space, step, &mut is_early);
         // No held reply takes space in the frame buffer any more.
         assert_eq!(usize::from(engine.storage.capacity()), space);
     }
 });
 
-fn run(engine: &mut MasterEngine, asked: &Asked, space: usize, step: u32) {
+fn run(engine: &mut MasterEngine, asked: &Asked, space: usize, step: u32, is_early: &mut bool) {
     engine.clear_outcome();
     *engine.request() = asked.request;
     engine.port.requests.clear();
     engine.port.received.clear();
+    engine.port.unexpected.clear();
     let started = engine.start(asked.unit);
     let fits = asked.frame().len() <= space;
     if started != Status::PENDING {
@@ -197,24 +200,36 @@ fn run(engine: &mut MasterEngine, asked: &Asked, space: usize, step: u32) {
         assert!(polls < 100_000, "the request never ends");
     };
     validate(engine, asked, status);
+    let port = &engine.port;
+    // Without a request on the line, all bytes arrived before it.
+    let unexpected = match port.requests.is_empty() {
+        true => &port.received,
+        false => &port.unexpected,
+    };
+    *is_early |= right_replies(unexpected, asked).next().is_some();
     if status.is_failure() {
-        check_no_reply_missed(engine, asked, space, status);
+        check_no_reply_missed(engine, asked, space, status, *is_early);
     }
 }
 
 /// Checks that the bytes received by a failed request contain no right reply. Skips requests
 /// that may fail for other reasons.
-fn check_no_reply_missed(engine: &mut MasterEngine, asked: &Asked, space: usize, status: Status) {
+fn check_no_reply_missed(
+    engine: &mut MasterEngine,
+    asked: &Asked,
+    space: usize,
+    status: Status,
+    is_early: bool,
+) {
     let other = matches!(
         status,
         Status::LINE_BUSY | Status::LINK_LOST | Status::BUFFER_TOO_SMALL
     );
     let settings = engine.settings;
-    // After an attempt without a right reply, and after a right reply that arrived before the
+    // After an attempt without a right reply, and after a right reply that arrived before a
     // request was sent, the master may hold the next reply, because it may be a late one.
     let attempts = engine.storage.counters[Counter::Requests as usize];
-    let unexpected = right_replies(&engine.port.unexpected, asked).next();
-    let held = settings.quiet_time > 0 && (attempts > 1 || unexpected.is_some());
+    let held = settings.quiet_time > 0 && (attempts > 1 || is_early);
     if other || held || settings.echo_discard {
         return;
     }
