@@ -190,7 +190,8 @@ static void close_all(const int *fds, unsigned count)
         close(fds[count]);
 }
 
-/* The server has closed a client's connection: after it is read to its end. */
+/* The server has closed a client's connection, and the client knows it: the system needs time for
+ * that on a busy machine. It is read to its end first. */
 static int is_closed(int fd)
 {
     uint8_t byte;
@@ -212,7 +213,7 @@ static void the_oldest_unfinished_handshake_leaves_for_a_new_client(void **state
         fds[i] = get_half_open("127.0.0.1");
     for (; i < 2 * PLACES; i++) {
         fds[i] = get_half_open("127.0.0.1");
-        assert_true(is_closed(fds[i - PLACES]));
+        UNTIL(is_closed(fds[i - PLACES]));
         for (k = i - PLACES + 1; k <= i; k++)
             assert_true(place_of(fds[k]) >= 0);
     }
@@ -230,7 +231,7 @@ static void a_client_whose_first_message_is_there_stays_longer_than_one_that_sen
     for (i = 1; i <= PLACES; i++)
         fds[i] = get_half_open("127.0.0.1");
     assert_true(place_of(fds[0]) >= 0);
-    assert_true(is_closed(fds[1]));
+    UNTIL(is_closed(fds[1]));
     close_all(fds, PLACES + 1);
 }
 
@@ -245,7 +246,7 @@ static void the_address_with_the_most_unfinished_handshakes_loses_one_first(void
     for (i = 1; i <= PLACES; i++)
         fds[i] = get_place("127.0.0.1", hello, hello_bytes, MBM_TLS_GREETED);
     assert_true(place_of(fds[0]) >= 0);
-    assert_true(is_closed(fds[1]));
+    UNTIL(is_closed(fds[1]));
     close_all(fds, PLACES + 1);
 }
 
