@@ -15,9 +15,26 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
+#include <time.h>
 #include <unistd.h>
 
-enum { PLACES = 4, STEP_US = 20000, MANY = 40 };
+enum { PLACES = 4, STEP_US = 20000, MANY = 40, JUMP_S = 10 };
+
+static time_t ahead;        /* seconds by which the clock is fast */
+static unsigned looks_left; /* looks at the clock before it jumps; 0: it does not */
+static unsigned looks;      /* looks_left when the server accepts */
+
+/* This function replaces that of libc. */
+int clock_gettime(clockid_t id, struct timespec *time)
+{
+    const int result = (int)syscall(SYS_clock_gettime, id, time);
+
+    time->tv_sec += ahead;
+    if (looks_left > 0 && --looks_left == 0)
+        ahead += JUMP_S;
+    return result;
+}
 
 static mbm_tls_identity identity, operator_identity;
 static mbm_tcp_listener listener;
@@ -77,6 +94,8 @@ static void record_hello(void)
 static int begin(void **state)
 {
     (void)state;
+    ahead = 0;
+    looks = 0;
     memset(&unit, 0, sizeof unit);
     unit.id = 17;
     words[0] = 0xBEEF;
@@ -113,7 +132,9 @@ static void go_round(int fd)
     int i;
 
     (void)mbm_tls_wait(tlss, tcps, PLACES, &listener, fd, STEP_US);
+    looks_left = looks;
     i = mbm_tls_accept(&listener, &identity, tlss, tcps, PLACES);
+    looks_left = 0;
     if (i >= 0) {
         const mbm_port port = mbm_tls_port(&tlss[i]);
 
@@ -219,6 +240,28 @@ static void the_oldest_unfinished_handshake_leaves_for_a_new_client(void **state
     }
     assert_int_equal(listener.refused, 0);
     close_all(fds, 2 * PLACES);
+}
+
+/* As on a busy machine, which may stop a program between two looks at the clock. */
+static void the_oldest_leaves_also_if_time_passes_while_handshakes_are_compared(void **state)
+{
+    int fds[PLACES + 1];
+    unsigned i, jump;
+
+    (void)state;
+    for (jump = 1; jump <= PLACES; jump++) {
+        for (i = 0; i <= PLACES; i++) {
+            looks = i == PLACES ? jump : 0;
+            fds[i] = get_half_open("127.0.0.1");
+        }
+        looks = 0;
+        UNTIL(is_closed(fds[0]));
+        for (i = 1; i <= PLACES; i++)
+            assert_true(place_of(fds[i]) >= 0);
+        close_all(fds, PLACES + 1);
+        for (i = 0; i < PLACES; i++)
+            leave((int)i);
+    }
 }
 
 static void a_client_whose_first_message_is_there_stays_longer_than_one_that_sent_half(void **state)
@@ -370,6 +413,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         TEST(the_oldest_unfinished_handshake_leaves_for_a_new_client),
+        TEST(the_oldest_leaves_also_if_time_passes_while_handshakes_are_compared),
         TEST(a_client_whose_first_message_is_there_stays_longer_than_one_that_sent_half),
         TEST(the_address_with_the_most_unfinished_handshakes_loses_one_first),
         TEST(clients_that_say_nothing_get_no_place),

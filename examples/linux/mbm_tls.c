@@ -220,12 +220,18 @@ static uint32_t now(const mbm_tls *tls)
     return tls->below.micros(tls->below.context);
 }
 
-/* A clock that steps back is not far ahead. */
-uint32_t mbm_tls_age(const mbm_tls *tls)
+/* For how many microseconds the handshake has been under way. A clock that steps back is not far
+ * ahead. */
+static uint32_t age_of(const mbm_tls *tls)
 {
     const uint32_t time = now(tls) - tls->startedAt;
 
     return time <= INT32_MAX ? time : 0;
+}
+
+int mbm_tls_isOlder(const mbm_tls *tls, const mbm_tls *other)
+{
+    return tls->startedAt - other->startedAt > INT32_MAX;
 }
 
 static int state_of(const mbm_tls *tls)
@@ -276,7 +282,7 @@ static void shake_hands(mbm_tls *tls)
         fail(tls, result);
     else if (tls->status == MBM_TLS_HANDSHAKE && is_over)
         tls->status = MBM_TLS_OPEN;
-    else if (tls->status == MBM_TLS_HANDSHAKE && mbm_tls_age(tls) >= tls->identity->handshakeUs)
+    else if (tls->status == MBM_TLS_HANDSHAKE && age_of(tls) >= tls->identity->handshakeUs)
         tls->status = MBM_TLS_TIMED_OUT;
 }
 
@@ -435,7 +441,7 @@ uint8_t mbm_tls_poll(mbm_tls *tls)
 uint32_t mbm_tls_pollDelay(mbm_tls *tls)
 {
     if (tls->status == MBM_TLS_HANDSHAKE) {
-        const uint32_t past = mbm_tls_age(tls), longest = tls->identity->handshakeUs;
+        const uint32_t past = age_of(tls), longest = tls->identity->handshakeUs;
 
         if (tls->isDue) {
             tls->isDue = 0;

@@ -337,8 +337,8 @@ int mbm_tls_findRole(const mbedtls_x509_buf *extensions, char *role);
 enum { MBM_TLS_SILENT, MBM_TLS_GREETED, MBM_TLS_CERTIFIED, MBM_TLS_PROVEN };
 uint8_t mbm_tls_progress(const mbm_tls *tls);
 
-/* For how many microseconds the handshake has been under way. */
-uint32_t mbm_tls_age(const mbm_tls *tls);
+/* Whether a connection was opened before another one. Both have the same clock. */
+int mbm_tls_isOlder(const mbm_tls *tls, const mbm_tls *other);
 
 #ifdef __cplusplus
 }

@@ -81,24 +81,21 @@ static size_t crowd_of(const mbm_tls *tlss, const mbm_tcp *tcps, size_t count, s
 static size_t first_to_go(const mbm_tls *tlss, const mbm_tcp *tcps, size_t count)
 {
     size_t i, found = count, most = 0;
-    uint32_t oldest = 0;
 
     for (i = 0; i < count; i++) {
         size_t crowd;
-        uint32_t age;
         uint8_t progress;
 
         if (!is_unfinished(&tlss[i], &tcps[i]))
             continue;
         crowd = crowd_of(tlss, tcps, count, i);
         progress = mbm_tls_progress(&tlss[i]);
-        age = mbm_tls_age(&tlss[i]);
         if (found == count || crowd > most ||
             (crowd == most && (progress < mbm_tls_progress(&tlss[found]) ||
-                               (progress == mbm_tls_progress(&tlss[found]) && age > oldest)))) {
+                               (progress == mbm_tls_progress(&tlss[found]) &&
+                                mbm_tls_isOlder(&tlss[i], &tlss[found]))))) {
             found = i;
             most = crowd;
-            oldest = age;
         }
     }
     return found;
