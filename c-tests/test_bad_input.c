@@ -25,12 +25,14 @@ static void all_requests_answer(mbm_master *m, uint8_t status)
     assert_int_equal(mbm_master_requestFrom(m, 0, 1), 0);
 }
 
-/* Calls all others except begin, setBuffers and statusText. */
+/* Calls all others except begin, setBuffers, setWords and statusText. */
 static void all_others_answer(mbm_master *m, uint8_t status)
 {
     mbm_turn turn = {0};
     mbm_counters counters;
+    uint8_t frame[8];
 
+    IS(status, mbm_master_setFrame(m, frame, sizeof frame));
     IS(status, mbm_master_poll(m));
     IS(status, mbm_master_cancel(m));
     IS(status, mbm_master_status(m));
@@ -80,6 +82,7 @@ static void null_is_an_invalid_argument_everywhere(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(NULL, 1, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtuWith(NULL, 1, &s->port, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(NULL, words, 2, words, 2, frame, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_setWords(NULL, words, 2, words, 2));
     memset(&m, 0, sizeof m);
     IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, NULL, 1, words, 2, frame, 16));
@@ -312,6 +315,9 @@ static void a_frame_buffer_below_8_bytes_is_refused(void **state)
     for (bytes = 0; bytes < 8; bytes++)
         IS(MBM_INVALID_ARGUMENT,
            mbm_master_setBuffers(n, s->response, 125, s->transmit, 123, s->buffer, bytes));
+    for (bytes = 0; bytes < 8; bytes++)
+        IS(MBM_INVALID_ARGUMENT, mbm_master_setFrame(n, s->buffer, bytes));
+    OK(mbm_master_setFrame(n, s->buffer, 8));
     OK(mbm_master_setBuffers(n, s->response, 125, s->transmit, 123, s->buffer, 8));
 }
 

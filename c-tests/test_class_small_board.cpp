@@ -1,5 +1,5 @@
-/* A board with one UART and little RAM. The buffers are as on AVR, and all objects share one
- * frame buffer. */
+/* A board with one UART and little RAM. The buffers are as on AVR, and the frame of a function
+ * that waits lies on its stack. */
 #define SHIM_UARTS 1
 #define MODBUSMASTER_RESPONSE_WORDS 64
 #define MODBUSMASTER_TRANSMIT_WORDS 64
@@ -165,6 +165,133 @@ static void transfers_of_64_registers_fit(void **)
     assert_int_equal(node.readWriteMultipleRegisters(0, 64, 0, 64), 0);
 }
 
+/* With the least frame that each function has. */
+static void a_late_reply_fits_beside_the_right_one(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(300);
+    for (int words : {1, 2, 20, 64}) {
+        Bytes late = raw({1, 3, 2 * words}), right = late;
+        late.resize(3 + 2 * static_cast<size_t>(words), 0x11);
+        right.resize(late.size(), 0x22);
+        Serial.reply({});
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(words)),
+                         ModbusMaster::ku8MBResponseTimedOut);
+        Serial.reply(joined(sealed(late), sealed(right)));
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(words)), 0);
+        assert_int_equal(node.getResponseBuffer(static_cast<uint8_t>(words - 1)), 0x2222);
+        Serial.reply(sealed(right));
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(words)), 0);
+    }
+}
+
+static void noise_longer_than_the_frame_is_skipped(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    for (int byte : {0x00, 0x01, 0x03, 0xFF}) {
+        Bytes noise(300, static_cast<uint8_t>(byte));
+        Serial.reply(joined(noise, adu({1, 3, 2, 0, byte})));
+        assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(node.getResponseBuffer(0), byte);
+        Serial.reply(joined(noise, adu({1, 5, 0, 3, 0xFF, 0})));
+        assert_int_equal(node.writeSingleCoil(3, 1), 0);
+    }
+}
+
+static void every_function_has_a_frame_that_suffices(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    Serial.reply(adu({1, 1, 3, 1, 2, 3}));
+    assert_int_equal(node.readCoils(0, 17), 0);
+    Serial.reply(adu({1, 2, 1, 1}));
+    assert_int_equal(node.readDiscreteInputs(0, 8), 0);
+    Serial.reply(adu({1, 4, 2, 1, 2}));
+    assert_int_equal(node.readInputRegisters(0, 1), 0);
+    Serial.reply(adu({1, 5, 0, 1, 0, 0}));
+    assert_int_equal(node.writeSingleCoil(1, 0), 0);
+    Serial.reply(adu({1, 6, 0, 1, 0, 2}));
+    assert_int_equal(node.writeSingleRegister(1, 2), 0);
+    Serial.reply(adu({1, 15, 0, 0, 4, 0}));
+    assert_int_equal(node.writeMultipleCoils(0, 1024), 0);
+    Serial.reply(adu({1, 16, 0, 0, 0, 1}));
+    assert_int_equal(node.writeMultipleRegisters(0, 1), 0);
+    Serial.reply(adu({1, 22, 0, 1, 0, 2, 0, 3}));
+    assert_int_equal(node.maskWriteRegister(1, 2, 3), 0);
+    Serial.reply(adu({1, 23, 2, 0, 1}));
+    assert_int_equal(node.readWriteMultipleRegisters(0, 1, 0, 64), 0);
+    node.beginTransmission(0);
+    for (int i = 0; i < 64; i++)
+        assert_int_equal(node.send(i), 0);
+    Serial.reply(adu({1, 16, 0, 0, 0, 64}));
+    assert_int_equal(node.writeMultipleRegisters(), 0);
+    node.beginTransmission(0);
+    assert_int_equal(node.sendBit(true), 0);
+    Serial.reply(adu({1, 15, 0, 0, 0, 1}));
+    assert_int_equal(node.writeMultipleCoils(), 0);
+    node.beginTransmission(0);
+    assert_int_equal(node.send(7), 0);
+    Serial.reply(adu({1, 23, 2, 0, 1}));
+    assert_int_equal(node.readWriteMultipleRegisters(0, 1), 0);
+    Serial.reply(adu({1, 3, 2, 0, 9}));
+    assert_int_equal(node.requestFrom(0, 1), 1);
+    assert_int_equal(node.receive(), 9);
+}
+
+/* Overwrites the stack that other functions have used. */
+static void use_the_stack()
+{
+    volatile uint8_t bytes[2048];
+    for (volatile uint8_t &byte : bytes)
+        byte = 0x5A;
+}
+
+static void a_request_that_outlives_its_function_keeps_its_frame(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    Serial.reply(adu({1, 3, 2, 0, 6}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    node.setBlocking(false);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    do {
+        use_the_stack();
+        board().now += 100;
+    } while (node.poll() == ModbusMaster::ku8MBPending);
+    assert_int_equal(node.status(), 0);
+    assert_int_equal(node.getResponseBuffer(0), 7);
+    Serial.sent.clear();
+    node.setBlocking(true);
+    use_the_stack();
+    node.cancel();
+    Serial.reply(adu({1, 3, 2, 0, 8}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_sent(Serial, {1, 3, 0, 0, 0, 1});
+}
+
+static ModbusMaster *own;
+
+static void an_idle_callback_may_cancel_and_make_another_request(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    own = &node;
+    node.idle([] {
+        own->idle(nullptr);
+        own->cancel();
+        use_the_stack();
+        answers[0] = own->readHoldingRegisters(0, 2);
+    });
+    Serial.reply({});
+    Serial.reply(adu({1, 3, 4, 0, 7, 0, 8}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(answers[0], 0);
+    assert_int_equal(node.getResponseBuffer(1), 8);
+}
+
 static void reads_of_65_registers_are_sent(void **)
 {
     ModbusMaster node;
@@ -208,6 +335,11 @@ int main()
         TEST(a_destroyed_object_frees_the_shared_frame),
         TEST(the_buffer_ends_after_64_words),
         TEST(transfers_of_64_registers_fit),
+        TEST(a_late_reply_fits_beside_the_right_one),
+        TEST(noise_longer_than_the_frame_is_skipped),
+        TEST(every_function_has_a_frame_that_suffices),
+        TEST(a_request_that_outlives_its_function_keeps_its_frame),
+        TEST(an_idle_callback_may_cancel_and_make_another_request),
         TEST(reads_of_65_registers_are_sent),
         TEST(writes_of_more_than_the_buffer_send_nothing),
     };

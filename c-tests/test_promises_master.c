@@ -268,6 +268,63 @@ static void a_begin_is_refused_without_a_change(void **state)
     IS(MBM_ILLEGAL_DATA_VALUE, write_registers(0, 1));
 }
 
+static void words_are_refused_without_a_change(void **state)
+{
+    (void)state;
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setWords(&m, NULL, 1, transmit, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setWords(&m, response, 1, NULL, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setWords(&m, response, 256, transmit, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setWords(&m, response, 1, transmit, 256));
+    IS(MBM_PENDING, read_holding(0, 1));
+    REFUSED(MBM_BUSY, m, mbm_master_setWords(&m, response, 1, transmit, 1));
+    OK(mbm_master_cancel(&m));
+    OK(mbm_master_setWords(&m, response, 1, transmit, 1));
+    IS(MBM_ILLEGAL_DATA_VALUE, write_registers(0, 2));
+}
+
+static void an_object_without_a_frame_makes_no_request(void **state)
+{
+    mbm_master other = MBM_INIT;
+
+    (void)state;
+    REFUSED(MBM_NOT_INITIALISED, other, mbm_master_setFrame(&other, frame, sizeof frame));
+    OK(mbm_master_setWords(&other, response, RESPONSE, transmit, TRANSMIT));
+    OK(mbm_master_beginRtu(&other, 17, &port));
+    IS(MBM_NOT_INITIALISED, mbm_master_readHoldingRegisters(&other, 0, 1));
+    OK(mbm_master_setFrame(&other, frame, sizeof frame));
+    OK(mbm_master_setBlocking(&other, 0));
+    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&other, 0, 1));
+    OK(mbm_master_cancel(&other));
+}
+
+/* Makes a request and waits for its end. The frame lies on the stack. */
+static uint8_t read_by_the_stack(uint8_t quantity)
+{
+    uint8_t own[MBM_FRAME_BYTES(2 * RESPONSE)];
+
+    OK(mbm_master_setFrame(&m, own, (uint16_t)MBM_FRAME_BYTES(2 * quantity)));
+    IS(MBM_PENDING, read_holding(0, quantity));
+    return run();
+}
+
+static void a_frame_is_used_only_while_a_request_is_under_way(void **state)
+{
+    (void)state;
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setFrame(&m, NULL, 8));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setFrame(&m, NULL, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setFrame(&m, frame, 7));
+    IS(MBM_PENDING, read_holding(0, 1));
+    REFUSED(MBM_BUSY, m, mbm_master_setFrame(&m, frame, 8));
+    OK(mbm_master_cancel(&m));
+    memset(frame, 0xA5, sizeof frame);
+    IS(MBM_RESPONSE_TIMED_OUT, read_by_the_stack(1));
+    IS(MBM_RESPONSE_TIMED_OUT, read_by_the_stack(2));
+    assert_int_equal(frame[0], 0xA5);
+    OK(mbm_master_setFrame(&m, frame, sizeof frame));
+    IS(MBM_PENDING, read_holding(0, 1));
+    assert_int_equal(frame[0], 17);
+}
+
 static void what_begin_keeps_and_drops(void **state)
 {
     (void)state;
@@ -458,7 +515,13 @@ int main(void)
         TEST(requests_that_read_are_not_broadcast),
         TEST(words_end_where_their_buffers_end),
         TEST(the_words_of_a_read_are_received_once),
+        TEST(words_are_refused_without_a_change),
+        TEST(an_object_without_a_frame_makes_no_request),
+        TEST(a_frame_is_used_only_while_a_request_is_under_way),
         TEST(a_begin_is_refused_without_a_change),
+        TEST(words_are_refused_without_a_change),
+        TEST(an_object_without_a_frame_makes_no_request),
+        TEST(a_frame_is_used_only_while_a_request_is_under_way),
         TEST(what_begin_keeps_and_drops),
         TEST(turns_and_views_check_their_arguments),
         TEST(settings_have_the_defaults_and_ranges_of_the_header),

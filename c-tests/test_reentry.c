@@ -41,6 +41,8 @@ static void every_function_of_the_master_is_busy(void)
 
     IS(MBM_BUSY, mbm_master_beginRtu(m, 1, &port));
     IS(MBM_BUSY, mbm_master_setBuffers(m, words, 1, words, 1, other_frame, 8));
+    IS(MBM_BUSY, mbm_master_setWords(m, words, 1, words, 1));
+    IS(MBM_BUSY, mbm_master_setFrame(m, other_frame, 8));
     IS(MBM_BUSY, mbm_master_poll(m));
     assert_int_equal(mbm_master_pollDelay(m), 0);
     IS(MBM_BUSY, mbm_master_cancel(m));

@@ -24,6 +24,7 @@
 #include "ModbusTransmission.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusMasterConstants.h"
+#include "ModbusMasterFrame.h"
 #include "ModbusMasterHelpers.h"
 #include "ModbusMasterOptions.h"
 #include "ModbusMasterPorts.h"
@@ -193,7 +194,7 @@ public:
      */
     uint8_t requestFrom(uint16_t address, uint16_t quantity)
     {
-        return mayRequest() ? mbm_master_requestFrom(&state.master, address, quantity) : 0;
+        return readHoldingRegisters(address, quantity) == ku8MBSuccess ? available() : 0;
     }
     /** How many words of the last successful read receive has not returned yet. */
     uint8_t available() const { return mbm_master_available(&state.master); }
@@ -212,68 +213,73 @@ public:
      */
     uint8_t readCoils(uint16_t address, uint16_t quantity)
     {
-        return request(mbm_master_readCoils, address, quantity);
+        return request(wordsOf(quantity), mbm_master_readCoils, address, quantity);
     }
     /** Function 02: as readCoils, of 1 to 2000 discrete inputs. */
     uint8_t readDiscreteInputs(uint16_t address, uint16_t quantity)
     {
-        return request(mbm_master_readDiscreteInputs, address, quantity);
+        return request(wordsOf(quantity), mbm_master_readDiscreteInputs, address, quantity);
     }
     /** Function 03: reads 1 to 125 holding registers; see readCoils. */
     uint8_t readHoldingRegisters(uint16_t address, uint16_t quantity)
     {
-        return request(mbm_master_readHoldingRegisters, address, quantity);
+        return request(quantity, mbm_master_readHoldingRegisters, address, quantity);
     }
     /** Function 04: reads 1 to 125 input registers; see readCoils. */
     template <typename Quantity> uint8_t readInputRegisters(uint16_t address, Quantity quantity)
     {
-        return request(mbm_master_readInputRegisters, address, static_cast<uint16_t>(quantity));
+        const uint16_t words = static_cast<uint16_t>(quantity);
+        return request(words, mbm_master_readInputRegisters, address, words);
     }
     /** As above, with the parameter types of ModbusMaster 2.0.1, for pointers to members. */
     uint8_t readInputRegisters(uint16_t address, uint8_t quantity)
     {
-        return request(mbm_master_readInputRegisters, address, uint16_t{quantity});
+        return request(quantity, mbm_master_readInputRegisters, address, uint16_t{quantity});
     }
     /** Function 05: switches a coil; every `on` other than 0 means on. See readCoils. */
     uint8_t writeSingleCoil(uint16_t address, uint8_t on)
     {
-        return request(mbm_master_writeSingleCoil, address, on);
+        return request(1, mbm_master_writeSingleCoil, address, on);
     }
     /** Function 06: stores the value in word 0 and writes it. See readCoils. */
     uint8_t writeSingleRegister(uint16_t address, uint16_t value)
     {
-        return request(mbm_master_writeSingleRegister, address, value);
+        return request(1, mbm_master_writeSingleRegister, address, value);
     }
     /** Function 0F: writes coils from word 0 on, lowest bit first. See readCoils. */
     uint8_t writeMultipleCoils(uint16_t address, uint16_t quantity)
     {
-        return request(mbm_master_writeMultipleCoils, address, quantity);
+        return request(wordsOf(quantity), mbm_master_writeMultipleCoils, address, quantity);
     }
     /** Function 0F: writes the queued bits to the last write address. */
-    uint8_t writeMultipleCoils() { return request(mbm_master_writeQueuedCoils); }
+    uint8_t writeMultipleCoils() { return request(transmitWords, mbm_master_writeQueuedCoils); }
     /** Function 10: writes 1 to 123 registers from word 0 on. See readCoils. */
     uint8_t writeMultipleRegisters(uint16_t address, uint16_t quantity)
     {
-        return request(mbm_master_writeMultipleRegisters, address, quantity);
+        return request(quantity, mbm_master_writeMultipleRegisters, address, quantity);
     }
     /** Function 10: writes the queued complete words to the last write address. */
-    uint8_t writeMultipleRegisters() { return request(mbm_master_writeQueuedRegisters); }
+    uint8_t writeMultipleRegisters()
+    {
+        return request(transmitWords, mbm_master_writeQueuedRegisters);
+    }
     /** Function 16: (register & andMask) | (orMask & ~andMask); stores the masks in words 0 and 1. */
     uint8_t maskWriteRegister(uint16_t address, uint16_t andMask, uint16_t orMask)
     {
-        return request(mbm_master_maskWriteRegister, address, andMask, orMask);
+        return request(2, mbm_master_maskWriteRegister, address, andMask, orMask);
     }
     /** Function 17: writes 1 to 121 registers from word 0 on, then reads 1 to 125. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity,
                                        uint16_t writeAddress, uint16_t writeQuantity)
     {
-        return request(mbm_master_readWriteMultipleRegisters, readAddress, readQuantity,
+        const uint16_t words = readQuantity > writeQuantity ? readQuantity : writeQuantity;
+        return request(words, mbm_master_readWriteMultipleRegisters, readAddress, readQuantity,
                        writeAddress, writeQuantity);
     }
     /** Function 17: writes the queued words to the last write address, then reads. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity)
     {
-        return request(mbm_master_readWriteQueuedRegisters, readAddress, readQuantity);
+        return request(mostWords, mbm_master_readWriteQueuedRegisters, readAddress, readQuantity);
     }
 
     /** Milliseconds from the end of a request to the end of its reply, 0 to 1000000; 2000 at
@@ -312,7 +318,13 @@ public:
      * another echoed address or value, another number of registers. A read of more words
      * than the response buffer holds fills the buffer. Unit 0 may be read. Off at first.
      */
-    void setLenient(bool on) { mbm_master_setLenient(&state.master, on); }
+    void setLenient(bool on)
+    {
+        // The reply may be longer than the one asked for.
+        if (on)
+            Frame::keep();
+        mbm_master_setLenient(&state.master, on);
+    }
     /** What setLenient has set. */
     bool getLenient() const { return mbm_master_getLenient(&state.master) != 0; }
     /** Character times that the driver stays on after flush, for cores whose flush returns early; 0 at first. */
@@ -323,7 +335,13 @@ public:
     /** What setPostFlushHold has set. */
     uint8_t getPostFlushHold() const { return mbm_master_getPostFlushHold(&state.master); }
     /** false: the functions return ku8MBPending at once, and poll completes the request. */
-    void setBlocking(bool on) { mbm_master_setBlocking(&state.master, on); }
+    void setBlocking(bool on)
+    {
+        // The request outlives the function that makes it.
+        if (!on)
+            Frame::keep();
+        mbm_master_setBlocking(&state.master, on);
+    }
     /** What setBlocking has set; true at first. */
     bool getBlocking() const { return mbm_master_getBlocking(&state.master) != 0; }
     /** Counts into `counters`; set them to 0 before. nullptr stops counting. Copies share them. */
@@ -349,9 +367,10 @@ private:
         transmitWords = MODBUSMASTER_TRANSMIT_WORDS,
         mostWords = responseWords > transmitWords ? +responseWords : +transmitWords,
         frameOfWords = MBM_FRAME_BYTES(mostWords),
-        frameBytes = frameOfWords < MBM_MAX_FRAME ? +frameOfWords : MBM_MAX_FRAME
+        frameBytes = frameOfWords < 255 ? +frameOfWords : 255
     };
 
+    typedef ModbusMasterFrame<frameBytes> Frame;
     typedef ModbusMasterPorts<void> Ports;
     typedef ModbusMasterTurn<void> Turn;
 
@@ -384,13 +403,11 @@ private:
 
     void setBuffers()
     {
-#if defined(MODBUSMASTER_SHARE_FRAME)
-        static uint8_t frame[frameBytes];
-#else
-        uint8_t *frame = state.frame;
+        mbm_master_setWords(&state.master, state.response, responseWords, state.transmit,
+                            transmitWords);
+#if !defined(MODBUSMASTER_SHARE_FRAME)
+        mbm_master_setFrame(&state.master, state.frame, frameBytes);
 #endif
-        mbm_master_setBuffers(&state.master, state.response, responseWords, state.transmit,
-                              transmitWords, frame, frameBytes);
     }
 
     // Uses the clock and the driver, not the Stream.
@@ -411,7 +428,7 @@ private:
     }
 
     // Every request calls this. Returns false while another object has a request under way
-    // in the shared frame buffer.
+    // and objects have no frame buffers.
     bool mayRequest()
     {
         if (!Turn::take(state.master))
@@ -420,11 +437,35 @@ private:
         return true;
     }
 
+    // The words that hold so many bits.
+    static uint16_t wordsOf(uint16_t bits) { return static_cast<uint16_t>(bits / 16u + 1u); }
+
+    // Makes a request that reads or writes so many words.
+#if defined(MODBUSMASTER_SHARE_FRAME)
+    // Not inline: the memory of the frame is free when it returns.
     template <typename... Parameters>
-    uint8_t request(uint8_t (*function)(mbm_master *, Parameters...), Parameters... arguments)
+    __attribute__((noinline)) uint8_t
+    request(uint16_t words, uint8_t (*function)(mbm_master *, Parameters...),
+            Parameters... arguments)
+    {
+        uint8_t *frame = Frame::kept;
+        uint8_t bytes = frameBytes;
+        if (frame == nullptr) {
+            bytes = Frame::bytesOf(words);
+            frame = static_cast<uint8_t *>(__builtin_alloca(bytes));
+        }
+        if (!mayRequest() || mbm_master_setFrame(&state.master, frame, bytes) != MBM_OK)
+            return ku8MBBusy;
+        return function(&state.master, arguments...);
+    }
+#else
+    template <typename... Parameters>
+    uint8_t request(uint16_t, uint8_t (*function)(mbm_master *, Parameters...),
+                    Parameters... arguments)
     {
         return mayRequest() ? function(&state.master, arguments...) : ku8MBBusy;
     }
+#endif
 
     uint8_t sendWord(uint16_t word) { return mbm_master_send(&state.master, word); }
     uint8_t sendWords(uint32_t words) { return mbm_master_send32(&state.master, words); }

@@ -10,10 +10,11 @@
  *   else 125. A longer read returns ku8MBBufferTooSmall.
  * - MODBUSMASTER_TRANSMIT_WORDS  words that a write sends, 2 to 123; 64 on AVR,
  *   else 123. A longer write returns ku8MBIllegalDataValue.
- * - MODBUSMASTER_SHARE_FRAME  one frame buffer for all objects. It is defined on AVR
- *   boards of at most 2.5 KB of RAM. A request while another object's request is under
- *   way returns ku8MBBusy. Do not define it if several threads use objects.
- * - MODBUSMASTER_OWN_FRAMES  a frame buffer for each object on those boards too, so
+ * - MODBUSMASTER_SHARE_FRAME  objects without a frame buffer: while a function waits, the
+ *   frame is on its stack. It is defined on AVR boards of at most 2.5 KB of RAM. A request
+ *   while another object's request is under way returns ku8MBBusy. Do not define it if
+ *   several threads use objects.
+ * - MODBUSMASTER_OWN_FRAMES  a frame buffer in each object on those boards too, so
  *   that several objects may have a request under way at the same time.
  * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  the UARTs that begin(baud) opens, if
  *   the core does not say which UARTs the board has.

@@ -22,7 +22,7 @@
 template <typename Unused> class ModbusMasterTurn {
 #if defined(MODBUSMASTER_SHARE_FRAME)
 public:
-    /** False while another object has a request under way in the shared frame buffer. */
+    /** False while another object has a request under way. */
     static bool take(mbm_master &master)
     {
         return shared.master == &master || mbm_master_takeTurn(&master, &shared) == MBM_OK;

@@ -893,6 +893,41 @@ uint8_t mbm_master_setBuffers(struct mbm_master *master,
                               uint16_t frameBytes);
 
 /**
+ * Sets the words for requests and replies, as mbm_master_setBuffers does. The frame buffer stays
+ * as it is.
+ *
+ * @param master         the object; initialised with MBM_INIT before the first call
+ * @param response       the words that reads fill; NULL only if `responseWords` is 0
+ * @param responseWords  0 to 255; 125 hold any reply
+ * @param transmit       the words that writes send; NULL only if `transmitWords` is 0
+ * @param transmitWords  0 to 255; 123 hold any request
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
+ */
+uint8_t mbm_master_setWords(struct mbm_master *master,
+                            uint16_t *response,
+                            uint16_t responseWords,
+                            uint16_t *transmit,
+                            uint16_t transmitWords);
+
+/**
+ * Sets the frame buffer, as mbm_master_setBuffers does. The master uses it only while a request
+ * is under way. So in blocking mode it may lie on the stack of a function that sets it and makes
+ * the request. Several masters may use one buffer in turn.
+ *
+ * For a request of `n` words, MBM_FRAME_BYTES(2 * n) bytes are enough to hold a late reply beside
+ * the right one.
+ *
+ * @param master      the object, with words or begun
+ * @param frame       the buffer of one frame
+ * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED, or MBM_BUSY while a request is under
+ *         way
+ */
+uint8_t mbm_master_setFrame(struct mbm_master *master,
+                            uint8_t *frame,
+                            uint16_t frameBytes);
+
+/**
  * Sends and receives for a non-blocking request, without waiting.
  *
  * Call it as often as you like. If your port does not buffer received bytes, call it at

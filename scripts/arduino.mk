@@ -43,6 +43,9 @@ AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/meg
 # Sketches that run with the small library too.
 MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe \
                 ServeSensorAndRelay)
+# Sketches that run with shortened calls and jumps too.
+RELAX_ELFS := $(patsubst %,$(AVR_OUT)/uno-relax/%.elf,SizeSerial SizeFC03 Basic PhoenixContact Probe \
+              ServeSensorAndRelay)
 # Other chips of the set avr5 that the simulator knows: some with two UARTs, some with one.
 CHIPS := mega1280 atmega644p atmega1284p atmega328 atmega644
 CHIP_ELFS := $(foreach chip,$(CHIPS),$(patsubst %,$(AVR_OUT)/$(chip)/%.elf,FirstRead WriteAndReadBack))
@@ -62,7 +65,7 @@ library-stamp: library
 
 .PHONY: avr-sketches
 avr-sketches: library-stamp
-	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
+	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(RELAX_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
 # The examples are compiled from their copies in the library.
 SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino firmware-tests/avr/libraries/*/src/*)
@@ -79,6 +82,7 @@ $(eval $(call sketches,leonardo))
 $(foreach chip,$(CHIPS),$(eval $(call sketches,$(chip))))
 $(eval $(call sketches,uno-minimal))
 $(eval $(call sketches,uno-125))
+$(eval $(call sketches,uno-relax))
 $(eval $(call sketches,uno-peer))
 $(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
 

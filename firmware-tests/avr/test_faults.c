@@ -181,7 +181,7 @@ typedef struct report {
     uint16_t words[READS][REGISTERS];
 } report;
 
-/* The folder of the sketches: with the library, or with its minimal variant. */
+/* The folder of the sketches: with the library, its minimal variant, or shortened calls. */
 static const char *place = "uno";
 
 static board *start(const char *sketch)
@@ -253,6 +253,13 @@ static void the_minimal_library_passes_every_fault_too(void **state)
     place = "uno";
 }
 
+static void a_sketch_linked_with_mrelax_passes_every_fault_too(void **state)
+{
+    place = "uno-relax";
+    no_fault_costs_more_reads_than_expected(state);
+    place = "uno";
+}
+
 static void an_absent_server_is_a_timeout(void **state)
 {
     report r = run(NULL, NULL);
@@ -309,6 +316,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_fault_costs_more_reads_than_expected),
         cmocka_unit_test(the_minimal_library_passes_every_fault_too),
+        cmocka_unit_test(a_sketch_linked_with_mrelax_passes_every_fault_too),
         cmocka_unit_test(an_absent_server_is_a_timeout),
         cmocka_unit_test(a_servers_exceptions_are_returned),
         cmocka_unit_test(a_reply_of_64_registers_at_115200_baud_arrives_whole),

@@ -316,6 +316,7 @@ static void basic_counts_in_the_server(void **state)
     (void)state;
     basic(&uno);
     basic(&minimal);
+    basic(&relaxed);
     basic(&mega);
 }
 
@@ -377,6 +378,7 @@ static void phoenix_contact_makes_its_requests(void **state)
     (void)state;
     phoenix_contact(&uno);
     phoenix_contact(&minimal);
+    phoenix_contact(&relaxed);
     phoenix_contact(&mega);
 }
 

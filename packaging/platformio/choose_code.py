@@ -65,3 +65,6 @@ else:
     # Some platforms pass these flags to the compiler only.
     given = flags("ASPPFLAGS")
     env.Append(ASPPFLAGS=[flag for flag in machine if flag not in given])  # noqa: F821
+    if "__AVR__" in defined:
+        # The linker shortens calls and jumps, also those of the sketch and of its core.
+        env.Append(LINKFLAGS=["-mrelax"])  # noqa: F821

@@ -202,11 +202,39 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
+    if frame.is_null() || frameBytes < 8 {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: as the header demands.
+    unsafe {
+        let status = mbm_master_setWords(master, response, responseWords, transmit, transmitWords);
+        if status == Status::OK.code() {
+            return mbm_master_setFrame(master, frame, frameBytes);
+        }
+        status
+    }
+}
+
+/// Sets the words for requests and replies, as mbm_master_setBuffers does. The frame buffer stays
+/// as it is.
+///
+/// @param master         the object; initialised with MBM_INIT before the first call
+/// @param response       the words that reads fill; NULL only if `responseWords` is 0
+/// @param responseWords  0 to 255; 125 hold any reply
+/// @param transmit       the words that writes send; NULL only if `transmitWords` is 0
+/// @param transmitWords  0 to 255; 123 hold any request
+/// @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_setWords(
+    master: *mut mbm_master,
+    response: *mut u16,
+    responseWords: u16,
+    transmit: *mut u16,
+    transmitWords: u16,
+) -> u8 {
     let refused = (response.is_null() && responseWords > 0)
         || (transmit.is_null() && transmitWords > 0)
-        || (responseWords | transmitWords) > 255
-        || frame.is_null()
-        || frameBytes < 8;
+        || (responseWords | transmitWords) > 255;
     if refused {
         return Status::INVALID_ARGUMENT.code();
     }
@@ -228,12 +256,45 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
         if !transmit.is_null() {
             storage.transmit = transmit;
         }
-        storage.frame = frame;
         storage.response_words = responseWords as u8;
         storage.transmit_words = transmitWords as u8;
-        // No frame of a master is longer than 255 bytes.
-        storage.frame_bytes = frameBytes.min(u8::MAX.into()) as u8;
         Status::OK.code()
+    }
+}
+
+/// Sets the frame buffer, as mbm_master_setBuffers does. The master uses it only while a request
+/// is under way. So in blocking mode it may lie on the stack of a function that sets it and makes
+/// the request. Several masters may use one buffer in turn.
+///
+/// For a request of `n` words, MBM_FRAME_BYTES(2 * n) bytes are enough to hold a late reply beside
+/// the right one.
+///
+/// @param master      the object, with words or begun
+/// @param frame       the buffer of one frame
+/// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
+/// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED, or MBM_BUSY while a request is under
+///         way
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_setFrame(
+    master: *mut mbm_master,
+    frame: *mut u8,
+    frameBytes: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(master, |master| {
+            if frame.is_null() || frameBytes < 8 {
+                return Status::INVALID_ARGUMENT;
+            }
+            if master.core.is_pending() {
+                return Status::BUSY;
+            }
+            let storage = master.core.storage();
+            storage.frame = frame;
+            // No frame of a master is longer than 255 bytes.
+            storage.frame_bytes = frameBytes.min(u8::MAX.into()) as u8;
+            Status::OK
+        })
     }
 }
 

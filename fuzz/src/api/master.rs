@@ -53,6 +53,18 @@ fn buffers(w: &World, master: *mut mbm_master) {
             mbm_master_setBuffers(master, responses, response, transmits, transmit, bytes, frame)
         )
     });
+    if w.rarely(2) {
+        refused_changes_nothing(w, &[span(master)], "mbm_master_setFrame", || {
+            call!(w, master, mbm_master_setFrame(master, bytes, frame))
+        });
+        refused_changes_nothing(w, &[span(master)], "mbm_master_setWords", || {
+            call!(
+                w,
+                master,
+                mbm_master_setWords(master, responses, response, transmits, transmit)
+            )
+        });
+    }
 }
 
 fn set(w: &World, master: *mut mbm_master) {
