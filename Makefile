@@ -184,7 +184,7 @@ fuzz-api: ## Fuzz the C API with sequences of calls, CALLS in total (10000000)
 MODEL_SECONDS ?= 300
 MODEL := --quiet --release --manifest-path model/Cargo.toml --target-dir $(BUILD)/model
 .PHONY: model
-model: ## Try every order of events around a request for MODEL_SECONDS (300)
+model: ## Try every order of events around a request, then every stream of bytes, each for MODEL_SECONDS (300)
 	@mkdir -p $(BUILD)
 	@$(CARGO) test $(MODEL) >$(BUILD)/model.log 2>&1 || { cat $(BUILD)/model.log; exit 1; }
 	@$(CARGO) run $(MODEL) -- $(MODEL_SECONDS)

@@ -1,15 +1,18 @@
 //! Explores the requests of a real master. At each step an adversary chooses what arrives and
 //! how far the clock moves. The program tries every order of these events, breadth first. Its
 //! argument is the time in seconds, 300 without one. It then plays every schedule of late replies
-//! with a client (see `client`).
+//! with a client (see `client`), and sends a master every stream of bytes (see `streams`), again
+//! for that time.
 
 mod client;
 mod line;
+mod streams;
 mod wire;
 
 use line::{Event, State};
 use stateright::{Checker, HasDiscoveries, Model, Path, Property};
 use std::time::{Duration, Instant};
+use streams::Before;
 
 /// What the adversary may do.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -108,6 +111,32 @@ fn explore(line: Line, time: Duration) -> Explored {
     }
 }
 
+/// Tries all streams of one byte, of two and so on, until the time is over. False if a stream has a
+/// result that it does not hold.
+fn try_streams((request, before): (streams::Request, Before), time: Duration) -> bool {
+    let deadline = Instant::now() + time;
+    let (mut longest, mut all) = (1, streams::Tally::default());
+    loop {
+        let tally = streams::explore(request, before, longest + 1, deadline, |stream, outcome| {
+            request.allows(before, stream, outcome)
+        });
+        if let Some((stream, outcome)) = tally.broken {
+            println!("model: broken: {request:?}, {before:?}: {stream:02X?} gives {outcome:?}");
+            return false;
+        }
+        if Instant::now() > deadline {
+            break;
+        }
+        (longest, all) = (longest + 1, tally);
+    }
+    println!(
+        "model: {request:?}, after {before:?}: every stream of up to {longest} bytes, {} streams, \
+         {} right, {} exceptions",
+        all.streams, all.right, all.exceptions
+    );
+    all.right > 0
+}
+
 fn main() {
     let seconds = std::env::args()
         .nth(1)
@@ -180,6 +209,16 @@ fn main() {
         failed += 1;
     } else {
         passed += 1;
+    }
+    for stream in [streams::Request::Read, streams::Request::Write]
+        .into_iter()
+        .flat_map(|request| [Before::Nothing, Before::Timeout].map(|before| (request, before)))
+    {
+        if try_streams(stream, Duration::from_secs(seconds) / 4) {
+            passed += 1;
+        } else {
+            failed += 1;
+        }
     }
     println!("{passed} passed, {failed} failed");
     if failed > 0 {
