@@ -438,7 +438,7 @@ private:
     }
 
     // The words that hold so many bits.
-    static uint16_t wordsOf(uint16_t bits) { return static_cast<uint16_t>(bits / 16u + 1u); }
+    static uint16_t wordsOf(uint16_t bits) { return (bits / 16u + 1u) & 0xFFFFu; }
 
     // Makes a request that reads or writes so many words.
 #if defined(MODBUSMASTER_SHARE_FRAME)

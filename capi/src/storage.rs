@@ -45,6 +45,16 @@ pub(super) struct MasterBuffers {
     pub(super) counters: *mut mbm_counters,
 }
 
+impl MasterBuffers {
+    /// Sets the frame buffer.
+    #[inline(always)]
+    pub(super) fn set_frame(&mut self, frame: *mut u8, bytes: u16) {
+        self.frame = frame;
+        // No frame of a master is longer than 255 bytes.
+        self.frame_bytes = bytes.min(u8::MAX.into()) as u8;
+    }
+}
+
 /// The array of `count` words at `first`; an empty one if `first` is NULL.
 ///
 /// # Safety

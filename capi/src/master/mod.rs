@@ -202,16 +202,20 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    if frame.is_null() || frameBytes < 8 {
+    let words = Given {
+        response,
+        response_words: responseWords,
+        transmit,
+        transmit_words: transmitWords,
+    };
+    if words.are_refused() || frame.is_null() || frameBytes < 8 {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
     unsafe {
-        let status = mbm_master_setWords(master, response, responseWords, transmit, transmitWords);
-        if status == Status::OK.code() {
-            return mbm_master_setFrame(master, frame, frameBytes);
-        }
-        status
+        set_words(master, words, |storage| {
+            storage.set_frame(frame, frameBytes)
+        })
     }
 }
 
@@ -232,13 +236,47 @@ pub unsafe extern "C" fn mbm_master_setWords(
     transmit: *mut u16,
     transmitWords: u16,
 ) -> u8 {
-    let refused = (response.is_null() && responseWords > 0)
-        || (transmit.is_null() && transmitWords > 0)
-        || (responseWords | transmitWords) > 255;
-    if refused {
+    let words = Given {
+        response,
+        response_words: responseWords,
+        transmit,
+        transmit_words: transmitWords,
+    };
+    if words.are_refused() {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
+    unsafe { set_words(master, words, |_| ()) }
+}
+
+/// The words that a caller gives.
+struct Given {
+    response: *mut u16,
+    response_words: u16,
+    transmit: *mut u16,
+    transmit_words: u16,
+}
+
+impl Given {
+    #[inline(always)]
+    fn are_refused(&self) -> bool {
+        (self.response.is_null() && self.response_words > 0)
+            || (self.transmit.is_null() && self.transmit_words > 0)
+            || (self.response_words | self.transmit_words) > 255
+    }
+}
+
+/// Makes `words` those of a master, and changes its other buffers too.
+///
+/// # Safety
+/// As for [`prepare`].
+#[inline(always)]
+unsafe fn set_words(
+    master: *mut mbm_master,
+    words: Given,
+    others: impl FnOnce(&mut MasterBuffers),
+) -> u8 {
+    // SAFETY: as the caller promises.
     unsafe {
         let status = prepare(master);
         if status != Status::OK {
@@ -250,14 +288,15 @@ pub unsafe extern "C" fn mbm_master_setWords(
         }
         let storage = master.core.storage();
         // An empty buffer keeps the earlier pointer, so that no pointer becomes NULL.
-        if !response.is_null() {
-            storage.response = response;
+        if !words.response.is_null() {
+            storage.response = words.response;
         }
-        if !transmit.is_null() {
-            storage.transmit = transmit;
+        if !words.transmit.is_null() {
+            storage.transmit = words.transmit;
         }
-        storage.response_words = responseWords as u8;
-        storage.transmit_words = transmitWords as u8;
+        storage.response_words = words.response_words as u8;
+        storage.transmit_words = words.transmit_words as u8;
+        others(storage);
         Status::OK.code()
     }
 }
@@ -280,21 +319,21 @@ pub unsafe extern "C" fn mbm_master_setFrame(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
+    if frame.is_null() || frameBytes < 8 {
+        return Status::INVALID_ARGUMENT.code();
+    }
     // SAFETY: as the header demands.
     unsafe {
-        pointers::with(master, |master| {
-            if frame.is_null() || frameBytes < 8 {
-                return Status::INVALID_ARGUMENT;
-            }
-            if master.core.is_pending() {
-                return Status::BUSY;
-            }
-            let storage = master.core.storage();
-            storage.frame = frame;
-            // No frame of a master is longer than 255 bytes.
-            storage.frame_bytes = frameBytes.min(u8::MAX.into()) as u8;
-            Status::OK
-        })
+        let status = pointers::check_once(master);
+        if status != Status::OK {
+            return status.code();
+        }
+        let core = pointers::object(master).core();
+        if core.is_pending() {
+            return Status::BUSY.code();
+        }
+        core.storage().set_frame(frame, frameBytes);
+        Status::OK.code()
     }
 }
 
