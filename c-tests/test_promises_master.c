@@ -325,6 +325,43 @@ static void a_frame_is_used_only_while_a_request_is_under_way(void **state)
     assert_int_equal(frame[0], 17);
 }
 
+/* A right reply, a wrong one, none, and a request that was cancelled. */
+static void an_ended_request_leaves_its_frame_alone(void **state)
+{
+    static const uint8_t right[] = {3, 2, 0, 7}, wrong[] = {4, 2, 0, 7}, late[] = {3, 2, 0, 8};
+    static uint8_t one_frame[MBM_FRAME_BYTES(2)], untouched[sizeof one_frame];
+    unsigned nth;
+
+    (void)state;
+    for (nth = 0; nth < 4; nth++) {
+        OK(mbm_master_setFrame(&m, one_frame, sizeof one_frame));
+        IS(MBM_PENDING, read_holding(0, 1));
+        if (nth < 2)
+            hooked_port_arrive_rtu(&wire, 17, nth == 0 ? right : wrong, sizeof right);
+        if (nth < 3)
+            run();
+        else
+            OK(mbm_master_cancel(&m));
+        memset(one_frame, 0xA5, sizeof one_frame);
+        memset(untouched, 0xA5, sizeof untouched);
+        hooked_port_arrive_rtu(&wire, 17, late, sizeof late);
+        wire.now += 100000;
+        mbm_master_poll(&m);
+        mbm_master_pollDelay(&m);
+        mbm_master_cancel(&m);
+        mbm_master_status(&m);
+        mbm_master_getExceptionCode(&m);
+        mbm_master_getResponseBuffer(&m, 0);
+        mbm_master_receive(&m);
+        mbm_master_beginRtu(&m, 17, &port);
+        mbm_master_lineUsed(&m);
+        OK(mbm_master_setFrame(&m, frame, sizeof frame));
+        IS(MBM_PENDING, read_holding(0, 1));
+        run();
+        assert_memory_equal(one_frame, untouched, sizeof untouched);
+    }
+}
+
 static void what_begin_keeps_and_drops(void **state)
 {
     (void)state;
@@ -515,13 +552,11 @@ int main(void)
         TEST(requests_that_read_are_not_broadcast),
         TEST(words_end_where_their_buffers_end),
         TEST(the_words_of_a_read_are_received_once),
-        TEST(words_are_refused_without_a_change),
-        TEST(an_object_without_a_frame_makes_no_request),
-        TEST(a_frame_is_used_only_while_a_request_is_under_way),
         TEST(a_begin_is_refused_without_a_change),
         TEST(words_are_refused_without_a_change),
         TEST(an_object_without_a_frame_makes_no_request),
         TEST(a_frame_is_used_only_while_a_request_is_under_way),
+        TEST(an_ended_request_leaves_its_frame_alone),
         TEST(what_begin_keeps_and_drops),
         TEST(turns_and_views_check_their_arguments),
         TEST(settings_have_the_defaults_and_ranges_of_the_header),
