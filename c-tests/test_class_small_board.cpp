@@ -3,7 +3,7 @@
 #define SHIM_UARTS 1
 #define MODBUSMASTER_RESPONSE_WORDS 64
 #define MODBUSMASTER_TRANSMIT_WORDS 64
-#define MODBUSMASTER_SHARE_FRAME
+#define RAMEND 0x08FF /* as on an Uno */
 #include "wire.h"
 
 static void a_uart_that_the_board_lacks_falls_back_to_the_first(void **)

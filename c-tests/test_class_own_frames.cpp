@@ -1,0 +1,44 @@
+/* A board with as little RAM as an Uno, and objects that have a frame buffer each. */
+#define SHIM_UARTS 1
+#define RAMEND 0x08FF
+#define MODBUSMASTER_OWN_FRAMES
+#include "wire.h"
+
+static HardwareSerial other_line;
+
+static void objects_have_a_frame_buffer_each(void **)
+{
+    assert_in_range(sizeof(ModbusMaster), 2 * (125 + 123) + sizeof(mbm_master) + 255, 1200);
+}
+
+static void two_objects_have_a_request_under_way_at_the_same_time(void **)
+{
+    ModbusMaster first, second;
+    first.begin(1, Serial);
+    second.begin(2, other_line);
+    first.setBlocking(false);
+    second.setBlocking(false);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    other_line.reply(adu({2, 3, 2, 0, 8}));
+    assert_int_equal(first.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    assert_int_equal(second.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    for (int i = 0; i < 1000; i++) {
+        first.poll();
+        second.poll();
+        board().now += 100;
+    }
+    assert_int_equal(first.status(), 0);
+    assert_int_equal(first.getResponseBuffer(0), 7);
+    assert_int_equal(second.status(), 0);
+    assert_int_equal(second.getResponseBuffer(0), 8);
+}
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        TEST(objects_have_a_frame_buffer_each),
+        TEST(two_objects_have_a_request_under_way_at_the_same_time),
+    };
+    return cmocka_run_group_tests_name("ModbusMaster with frame buffers on a small board", tests, nullptr,
+                                       nullptr);
+}
