@@ -1,6 +1,6 @@
 // Three slaves on one bus. Each slave has an object of its own, with its own words. All
-// objects share the port, and on a small board also one frame buffer. The buffers of this
-// sketch are smaller than usual, to leave RAM for other things.
+// objects share the port. The buffers of this sketch are smaller than usual, to leave RAM
+// for other things.
 #define MODBUSMASTER_RESPONSE_WORDS 16
 #define MODBUSMASTER_TRANSMIT_WORDS 8
 #include <ModbusMaster.h>
