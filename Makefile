@@ -205,9 +205,14 @@ certificates:
 corruption: ## Compute which damage CRC-16 lets through; writes docs/reliability.md; REPLIES (40000000)
 	@CARGO="$(CARGO)" REPLIES="$(REPLIES)" scripts/corruption
 
+# The C libraries of those compilers for firmware that are installed. Debian packs each library apart from
+# its compiler.
+FIRMWARE_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi) \
+	$(if $(shell command -v riscv64-unknown-elf-gcc),picolibc-riscv64-unknown-elf)
 .PHONY: need-check need-test
 need-check:
-	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools python3
+	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools python3 \
+		$(FIRMWARE_LIBC)
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
 		perl valgrind mbpoll libmbedtls-dev openssl
