@@ -39,6 +39,6 @@ int main()
         TEST(objects_have_a_frame_buffer_each),
         TEST(two_objects_have_a_request_under_way_at_the_same_time),
     };
-    return cmocka_run_group_tests_name("ModbusMaster with frame buffers on a small board", tests, nullptr,
-                                       nullptr);
+    return cmocka_run_group_tests_name("ModbusMaster with frame buffers on a small board", tests,
+                                       nullptr, nullptr);
 }
