@@ -45,7 +45,8 @@ MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic Phoenix
                 ServeSensorAndRelay)
 # Sketches that run with shortened calls and jumps too.
 RELAX_ELFS := $(patsubst %,$(AVR_OUT)/uno-relax/%.elf,SizeSerial SizeFC03 Basic PhoenixContact Probe \
-              ServeSensorAndRelay)
+              ServeSensorAndRelay) \
+              $(patsubst %,$(AVR_OUT)/mega-relax/%.elf,Basic PhoenixContact ServeSensorAndRelay)
 # Other chips of the set avr5 that the simulator knows: some with two UARTs, some with one.
 CHIPS := mega1280 atmega644p atmega1284p atmega328 atmega644
 CHIP_ELFS := $(foreach chip,$(CHIPS),$(patsubst %,$(AVR_OUT)/$(chip)/%.elf,FirstRead WriteAndReadBack))
@@ -83,6 +84,7 @@ $(foreach chip,$(CHIPS),$(eval $(call sketches,$(chip))))
 $(eval $(call sketches,uno-minimal))
 $(eval $(call sketches,uno-125))
 $(eval $(call sketches,uno-relax))
+$(eval $(call sketches,mega-relax))
 $(eval $(call sketches,uno-peer))
 $(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
 

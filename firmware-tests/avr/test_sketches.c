@@ -318,6 +318,7 @@ static void basic_counts_in_the_server(void **state)
     basic(&minimal);
     basic(&relaxed);
     basic(&mega);
+    basic(&relaxed_mega);
 }
 
 /* The requests of a round: function and quantity, in order. */
@@ -380,6 +381,7 @@ static void phoenix_contact_makes_its_requests(void **state)
     phoenix_contact(&minimal);
     phoenix_contact(&relaxed);
     phoenix_contact(&mega);
+    phoenix_contact(&relaxed_mega);
 }
 
 /* --- sketches that are no examples */
