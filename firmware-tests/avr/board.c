@@ -148,9 +148,12 @@ static void received(struct avr_irq_t *irq, uint32_t value, void *parameter)
 static void byte_out(struct avr_irq_t *irq, uint32_t value, void *parameter)
 {
     wire *w = parameter;
+    uint64_t now = w->on->avr->cycle, next = w->last_started + 10 * w->bit;
 
     (void)irq;
-    byte_started(w, (uint8_t)value, w->on->avr->cycle);
+    /* The simulator's UART sends byte after byte without a pause. But it reports a byte when the
+     * board's interrupt writes it, which another interrupt may delay. */
+    byte_started(w, (uint8_t)value, w->length > 0 && now - next < 5 * w->bit ? next : now);
 }
 
 /* The simulator's bytes are always eleven bits long. Corrects that for other formats. */
