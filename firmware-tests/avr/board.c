@@ -149,11 +149,14 @@ static void byte_out(struct avr_irq_t *irq, uint32_t value, void *parameter)
 {
     wire *w = parameter;
     uint64_t now = w->on->avr->cycle, next = w->last_started + 10 * w->bit;
+    int follows = w->length > 0 && now - next < 5 * w->bit;
 
     (void)irq;
+    byte_started(w, (uint8_t)value, now);
     /* The simulator's UART sends byte after byte without a pause. But it reports a byte when the
      * board's interrupt writes it, which another interrupt may delay. */
-    byte_started(w, (uint8_t)value, w->length > 0 && now - next < 5 * w->bit ? next : now);
+    if (follows)
+        w->last_started = next;
 }
 
 /* The simulator's bytes are always eleven bits long. Corrects that for other formats. */
