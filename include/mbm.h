@@ -794,7 +794,7 @@ typedef struct mbm_master {
     /**
      * Private.
      */
-    void *pointers[13];
+    void *pointers[14];
     /**
      * Private.
      */
@@ -1337,9 +1337,10 @@ uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint32_t delayM
  *
  * So a device that answers in order and within the response timeout never gives the data of
  * another request, whatever its usual latency and however late one of its replies was. The
- * request after a timeout takes at most one quiet time and one response timeout longer; all
- * others take no longer. A wrong reading remains possible if the device takes longer than
- * the response timeout for two requests in a row.
+ * request after a timeout ends one response timeout after the last reply that arrives, and at
+ * the latest three response timeouts after it was sent; all others take no longer. A wrong
+ * reading remains possible if the device takes longer than the response timeout for two
+ * requests in a row.
  *
  * With a quiet time of 0 the master waits and holds nothing: a reply that is later than the
  * response timeout may be taken for the reply to the next request, and so may all that
@@ -1616,11 +1617,11 @@ typedef struct mbm_client {
     /**
      * Private.
      */
-    void *pointers[47];
+    void *pointers[49];
     /**
      * Private.
      */
-    uint32_t words[27];
+    uint32_t words[28];
 } mbm_client;
 
 /**

@@ -63,16 +63,7 @@ impl Storage for Lent {
         self.frame.bytes(index, count)
     }
 
-    fn set_aside(&mut self, count: u16) {
-        self.within(0, count);
-        self.frame.set_aside(count);
-    }
-
-    fn take_back(&mut self, count: u16) {
-        self.frame.take_back(count);
-    }
-
-    fn count(&mut self, counter: Counter, more: u16) {
+    fn count(&mut self, counter: Counter, more: u32) {
         self.counters.borrow_mut()[counter as usize] += u32::from(more);
     }
 }

@@ -113,7 +113,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             return false;
         }
         let received = received as u16;
-        self.storage.count(Counter::BytesReceived, received);
+        self.storage.count(Counter::BytesReceived, received.into());
         self.end += received;
         true
     }
@@ -282,9 +282,9 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn time_of(&mut self, state: &RequestState) -> u32 {
         if state.header.is_answered() {
-            state.response_timeout(&mut self.storage, self.settings.response_timeout)
+            state.response_timeout(&mut self.storage, self.settings.response_timeout.get())
         } else {
-            self.settings.turnaround_delay
+            self.settings.turnaround_delay.get()
         }
     }
 
@@ -300,7 +300,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         }
         let sent = sent as u16;
         self.accepts |= sent > 0;
-        self.storage.count(Counter::BytesSent, sent);
+        self.storage.count(Counter::BytesSent, sent.into());
         self.sent += sent;
         if self.sent == self.filled {
             self.sent = 0;
