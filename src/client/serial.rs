@@ -74,7 +74,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
 
     /// Passes a request to the engine and starts it.
     fn start(&mut self, request: J) -> Status {
-        let unit = request.state().unit;
+        let unit = request.state().unit();
         self.engine.clear_outcome();
         self.engine.request().begin(request);
         self.engine.start(unit)

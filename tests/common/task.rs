@@ -99,7 +99,7 @@ impl Task {
         build: impl FnOnce(&mut RequestHeader) -> Status,
     ) -> Task {
         let mut state = RequestState::NONE;
-        state.unit = unit;
+        state.unit = unit.into();
         state.transaction = transaction;
         state.capacity = 252;
         assert_eq!(build(&mut state.header), Status::OK);

@@ -249,7 +249,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             return Status::BUSY;
         }
         let state = request.state();
-        let (unit, header) = (state.unit, &state.header);
+        let (unit, header) = (state.unit(), &state.header);
         let begin = usize::from(self.filled);
         let Some(space) = self.storage.outgoing().get_mut(begin..) else {
             return Status::BUSY;
@@ -398,7 +398,7 @@ fn write_frame<J: ClientRequest>(
 ) -> Result<usize, Status> {
     let state = request.state();
     let header = &state.header;
-    tcp::emit(place, wire, state.unit, |pdu| {
+    tcp::emit(place, wire, state.unit(), |pdu| {
         let length = usize::from(header.request_length());
         let pdu = pdu.get_mut(..length).ok_or(Status::BUFFER_TOO_SMALL)?;
         header.emit(pdu, data_of(request));
