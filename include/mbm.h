@@ -5748,7 +5748,8 @@ typedef struct mbm_packet {
     uint16_t messageCount;
     /**
      * The unit id that the request addresses, or that replies, 0 to 255. Only frames have it.
-     * Functions that read a packet refuse a greater number (MBM_INVALID_ARGUMENT).
+     * mbm_frame_build, mbm_frame_exception and mbm_frame_replyLength refuse a greater number
+     * (MBM_INVALID_ARGUMENT).
      */
     uint16_t unit;
     /**

@@ -129,7 +129,8 @@ pub struct mbm_packet {
     /// 0C: the count of messages.
     pub messageCount: u16,
     /// The unit id that the request addresses, or that replies, 0 to 255. Only frames have it.
-    /// Functions that read a packet refuse a greater number (MBM_INVALID_ARGUMENT).
+    /// mbm_frame_build, mbm_frame_exception and mbm_frame_replyLength refuse a greater number
+    /// (MBM_INVALID_ARGUMENT).
     pub unit: u16,
     /// MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
     pub kind: u8,
