@@ -284,14 +284,14 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             self.content = S::Count::ZERO;
             self.seen = Outcome::NOTHING;
         } else {
-            keep = keep - 1u8.into();
+            keep -= 1u8.into();
         }
         if Q::HAS_FIXED_REPLY {
             let longest = self.length.max(self.outgoing).max(EXCEPTION_FRAME.into());
             keep = keep.min(longest - 1u8.into());
         }
         while keep > S::Count::ZERO && self.storage.byte(self.end - keep) != self.unit {
-            keep = keep - 1u8.into();
+            keep -= 1u8.into();
         }
         self.storage.move_down(self.end - keep, keep);
         self.end = keep;

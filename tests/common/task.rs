@@ -64,7 +64,7 @@ impl Storage for Lent {
     }
 
     fn count(&mut self, counter: Counter, more: u32) {
-        self.counters.borrow_mut()[counter as usize] += u32::from(more);
+        self.counters.borrow_mut()[counter as usize] += more;
     }
 }
 
