@@ -61,7 +61,7 @@ fn is_allowed(fields: &[&Field], limits: &Limits) -> bool {
         (u32::from(limits.registers), u32::from(limits.register_gap))
     };
     if let Some(own) = own {
-        let own = if bits { own.bits } else { own.registers.into() };
+        let own = if bits { own.bits } else { own.registers };
         if own > 0 {
             most = own.into();
         }
