@@ -4,7 +4,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::engine::{Buffers, Counter, Engine, Setting, Settings, Storage as _, Words as _, BROADCAST};
+use mbm::engine::{
+    Buffers, Counter, Engine, Setting, Settings, Storage as _, Words as _, BROADCAST,
+};
 use mbm::error::Status;
 use mbm::pdu::master_request::MasterRequest;
 use mbm::port::Port;
