@@ -312,6 +312,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 
     /// Ends the request with what was seen.
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn settle(&mut self) -> Status {
         if let Some(observe) = self.observer {
             observe(self, Event::End);

@@ -34,6 +34,9 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             // One byte, at the end.
             return self.take_in();
         }
+        if first == S::Count::ZERO && received == self.length && self.is_reply_alone(received) {
+            return true;
+        }
         let mut index = first;
         let end = first + received;
         while index < end {
@@ -46,6 +49,29 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             index += 1u8.into();
         }
         false
+    }
+
+    /// True if the received bytes are exactly the reply, and end the request. Hosts receive most
+    /// replies in this way, and save 2000 instructions for ten registers.
+    #[inline(always)]
+    fn is_reply_alone(&mut self, received: S::Count) -> bool {
+        let frame = self.storage.slice(S::Count::ZERO, received);
+        let start = [self.unit, self.request.function()];
+        if self.is_on_probation
+            || self.outgoing > S::Count::ZERO
+            || !frame.starts_with(&start)
+            || !rtu::is_frame(frame)
+        {
+            return false;
+        }
+        self.end = received;
+        self.run_length = received;
+        let is_reply = self.accept(received);
+        if !is_reply {
+            self.end = S::Count::ZERO;
+            self.run_length = S::Count::ZERO;
+        }
+        is_reply
     }
 
     /// Takes in the byte at the end of the frame buffer. True if the request ends with it.

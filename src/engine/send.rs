@@ -3,7 +3,7 @@
 use super::{Count, Engine, Outcome, Phase, RequestSpec, Storage, BROADCAST};
 use crate::error::Status;
 use crate::port::Port;
-use crate::time::characters;
+use crate::time::{characters, has_elapsed};
 
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Starts the request to `unit`; the calls of `poll` send it. A refused request sends
@@ -77,8 +77,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
         self.tally(Status::PENDING);
         self.is_late = false;
-        // If the port accepts nothing, this wait ends the request.
-        self.wait = self.wait.wrapping_add(Q::response_timeout(self));
         self.since = self.now;
         self.phase = Phase::Send;
         self.port.pre_transmission();
@@ -88,6 +86,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Writes the frame to the port, waits until the port has sent it, and keeps the driver on
     /// for the post-flush hold.
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn send(&mut self) -> Status {
         if self.phase == Phase::Send {
             let left = self.outgoing - self.sent;
@@ -143,9 +142,11 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     }
 
     /// The status of a request whose port does not go on.
-    #[inline(always)]
-    fn stalled(&self) -> Status {
-        if self.has_expired() {
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn stalled(&mut self) -> Status {
+        // As long as the request waits for its reply, after as long as it waited for silence.
+        let time = self.wait.wrapping_add(Q::response_timeout(self));
+        if has_elapsed(time, self.now, self.since) {
             Status::LINE_BUSY
         } else {
             Status::PENDING
@@ -155,6 +156,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Waits for the reply until the response timeout, or for the turnaround delay. A port that
     /// does not know when the last bit has left may have bytes left to send.
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn wait_for_reply(&mut self) {
         self.wait = if self.phase == Phase::Turnaround {
             self.settings.turnaround_delay.get()
