@@ -11,22 +11,10 @@
 //! Only [`Engine::set_lenient`] names this module. A program that does not call that function
 //! contains none of this code.
 
-use super::{Engine, Outcome, Storage, Words};
+use super::{Engine, Event, Outcome, Storage, Words};
 use crate::frame::rtu;
 use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
-
-/// What an observer is called for.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Event {
-    /// A byte has arrived, and the search has not ended with it. `true` if it ends a frame.
-    Byte(u8, bool),
-    /// The request ends.
-    End,
-}
-
-/// A function that sees the bytes beside the search, and the end of the request.
-pub type Observer<P, S, Q> = fn(&mut Engine<P, S, Q>, Event);
 
 /// Bytes before the data in the response to a read: unit, function code and byte count.
 const BEFORE_DATA: u8 = 3;
@@ -137,6 +125,18 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         }
     }
 
+    /// Moves the kept bytes, in the order in which they arrived, to the front of the buffer.
+    fn move_kept_to_front(&mut self) {
+        let (mut front, mut back) = (0, self.storage.capacity());
+        while front < back {
+            back -= 1;
+            let (first, last) = (self.storage.byte(front), self.storage.byte(back));
+            self.storage.set_byte(front, last);
+            self.storage.set_byte(back, first);
+            front += 1;
+        }
+    }
+
     /// Makes a deviating reply the result of a request that would fail. Of a reply with more
     /// data than response words, the data that fill these words count.
     fn accept_deviating(&mut self) {
@@ -144,8 +144,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
             if self.request.is_read() {
                 let data = self.kept_data();
                 self.request.set_reads(data);
-                let space = self.storage.capacity();
-                self.storage.bytes(0, space).reverse();
+                self.move_kept_to_front();
             }
             self.exception = 0;
             self.is_early = false;

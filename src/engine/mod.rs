@@ -27,7 +27,6 @@ mod spec;
 mod storage;
 mod tally;
 
-pub use lenient::Observer;
 pub use outcome::Outcome;
 pub use settings::{Setting, Settings};
 pub use spec::RequestSpec;
@@ -140,3 +139,15 @@ pub struct Engine<P, S: Storage, Q> {
     /// The observer has seen a deviating reply.
     has_deviating: bool,
 }
+
+/// What an observer is called for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Event {
+    /// A byte has arrived, and the search has not ended with it. `true` if it ends a frame.
+    Byte(u8, bool),
+    /// The request ends.
+    End,
+}
+
+/// A function that sees the bytes beside the search, and the end of the request.
+pub type Observer<P, S, Q> = fn(&mut Engine<P, S, Q>, Event);

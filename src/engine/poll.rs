@@ -1,7 +1,6 @@
 //! Moves a request on, from its start to its end.
 
-use super::lenient::Event;
-use super::{Count, Engine, Outcome, Phase, RequestSpec, Settings, Storage};
+use super::{Count, Engine, Event, Outcome, Phase, RequestSpec, Settings, Storage};
 use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;

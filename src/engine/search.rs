@@ -10,8 +10,7 @@
 //! right, these bytes were a whole frame. If that frame is not the reply, it is skipped, and an
 //! exception or a damaged reply that seemed to lie in it is forgotten.
 
-use super::lenient::Event;
-use super::{Count, Engine, Outcome, RequestSpec, Storage};
+use super::{Count, Engine, Event, Outcome, RequestSpec, Storage};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::frame::rtu::{self, MIN_FRAME};
