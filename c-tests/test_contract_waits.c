@@ -136,6 +136,18 @@ static void a_reply_late_in_the_quiet_time_does_not_make_the_line_busy(void **st
     sim_reads(s, 500);
 }
 
+static void a_foreign_frame_in_the_quiet_time_does_not_lengthen_it(void **state)
+{
+    NODE;
+
+    mbm_master_setResponseTimeout(n, 50);
+    /* Within the frame is what seems to be a damaged exception. */
+    sim_answer(s, 1, 60000, "05 03 06 11 83 00 00 00 00 +");
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].silence, 100000);
+}
+
 static void a_request_without_a_reply_is_repeated_as_often_as_set(void **state)
 {
     NODE;
@@ -394,6 +406,7 @@ int main(void)
         SIM_TEST(the_quiet_time_is_kept_after_a_timeout),
         SIM_TEST(a_reply_in_the_quiet_time_is_dropped),
         SIM_TEST(a_reply_late_in_the_quiet_time_does_not_make_the_line_busy),
+        SIM_TEST(a_foreign_frame_in_the_quiet_time_does_not_lengthen_it),
         SIM_TEST(a_request_without_a_reply_is_repeated_as_often_as_set),
         SIM_TEST(damaged_and_malformed_replies_are_retried_exceptions_are_not),
         SIM_TEST(a_broadcast_succeeds_after_the_turnaround_delay),

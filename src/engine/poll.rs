@@ -205,9 +205,10 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// it is over.
     #[inline(always)]
     fn listen(&mut self) -> Status {
-        // All received bytes are searched, also if the port returns them one by one, but at most
-        // as many as a frame buffer holds.
-        let mut budget = S::Count::MAX;
+        // All received bytes are searched, also if the port returns them one by one, but not more
+        // than about a frame in one poll.
+        const MOST: u8 = u8::MAX;
+        let mut budget = S::Count::from(MOST);
         loop {
             if self.end == self.space {
                 self.make_space();
@@ -246,13 +247,14 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
                 self.wait_for_silence();
             }
             if budget < received {
+                budget = S::Count::ZERO;
                 break;
             }
             budget -= received;
         }
         // Received bytes extend the wait, but not for ever.
         let limit = self.wait.wrapping_add(Q::response_timeout(self));
-        let is_old = budget < S::Count::MAX && self.since.wrapping_sub(self.begun) >= limit;
+        let is_old = budget < MOST.into() && self.since.wrapping_sub(self.begun) >= limit;
         let is_over = self.has_expired();
         if self.phase == Phase::Gap {
             if is_over {

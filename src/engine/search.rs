@@ -10,7 +10,7 @@
 //! right, these bytes were a whole frame. If that frame is not the reply, it is skipped, and an
 //! exception or a damaged reply that seemed to lie in it is forgotten.
 
-use super::{Count, Engine, Event, Outcome, RequestSpec, Storage};
+use super::{Count, Engine, Event, Outcome, Phase, RequestSpec, Storage};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::frame::rtu::{self, MIN_FRAME};
@@ -281,8 +281,10 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.is_early = false;
         self.exception = 0;
         self.seen = Outcome::NOTHING;
-        self.since = self.begun;
-        self.wait_for_reply();
+        if self.phase == Phase::Reply {
+            self.since = self.begun;
+            self.wait_for_reply();
+        }
     }
 
     /// Notes a frame with a right CRC that does not answer the request.

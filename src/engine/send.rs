@@ -52,6 +52,9 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.seen = Outcome::NOTHING;
         self.is_early = false;
         self.is_held = false;
+        if !Q::HAS_FIXED_REPLY {
+            self.is_unsearched = false;
+        }
         self.is_on_probation = self.may_be_late();
         self.begin_frame();
     }

@@ -50,9 +50,6 @@ pub trait Count:
     /// No byte.
     const ZERO: Self;
 
-    /// The greatest number.
-    const MAX: Self;
-
     /// This number of bytes of a frame buffer.
     fn of(bytes: usize) -> Self;
 
@@ -62,7 +59,6 @@ pub trait Count:
 
 impl Count for u8 {
     const ZERO: Self = 0;
-    const MAX: Self = u8::MAX;
 
     fn of(bytes: usize) -> Self {
         bytes as u8
@@ -75,7 +71,6 @@ impl Count for u8 {
 
 impl Count for u16 {
     const ZERO: Self = 0;
-    const MAX: Self = u16::MAX;
 
     fn of(bytes: usize) -> Self {
         bytes as u16
