@@ -1388,7 +1388,7 @@ uint8_t mbm_master_setEchoDiscard(struct mbm_master *master, uint8_t on);
  *   It accepts such a reply at the end of the response timeout, if no right reply has
  *   arrived. mbm_master_available returns the number of words that arrived.
  * - A read of more words than the response words hold succeeds and fills all of them.
- *   (A reply that is longer than the frame buffer must not follow noise directly.)
+ *   (If the reply is longer than the frame buffer, no noise may have arrived before it.)
  * - The master also sends requests that read to unit 0, and accepts a reply from unit 0.
  *
  * Set a short response timeout (mbm_master_setResponseTimeout) if the device deviates in
