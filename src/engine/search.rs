@@ -151,18 +151,20 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     #[cold]
     #[inline(always)]
     fn note_too_long(&mut self) {
-        if self.end < 3u8.into() {
-            return;
-        }
-        let front = self.end - 3u8.into();
-        let count: u16 = (self.length - 5u8.into()).into();
-        if self.storage.byte(front) == self.unit
-            && self.storage.byte(front + 1u8.into()) == self.request.function()
-            && u16::from(self.storage.byte(front + 2u8.into())) == count
-        {
+        if self.end >= 3u8.into() && self.begins_read(self.end - 3u8.into()) {
             self.note(Outcome::TOO_LONG);
             self.is_early = true;
         }
+    }
+
+    /// True if the bytes at `front` are those with which the reply to a read begins: unit,
+    /// function code and byte count.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn begins_read(&self, front: S::Count) -> bool {
+        let count: u16 = (self.length - 5u8.into()).into();
+        self.storage.byte(front) == self.unit
+            && self.storage.byte(front + 1u8.into()) == self.request.function()
+            && u16::from(self.storage.byte(front + 2u8.into())) == count
     }
 
     /// Moves the frame of `length` bytes at the end of the buffer to its front, and makes it the
@@ -248,7 +250,12 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
         let last = self.storage.slice(self.end - 1u8.into(), 1u8.into());
         self.run = self.run.with(last);
-        self.run.is_residue() && self.run_length >= MIN_FRAME.into()
+        if !self.run.is_residue() || self.run_length < MIN_FRAME.into() {
+            return false;
+        }
+        // By chance, the CRC may be right before the end of the reply.
+        let is_here = self.run_length < self.length && self.run_length <= self.end - self.content;
+        !(is_here && self.begins_read(self.end - self.run_length))
     }
 
     /// Skips a whole frame that is not the reply. True if it is the reply but the frame buffer
