@@ -252,6 +252,13 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             }
             budget -= received;
         }
+        // The search may have taken long. The silence begins after it.
+        let restarts =
+            self.phase == Phase::Gap || self.is_held || self.is_early || self.is_unsearched;
+        if budget < MOST.into() && restarts {
+            self.now = self.port.micros();
+            self.since = self.now;
+        }
         // Received bytes extend the wait, but not for ever.
         let limit = self.wait.wrapping_add(Q::response_timeout(self));
         let is_old = budget < MOST.into() && self.since.wrapping_sub(self.begun) >= limit;
