@@ -804,7 +804,7 @@ typedef struct mbm_master {
     /**
      * Private.
      */
-    uint32_t words[23];
+    uint32_t words[25];
 } mbm_master;
 
 /**
@@ -1627,7 +1627,7 @@ typedef struct mbm_client {
     /**
      * Private.
      */
-    uint32_t words[28];
+    uint32_t words[29];
 } mbm_client;
 
 /**

@@ -83,9 +83,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         }
         // The search has taken in the last byte, so the buffer may be full.
         if self.end == space {
-            let keep = self.end - 1;
-            self.storage.move_down(1, keep);
-            self.end = keep;
+            self.drop_to(1);
         }
         self.storage.set_byte(space - 1, byte);
         self.space -= 1;

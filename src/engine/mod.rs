@@ -109,6 +109,10 @@ pub struct Engine<P, S: Storage, Q> {
     foreign_frames: u8,
     /// CRC of the bytes that have arrived since the last frame ended.
     run: Crc16,
+    /// The CRC since the last frame of the bytes that were dropped from the frame buffer.
+    before: Crc16,
+    /// The weight of `length` for [`Crc16::since_start`]; 0 if it is not computed yet.
+    weight: Crc16,
     /// The caller's frame buffer, words and counters.
     pub storage: S,
     /// The byte stream.

@@ -34,6 +34,8 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             sent: S::Count::ZERO,
             foreign_frames: 0,
             run: Crc16::START,
+            before: Crc16::START,
+            weight: Crc16::RESIDUE,
             storage,
             since: 0,
             wait: 0,

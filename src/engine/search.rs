@@ -200,7 +200,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         {
             return false;
         }
-        if rtu::is_frame(self.storage.slice(front, length)) {
+        if self.is_right(front, length) {
             return true;
         }
         // A damaged reply ends the request, unless it lies within the reply or another frame.
@@ -210,6 +210,40 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
         self.note_damaged();
         false
+    }
+
+    /// True if the CRC of the `length` bytes at the end of the buffer is right. It follows from
+    /// the CRC of all bytes since the last frame and from that of the bytes before `front`, which
+    /// are few. So bytes that begin like the reply again and again cost little.
+    #[inline(always)]
+    fn is_right(&mut self, front: S::Count, length: S::Count) -> bool {
+        let known = self.known();
+        if !cfg!(feature = "diagnosis") || front < known || length != self.length {
+            return rtu::is_frame(self.storage.slice(front, length));
+        }
+        let before = self.before.with(self.storage.slice(known, front - known));
+        if before != Crc16::START && self.weight == Crc16::RESIDUE {
+            self.weight = Crc16::weight(length.into());
+        }
+        before.since_start(self.weight) == self.run
+    }
+
+    /// The index in the buffer up to which `before` is the CRC since the last frame.
+    #[inline(always)]
+    fn known(&self) -> S::Count {
+        self.end - self.run_length.min(self.end - self.content)
+    }
+
+    /// Drops the bytes before `front`.
+    #[inline(always)]
+    pub(super) fn drop_to(&mut self, front: S::Count) {
+        let known = self.known();
+        if cfg!(feature = "diagnosis") && known < front {
+            self.before = self.before.with(self.storage.slice(known, front - known));
+        }
+        self.content = S::Count::ZERO;
+        self.end -= front;
+        self.storage.move_down(front, self.end);
     }
 
     /// Notes a damaged reply. It may be the answer, so a held reply is not.
@@ -227,6 +261,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.run_length = S::Count::ZERO;
         if cfg!(feature = "diagnosis") {
             self.run = Crc16::START;
+            self.before = Crc16::START;
             self.run_kind = Outcome::MALFORMED;
         }
     }
@@ -315,7 +350,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         let mut keep = self.end - self.content;
         if self.content > S::Count::ZERO {
             self.note_foreign_frame();
-            self.content = S::Count::ZERO;
             self.seen = Outcome::NOTHING;
         } else {
             keep -= 1u8.into();
@@ -327,7 +361,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         while keep > S::Count::ZERO && self.storage.byte(self.end - keep) != self.unit {
             keep -= 1u8.into();
         }
-        self.storage.move_down(self.end - keep, keep);
-        self.end = keep;
+        self.drop_to(self.end - keep);
     }
 }

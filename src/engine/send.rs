@@ -2,6 +2,7 @@
 
 use super::{Count, Engine, Outcome, Phase, RequestSpec, Storage, BROADCAST};
 use crate::error::Status;
+use crate::frame::checksum::Crc16;
 use crate::port::Port;
 use crate::time::{characters, has_elapsed};
 
@@ -49,6 +50,9 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.end = S::Count::ZERO;
         self.content = S::Count::ZERO;
         self.length = self.request.reply_length();
+        if cfg!(feature = "diagnosis") {
+            self.weight = Crc16::RESIDUE;
+        }
         self.seen = Outcome::NOTHING;
         self.is_early = false;
         self.is_held = false;

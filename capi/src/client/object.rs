@@ -32,7 +32,7 @@ pub struct mbm_client {
     /// Private.
     pointers: [*mut c_void; 49],
     /// Private.
-    words: [u32; 28],
+    words: [u32; 29],
 }
 
 /// The fields in the storage of an `mbm_client`.

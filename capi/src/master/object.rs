@@ -17,5 +17,5 @@ pub struct mbm_master {
     /// Private.
     pointers: [*mut c_void; 14],
     /// Private.
-    words: [u32; 23],
+    words: [u32; 25],
 }
