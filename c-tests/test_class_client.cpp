@@ -133,6 +133,28 @@ static void a_pending_request_is_refused_and_unchanged(void **)
                     {4, 3, 2, 0, 2});
 }
 
+static void a_request_refuses_a_unit_and_a_timeout_that_are_too_large(void **)
+{
+    ModbusSerialClient client;
+    ModbusRequestOf<1> request(17), beyond(300);
+    client.begin(Serial, 19200);
+    assert_int_equal(beyond.getUnitID(), 300);
+    assert_int_equal(client.readHoldingRegisters(beyond, 5, 1), MBM_INVALID_ARGUMENT);
+    assert_int_equal(beyond.status(), MBM_INVALID_ARGUMENT);
+    assert_int_equal(request.setUnitID(300), MBM_INVALID_ARGUMENT);
+    assert_int_equal(request.getUnitID(), 17);
+    assert_int_equal(request.setUnitID(255), MBM_OK);
+    assert_int_equal(request.setResponseTimeout(100000), MBM_OK);
+    assert_int_equal(request.setResponseTimeout(1000001), MBM_INVALID_ARGUMENT);
+    assert_int_equal(client.readHoldingRegisters(request, 5, 1), MBM_PENDING);
+    const unsigned long before = millis();
+    while (client.poll() == MBM_PENDING)
+        assert_true(millis() - before < 200000);
+    assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT);
+    assert_in_range(millis() - before, 100000, 100300);
+    assert_int_equal(client.pending(), 0);
+}
+
 static void a_request_that_needs_more_words_than_it_has_is_refused(void **)
 {
     ModbusSerialClient client;
@@ -420,6 +442,7 @@ int main()
         TEST(a_callback_may_replace_itself_and_send_a_request),
         TEST(requests_are_sent_in_their_order),
         TEST(a_pending_request_is_refused_and_unchanged),
+        TEST(a_request_refuses_a_unit_and_a_timeout_that_are_too_large),
         TEST(a_request_that_needs_more_words_than_it_has_is_refused),
         TEST(a_request_has_its_own_timeout_and_retries),
         TEST(a_request_is_repeated_as_often_as_set),

@@ -31,6 +31,7 @@ static int start(void **state)
     line->setResponseTimeout(PATIENCE_MS);
     assert_int_equal(gateway->poll(), MBM_NOT_INITIALISED);
     assert_int_equal(gateway->begin(*wifi, *line, 0), MBM_INVALID_ARGUMENT);
+    assert_int_equal(gateway->begin(*wifi, *line, 273, 274), MBM_INVALID_ARGUMENT);
     assert_int_equal(gateway->begin(*wifi, *line, 17, 18), MBM_OK);
     return 0;
 }

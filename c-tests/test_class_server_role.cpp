@@ -171,6 +171,21 @@ static void each_of_several_units_serves_its_own_tables(void **)
     expect_no_response(server, adu({6, 3, 0, 0, 0, 1}));
 }
 
+static void a_unit_id_above_255_is_refused(void **)
+{
+    ModbusServer server;
+    ModbusRegisterArray<2> holding;
+    ModbusUnit units[2];
+    units[1].setUnitID(300);
+    server.holdingRegisters(holding);
+    assert_int_equal(server.begin(7, Serial, 19200), MBM_OK);
+    assert_int_equal(server.begin(263, Serial, 19200), MBM_INVALID_ARGUMENT);
+    assert_int_equal(server.beginAscii(256, Serial), MBM_INVALID_ARGUMENT);
+    assert_int_equal(server.begin(units, Serial, 19200), MBM_INVALID_ARGUMENT);
+    assert_int_equal(server.getUnitID(), 7);
+    expect_response(server, {7, 3, 0, 0, 0, 1}, {7, 3, 2, 0, 0});
+}
+
 static uint16_t adds(const mbm_request &request, uint8_t *response, uint16_t capacity)
 {
     if (request.length != 2 || capacity < 1)
@@ -333,6 +348,7 @@ int main()
         TEST(mask_write_and_read_write_are_served_after_maskAndReadWrite),
         TEST(a_unit_without_tables_sends_no_response),
         TEST(each_of_several_units_serves_its_own_tables),
+        TEST(a_unit_id_above_255_is_refused),
         TEST(a_function_of_the_sketch_is_served),
         TEST(a_function_can_be_switched_off_and_on),
         TEST(the_other_functions_are_served_from_their_records),

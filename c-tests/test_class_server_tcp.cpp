@@ -45,6 +45,7 @@ template <typename Listener> static void each_function_is_served()
     server.maskAndReadWrite(holding);
     server.coils(coils);
     assert_int_equal(server.begin(7, listener), MBM_OK);
+    assert_int_equal(server.begin(263, listener), MBM_INVALID_ARGUMENT);
     assert_int_equal(server.getUnitID(), 7);
     holding[2] = 0xBEEF;
     coils.set(1, true);

@@ -9,6 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "refused.h"
+
 enum { UNIT = 7, MS = 1000, STEPS = 1000 };
 /* Timeouts in milliseconds. */
 enum { CLIENTS = 300, UNITS = 700, OWN = 1100 };
@@ -104,6 +106,70 @@ static void the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_clien
         assert_int_equal(time_of_read(), UNITS);
         OK(mbm_client_setUnits(&client, NULL, 0));
         assert_int_equal(time_of_read(), CLIENTS);
+    }
+}
+
+static void a_unit_and_a_timeout_that_are_too_large_are_refused(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin(framings[i]);
+        request.unit = 300; /* not 44 */
+        REFUSED(MBM_INVALID_ARGUMENT, client,
+                mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+        IS(MBM_INVALID_ARGUMENT, request.status);
+        request.unit = 256; /* not a broadcast */
+        REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_writeSingleCoil(&client, &request, 0, 1));
+        request.unit = UINT16_MAX;
+        REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_readExceptionStatus(&client, &request));
+        request.unit = 255;
+        assert_int_equal(time_of_read(), CLIENTS);
+
+        request.timeoutMs = 1000001;
+        REFUSED(MBM_INVALID_ARGUMENT, client,
+                mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+        IS(MBM_INVALID_ARGUMENT, request.status);
+        request.timeoutMs = UINT32_MAX;
+        REFUSED(MBM_INVALID_ARGUMENT, client,
+                mbm_client_maskWriteRegister(&client, &request, 0, 0, 0));
+        request.timeoutMs = 100000; /* not 34464 */
+        assert_int_equal(time_of_read(), 100000);
+        request.timeoutMs = 1000000;
+        assert_int_equal(time_of_read(), 1000000);
+        assert_int_equal(mbm_client_pending(&client), 0);
+    }
+}
+
+static void a_record_with_a_unit_or_a_timeout_that_is_too_large_is_refused(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin(framings[i]);
+        units[1].timeoutMs = UNITS;
+        OK(mbm_client_setUnits(&client, units, 2));
+        units[0].unit = 300;
+        REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setUnits(&client, units, 1));
+        units[0].unit = UNIT + 1;
+        units[0].timeoutMs = 1000001;
+        REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setUnits(&client, units, 1));
+        assert_int_equal(time_of_read(), UNITS); /* as before the refused calls */
+        units[0].timeoutMs = 1000000;
+        OK(mbm_client_setUnits(&client, units, 2));
+
+        /* Changed later, which no call can refuse. */
+        request.unit = 44;
+        units[1].unit = 300;
+        assert_int_equal(time_of_read(), CLIENTS);
+        request.unit = UNIT;
+        units[1].unit = UNIT;
+        units[1].timeoutMs = 100000;
+        assert_int_equal(time_of_read(), 100000);
+        units[1].timeoutMs = UINT32_MAX;
+        assert_int_equal(time_of_read(), 1000000);
     }
 }
 
@@ -334,6 +400,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_client),
+        cmocka_unit_test(a_unit_and_a_timeout_that_are_too_large_are_refused),
+        cmocka_unit_test(a_record_with_a_unit_or_a_timeout_that_is_too_large_is_refused),
         cmocka_unit_test(the_retries_of_a_request_override_those_of_the_unit_and_of_the_client),
         cmocka_unit_test(a_client_that_repeats_nothing_refuses_a_request_with_retries),
         cmocka_unit_test(a_busy_device_gets_its_request_again_after_the_wait),

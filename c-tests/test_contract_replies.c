@@ -365,7 +365,7 @@ static void an_echo_is_dropped_with_echo_discard_on(void **state)
     OK(mbm_master_writeSingleCoil(n, 1, 1));
 }
 
-static void a_damaged_echo_makes_only_one_request_fail(void **state)
+static void a_damaged_echo_does_not_hide_the_reply(void **state)
 {
     NODE;
 
@@ -374,7 +374,7 @@ static void a_damaged_echo_makes_only_one_request_fail(void **state)
     mbm_master_setTransmitBuffer(n, 1, 0x2222);
     sim_answer(s, 1, 0, "11 10 00 01 00 02 04 11 11 22 23 AB 23");
     sim_answer(s, 1, 3000, "11 10 00 01 00 02 +");
-    assert_int_equal(mbm_master_writeMultipleRegisters(n, 1, 2), MBM_INVALID_CRC);
+    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
     s->echo = 1;
     sim_answer(s, 1, 500, "11 10 00 01 00 02 +");
     OK(mbm_master_writeMultipleRegisters(n, 1, 2));
@@ -467,7 +467,7 @@ int main(void)
         SIM_TEST(a_pause_after_data_like_a_damaged_exception_does_not_end_the_request),
         SIM_TEST(foreign_data_like_our_damaged_reply_do_not_end_the_request),
         SIM_TEST(an_echo_is_dropped_with_echo_discard_on),
-        SIM_TEST(a_damaged_echo_makes_only_one_request_fail),
+        SIM_TEST(a_damaged_echo_does_not_hide_the_reply),
         SIM_TEST(noise_before_the_echo_does_not_hide_a_foreign_frame_after_it),
         SIM_TEST(an_echo_alone_is_no_success),
         SIM_TEST(with_discard_off_an_echo_that_is_no_reply_is_skipped),

@@ -136,6 +136,18 @@ static void a_reply_late_in_the_quiet_time_does_not_make_the_line_busy(void **st
     sim_reads(s, 500);
 }
 
+static void a_foreign_frame_in_the_quiet_time_does_not_lengthen_it(void **state)
+{
+    NODE;
+
+    mbm_master_setResponseTimeout(n, 50);
+    /* Within the frame is what seems to be a damaged exception. */
+    sim_answer(s, 1, 60000, "05 03 06 11 83 00 00 00 00 +");
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].silence, 100000);
+}
+
 static void a_request_without_a_reply_is_repeated_as_often_as_set(void **state)
 {
     NODE;
@@ -217,13 +229,14 @@ static void a_line_that_never_falls_silent_is_busy(void **state)
     assert_in_range(s->now, 100000, 110000);
 }
 
-static void an_endless_flush_is_bounded_even_if_every_read_returns_bytes(void **state)
+static void a_flood_is_bounded_even_if_every_read_returns_bytes(void **state)
 {
-    static const uint8_t noise[4000] = {0};
+    static const uint8_t noise[8000] = {0};
     NODE;
 
     OK(mbm_master_setResponseTimeout(n, 1));
     s->character = 0;
+    s->step = 250; /* so the flood lasts longer than the timeout and the gap */
     sim_deliver(s, 0, noise, sizeof noise);
     s->read_piece = 1;
     assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
@@ -393,12 +406,13 @@ int main(void)
         SIM_TEST(the_quiet_time_is_kept_after_a_timeout),
         SIM_TEST(a_reply_in_the_quiet_time_is_dropped),
         SIM_TEST(a_reply_late_in_the_quiet_time_does_not_make_the_line_busy),
+        SIM_TEST(a_foreign_frame_in_the_quiet_time_does_not_lengthen_it),
         SIM_TEST(a_request_without_a_reply_is_repeated_as_often_as_set),
         SIM_TEST(damaged_and_malformed_replies_are_retried_exceptions_are_not),
         SIM_TEST(a_broadcast_succeeds_after_the_turnaround_delay),
         SIM_TEST(a_read_is_not_broadcast),
         SIM_TEST(a_line_that_never_falls_silent_is_busy),
-        SIM_TEST(an_endless_flush_is_bounded_even_if_every_read_returns_bytes),
+        SIM_TEST(a_flood_is_bounded_even_if_every_read_returns_bytes),
         SIM_TEST(a_request_that_takes_longer_than_the_response_timeout_is_sent),
         SIM_TEST(a_port_that_accepts_a_byte_now_and_then_is_not_busy),
         SIM_TEST(a_gap_longer_than_the_timeout_is_waited_for),

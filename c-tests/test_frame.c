@@ -19,7 +19,8 @@ static uint16_t wrap(const mbm_framing *f, const mbm_packet *p, const uint8_t *p
                      uint8_t *frame)
 {
     static const char digits[] = "0123456789ABCDEF";
-    uint8_t sum = p->unit;
+    const uint8_t unit = (uint8_t)p->unit;
+    uint8_t sum = unit;
     uint16_t i;
 
     if (f->kind == MBM_FRAMING_TCP) {
@@ -29,13 +30,13 @@ static uint16_t wrap(const mbm_framing *f, const mbm_packet *p, const uint8_t *p
                                   0,
                                   0,
                                   (uint8_t)(length + 1),
-                                  p->unit};
+                                  unit};
 
         memcpy(frame, header, 7);
         memcpy(frame + 7, pdu, length);
         return (uint16_t)(length + 7);
     }
-    frame[0] = p->unit;
+    frame[0] = unit;
     memcpy(frame + 1, pdu, length);
     if (f->kind != MBM_FRAMING_ASCII)
         return (uint16_t)seal(frame, length + 1u);
@@ -44,7 +45,7 @@ static uint16_t wrap(const mbm_framing *f, const mbm_packet *p, const uint8_t *p
         sum = (uint8_t)(sum + pdu[i]);
     sum = (uint8_t)-sum;
     for (i = 0; i < length + 2u; i++) {
-        uint8_t byte = i == 0 ? p->unit : i == length + 1u ? sum : pdu[i - 1];
+        uint8_t byte = i == 0 ? unit : i == length + 1u ? sum : pdu[i - 1];
 
         frame[1 + 2 * i] = (uint8_t)digits[byte >> 4];
         frame[2 + 2 * i] = (uint8_t)digits[byte & 15];

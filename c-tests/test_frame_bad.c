@@ -136,6 +136,33 @@ static void an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused(voi
     }
 }
 
+static void a_packet_with_a_unit_above_255_is_refused(void **state)
+{
+    const mbm_framing *const kinds[] = {&rtu, &ascii, &tcp};
+    uint8_t frame[MBM_MAX_ASCII_FRAME], was[MBM_MAX_ASCII_FRAME] = {0};
+    mbm_packet packet = {.kind = MBM_PACKET_REQUEST, .function = 3, .quantity = 1};
+    mbm_length expected;
+    uint16_t length;
+    size_t i;
+
+    (void)state;
+    memset(frame, 0, sizeof frame);
+    for (i = 0; i < COUNT(kinds); i++) {
+        packet.unit = 300; /* not 44 */
+        IS(MBM_INVALID_ARGUMENT, mbm_frame_build(kinds[i], &packet, frame, sizeof frame, &length));
+        assert_int_equal(length, 0);
+        IS(MBM_INVALID_ARGUMENT,
+           mbm_frame_exception(kinds[i], &packet, 2, frame, sizeof frame, &length));
+        assert_int_equal(length, 0);
+        packet.unit = 256; /* not a broadcast */
+        IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(kinds[i], &packet, &expected));
+        assert_memory_equal(frame, was, sizeof frame);
+    }
+    packet.unit = 255;
+    OK(mbm_frame_build(&tcp, &packet, frame, sizeof frame, &length));
+    assert_int_equal(frame[6], 255);
+}
+
 static void impossible_mbap_lengths_are_malformed(void **state)
 {
     static const uint16_t lengths[] = {0, 1, 255, 256, 65535};
@@ -270,6 +297,7 @@ int main(void)
         cmocka_unit_test(an_rtu_frame_that_is_cut_or_changed_is_refused),
         cmocka_unit_test(a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused),
         cmocka_unit_test(an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused),
+        cmocka_unit_test(a_packet_with_a_unit_above_255_is_refused),
         cmocka_unit_test(impossible_mbap_lengths_are_malformed),
         cmocka_unit_test(ascii_digits_may_be_lower_case_and_must_come_in_pairs),
         cmocka_unit_test(first_bytes_that_begin_no_frame_are_malformed),

@@ -40,7 +40,13 @@ static void a_gateway_goes_on_after_a_refused_begin(void **state)
                                            {1, 11, 0, 246},
                                            {0, 1, MBM_GATEWAY_ALL_LINES, 0},
                                            {1, 1, MBM_GATEWAY_ALL_LINES, 0},
-                                           {0, 0, MBM_GATEWAY_ALL_LINES, 1}};
+                                           {0, 0, MBM_GATEWAY_ALL_LINES, 1},
+                                           {300, 300, 0, 0}, /* not 44 */
+                                           {1, 287, 0, 0},
+                                           {256, 257, 0, 0},
+                                           {0, 256, MBM_GATEWAY_ALL_LINES, 0},
+                                           {1, 1, 0, 300},
+                                           {1, 1, MBM_GATEWAY_LOCAL, 256}};
     static mbm_client none;
     mbm_gatewayLine line = {0};
     mbm_gatewayConfig config;
@@ -85,6 +91,7 @@ static void a_refused_call_changes_nothing(void **state)
 {
     static const mbm_function bad[] = {{0x41, {0}, {0}}, {128, {0}, {0}}};
     mbm_port port = memory_port_of(&b.sockets[0]), deaf = port;
+    mbm_unit beyond = {.id = 300};
 
     (void)state;
     deaf.read = NULL;
@@ -96,6 +103,7 @@ static void a_refused_call_changes_nothing(void **state)
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_close(&b.gateway, BENCH_CONNECTIONS));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setInFlight(&b.gateway, 0));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_serveUnits(&b.gateway, NULL, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_serveUnits(&b.gateway, &beyond, 1));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setFunctions(&b.gateway, NULL, 1));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setFunctions(&b.gateway, bad, COUNT(bad)));
     assert_int_equal(mbm_gateway_pending(&b.gateway, 250), 0);

@@ -436,6 +436,35 @@ static void a_device_that_never_stops_answering_does_not_keep_a_request_from_end
     assert_in_range(s->now - at, 1000 * TIMEOUT_MS, 1000 * 3 * TIMEOUT_MS + QUIET + 1000);
 }
 
+/* The program polls when a byte has arrived, and else when mbm_master_pollDelay says. */
+static void a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_most(void **state)
+{
+    uint8_t frame[16];
+    const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
+    size_t length = fault_right_reply(frame, request);
+    uint64_t at, sent;
+    DEVICE;
+
+    device.takes[0] = 0xFFFFFFFF;
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    s->device = NULL;
+    /* The last reply arrives shortly before the wait is over. */
+    for (at = s->now + QUIET + 10000; at < s->now + QUIET + 1000 * 3 * TIMEOUT_MS - 30000;
+         at += 10000)
+        sim_deliver(s, at, frame, length);
+    OK(mbm_master_setBlocking(n, 0));
+    assert_int_equal(read_at(s, 7), MBM_PENDING);
+    while (mbm_master_poll(n) == MBM_PENDING) {
+        uint64_t next = s->now + mbm_master_pollDelay(n);
+
+        if (s->first < s->last && s->incoming[s->first].at < next)
+            next = s->incoming[s->first].at;
+        s->now = next > s->now ? next : s->now + 1;
+    }
+    sent = s->frames[s->sent - 1].end;
+    assert_in_range(s->now - sent, 0, 1000 * 3 * TIMEOUT_MS + 1000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -461,6 +490,7 @@ int main(void)
         SIM_TEST(one_late_reply_does_not_shift_the_clients_answers),
         SIM_TEST(a_late_reply_does_not_shift_the_clients_answers_after_a_retry),
         SIM_TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_ending),
+        SIM_TEST(a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_most),
     };
 
     return cmocka_run_group_tests_name("late replies", tests, NULL, NULL);

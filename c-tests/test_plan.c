@@ -42,6 +42,26 @@ static void fields_that_fit_together_are_one_request(void **state)
     assert_int_equal(plan_device_integer(&d, 2, 0), d.registers[15]);
 }
 
+static void limits_above_255_are_not_reduced(void **state)
+{
+    mbm_planUnitLimits own = {.registersPerRead = 260, .unit = 2};
+
+    (void)state;
+    d.setup.registersPerRead = 300;
+    d.setup.registerGap = 300;
+    d.setup.units = &own;
+    d.setup.unitCount = 1;
+    add(1, 0, SECOND);
+    add(1, 124, SECOND);
+    add(2, 0, SECOND);
+    add(2, 124, SECOND);
+    plan_device_start(&d);
+    plan_device_run(&d, 100);
+    assert_int_equal(d.requested, 2);
+    assert_int_equal(d.log[0].quantity, 125);
+    assert_int_equal(d.log[1].quantity, 125);
+}
+
 static void each_read_keeps_its_interval(void **state)
 {
     unsigned fast, slow;
@@ -273,6 +293,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(every_table_is_read_with_its_function, rtu),
         cmocka_unit_test_setup(fields_that_fit_together_are_one_request, rtu),
+        cmocka_unit_test_setup(limits_above_255_are_not_reduced, rtu),
         cmocka_unit_test_setup(each_read_keeps_its_interval, rtu),
         cmocka_unit_test_setup(reads_of_one_interval_are_spread_over_it, rtu),
         cmocka_unit_test_setup(a_value_is_never_older_than_its_interval_while_its_unit_answers,

@@ -51,6 +51,10 @@ static void a_wrong_field_is_named(void **state)
     field->address = 20;
     field->unit = 0;
     refuses(MBM_BROADCAST_NOT_ALLOWED, 1);
+    field->unit = 300; /* not 44 */
+    refuses(MBM_INVALID_ARGUMENT, 1);
+    field->unit = 256; /* not a broadcast */
+    refuses(MBM_INVALID_ARGUMENT, 1);
     field->unit = 1;
     field->count = 63;
     refuses(MBM_ILLEGAL_DATA_VALUE, 1);
@@ -102,6 +106,26 @@ static void a_setup_that_is_not_complete_is_refused(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(&d.plan, &d.client, NULL, NULL));
     memset(&d.client, 0, sizeof d.client);
     refuses(MBM_NOT_INITIALISED, 0xFFFF);
+}
+
+static void limits_and_ranges_of_a_unit_above_255_are_refused(void **state)
+{
+    mbm_planUnitLimits limits[2] = {{.unit = 255}, {.unit = 256}};
+    mbm_planExcludedRange ranges[2] = {{.unit = 255, .table = HOLDING},
+                                       {.unit = 301, .table = HOLDING}};
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 0);
+    plan_device_start(&d);
+    d.setup.units = limits;
+    d.setup.unitCount = 2;
+    REFUSED(MBM_INVALID_ARGUMENT, d.plan, plan_device_try(&d, NULL));
+    d.setup.unitCount = 1;
+    d.setup.excluded = ranges;
+    d.setup.excludedCount = 2;
+    REFUSED(MBM_INVALID_ARGUMENT, d.plan, plan_device_try(&d, NULL));
+    d.setup.excludedCount = 1;
+    plan_device_start(&d);
 }
 
 static void what_was_never_begun_is_refused(void **state)
@@ -216,6 +240,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(a_wrong_field_is_named, rtu),
         cmocka_unit_test_setup(a_setup_that_is_not_complete_is_refused, rtu),
+        cmocka_unit_test_setup(limits_and_ranges_of_a_unit_above_255_are_refused, rtu),
         cmocka_unit_test_setup(what_was_never_begun_is_refused, rtu),
         cmocka_unit_test_setup(a_plan_that_begins_again_gives_its_requests_up, rtu),
         cmocka_unit_test_setup(a_plan_whose_new_table_is_wrong_has_ended, rtu),

@@ -51,6 +51,12 @@ static void all_begins_are_refused(uint8_t *frame)
             mbm_server_beginTcp(&server, &port, &other, 1, frame, 20));
     REFUSED(MBM_INVALID_ARGUMENT, server,
             mbm_server_beginRtuOverTcp(&server, &port, &other, 1, frame, 15));
+    other.id = 300; /* not 44 */
+    REFUSED(MBM_INVALID_ARGUMENT, server,
+            mbm_server_beginRtu(&server, &port, &other, 1, frame, 20));
+    other.id = 256; /* not a unit for every id */
+    REFUSED(MBM_INVALID_ARGUMENT, server,
+            mbm_server_beginRtuOverTcp(&server, &port, &other, 1, frame, 20));
 }
 
 static void poll_for_a_while(void)

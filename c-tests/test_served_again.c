@@ -112,7 +112,7 @@ static const struct {
 
 static unsigned answered(mbm_unit *unit, int family)
 {
-    return answer(unit, unit->id, requests[family].pdu, requests[family].length);
+    return answer(unit, (uint8_t)unit->id, requests[family].pdu, requests[family].length);
 }
 
 static unsigned function(int family)

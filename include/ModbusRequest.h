@@ -24,16 +24,19 @@
  */
 class ModbusRequest : public ModbusValues {
 public:
-    /** For `unit`, without words: for functions 05, 06 and 16. */
-    ModbusRequest(uint8_t unit) : ModbusRequest(unit, nullptr, 0) {}
+    /**
+     * For `unit`, without words: for functions 05, 06 and 16. Every call of a request for a
+     * unit above 255 is refused with MBM_INVALID_ARGUMENT.
+     */
+    ModbusRequest(uint16_t unit) : ModbusRequest(unit, nullptr, 0) {}
     /** For `unit`, with the words of an array, which must outlive it. */
     template <size_t N>
-    ModbusRequest(uint8_t unit, uint16_t (&array)[N]) : ModbusRequest(unit, array, N)
+    ModbusRequest(uint16_t unit, uint16_t (&array)[N]) : ModbusRequest(unit, array, N)
     {
         static_assert(N <= 32767, "a request has at most 32767 words");
     }
     /** For `unit`, with `quantity` (0 to 32767) words, which must outlive it. */
-    ModbusRequest(uint8_t unit, uint16_t *array, uint16_t quantity)
+    ModbusRequest(uint16_t unit, uint16_t *array, uint16_t quantity)
         : ModbusValues(array, quantity), request()
     {
         request.context = this;
@@ -44,30 +47,33 @@ public:
 
     /**
      * Sets the unit of later calls: on a serial line 1 to 247, 0 broadcasts; on TCP 1
-     * to 255. Returns MBM_OK; MBM_BUSY, with nothing changed, while the request is pending.
+     * to 255. Returns MBM_OK; MBM_INVALID_ARGUMENT above 255; MBM_BUSY while the request is
+     * pending. A call that is refused changes nothing.
      */
-    uint8_t setUnitID(uint8_t unit)
+    uint8_t setUnitID(uint16_t unit)
     {
+        if (unit > 255)
+            return MBM_INVALID_ARGUMENT;
         if (pending())
             return MBM_BUSY;
         request.unit = unit;
         return MBM_OK;
     }
     /** The unit of later calls. */
-    uint8_t getUnitID() const { return request.unit; }
+    uint16_t getUnitID() const { return request.unit; }
 
     /**
      * Sets the response timeout of later calls in milliseconds, instead of the client's; 0
      * (at first): the client's. Returns MBM_OK; MBM_BUSY, with nothing changed, while the
-     * request is pending; MBM_INVALID_ARGUMENT above 65535.
+     * request is pending; MBM_INVALID_ARGUMENT above 1000000.
      */
     uint8_t setResponseTimeout(uint32_t ms)
     {
-        if (ms > 65535)
+        if (ms > 1000000)
             return MBM_INVALID_ARGUMENT;
         if (pending())
             return MBM_BUSY;
-        request.timeoutMs = static_cast<uint16_t>(ms);
+        request.timeoutMs = ms;
         return MBM_OK;
     }
     /**
@@ -135,7 +141,7 @@ public:
     static_assert(Words >= 1 && Words <= 126, "a request transfers 1 to 126 words");
 
     /** For `unit`. */
-    ModbusRequestOf(uint8_t unit) : ModbusRequest(unit, storage, Words), storage() {}
+    ModbusRequestOf(uint16_t unit) : ModbusRequest(unit, storage, Words), storage() {}
 
 private:
     uint16_t storage[Words];

@@ -62,8 +62,8 @@
  */
 class ModbusUnit {
 public:
-    /** Unit 1 to 247. */
-    ModbusUnit(uint8_t id = 1) : unit() { unit.id = id; }
+    /** Unit 1 to 247. begin refuses a unit above 255. */
+    ModbusUnit(uint16_t id = 1) : unit() { unit.id = id; }
     ModbusUnit(const ModbusUnit &) = delete;
     ModbusUnit &operator=(const ModbusUnit &) = delete;
 
@@ -135,13 +135,28 @@ public:
     }
 
     /** Sets the unit id, 1 to 247. */
-    void setUnitID(uint8_t id) { unit.id = id; }
+    void setUnitID(uint16_t id) { unit.id = id; }
     /** The unit id. */
-    uint8_t getUnitID() const { return unit.id; }
+    uint16_t getUnitID() const { return unit.id; }
 
 private:
     friend class ModbusServer;
     template <typename Listener, uint8_t Connections> friend class ModbusTcpServer;
+
+    // Sets the unit id and returns the one before.
+    uint16_t setID(uint16_t id)
+    {
+        const uint16_t before = unit.id;
+        unit.id = id;
+        return before;
+    }
+    // Sets the unit id back if begin was refused.
+    uint8_t keepID(uint16_t before, uint8_t status)
+    {
+        if (status != MBM_OK)
+            unit.id = before;
+        return status;
+    }
 
     mbm_unit unit;
 };
@@ -165,12 +180,13 @@ public:
      * @param id      1 to 247
      * @param stream  must outlive its use here
      * @param baud    bits per second, for t3.5; 0: unknown, 4 ms
-     * @return MBM_OK; MBM_BUSY, with nothing changed, from within a hook or function
-     *         of this server
+     * @return MBM_OK; or with nothing changed MBM_BUSY from within a hook or function of
+     *         this server, MBM_INVALID_ARGUMENT for a unit id above 255
      */
-    uint8_t begin(uint8_t id, Stream &stream, uint32_t baud = 0)
+    uint8_t begin(uint16_t id, Stream &stream, uint32_t baud = 0)
     {
-        return withId(id, beginRtu(*this, 1, stream, baud));
+        const uint16_t before = setID(id);
+        return keepID(before, beginRtu(*this, 1, stream, baud));
     }
 
     /** As begin, for all units of an array, which answer instead of this one. */
@@ -181,9 +197,10 @@ public:
     }
 
     /** As begin, with ASCII instead of RTU; a frame takes twice as many bytes and 1. */
-    uint8_t beginAscii(uint8_t id, Stream &stream)
+    uint8_t beginAscii(uint16_t id, Stream &stream)
     {
-        return withId(id, listen(mbm_server_beginAscii, *this, 1, stream));
+        const uint16_t before = setID(id);
+        return keepID(before, listen(mbm_server_beginAscii, *this, 1, stream));
     }
 
     /** As beginAscii, for all units of an array. */
@@ -290,12 +307,6 @@ private:
             state.rtu = true;
             setBaudRate(baud);
         }
-        return status;
-    }
-    uint8_t withId(uint8_t id, uint8_t status)
-    {
-        if (status == MBM_OK)
-            setUnitID(id);
         return status;
     }
 

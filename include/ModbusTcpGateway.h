@@ -72,8 +72,8 @@ public:
      *         MBM_INVALID_ARGUMENT for unit ids out of range, MBM_NOT_INITIALISED for a line
      *         that was not begun
      */
-    uint8_t begin(Listener &listener, ModbusClient &devices, uint8_t first = 1,
-                  uint8_t last = 247)
+    uint8_t begin(Listener &listener, ModbusClient &devices, uint16_t first = 1,
+                  uint16_t last = 247)
     {
         if (this->polling)
             return MBM_BUSY;

@@ -72,15 +72,13 @@ public:
      *
      * @param id        1 to 247; requests for 0 and 255 are for this unit too
      * @param listener  must outlive its use here
-     * @return MBM_OK; MBM_BUSY, with nothing changed, from within a hook or function of
-     *         this server
+     * @return MBM_OK; or with nothing changed MBM_BUSY from within a hook or function of
+     *         this server, MBM_INVALID_ARGUMENT for a unit id above 255
      */
-    uint8_t begin(uint8_t id, Listener &listener)
+    uint8_t begin(uint16_t id, Listener &listener)
     {
-        const uint8_t status = serve(*this, 1, listener);
-        if (status == MBM_OK)
-            setUnitID(id);
-        return status;
+        const uint16_t before = setID(id);
+        return keepID(before, serve(*this, 1, listener));
     }
     /** As begin, for all units of an array, which answer instead of this one. */
     template <size_t N> uint8_t begin(ModbusUnit (&units)[N], Listener &listener)
@@ -109,6 +107,9 @@ private:
     {
         if (this->polling)
             return MBM_BUSY;
+        for (uint8_t i = 0; i < quantity; i++)
+            if ((&units)[i].unit.id > 255)
+                return MBM_INVALID_ARGUMENT;
         first = &units;
         count = quantity;
         this->listen(listener);

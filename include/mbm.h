@@ -15,6 +15,12 @@
  * - You may call a begin function again at any time, but not from a hook of the object. The
  *   object then gives up what was pending; requests get the status MBM_CANCELLED.
  *
+ * A unit id and a time that you pass have a wider type than they need, so that a number that is
+ * too large is refused and not narrowed. Other numbers, such as retries, the length of an array,
+ * addresses and quantities, have the type that they need, which costs less flash: C reduces a
+ * larger one modulo 256 or 65536 before the library sees it. So it does with `slave` of the
+ * mbm_master functions. -Wconversion shows where.
+ *
  * "V1.1b3" is the Modbus application protocol specification, "serial line guide V1.02" the
  * guide for RTU and ASCII.
  *
@@ -794,7 +800,7 @@ typedef struct mbm_master {
     /**
      * Private.
      */
-    void *pointers[13];
+    void *pointers[14];
     /**
      * Private.
      */
@@ -1337,9 +1343,10 @@ uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint32_t delayM
  *
  * So a device that answers in order and within the response timeout never gives the data of
  * another request, whatever its usual latency and however late one of its replies was. The
- * request after a timeout takes at most one quiet time and one response timeout longer; all
- * others take no longer. A wrong reading remains possible if the device takes longer than
- * the response timeout for two requests in a row.
+ * request after a timeout ends one response timeout after the last reply that arrives, and at
+ * the latest three response timeouts after it was sent; all others take no longer. A wrong
+ * reading remains possible if the device takes longer than the response timeout for two
+ * requests in a row.
  *
  * With a quiet time of 0 the master waits and holds nothing: a reply that is later than the
  * response timeout may be taken for the reply to the next request, and so may all that
@@ -1381,7 +1388,7 @@ uint8_t mbm_master_setEchoDiscard(struct mbm_master *master, uint8_t on);
  *   It accepts such a reply at the end of the response timeout, if no right reply has
  *   arrived. mbm_master_available returns the number of words that arrived.
  * - A read of more words than the response words hold succeeds and fills all of them.
- *   (A reply that is longer than the frame buffer must not follow noise directly.)
+ *   (If the reply is longer than the frame buffer, no noise may have arrived before it.)
  * - The master also sends requests that read to unit 0, and accepts a reply from unit 0.
  *
  * Set a short response timeout (mbm_master_setResponseTimeout) if the device deviates in
@@ -1616,11 +1623,11 @@ typedef struct mbm_client {
     /**
      * Private.
      */
-    void *pointers[47];
+    void *pointers[49];
     /**
      * Private.
      */
-    uint32_t words[27];
+    uint32_t words[28];
 } mbm_client;
 
 /**
@@ -1665,9 +1672,10 @@ typedef struct mbm_clientRequest {
     uint16_t transaction;
     /**
      * The unit identifier of the device. On a serial line 1 to 247; 0 is broadcast; the
-     * client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255.
+     * client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255. A client
+     * refuses a greater number (MBM_INVALID_ARGUMENT).
      */
-    uint8_t unit;
+    uint16_t unit;
     /**
      * MBM_PENDING from the call that queues the request until it ends; then its result.
      */
@@ -1677,15 +1685,15 @@ typedef struct mbm_clientRequest {
      */
     uint8_t exception;
     /**
+     * The response timeout of this request in milliseconds, 1 to 1000000 (16 minutes); 0: that
+     * of the unit (mbm_clientUnit) or of the client (mbm_client_setResponseTimeout). A client
+     * refuses a greater number (MBM_INVALID_ARGUMENT).
+     */
+    uint32_t timeoutMs;
+    /**
      * The number of bytes received into `reply`.
      */
     uint8_t length;
-    /**
-     * The response timeout of this request in milliseconds, 1 to 65535; 0: that of the unit
-     * (mbm_clientUnit) or of the client (mbm_client_setResponseTimeout). The client reads it
-     * each time it sends the request.
-     */
-    uint16_t timeoutMs;
     /**
      * How often the client repeats this request at most, 1 to 254; MBM_NO_RETRIES: never; 0:
      * as often as the unit or mbm_client_setRetries says. With 1 to 254, a client refuses the
@@ -1697,7 +1705,7 @@ typedef struct mbm_clientRequest {
     /**
      * Private.
      */
-    uint8_t bytes[5];
+    uint8_t bytes[6];
     /**
      * Private.
      */
@@ -1823,9 +1831,16 @@ typedef struct mbm_clientUnit {
      */
     uint32_t last;
     /**
-     * Set by you: the unit identifier.
+     * Set by you: the response timeout of this unit in milliseconds, 1 to 1000000 (16
+     * minutes); 0: that of mbm_client_setResponseTimeout. mbm_client_setUnits refuses a
+     * greater number. If you set it later, it means 1000000.
      */
-    uint8_t unit;
+    uint32_t timeoutMs;
+    /**
+     * Set by you: the unit identifier, 0 to 255. mbm_client_setUnits refuses a greater number.
+     * If you set it later, the record is of no unit.
+     */
+    uint16_t unit;
     /**
      * The status of the last request that ended; MBM_OK if none has ended.
      */
@@ -1839,11 +1854,6 @@ typedef struct mbm_clientUnit {
      * MBM_NO_RETRIES: never; 0: as often as mbm_client_setRetries says.
      */
     uint8_t retryLimit;
-    /**
-     * Set by you: the response timeout of this unit in milliseconds, 1 to 65535; 0: that of
-     * mbm_client_setResponseTimeout.
-     */
-    uint16_t timeoutMs;
 } mbm_clientUnit;
 
 /**
@@ -2756,7 +2766,9 @@ uint8_t mbm_client_setCounters(struct mbm_client *client,
  * @param units   your array of records, initialised with MBM_INIT except for the fields that
  *                you set; NULL for none
  * @param count   the number of records, 0 to 255
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a record with a `unit` above 255 or a
+ *         `timeoutMs` above 1000000; MBM_NOT_INITIALISED. A call that is refused changes
+ *         nothing
  */
 uint8_t mbm_client_setUnits(struct mbm_client *client,
                             struct mbm_clientUnit *units,
@@ -2869,9 +2881,9 @@ typedef struct mbm_plan {
  */
 typedef struct mbm_planField {
     /**
-     * The unit, 1 to 255.
+     * The unit, 1 to 255. mbm_plan_begin refuses a greater number.
      */
-    uint8_t unit;
+    uint16_t unit;
     /**
      * One of MBM_TABLE_...
      */
@@ -2938,11 +2950,11 @@ typedef struct mbm_planUnitLimits {
     /**
      * Registers, 1 to 125; 0 means as `registersPerRead` of the plan.
      */
-    uint8_t registersPerRead;
+    uint16_t registersPerRead;
     /**
-     * The unit.
+     * The unit, 1 to 255. mbm_plan_begin refuses a greater number.
      */
-    uint8_t unit;
+    uint16_t unit;
 } mbm_planUnitLimits;
 
 /**
@@ -2958,9 +2970,9 @@ typedef struct mbm_planExcludedRange {
      */
     uint16_t last;
     /**
-     * The unit; 0 for every unit.
+     * The unit, 1 to 255; 0 for every unit. mbm_plan_begin refuses a greater number.
      */
-    uint8_t unit;
+    uint16_t unit;
     /**
      * One of MBM_TABLE_...
      */
@@ -3044,11 +3056,11 @@ typedef struct mbm_planSetup {
     /**
      * The most registers that one read requests, 1 to 125; 0 means 125.
      */
-    uint8_t registersPerRead;
+    uint16_t registersPerRead;
     /**
      * The most registers between two fields that one read may cover as well.
      */
-    uint8_t registerGap;
+    uint16_t registerGap;
     /**
      * How many requests, 1 to 16.
      */
@@ -3103,7 +3115,8 @@ typedef struct mbm_planReadInfo {
  *
  * You may call it again at any time, also from `update`, but not from a hook of the client's
  * port. The plan then first ends, as by mbm_plan_end, unless the call is refused for NULL, a
- * count out of range or a client that was never begun.
+ * count out of range, a unit above 255 of limits or of an excluded range, or a client that was
+ * never begun.
  *
  * @param plan    the object; initialised with MBM_INIT before the first call
  * @param client  the client that sends the reads, begun; the program may use it too, and other
@@ -3112,12 +3125,14 @@ typedef struct mbm_planReadInfo {
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
  * @return MBM_OK; MBM_BUSY from within a hook of the client's port; of a field
  *         MBM_INVALID_ARGUMENT for an unknown table, type or order, a type that the table does
- *         not have, an interval out of range, a negative divisor or a scale of a text,
+ *         not have, a unit above 255, an interval out of range, a negative divisor or a scale
+ *         of a text,
  *         MBM_BROADCAST_NOT_ALLOWED for unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
  *         address 65535 or into an excluded range, MBM_ILLEGAL_DATA_VALUE if it is longer than
  *         a read may be, MBM_FIELDS_OVERLAP for the later of two that share an address,
  *         MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data;
- *         MBM_INVALID_ARGUMENT also for NULL pointers and counts out of range;
+ *         MBM_INVALID_ARGUMENT also for NULL pointers, counts out of range, and a unit above
+ *         255 of limits or of an excluded range;
  *         MBM_NOT_INITIALISED for a client that was never begun. After the status of a field
  *         the plan has ended, and `positions` and `reads` may be changed; after any other
  *         nothing is
@@ -3361,7 +3376,7 @@ typedef struct mbm_link {
     /**
      * Private.
      */
-    uint32_t words[20];
+    uint32_t words[21];
 } mbm_link;
 
 /**
@@ -3581,8 +3596,9 @@ typedef struct mbm_server {
  * @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame.
  *                The server ignores a longer request, and answers exception 04 in place
  *                of a longer response
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a buffer
- *         that is too short; MBM_BUSY from within a hook of this server
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook, a buffer
+ *         that is too short or a unit with an id above 255; MBM_BUSY from within a hook of
+ *         this server
  */
 uint8_t mbm_server_beginRtu(struct mbm_server *server,
                             const struct mbm_port *port,
@@ -3888,9 +3904,10 @@ typedef struct mbm_unit {
     /**
      * The unit id, 1 to 247 (serial line guide V1.02, 2.2). The ids 248 to 255, which
      * the standard reserves, are accepted. 0 answers to every id. A unit without any
-     * record does not answer.
+     * record does not answer. A begin function of a server refuses a greater id
+     * (MBM_INVALID_ARGUMENT). If you set one later, no request has it.
      */
-    uint8_t id;
+    uint16_t id;
 } mbm_unit;
 
 /**
@@ -4482,7 +4499,8 @@ uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
  *                    after a damaged frame, a request for another unit, a broadcast, and
  *                    with any status but MBM_OK
  * @return MBM_OK; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write
- *         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT
+ *         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT, also
+ *         for a unit with an id above 255
  */
 uint8_t mbm_unit_respond(struct mbm_unit *units,
                          uint8_t count,
@@ -4614,13 +4632,13 @@ typedef struct mbm_gateway {
  */
 typedef struct mbm_gatewayRoute {
     /**
-     * The first unit id on TCP, 0 to 255.
+     * The first unit id on TCP, 0 to 255. mbm_gateway_begin refuses a greater number.
      */
-    uint8_t first;
+    uint16_t first;
     /**
-     * The last unit id on TCP.
+     * The last unit id on TCP, up to 255.
      */
-    uint8_t last;
+    uint16_t last;
     /**
      * The index of the line, MBM_GATEWAY_ALL_LINES or MBM_GATEWAY_LOCAL.
      */
@@ -4630,7 +4648,7 @@ typedef struct mbm_gatewayRoute {
      * 255. 0: the ids on the line are those on TCP. A request whose unit id on the line is 0
      * is a broadcast.
      */
-    uint8_t unit;
+    uint16_t unit;
 } mbm_gatewayRoute;
 
 /**
@@ -4902,7 +4920,8 @@ uint32_t mbm_gateway_queueTime(const struct mbm_gateway *gateway);
  * @param units    one unit, or an array of units; must stay valid for as long as the gateway
  *                 is used. Servers may serve the same units. NULL only if `count` is 0
  * @param count    how many units
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; MBM_BUSY; MBM_INVALID_ARGUMENT, also for a unit with an id above 255;
+ *         MBM_NOT_INITIALISED
  */
 uint8_t mbm_gateway_serveUnits(struct mbm_gateway *gateway,
                                struct mbm_unit *units,
@@ -5728,13 +5747,15 @@ typedef struct mbm_packet {
      */
     uint16_t messageCount;
     /**
+     * The unit id that the request addresses, or that replies, 0 to 255. Only frames have it.
+     * mbm_frame_build, mbm_frame_exception and mbm_frame_replyLength refuse a greater number
+     * (MBM_INVALID_ARGUMENT).
+     */
+    uint16_t unit;
+    /**
      * MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
      */
     uint8_t kind;
-    /**
-     * The unit id that the request addresses, or that replies. Only frames have it.
-     */
-    uint8_t unit;
     /**
      * The function code, 1 to 127; of an exception the one of the request.
      */
@@ -5835,8 +5856,8 @@ typedef struct mbm_record {
  * @param capacity  bytes of `frame`; MBM_MAX_FRAME suffice for RTU, MBM_MAX_TCP_FRAME for
  *                  TCP, MBM_MAX_PDU for MBM_FRAMING_NONE, MBM_MAX_ASCII_FRAME for all
  * @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; otherwise the status that
- *         mbm_frame_parse would return for such a frame
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also for a unit above 255;
+ *         otherwise the status that mbm_frame_parse would return for such a frame
  */
 uint8_t mbm_frame_build(const struct mbm_framing *framing,
                         const struct mbm_packet *packet,

@@ -1,7 +1,7 @@
 //! A master with the interface of the Arduino library ModbusMaster: transmit words, ten
 //! functions, response words. Each function starts a request; `poll` advances it to its end.
 
-use crate::engine::{Engine, Receive, Settings, Words, BROADCAST};
+use crate::engine::{Engine, Settings, Words, BROADCAST};
 use crate::error::Status;
 use crate::pdu::bits;
 use crate::pdu::function_spec::FunctionSpec;
@@ -21,9 +21,6 @@ pub struct Master<P, S: Words> {
     slave: u8,
     status: Status,
     engine: Engine<P, S, MasterRequest>,
-    /// The function that waits for the reply if deviating replies are accepted; `None` if they
-    /// are not. (A pointer, so that firmware without `set_lenient` does not contain its code.)
-    lenient: Option<Receive<Engine<P, S, MasterRequest>>>,
     /// The address to which the write functions without an address argument write.
     write_address: u16,
     /// Number of bits queued in the transmit words; a queued word counts as 16.
@@ -35,7 +32,6 @@ impl<P, S: Words> Master<P, S> {
     pub const fn new(slave: u8, port: P, storage: S) -> Self {
         Master {
             engine: Engine::new(port, storage),
-            lenient: None,
             write_address: 0,
             transmit_bits: 0,
             response_words: 0,
@@ -113,25 +109,20 @@ impl<P: Port, S: Words> Master<P, S> {
         self.transmit_bits = 0;
     }
 
-    /// Sets the defaults in a zeroed master, which has no port and no buffers yet.
-    pub fn set_default_if_zero(&mut self) {
-        self.slave = 1;
-        self.engine.settings.set_default_if_zero();
+    /// Sets whether a reply that deviates from the standard is accepted if no right reply
+    /// comes, and whether reads are sent to unit 0: see [`Engine::set_lenient`].
+    pub fn set_lenient(&mut self, on: bool) {
+        self.engine.set_lenient(on);
     }
 
-    /// Sets whether a reply that deviates from the standard is accepted if no right reply
-    /// comes, and whether reads are sent to unit 0: see [`Engine::receive_lenient`].
-    pub fn set_lenient(&mut self, on: bool) {
-        self.lenient = if on {
-            Some(Engine::receive_lenient)
-        } else {
-            None
-        };
+    /// Counts from now on. A new master counts; zeroed memory does not.
+    pub fn set_counting(&mut self) {
+        self.engine.set_counting();
     }
 
     /// Whether a reply that deviates from the standard is accepted.
     pub fn is_lenient(&self) -> bool {
-        self.lenient.is_some()
+        self.engine.is_lenient()
     }
 
     /// Cancels the request in progress, if there is one. Its status becomes
@@ -168,7 +159,7 @@ impl<P: Port, S: Words> Master<P, S> {
     pub fn poll(&mut self) -> Status {
         if self.engine.is_pending() {
             let now = self.engine.port.micros();
-            self.status = match self.engine.poll_with(now, self.lenient) {
+            self.status = match self.engine.poll(now) {
                 Status::OK if self.engine.request().is_read() => self.store_words(),
                 status => status,
             };
@@ -197,23 +188,29 @@ impl<P: Port, S: Words> Master<P, S> {
     }
 
     /// [`Status::OK`] if a request may be built, otherwise the error.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn check_ready(&mut self) -> Status {
+    #[inline(always)]
+    fn check_ready(&self) -> Status {
         if self.is_pending() {
             return Status::BUSY;
         }
-        if self.engine.port.is_ready() && self.storage().capacity() > 0 {
+        if self.engine.port.is_ready() && self.engine.storage.capacity() > 0 {
             return Status::OK;
         }
-        self.status = Status::NOT_INITIALISED;
-        self.status
+        Status::NOT_INITIALISED
     }
 
     /// Starts the request of the function `spec`, with an address and a quantity or value
     /// `word`. If it returns an error, nothing is sent. The address of a write becomes the
     /// write address.
-    #[cfg_attr(target_os = "none", inline(never))]
+    #[inline(always)]
     pub fn request(&mut self, address: u16, word: u16, spec: MasterSpec) -> Status {
+        let built = self.build(address, word, spec);
+        self.start(built)
+    }
+
+    /// Builds the request of the function `spec`. [`Master::start`] starts it.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn build(&mut self, address: u16, word: u16, spec: MasterSpec) -> Status {
         let ready = self.check_ready();
         if ready != Status::OK {
             return ready;
@@ -223,39 +220,30 @@ impl<P: Port, S: Words> Master<P, S> {
         if !request.is_read() {
             self.write_address = address;
         }
-        self.start(built)
-    }
-
-    /// As [`Master::request`], for a request that `build` builds, and that writes to
-    /// `address`.
-    fn write(&mut self, address: u16, build: impl FnOnce(&mut MasterRequest) -> Status) -> Status {
-        let ready = self.check_ready();
-        if ready != Status::OK {
-            return ready;
-        }
-        self.write_address = address;
-        let built = build(self.engine.request());
-        self.start(built)
+        built
     }
 
     /// Starts the request that was built. `built` is the status of building it; if it is an
     /// error, nothing is sent.
     #[cfg_attr(target_os = "none", inline(never))]
     fn start(&mut self, built: Status) -> Status {
+        if built == Status::BUSY {
+            return built;
+        }
         self.transmit_bits = 0;
         self.response_index = 0;
         self.engine.clear_outcome();
         self.status = built;
         if built == Status::OK {
             let request = self.engine.request();
-            let request_is_read = request.is_read();
-            if request_is_read {
+            let is_read = request.is_read();
+            let words = request.sends().div_ceil(2);
+            if is_read {
                 self.response_words = 0;
             }
-            let words = request.sends().div_ceil(2);
             self.status = if words > self.engine.storage.transmit_words() {
                 Status::ILLEGAL_DATA_VALUE
-            } else if self.slave == BROADCAST && request_is_read && self.lenient.is_none() {
+            } else if self.slave == BROADCAST && is_read && !self.is_lenient() {
                 Status::BROADCAST_NOT_ALLOWED
             } else {
                 self.engine.start_any(self.slave)
@@ -308,14 +296,12 @@ impl<P: Port, S: Words> Master<P, S> {
 
     /// 06: writes one register. The value also becomes transmit word 0.
     pub fn write_single_register(&mut self, address: u16, value: u16) -> Status {
-        if self.check_ready() == Status::OK {
+        let spec = MasterSpec::new(FunctionSpec::WRITE_SINGLE_REGISTER);
+        let built = self.build(address, value, spec);
+        if built == Status::OK {
             self.set_transmit_word(0, value);
         }
-        self.request(
-            address,
-            value,
-            MasterSpec::new(FunctionSpec::WRITE_SINGLE_REGISTER),
-        )
+        self.start(built)
     }
 
     /// 0F: writes 1 to 1968 coils from the transmit words, lowest bit first.
@@ -350,13 +336,14 @@ impl<P: Port, S: Words> Master<P, S> {
     /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
     /// The masks also become transmit words 0 and 1.
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
-        if self.check_ready() == Status::OK {
+        let spec = MasterSpec::new(FunctionSpec::MASK_WRITE_REGISTER);
+        let built = self.build(address, and_mask, spec);
+        if built == Status::OK {
             self.set_transmit_word(0, and_mask);
             self.set_transmit_word(1, or_mask);
+            self.engine.request().append_word(or_mask);
         }
-        self.write(address, |request| {
-            request.mask_write_register(address, and_mask, or_mask)
-        })
+        self.start(built)
     }
 
     /// 17: writes 1 to 121 registers from the transmit words, then reads 1 to
@@ -368,9 +355,18 @@ impl<P: Port, S: Words> Master<P, S> {
         write_address: u16,
         write_quantity: u16,
     ) -> Status {
-        self.write(write_address, |request| {
-            request.read_write_registers(read_address, read_quantity, write_address, write_quantity)
-        })
+        let spec = MasterSpec::new(FunctionSpec::READ_WRITE_REGISTERS);
+        let mut built = self.build(read_address, read_quantity, spec);
+        if built != Status::BUSY && built != Status::NOT_INITIALISED {
+            self.write_address = write_address;
+            let request = self.engine.request();
+            // A fault of the write is reported before one of the read.
+            match request.append_write(write_address, write_quantity) {
+                Status::OK => {}
+                refused => built = refused,
+            }
+        }
+        self.start(built)
     }
 
     /// 17: writes the queued words to the last write address, then reads 1 to 125 registers

@@ -60,7 +60,18 @@ pub const fn millis(milliseconds: u16) -> u32 {
 
 /// The longest timeout that a caller may set, in milliseconds, about 16 minutes. A request may
 /// wait for three times as long for a second reply, which still fits into 32 bits.
-const LONGEST_TIMEOUT_MS: u32 = 1_000_000;
+pub const LONGEST_TIMEOUT_MS: u32 = 1_000_000;
+
+/// Converts a timeout in milliseconds to microseconds. One above [`LONGEST_TIMEOUT_MS`] counts
+/// as that.
+#[inline(always)]
+pub const fn timeout_at_most(milliseconds: u32) -> u32 {
+    if milliseconds > LONGEST_TIMEOUT_MS {
+        LONGEST_TIMEOUT_MS * 1000
+    } else {
+        milliseconds * 1000
+    }
+}
 
 /// Converts a timeout in milliseconds to microseconds. `None` above 1 000 000.
 #[cfg_attr(target_os = "none", inline(never))]

@@ -13,7 +13,7 @@ use proptest::prelude::*;
 
 /// The least number of reads and registers, of every way to cut the sorted fields of a group.
 fn exhaustive(fields: &[Field], limits: &Limits) -> (usize, u32) {
-    let mut groups: Vec<(u8, u8, u32)> = fields
+    let mut groups: Vec<(u16, u8, u32)> = fields
         .iter()
         .map(|field| (field.unit, field.table, field.interval_ms))
         .collect();
@@ -61,7 +61,7 @@ fn is_allowed(fields: &[&Field], limits: &Limits) -> bool {
         (u32::from(limits.registers), u32::from(limits.register_gap))
     };
     if let Some(own) = own {
-        let own = if bits { own.bits } else { own.registers.into() };
+        let own = if bits { own.bits } else { own.registers };
         if own > 0 {
             most = own.into();
         }
@@ -85,7 +85,7 @@ fn is_allowed(fields: &[&Field], limits: &Limits) -> bool {
 prop_compose! {
     /// A field of two units, three tables and two intervals, next to others.
     fn fields_near()(
-        unit in 1u8..=2,
+        unit in 1u16..=2,
         table in prop_oneof![1 => Just(COILS), 3 => Just(HOLDING_REGISTERS), 1 => Just(INPUT_REGISTERS)],
         value_type in prop_oneof![Just(UINT16), Just(UINT32), Just(DOUBLE), Just(TEXT)],
         address in 0u16..60,
@@ -104,10 +104,10 @@ proptest! {
     #[test]
     fn no_other_way_to_group_is_better(
         fields in prop::collection::vec(fields_near(), 1..12),
-        (bits, registers) in (0u16..40, 0u8..30),
-        (bit_gap, register_gap) in (0u16..20, 0u8..12),
-        own in prop::option::of((1u8..=2, 0u16..30, 0u8..20)),
-        range in prop::option::of((0u8..=2, 1u8..=4, 0u16..60, 0u16..4)),
+        (bits, registers) in (0u16..40, 0u16..30),
+        (bit_gap, register_gap) in (0u16..20, 0u16..12),
+        own in prop::option::of((1u16..=2, 0u16..30, 0u16..20)),
+        range in prop::option::of((0u16..=2, 1u8..=4, 0u16..60, 0u16..4)),
     ) {
         let units: Vec<_> = own
             .map(|(unit, bits, registers)| UnitLimits { bits, registers, unit })

@@ -65,8 +65,8 @@ unsafe fn format(
 /// @param capacity  bytes of `frame`; MBM_MAX_FRAME suffice for RTU, MBM_MAX_TCP_FRAME for
 ///                  TCP, MBM_MAX_PDU for MBM_FRAMING_NONE, MBM_MAX_ASCII_FRAME for all
 /// @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; otherwise the status that
-///         mbm_frame_parse would return for such a frame
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also for a unit above 255;
+///         otherwise the status that mbm_frame_parse would return for such a frame
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_build(
     framing: *const mbm_framing,
@@ -86,7 +86,7 @@ pub unsafe extern "C" fn mbm_frame_build(
             let data = packet.data()?;
             let Head {
                 transaction, unit, ..
-            } = packet.head();
+            } = packet.head()?;
             let own = format.own.as_slice();
             match format.framing {
                 Some(framing) => framing.emit(buffer, transaction, unit, format.end, |pdu| {
@@ -155,7 +155,7 @@ pub unsafe extern "C" fn mbm_frame_parse(
     let status = match adu {
         Ok(adu) => {
             found = mbm_packet::of(kind, adu.pdu);
-            found.unit = adu.unit;
+            found.unit = adu.unit.into();
             found.transaction = adu.transaction;
             let taken = found.take(pdu_kind, adu.pdu, format.own.as_slice());
             taken.err().unwrap_or(Status::OK)
@@ -202,7 +202,7 @@ pub unsafe extern "C" fn mbm_frame_exception(
             let buffer = buffer.ok_or(Status::INVALID_ARGUMENT)?;
             let code = Status::from_code(code);
             let framing = format.framing.ok_or(Status::INVALID_ARGUMENT)?;
-            let exception = Exception::new(framing, request.head(), code)?;
+            let exception = Exception::new(framing, request.head()?, code)?;
             exception.emit(framing, format.end, buffer)
         };
         put_length(length, build())
@@ -288,8 +288,9 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
             let packet = get(request).ok_or(Status::INVALID_ARGUMENT)?;
             let format = format(framing, |_| Some(packet.function))?;
             let own = format.own.as_slice();
+            let unit = packet.head()?.unit;
             reply_length(&packet, own, |request| match format.framing {
-                Some(framing) => length::of_reply(framing, packet.unit, request, own),
+                Some(framing) => length::of_reply(framing, unit, request, own),
                 None => request.response_length(own),
             })
         };

@@ -108,29 +108,17 @@ macro_rules! frame_storage {
             unsafe { core::slice::from_raw_parts_mut(self.frame.add(index.into()), count.into()) }
         }
 
-        fn set_aside(&mut self, count: $count) {
-            // SAFETY: up to `frame_bytes`, see above.
-            self.frame = unsafe { self.frame.add(count.into()) };
-            self.frame_bytes -= count;
-        }
-
-        fn take_back(&mut self, count: $count) {
-            // SAFETY: `set_aside` moved `frame` by that many bytes.
-            self.frame = unsafe { self.frame.sub(count.into()) };
-            self.frame_bytes += count;
-        }
-
         // Not inlined on a microcontroller, to save flash.
-        #[cfg_attr(all(feature = "counters", target_os = "none"), inline(never))]
-        fn count(&mut self, counter: mbm::engine::Counter, more: u16) {
-            if !cfg!(feature = "counters") || self.counters.is_null() {
+        #[cfg_attr(target_os = "none", inline(never))]
+        fn count(&mut self, counter: mbm::engine::Counter, more: u32) {
+            if self.counters.is_null() {
                 return;
             }
             // SAFETY: mbm_counters is an array of COUNTERS integers, and `counter` is less
             // than COUNTERS.
             unsafe {
                 let counter = self.counters.cast::<u32>().add(counter as usize);
-                *counter = (*counter).wrapping_add(more.into());
+                *counter = (*counter).wrapping_add(more);
             }
         }
     };

@@ -96,7 +96,7 @@ static int add_route(const char *text, uint8_t to)
     for (i = 0; i < config.routeCount; i++)
         if (first <= routes[i].last && last >= routes[i].first)
             return -1;
-    *route = (mbm_gatewayRoute){(uint8_t)first, (uint8_t)last, to, (uint8_t)unit};
+    *route = (mbm_gatewayRoute){(uint16_t)first, (uint16_t)last, to, (uint16_t)unit};
     config.routeCount++;
     return 0;
 }

@@ -75,12 +75,12 @@ typedef struct mbm_caller {
  * @return `queued` if it is not MBM_PENDING: the request was refused. Otherwise the status of
  *         the request; if `request` is NULL, MBM_OK when no request is pending. After
  *         `timeoutMs` MBM_RESPONSE_TIMED_OUT, while a connection is being made
- *         MBM_CONNECT_TIMED_OUT, without a link what its `status` says. A request that could not be
- * sent because the connection is being made is MBM_CONNECT_TIMED_OUT too. MBM_CANCELLED if `stop`
- * is set. MBM_BUSY from within `done` or a hook of the port, and while the client is suspended.
- * MBM_INVALID_ARGUMENT for NULL, and for a request of another client; MBM_NOT_INITIALISED. After
- * `timeoutMs`, for MBM_CANCELLED and MBM_BUSY the request is cancelled; if `request` is NULL, none
- * is
+ *         MBM_CONNECT_TIMED_OUT, without a link what its `status` says. A request that could not
+ *         be sent because the connection is being made is MBM_CONNECT_TIMED_OUT too.
+ *         MBM_CANCELLED if `stop` is set. MBM_BUSY from within `done` or a hook of the port, and
+ *         while the client is suspended. MBM_INVALID_ARGUMENT for NULL, and for a request of
+ *         another client; MBM_NOT_INITIALISED. After `timeoutMs`, for MBM_CANCELLED and for
+ *         MBM_BUSY the request is cancelled; if `request` is NULL, no request is cancelled
  */
 uint8_t mbm_call(const mbm_caller *caller, uint8_t queued);
 

@@ -7,17 +7,18 @@
 #include <string.h>
 
 /* FULL bytes fill the frame buffer. COUNTED_BYTES are averaged. IN_CORE bytes fit into the
- * core's receive buffer of 64 bytes. */
-enum { FULL = 255, COUNTED_BYTES = 1000, IN_CORE = 60 };
+ * core's receive buffer of CORE bytes. */
+enum { FULL = 255, COUNTED_BYTES = 1000, IN_CORE = 60, CORE = 64 };
 
 typedef struct flood {
     board *on;
     wire *bus;
     uint8_t (*byte)(unsigned i);
-    unsigned played;
-    uint16_t taken, status; /* their addresses in the sketch */
+    unsigned played, taken;
+    uint16_t tail, status; /* their addresses in the sketch */
+    uint8_t at;            /* where the core's next byte to read was last */
     uint64_t began, longest;
-    int takes;
+    int polls, takes;
     /* the cycles of polls with bytes to read, and of all others */
     uint64_t busy;
     span idle;
@@ -37,6 +38,7 @@ static void poll_begins_or_ends(void *context, int level, uint64_t cycle)
     flood *f = context;
     uint64_t lasted = cycle - f->began;
 
+    f->polls = level;
     if (level) {
         f->began = cycle;
         return;
@@ -61,11 +63,12 @@ static flood *begin(const char *folder, uint8_t (*byte)(unsigned i))
     f.byte = byte;
     f.on = timed_board(folder, "TimeWait");
     f.bus = board_uart(f.on, '0', NULL, NULL);
-    f.taken = board_symbol(f.on, "taken");
     f.status = board_symbol(f.on, "status");
     while (f.bus->frames == 0)
         if (!board_run(f.on, 100) || board_cycle(f.on) > 100 * MS)
             give_up("TimeWait sends no request");
+    f.tail = board_word(f.on, board_symbol(f.on, "tail"));
+    f.at = board_byte(f.on, f.tail);
     board_watch_pin(f.on, 'B', 0, poll_begins_or_ends, &f);
     board_watch_pin(f.on, 'B', 1, poll_takes_bytes, &f);
     return &f;
@@ -82,23 +85,34 @@ static void play(flood *f, unsigned count)
     f->played += count;
 }
 
-/* Plays bytes until polls have read `target` bytes. The line pauses before the core's
- * buffer would overflow, so a master that is too slow loses no byte here. */
+/* Runs the sketch for less than a byte takes. Counts the bytes that it has taken from the core,
+ * of which one poll may take more than the core holds. */
+static int run(flood *f)
+{
+    int runs = board_run(f->on, 100);
+    uint8_t now = board_byte(f->on, f->tail);
+
+    f->taken += (unsigned)(now + CORE - f->at) % CORE;
+    f->at = now;
+    return runs;
+}
+
+/* Plays bytes until polls have taken `target` bytes and the last of them has ended. The line
+ * pauses before the core's buffer would overflow, so a master that is too slow loses no byte
+ * here. */
 static void feed(flood *f, unsigned target)
 {
     uint64_t end_at = board_cycle(f->on) + 1500 * MS;
-    uint16_t taken;
 
-    while ((taken = board_word(f->on, f->taken)) != target) {
-        /* While the sketch stores the low byte, `taken` may exceed what was played. */
-        uint16_t waiting = (uint16_t)(f->played - taken);
+    while (f->taken != target || f->polls) {
+        unsigned waiting = f->played - f->taken;
 
         if (f->bus->bytes_received == f->played && f->played < target && waiting < IN_CORE) {
             unsigned count = IN_CORE - waiting;
 
             play(f, count < target - f->played ? count : target - f->played);
         }
-        if (!board_run(f->on, 100) || board_cycle(f->on) > end_at)
+        if (!run(f) || board_cycle(f->on) > end_at)
             give_up("a master does not take the bytes of a flood");
     }
     if (board_byte(f->on, f->status) != MBM_PENDING)

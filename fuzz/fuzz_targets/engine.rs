@@ -4,7 +4,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::engine::{Buffers, Counter, Engine, Settings, Storage as _, Words as _, BROADCAST};
+use mbm::engine::{
+    Buffers, Counter, Engine, Setting, Settings, Storage as _, Words as _, BROADCAST,
+};
 use mbm::error::Status;
 use mbm::pdu::master_request::MasterRequest;
 use mbm::port::Port;
@@ -131,11 +133,11 @@ fuzz_target!(|data: &[u8]| {
     let mut engine = Engine::new(line, buffers);
     let time = |input: &mut Input| u32::from(input.u8()) * 64;
     engine.settings = Settings {
-        gap: time(input),
-        silence: time(input),
-        response_timeout: 1000 + 4 * time(input),
-        turnaround_delay: time(input),
-        quiet_time: 2 * time(input),
+        gap: Setting::new(time(input)),
+        silence: Setting::new(time(input)),
+        response_timeout: Setting::new(1000 + 4 * time(input)),
+        turnaround_delay: Setting::new(time(input)),
+        quiet_time: Setting::new(2 * time(input)),
         character: u16::from(input.u8()),
         retries: input.u8() % 3,
         post_flush_hold: input.u8() % 4,
@@ -229,7 +231,7 @@ fn check_no_reply_missed(
     // After an attempt without a right reply, and after a right reply that arrived before a
     // request was sent, the master may hold the next reply, because it may be a late one.
     let attempts = engine.storage.counters[Counter::Requests as usize];
-    let held = settings.quiet_time > 0 && (attempts > 1 || is_early);
+    let held = settings.quiet_time.get() > 0 && (attempts > 1 || is_early);
     if other || held || settings.echo_discard {
         return;
     }

@@ -19,7 +19,7 @@ fn u32_of(input: &mut Input) -> u32 {
 fn field(input: &mut Input) -> Field {
     let shape = input.u8();
     Field {
-        unit: shape & 3,
+        unit: (shape & 3).into(),
         table: shape >> 2 & 7,
         value_type: input.u8() % 12,
         order: shape >> 5,
@@ -78,20 +78,20 @@ fuzz_target!(|data: &[u8]| {
     let mut input = Input(data);
     let units = [UnitLimits {
         bits: input.u16(),
-        registers: input.u8(),
-        unit: input.u8() & 3,
+        registers: input.u8().into(),
+        unit: (input.u8() & 3).into(),
     }];
     let excluded = [ExcludedRange {
         first: input.u8().into(),
         last: input.u8().into(),
-        unit: input.u8() & 3,
+        unit: (input.u8() & 3).into(),
         table: input.u8() & 7,
     }];
     let limits = Limits {
         bits: input.u16(),
-        registers: input.u8(),
+        registers: input.u8().into(),
         bit_gap: input.u16(),
-        register_gap: input.u8(),
+        register_gap: input.u8().into(),
         units: &units,
         excluded: &excluded,
     };

@@ -7,6 +7,7 @@
 mod wire;
 
 use mbm::client::{Client, Serial};
+use mbm::engine::Setting;
 use mbm::error::Status;
 use mbm::frame::rtu;
 use mbm::pdu::function_spec::FunctionSpec;
@@ -123,10 +124,10 @@ pub fn play(schedule: Schedule, quiet_time: u32) -> Ended {
     let end = End::default();
     let mut line = Serial::new(end.clone(), Lent::default());
     let settings = &mut line.engine.settings;
-    settings.gap = SILENCE;
-    settings.silence = SILENCE;
-    settings.response_timeout = TIMEOUT;
-    settings.quiet_time = quiet_time;
+    settings.gap = Setting::new(SILENCE);
+    settings.silence = Setting::new(SILENCE);
+    settings.response_timeout = Setting::new(TIMEOUT);
+    settings.quiet_time = Setting::new(quiet_time);
     let mut client: Client<_, Task, 4> = Client::new(line);
     let mut device = Device {
         late: [schedule.first, schedule.second].into(),

@@ -1,6 +1,7 @@
 //! A master, a device that answers in order, and an adversary between them.
 
 use crate::wire::{self, Lent, Wire};
+use mbm::engine::Setting;
 use mbm::error::Status;
 use mbm::frame::rtu;
 use mbm::master::Master;
@@ -138,10 +139,10 @@ impl State {
     pub fn new(buffer: usize, retries: u8, quiet_time: u32) -> Self {
         let mut master = Master::new(UNIT, Wire::default(), wire::lent(buffer));
         let settings = master.settings();
-        settings.gap = SILENCE;
-        settings.silence = SILENCE;
-        settings.response_timeout = TIMEOUT;
-        settings.quiet_time = quiet_time;
+        settings.gap = Setting::new(SILENCE);
+        settings.silence = Setting::new(SILENCE);
+        settings.response_timeout = Setting::new(TIMEOUT);
+        settings.quiet_time = Setting::new(quiet_time);
         settings.retries = retries;
         let mut state = State {
             master,

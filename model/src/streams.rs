@@ -3,7 +3,7 @@
 //! and each byte that makes the CRC of a frame of the unit right, wherever that frame began.
 
 use crate::wire::Wire;
-use mbm::engine::Buffers;
+use mbm::engine::{Buffers, Setting};
 use mbm::error::Status;
 use mbm::master::Master;
 use std::time::Instant;
@@ -112,26 +112,48 @@ impl Request {
         }
     }
 
-    /// The results of all replies that a stream holds.
-    pub fn results(self, stream: &[u8]) -> impl Iterator<Item = Outcome> + '_ {
-        let frames = [EXCEPTION_FRAME, self.length()].map(|length| stream.windows(length));
-        frames.into_iter().flatten().filter_map(move |frame| {
-            let (content, crc) = frame.split_at(frame.len() - 2);
-            let result = self.result(content)?;
-            (crc_of(content).to_le_bytes() == crc).then_some(result)
-        })
+    /// The results of all replies that a stream holds, each with the index of its first byte.
+    pub fn results(self, stream: &[u8]) -> impl Iterator<Item = (usize, Outcome)> + '_ {
+        let frames =
+            [EXCEPTION_FRAME, self.length()].map(|length| stream.windows(length).enumerate());
+        frames
+            .into_iter()
+            .flatten()
+            .filter_map(move |(start, frame)| {
+                let (content, crc) = frame.split_at(frame.len() - 2);
+                let result = self.result(content)?;
+                (crc_of(content).to_le_bytes() == crc).then_some((start, result))
+            })
     }
 
     /// True if a stream may have this result: a reply only if the stream holds it, and a failure
-    /// only if it holds none.
+    /// only if it holds none, or only exceptions that lie within longer frames.
     pub fn allows(self, before: Before, stream: &[u8], outcome: Outcome) -> bool {
         let mut results = self.results(stream);
         if !outcome.status.is_failure() {
-            return results.any(|result| result == outcome);
+            return results.any(|(_, result)| result == outcome);
         }
         // A held reply is given up if more follows, which may be the rest of the right one.
-        before == Before::Timeout || results.next().is_none()
+        before == Before::Timeout
+            || results.all(|(start, result)| {
+                result.status.is_exception() && lies_in_a_longer_frame(stream, start)
+            })
     }
+}
+
+/// True if the exception at `start` is a part of a longer frame. The frames of a stream follow
+/// each other; the first begins with its first byte.
+fn lies_in_a_longer_frame(stream: &[u8], start: usize) -> bool {
+    let mut begin = 0;
+    for end in 1..=stream.len() {
+        if end - begin >= 4 && crc_of(&stream[begin..end]) == 0 {
+            if begin <= start && start + EXCEPTION_FRAME <= end && end - begin > EXCEPTION_FRAME {
+                return true;
+            }
+            begin = end;
+        }
+    }
+    false
 }
 
 /// A master that has sent its request and waits for the reply.
@@ -139,10 +161,10 @@ fn waiting(request: Request, before: Before) -> Tried {
     let buffers = Buffers::new([0; 20], [0], []);
     let mut master = Master::new(UNIT, Wire::default(), buffers);
     let settings = master.settings();
-    settings.gap = SILENCE;
-    settings.silence = SILENCE;
-    settings.response_timeout = TIMEOUT;
-    settings.quiet_time = QUIET;
+    settings.gap = Setting::new(SILENCE);
+    settings.silence = Setting::new(SILENCE);
+    settings.response_timeout = Setting::new(TIMEOUT);
+    settings.quiet_time = Setting::new(QUIET);
     if before == Before::Timeout {
         request.start(&mut master);
         let outcome = outcome_of(&mut master);
@@ -344,7 +366,7 @@ mod tests {
     #[test]
     fn a_stream_that_holds_no_reply_has_no_result() {
         let reply = [17, 3, 2, 0, 9, 0xB9, 0x81];
-        let value = |stream: &[u8]| Request::Read.results(stream).next().map(|r| r.value);
+        let value = |stream: &[u8]| Request::Read.results(stream).next().map(|(_, r)| r.value);
         assert_eq!(crc_of(&reply[..5]).to_le_bytes(), reply[5..]);
         assert_eq!(value(&reply), Some(9));
         assert_eq!(value(&[&[0, 17], &reply[..]].concat()), Some(9));

@@ -2,7 +2,7 @@
 
 use super::request::{RequestState, Stage};
 use super::storage::ClientStorage;
-use crate::time::{elapsed, millis};
+use crate::time::{elapsed, timeout_at_most};
 
 impl RequestState {
     /// Microseconds until the request is due.
@@ -14,7 +14,7 @@ impl RequestState {
             wait => wait.saturating_sub(elapsed(now, self.since)),
         };
         if self.is(Stage::Queued) {
-            wait.max(storage.rest(self.unit, now))
+            wait.max(storage.rest(self.unit(), now))
         } else {
             wait
         }
@@ -24,12 +24,12 @@ impl RequestState {
     #[inline(always)]
     pub(super) fn response_timeout(&self, storage: &mut impl ClientStorage, line: u32) -> u32 {
         let timeout = match self.timeout_ms {
-            0 => storage.unit_timeout_ms(self.unit),
+            0 => storage.unit_timeout_ms(self.unit()),
             own => own,
         };
         match timeout {
             0 => line,
-            own => millis(own),
+            own => timeout_at_most(own),
         }
     }
 }

@@ -95,7 +95,9 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         let state = request.state();
         if self.pending() >= N {
             Status::QUEUE_FULL
-        } else if state.unit == BROADCAST
+        } else if !state.is_in_range() {
+            Status::INVALID_ARGUMENT
+        } else if state.unit() == BROADCAST
             && !(self.has_broadcast && state.header.may_be_broadcast())
         {
             Status::BROADCAST_NOT_ALLOWED
@@ -338,7 +340,7 @@ fn end_or_retry(
     } else {
         storage.again(policy, request.state(), status)
     };
-    storage.note(request.state().unit, status, again.is_some(), now);
+    storage.note(request.state().unit(), status, again.is_some(), now);
     let state = request.state_mut();
     let Some(wait) = again else {
         state.end(status);

@@ -4,6 +4,7 @@
 use crate::engine::BROADCAST;
 use crate::error::Status;
 use crate::pdu::header::RequestHeader;
+use crate::time::LONGEST_TIMEOUT_MS;
 use crate::FIRMWARE;
 
 /// The stage of a request.
@@ -32,16 +33,17 @@ pub struct RequestState {
     pub capacity: u16,
     /// A number that the caller chooses for the request; 0 for none.
     pub transaction: u16,
-    /// The unit that the request is for.
-    pub unit: u8,
+    /// The unit that the request is for. A client refuses one above 255.
+    pub unit: u16,
     /// [`Status::PENDING`] while the request is queued or in flight, then its result.
     pub status: Status,
     /// The exception code of the response as received; 0 if it was no exception.
     pub exception: u8,
+    /// The response timeout in milliseconds; 0 for that of the unit or line. A client refuses
+    /// one above [`LONGEST_TIMEOUT_MS`].
+    pub timeout_ms: u32,
     /// Number of data bytes received.
     pub length: u8,
-    /// The response timeout in milliseconds; 0 for that of the unit or line.
-    pub timeout_ms: u16,
     /// Greatest number of retries; 0 for that of the unit or line, [`NO_RETRIES`](super::NO_RETRIES) for none.
     pub retry_limit: u8,
     stage: Stage,
@@ -66,8 +68,8 @@ impl RequestState {
         unit: 0,
         status: Status::OK,
         exception: 0,
-        length: 0,
         timeout_ms: 0,
+        length: 0,
         retry_limit: 0,
         stage: Stage::Queued,
         retries: 0,
@@ -77,6 +79,16 @@ impl RequestState {
         wait: 0,
         header: RequestHeader::NONE,
     };
+
+    /// The unit identifier in the frame.
+    pub const fn unit(&self) -> u8 {
+        self.unit as u8
+    }
+
+    /// False for a unit or a timeout that is too large.
+    pub(super) const fn is_in_range(&self) -> bool {
+        self.unit <= u8::MAX as u16 && self.timeout_ms <= LONGEST_TIMEOUT_MS
+    }
 
     /// The transaction identifier of the TCP frame in which the request was last sent; 0 if
     /// it was not sent yet.
@@ -93,7 +105,7 @@ impl RequestState {
     /// True if a device answers such a request: it is no broadcast, which only a serial line
     /// has, and its function has a response.
     pub const fn has_reply(&self) -> bool {
-        self.unit != BROADCAST && self.header.is_answered()
+        self.unit() != BROADCAST && self.header.is_answered()
     }
 
     /// Ends the request with `status`.

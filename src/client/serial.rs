@@ -7,7 +7,7 @@ use super::request::{is_answer, store_response, ClientRequest, Stage};
 use super::storage::ClientStorage;
 use super::transport::Transport;
 use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
-use crate::engine::Engine;
+use crate::engine::{Engine, Setting};
 use crate::error::Status;
 use crate::frame::{ascii, rtu};
 use crate::port::Port;
@@ -19,7 +19,7 @@ pub struct Serial<P, S: ClientStorage, J> {
     pub engine: ClientEngine<P, S, J>,
 }
 
-impl<P, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
+impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// A serial line with RTU frames.
     pub const fn new(port: P, storage: S) -> Self {
         Serial {
@@ -38,15 +38,15 @@ impl<P, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// without a character ends an incomplete frame.
     pub fn set_ascii(&mut self) {
         self.engine.request().set_ascii(ascii::END);
-        self.engine.settings.gap = 0;
-        self.engine.settings.silence = ASCII_SILENCE;
+        self.engine.settings.gap = Setting::new(0);
+        self.engine.settings.silence = Setting::new(ASCII_SILENCE);
     }
 
     /// Changes the line to a TCP stream: no silence before a request, and
     /// [`STREAM_SILENCE`] ends a frame.
     pub fn set_stream(&mut self) {
-        self.engine.settings.gap = 0;
-        self.engine.settings.silence = STREAM_SILENCE;
+        self.engine.settings.gap = Setting::new(0);
+        self.engine.settings.silence = Setting::new(STREAM_SILENCE);
     }
 }
 
@@ -74,7 +74,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
 
     /// Passes a request to the engine and starts it.
     fn start(&mut self, request: J) -> Status {
-        let unit = request.state().unit;
+        let unit = request.state().unit();
         self.engine.clear_outcome();
         self.engine.request().begin(request);
         self.engine.start(unit)
@@ -83,15 +83,13 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// Stores the response in the request, and returns the status of the request.
     fn received(&mut self, request: &mut J, status: Status) -> Status {
         request.state_mut().exception = self.engine.exception_code();
-        // The length is 0 after a broadcast or another request that has no response.
-        let length = self.engine.request.length;
-        if status != Status::OK || length == 0 {
+        // The content is empty after a broadcast or another request that has no response.
+        let content = self.engine.content;
+        if status != Status::OK || content == 0 {
             return status;
         }
-        store_response(
-            request,
-            self.engine.storage.slice(rtu::PDU as u16, length.into()),
-        )
+        let pdu = rtu::PDU as u16;
+        store_response(request, self.engine.storage.slice(pdu, content - pdu))
     }
 }
 

@@ -39,7 +39,7 @@ pub trait ClientStorage: Storage<Count = u16> {
 
     /// The response timeout of a unit in milliseconds; 0 for that of the line. The client has
     /// just called [`ClientStorage::rest`] for the unit.
-    fn unit_timeout_ms(&mut self, unit: u8) -> u16 {
+    fn unit_timeout_ms(&mut self, unit: u8) -> u32 {
         find(self.units(), unit).map_or(0, |unit| unit.timeout_ms)
     }
 
@@ -49,7 +49,7 @@ pub trait ClientStorage: Storage<Count = u16> {
         if status.is_exception() {
             return again_when_busy(policy, state, status);
         }
-        let unit = find(self.units(), state.unit);
+        let unit = find(self.units(), state.unit());
         let limit = unit.map_or(0, |unit| unit.retry_limit);
         again(policy, state, limit, status, || self.random())
     }

@@ -1,7 +1,7 @@
 //! Records of units, in storage that the caller supplies.
 
 use crate::error::Status;
-use crate::time::{clamped, elapsed};
+use crate::time::{clamped, elapsed, LONGEST_TIMEOUT_MS};
 
 /// The settings and counts of one unit. The counts wrap at 2^32.
 #[repr(C)]
@@ -19,8 +19,11 @@ pub struct UnitRecord {
     pub delay: u32,
     /// Time at which the last request to this unit ended.
     last: u32,
-    /// The unit id.
-    pub unit: u8,
+    /// Response timeout of this unit, in milliseconds; 0 for that of the line. One above
+    /// [`LONGEST_TIMEOUT_MS`] counts as that.
+    pub timeout_ms: u32,
+    /// The unit id. No unit has one above 255.
+    pub unit: u16,
     /// Status code of the last request that ended.
     pub status: u8,
     /// `delay` may not have passed since `last` yet.
@@ -28,8 +31,6 @@ pub struct UnitRecord {
     /// Greatest number of retries of a request to this unit; 0 for that of the line,
     /// [`NO_RETRIES`](super::NO_RETRIES) for none.
     pub retry_limit: u8,
-    /// Response timeout of this unit, in milliseconds; 0 for that of the line.
-    pub timeout_ms: u16,
 }
 
 impl UnitRecord {
@@ -42,12 +43,17 @@ impl UnitRecord {
             retries: 0,
             delay,
             last: 0,
-            unit,
+            timeout_ms: 0,
+            unit: unit as u16,
             status: 0,
             cooling_down: false,
             retry_limit: 0,
-            timeout_ms: 0,
         }
+    }
+
+    /// False for a unit id or a timeout that is too large.
+    pub const fn is_in_range(&self) -> bool {
+        self.unit <= u8::MAX as u16 && self.timeout_ms <= LONGEST_TIMEOUT_MS
     }
 
     /// Microseconds until the unit may get its next request.
@@ -83,7 +89,9 @@ impl UnitRecord {
 
 /// The record of a unit, if there is one.
 pub fn find(units: &mut [UnitRecord], unit: u8) -> Option<&mut UnitRecord> {
-    units.iter_mut().find(|record| record.unit == unit)
+    units
+        .iter_mut()
+        .find(|record| record.unit == u16::from(unit))
 }
 
 /// Microseconds until a unit may get its next request, by its record in `units`; 0 if it

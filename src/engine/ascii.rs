@@ -1,98 +1,142 @@
 //! Finds the reply among the received characters of an ASCII line. Every frame begins with a
 //! colon; characters before a colon are noise.
 
-use super::{Count, Engine, Match, RequestSpec, RxFault, Storage};
+use super::{Count, Engine, Outcome, RequestSpec, Storage};
+use crate::bytes::move_to_front;
+use crate::error::Status;
 use crate::frame::ascii::{self, find, Decoded};
 use crate::frame::rtu;
 use crate::pdu::EXCEPTION;
+use crate::port::Port;
 
 /// Characters around unit and PDU: colon, two of the LRC, CR and the delimiter.
 const OVERHEAD: u8 = 5;
+
+/// Bytes of an exception: unit, function code, exception code.
+const EXCEPTION_CONTENT: u8 = 3;
 
 /// Length in characters of the frame for a PDU of `length` bytes.
 pub fn frame_length(length: u8) -> u16 {
     2 * (u16::from(length) + 1) + u16::from(OVERHEAD)
 }
 
-/// Length of unit and PDU in a frame of `characters` characters.
-pub fn content(characters: u16) -> u16 {
-    (characters - u16::from(OVERHEAD)) / 2
-}
-
-impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
-    /// Searches the received characters for the reply in an ASCII frame that ends with
-    /// `delimiter`. Leaves the reply decoded at the front of the buffer: unit and PDU, followed
-    /// by the remaining characters of its frame.
-    pub fn find_ascii_reply(&mut self, delimiter: u8) -> bool {
-        let mut front = S::Count::ZERO;
-        let found = loop {
-            let rest = self.storage.slice(front, self.end - front);
-            let (begin, end) = find(rest, delimiter);
-            let Some(end) = end else {
-                self.note_skipped(begin);
-                front += S::Count::of(begin);
-                break false;
-            };
-            self.note_skipped(begin);
-            let begins = front + S::Count::of(begin);
-            front += S::Count::of(end);
-            if begins < front && self.is_reply(begins, front - begins, delimiter) {
-                self.needed = front - begins;
-                front = begins;
-                break true;
+impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+    /// Searches the frame buffer, to which the port has appended `received` characters, for the
+    /// reply in a frame that ends with `delimiter`. Leaves unit and PDU of the reply at the front
+    /// of the buffer. True if the request ends.
+    pub fn search_ascii(&mut self, received: S::Count, delimiter: u8) -> bool {
+        self.end += received;
+        loop {
+            let rest = self.storage.slice(self.content, self.end - self.content);
+            let (begin, after) = find(rest, delimiter);
+            if begin > 0 {
+                self.note_skipped();
             }
-        };
-        self.drop_front(front);
-        if !found && self.end == self.storage.capacity() && self.held == S::Count::ZERO {
-            // The frame is too long for the buffer.
-            self.note_fault(RxFault::TOO_LONG);
+            let front = self.content + S::Count::of(begin);
+            let Some(after) = after else {
+                self.drop_until(front);
+                break;
+            };
+            let after = self.content + S::Count::of(after);
+            if front < after && self.is_ascii_reply(front, after - front, delimiter) {
+                self.is_early = self.run_length > S::Count::ZERO;
+                if !self.is_on_probation {
+                    return true;
+                }
+                let end = self.end;
+                self.hold_response();
+                self.end = end;
+            }
+            self.drop_until(after);
+        }
+        if self.is_held {
+            self.run_length = self.end - self.content;
+        }
+        if self.end == self.space {
+            self.drop_too_long();
+        }
+        false
+    }
+
+    /// Makes space in a full buffer: drops a held reply, or a frame that is too long for it.
+    fn drop_too_long(&mut self) {
+        let held = self.content;
+        self.content = S::Count::ZERO;
+        if held > S::Count::ZERO {
+            self.note_foreign_frame();
+            self.seen = Outcome::NOTHING;
+            self.drop_until(held);
+        } else {
+            self.note(Outcome::TOO_LONG);
+            self.is_early = true;
             self.end = S::Count::ZERO;
         }
-        found
+    }
+
+    /// Drops the received characters before `index`.
+    fn drop_until(&mut self, index: S::Count) {
+        let from = index - self.content;
+        let rest = self.storage.bytes(self.content, self.end - self.content);
+        move_to_front(rest, from.into());
+        self.end -= from;
     }
 
     /// Notes that characters outside of a frame were skipped.
-    fn note_skipped(&mut self, count: usize) {
-        if count > 0 {
-            self.skipped = 1;
-        }
+    fn note_skipped(&mut self) {
+        self.run_length = 1u8.into();
     }
 
-    /// Decodes the frame of `length` characters at `front`; true if it is the reply.
-    fn is_reply(&mut self, front: S::Count, length: S::Count, delimiter: u8) -> bool {
+    /// Decodes the frame of `length` characters at `front`. If it is the reply, moves it to the
+    /// front of the buffer.
+    fn is_ascii_reply(&mut self, front: S::Count, length: S::Count, delimiter: u8) -> bool {
         let frame = self.storage.bytes(front, length);
         let content = match ascii::decode(frame, delimiter, true) {
             Decoded::Valid(length) => S::Count::from(length),
             Decoded::WrongLrc(_) => {
                 // The unit has been decoded to the front of the frame.
                 if self.storage.byte(front) == self.unit {
-                    self.note_fault(RxFault::BAD_CRC);
+                    self.note_damaged();
+                    self.is_early = true;
                 }
                 return false;
             }
             Decoded::Malformed => {
-                self.skipped = 1;
+                self.note_skipped();
                 return false;
             }
         };
-        let function = self.storage.byte(front + 1u8.into()) & !EXCEPTION;
+        let function = self.storage.byte(front + 1u8.into());
         // The length of an RTU frame of this content: the LRC and one character stand for
         // the CRC.
         let whole = content + rtu::CRC.into();
-        let fault = if self.storage.byte(front) != self.unit {
-            RxFault::OTHER_UNIT
-        } else if function != self.request.function() {
-            RxFault::OTHER_FUNCTION
-        } else if Q::expected_length(self, front, whole) != whole {
-            RxFault::MALFORMED
-        } else {
-            match Q::validate(self, front, content) {
-                Match::Reply => return true,
-                Match::Echo => return false,
-                Match::Unrelated => RxFault::MALFORMED,
+        let kind = if self.storage.byte(front) != self.unit {
+            Outcome::OTHER_UNIT
+        } else if function & !EXCEPTION != self.request.function() {
+            Outcome::OTHER_FUNCTION
+        } else if function & EXCEPTION != 0 {
+            let code = self.storage.byte(front + 2u8.into());
+            let is_valid = Status::exception(code) != Status::MALFORMED_REPLY;
+            if is_valid && content == EXCEPTION_CONTENT.into() {
+                self.exception = code;
+                self.seen = Outcome(code);
+                self.content = S::Count::ZERO;
+                return true;
             }
+            Outcome::MALFORMED
+        } else if length == self.outgoing && Q::is_echo(self, front) {
+            self.outgoing = S::Count::ZERO;
+            return false;
+        } else if Q::is_reply(self, front, whole) {
+            self.exception = 0;
+            self.seen = Outcome::OK;
+            self.storage.move_down(front, content);
+            self.content = content;
+            return true;
+        } else {
+            Outcome::MALFORMED
         };
-        self.note_foreign_frame(fault);
+        self.note_foreign_frame();
+        self.note(kind);
         false
     }
 }

@@ -3,18 +3,17 @@
 //!
 //! A *deviating reply* has the right unit, function and CRC. The reply to a write deviates if it
 //! repeats another address, value or quantity than the request. The reply to a read deviates if
-//! it has more or less data than requested, or more than the frame buffer holds. The strict
-//! search skips such a reply and looks for a valid one. Here the skipped bytes are kept at the
-//! front of the frame buffer, as far as they fill response words. So a valid reply always wins.
+//! it has more or less data than requested, or more than the frame buffer holds. The search does
+//! not find such a reply and looks for a valid one. Meanwhile this module copies the bytes of
+//! the frame that is being received to the end of the frame buffer, in reverse order, as far as
+//! they fill response words. So a valid reply always wins.
 //!
-//! Only [`Engine::receive_lenient`] calls this module. A program that does not call that function
+//! Only [`Engine::set_lenient`] names this module. A program that does not call that function
 //! contains none of this code.
 
-use super::{Engine, Phase, Probation, Words, BROADCAST};
-use crate::error::Status;
+use super::{Engine, Event, Outcome, Storage, Words};
 use crate::frame::rtu;
 use crate::pdu::master_request::MasterRequest;
-use crate::pdu::EXCEPTION;
 use crate::port::Port;
 
 /// Bytes before the data in the response to a read: unit, function code and byte count.
@@ -24,114 +23,100 @@ const BEFORE_DATA: u8 = 3;
 /// them.
 const LEFT_FREE: u8 = 8;
 
-impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
-    /// Waits for the reply, as [`Engine::poll`] does, and accepts a deviating reply. A read may be
-    /// sent to unit 0, which then has to reply.
-    pub fn receive_lenient(&mut self) -> Status {
-        if self.unit == BROADCAST {
-            if !self.request.is_read() {
-                return self.turn_around();
-            }
-            if self.phase == Phase::Turnaround {
-                self.phase = Phase::Reply;
-                self.wait = self.settings.response_timeout;
-                // For a broadcast it was left at the value for "unit 0 did not reply".
-                self.probation = Probation::Off;
-            }
-        }
-        let status = self.receive::<true>();
-        let most = u16::from(self.storage.response_words()) << 1;
-        if status == Status::OK && most > 0 && u16::from(self.request.reads()) > most {
-            self.request.set_reads(most as u8);
-        }
-        status
+impl<P, S: Storage, Q> Engine<P, S, Q> {
+    /// True if deviating replies are accepted.
+    pub fn is_lenient(&self) -> bool {
+        self.observer.is_some()
     }
 }
 
-impl<P, S: Words> Engine<P, S, MasterRequest> {
-    /// Skips the byte at `front`, but keeps it if it may belong to a deviating response to a read.
-    /// Returns the index of the next byte.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn skip_or_keep_byte(&mut self, front: u8) -> u8 {
-        let is_kept = self.is_kept(front);
-        self.skip_byte(front);
-        if !is_kept {
-            return front + 1;
-        }
-        let byte = self.storage.byte(front);
-        self.storage.set_byte(0, byte);
-        self.storage.set_aside(1);
-        self.held += 1;
-        self.end -= 1;
-        self.processed = self.processed.saturating_sub(1);
-        front
+impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
+    /// Sets whether a deviating reply is accepted. A read may then be sent to unit 0, which has
+    /// to reply.
+    pub fn set_lenient(&mut self, on: bool) {
+        self.observer = if on { Some(observe) } else { None };
     }
 
-    /// True if the byte at `front` must be kept. Sets `probation` if that byte completes a
-    /// deviating response.
-    fn is_kept(&mut self, front: u8) -> bool {
-        let is_decided = matches!(self.probation, Probation::Held | Probation::Deviating);
-        if is_decided || !self.request.is_read() {
-            return false;
+    /// Gives the kept bytes' place back to the search.
+    fn drop_kept(&mut self) {
+        self.space += self.kept;
+        self.kept = 0;
+    }
+
+    /// Keeps the byte if it may belong to a deviating response to a read. Notes a deviating
+    /// reply that ends with it.
+    fn keep(&mut self, byte: u8, is_whole: bool) {
+        if self.has_deviating || self.is_held {
+            return;
         }
-        if self.skipped == 0 {
+        let function = self.request.function();
+        if !self.request.is_read() {
+            // The search has found that it is not the reply.
+            if self.ends_with(self.length, function) {
+                self.note_deviating(is_whole);
+            }
+            return;
+        }
+        if self.run_length == 1 {
+            self.space = self.storage.capacity();
+            self.kept = 0;
+        }
+        let is_ours = match self.run_length {
+            1 => byte == self.unit,
+            2 => self.kept == 1 && byte == function,
+            // What begins as the expected reply needs no copy, if the search has space for it.
+            3 if byte == self.request.reads() && self.length <= self.storage.capacity() => false,
+            _ => self.kept > 0,
+        };
+        if !is_ours {
             self.drop_kept();
-            let unit = self.storage.byte(front);
-            let function = self.storage.byte(front + 1);
-            return unit == self.unit && function == self.request.function();
+            return;
         }
-        if self.held == 0 {
-            return false;
-        }
-        let byte = self.storage.bytes(front, 1);
-        let is_residue = self.crc_skipped.with(byte).is_residue();
-        let length = self.count_kept();
-        if is_residue && length == self.kept_length() && self.kept_data() > 0 {
-            self.probation = Probation::Deviating;
-            return false;
-        }
-        if length == u8::MAX {
-            // No frame is longer.
-            self.drop_kept();
-            return false;
+        if is_whole && self.run_length == self.kept_length() && self.kept_data() > 0 {
+            self.note_deviating(is_whole);
+            return;
         }
         let words = u16::from(self.storage.response_words());
-        u16::from(self.held) < (words << 1) + u16::from(BEFORE_DATA)
-            && self.storage.capacity() > LEFT_FREE
+        let space = self.space;
+        if u16::from(self.kept) >= (words << 1) + u16::from(BEFORE_DATA) || space <= LEFT_FREE {
+            return;
+        }
+        // The search has taken in the last byte, so the buffer may be full.
+        if self.end == space {
+            let keep = self.end - 1;
+            self.storage.move_down(1, keep);
+            self.end = keep;
+        }
+        self.storage.set_byte(space - 1, byte);
+        self.space -= 1;
+        self.kept += 1;
     }
 
-    /// Counts one more byte of the response that the kept bytes begin. Returns how many bytes it
-    /// has by now, including bytes that were not kept because the buffer is too small. The count
-    /// is stored in place of the first kept byte, which is the unit.
-    fn count_kept(&mut self) -> u8 {
-        let held = self.held;
-        self.storage.take_back(held);
-        let more = match held {
-            1 => 1,
-            _ => self.storage.byte(0).saturating_add(1),
-        };
-        self.storage.set_byte(0, more);
-        self.storage.set_aside(held);
-        more.saturating_add(1)
+    /// Notes a deviating reply. A whole frame is not counted as one that does not answer.
+    fn note_deviating(&mut self, is_whole: bool) {
+        self.has_deviating = true;
+        self.foreign_frames = self.foreign_frames.wrapping_sub(is_whole.into());
+    }
+
+    /// The kept byte at `index`.
+    fn kept_byte(&self, index: u8) -> u8 {
+        self.storage.byte(self.storage.capacity() - 1 - index)
     }
 
     /// Length of the frame that the kept bytes begin, from its byte count. 0 if the byte count is
     /// not kept yet, or is too great for a frame.
-    fn kept_length(&mut self) -> u8 {
-        let held = self.held;
-        if held <= BEFORE_DATA {
+    fn kept_length(&self) -> u8 {
+        if self.kept < BEFORE_DATA {
             return 0;
         }
-        self.storage.take_back(held);
-        let count = self.storage.byte(2);
-        self.storage.set_aside(held);
+        let count = self.kept_byte(BEFORE_DATA - 1);
         count.checked_add(BEFORE_DATA + rtu::CRC).unwrap_or(0)
     }
 
     /// How many bytes of the frame's data are kept. For registers, only whole registers count.
-    fn kept_data(&mut self) -> u8 {
+    fn kept_data(&self) -> u8 {
         let length = self.kept_length();
-        let kept = self.held.min(length.saturating_sub(rtu::CRC));
+        let kept = self.kept.min(length.saturating_sub(rtu::CRC));
         let data = kept.saturating_sub(BEFORE_DATA);
         if self.request.has_registers() {
             data & !1
@@ -140,46 +125,43 @@ impl<P, S: Words> Engine<P, S, MasterRequest> {
         }
     }
 
-    /// Handles the frame at `front`, whose unit, function and CRC are right, but which is not the
-    /// expected reply. It is a deviating reply, unless it is an exception.
-    pub(super) fn note_deviating(&mut self, front: u8) {
-        let is_exception = self.storage.byte(front + 1) & EXCEPTION != 0;
-        if !is_exception && self.probation != Probation::Held {
-            self.probation = Probation::Deviating;
+    /// Moves the kept bytes, in the order in which they arrived, to the front of the buffer.
+    fn move_kept_to_front(&mut self) {
+        let (mut front, mut back) = (0, self.storage.capacity());
+        while front < back {
+            back -= 1;
+            let (first, last) = (self.storage.byte(front), self.storage.byte(back));
+            self.storage.set_byte(front, last);
+            self.storage.set_byte(back, first);
+            front += 1;
         }
     }
 
-    /// Drops the kept bytes, because a valid reply was found or their space is needed.
-    pub(super) fn drop_kept(&mut self) {
-        if self.probation != Probation::Held {
-            let held = self.held;
-            self.take_back();
-            self.storage.move_down(held, self.end);
-            if self.probation == Probation::Deviating {
-                self.probation = Probation::Off;
+    /// Makes a deviating reply the result of a request that would fail. Of a reply with more
+    /// data than response words, the data that fill these words count.
+    fn accept_deviating(&mut self) {
+        if self.has_deviating && !self.is_held && !self.seen.is_response() {
+            if self.request.is_read() {
+                let data = self.kept_data();
+                self.request.set_reads(data);
+                self.move_kept_to_front();
             }
+            self.exception = 0;
+            self.is_early = false;
+            self.seen = Outcome::OK;
+        } else if self.has_deviating {
+            self.note_foreign_frame();
+        }
+        let most = u16::from(self.storage.response_words()) << 1;
+        if most > 0 && u16::from(self.request.reads()) > most {
+            self.request.set_reads(most as u8);
         }
     }
+}
 
-    /// Makes a deviating reply the result of the request. False if there was none.
-    pub(super) fn accept_deviating(&mut self) -> bool {
-        // The last bytes may look like the beginning of a valid reply. Skip them too.
-        let mut front = 0;
-        while front < self.end {
-            front = self.skip_or_keep_byte(front);
-        }
-        if self.probation != Probation::Deviating {
-            return false;
-        }
-        if self.request.is_read() {
-            let data = self.kept_data();
-            self.take_back();
-            self.request.set_reads(data);
-        }
-        self.exception = 0;
-        // The reply was counted as a skipped frame.
-        self.skipped = 0;
-        self.foreign_frames = self.foreign_frames.saturating_sub(1);
-        true
+fn observe<P: Port, S: Words>(engine: &mut Engine<P, S, MasterRequest>, event: Event) {
+    match event {
+        Event::Byte(byte, is_whole) => engine.keep(byte, is_whole),
+        Event::End => engine.accept_deviating(),
     }
 }

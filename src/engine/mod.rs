@@ -3,36 +3,33 @@
 //! The master and the client's serial lines use this engine. The client's requests choose
 //! their framing, RTU or ASCII (see `spec`).
 //!
-//! The engine searches the received bytes for the reply (see `rtu`, `ascii`). Noise, frames
-//! of other units, late replies and a local echo before the reply do no harm.
-//!
-//! RTU frames carry no transaction number. A late reply to an earlier request looks like the
-//! reply if unit, function and length are the same, and a late exception looks like the reply
-//! if the function is the same. Two rules keep late replies from being delivered:
-//! - After a request without a right reply, the engine waits for the quiet time before it
-//!   sends the next request.
-//! - The next reply of that unit is on probation (see `receive`).
-//!
-//! A reply that arrives while no request has been sent shows that the replies are late, too.
+//! - `poll` has the phases of a request and its one timer.
+//! - `send` writes the request and waits until the port has sent it.
+//! - `search` finds the reply in RTU frames: for each byte it asks whether the reply ends there.
+//! - `late` keeps a late reply from being delivered as the answer to a later request.
+//! - `tally` counts the attempts that end, if the program has counters.
+//! - `ascii` finds the reply in ASCII frames; `lenient` accepts replies that deviate from the
+//!   standard.
 //!
 //! `inline(never)` keeps the steps apart in firmware. Each step then needs few values at a
 //! time, which fit into the registers, and the code is small.
 
 pub mod ascii;
-mod fault;
+mod late;
 mod lenient;
 mod master_request;
+mod outcome;
 mod poll;
-mod receive;
-mod rtu;
+mod search;
 mod send;
 mod settings;
 mod spec;
 mod storage;
+mod tally;
 
-pub use fault::RxFault;
-pub use settings::Settings;
-pub use spec::{Match, RequestSpec};
+pub use outcome::Outcome;
+pub use settings::{Setting, Settings};
+pub use spec::RequestSpec;
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 
 use crate::error::Status;
@@ -41,7 +38,7 @@ use crate::frame::checksum::Crc16;
 /// The unit address of a broadcast (serial line guide V1.02, 2.2).
 pub const BROADCAST: u8 = 0;
 
-/// The phase of a request. The phases follow each other in this order.
+/// The phase of a request. The driver is on from `Send` on.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
 #[repr(u8)]
 enum Phase {
@@ -49,34 +46,17 @@ enum Phase {
     Idle,
     /// Waits until the line is silent.
     Gap,
-    /// Writes the frame to the port. The driver is on.
-    Send,
-    /// Waits until the port has sent the last bit. The driver is on.
-    Flush,
-    /// Keeps the driver on for the post-flush hold.
-    PostFlush,
     /// Waits for the reply.
     Reply,
     /// Gives the slaves time to carry out a broadcast.
     Turnaround,
+    /// Writes the frame to the port.
+    Send,
+    /// Waits until the port has sent the last bit.
+    Flush,
+    /// Keeps the driver on for the post-flush hold.
+    PostFlush,
 }
-
-/// Whether the reply to the pending request may be a late reply.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[repr(u8)]
-enum Probation {
-    /// No late reply is expected.
-    Off,
-    /// The next reply may be late.
-    On,
-    /// The next reply may be late, and one reply is or was held.
-    Held,
-    /// A deviating reply has come (see `lenient`).
-    Deviating,
-}
-
-/// A function that waits for the reply.
-pub type Receive<E> = fn(&mut E) -> Status;
 
 /// One request and its reply, over a port and in the caller's storage.
 // Small fields come first: a Cortex-M0 and an AVR need one more instruction to reach a field
@@ -87,66 +67,87 @@ pub struct Engine<P, S: Storage, Q> {
     phase: Phase,
     /// The phase began in the last poll. Its time starts with the next look at the clock.
     phase_begins: bool,
-    /// The last poll found nothing to do.
-    waiting: bool,
     /// The unit that the request is sent to.
     pub(crate) unit: u8,
     retries: u8,
     /// The exception code of the last reply; 0 if the reply was no exception.
     pub(crate) exception: u8,
-    /// See [`RequestSpec::reply_length`].
+    /// What the request ends with if no more bytes arrive.
+    seen: Outcome,
+    /// The response or damaged reply in `seen` may lie within another frame, so a silence must
+    /// follow it.
+    is_early: bool,
+    /// The next reply may be a late one, and is held.
+    is_on_probation: bool,
+    /// A reply is or was held.
+    is_held: bool,
+    /// The last request got no right reply. Its reply may still come.
+    is_late: bool,
+    /// One of the late units sent no reply, not only a damaged one.
+    has_slow_unit: bool,
+    /// Bytes have arrived since the line was last silent. (Only for replies of unknown length.)
+    is_unsearched: bool,
+    /// What the frame that is being received is if it ends with a right CRC.
+    run_kind: Outcome,
+    /// How many bytes have arrived since the last frame ended.
+    run_length: S::Count,
+    /// Length of the reply's frame that is no exception; 0 if the request does not determine it.
     length: S::Count,
     /// How many bytes the frame buffer holds.
     end: S::Count,
-    /// How many of these bytes were sent, or are part of `crc`.
-    processed: S::Count,
-    /// The least length of the candidate at the front of the buffer. Once the reply is
-    /// found: the length of its frame.
-    needed: S::Count,
-    /// Length of the bytes that the storage has set aside: a held reply, or what may become a
-    /// deviating reply (see `lenient`); 0 if there are none.
-    pub(crate) held: S::Count,
-    /// Whether the next reply may be a late reply.
-    probation: Probation,
-    /// The last request got no right reply. Its reply may still come.
-    late: bool,
-    /// One of the late units sent no reply, not only a damaged one.
-    has_slow_unit: bool,
-    /// The echo of the request is expected before the reply.
-    pub(crate) echo: bool,
-    /// No byte has arrived since the received bytes were last searched for a reply after an
-    /// incomplete candidate. Before a request is sent: the frame buffer holds the request.
-    resynced: bool,
-    /// The most severe fault among the skipped bytes.
-    fault: RxFault,
-    /// How many skipped frames had a right CRC.
+    /// How many bytes of the frame buffer the search uses.
+    space: S::Count,
+    /// Length of the right reply, unit and PDU, at the front of the frame buffer; 0 if there is
+    /// none.
+    pub(crate) content: S::Count,
+    /// How many bytes of the frame buffer are to be sent; 0 if received bytes have overwritten
+    /// them. After they were sent: the length of the echo that is expected, or 0.
+    outgoing: S::Count,
+    /// How many bytes of the request were sent.
+    sent: S::Count,
+    /// How many frames with a right CRC were skipped that were not counted yet.
     foreign_frames: u8,
-    /// How many bytes were skipped since the last frame ended, at most `MIN_FRAME`.
-    skipped: u8,
-    /// The fault to note if the skipped bytes turn out to be a frame.
-    skipped_as: RxFault,
+    /// CRC of the bytes that have arrived since the last frame ended.
+    run: Crc16,
     /// The caller's frame buffer, words and counters.
     pub storage: S,
-    /// Time at which the phase began.
-    phase_start: u32,
-    /// How long the phase may last.
-    wait: u32,
-    /// Time at which the line was last in use.
-    last_byte: u32,
-    /// The time of the current poll.
-    now: u32,
-    /// The units that did not answer their last request. Each bit stands for the units whose
-    /// numbers are equal modulo 32.
-    late_units: [u8; 4],
-    /// CRC of the bytes skipped since the last frame ended. `crc` continues it over the first
-    /// `processed` bytes of the buffer.
-    crc_skipped: Crc16,
-    crc: Crc16,
-    /// Factor that carries `crc_skipped` over the length of a reply; `RESIDUE` until computed.
-    weight: Crc16,
     /// The byte stream.
     pub port: P,
+    /// When the wait began. Before and between requests: when the line was last in use.
+    since: u32,
+    /// How long the wait lasts.
+    wait: u32,
+    /// The time of the current poll.
+    now: u32,
     pub(crate) request: Q,
     /// Times and options of the requests.
     pub settings: Settings,
+    /// When the phase began.
+    begun: u32,
+    /// The units that did not answer their last request. Each bit stands for the units whose
+    /// numbers are equal modulo 32.
+    late_units: [u8; 4],
+    /// How many bytes have arrived that were not counted yet.
+    received: u32,
+    /// Counts attempts and bytes. (A pointer, so that a program without counters does not
+    /// contain its code.)
+    tally: Option<fn(&mut Self, Status)>,
+    /// Sees every received byte if deviating replies are accepted (see `lenient`).
+    observer: Option<Observer<P, S, Q>>,
+    /// How many bytes of the frame buffer, after the `space` ones, the observer has filled.
+    kept: S::Count,
+    /// The observer has seen a deviating reply.
+    has_deviating: bool,
 }
+
+/// What an observer is called for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Event {
+    /// A byte has arrived, and the search has not ended with it. `true` if it ends a frame.
+    Byte(u8, bool),
+    /// The request ends.
+    End,
+}
+
+/// A function that sees the bytes beside the search, and the end of the request.
+pub type Observer<P, S, Q> = fn(&mut Engine<P, S, Q>, Event);

@@ -1,11 +1,12 @@
 //! Moves a request on, from its start to its end.
 
-use super::{Count, Engine, Phase, Probation, Receive, RequestSpec, RxFault, Settings, Storage};
+use super::{Count, Engine, Event, Outcome, Phase, RequestSpec, Settings, Storage};
 use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;
 use crate::port::Port;
 use crate::time::{elapsed, has_elapsed, LONGEST};
+use crate::FIRMWARE;
 
 impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// An engine without a request.
@@ -13,36 +14,40 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         Engine {
             phase: Phase::Idle,
             phase_begins: false,
-            waiting: false,
             unit: 0,
             retries: 0,
             exception: 0,
+            seen: Outcome::OK,
+            is_early: false,
+            is_on_probation: false,
+            is_held: false,
+            is_late: false,
+            has_slow_unit: false,
+            is_unsearched: false,
+            run_kind: Outcome::MALFORMED,
+            run_length: S::Count::ZERO,
             length: S::Count::ZERO,
             end: S::Count::ZERO,
-            processed: S::Count::ZERO,
-            needed: S::Count::ZERO,
-            held: S::Count::ZERO,
-            probation: Probation::Off,
-            late: false,
-            echo: false,
-            resynced: false,
-            fault: RxFault::NOTHING,
+            space: S::Count::ZERO,
+            content: S::Count::ZERO,
+            outgoing: S::Count::ZERO,
+            sent: S::Count::ZERO,
             foreign_frames: 0,
-            skipped: 0,
-            skipped_as: RxFault::NOTHING,
-            crc_skipped: Crc16::START,
-            crc: Crc16::START,
-            weight: Crc16::RESIDUE,
-            request: Q::NONE,
-            phase_start: 0,
-            wait: 0,
-            last_byte: 0,
-            now: 0,
-            has_slow_unit: false,
-            late_units: [0; 4],
+            run: Crc16::START,
             storage,
-            settings: Settings::DEFAULT,
+            since: 0,
+            wait: 0,
+            begun: 0,
+            now: 0,
+            late_units: [0; 4],
             port,
+            request: Q::NONE,
+            received: 0,
+            tally: Some(Engine::count),
+            observer: None,
+            kept: S::Count::ZERO,
+            has_deviating: false,
+            settings: Settings::DEFAULT,
         }
     }
 
@@ -51,10 +56,15 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.phase != Phase::Idle
     }
 
-    /// True if the last poll found nothing to do and the driver is off. The caller may do
-    /// something else for a while.
-    pub const fn is_waiting(&self) -> bool {
-        self.waiting
+    /// True if the request waits for the line or the reply, with the driver off. The caller may
+    /// do something else for a while.
+    pub fn is_waiting(&self) -> bool {
+        self.phase != Phase::Idle && self.phase < Phase::Send
+    }
+
+    /// How many bytes the frame buffer holds.
+    pub(crate) fn end(&self) -> S::Count {
+        self.end
     }
 
     /// The request that [`Engine::start`] sends.
@@ -76,7 +86,7 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// For model checkers: two engines that will behave alike become equal.
     #[doc(hidden)]
     pub fn rebase(&mut self, now: u32, longest: u32) {
-        for time in [&mut self.phase_start, &mut self.last_byte, &mut self.now] {
+        for time in [&mut self.since, &mut self.begun, &mut self.now] {
             *time = 0u32.wrapping_sub(elapsed(now, *time).min(longest));
         }
     }
@@ -85,29 +95,17 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// send.
     #[inline(always)]
     pub(crate) fn append_crc(&mut self, length: S::Count) {
-        let [low, high] = crc16(self.storage.bytes(S::Count::ZERO, length)).to_bytes();
+        let [low, high] = crc16(self.storage.slice(S::Count::ZERO, length)).to_bytes();
         self.storage.set_byte(length, low);
         self.storage.set_byte(length + 1u8.into(), high);
         self.set_frame_length(length + rtu::CRC.into());
     }
 
-    /// Writes the frame of a request whose PDU is a function code and two words. On hosts
-    /// only: most requests are of this form, and this function takes half the time.
-    #[inline(always)]
-    pub(crate) fn write_short(&mut self, words: [u8; 4]) {
-        let frame = rtu::short(self.unit, self.request.function(), words);
-        let length = S::Count::from(frame.len() as u8);
-        if let Some(place) = self.storage.bytes(S::Count::ZERO, length).first_chunk_mut() {
-            *place = frame;
-        }
-        self.set_frame_length(length);
-    }
-
     /// Sets how many bytes of the frame buffer are to be sent.
     #[inline(always)]
     pub(crate) fn set_frame_length(&mut self, length: S::Count) {
-        self.end = length;
-        self.processed = S::Count::ZERO;
+        self.outgoing = length;
+        self.sent = S::Count::ZERO;
     }
 
     /// Enters a phase that may last `wait` microseconds from the next look at the clock on.
@@ -117,145 +115,259 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.phase_begins = true;
     }
 
-    pub(super) fn wait(&mut self) -> Status {
-        self.waiting = true;
-        Status::PENDING
-    }
-
     /// Stores the time `now`, and starts the time of a phase that has just begun.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn look_at_clock(&mut self, now: u32) {
+    fn look_at_clock(&mut self, now: u32) {
         self.now = now;
         if self.phase_begins {
             self.phase_begins = false;
-            self.phase_start = now;
-            // The silence is measured from the end of our request; before a request, from the
-            // last received byte.
+            self.begun = now;
+            // Before a request, the silence counts from the last use of the line.
             if self.phase != Phase::Gap {
-                self.last_byte = now;
+                self.since = now;
             }
         }
     }
 
-    /// True once the time of the phase has expired.
+    /// True once the wait is over.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn has_expired(&self) -> bool {
-        self.has_elapsed_since(self.wait, false)
-    }
-
-    /// True once the line has been silent for `time` microseconds.
-    #[inline(always)]
-    pub(super) fn is_silent(&self, time: u32) -> bool {
-        self.has_elapsed_since(time, true)
-    }
-
-    /// True once `time` microseconds have passed since the line was last in use, or since the
-    /// phase began. One function does both, because 32-bit arithmetic is large on an AVR.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn has_elapsed_since(&self, time: u32, since_last_byte: bool) -> bool {
-        let phase_start = if since_last_byte {
-            self.last_byte
-        } else {
-            self.phase_start
-        };
-        has_elapsed(time, self.now, phase_start)
-    }
-
-    /// Waits for the turnaround delay, in which the slaves carry out a broadcast.
-    #[inline(always)]
-    pub(super) fn turn_around(&mut self) -> Status {
-        if self.has_expired() {
-            Status::OK
-        } else {
-            self.wait()
-        }
-    }
-
-    /// The status of a request that cannot go on, because the line is not silent or the port
-    /// accepts nothing: `PENDING`, or `LINE_BUSY` once the phase has expired.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn stalled(&self) -> Status {
-        if self.has_expired() {
-            Status::LINE_BUSY
-        } else {
-            Status::PENDING
-        }
+        has_elapsed(self.wait, self.now, self.since)
     }
 }
 
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
-    /// Notes that the line is in use now. The gap counts from now.
+    /// Notes that the line is in use now. The gap counts from now. Nothing changes while a
+    /// request is on the line.
     pub fn line_used(&mut self) {
-        self.last_byte = self.port.micros();
+        if self.phase <= Phase::Gap {
+            self.since = self.port.micros();
+        }
     }
 
     /// Notes that the line was in use at `time`, by the clock of the port. The gap counts from
-    /// `time`, unless the line was in use later.
+    /// `time`, unless the line was in use later. Nothing changes while a request is on the line.
     pub fn line_used_at(&mut self, time: u32) {
-        if time.wrapping_sub(self.last_byte) < LONGEST {
-            self.last_byte = time;
+        if self.phase <= Phase::Gap && time.wrapping_sub(self.since) < LONGEST {
+            self.since = time;
         }
     }
 
     /// The time at which the line was last in use, by the clock of the port.
     pub fn last_use(&self) -> u32 {
-        self.last_byte
+        self.since
     }
 
     /// Does what the request has to do at the time `now`, without waiting. Returns
     /// [`Status::PENDING`] until the request has ended, then its status.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self, now: u32) -> Status {
-        self.poll_with(now, None)
-    }
-
-    /// As [`Engine::poll`], but `receive` waits for the reply if there is such a function.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub fn poll_with(&mut self, now: u32, receive: Option<Receive<Self>>) -> Status {
-        self.waiting = false;
         self.look_at_clock(now);
-        let status = if self.phase < Phase::Reply {
-            match self.phase {
-                Phase::Idle => return Status::OK,
-                Phase::Gap => self.wait_for_silence(),
-                _ => self.send(),
-            }
-        } else if let Some(receive) = receive {
-            receive(self)
-        } else if self.phase == Phase::Reply {
-            self.receive::<false>()
-        } else {
-            self.turn_around()
+        let status = match self.phase {
+            Phase::Idle => return Status::OK,
+            Phase::Gap | Phase::Reply => self.listen(),
+            Phase::Turnaround if self.has_expired() => Status::OK,
+            Phase::Turnaround => Status::PENDING,
+            _ => self.send(),
         };
-        if status.is_failure() {
-            self.cancel();
-        } else if status != Status::PENDING {
-            self.end();
+        if status != Status::PENDING {
+            self.tally(status);
+            if status.is_failure() {
+                self.end_on_line();
+            }
+            self.phase = Phase::Idle;
         }
         status
+    }
+
+    /// Reads received bytes into `space` bytes of the frame buffer from `index` on. Returns how
+    /// many; negative if the link is lost.
+    #[inline(always)]
+    fn read_bytes(&mut self, index: S::Count, space: S::Count) -> i16 {
+        let received = self.port.read(self.storage.bytes(index, space));
+        if received > 0 {
+            self.received = self.received.wrapping_add(received as u32);
+        }
+        received
+    }
+
+    /// Reads the received bytes at the time `now` and drops them. Negative if the link is lost.
+    pub fn drop_received(&mut self, now: u32) -> i16 {
+        let received = self.read_bytes(S::Count::ZERO, self.storage.capacity());
+        if received > 0 {
+            self.since = now;
+            self.tally(Status::PENDING);
+        }
+        received
+    }
+
+    /// Searches the bytes that have arrived, and ends the wait for silence or for the reply once
+    /// it is over.
+    #[inline(always)]
+    fn listen(&mut self) -> Status {
+        // All received bytes are searched, also if the port returns them one by one, but not more
+        // than about a frame in one poll.
+        const MOST: u8 = u8::MAX;
+        let mut budget = S::Count::from(MOST);
+        loop {
+            if self.end == self.space {
+                self.make_space();
+            }
+            // Firmware reads single bytes, which takes less code: 56 bytes on a Cortex-M0+, 140
+            // on an AVR. The observer uses the end of the buffer, so it must see each byte
+            // before the next one.
+            let first = self.end;
+            let space = if FIRMWARE || self.is_lenient() {
+                1u8.into()
+            } else {
+                self.space - first
+            };
+            let received = self.read_bytes(first, space);
+            if received < 0 {
+                return Status::LINK_LOST;
+            }
+            let received = S::Count::of(received as usize);
+            if received == S::Count::ZERO {
+                break;
+            }
+            if self.phase == Phase::Gap {
+                // They overwrite the request.
+                self.outgoing = S::Count::ZERO;
+            }
+            let ends = Q::search(self, first, received);
+            if self.phase == Phase::Gap {
+                if ends {
+                    self.note_unexpected();
+                }
+                self.since = self.now;
+            } else if ends {
+                self.since = self.now;
+                return self.settle();
+            } else {
+                self.wait_for_silence();
+            }
+            if budget < received {
+                budget = S::Count::ZERO;
+                break;
+            }
+            budget -= received;
+        }
+        // The search may have taken long. The silence begins after it.
+        let restarts =
+            self.phase == Phase::Gap || self.is_held || self.is_early || self.is_unsearched;
+        if budget < MOST.into() && restarts {
+            self.now = self.port.micros();
+            self.since = self.now;
+        }
+        // Received bytes extend the wait, but not for ever.
+        let limit = self.wait.wrapping_add(Q::response_timeout(self));
+        let is_old = budget < MOST.into() && self.since.wrapping_sub(self.begun) >= limit;
+        let is_over = self.has_expired();
+        if self.phase == Phase::Gap {
+            if is_over {
+                return self.transmit();
+            }
+            return if is_old {
+                Status::LINE_BUSY
+            } else {
+                Status::PENDING
+            };
+        }
+        if !is_over && !is_old {
+            return Status::PENDING;
+        }
+        if !Q::HAS_FIXED_REPLY && self.is_unsearched && !self.find_in_silence() {
+            return Status::PENDING;
+        }
+        if self.is_held_in_vain() && self.seen.is_response() {
+            self.seen = Outcome::NOTHING;
+        }
+        self.settle()
+    }
+
+    /// Lets silence end the wait for the reply, if it is known what the request ends with then.
+    #[inline(always)]
+    fn wait_for_silence(&mut self) {
+        if self.is_held {
+            self.wait = self.hold();
+        } else if self.is_early || !Q::HAS_FIXED_REPLY && self.is_unsearched {
+            self.wait = self.settings.silence.get();
+        } else {
+            return;
+        }
+        self.since = self.now;
+    }
+
+    /// Searches the received bytes for a reply that ends with the silence. False if the request
+    /// still waits for its reply.
+    fn find_in_silence(&mut self) -> bool {
+        self.is_unsearched = false;
+        let length = Q::ending_reply(self, true);
+        if length > S::Count::ZERO && self.accept(length) {
+            if !self.is_on_probation {
+                return true;
+            }
+            self.hold_response();
+        }
+        if self.is_held {
+            self.wait = self.hold();
+        } else if !self.is_early {
+            self.since = self.begun;
+            self.wait_for_reply();
+        }
+        self.has_expired()
+    }
+
+    /// Ends the request with what was seen.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    fn settle(&mut self) -> Status {
+        if let Some(observe) = self.observer {
+            observe(self, Event::End);
+        }
+        let status = self.seen.status();
+        if self.seen.is_response() {
+            self.expect_no_late_reply();
+            return status;
+        }
+        if !cfg!(feature = "retries")
+            || !Q::HAS_FIXED_REPLY
+            || self.retries == 0
+            || status == Status::BUFFER_TOO_SMALL
+        {
+            return status;
+        }
+        self.retries -= 1;
+        self.tally(status);
+        // The damaged reply may have been noise, so the right reply may still come.
+        self.expect_late_reply();
+        self.since = self.now;
+        self.begin()
     }
 
     /// Cancels the request and switches the driver off. If the request was sent completely,
     /// its reply may still come.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn cancel(&mut self) {
-        if self.phase > Phase::Gap {
-            self.line_used();
-        }
-        if self.phase > Phase::Send {
-            self.expect_late_reply();
-        }
-        self.end();
+        self.tally(Status::CANCELLED);
+        self.end_on_line();
+        self.phase = Phase::Idle;
     }
 
-    /// Ends the request and switches the driver off.
+    /// Ends a request without a right reply on the line: switches the driver off, and notes that
+    /// the reply may come late.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn end(&mut self) {
-        self.take_back();
-        if matches!(self.phase, Phase::Send | Phase::Flush | Phase::PostFlush) {
+    fn end_on_line(&mut self) {
+        if self.phase <= Phase::Gap {
+            return;
+        }
+        if self.phase != Phase::Send {
+            self.expect_late_reply();
+        }
+        if self.phase >= Phase::Send {
             self.port.post_transmission();
         }
-        self.phase = Phase::Idle;
-        self.waiting = false;
+        self.since = self.port.micros();
     }
 
     /// Microseconds from `now` for which poll will find nothing to do unless a byte arrives;
@@ -263,21 +375,10 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// this call, so the caller may sleep for the returned time.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
         self.look_at_clock(now);
-        let (time, phase_start) = if self.phase < Phase::Reply {
-            match self.phase {
-                Phase::Idle => return u32::MAX,
-                Phase::Gap => (self.required_silence(), self.last_byte),
-                _ => return 0,
-            }
-        } else if self.phase == Phase::Turnaround {
-            (self.wait, self.phase_start)
-        } else if self.probation == Probation::Held {
-            (self.hold(), self.last_byte)
-        } else if !self.resynced {
-            (self.settings.silence, self.last_byte)
-        } else {
-            (self.wait, self.phase_start)
-        };
-        time.saturating_sub(elapsed(now, phase_start))
+        match self.phase {
+            Phase::Idle => u32::MAX,
+            phase if phase >= Phase::Send => 0,
+            _ => self.wait.saturating_sub(elapsed(now, self.since)),
+        }
     }
 }

@@ -1,9 +1,9 @@
-//! Sends a request: waits for silence, writes the frame, waits until its last bit has left.
+//! Sends one request: writes the frame, waits until its last bit has left.
 
-use super::{Count, Counter, Engine, Phase, RequestSpec, Storage, BROADCAST};
+use super::{Count, Engine, Outcome, Phase, RequestSpec, Storage, BROADCAST};
 use crate::error::Status;
 use crate::port::Port;
-use crate::time::characters;
+use crate::time::{characters, has_elapsed};
 
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Starts the request to `unit`; the calls of `poll` send it. A refused request sends
@@ -33,77 +33,76 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn begin(&mut self) -> Status {
-        self.take_back();
         Q::write(self);
-        self.resynced = true;
-        let wait = Q::response_timeout(self);
-        self.enter(Phase::Gap, wait.wrapping_add(self.required_silence()));
+        self.begin_search();
+        let silence = self.required_silence();
+        self.enter(Phase::Gap, silence);
         Status::PENDING
     }
 
-    /// The silence, in microseconds, that the next request waits for.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn required_silence(&self) -> u32 {
-        if self.late {
-            self.settings.gap.max(self.settings.quiet_time)
-        } else {
-            self.settings.gap
-        }
-    }
-
-    /// Waits until the line has been silent for the gap, then sends. Bytes that arrive here
-    /// answer no request and are dropped. If the line is never silent, the wait ends after
-    /// the response timeout plus the gap.
+    /// Prepares the search for the reply to the request.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(super) fn wait_for_silence(&mut self) -> Status {
-        let index = if self.resynced {
-            S::Count::ZERO
-        } else {
-            self.end
-        };
-        let received = self.read_bytes(index);
-        if received < 0 {
-            return Status::LINK_LOST;
+    fn begin_search(&mut self) {
+        self.space = self.storage.capacity();
+        self.has_deviating = false;
+        self.end = S::Count::ZERO;
+        self.content = S::Count::ZERO;
+        self.length = self.request.reply_length();
+        self.seen = Outcome::NOTHING;
+        self.is_early = false;
+        self.is_held = false;
+        if !Q::HAS_FIXED_REPLY {
+            self.is_unsearched = false;
         }
-        if received > 0 {
-            self.search_unexpected(S::Count::of(received as usize));
-            return self.stalled();
+        self.is_on_probation = self.may_be_late();
+        self.begin_frame();
+    }
+
+    /// A right reply has arrived before the request was sent. It belongs to an earlier request,
+    /// so more late replies may come.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn note_unexpected(&mut self) {
+        self.exception = 0;
+        if self.unit != BROADCAST {
+            self.expect_late_reply();
         }
-        if !self.is_silent(self.required_silence()) {
-            return self.wait();
-        }
-        if !self.resynced {
-            // The received bytes have overwritten the request.
+        self.begin_search();
+        self.wait = self.required_silence();
+    }
+
+    /// Switches the driver on and begins to send.
+    #[inline(always)]
+    pub(super) fn transmit(&mut self) -> Status {
+        if self.outgoing == S::Count::ZERO {
             Q::write(self);
         }
-        self.storage.count(Counter::Requests, 1);
-        self.late = false;
+        self.tally(Status::PENDING);
+        self.is_late = false;
+        self.since = self.now;
         self.phase = Phase::Send;
-        self.phase_start = self.now;
         self.port.pre_transmission();
         self.send()
     }
 
     /// Writes the frame to the port, waits until the port has sent it, and keeps the driver on
-    /// for the post-flush hold. If the port accepts nothing, the wait ends after the response
-    /// timeout plus the silence that the request waited for.
+    /// for the post-flush hold.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn send(&mut self) -> Status {
         if self.phase == Phase::Send {
-            let left = self.end - self.processed;
-            let sent = self.port.write(self.storage.bytes(self.processed, left));
+            let left = self.outgoing - self.sent;
+            let sent = self.port.write(self.storage.bytes(self.sent, left));
             if sent < 0 {
                 return Status::LINK_LOST;
             }
             if sent == 0 {
                 return self.stalled();
             }
-            self.storage.count(Counter::BytesSent, sent as u16);
             let sent = S::Count::of(sent as usize);
-            self.processed += sent;
-            self.phase_start = self.now;
+            self.sent += sent;
+            self.since = self.now;
             if sent < left {
                 return Status::PENDING;
             }
@@ -121,31 +120,57 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             if !self.port.flush() {
                 return self.stalled();
             }
-            let hold_reply = self.settings.post_flush_hold;
-            if cfg!(feature = "hold") && hold_reply > 0 {
-                self.enter(
-                    Phase::PostFlush,
-                    characters(self.settings.any_character(), hold_reply),
-                );
+            let hold = self.settings.post_flush_hold;
+            if cfg!(feature = "hold") && hold > 0 {
+                let time = characters(self.settings.any_character(), hold);
+                self.enter(Phase::PostFlush, time);
                 return Status::PENDING;
             }
         }
         // The request has been sent: the driver goes off, and the wait for the reply begins.
-        let sent: u16 = self.end.into();
-        self.begin_reply();
+        self.begin_search();
+        if !(cfg!(feature = "echo") && self.settings.echo_discard) {
+            self.outgoing = S::Count::ZERO;
+        }
         self.port.post_transmission();
-        let (phase, mut time) = if self.unit == BROADCAST || !self.request.is_answered() {
-            (Phase::Turnaround, self.settings.turnaround_delay)
+        let is_broadcast = self.unit == BROADCAST && self.request.may_be_broadcast();
+        let phase = if is_broadcast || !self.request.is_answered() {
+            Phase::Turnaround
         } else {
-            (Phase::Reply, Q::response_timeout(self))
+            Phase::Reply
+        };
+        self.enter(phase, 0);
+        self.wait_for_reply();
+        Status::PENDING
+    }
+
+    /// The status of a request whose port does not go on.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn stalled(&mut self) -> Status {
+        // As long as the request waits for its reply, after as long as it waited for silence.
+        let time = self.wait.wrapping_add(Q::response_timeout(self));
+        if has_elapsed(time, self.now, self.since) {
+            Status::LINE_BUSY
+        } else {
+            Status::PENDING
+        }
+    }
+
+    /// Waits for the reply until the response timeout, or for the turnaround delay. A port that
+    /// does not know when the last bit has left may have bytes left to send.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    pub(super) fn wait_for_reply(&mut self) {
+        self.wait = if self.phase == Phase::Turnaround {
+            self.settings.turnaround_delay.get()
+        } else {
+            Q::response_timeout(self)
         };
         if !self.port.knows_when_sent() {
-            // The port may have bytes left to send.
+            let sent: u16 = self.sent.into();
             let [low, high] = sent.to_le_bytes();
-            time += characters(self.settings.character, low);
-            time += characters(self.settings.character, high) << 8;
+            let character = self.settings.character;
+            self.wait += characters(character, low) + (characters(character, high) << 8);
         }
-        self.enter(phase, time);
-        self.wait()
     }
 }

@@ -1,18 +1,7 @@
 //! What the engine needs to know about a request and its reply.
 
 use super::{Engine, Storage};
-use crate::frame::rtu;
-
-/// What a received frame is to the pending request.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Match {
-    /// The frame is the reply.
-    Reply,
-    /// The frame is the echo of the request.
-    Echo,
-    /// The frame is neither.
-    Unrelated,
-}
+use crate::port::Port;
 
 /// A request: how its frame is written, and how its reply is recognised. The functions with
 /// an `engine` argument take the engine that holds the request.
@@ -45,7 +34,7 @@ pub trait RequestSpec<P, S: Storage>: Sized {
     /// Microseconds that the reply may take, and that the request may wait for the line.
     #[inline(always)]
     fn response_timeout(engine: &mut Engine<P, S, Self>) -> u32 {
-        engine.settings.response_timeout
+        engine.settings.response_timeout.get()
     }
 
     /// True if a frame buffer of `space` bytes holds the frame of the request.
@@ -54,62 +43,36 @@ pub trait RequestSpec<P, S: Storage>: Sized {
     /// Writes the frame of the request into the frame buffer.
     fn write(engine: &mut Engine<P, S, Self>);
 
-    /// Length of the frame of a reply that is no exception; 0 if it is not known yet, or
-    /// greater than the frame buffer.
-    fn reply_length(&self, space: S::Count) -> S::Count;
+    /// Length of the RTU frame of a reply that is no exception; 0 if the request does not
+    /// determine it.
+    fn reply_length(&self) -> S::Count;
 
-    /// The length of the frame that begins with the `have` bytes at `front`. These are at least
-    /// the unit of the request and one more byte. While they do not determine the length, the
-    /// least possible length; 0 if no expected frame begins with them.
-    fn expected_length(
-        engine: &mut Engine<P, S, Self>,
-        front: S::Count,
-        have: S::Count,
-    ) -> S::Count;
+    /// True if the frame of `length` bytes at `front`, whose unit, function code and CRC are
+    /// right and which is no exception, answers the request.
+    fn is_reply(engine: &mut Engine<P, S, Self>, front: S::Count, length: S::Count) -> bool;
 
-    /// Compares the frame at `front`, whose CRC is right, with the request. Its unit and PDU
-    /// have `content` bytes. Stores the exception code.
-    fn validate(engine: &mut Engine<P, S, Self>, front: S::Count, content: S::Count) -> Match;
+    /// True if the frame at `front`, which is as long as the request and has its unit and
+    /// function code, begins as the request does.
+    fn is_echo(engine: &mut Engine<P, S, Self>, front: S::Count) -> bool;
 
-    /// Searches the received bytes for the reply, and moves it to the front of the buffer.
-    /// False if it has not arrived yet.
+    /// For a reply whose length the request does not determine: the length of the reply's frame
+    /// that ends with the last received byte, with a right CRC; 0 if there is none. `is_silent`
+    /// is true if the line has been silent since.
     #[inline(always)]
-    fn find_reply(engine: &mut Engine<P, S, Self>) -> bool {
-        engine.find_rtu_reply::<false>()
+    fn ending_reply(_engine: &mut Engine<P, S, Self>, _is_silent: bool) -> S::Count
+    where
+        P: Port,
+    {
+        0u8.into()
     }
 
-    /// As [`RequestSpec::find_reply`], once the line is silent: also searches after an incomplete
-    /// candidate.
+    /// Searches the `received` bytes that the port has written to the frame buffer from `first`
+    /// on. True if the request ends.
     #[inline(always)]
-    fn find_reply_in_silence(engine: &mut Engine<P, S, Self>) -> bool {
-        engine.resync(1u8.into())
-    }
-
-    /// Skips the byte at `front`, but keeps it if it may belong to a deviating reply (see
-    /// `lenient`). Returns the index of the next byte.
-    #[inline(always)]
-    fn skip_or_keep_byte(engine: &mut Engine<P, S, Self>, front: S::Count) -> S::Count {
-        engine.skip_byte(front);
-        front + 1u8.into()
-    }
-
-    /// Notes the frame at `front`, which does not answer the request, as a deviating reply.
-    #[inline(always)]
-    fn note_deviating(_engine: &mut Engine<P, S, Self>, _front: S::Count) {}
-
-    /// Drops the bytes that were kept.
-    #[inline(always)]
-    fn drop_kept(_engine: &mut Engine<P, S, Self>) {}
-
-    /// Accepts the deviating reply as the answer. False if there is none.
-    #[inline(always)]
-    fn accept_deviating(_engine: &mut Engine<P, S, Self>) -> bool {
-        false
-    }
-
-    /// How many bytes of unit and PDU a frame of `length` bytes on the wire carries.
-    #[inline(always)]
-    fn content(&self, length: S::Count) -> S::Count {
-        length - rtu::CRC.into()
+    fn search(engine: &mut Engine<P, S, Self>, first: S::Count, received: S::Count) -> bool
+    where
+        P: Port,
+    {
+        engine.search(first, received)
     }
 }

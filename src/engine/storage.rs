@@ -50,39 +50,34 @@ pub trait Count:
     /// No byte.
     const ZERO: Self;
 
-    /// The greatest number.
-    const MAX: Self;
-
     /// This number of bytes of a frame buffer.
     fn of(bytes: usize) -> Self;
 
-    /// The difference; 0 if `other` is greater.
-    fn saturating_sub(self, other: Self) -> Self;
+    /// The sum; the greatest number if the sum is greater.
+    fn saturating_add(self, other: Self) -> Self;
 }
 
 impl Count for u8 {
     const ZERO: Self = 0;
-    const MAX: Self = u8::MAX;
 
     fn of(bytes: usize) -> Self {
         bytes as u8
     }
 
-    fn saturating_sub(self, other: Self) -> Self {
-        self.saturating_sub(other)
+    fn saturating_add(self, other: Self) -> Self {
+        self.saturating_add(other)
     }
 }
 
 impl Count for u16 {
     const ZERO: Self = 0;
-    const MAX: Self = u16::MAX;
 
     fn of(bytes: usize) -> Self {
         bytes as u16
     }
 
-    fn saturating_sub(self, other: Self) -> Self {
-        self.saturating_sub(other)
+    fn saturating_add(self, other: Self) -> Self {
+        self.saturating_add(other)
     }
 }
 
@@ -94,7 +89,7 @@ pub trait Storage {
     /// The type of lengths and indexes.
     type Count: Count;
 
-    /// Bytes of the frame buffer, without those that are set aside.
+    /// Bytes of the frame buffer.
     fn capacity(&self) -> Self::Count;
 
     /// A byte of the frame buffer.
@@ -114,14 +109,8 @@ pub trait Storage {
         move_to_front(self.bytes(Self::Count::ZERO, from + count), from.into());
     }
 
-    /// Sets the first `count` bytes aside. The frame buffer then begins after them.
-    fn set_aside(&mut self, count: Self::Count);
-
-    /// Puts the `count` bytes that were set aside back at the front of the frame buffer.
-    fn take_back(&mut self, count: Self::Count);
-
     /// Adds `more` to a counter, if there is memory for counters.
-    fn count(&mut self, _counter: Counter, _more: u16) {}
+    fn count(&mut self, _counter: Counter, _more: u32) {}
 }
 
 /// The memory of a master: transmit and response words beside the frame buffer. The engine
@@ -154,14 +143,12 @@ pub trait Words: Storage<Count = u8> {
 #[derive(Clone, Hash, Debug, Default)]
 pub struct Frame<F> {
     bytes: F,
-    /// How many bytes at the front are set aside.
-    aside: u16,
 }
 
 impl<F> Frame<F> {
     /// A frame buffer.
     pub const fn new(bytes: F) -> Self {
-        Frame { bytes, aside: 0 }
+        Frame { bytes }
     }
 }
 
@@ -169,8 +156,7 @@ impl<F: AsRef<[u8]> + AsMut<[u8]>> Storage for Frame<F> {
     type Count = u16;
 
     fn capacity(&self) -> u16 {
-        let space = self.bytes.as_ref().len().min(u16::MAX.into()) as u16;
-        space.saturating_sub(self.aside)
+        self.bytes.as_ref().len().min(u16::MAX.into()) as u16
     }
 
     fn byte(&self, index: u16) -> u8 {
@@ -182,26 +168,16 @@ impl<F: AsRef<[u8]> + AsMut<[u8]>> Storage for Frame<F> {
     }
 
     fn slice(&self, index: u16, count: u16) -> &[u8] {
-        let first = usize::from(self.aside) + usize::from(index);
+        let first = usize::from(index);
         let bytes = self.bytes.as_ref().get(first..first + usize::from(count));
         bytes.unwrap_or_default()
     }
 
     fn bytes(&mut self, index: u16, count: u16) -> &mut [u8] {
-        let first = usize::from(self.aside) + usize::from(index);
-        let bytes = self
-            .bytes
-            .as_mut()
-            .get_mut(first..first + usize::from(count));
+        let first = usize::from(index);
+        let last = first + usize::from(count);
+        let bytes = self.bytes.as_mut().get_mut(first..last);
         bytes.unwrap_or_default()
-    }
-
-    fn set_aside(&mut self, count: u16) {
-        self.aside += count;
-    }
-
-    fn take_back(&mut self, count: u16) {
-        self.aside -= count;
     }
 }
 
@@ -240,8 +216,7 @@ where
     type Count = u8;
 
     fn capacity(&self) -> u8 {
-        // Bytes that are set aside count for the limit of 255 too.
-        count(self.frame.bytes.as_ref().len()).saturating_sub(self.frame.aside as u8)
+        count(self.frame.bytes.as_ref().len())
     }
 
     fn byte(&self, index: u8) -> u8 {
@@ -260,17 +235,9 @@ where
         self.frame.bytes(index.into(), count.into())
     }
 
-    fn set_aside(&mut self, count: u8) {
-        self.frame.set_aside(count.into());
-    }
-
-    fn take_back(&mut self, count: u8) {
-        self.frame.take_back(count.into());
-    }
-
-    fn count(&mut self, counter: Counter, more: u16) {
+    fn count(&mut self, counter: Counter, more: u32) {
         if let Some(count) = self.counters.get_mut(counter as usize) {
-            *count = count.wrapping_add(more.into());
+            *count = count.wrapping_add(more);
         }
     }
 }

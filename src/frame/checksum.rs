@@ -164,41 +164,6 @@ impl Crc16 {
         }
     }
 
-    /// The weight that [`Crc16::since_start`] needs for a frame of `bytes` bytes.
-    #[cfg_attr(target_os = "none", inline(never))]
-    #[must_use]
-    pub fn weight(bytes: u16) -> Crc16 {
-        let first = Crc16(0x8000);
-        (0..bytes * 8).fold(first, |weight, _| weight.shifted())
-    }
-
-    /// The CRC of a run of bytes that ends with a frame whose CRC is right. `self` is the CRC of
-    /// the bytes before that frame, `weight` the weight of the frame's length. (The CRC is
-    /// linear: the bytes before the frame add a difference, multiplied by the weight.)
-    #[cfg_attr(target_os = "none", inline(never))]
-    #[must_use]
-    pub fn since_start(self, mut weight: Crc16) -> Crc16 {
-        let mut difference = self.0 ^ Crc16::START.0;
-        let mut product = 0;
-        while difference != 0 {
-            if difference & 0x8000 != 0 {
-                product ^= weight.0;
-            }
-            difference <<= 1;
-            weight = weight.shifted();
-        }
-        Crc16(product)
-    }
-
-    /// The CRC after one more bit, which is 0.
-    const fn shifted(self) -> Crc16 {
-        Crc16(if self.0 & 1 != 0 {
-            self.0 >> 1 ^ 0xA001
-        } else {
-            self.0 >> 1
-        })
-    }
-
     /// The two bytes of the CRC as they are sent, low byte first.
     pub const fn to_bytes(self) -> [u8; 2] {
         self.0.to_le_bytes()
@@ -213,16 +178,6 @@ impl Crc16 {
 /// The CRC-16 of `bytes`.
 pub fn crc16(bytes: &[u8]) -> Crc16 {
     Crc16::START.with(bytes)
-}
-
-/// The CRC-16 of six bytes: unit, function code and two words. It is fast, but needs a table, so
-/// firmware uses [`crc16`] instead.
-#[inline]
-pub fn crc16_of_six(bytes: [u8; 6]) -> Crc16 {
-    let [last, [next, first, ..], ..] = &TABLES;
-    let [a, b, rest @ ..] = bytes;
-    let [low, high] = Crc16::START.to_bytes();
-    Crc16(lookup(first, a ^ low) ^ lookup(next, b ^ high) ^ lookup_four(last, rest))
 }
 
 /// The LRC of `bytes`: the sum of `bytes` and the LRC is 0 modulo 256.
@@ -275,25 +230,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn crc_of_six_bytes_equals_the_crc_of_any_bytes(bytes: [u8; 6]) {
-            prop_assert_eq!(crc16_of_six(bytes), crc16(&bytes));
-        }
-
-        #[test]
         fn before_undoes_one_byte(crc: u16, byte: u8) {
             let after = Crc16(crc).with(&[byte]);
             prop_assert_eq!(after.before(byte), Crc16(crc));
             prop_assert_eq!(undo_by_bits(after.0, byte), crc);
             prop_assert_eq!(undo_by_parity(after.0, byte), crc);
-        }
-
-        #[test]
-        fn since_start_predicts_the_crc_after_a_frame(noise: std::vec::Vec<u8>, frame: std::vec::Vec<u8>) {
-            let frame = frame.get(..250).unwrap_or(&frame);
-            let before = crc16(&noise);
-            let after = before.with(frame).with(&crc16(frame).to_bytes());
-            let weight = Crc16::weight(frame.len() as u16 + 2);
-            prop_assert_eq!(after, before.since_start(weight));
         }
 
         #[test]

@@ -1,7 +1,7 @@
 //! RTU frames: unit, PDU and CRC-16. Silence separates the frames (serial line guide V1.02,
 //! 2.5.1).
 
-use super::checksum::{crc16, crc16_of_six, Crc16};
+use super::checksum::{crc16, Crc16};
 use super::Adu;
 use crate::error::Status;
 
@@ -37,13 +37,6 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
         [*low, *high] = crc16(content).to_bytes();
     }
     true
-}
-
-/// The frame of a PDU of a function code and two words. It is fast, and is meant for hosts.
-#[inline]
-pub fn short(unit: u8, function: u8, [a, b, c, d]: [u8; 4]) -> [u8; 8] {
-    let [low, high] = crc16_of_six([unit, function, a, b, c, d]).to_bytes();
-    [unit, function, a, b, c, d, low, high]
 }
 
 /// Parses the frame that fills `bytes`.
@@ -127,18 +120,4 @@ pub fn emit(
     }
     write(buffer, unit, length, |_| ());
     Ok(length + OVERHEAD)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn short_equals_write_for_a_function_code_and_two_words() {
-        let mut frame = [0; 8];
-        assert!(write(&mut frame, 0x11, 5, |pdu| pdu
-            .copy_from_slice(&[3, 0, 0x6B, 0, 3])));
-        assert_eq!(short(0x11, 3, [0, 0x6B, 0, 3]), frame);
-        assert_eq!(frame, [0x11, 3, 0, 0x6B, 0, 3, 0x76, 0x87]);
-    }
 }

@@ -11,14 +11,14 @@ pub const LOCAL: u8 = 0xFE;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Route {
     /// The first unit id on TCP.
-    pub first: u8,
-    /// The last unit id on TCP.
-    pub last: u8,
+    pub first: u16,
+    /// The last unit id on TCP, at most 255.
+    pub last: u16,
     /// The index of the line, [`ALL_LINES`] or [`LOCAL`].
     pub line: u8,
     /// The unit on the line that has the id `first` on TCP; the units after it follow. 0: the
     /// ids on the line are those on TCP.
-    pub unit: u8,
+    pub unit: u16,
 }
 
 /// Where a request goes.
@@ -34,23 +34,25 @@ impl Route {
     /// True if the range is not empty, leads to one of `lines` lines, and all unit ids there
     /// exist. Only a broadcast may go to all lines.
     pub fn is_valid(&self, lines: u8) -> bool {
-        let Some(more) = self.last.checked_sub(self.first) else {
+        const LAST: u16 = u8::MAX as u16;
+        if self.last > LAST || self.first > self.last {
             return false;
-        };
+        }
+        let exist = self.unit <= LAST - (self.last - self.first);
         match self.line {
             ALL_LINES => self.last == 0 && self.unit == 0,
-            LOCAL => self.unit.checked_add(more).is_some(),
-            line => line < lines && self.unit.checked_add(more).is_some(),
+            LOCAL => exist,
+            line => line < lines && exist,
         }
     }
 
     /// The first of the routes that has the unit id `unit` on TCP.
     pub fn find(routes: &[Route], unit: u8) -> Option<Destination> {
-        let covers = |route: &&Route| (route.first..=route.last).contains(&unit);
+        let covers = |route: &&Route| (route.first..=route.last).contains(&unit.into());
         let route = routes.iter().find(covers)?;
         let unit = match route.unit {
             0 => unit,
-            first => first.wrapping_add(unit.wrapping_sub(route.first)),
+            first => (first as u8).wrapping_add(unit.wrapping_sub(route.first as u8)),
         };
         Some(Destination {
             line: route.line,
@@ -63,7 +65,7 @@ impl Route {
 mod tests {
     use super::*;
 
-    const fn route(first: u8, last: u8, line: u8, unit: u8) -> Route {
+    const fn route(first: u16, last: u16, line: u8, unit: u16) -> Route {
         Route {
             first,
             last,
@@ -101,5 +103,9 @@ mod tests {
         assert!(!route(0, 1, ALL_LINES, 0).is_valid(1));
         assert!(!route(0, 0, ALL_LINES, 5).is_valid(1));
         assert!(route(1, 1, LOCAL, 0).is_valid(0));
+        assert!(!route(300, 300, 0, 0).is_valid(1));
+        assert!(!route(1, 256, 0, 0).is_valid(1));
+        assert!(!route(1, 1, 0, 256).is_valid(1));
+        assert!(!route(1, 1, LOCAL, 300).is_valid(1));
     }
 }

@@ -3,7 +3,6 @@
 //! The client uses a [`FunctionSpec`] as it is. The compiler converts it for the master, see
 //! [`MasterSpec`](super::master_request::MasterSpec).
 
-use super::limits::{MAX_READ_BITS, MAX_READ_REGISTERS, MAX_WRITE_BITS, MAX_WRITE_REGISTERS};
 use super::{bits, diagnostics, files, identification, registers};
 
 /// How the request and the response of a function are composed: flags and small numbers.
@@ -113,19 +112,6 @@ impl FunctionSpec {
     /// The function code.
     pub(super) const fn function(self) -> u8 {
         self.0 as u8
-    }
-
-    /// The greatest quantity of bits or registers that the standard allows; 0 if the request
-    /// has no quantity.
-    #[inline(always)]
-    pub(super) const fn greatest_quantity(self) -> u16 {
-        match (self.has(READ), self.has(BITS)) {
-            _ if !self.has(RANGE) => 0,
-            (true, true) => MAX_READ_BITS,
-            (true, false) => MAX_READ_REGISTERS,
-            (false, true) => MAX_WRITE_BITS,
-            (false, false) => MAX_WRITE_REGISTERS,
-        }
     }
 
     pub(super) const fn number(self, at: u32) -> u8 {

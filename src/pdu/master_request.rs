@@ -2,45 +2,55 @@
 
 use super::fields::check_range;
 use super::function_spec::*;
-use super::limits::MAX_READ_WRITE_REGISTERS;
+use super::limits::{
+    MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
+    MAX_WRITE_REGISTERS,
+};
 use crate::error::Status;
 
 /// Function code, and at most four words of address and quantity.
 const HEAD: usize = 9;
 
-/// The part of a [`FunctionSpec`] that the master needs. The compiler converts each constant.
-/// Converted at run time, they would enlarge [`MasterRequest::set`] by at least 22 bytes on an
-/// AVR and 16 on a Cortex-M0+.
+/// The part of a [`FunctionSpec`] that the master needs: the function code and three flags in one
+/// byte. The compiler converts each constant, which takes less flash than at run time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-// One number, because a call passes it in registers. A microcontroller would copy a constant
-// of several fields to RAM first.
-pub struct MasterSpec(u32);
+pub struct MasterSpec(u8);
 
 impl MasterSpec {
-    /// The response carries data after a byte count. Without this flag it repeats the head.
-    const READS: u8 = 1;
-    /// A byte count and data follow the head.
-    const SENDS: u8 = 2;
-    /// The data are registers, not bits.
-    const REGISTERS: u8 = 4;
+    const FUNCTION: u8 = 0x1F;
+    /// The second word is a quantity.
+    const COUNTED: u8 = 0x20;
+    /// The response repeats the head. Without this flag it carries data after a byte count.
+    const WRITES: u8 = 0x40;
+    /// The data are bits, not registers.
+    const BITS: u8 = 0x80;
 
     /// Converts `spec`, which must be that of one of the master's functions.
     #[inline(always)]
     pub const fn new(spec: FunctionSpec) -> MasterSpec {
-        let mut flags = 0;
-        if spec.has(READ) {
-            flags |= MasterSpec::READS;
+        let mut code = spec.function();
+        if spec.has(RANGE) {
+            code |= MasterSpec::COUNTED;
         }
-        if spec.has(COUNTED) {
-            flags |= MasterSpec::SENDS;
+        if !spec.has(READ) {
+            code |= MasterSpec::WRITES;
         }
-        if spec.has(RANGE) && !spec.has(BITS) {
-            flags |= MasterSpec::REGISTERS;
+        if spec.has(BITS) {
+            code |= MasterSpec::BITS;
         }
-        let [low, high] = spec.greatest_quantity().to_le_bytes();
-        MasterSpec(u32::from_le_bytes([spec.function(), flags, low, high]))
+        MasterSpec(code)
+    }
+
+    const fn has(self, flag: u8) -> bool {
+        self.0 & flag != 0
     }
 }
+
+// A byte count limits the quantity of bits as it limits that of registers.
+const _: () = {
+    assert!(MAX_READ_BITS == MAX_READ_REGISTERS * 16);
+    assert!(MAX_WRITE_BITS == MAX_WRITE_REGISTERS * 16);
+};
 
 /// A request, which the master keeps until the response has arrived: the head, and the
 /// number of bytes of the transmit words that follow it.
@@ -49,16 +59,14 @@ impl MasterSpec {
 #[repr(C)]
 pub struct MasterRequest {
     head_length: u8,
-    /// Length of the response PDU if the request succeeds.
-    response_length: u8,
     /// Bytes of data that follow the head and their byte count; 0: neither follows.
     sends: u8,
     /// Bytes of data in the response; 0: it repeats the head.
     reads: u8,
-    /// A mask of the bits that are used in the last byte of data.
-    mask: u8,
-    /// The data are registers, which travel high byte first.
-    registers: bool,
+    /// Bits that are used in the last byte of data; 0: all.
+    last_bits: u8,
+    /// The data are bits, of which the low byte of 16 travels first.
+    has_bits: bool,
     head: [u8; HEAD],
 }
 
@@ -66,11 +74,10 @@ impl MasterRequest {
     /// No request.
     pub const NONE: MasterRequest = MasterRequest {
         head_length: 0,
-        response_length: 0,
         sends: 0,
         reads: 0,
-        mask: 0,
-        registers: false,
+        last_bits: 0,
+        has_bits: false,
         head: [0; HEAD],
     };
 
@@ -94,33 +101,41 @@ impl MasterRequest {
     /// otherwise [`Status::OK`].
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn set(&mut self, spec: MasterSpec, address: u16, word: u16) -> Status {
-        let [function, flags, low, high] = spec.0.to_le_bytes();
         let ([a, b], [c, d]) = (address.to_be_bytes(), word.to_be_bytes());
         let [at_0, at_1, at_2, at_3, at_4, ..] = &mut self.head;
-        (*at_0, *at_1, *at_2, *at_3, *at_4) = (function, a, b, c, d);
+        *at_0 = spec.0 & MasterSpec::FUNCTION;
+        (*at_1, *at_2, *at_3, *at_4) = (a, b, c, d);
         self.head_length = 5;
-        self.response_length = 5;
-        self.registers = flags & MasterSpec::REGISTERS != 0;
-        self.mask = 0xFF;
         // A greater quantity is refused below, so the lost high bits do no harm.
+        let mut words = word;
         let mut bytes = (word << 1) as u8;
-        if !self.registers {
+        self.has_bits = spec.has(MasterSpec::BITS);
+        self.last_bits = 0;
+        if self.has_bits {
+            words = (word >> 4) + u16::from(word & 15 != 0);
             bytes = (word.wrapping_add(7) >> 3) as u8;
-            self.mask >>= word.wrapping_neg() & 7;
+            self.last_bits = d & 7;
         }
-        self.sends = bytes;
-        self.reads = 0;
-        if flags & MasterSpec::READS != 0 {
-            self.reads = bytes;
-            self.response_length = bytes.wrapping_add(2);
+        self.sends = 0;
+        self.reads = bytes;
+        let mut most = MAX_READ_REGISTERS;
+        if spec.has(MasterSpec::WRITES) {
+            self.reads = 0;
+            most = MAX_WRITE_REGISTERS;
         }
-        if flags & MasterSpec::SENDS == 0 {
-            self.sends = 0;
+        if !spec.has(MasterSpec::COUNTED) {
+            return Status::OK;
         }
-        match u16::from_le_bytes([low, high]) {
-            0 => Status::OK,
-            most => check_range(address, word, most),
+        if spec.has(MasterSpec::WRITES) {
+            self.sends = bytes;
         }
+        if words == 0 || words > most {
+            return Status::ILLEGAL_DATA_VALUE;
+        }
+        if address.checked_add(word - 1).is_none() {
+            return Status::ILLEGAL_DATA_ADDRESS;
+        }
+        Status::OK
     }
 
     /// 16 (hex): the register becomes `(register & and_mask) | (or_mask & !and_mask)`.
@@ -144,25 +159,28 @@ impl MasterRequest {
     ) -> Status {
         let spec = MasterSpec::new(FunctionSpec::READ_WRITE_REGISTERS);
         let readable = self.set(spec, read_address, read_quantity);
-        self.append_word(write_address);
-        self.append_word(write_quantity);
-        self.sends = (write_quantity << 1) as u8;
-        match check_range(write_address, write_quantity, MAX_READ_WRITE_REGISTERS) {
+        let writable = self.append_write(write_address, write_quantity);
+        match writable {
             Status::OK => readable,
             refused => refused,
         }
     }
 
+    /// Appends what is written, to a request that reads: address and quantity.
+    pub fn append_write(&mut self, address: u16, quantity: u16) -> Status {
+        self.append_word(address);
+        self.append_word(quantity);
+        self.sends = (quantity << 1) as u8;
+        check_range(address, quantity, MAX_READ_WRITE_REGISTERS)
+    }
+
     /// Appends a word to the head.
-    fn append_word(&mut self, word: u16) {
+    pub fn append_word(&mut self, word: u16) {
         let at = usize::from(self.head_length);
         if let Some(place) = self.head.get_mut(at..at + 2) {
             place.copy_from_slice(&word.to_be_bytes());
         }
         self.head_length += 2;
-        if self.reads == 0 {
-            self.response_length = self.head_length;
-        }
     }
 
     /// The function code.
@@ -175,6 +193,12 @@ impl MasterRequest {
         &self.head
     }
 
+    /// The byte of the head at `index`.
+    #[inline(always)]
+    pub fn head_at(&self, index: u8) -> u8 {
+        self.head.get(usize::from(index)).copied().unwrap_or(0)
+    }
+
     /// Bytes of the head. The response to a write repeats them.
     pub const fn head_length(&self) -> u8 {
         self.head_length
@@ -183,12 +207,16 @@ impl MasterRequest {
     /// True if the data are registers, which travel high byte first; false if they
     /// are bits, of which the low byte of 16 travels first.
     pub const fn has_registers(&self) -> bool {
-        self.registers
+        !self.has_bits
     }
 
     /// Length of the response PDU if the request succeeds.
     pub const fn response_length(&self) -> u8 {
-        self.response_length
+        if self.reads > 0 {
+            self.reads + 2
+        } else {
+            self.head_length
+        }
     }
 
     /// True if the response carries data behind a byte count, false if it
@@ -205,7 +233,7 @@ impl MasterRequest {
     /// Sets the bytes of data in the response to `bytes`. All bits of them are used.
     pub fn set_reads(&mut self, bytes: u8) {
         self.reads = bytes;
-        self.mask = 0xFF;
+        self.last_bits = 0;
     }
 
     /// Bytes of the caller's words that are sent.
@@ -215,13 +243,10 @@ impl MasterRequest {
 
     /// A mask of the bits that are used in the last byte of data.
     pub const fn mask(&self) -> u8 {
-        self.mask
-    }
-
-    /// The two words of a request that consists of a function code and two words.
-    pub fn two_words(&self) -> Option<[u8; 4]> {
-        let [_, a, b, c, d, ..] = self.head;
-        (self.head_length == 5 && self.sends == 0).then_some([a, b, c, d])
+        match self.last_bits {
+            0 => 0xFF,
+            bits => (1 << bits) - 1,
+        }
     }
 
     /// Length of the PDU.

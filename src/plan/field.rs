@@ -40,7 +40,7 @@ pub const LONGEST_INTERVAL_MS: u32 = 86_400_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// The unit, 1 to 255.
-    pub unit: u8,
+    pub unit: u16,
     /// [`COILS`] to [`INPUT_REGISTERS`].
     pub table: u8,
     /// [`BIT`] to [`TEXT`].
@@ -109,7 +109,7 @@ impl Field {
     /// There are more than 65535 places between two tables.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) const fn place(&self) -> u32 {
-        place(self.unit, self.table, self.address)
+        place(self.unit as u8, self.table, self.address)
     }
 
     /// The address after the last bit or register, up to 65536.

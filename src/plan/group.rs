@@ -174,7 +174,7 @@ impl<'a, L: ReadLimits> Table<'a, L> {
             read.address = first.address;
             read.quantity = end.wrapping_sub(first.place()) as u16;
             read.offset = offset;
-            read.unit = first.unit;
+            read.unit = first.unit as u8;
             read.table = first.table;
             read.status.set(Status::PENDING.code());
             read.doublings.set(0);

@@ -11,9 +11,9 @@ pub struct UnitLimits {
     /// Bits, up to 2000.
     pub bits: u16,
     /// Registers, up to 125.
-    pub registers: u8,
-    /// The unit.
-    pub unit: u8,
+    pub registers: u16,
+    /// The unit. No unit has one above 255.
+    pub unit: u16,
 }
 
 /// Addresses that no read may touch.
@@ -24,8 +24,8 @@ pub struct ExcludedRange {
     pub first: u16,
     /// The last address.
     pub last: u16,
-    /// The unit; 0 for every unit.
-    pub unit: u8,
+    /// The unit; 0 for every unit. No unit has one above 255.
+    pub unit: u16,
     /// The table, as in a field.
     pub table: u8,
 }
@@ -35,19 +35,19 @@ pub trait ReadLimits {
     /// The most bits that one read requests; 0 or more than 2000 mean 2000.
     fn bits(&self) -> u16;
     /// The most registers that one read requests; 0 or more than 125 mean 125.
-    fn registers(&self) -> u8;
+    fn registers(&self) -> u16;
     /// The most bits between two fields that one read may cover in passing.
     fn bit_gap(&self) -> u16;
     /// The most registers between two fields that one read may cover in passing.
-    fn register_gap(&self) -> u8;
+    fn register_gap(&self) -> u16;
     /// Units with other limits.
     fn units(&self) -> &[UnitLimits];
     /// Addresses that no read may touch.
     fn excluded(&self) -> &[ExcludedRange];
 
     /// Checks a field by itself: [`Status::OK`]; [`Status::INVALID_ARGUMENT`] for an unknown
-    /// table, type or order, a type that the table does not have, an interval out of range, a
-    /// negative divisor, or a scale of a text;
+    /// table, type or order, a type that the table does not have, a unit above 255, an interval
+    /// out of range, a negative divisor, or a scale of a text;
     /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
     /// field goes beyond address 65535 or into an excluded range;
     /// [`Status::ILLEGAL_DATA_VALUE`] if one read cannot hold it.
@@ -57,6 +57,7 @@ pub trait ReadLimits {
             && field.value_type.wrapping_sub(1) < TEXT
             && field.is_in_bits() == (field.value_type == BIT)
             && field.order <= 4
+            && field.unit <= u8::MAX.into()
             && field.divisor >= 0
             && (field.value_type != TEXT || field.multiplier | field.divisor == 0)
             && field.interval_ms.wrapping_sub(1) < LONGEST_INTERVAL_MS;
@@ -80,8 +81,8 @@ pub trait ReadLimits {
         let (most, all, own): (u16, u16, u16) = if field.is_in_bits() {
             (MAX_READ_BITS, self.bits(), own.map_or(0, |own| own.bits))
         } else {
-            let own = own.map_or(0, |own| own.registers.into());
-            (MAX_READ_REGISTERS, self.registers().into(), own)
+            let own = own.map_or(0, |own| own.registers);
+            (MAX_READ_REGISTERS, self.registers(), own)
         };
         let limit = if own > 0 { own } else { all };
         (limit.wrapping_sub(1).min(most - 1) + 1).into()
@@ -101,10 +102,9 @@ pub trait ReadLimits {
     #[cfg_attr(target_os = "none", inline(never))]
     fn excludes(&self, first: u32, end: u32) -> bool {
         self.excluded().iter().any(|range| {
-            let unit = if range.unit == 0 {
-                (first >> 20) as u8
-            } else {
-                range.unit
+            let unit = match range.unit {
+                0 => (first >> 20) as u8,
+                unit => unit as u8,
             };
             place(unit, range.table, range.first) < end
                 && place(unit, range.table, range.last) >= first
@@ -118,11 +118,11 @@ pub struct Limits<'a> {
     /// See [`ReadLimits::bits`].
     pub bits: u16,
     /// See [`ReadLimits::registers`].
-    pub registers: u8,
+    pub registers: u16,
     /// See [`ReadLimits::bit_gap`].
     pub bit_gap: u16,
     /// See [`ReadLimits::register_gap`].
-    pub register_gap: u8,
+    pub register_gap: u16,
     /// See [`ReadLimits::units`].
     pub units: &'a [UnitLimits],
     /// See [`ReadLimits::excluded`].
@@ -134,7 +134,7 @@ impl ReadLimits for Limits<'_> {
         self.bits
     }
 
-    fn registers(&self) -> u8 {
+    fn registers(&self) -> u16 {
         self.registers
     }
 
@@ -142,7 +142,7 @@ impl ReadLimits for Limits<'_> {
         self.bit_gap
     }
 
-    fn register_gap(&self) -> u8 {
+    fn register_gap(&self) -> u16 {
         self.register_gap
     }
 

@@ -107,8 +107,8 @@ impl RequestInfo {
 
     /// True if a frame that is no broadcast addresses a unit with this id.
     #[inline]
-    pub const fn is_for(&self, id: u8) -> bool {
-        self.to == id || id == ANY || self.is_for_any()
+    pub const fn is_for(&self, id: u16) -> bool {
+        self.to as u16 == id || id == ANY as u16 || self.is_for_any()
     }
 
     /// True if a frame that is no broadcast addresses the server itself. In a stream the ids 0

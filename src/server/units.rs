@@ -152,7 +152,7 @@ impl<'u, 'a: 'u, U: Iterator<Item = &'u mut Unit<'a>>> Dispatch for Slice<'_, U>
     }
 
     fn is_for(&self, unit: &Self::Unit) -> bool {
-        self.info.is_for(unit.id)
+        self.info.is_for(unit.id.into())
     }
 
     fn offer(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply> {

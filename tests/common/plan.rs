@@ -49,7 +49,7 @@ fn check_positions(fields: &[Field], positions: &[Position], reads: &[Read]) {
                 "field {own} twice"
             );
             assert_eq!(positions[own].read(), index);
-            assert_eq!((read.unit, read.table), (field.unit, field.table));
+            assert_eq!((read.unit, read.table), (field.unit as u8, field.table));
             assert_eq!(read.interval_ms, field.interval_ms);
             assert!(read.address <= field.address);
             let end = u32::from(read.address) + u32::from(read.quantity);

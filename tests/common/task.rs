@@ -63,17 +63,8 @@ impl Storage for Lent {
         self.frame.bytes(index, count)
     }
 
-    fn set_aside(&mut self, count: u16) {
-        self.within(0, count);
-        self.frame.set_aside(count);
-    }
-
-    fn take_back(&mut self, count: u16) {
-        self.frame.take_back(count);
-    }
-
-    fn count(&mut self, counter: Counter, more: u16) {
-        self.counters.borrow_mut()[counter as usize] += u32::from(more);
+    fn count(&mut self, counter: Counter, more: u32) {
+        self.counters.borrow_mut()[counter as usize] += more;
     }
 }
 
@@ -108,7 +99,7 @@ impl Task {
         build: impl FnOnce(&mut RequestHeader) -> Status,
     ) -> Task {
         let mut state = RequestState::NONE;
-        state.unit = unit;
+        state.unit = unit.into();
         state.transaction = transaction;
         state.capacity = 252;
         assert_eq!(build(&mut state.header), Status::OK);

@@ -40,7 +40,6 @@ unsafe fn begin(
                 let object = pointers::object(pointer);
                 (*object).kind = kind;
                 (*object).queue.connected = true;
-                kind.settings(object).set_default_if_zero();
                 (*kind.port(object)).copy(port);
                 let storage = kind.storage(object);
                 storage.frame = frame;

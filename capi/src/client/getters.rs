@@ -27,7 +27,11 @@ unsafe fn get<T: Default>(client: *const mbm_client, getter: impl FnOnce(&Settin
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getResponseTimeout(client: *const mbm_client) -> u32 {
     // SAFETY: as the header demands.
-    unsafe { get(client, |settings| to_millis(settings.response_timeout)) }
+    unsafe {
+        get(client, |settings| {
+            to_millis(settings.response_timeout.get())
+        })
+    }
 }
 
 /// Returns the silence before a request on an RTU line that is in effect: what
@@ -38,7 +42,7 @@ pub unsafe extern "C" fn mbm_client_getResponseTimeout(client: *const mbm_client
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getGap(client: *const mbm_client) -> u32 {
     // SAFETY: as the header demands.
-    unsafe { get(client, |settings| settings.gap) }
+    unsafe { get(client, |settings| settings.gap.get()) }
 }
 
 /// Returns the turnaround delay: see mbm_client_setTurnaroundDelay.
@@ -50,7 +54,7 @@ pub unsafe extern "C" fn mbm_client_getTurnaroundDelay(client: *const mbm_client
     // SAFETY: as the header demands.
     unsafe {
         get(client, |settings| {
-            to_millis(settings.turnaround_delay) as u16
+            to_millis(settings.turnaround_delay.get()) as u16
         })
     }
 }
@@ -62,7 +66,11 @@ pub unsafe extern "C" fn mbm_client_getTurnaroundDelay(client: *const mbm_client
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getQuietTime(client: *const mbm_client) -> u16 {
     // SAFETY: as the header demands.
-    unsafe { get(client, |settings| to_millis(settings.quiet_time) as u16) }
+    unsafe {
+        get(client, |settings| {
+            to_millis(settings.quiet_time.get()) as u16
+        })
+    }
 }
 
 /// Returns how often a request is repeated: see mbm_client_setRetries.

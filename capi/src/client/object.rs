@@ -30,9 +30,9 @@ pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 #[repr(C)]
 pub struct mbm_client {
     /// Private.
-    pointers: [*mut c_void; 47],
+    pointers: [*mut c_void; 49],
     /// Private.
-    words: [u32; 27],
+    words: [u32; 28],
 }
 
 /// The fields in the storage of an `mbm_client`.

@@ -67,7 +67,7 @@ fn again_after_failure(
     status: Status,
 ) -> Option<u32> {
     let limit = match storage.unit_records {
-        Some(unit_records) => (unit_records.retry_limit)(storage, state.unit),
+        Some(unit_records) => (unit_records.retry_limit)(storage, state.unit()),
         None => 0,
     };
     again(policy, state, limit, status, || storage.random())

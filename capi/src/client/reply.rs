@@ -35,7 +35,7 @@ fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Status> 
     };
     let pdu = pdu.get(..length).unwrap_or_default();
     let mut packet = mbm_packet::of(MBM_PACKET_RESPONSE, pdu);
-    packet.unit = state.unit;
+    packet.unit = state.unit().into();
     packet.transaction = state.wire();
     // The client has checked the length of a user's function by the rule of the request.
     let own = Function {

@@ -35,18 +35,19 @@ pub struct mbm_clientRequest {
     /// on the wire: mbm_client_wireTransaction returns that.
     pub transaction: u16,
     /// The unit identifier of the device. On a serial line 1 to 247; 0 is broadcast; the
-    /// client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255.
-    pub unit: u8,
+    /// client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255. A client
+    /// refuses a greater number (MBM_INVALID_ARGUMENT).
+    pub unit: u16,
     /// MBM_PENDING from the call that queues the request until it ends; then its result.
     pub status: u8,
     /// The exception code of the response as received; 0 if the response was no exception.
     pub exception: u8,
+    /// The response timeout of this request in milliseconds, 1 to 1000000 (16 minutes); 0: that
+    /// of the unit (mbm_clientUnit) or of the client (mbm_client_setResponseTimeout). A client
+    /// refuses a greater number (MBM_INVALID_ARGUMENT).
+    pub timeoutMs: u32,
     /// The number of bytes received into `reply`.
     pub length: u8,
-    /// The response timeout of this request in milliseconds, 1 to 65535; 0: that of the unit
-    /// (mbm_clientUnit) or of the client (mbm_client_setResponseTimeout). The client reads it
-    /// each time it sends the request.
-    pub timeoutMs: u16,
     /// How often the client repeats this request at most, 1 to 254; MBM_NO_RETRIES: never; 0:
     /// as often as the unit or mbm_client_setRetries says. With 1 to 254, a client refuses the
     /// request (MBM_INVALID_ARGUMENT) if none of mbm_client_setRetries,
@@ -54,7 +55,7 @@ pub struct mbm_clientRequest {
     /// code for repetitions.
     pub retryLimit: u8,
     /// Private.
-    bytes: [u8; 5],
+    bytes: [u8; 6],
     /// Private.
     words: [u32; 7],
 }

@@ -1,12 +1,14 @@
 //! The settings of a client.
 
 use super::object::{mbm_client, queue, DEPTH};
+use super::object::{transport, SerialTransport};
 use super::request::RequestPtr;
 use super::storage::ClientBuffers;
+use crate::framing::MBM_FRAMING_TCP;
 use crate::pointers;
 use crate::storage::mbm_counters;
 use mbm::client::RequestQueue;
-use mbm::engine::Settings;
+use mbm::engine::{Setting, Settings};
 use mbm::error::Status;
 use mbm::time::{millis, timeout};
 
@@ -55,7 +57,7 @@ pub unsafe extern "C" fn mbm_client_setResponseTimeout(
             let Some(timeout) = timeout(timeoutMs) else {
                 return Status::INVALID_ARGUMENT;
             };
-            parts.settings.response_timeout = timeout;
+            parts.settings.response_timeout = Setting::new(timeout);
             Status::OK
         })
     }
@@ -115,7 +117,7 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
             let Ok(delay) = u16::try_from(delayMs) else {
                 return Status::INVALID_ARGUMENT;
             };
-            parts.settings.turnaround_delay = millis(delay);
+            parts.settings.turnaround_delay = Setting::new(millis(delay));
             Status::OK
         })
     }
@@ -140,7 +142,7 @@ pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietM
             let Ok(quiet) = u16::try_from(quietMs) else {
                 return Status::INVALID_ARGUMENT;
             };
-            parts.settings.quiet_time = millis(quiet);
+            parts.settings.quiet_time = Setting::new(millis(quiet));
             Status::OK
         })
     }
@@ -213,10 +215,13 @@ pub unsafe extern "C" fn mbm_client_setCounters(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        set(client, |parts| {
-            if_built_in(cfg!(feature = "counters") || counters.is_null(), || {
-                parts.storage.counters = counters;
-            })
+        pointers::with(client, |object| {
+            let kind = &*(*object).kind;
+            kind.storage(object).counters = counters;
+            if kind.framing != MBM_FRAMING_TCP {
+                transport::<SerialTransport>(object).engine.set_counting();
+            }
+            Status::OK
         })
     }
 }

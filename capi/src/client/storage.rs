@@ -40,7 +40,7 @@ pub(crate) struct ClientBuffers {
     pub(super) outgoing_bytes: u16,
     pub(super) unit_count: u8,
     /// The response timeout of the unit that `rest` last looked at.
-    pub(super) unit_timeout_ms: u16,
+    pub(super) unit_timeout_ms: u32,
 }
 
 // SAFETY, of all functions here: each pointer is NULL, or valid as the C function that set
@@ -82,7 +82,7 @@ impl ClientStorage for ClientBuffers {
         }
     }
 
-    fn unit_timeout_ms(&mut self, _: u8) -> u16 {
+    fn unit_timeout_ms(&mut self, _: u8) -> u32 {
         self.unit_timeout_ms
     }
 

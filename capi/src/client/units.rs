@@ -4,6 +4,7 @@ use super::object::mbm_client;
 use super::repeat::allow_retries;
 use super::settings::set;
 use super::storage::UnitRecords;
+use crate::pointers::array;
 use mbm::client::{find, note, rest, ClientStorage as _, UnitRecord};
 use mbm::error::Status;
 
@@ -24,8 +25,13 @@ pub struct mbm_clientUnit {
     pub delayUs: u32,
     /// Private.
     last: u32,
-    /// Set by you: the unit identifier.
-    pub unit: u8,
+    /// Set by you: the response timeout of this unit in milliseconds, 1 to 1000000 (16
+    /// minutes); 0: that of mbm_client_setResponseTimeout. mbm_client_setUnits refuses a
+    /// greater number. If you set it later, it means 1000000.
+    pub timeoutMs: u32,
+    /// Set by you: the unit identifier, 0 to 255. mbm_client_setUnits refuses a greater number.
+    /// If you set it later, the record is of no unit.
+    pub unit: u16,
     /// The status of the last request that ended; MBM_OK if none has ended.
     pub status: u8,
     /// Private.
@@ -33,9 +39,6 @@ pub struct mbm_clientUnit {
     /// Set by you: how often the client repeats a request to this unit at most, 1 to 254;
     /// MBM_NO_RETRIES: never; 0: as often as mbm_client_setRetries says.
     pub retryLimit: u8,
-    /// Set by you: the response timeout of this unit in milliseconds, 1 to 65535; 0: that of
-    /// mbm_client_setResponseTimeout.
-    pub timeoutMs: u16,
 }
 
 const _: () = {
@@ -57,7 +60,9 @@ const _: () = {
 /// @param units   your array of records, initialised with MBM_INIT except for the fields that
 ///                you set; NULL for none
 /// @param count   the number of records, 0 to 255
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a record with a `unit` above 255 or a
+///         `timeoutMs` above 1000000; MBM_NOT_INITIALISED. A call that is refused changes
+///         nothing
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setUnits(
     client: *mut mbm_client,
@@ -67,6 +72,10 @@ pub unsafe extern "C" fn mbm_client_setUnits(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
+            let records: &[UnitRecord] = array(units.cast(), count.into()).unwrap_or_default();
+            if !records.iter().all(UnitRecord::is_in_range) {
+                return Status::INVALID_ARGUMENT;
+            }
             parts.storage.units = units.cast();
             parts.storage.unit_count = count;
             parts.storage.unit_records = (!units.is_null()).then_some(&UNIT_RECORDS);

@@ -27,16 +27,16 @@ pub const MBM_GATEWAY_LOCAL: u8 = 0xFE;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_gatewayRoute {
-    /// The first unit id on TCP, 0 to 255.
-    pub first: u8,
-    /// The last unit id on TCP.
-    pub last: u8,
+    /// The first unit id on TCP, 0 to 255. mbm_gateway_begin refuses a greater number.
+    pub first: u16,
+    /// The last unit id on TCP, up to 255.
+    pub last: u16,
     /// The index of the line, MBM_GATEWAY_ALL_LINES or MBM_GATEWAY_LOCAL.
     pub line: u8,
     /// The id on the line of the unit that is `first` on TCP; the units after it follow, up to
     /// 255. 0: the ids on the line are those on TCP. A request whose unit id on the line is 0
     /// is a broadcast.
-    pub unit: u8,
+    pub unit: u16,
 }
 
 /// A line of a gateway. Initialise it with MBM_INIT, then set the fields that you need.

@@ -6,7 +6,7 @@ use crate::client::{mbm_client, mbm_clientRequest, mbm_client_custom};
 use crate::framing::{mbm_framing, MBM_FRAMING_TCP, MBM_MAX_TCP_FRAME};
 use crate::functions::{declared, mbm_function};
 use crate::pointers;
-use crate::server::{mbm_unit, mbm_unit_respond};
+use crate::server::{have_ids, mbm_unit, mbm_unit_respond};
 use core::ffi::c_void;
 use core::ptr::null;
 use core::slice::from_raw_parts;
@@ -92,7 +92,8 @@ pub unsafe extern "C" fn mbm_gateway_queueTime(gateway: *const mbm_gateway) -> u
 /// @param units    one unit, or an array of units; must stay valid for as long as the gateway
 ///                 is used. Servers may serve the same units. NULL only if `count` is 0
 /// @param count    how many units
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; MBM_BUSY; MBM_INVALID_ARGUMENT, also for a unit with an id above 255;
+///         MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_serveUnits(
     gateway: *mut mbm_gateway,
@@ -102,7 +103,7 @@ pub unsafe extern "C" fn mbm_gateway_serveUnits(
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(gateway, |core| {
-            if units.is_null() && count > 0 {
+            if count > 0 && (units.is_null() || !have_ids(units, count)) {
                 return Status::INVALID_ARGUMENT;
             }
             let parts = &mut (*core).storage;

@@ -175,7 +175,7 @@ impl GatewayStorage for Parts {
             let frame = mbm_gatewayRequest::frame(place);
             let body = frame.add(BODY);
             let request = &raw mut (*place).request;
-            (*request).unit = unit;
+            (*request).unit = unit.into();
             (*request).data = body.cast();
             (*request).reply = body.cast();
             (*request).replyBytes = MBM_MAX_TCP_FRAME - BODY as u16;

@@ -22,7 +22,7 @@ pub struct mbm_link {
     /// Private.
     pointers: [*mut c_void; 32],
     /// Private.
-    words: [u32; 20],
+    words: [u32; 21],
 }
 
 /// What has happened to a link. You may read and zero the counters at any time, but not from

@@ -14,7 +14,7 @@ pub unsafe extern "C" fn mbm_master_getResponseTimeout(master: *const mbm_master
     // SAFETY: as the header demands.
     unsafe {
         read(master, 0, |master| {
-            to_millis(master.core.settings().response_timeout)
+            to_millis(master.core.settings().response_timeout.get())
         })
     }
 }
@@ -27,7 +27,7 @@ pub unsafe extern "C" fn mbm_master_getResponseTimeout(master: *const mbm_master
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_getGap(master: *const mbm_master) -> u32 {
     // SAFETY: as the header demands.
-    unsafe { read(master, 0, |master| master.core.settings().gap) }
+    unsafe { read(master, 0, |master| master.core.settings().gap.get()) }
 }
 
 /// Returns the turnaround delay: see mbm_master_setTurnaroundDelay.
@@ -39,7 +39,7 @@ pub unsafe extern "C" fn mbm_master_getTurnaroundDelay(master: *const mbm_master
     // SAFETY: as the header demands.
     unsafe {
         read(master, 0, |master| {
-            to_millis(master.core.settings().turnaround_delay) as u16
+            to_millis(master.core.settings().turnaround_delay.get()) as u16
         })
     }
 }
@@ -53,7 +53,7 @@ pub unsafe extern "C" fn mbm_master_getQuietTime(master: *const mbm_master) -> u
     // SAFETY: as the header demands.
     unsafe {
         read(master, 0, |master| {
-            to_millis(master.core.settings().quiet_time) as u16
+            to_millis(master.core.settings().quiet_time.get()) as u16
         })
     }
 }

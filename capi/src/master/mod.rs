@@ -96,7 +96,7 @@ pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
                     pointers::zero(master);
                 }
                 let object = mbm_master::access(master);
-                object.core.set_default_if_zero();
+                object.core.set_slave(1);
                 object.mark = pointers::BEGUN;
                 Status::OK
             }

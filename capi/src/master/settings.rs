@@ -4,6 +4,7 @@ use super::with_hooks;
 use super::{mbm_master, Core};
 use crate::pointers::{check, read, with};
 use crate::storage::mbm_counters;
+use mbm::engine::Setting;
 use mbm::error::Status;
 use mbm::time::{millis, timeout};
 
@@ -62,7 +63,7 @@ pub unsafe extern "C" fn mbm_master_setResponseTimeout(
             let Some(timeout) = timeout(timeoutMs) else {
                 return Status::INVALID_ARGUMENT;
             };
-            master.core.settings().response_timeout = timeout;
+            master.core.settings().response_timeout = Setting::new(timeout);
             Status::OK
         })
     }
@@ -122,7 +123,7 @@ pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
             let Ok(delay) = u16::try_from(delayMs) else {
                 return Status::INVALID_ARGUMENT;
             };
-            master.core.settings().turnaround_delay = millis(delay);
+            master.core.settings().turnaround_delay = Setting::new(millis(delay));
             Status::OK
         })
     }
@@ -142,9 +143,10 @@ pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
 ///
 /// So a device that answers in order and within the response timeout never gives the data of
 /// another request, whatever its usual latency and however late one of its replies was. The
-/// request after a timeout takes at most one quiet time and one response timeout longer; all
-/// others take no longer. A wrong reading remains possible if the device takes longer than
-/// the response timeout for two requests in a row.
+/// request after a timeout ends one response timeout after the last reply that arrives, and at
+/// the latest three response timeouts after it was sent; all others take no longer. A wrong
+/// reading remains possible if the device takes longer than the response timeout for two
+/// requests in a row.
 ///
 /// With a quiet time of 0 the master waits and holds nothing: a reply that is later than the
 /// response timeout may be taken for the reply to the next request, and so may all that
@@ -161,7 +163,7 @@ pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, quietM
             let Ok(quiet) = u16::try_from(quietMs) else {
                 return Status::INVALID_ARGUMENT;
             };
-            master.core.settings().quiet_time = millis(quiet);
+            master.core.settings().quiet_time = Setting::new(millis(quiet));
             Status::OK
         })
     }
@@ -210,7 +212,7 @@ pub unsafe extern "C" fn mbm_master_setEchoDiscard(master: *mut mbm_master, on: 
 ///   It accepts such a reply at the end of the response timeout, if no right reply has
 ///   arrived. mbm_master_available returns the number of words that arrived.
 /// - A read of more words than the response words hold succeeds and fills all of them.
-///   (A reply that is longer than the frame buffer must not follow noise directly.)
+///   (If the reply is longer than the frame buffer, no noise may have arrived before it.)
 /// - The master also sends requests that read to unit 0, and accepts a reply from unit 0.
 ///
 /// Set a short response timeout (mbm_master_setResponseTimeout) if the device deviates in
@@ -288,9 +290,9 @@ pub unsafe extern "C" fn mbm_master_setCounters(
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            if_built_in(cfg!(feature = "counters") || counters.is_null(), || {
-                master.core.storage().counters = counters;
-            })
+            master.core.storage().counters = counters;
+            master.core.set_counting();
+            Status::OK
         })
     }
 }

@@ -52,13 +52,13 @@ impl mbm_packet {
         }
     }
 
-    /// The transaction, the unit and the function code.
-    pub(crate) const fn head(&self) -> Head {
-        Head {
+    /// The transaction, the unit and the function code, if the unit is one.
+    pub(crate) fn head(&self) -> Result<Head, Status> {
+        Ok(Head {
             transaction: self.transaction,
-            unit: self.unit,
+            unit: self.unit.try_into().or(Err(Status::INVALID_ARGUMENT))?,
             function: self.function,
-        }
+        })
     }
 
     fn set_data(&mut self, data: &[u8]) {

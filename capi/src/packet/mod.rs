@@ -128,10 +128,12 @@ pub struct mbm_packet {
     pub eventCount: u16,
     /// 0C: the count of messages.
     pub messageCount: u16,
+    /// The unit id that the request addresses, or that replies, 0 to 255. Only frames have it.
+    /// mbm_frame_build, mbm_frame_exception and mbm_frame_replyLength refuse a greater number
+    /// (MBM_INVALID_ARGUMENT).
+    pub unit: u16,
     /// MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
     pub kind: u8,
-    /// The unit id that the request addresses, or that replies. Only frames have it.
-    pub unit: u8,
     /// The function code, 1 to 127; of an exception the one of the request.
     pub function: u8,
     /// Exception: the code, 1 to 127. The numbers are those of MBM_ILLEGAL_FUNCTION and

@@ -18,7 +18,8 @@ use mbm::plan::{group, schedule};
 ///
 /// You may call it again at any time, also from `update`, but not from a hook of the client's
 /// port. The plan then first ends, as by mbm_plan_end, unless the call is refused for NULL, a
-/// count out of range or a client that was never begun.
+/// count out of range, a unit above 255 of limits or of an excluded range, or a client that was
+/// never begun.
 ///
 /// @param plan    the object; initialised with MBM_INIT before the first call
 /// @param client  the client that sends the reads, begun; the program may use it too, and other
@@ -27,12 +28,14 @@ use mbm::plan::{group, schedule};
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
 /// @return MBM_OK; MBM_BUSY from within a hook of the client's port; of a field
 ///         MBM_INVALID_ARGUMENT for an unknown table, type or order, a type that the table does
-///         not have, an interval out of range, a negative divisor or a scale of a text,
+///         not have, a unit above 255, an interval out of range, a negative divisor or a scale
+///         of a text,
 ///         MBM_BROADCAST_NOT_ALLOWED for unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
 ///         address 65535 or into an excluded range, MBM_ILLEGAL_DATA_VALUE if it is longer than
 ///         a read may be, MBM_FIELDS_OVERLAP for the later of two that share an address,
 ///         MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data;
-///         MBM_INVALID_ARGUMENT also for NULL pointers and counts out of range;
+///         MBM_INVALID_ARGUMENT also for NULL pointers, counts out of range, and a unit above
+///         255 of limits or of an excluded range;
 ///         MBM_NOT_INITIALISED for a client that was never begun. After the status of a field
 ///         the plan has ended, and `positions` and `reads` may be changed; after any other
 ///         nothing is

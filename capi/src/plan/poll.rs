@@ -71,7 +71,7 @@ unsafe fn queue(object: *const Object, request: *mut mbm_clientRequest, read: &R
         (*request).reply = (*object).setup().data.add(read.offset.into()).cast();
         (*request).replyBytes = read.words() * 2;
         (*request).transaction = 0;
-        (*request).unit = read.unit;
+        (*request).unit = read.unit.into();
         let (address, quantity) = (read.address, read.quantity);
         let status = client::read_table((*object).client, request, read.table, address, quantity);
         match Status::from_code(status) {

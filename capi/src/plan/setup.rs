@@ -14,8 +14,8 @@ use mbm::plan::{ExcludedRange, Field, Position, Read, ReadLimits, UnitLimits};
 /// unit again and again. A table of them may be constant.
 #[repr(C)]
 pub struct mbm_planField {
-    /// The unit, 1 to 255.
-    pub unit: u8,
+    /// The unit, 1 to 255. mbm_plan_begin refuses a greater number.
+    pub unit: u16,
     /// One of MBM_TABLE_...
     pub table: u8,
     /// One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, another for registers.
@@ -41,9 +41,9 @@ pub struct mbm_planUnitLimits {
     /// Bits, 1 to 2000; 0 means as `bitsPerRead` of the plan.
     pub bitsPerRead: u16,
     /// Registers, 1 to 125; 0 means as `registersPerRead` of the plan.
-    pub registersPerRead: u8,
-    /// The unit.
-    pub unit: u8,
+    pub registersPerRead: u16,
+    /// The unit, 1 to 255. mbm_plan_begin refuses a greater number.
+    pub unit: u16,
 }
 
 /// Addresses that no read of a plan may touch.
@@ -53,8 +53,8 @@ pub struct mbm_planExcludedRange {
     pub first: u16,
     /// The last address, not less than `first`.
     pub last: u16,
-    /// The unit; 0 for every unit.
-    pub unit: u8,
+    /// The unit, 1 to 255; 0 for every unit. mbm_plan_begin refuses a greater number.
+    pub unit: u16,
     /// One of MBM_TABLE_...
     pub table: u8,
 }
@@ -115,9 +115,9 @@ pub struct mbm_planSetup {
     /// The most bits between two fields that one read may cover as well.
     pub bitGap: u16,
     /// The most registers that one read requests, 1 to 125; 0 means 125.
-    pub registersPerRead: u8,
+    pub registersPerRead: u16,
     /// The most registers between two fields that one read may cover as well.
-    pub registerGap: u8,
+    pub registerGap: u16,
     /// How many requests, 1 to 16.
     pub requestCount: u8,
     /// How many units with limits of their own.
@@ -145,8 +145,13 @@ const _: () = {
     assert!(align_of::<mbm_planRead>() >= align_of::<Read>());
 };
 
+/// True if a unit may have this identifier.
+fn is_unit(unit: u16) -> bool {
+    unit <= u8::MAX.into()
+}
+
 impl mbm_planSetup {
-    /// True if every pointer that must be there is, and the counts are in range.
+    /// True if every pointer that must be there is, and counts and units are in range.
     pub(super) fn is_complete(&self) -> bool {
         !self.fields.is_null()
             && !self.positions.is_null()
@@ -156,6 +161,8 @@ impl mbm_planSetup {
             && self.requestCount.wrapping_sub(1) < crate::client::MBM_CLIENT_DEPTH
             && (!self.units.is_null() || self.unitCount == 0)
             && (!self.excluded.is_null() || self.excludedCount == 0)
+            && self.units().iter().all(|limits| is_unit(limits.unit))
+            && self.excluded().iter().all(|range| is_unit(range.unit))
     }
 
     pub(super) fn backoff(&self) -> Backoff {
@@ -184,7 +191,7 @@ impl ReadLimits for mbm_planSetup {
         self.bitsPerRead
     }
 
-    fn registers(&self) -> u8 {
+    fn registers(&self) -> u16 {
         self.registersPerRead
     }
 
@@ -192,7 +199,7 @@ impl ReadLimits for mbm_planSetup {
         self.bitGap
     }
 
-    fn register_gap(&self) -> u8 {
+    fn register_gap(&self) -> u16 {
         self.registerGap
     }
 

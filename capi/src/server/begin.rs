@@ -1,6 +1,7 @@
 //! The functions that begin a server, and its settings.
 
 use super::buffers::Core;
+use super::units::have_ids;
 use super::{mbm_server, mbm_unit};
 use crate::framing::MBM_MAX_TCP_FRAME;
 use crate::pointers::{check, object, read, with_hooks, CObject, BEGUN, IN_HOOK};
@@ -34,7 +35,7 @@ unsafe fn begin(
     // SAFETY: not NULL, so a port and the storage of an object. Zero is a valid value of
     // every field of the object.
     unsafe {
-        if !(*port).is_complete() {
+        if !(*port).is_complete() || !have_ids(units, count) {
             return Status::INVALID_ARGUMENT;
         }
         let mark = mbm_server::mark(server).read();
@@ -79,8 +80,9 @@ unsafe fn begin(
 /// @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame.
 ///                The server ignores a longer request, and answers exception 04 in place
 ///                of a longer response
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a buffer
-///         that is too short; MBM_BUSY from within a hook of this server
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook, a buffer
+///         that is too short or a unit with an id above 255; MBM_BUSY from within a hook of
+///         this server
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginRtu(
     server: *mut mbm_server,

@@ -48,7 +48,8 @@ impl Units for RespondUnits {
 ///                    after a damaged frame, a request for another unit, a broadcast, and
 ///                    with any status but MBM_OK
 /// @return MBM_OK; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write
-///         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT
+///         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT, also
+///         for a unit with an id above 255
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_respond(
     units: *mut mbm_unit,
@@ -73,7 +74,8 @@ pub unsafe extern "C" fn mbm_unit_respond(
         Ok(framing) if !units.is_null() && !frame.is_null() && !response.is_null() => framing,
         _ => return Status::INVALID_ARGUMENT.code(),
     };
-    if length > capacity {
+    // SAFETY: not NULL; the rest as the header demands.
+    if length > capacity || !unsafe { units::have_ids(units, count) } {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: not NULL; the rest as the header demands.

@@ -44,8 +44,9 @@ pub struct mbm_unit {
     pub diagnostics: *mut mbm_diagnostics,
     /// The unit id, 1 to 247 (serial line guide V1.02, 2.2). The ids 248 to 255, which
     /// the standard reserves, are accepted. 0 answers to every id. A unit without any
-    /// record does not answer.
-    pub id: u8,
+    /// record does not answer. A begin function of a server refuses a greater id
+    /// (MBM_INVALID_ARGUMENT). If you set one later, no request has it.
+    pub id: u16,
 }
 
 /// Puts a service into the first free place of a unit, unless the unit has it already. A
@@ -345,6 +346,16 @@ unsafe fn serves(unit: *const mbm_unit) -> bool {
     }
 }
 
+/// True if every unit has an id that a request can have.
+///
+/// # Safety
+/// `units` points to `count` units.
+#[cfg_attr(target_os = "none", inline(never))]
+pub(crate) unsafe fn have_ids(units: *const mbm_unit, count: u8) -> bool {
+    // SAFETY: as the caller promises.
+    (0..count).all(|index| unsafe { (*units.add(index.into())).id <= u8::MAX.into() })
+}
+
 /// Passes a frame to each unit. The first unit that it addresses answers.
 ///
 /// # Safety
@@ -364,7 +375,7 @@ pub(super) unsafe fn serve(
             && count == 1
             && (*units).monitor.is_none()
             && (*info).length != 0
-            && (*info).to == (*units).id
+            && u16::from((*info).to) == (*units).id
             && (*info).to != ANY
             && serves(units)
         {
@@ -469,7 +480,7 @@ unsafe fn count_skipped(
     // SAFETY: as the caller promises; no function of the program runs meanwhile.
     let (info, units) = unsafe { (&*info, from_raw_parts(units, count.into())) };
     let monitors = |unit: &mbm_unit| unit.monitor.is_some();
-    let answers = |unit: &mbm_unit| unit.id == info.to || unit.id == ANY;
+    let answers = |unit: &mbm_unit| unit.id == u16::from(info.to) || unit.id == u16::from(ANY);
     if all == Addressing::FOREIGN {
         count_before(units, monitors)
     } else if info.is_for_any() {

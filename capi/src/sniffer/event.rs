@@ -110,7 +110,7 @@ impl mbm_event {
             // A malformed PDU leaves the packet unchanged.
             let _ = packet.take(pdu_kind, event.pdu, functions);
         }
-        packet.unit = event.unit;
+        packet.unit = event.unit.into();
         packet.transaction = event.transaction;
         let subject = event.subject();
         let mut asked = [0; HEAD];

@@ -27,12 +27,13 @@ CELL = (WIDTH - 2 * MARGIN) / len(RECEIVED)
 def draw():
     false_crc = crc16(RECEIVED[1:1 + len(CONTENT)])
     claimed = RECEIVED[1 + len(CONTENT):1 + len(REPLY)]
-    assert false_crc != claimed and RECEIVED[1:4] == REPLY[:3]
+    assert false_crc != claimed and RECEIVED[1:4] == REPLY[:3] and (len(REPLY), len(RECEIVED)) == (11, 15)
     drawing = Drawing(
         "How mbm finds a reply behind noise",
-        f"The received bytes are {RECEIVED.hex(' ').upper()}. The first byte is not the unit. The second to fourth "
-        "byte begin like the reply, but the CRC of the frame that would begin there is wrong. The fifth byte begins "
-        "the reply: its CRC is right.")
+        f"The received bytes are {RECEIVED.hex(' ').upper()}. For each byte mbm looks at the last {len(REPLY)} bytes. At "
+        "the eleventh byte they begin with another byte than the unit. At the twelfth byte they begin like the reply, but "
+        "their CRC is wrong. At the thirteenth and fourteenth byte they do not begin with the unit. At the fifteenth "
+        "byte they begin like the reply, and their CRC is right.")
     y = 28
     drawing.text(WIDTH / 2, y, f"unit {UNIT} was asked for {len(WORDS)} holding registers:", "", "middle")
     drawing.text(WIDTH / 2, y + 18, f"the reply begins {REPLY[:3].hex(' ').upper()}, and has {len(REPLY)} bytes", "",
@@ -43,21 +44,23 @@ def draw():
         drawing.box(MARGIN + index * CELL + 1, y, CELL - 2, 30, kind, [f"{byte:02X}"], ("code", ""))
     y += 30
 
-    def candidate(y, first, count, kind, texts):
-        """A bracket below the bytes that are looked at, and what is found."""
-        left, right = MARGIN + first * CELL + 2, MARGIN + (first + count) * CELL - 2
+    def suffix(y, last, kind, texts):
+        """A bracket below as many bytes as the reply has, up to number `last`, and what is found."""
+        first = last - len(REPLY)
+        left, right = MARGIN + first * CELL + 2, MARGIN + last * CELL - 2
         drawing.line((left, y + 8), (left, y + 14), (right, y + 14), (right, y + 8), kind=f"trace trace-{kind}")
         for index, text in enumerate(texts):
             width = WIDTH - MARGIN - left
             y = drawing.paragraph(left, y + 31 if index == 0 else y, width, text, "strong" if index == 0 else "soft")
         return y - 10
 
-    y = candidate(y, 0, 1, "bad", ["not here", f"{RECEIVED[0]:02X} is not the unit: one byte on"])
-    y = candidate(y, 1, len(REPLY), "bad",
-                  ["not here", f"begins like the reply; but the CRC of its 9 bytes is {false_crc.hex(' ').upper()}, and "
-                   f"{claimed.hex(' ').upper()} stands there: one byte on"])
-    y = candidate(y, 2, 2, "bad", ["not here", f"{RECEIVED[2]:02X} and {RECEIVED[3]:02X} are not the unit"])
-    y = candidate(y, len(NOISE), len(REPLY), "good",
-                  ["here", f"the CRC {REPLY[-2:].hex(' ').upper()} is right", f"registers: {', '.join(map(str, WORDS))}"])
+    y = suffix(y, 11, "bad", ["byte 11: no", f"the last {len(REPLY)} bytes begin with {RECEIVED[0]:02X}, which is not the unit"])
+    y = suffix(y, 12, "bad",
+               ["byte 12: no", f"they begin like the reply; but the CRC of the first 9 is {false_crc.hex(' ').upper()}, and "
+                f"{claimed.hex(' ').upper()} stands there"])
+    y = suffix(y, 13, "bad", ["bytes 13 and 14: no",
+                              f"they begin with {RECEIVED[2]:02X} and with {RECEIVED[3]:02X}, which are not the unit"])
+    y = suffix(y, 15, "good",
+               ["byte 15: yes", f"the CRC {REPLY[-2:].hex(' ').upper()} is right", f"registers: {', '.join(map(str, WORDS))}"])
     drawing.bottom = y
     return drawing

@@ -50,8 +50,8 @@ fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
         };
         (*request).replyBytes = space;
         (*request).transaction = if w.rarely(8) { w.word() } else { 0 };
-        (*request).unit = w.unit_id();
-        (*request).timeoutMs = if w.rarely(4) { w.word() } else { 0 };
+        (*request).unit = w.unit_id().into();
+        (*request).timeoutMs = if w.rarely(4) { w.word().into() } else { 0 };
         (*request).retryLimit = retry_limit(w);
     }
 }

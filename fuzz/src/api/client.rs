@@ -63,8 +63,8 @@ fn set(w: &World, client: *mut mbm_client) {
     for (at, unit) in records.iter().enumerate() {
         // SAFETY: the index is below the count.
         let record = unsafe { &mut *units.add(at) };
-        (record.unit, record.delayUs) = (*unit, more.into());
-        (record.retryLimit, record.timeoutMs) = (limit, if w.rarely(2) { word } else { 0 });
+        (record.unit, record.delayUs) = ((*unit).into(), more.into());
+        (record.retryLimit, record.timeoutMs) = (limit, if w.rarely(2) { word.into() } else { 0 });
     }
     let none: *mut mbm_clientUnit = null_mut();
     let units = if w.rarely(8) { null_mut() } else { units };

@@ -34,17 +34,21 @@ fn config(w: &World) -> mbm_gatewayConfig {
         .collect();
     let routes: Vec<mbm_gatewayRoute> = (0..1 + w.byte() % 4)
         .map(|_| {
-            let first = w.unit_id();
+            let first = u16::from(w.unit_id());
             mbm_gatewayRoute {
                 first,
-                last: first.saturating_add(if w.rarely(2) { 0 } else { w.byte() % 8 }),
+                last: first.saturating_add(if w.rarely(2) {
+                    0
+                } else {
+                    (w.byte() % 8).into()
+                }),
                 line: match w.byte() {
                     byte @ 0..0xC0 if line_count > 0 => byte % line_count,
                     0xC0..0xF0 => MBM_GATEWAY_LOCAL,
                     0xF0.. => MBM_GATEWAY_ALL_LINES,
                     byte => byte,
                 },
-                unit: if w.rarely(4) { w.byte() } else { 0 },
+                unit: if w.rarely(4) { w.byte().into() } else { 0 },
             }
         })
         .collect();

@@ -76,7 +76,7 @@ pub fn identify(w: &World, client: *mut mbm_client) {
         };
         // SAFETY: as above.
         unsafe {
-            (*request).unit = w.unit_id();
+            (*request).unit = w.unit_id().into();
             ((*request).reply, (*request).replyBytes) = (reply, space);
             (*identification).object = (!w.rarely(8)).then_some(object);
             (*identification).done = (!w.rarely(8)).then_some(done);

@@ -58,7 +58,7 @@ fn random_packet(w: &World) -> *mut mbm_packet {
         eventCount: w.word(),
         messageCount: w.word(),
         kind: w.byte() % 4,
-        unit: w.unit_id(),
+        unit: w.unit_id().into(),
         function: if w.rarely(16) { w.byte() } else { function },
         exceptionCode: w.byte(),
         exceptionStatus: w.byte(),

@@ -19,7 +19,7 @@ fn field(w: &World) -> mbm_planField {
     let bits = byte & 1 != 0;
     let good = !w.rarely(12);
     mbm_planField {
-        unit: w.unit_id(),
+        unit: w.unit_id().into(),
         table: if good {
             1 + (byte >> 1 & 1) + if bits { 0 } else { 2 }
         } else {
@@ -55,15 +55,15 @@ pub fn begin(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
     let units: Vec<_> = (0..w.byte() % 3)
         .map(|_| mbm_planUnitLimits {
             bitsPerRead: w.word(),
-            registersPerRead: w.byte(),
-            unit: w.unit_id(),
+            registersPerRead: w.byte().into(),
+            unit: w.unit_id().into(),
         })
         .collect();
     let excluded: Vec<_> = (0..w.byte() % 3)
         .map(|_| mbm_planExcludedRange {
             first: w.word(),
             last: w.word(),
-            unit: w.byte() % 4,
+            unit: (w.byte() % 4).into(),
             table: w.byte() % 5,
         })
         .collect();
@@ -93,8 +93,8 @@ pub fn begin(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
         dataWords: words,
         bitsPerRead: w.word(),
         bitGap: w.word(),
-        registersPerRead: w.byte(),
-        registerGap: w.byte(),
+        registersPerRead: w.byte().into(),
+        registerGap: w.byte().into(),
         requestCount: requests,
         unitCount: units.len() as u8,
         excludedCount: excluded.len() as u8,

@@ -41,7 +41,7 @@ pub fn array(w: &World) -> (*mut mbm_unit, u8) {
                 .cast();
             for at in 0..count {
                 // SAFETY: the index is below the count.
-                unsafe { (*new.add(at.into())).id = w.unit_id() };
+                unsafe { (*new.add(at.into())).id = w.unit_id().into() };
             }
             w.units.borrow_mut().push((new, count));
         }

@@ -161,7 +161,7 @@ fn unit(w: &World) {
             w.note(|| format!("memset({unit:?}, 0, unit)"));
             unit.write(std::mem::zeroed());
         }
-        (*unit).id = w.unit_id();
+        (*unit).id = w.unit_id().into();
     }
 }
 

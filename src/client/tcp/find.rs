@@ -44,7 +44,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         let (start, rest) = frame.split_first_chunk()?;
         let (count, data) = rest.split_first()?;
         let function = state.header.function();
-        if u64::from_be_bytes(*start) != tcp::start(state.wire, asked + 2, state.unit, function)
+        if u64::from_be_bytes(*start) != tcp::start(state.wire, asked + 2, state.unit(), function)
             || *count != asked
             || self.skip > 0
             || !state.is(Stage::Sent)
@@ -177,7 +177,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
 /// True if a response with this header answers the request.
 fn is_answered_by<J: ClientRequest>(request: &J, header: &Header) -> bool {
     let state = request.state();
-    state.is_sent() && state.wire == header.transaction && state.unit == header.unit
+    state.is_sent() && state.wire == header.transaction && state.unit() == header.unit
 }
 
 /// Checks the response `pdu` and stores its data in the request. Returns the status of the

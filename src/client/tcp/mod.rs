@@ -113,7 +113,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             return false;
         }
         let received = received as u16;
-        self.storage.count(Counter::BytesReceived, received);
+        self.storage.count(Counter::BytesReceived, received.into());
         self.end += received;
         true
     }
@@ -249,7 +249,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             return Status::BUSY;
         }
         let state = request.state();
-        let (unit, header) = (state.unit, &state.header);
+        let (unit, header) = (state.unit(), &state.header);
         let begin = usize::from(self.filled);
         let Some(space) = self.storage.outgoing().get_mut(begin..) else {
             return Status::BUSY;
@@ -282,9 +282,9 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn time_of(&mut self, state: &RequestState) -> u32 {
         if state.header.is_answered() {
-            state.response_timeout(&mut self.storage, self.settings.response_timeout)
+            state.response_timeout(&mut self.storage, self.settings.response_timeout.get())
         } else {
-            self.settings.turnaround_delay
+            self.settings.turnaround_delay.get()
         }
     }
 
@@ -300,7 +300,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         }
         let sent = sent as u16;
         self.accepts |= sent > 0;
-        self.storage.count(Counter::BytesSent, sent);
+        self.storage.count(Counter::BytesSent, sent.into());
         self.sent += sent;
         if self.sent == self.filled {
             self.sent = 0;
@@ -398,7 +398,7 @@ fn write_frame<J: ClientRequest>(
 ) -> Result<usize, Status> {
     let state = request.state();
     let header = &state.header;
-    tcp::emit(place, wire, state.unit, |pdu| {
+    tcp::emit(place, wire, state.unit(), |pdu| {
         let length = usize::from(header.request_length());
         let pdu = pdu.get_mut(..length).ok_or(Status::BUFFER_TOO_SMALL)?;
         header.emit(pdu, data_of(request));

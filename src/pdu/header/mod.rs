@@ -213,6 +213,15 @@ impl RequestHeader {
             && matches!(pdu, [code, a, b, c, d] if code == function && [*a, *b, *c, *d] == *words)
     }
 
+    /// Length of the PDU of a response that is no exception; 0 if the request does not determine
+    /// it.
+    pub const fn fixed_length(&self) -> u8 {
+        match self.spec.0 & KIND {
+            FIXED | READ => self.length,
+            _ => 0,
+        }
+    }
+
     /// The length of the response that begins with `pdu`. While `pdu` is too short to
     /// determine the length, the least possible length; `None` if no response to this request
     /// begins with `pdu`. If only the end of the frame determines the length, `whole`; for 11

@@ -134,8 +134,8 @@ pub fn queue(life: &Life, at: usize) {
         (*request).data = w.noise(64).cast();
         (*request).reply = w.noise(64).cast();
         (*request).replyBytes = 64;
-        (*request).unit = unit;
-        (*request).timeoutMs = timeout;
+        (*request).unit = unit.into();
+        (*request).timeoutMs = timeout.into();
         (*request).retryLimit = 0;
     }
     let count = 1 + u16::from(w.byte()) % 8;
@@ -253,9 +253,9 @@ pub fn set(life: &Life, at: usize) {
             for unit in 0..3 {
                 // SAFETY: there are three.
                 let record = unsafe { &mut *units.add(unit) };
-                record.unit = 1 + unit as u8;
+                record.unit = 1 + unit as u16;
                 record.delayUs = u32::from(word) * 500;
-                record.timeoutMs = u16::from(byte);
+                record.timeoutMs = u32::from(byte);
                 record.retryLimit = [0, MBM_NO_RETRIES, 1][unit];
             }
             limits.rest = limits.rest.max(us);

@@ -114,8 +114,8 @@ fn begin(life: &Life) {
         let lines: *mut mbm_gatewayLine = w.block(LINES * size_of::<mbm_gatewayLine>(), 8).cast();
         let routes: Vec<mbm_gatewayRoute> = (0..LINES as u8)
             .map(|line| mbm_gatewayRoute {
-                first: 1 + 10 * line,
-                last: 3 + 10 * line,
+                first: 1 + 10 * u16::from(line),
+                last: 3 + 10 * u16::from(line),
                 line,
                 unit: 1,
             })

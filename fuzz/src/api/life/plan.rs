@@ -72,7 +72,7 @@ fn begin(life: &Life) {
     let side = &life.plan;
     let fields: Vec<mbm_planField> = (0..FIELDS as u16)
         .map(|at| mbm_planField {
-            unit: 1 + w.byte() % 3,
+            unit: (1 + w.byte() % 3).into(),
             table: 3 + w.byte() % 2,
             r#type: MBM_TYPE_UINT16,
             order: 0,
@@ -101,7 +101,7 @@ fn begin(life: &Life) {
         bitsPerRead: 0,
         bitGap: 0,
         registersPerRead: 0,
-        registerGap: w.byte() % 32,
+        registerGap: (w.byte() % 32).into(),
         requestCount: REQUESTS as u8,
         unitCount: 0,
         excludedCount: 0,

@@ -1,0 +1,333 @@
+//! Finds the reply among the received bytes of an RTU line.
+//!
+//! The request determines its reply: unit, function code, length, and the byte count or the
+//! repeated head. So each received byte may be the last one of the reply: the reply ends there
+//! if the bytes before it begin as the reply does and have a right CRC. What precedes them, noise,
+//! frames of other units, late replies or an echo, does not matter. The same question is asked
+//! for an exception to the request, which has five bytes, and for the echo of the request.
+//!
+//! Beside that, the engine computes the CRC of all bytes since the last frame ended. If it is
+//! right, these bytes were a whole frame. If that frame is not the reply, it is skipped, and an
+//! exception or a damaged reply that seemed to lie in it is forgotten.
+
+use super::{Count, Engine, Event, Outcome, Phase, RequestSpec, Storage};
+use crate::error::Status;
+use crate::frame::checksum::Crc16;
+use crate::frame::rtu::{self, MIN_FRAME};
+use crate::pdu::EXCEPTION;
+use crate::port::Port;
+use crate::FIRMWARE;
+
+/// Length of the frame of an exception: unit, function, code, CRC.
+const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
+
+impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+    /// Searches the `received` bytes that the port has written to the frame buffer from `first`
+    /// on. True if the request ends. The bytes after the reply are dropped then.
+    #[inline(always)]
+    pub(crate) fn search(&mut self, first: S::Count, received: S::Count) -> bool {
+        if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
+            self.is_unsearched = true;
+        }
+        if FIRMWARE {
+            // One byte, at the end.
+            return self.take_in();
+        }
+        if first == S::Count::ZERO && received == self.length && self.is_reply_alone(received) {
+            return true;
+        }
+        let mut index = first;
+        let end = first + received;
+        while index < end {
+            // The search moves bytes to the front only, so this byte is still there.
+            let byte = self.storage.byte(index);
+            self.storage.set_byte(self.end, byte);
+            if self.take_in() {
+                return true;
+            }
+            index += 1u8.into();
+        }
+        false
+    }
+
+    /// True if the received bytes are exactly the reply, and end the request. Hosts receive most
+    /// replies in this way, and save 2000 instructions for ten registers.
+    #[inline(always)]
+    fn is_reply_alone(&mut self, received: S::Count) -> bool {
+        let frame = self.storage.slice(S::Count::ZERO, received);
+        let start = [self.unit, self.request.function()];
+        if self.is_on_probation
+            || self.outgoing > S::Count::ZERO
+            || !frame.starts_with(&start)
+            || !rtu::is_frame(frame)
+        {
+            return false;
+        }
+        self.end = received;
+        self.run_length = received;
+        let is_reply = self.accept(received);
+        if !is_reply {
+            self.end = S::Count::ZERO;
+            self.run_length = S::Count::ZERO;
+        }
+        is_reply
+    }
+
+    /// Takes in the byte at the end of the frame buffer. True if the request ends with it.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn take_in(&mut self) -> bool {
+        let byte = self.storage.byte(self.end);
+        self.end += 1u8.into();
+        let is_whole = self.continue_frame(byte);
+        let function = self.request.function();
+        if cfg!(feature = "echo")
+            && self.outgoing > S::Count::ZERO
+            && self.ends_with(self.outgoing, function)
+            && Q::is_echo(self, self.end - self.outgoing)
+        {
+            self.outgoing = S::Count::ZERO;
+            self.begin_frame();
+            self.forget();
+            return false;
+        }
+        let is_response = if self.ends_with(EXCEPTION_FRAME.into(), function | EXCEPTION) {
+            self.accept_exception(is_whole)
+        } else {
+            let length = self.ending_reply();
+            length > S::Count::ZERO && self.accept(length)
+        };
+        if is_response {
+            if self.is_on_probation {
+                self.hold_response();
+                return false;
+            }
+            if self.content > S::Count::ZERO || !self.is_early {
+                return true;
+            }
+        }
+        if let Some(observe) = self.observer {
+            observe(self, Event::Byte(byte, is_whole));
+        }
+        is_whole && self.skip_frame()
+    }
+
+    /// Makes the exception at the end of the buffer the outcome. False if its code is invalid.
+    #[inline(always)]
+    fn accept_exception(&mut self, is_whole: bool) -> bool {
+        let code = self.storage.byte(self.end - 3u8.into());
+        if !self.is_held {
+            self.exception = code;
+        }
+        if let Status::MALFORMED_REPLY = Status::exception(code) {
+            self.note(Outcome::MALFORMED);
+            return false;
+        }
+        self.exception = code;
+        self.seen = Outcome(code);
+        self.content = S::Count::ZERO;
+        // It may lie within another frame, unless it is a whole frame itself.
+        self.is_early = !is_whole || self.run_length != EXCEPTION_FRAME.into();
+        true
+    }
+
+    /// Length of the reply's frame that ends with the last byte, with a right CRC; 0 if there is
+    /// none.
+    #[inline(always)]
+    fn ending_reply(&mut self) -> S::Count {
+        if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
+            return Q::ending_reply(self, false);
+        }
+        if self.ends_with(self.length, self.request.function()) {
+            return self.length;
+        }
+        if self.length > self.storage.capacity() {
+            self.note_too_long();
+        }
+        S::Count::ZERO
+    }
+
+    /// Notes that the reply to a read begins with the last three bytes, if the frame buffer
+    /// cannot hold that reply.
+    #[cold]
+    #[inline(always)]
+    fn note_too_long(&mut self) {
+        if self.end >= 3u8.into() && self.begins_read(self.end - 3u8.into()) {
+            self.note(Outcome::TOO_LONG);
+            self.is_early = true;
+        }
+    }
+
+    /// True if the bytes at `front` are those with which the reply to a read begins: unit,
+    /// function code and byte count.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn begins_read(&self, front: S::Count) -> bool {
+        let count: u16 = (self.length - 5u8.into()).into();
+        self.storage.byte(front) == self.unit
+            && self.storage.byte(front + 1u8.into()) == self.request.function()
+            && u16::from(self.storage.byte(front + 2u8.into())) == count
+    }
+
+    /// Moves the frame of `length` bytes at the end of the buffer to its front, and makes it the
+    /// reply. False, with nothing changed, if it does not answer the request.
+    #[inline(always)]
+    pub(super) fn accept(&mut self, length: S::Count) -> bool {
+        let front = self.end - length;
+        if !Q::is_reply(self, front, length) {
+            self.note(Outcome::MALFORMED);
+            return false;
+        }
+        self.is_early = self.run_length != length;
+        self.seen = Outcome::OK;
+        self.exception = 0;
+        self.content = length - rtu::CRC.into();
+        if front > S::Count::ZERO {
+            self.storage.move_down(front, self.content);
+        }
+        true
+    }
+
+    /// True if the last `length` bytes are a frame of our unit with that function code and a
+    /// right CRC. Notes a wrong CRC.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(crate) fn ends_with(&mut self, length: S::Count, function: u8) -> bool {
+        let have = self.end - self.content;
+        if length > have {
+            return false;
+        }
+        let front = self.end - length;
+        if self.storage.byte(front) != self.unit
+            || self.storage.byte(front + 1u8.into()) != function
+        {
+            return false;
+        }
+        if rtu::is_frame(self.storage.slice(front, length)) {
+            return true;
+        }
+        // A damaged reply ends the request, unless it lies within the reply or another frame.
+        let is_long = self.length > S::Count::ZERO && have >= self.length;
+        if cfg!(feature = "diagnosis") && (is_long || self.run_length == length) {
+            self.is_early = true;
+        }
+        self.note_damaged();
+        false
+    }
+
+    /// Notes a damaged reply. It may be the answer, so a held reply is not.
+    #[inline(always)]
+    pub(super) fn note_damaged(&mut self) {
+        if self.is_held {
+            self.seen = Outcome::BAD_CRC;
+        }
+        self.note(Outcome::BAD_CRC);
+    }
+
+    /// The next byte begins a frame.
+    #[inline(always)]
+    pub(super) fn begin_frame(&mut self) {
+        self.run_length = S::Count::ZERO;
+        if cfg!(feature = "diagnosis") {
+            self.run = Crc16::START;
+            self.run_kind = Outcome::MALFORMED;
+        }
+    }
+
+    /// Counts the byte as one of the frame that is being received. True if all bytes since the
+    /// last frame form a frame.
+    #[inline(always)]
+    fn continue_frame(&mut self, byte: u8) -> bool {
+        self.run_length = self.run_length.saturating_add(1u8.into());
+        if !cfg!(feature = "diagnosis") {
+            return false;
+        }
+        if self.run_length == 1u8.into() && byte != self.unit {
+            self.run_kind = Outcome::OTHER_UNIT;
+        }
+        if self.run_length == 2u8.into()
+            && byte & !EXCEPTION != self.request.function()
+            && self.run_kind == Outcome::MALFORMED
+        {
+            self.run_kind = Outcome::OTHER_FUNCTION;
+        }
+        let last = self.storage.slice(self.end - 1u8.into(), 1u8.into());
+        self.run = self.run.with(last);
+        if !self.run.is_residue() || self.run_length < MIN_FRAME.into() {
+            return false;
+        }
+        // By chance, the CRC may be right before the end of the reply.
+        let is_here = self.run_length < self.length && self.run_length <= self.end - self.content;
+        !(is_here && self.begins_read(self.end - self.run_length))
+    }
+
+    /// Skips a whole frame that is not the reply. True if it is the reply but the frame buffer
+    /// cannot hold it, which ends the request.
+    #[inline(always)]
+    fn skip_frame(&mut self) -> bool {
+        let kind = self.run_kind;
+        if kind == Outcome::MALFORMED && self.seen == Outcome::TOO_LONG {
+            return true;
+        }
+        self.note_foreign_frame();
+        self.begin_frame();
+        if self.is_held {
+            // A damaged reply that seemed to follow the held one lies in this frame.
+            self.seen = if self.content > S::Count::ZERO || self.exception > 0 {
+                Outcome(self.exception)
+            } else {
+                Outcome::NOTHING
+            };
+        } else if self.is_early || self.seen == Outcome::BAD_CRC {
+            self.forget();
+        }
+        self.note(kind);
+        false
+    }
+
+    /// Forgets what was seen, because it lies within another frame, and waits for the reply again.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn forget(&mut self) {
+        self.is_early = false;
+        self.exception = 0;
+        self.seen = Outcome::NOTHING;
+        if self.phase == Phase::Reply {
+            self.since = self.begun;
+            self.wait_for_reply();
+        }
+    }
+
+    /// Notes a frame with a right CRC that does not answer the request.
+    #[inline(always)]
+    pub(super) fn note_foreign_frame(&mut self) {
+        self.foreign_frames = self.foreign_frames.wrapping_add(1);
+    }
+
+    /// Notes a fault if it is more severe than the noted one. A response stays.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(crate) fn note(&mut self, fault: Outcome) {
+        if !self.seen.is_response() && self.seen < fault {
+            self.seen = fault;
+        }
+    }
+
+    /// Makes space in a full frame buffer. A held reply is dropped, because too many bytes
+    /// follow it. Of the other bytes those stay with which the reply may begin.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn make_space(&mut self) {
+        let mut keep = self.end - self.content;
+        if self.content > S::Count::ZERO {
+            self.note_foreign_frame();
+            self.content = S::Count::ZERO;
+            self.seen = Outcome::NOTHING;
+        } else {
+            keep -= 1u8.into();
+        }
+        if Q::HAS_FIXED_REPLY {
+            let longest = self.length.max(self.outgoing).max(EXCEPTION_FRAME.into());
+            keep = keep.min(longest - 1u8.into());
+        }
+        while keep > S::Count::ZERO && self.storage.byte(self.end - keep) != self.unit {
+            keep -= 1u8.into();
+        }
+        self.storage.move_down(self.end - keep, keep);
+        self.end = keep;
+    }
+}

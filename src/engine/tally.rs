@@ -1,0 +1,49 @@
+//! Adds the attempts and the bytes on the line to the counters of the storage.
+
+use super::{Counter, Engine, Phase, Storage};
+use crate::error::Status;
+
+impl<P, S: Storage, Q> Engine<P, S, Q> {
+    /// Counts from now on.
+    pub fn set_counting(&mut self) {
+        self.tally = Some(Engine::count);
+    }
+
+    /// Counts what has happened, if the engine counts: an attempt that ends with `status`; or, if
+    /// that is [`Status::PENDING`], one that begins, or bytes that answer no request.
+    #[inline(always)]
+    pub(super) fn tally(&mut self, status: Status) {
+        if let Some(tally) = self.tally {
+            tally(self, status);
+        }
+    }
+
+    /// As [`Engine::tally`], for an engine that counts.
+    pub(super) fn count(&mut self, status: Status) {
+        let storage = &mut self.storage;
+        storage.count(Counter::BytesReceived, self.received);
+        self.received = 0;
+        storage.count(Counter::ForeignFrames, self.foreign_frames.into());
+        self.foreign_frames = 0;
+        if status == Status::PENDING {
+            storage.count(Counter::Requests, u32::from(self.phase == Phase::Gap));
+            return;
+        }
+        if self.phase > Phase::Gap {
+            let sent: u16 = self.sent.into();
+            storage.count(Counter::BytesSent, sent.into());
+        }
+        if self.phase != Phase::Reply {
+            return;
+        }
+        if self.seen.is_response() {
+            storage.count(Counter::Replies, 1);
+            storage.count(Counter::Exceptions, u32::from(status.is_exception()));
+            storage.count(Counter::Resynchronisations, u32::from(self.is_early));
+        } else if status == Status::INVALID_CRC {
+            storage.count(Counter::BadCrc, 1);
+        } else if status == self.seen.status() && status != Status::BUFFER_TOO_SMALL {
+            storage.count(Counter::Timeouts, 1);
+        }
+    }
+}
