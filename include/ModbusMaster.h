@@ -437,10 +437,10 @@ private:
         return true;
     }
 
-    // The words that hold so many bits.
+    // How many words hold `bits` bits, or one more.
     static uint16_t wordsOf(uint16_t bits) { return (bits / 16u + 1u) & 0xFFFFu; }
 
-    // Makes a request that reads or writes so many words.
+    // Makes a request that reads or writes at most `words` words, by calling `function`.
 #if defined(MODBUSMASTER_SHARE_FRAME)
     // Not inline: the memory of the frame is free when it returns.
     template <typename... Parameters>

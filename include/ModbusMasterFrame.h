@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "ModbusMasterOptions.h"
+#include "mbm.h"
 
 #if defined(MODBUSMASTER_SHARE_FRAME)
 /**
@@ -41,11 +42,10 @@ public:
      */
     static uint8_t bytesOf(uint16_t words)
     {
-        return words < (Bytes - overhead) / 4u ? static_cast<uint8_t>(4u * words + overhead) : Bytes;
+        return words < (Bytes - MBM_FRAME_BYTES(0)) / 4u
+                   ? static_cast<uint8_t>(MBM_FRAME_BYTES(2u * words))
+                   : Bytes;
     }
-
-private:
-    enum : uint8_t { overhead = 13 };
 };
 
 /** @cond the definition of the static member */

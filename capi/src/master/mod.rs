@@ -208,7 +208,7 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
         transmit,
         transmit_words: transmitWords,
     };
-    if words.are_refused() || frame.is_null() || frameBytes < 8 {
+    if words.are_refused() || is_frame_refused(frame, frameBytes) {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
@@ -266,6 +266,12 @@ impl Given {
     }
 }
 
+/// True for a frame buffer that cannot hold an exception or a request of two words.
+#[inline(always)]
+fn is_frame_refused(frame: *mut u8, bytes: u16) -> bool {
+    frame.is_null() || bytes < 8
+}
+
 /// Makes `words` those of a master, and changes its other buffers too.
 ///
 /// # Safety
@@ -319,7 +325,7 @@ pub unsafe extern "C" fn mbm_master_setFrame(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    if frame.is_null() || frameBytes < 8 {
+    if is_frame_refused(frame, frameBytes) {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
