@@ -442,6 +442,22 @@ static void counters_count_what_happened(void **state)
     assert_int_equal(s->counters.requests, 4);
 }
 
+static void counters_miss_no_frame_of_a_crowded_line(void **state)
+{
+    int i;
+    NODE;
+
+    for (i = 0; i < 30; i++)
+        sim_answer(s, 1, 30000 * (unsigned)i,
+                   "12 07 + / 12 07 + / 12 07 + / 12 07 + / 12 07 + / 12 07 + / 12 07 + / "
+                   "12 07 + / 12 07 + / 12 07 +");
+    sim_answer(s, 1, 900000, "11 03 02 00 2A +");
+    OK(mbm_master_readHoldingRegisters(n, 0, 1));
+    assert_int_equal(s->counters.foreignFrames, 300);
+    assert_int_equal(s->counters.bytesReceived, 300 * 4 + 7);
+    assert_int_equal(s->counters.requests, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -473,6 +489,7 @@ int main(void)
         SIM_TEST(with_discard_off_an_echo_that_is_no_reply_is_skipped),
         SIM_TEST(a_device_that_does_not_echo_still_answers_reads_with_discard_on),
         SIM_TEST(counters_count_what_happened),
+        SIM_TEST(counters_miss_no_frame_of_a_crowded_line),
     };
 
     return cmocka_run_group_tests_name("contract: replies", tests, NULL, NULL);

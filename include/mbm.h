@@ -800,11 +800,11 @@ typedef struct mbm_master {
     /**
      * Private.
      */
-    void *pointers[14];
+    void *pointers[17];
     /**
      * Private.
      */
-    uint32_t words[23];
+    uint32_t words[21];
 } mbm_master;
 
 /**

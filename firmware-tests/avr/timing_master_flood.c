@@ -14,15 +14,25 @@ typedef struct flood {
     board *on;
     wire *bus;
     uint8_t (*byte)(unsigned i);
-    unsigned played, taken;
+    unsigned played, taken, finished; /* finished: taken by polls that have ended */
     uint16_t tail, status; /* their addresses in the sketch */
     uint8_t at;            /* where the core's next byte to read was last */
     uint64_t began, longest;
-    int polls, takes;
+    int takes;
     /* the cycles of polls with bytes to read, and of all others */
     uint64_t busy;
     span idle;
 } flood;
+
+/* Counts the bytes that the sketch has taken from the core since the last count. One poll may
+ * take more than the core holds. */
+static void count_taken(flood *f)
+{
+    uint8_t now = board_byte(f->on, f->tail);
+
+    f->taken += (unsigned)(now + CORE - f->at) % CORE;
+    f->at = now;
+}
 
 static void poll_takes_bytes(void *context, int level, uint64_t cycle)
 {
@@ -38,11 +48,12 @@ static void poll_begins_or_ends(void *context, int level, uint64_t cycle)
     flood *f = context;
     uint64_t lasted = cycle - f->began;
 
-    f->polls = level;
     if (level) {
         f->began = cycle;
         return;
     }
+    count_taken(f);
+    f->finished = f->taken;
     if (f->began == 0) /* the poll began before the measurement */
         return;
     if (lasted > f->longest)
@@ -85,15 +96,12 @@ static void play(flood *f, unsigned count)
     f->played += count;
 }
 
-/* Runs the sketch for less than a byte takes. Counts the bytes that it has taken from the core,
- * of which one poll may take more than the core holds. */
+/* Runs the sketch for less than a byte takes. */
 static int run(flood *f)
 {
     int runs = board_run(f->on, 100);
-    uint8_t now = board_byte(f->on, f->tail);
 
-    f->taken += (unsigned)(now + CORE - f->at) % CORE;
-    f->at = now;
+    count_taken(f);
     return runs;
 }
 
@@ -104,7 +112,7 @@ static void feed(flood *f, unsigned target)
 {
     uint64_t end_at = board_cycle(f->on) + 1500 * MS;
 
-    while (f->taken != target || f->polls) {
+    while (f->finished != target) {
         unsigned waiting = f->played - f->taken;
 
         if (f->bus->bytes_received == f->played && f->played < target && waiting < IN_CORE) {

@@ -52,7 +52,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         if self.is_held {
             self.run_length = self.end - self.content;
         }
-        if self.end == self.space {
+        if self.end == self.space() {
             self.drop_too_long();
         }
         false

@@ -37,16 +37,10 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         self.observer = if on { Some(observe) } else { None };
     }
 
-    /// Gives the kept bytes' place back to the search.
-    fn drop_kept(&mut self) {
-        self.space += self.kept;
-        self.kept = 0;
-    }
-
     /// Keeps the byte if it may belong to a deviating response to a read. Notes a deviating
     /// reply that ends with it.
     fn keep(&mut self, byte: u8, is_whole: bool) {
-        if self.has_deviating || self.is_held {
+        if self.awaits_end || self.is_held {
             return;
         }
         let function = self.request.function();
@@ -58,7 +52,6 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
             return;
         }
         if self.run_length == 1 {
-            self.space = self.storage.capacity();
             self.kept = 0;
         }
         let is_ours = match self.run_length {
@@ -69,7 +62,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
             _ => self.kept > 0,
         };
         if !is_ours {
-            self.drop_kept();
+            self.kept = 0;
             return;
         }
         if is_whole && self.run_length == self.kept_length() && self.kept_data() > 0 {
@@ -77,24 +70,21 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
             return;
         }
         let words = u16::from(self.storage.response_words());
-        let space = self.space;
+        let space = self.space();
         if u16::from(self.kept) >= (words << 1) + u16::from(BEFORE_DATA) || space <= LEFT_FREE {
             return;
         }
         // The search has taken in the last byte, so the buffer may be full.
         if self.end == space {
-            let keep = self.end - 1;
-            self.storage.move_down(1, keep);
-            self.end = keep;
+            self.drop_to(1);
         }
         self.storage.set_byte(space - 1, byte);
-        self.space -= 1;
         self.kept += 1;
     }
 
     /// Notes a deviating reply. A whole frame is not counted as one that does not answer.
     fn note_deviating(&mut self, is_whole: bool) {
-        self.has_deviating = true;
+        self.awaits_end = true;
         self.foreign_frames = self.foreign_frames.wrapping_sub(is_whole.into());
     }
 
@@ -140,7 +130,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     /// Makes a deviating reply the result of a request that would fail. Of a reply with more
     /// data than response words, the data that fill these words count.
     fn accept_deviating(&mut self) {
-        if self.has_deviating && !self.is_held && !self.seen.is_response() {
+        if self.awaits_end && !self.is_held && !self.seen.is_response() {
             if self.request.is_read() {
                 let data = self.kept_data();
                 self.request.set_reads(data);
@@ -149,7 +139,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
             self.exception = 0;
             self.is_early = false;
             self.seen = Outcome::OK;
-        } else if self.has_deviating {
+        } else if self.awaits_end {
             self.note_foreign_frame();
         }
         let most = u16::from(self.storage.response_words()) << 1;

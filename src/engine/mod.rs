@@ -85,8 +85,9 @@ pub struct Engine<P, S: Storage, Q> {
     is_late: bool,
     /// One of the late units sent no reply, not only a damaged one.
     has_slow_unit: bool,
-    /// Bytes have arrived since the line was last silent. (Only for replies of unknown length.)
-    is_unsearched: bool,
+    /// A reply may have arrived that counts only once the bytes end: one of unknown length, or a
+    /// deviating one.
+    awaits_end: bool,
     /// What the frame that is being received is if it ends with a right CRC.
     run_kind: Outcome,
     /// How many bytes have arrived since the last frame ended.
@@ -95,8 +96,8 @@ pub struct Engine<P, S: Storage, Q> {
     length: S::Count,
     /// How many bytes the frame buffer holds.
     end: S::Count,
-    /// How many bytes of the frame buffer the search uses.
-    space: S::Count,
+    /// How many bytes at the end of the frame buffer the observer has filled.
+    kept: S::Count,
     /// Length of the right reply, unit and PDU, at the front of the frame buffer; 0 if there is
     /// none.
     pub(crate) content: S::Count,
@@ -109,6 +110,12 @@ pub struct Engine<P, S: Storage, Q> {
     foreign_frames: u8,
     /// CRC of the bytes that have arrived since the last frame ended.
     run: Crc16,
+    /// The CRC since the last frame of the bytes that were dropped from the frame buffer.
+    before: Crc16,
+    /// The weight of `length` for [`Crc16::since_start`]; 0 if it is not computed yet.
+    weight: Crc16,
+    /// How many bytes have arrived that were not counted yet.
+    received: u16,
     /// The caller's frame buffer, words and counters.
     pub storage: S,
     /// The byte stream.
@@ -127,17 +134,11 @@ pub struct Engine<P, S: Storage, Q> {
     /// The units that did not answer their last request. Each bit stands for the units whose
     /// numbers are equal modulo 32.
     late_units: [u8; 4],
-    /// How many bytes have arrived that were not counted yet.
-    received: u32,
     /// Counts attempts and bytes. (A pointer, so that a program without counters does not
     /// contain its code.)
     tally: Option<fn(&mut Self, Status)>,
     /// Sees every received byte if deviating replies are accepted (see `lenient`).
     observer: Option<Observer<P, S, Q>>,
-    /// How many bytes of the frame buffer, after the `space` ones, the observer has filled.
-    kept: S::Count,
-    /// The observer has seen a deviating reply.
-    has_deviating: bool,
 }
 
 /// What an observer is called for.

@@ -23,17 +23,20 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             is_held: false,
             is_late: false,
             has_slow_unit: false,
-            is_unsearched: false,
+            awaits_end: false,
             run_kind: Outcome::MALFORMED,
             run_length: S::Count::ZERO,
             length: S::Count::ZERO,
             end: S::Count::ZERO,
-            space: S::Count::ZERO,
+            kept: S::Count::ZERO,
             content: S::Count::ZERO,
             outgoing: S::Count::ZERO,
             sent: S::Count::ZERO,
             foreign_frames: 0,
             run: Crc16::START,
+            before: Crc16::START,
+            weight: Crc16::RESIDUE,
+            received: 0,
             storage,
             since: 0,
             wait: 0,
@@ -42,11 +45,8 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             late_units: [0; 4],
             port,
             request: Q::NONE,
-            received: 0,
             tally: Some(Engine::count),
             observer: None,
-            kept: S::Count::ZERO,
-            has_deviating: false,
             settings: Settings::DEFAULT,
         }
     }
@@ -170,8 +170,11 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             Phase::Turnaround => Status::PENDING,
             _ => self.send(),
         };
-        if status != Status::PENDING {
+        // In time, before the count of foreign frames is too great.
+        if status != Status::PENDING || self.received >= 0x200 {
             self.tally(status);
+        }
+        if status != Status::PENDING {
             if status.is_failure() {
                 self.end_on_line();
             }
@@ -186,7 +189,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     fn read_bytes(&mut self, index: S::Count, space: S::Count) -> i16 {
         let received = self.port.read(self.storage.bytes(index, space));
         if received > 0 {
-            self.received = self.received.wrapping_add(received as u32);
+            self.received = self.received.wrapping_add(received as u16);
         }
         received
     }
@@ -205,12 +208,12 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// it is over.
     #[inline(always)]
     fn listen(&mut self) -> Status {
-        // All received bytes are searched, also if the port returns them one by one, but not more
-        // than about a frame in one poll.
-        const MOST: u8 = u8::MAX;
+        // All received bytes are searched, also if the port returns them one by one. If they never
+        // end, the poll ends after as many as an AVR searches in 30 ms at most.
+        const MOST: u8 = 90;
         let mut budget = S::Count::from(MOST);
         loop {
-            if self.end == self.space {
+            if self.end == self.space() {
                 self.make_space();
             }
             // Firmware reads single bytes, which takes less code: 56 bytes on a Cortex-M0+, 140
@@ -220,7 +223,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             let space = if FIRMWARE || self.is_lenient() {
                 1u8.into()
             } else {
-                self.space - first
+                self.space() - first
             };
             let received = self.read_bytes(first, space);
             if received < 0 {
@@ -254,7 +257,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
         // The search may have taken long. The silence begins after it.
         let restarts =
-            self.phase == Phase::Gap || self.is_held || self.is_early || self.is_unsearched;
+            self.phase == Phase::Gap || self.is_held || self.is_early || self.may_end_in_silence();
         if budget < MOST.into() && restarts {
             self.now = self.port.micros();
             self.since = self.now;
@@ -276,7 +279,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         if !is_over && !is_old {
             return Status::PENDING;
         }
-        if !Q::HAS_FIXED_REPLY && self.is_unsearched && !self.find_in_silence() {
+        if self.may_end_in_silence() && !self.find_in_silence() {
             return Status::PENDING;
         }
         if self.is_held_in_vain() && self.seen.is_response() {
@@ -290,7 +293,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     fn wait_for_silence(&mut self) {
         if self.is_held {
             self.wait = self.hold();
-        } else if self.is_early || !Q::HAS_FIXED_REPLY && self.is_unsearched {
+        } else if self.is_early || self.may_end_in_silence() {
             self.wait = self.settings.silence.get();
         } else {
             return;
@@ -298,10 +301,16 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.since = self.now;
     }
 
+    /// True if bytes have arrived that may be a reply of unknown length, which silence ends.
+    #[inline(always)]
+    fn may_end_in_silence(&self) -> bool {
+        !Q::HAS_FIXED_REPLY && self.awaits_end
+    }
+
     /// Searches the received bytes for a reply that ends with the silence. False if the request
     /// still waits for its reply.
     fn find_in_silence(&mut self) -> bool {
-        self.is_unsearched = false;
+        self.awaits_end = false;
         let length = Q::ending_reply(self, true);
         if length > S::Count::ZERO && self.accept(length) {
             if !self.is_on_probation {

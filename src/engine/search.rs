@@ -21,13 +21,18 @@ use crate::FIRMWARE;
 /// Length of the frame of an exception: unit, function, code, CRC.
 const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 
+/// True if the CRC of a reply is derived from the CRC of all bytes since the last frame. That
+/// takes code, and pays only where the CRC of a long reply takes long. (Hosts test it.)
+pub(super) const DERIVES_CRC: bool =
+    cfg!(feature = "diagnosis") && cfg!(any(target_arch = "avr", not(target_os = "none")));
+
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Searches the `received` bytes that the port has written to the frame buffer from `first`
     /// on. True if the request ends. The bytes after the reply are dropped then.
     #[inline(always)]
     pub(crate) fn search(&mut self, first: S::Count, received: S::Count) -> bool {
         if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
-            self.is_unsearched = true;
+            self.awaits_end = true;
         }
         if FIRMWARE {
             // One byte, at the end.
@@ -200,7 +205,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         {
             return false;
         }
-        if rtu::is_frame(self.storage.slice(front, length)) {
+        if self.is_right(front, length) {
             return true;
         }
         // A damaged reply ends the request, unless it lies within the reply or another frame.
@@ -210,6 +215,46 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
         self.note_damaged();
         false
+    }
+
+    /// True if the CRC of the `length` bytes at `front` is right. For the reply, it follows from
+    /// the CRC of all bytes since the last frame and from that of the bytes before `front`, which
+    /// are few. So bytes that begin like the reply again and again cost little.
+    #[inline(always)]
+    fn is_right(&mut self, front: S::Count, length: S::Count) -> bool {
+        let known = self.known();
+        if !DERIVES_CRC || length != self.length || front < known {
+            return rtu::is_frame(self.storage.slice(front, length));
+        }
+        let before = self.before.with(self.storage.slice(known, front - known));
+        if before != Crc16::START && self.weight == Crc16::RESIDUE {
+            self.weight = Crc16::weight(self.storage.slice(front, length));
+        }
+        before.since_start(self.weight) == self.run
+    }
+
+    /// How many bytes of the frame buffer the search uses.
+    #[inline(always)]
+    pub(super) fn space(&self) -> S::Count {
+        self.storage.capacity() - self.kept
+    }
+
+    /// The index in the buffer up to which `before` is the CRC since the last frame.
+    #[inline(always)]
+    fn known(&self) -> S::Count {
+        self.end - self.run_length.min(self.end)
+    }
+
+    /// Drops the bytes before `front`.
+    #[inline(always)]
+    pub(super) fn drop_to(&mut self, front: S::Count) {
+        if DERIVES_CRC && self.known() < front {
+            let known = self.known();
+            self.before = self.before.with(self.storage.slice(known, front - known));
+        }
+        self.content = S::Count::ZERO;
+        self.end -= front;
+        self.storage.move_down(front, self.end);
     }
 
     /// Notes a damaged reply. It may be the answer, so a held reply is not.
@@ -228,6 +273,9 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         if cfg!(feature = "diagnosis") {
             self.run = Crc16::START;
             self.run_kind = Outcome::MALFORMED;
+        }
+        if DERIVES_CRC {
+            self.before = Crc16::START;
         }
     }
 
@@ -315,7 +363,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         let mut keep = self.end - self.content;
         if self.content > S::Count::ZERO {
             self.note_foreign_frame();
-            self.content = S::Count::ZERO;
             self.seen = Outcome::NOTHING;
         } else {
             keep -= 1u8.into();
@@ -327,7 +374,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         while keep > S::Count::ZERO && self.storage.byte(self.end - keep) != self.unit {
             keep -= 1u8.into();
         }
-        self.storage.move_down(self.end - keep, keep);
-        self.end = keep;
+        self.drop_to(self.end - keep);
     }
 }

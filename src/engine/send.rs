@@ -1,7 +1,9 @@
 //! Sends one request: writes the frame, waits until its last bit has left.
 
+use super::search::DERIVES_CRC;
 use super::{Count, Engine, Outcome, Phase, RequestSpec, Storage, BROADCAST};
 use crate::error::Status;
+use crate::frame::checksum::Crc16;
 use crate::port::Port;
 use crate::time::{characters, has_elapsed};
 
@@ -44,17 +46,17 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     fn begin_search(&mut self) {
-        self.space = self.storage.capacity();
-        self.has_deviating = false;
+        self.kept = S::Count::ZERO;
+        self.awaits_end = false;
         self.end = S::Count::ZERO;
         self.content = S::Count::ZERO;
         self.length = self.request.reply_length();
+        if DERIVES_CRC {
+            self.weight = Crc16::RESIDUE;
+        }
         self.seen = Outcome::NOTHING;
         self.is_early = false;
         self.is_held = false;
-        if !Q::HAS_FIXED_REPLY {
-            self.is_unsearched = false;
-        }
         self.is_on_probation = self.may_be_late();
         self.begin_frame();
     }
@@ -78,10 +80,10 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         if self.outgoing == S::Count::ZERO {
             Q::write(self);
         }
-        self.tally(Status::PENDING);
         self.is_late = false;
         self.since = self.now;
         self.phase = Phase::Send;
+        self.tally(Status::PENDING);
         self.port.pre_transmission();
         self.send()
     }

@@ -10,7 +10,7 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
     }
 
     /// Counts what has happened, if the engine counts: an attempt that ends with `status`; or, if
-    /// that is [`Status::PENDING`], one that begins, or bytes that answer no request.
+    /// that is [`Status::PENDING`], one that begins to send, or bytes that have arrived.
     #[inline(always)]
     pub(super) fn tally(&mut self, status: Status) {
         if let Some(tally) = self.tally {
@@ -21,12 +21,12 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
     /// As [`Engine::tally`], for an engine that counts.
     pub(super) fn count(&mut self, status: Status) {
         let storage = &mut self.storage;
-        storage.count(Counter::BytesReceived, self.received);
+        storage.count(Counter::BytesReceived, self.received.into());
         self.received = 0;
         storage.count(Counter::ForeignFrames, self.foreign_frames.into());
         self.foreign_frames = 0;
         if status == Status::PENDING {
-            storage.count(Counter::Requests, u32::from(self.phase == Phase::Gap));
+            storage.count(Counter::Requests, u32::from(self.phase == Phase::Send));
             return;
         }
         if self.phase > Phase::Gap {

@@ -3,6 +3,9 @@
 
 use crate::FIRMWARE;
 
+/// The polynomial of the CRC-16, lowest power in the highest bit.
+const POLYNOMIAL: u16 = 0xA001;
+
 /// For each byte value: its contribution to the CRC after a fixed number of further bytes.
 type Table = [u16; 256];
 
@@ -21,7 +24,7 @@ const fn tables() -> [[Table; 4]; 4] {
         while following < 16 {
             let mut bit = 0;
             while bit < 8 {
-                crc = (crc >> 1) ^ ((crc & 1) * 0xA001);
+                crc = (crc >> 1) ^ ((crc & 1) * POLYNOMIAL);
                 bit += 1;
             }
             tables[following / 4][following % 4][byte] = crc;
@@ -164,6 +167,37 @@ impl Crc16 {
         }
     }
 
+    /// The weight that [`Crc16::since_start`] needs for a frame as long as `bytes`, whatever they
+    /// are.
+    #[inline(always)]
+    #[must_use]
+    pub fn weight(bytes: &[u8]) -> Crc16 {
+        // The CRC is linear, so what the bytes add is in both.
+        Crc16(Crc16(0x8000).with(bytes).0 ^ Crc16(0).with(bytes).0)
+    }
+
+    /// The CRC of a run of bytes that ends with a frame whose CRC is right. `self` is the CRC of
+    /// the bytes before that frame, `weight` the weight of the frame's length. (The CRC is
+    /// linear: the bytes before the frame add a difference, multiplied by the weight.)
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[must_use]
+    pub fn since_start(self, mut weight: Crc16) -> Crc16 {
+        let mut difference = self.0 ^ Crc16::START.0;
+        let mut product = 0;
+        while difference != 0 {
+            if difference & 0x8000 != 0 {
+                product ^= weight.0;
+            }
+            difference <<= 1;
+            let is_odd = weight.0 & 1 != 0;
+            weight.0 >>= 1;
+            if is_odd {
+                weight.0 ^= POLYNOMIAL;
+            }
+        }
+        Crc16(product)
+    }
+
     /// The two bytes of the CRC as they are sent, low byte first.
     pub const fn to_bytes(self) -> [u8; 2] {
         self.0.to_le_bytes()
@@ -235,6 +269,15 @@ mod tests {
             prop_assert_eq!(after.before(byte), Crc16(crc));
             prop_assert_eq!(undo_by_bits(after.0, byte), crc);
             prop_assert_eq!(undo_by_parity(after.0, byte), crc);
+        }
+
+        #[test]
+        fn since_start_predicts_the_crc_after_a_frame(noise: std::vec::Vec<u8>, frame: std::vec::Vec<u8>) {
+            let frame = frame.get(..250).unwrap_or(&frame);
+            let before = crc16(&noise);
+            let after = before.with(frame).with(&crc16(frame).to_bytes());
+            let weight = Crc16::weight(&std::vec![7; frame.len() + 2]);
+            prop_assert_eq!(after, before.since_start(weight));
         }
 
         #[test]

@@ -15,7 +15,7 @@ use core::ffi::c_void;
 #[repr(C)]
 pub struct mbm_master {
     /// Private.
-    pointers: [*mut c_void; 14],
+    pointers: [*mut c_void; 17],
     /// Private.
-    words: [u32; 23],
+    words: [u32; 21],
 }
