@@ -289,6 +289,38 @@ static uint8_t poll_as_rarely_as_allowed(sim *s)
     return status;
 }
 
+#define TEN(text) text text text text text text text text text text
+
+/* A poll does not take all of 407 bytes. Those that are left need no wait, also if the deadline
+ * has passed. */
+static void a_reply_behind_400_bytes_is_found_by_polls_without_a_wait(void **state)
+{
+    static const uint32_t pauses[] = {1000000, 3000000};
+    unsigned i;
+    NODE;
+
+    OK(mbm_master_setBlocking(n, 0));
+    s->character = 100;
+    for (i = 0; i < 2; i++) {
+        const unsigned sent = s->sent;
+        uint64_t at;
+
+        sim_answer(s, 1, 0, TEN(TEN("12 07 + / ")) "11 03 02 00 2A +");
+        assert_int_equal(sim_read_one(s), MBM_PENDING);
+        while (s->sent == sent) {
+            assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+            s->now += 100;
+        }
+        s->now += 1000;
+        assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+        s->now += pauses[i];
+        at = s->now;
+        OK(poll_as_rarely_as_allowed(s));
+        assert_in_range(s->now - at, 0, 1000);
+        assert_int_equal(mbm_master_getResponseBuffer(n, 0), 42);
+    }
+}
+
 static void sleeping_for_poll_delay_does_not_lengthen_a_timeout(void **state)
 {
     uint64_t begin;
@@ -416,6 +448,7 @@ int main(void)
         SIM_TEST(a_request_that_takes_longer_than_the_response_timeout_is_sent),
         SIM_TEST(a_port_that_accepts_a_byte_now_and_then_is_not_busy),
         SIM_TEST(a_gap_longer_than_the_timeout_is_waited_for),
+        SIM_TEST(a_reply_behind_400_bytes_is_found_by_polls_without_a_wait),
         SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout),
         SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay),
         SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply),

@@ -40,7 +40,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             let after = self.content + S::Count::of(after);
             if front < after && self.is_ascii_reply(front, after - front, delimiter) {
                 self.is_early = self.run_length > S::Count::ZERO;
-                if !self.is_on_probation {
+                if !self.is_on_probation() {
                     return true;
                 }
                 let end = self.end;
@@ -49,7 +49,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             }
             self.drop_until(after);
         }
-        if self.is_held {
+        if self.is_held() {
             self.run_length = self.end - self.content;
         }
         if self.end == self.space() {

@@ -20,6 +20,18 @@
 use super::{Engine, Outcome, Phase, RequestSpec, Storage};
 use crate::port::Port;
 
+/// Whether the reply to the pending request may be a late one, which is held.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(u8)]
+pub(super) enum Probation {
+    /// It is none.
+    No,
+    /// The next reply will be held.
+    Yes,
+    /// A reply is or was held.
+    Held,
+}
+
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// The byte of `late_units` that has the bit of the pending request's unit, and that bit.
     #[cfg_attr(target_os = "none", inline(never))]
@@ -75,14 +87,26 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
     }
 
+    /// True if the next reply is held, or one was held.
+    #[inline(always)]
+    pub(super) fn is_on_probation(&self) -> bool {
+        self.probation != Probation::No
+    }
+
+    /// True if a reply is or was held.
+    #[inline(always)]
+    pub(super) fn is_held(&self) -> bool {
+        self.probation == Probation::Held
+    }
+
     /// Holds the response in `seen`, which is on probation. It replaces a response that was held
     /// before.
     #[inline(always)]
     pub(super) fn hold_response(&mut self) {
-        if self.is_held {
+        if self.is_held() {
             self.note_foreign_frame();
         }
-        self.is_held = true;
+        self.probation = Probation::Held;
         self.end = self.content;
         self.begin_frame();
     }
@@ -91,6 +115,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// or the line is not silent. A single byte may be noise.
     #[inline(always)]
     pub(super) fn is_held_in_vain(&self) -> bool {
-        self.is_held && (self.run_length > 1u8.into() || !self.has_expired())
+        self.is_held() && (self.run_length > 1u8.into() || !self.has_expired())
     }
 }

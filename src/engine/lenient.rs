@@ -40,7 +40,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     /// Keeps the byte if it may belong to a deviating response to a read. Notes a deviating
     /// reply that ends with it.
     fn keep(&mut self, byte: u8, is_whole: bool) {
-        if self.awaits_end || self.is_held {
+        if self.awaits_end || self.is_held() {
             return;
         }
         let function = self.request.function();
@@ -130,7 +130,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     /// Makes a deviating reply the result of a request that would fail. Of a reply with more
     /// data than response words, the data that fill these words count.
     fn accept_deviating(&mut self) {
-        if self.awaits_end && !self.is_held && !self.seen.is_response() {
+        if self.awaits_end && !self.is_held() && !self.seen.is_response() {
             if self.request.is_read() {
                 let data = self.kept_data();
                 self.request.set_reads(data);

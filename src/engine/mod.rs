@@ -32,6 +32,8 @@ pub use settings::{Setting, Settings};
 pub use spec::RequestSpec;
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 
+use late::Probation;
+
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 
@@ -77,10 +79,8 @@ pub struct Engine<P, S: Storage, Q> {
     /// The response or damaged reply in `seen` may lie within another frame, so a silence must
     /// follow it.
     is_early: bool,
-    /// The next reply may be a late one, and is held.
-    is_on_probation: bool,
-    /// A reply is or was held.
-    is_held: bool,
+    /// Whether the reply may be a late one, which is held.
+    probation: Probation,
     /// The last request got no right reply. Its reply may still come.
     is_late: bool,
     /// One of the late units sent no reply, not only a damaged one.
@@ -88,6 +88,8 @@ pub struct Engine<P, S: Storage, Q> {
     /// A reply may have arrived that counts only once the bytes end: one of unknown length, or a
     /// deviating one.
     awaits_end: bool,
+    /// The last poll may have left bytes unread.
+    has_more: bool,
     /// What the frame that is being received is if it ends with a right CRC.
     run_kind: Outcome,
     /// How many bytes have arrived since the last frame ended.

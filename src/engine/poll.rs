@@ -1,6 +1,6 @@
 //! Moves a request on, from its start to its end.
 
-use super::{Count, Engine, Event, Outcome, Phase, RequestSpec, Settings, Storage};
+use super::{Count, Engine, Event, Outcome, Phase, Probation, RequestSpec, Settings, Storage};
 use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;
@@ -19,11 +19,11 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             exception: 0,
             seen: Outcome::OK,
             is_early: false,
-            is_on_probation: false,
-            is_held: false,
+            probation: Probation::No,
             is_late: false,
             has_slow_unit: false,
             awaits_end: false,
+            has_more: false,
             run_kind: Outcome::MALFORMED,
             run_length: S::Count::ZERO,
             length: S::Count::ZERO,
@@ -255,17 +255,23 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             }
             budget -= received;
         }
+        self.has_more = budget == S::Count::ZERO;
         // The search may have taken long. The silence begins after it.
-        let restarts =
-            self.phase == Phase::Gap || self.is_held || self.is_early || self.may_end_in_silence();
-        if budget < MOST.into() && restarts {
-            self.now = self.port.micros();
-            self.since = self.now;
+        let restarts = self.phase == Phase::Gap
+            || self.is_held()
+            || self.is_early
+            || self.may_end_in_silence();
+        let mut is_old = false;
+        if budget < MOST.into() {
+            if restarts {
+                self.now = self.port.micros();
+                self.since = self.now;
+            }
+            // Received bytes extend the wait, but not for ever.
+            let limit = self.wait.wrapping_add(Q::response_timeout(self));
+            is_old = self.now.wrapping_sub(self.begun) >= limit;
         }
-        // Received bytes extend the wait, but not for ever.
-        let limit = self.wait.wrapping_add(Q::response_timeout(self));
-        let is_old = budget < MOST.into() && self.since.wrapping_sub(self.begun) >= limit;
-        let is_over = self.has_expired();
+        let is_over = !self.has_more && self.has_expired();
         if self.phase == Phase::Gap {
             if is_over {
                 return self.transmit();
@@ -291,7 +297,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Lets silence end the wait for the reply, if it is known what the request ends with then.
     #[inline(always)]
     fn wait_for_silence(&mut self) {
-        if self.is_held {
+        if self.is_held() {
             self.wait = self.hold();
         } else if self.is_early || self.may_end_in_silence() {
             self.wait = self.settings.silence.get();
@@ -313,12 +319,12 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.awaits_end = false;
         let length = Q::ending_reply(self, true);
         if length > S::Count::ZERO && self.accept(length) {
-            if !self.is_on_probation {
+            if !self.is_on_probation() {
                 return true;
             }
             self.hold_response();
         }
-        if self.is_held {
+        if self.is_held() {
             self.wait = self.hold();
         } else if !self.is_early {
             self.since = self.begun;
@@ -379,14 +385,14 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.since = self.port.micros();
     }
 
-    /// Microseconds from `now` for which poll will find nothing to do unless a byte arrives;
-    /// `u32::MAX` if no request is pending. A phase that has just begun counts its time from
+    /// Microseconds from `now` for which poll will find nothing to do unless a byte arrives; 0 if
+    /// the last poll has left bytes unread; `u32::MAX` if no request is pending. A phase that has just begun counts its time from
     /// this call, so the caller may sleep for the returned time.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
         self.look_at_clock(now);
         match self.phase {
             Phase::Idle => u32::MAX,
-            phase if phase >= Phase::Send => 0,
+            phase if phase >= Phase::Send || self.has_more => 0,
             _ => self.wait.saturating_sub(elapsed(now, self.since)),
         }
     }

@@ -61,7 +61,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     fn is_reply_alone(&mut self, received: S::Count) -> bool {
         let frame = self.storage.slice(S::Count::ZERO, received);
         let start = [self.unit, self.request.function()];
-        if self.is_on_probation
+        if self.is_on_probation()
             || self.outgoing > S::Count::ZERO
             || !frame.starts_with(&start)
             || !rtu::is_frame(frame)
@@ -102,7 +102,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             length > S::Count::ZERO && self.accept(length)
         };
         if is_response {
-            if self.is_on_probation {
+            if self.is_on_probation() {
                 self.hold_response();
                 return false;
             }
@@ -120,7 +120,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     #[inline(always)]
     fn accept_exception(&mut self, is_whole: bool) -> bool {
         let code = self.storage.byte(self.end - 3u8.into());
-        if !self.is_held {
+        if !self.is_held() {
             self.exception = code;
         }
         if let Status::MALFORMED_REPLY = Status::exception(code) {
@@ -260,7 +260,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Notes a damaged reply. It may be the answer, so a held reply is not.
     #[inline(always)]
     pub(super) fn note_damaged(&mut self) {
-        if self.is_held {
+        if self.is_held() {
             self.seen = Outcome::BAD_CRC;
         }
         self.note(Outcome::BAD_CRC);
@@ -316,7 +316,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
         self.note_foreign_frame();
         self.begin_frame();
-        if self.is_held {
+        if self.is_held() {
             // A damaged reply that seemed to follow the held one lies in this frame.
             self.seen = if self.content > S::Count::ZERO || self.exception > 0 {
                 Outcome(self.exception)

@@ -1,7 +1,7 @@
 //! Sends one request: writes the frame, waits until its last bit has left.
 
 use super::search::DERIVES_CRC;
-use super::{Count, Engine, Outcome, Phase, RequestSpec, Storage, BROADCAST};
+use super::{Count, Engine, Outcome, Phase, Probation, RequestSpec, Storage, BROADCAST};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::port::Port;
@@ -56,8 +56,12 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
         self.seen = Outcome::NOTHING;
         self.is_early = false;
-        self.is_held = false;
-        self.is_on_probation = self.may_be_late();
+        self.has_more = false;
+        self.probation = if self.may_be_late() {
+            Probation::Yes
+        } else {
+            Probation::No
+        };
         self.begin_frame();
     }
 
