@@ -176,7 +176,10 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             let sent: u16 = self.sent.into();
             let [low, high] = sent.to_le_bytes();
             let character = self.settings.character;
-            self.wait += characters(character, low) + (characters(character, high) << 8);
+            self.wait += characters(character, low);
+            if high > 0 {
+                self.wait += characters(character, high) << 8;
+            }
         }
     }
 }
