@@ -127,7 +127,7 @@ impl Request {
     }
 
     /// True if a stream may have this result: a reply only if the stream holds it, and a failure
-    /// only if it holds none, or only exceptions that lie within longer frames.
+    /// only if it holds none, or only exceptions that share bytes with longer frames.
     pub fn allows(self, before: Before, stream: &[u8], outcome: Outcome) -> bool {
         let mut results = self.results(stream);
         if !outcome.status.is_failure() {
@@ -136,18 +136,19 @@ impl Request {
         // A held reply is given up if more follows, which may be the rest of the right one.
         before == Before::Timeout
             || results.all(|(start, result)| {
-                result.status.is_exception() && lies_in_a_longer_frame(stream, start)
+                result.status.is_exception() && shares_bytes_with_a_longer_frame(stream, start)
             })
     }
 }
 
-/// True if the exception at `start` is a part of a longer frame. The frames of a stream follow
-/// each other; the first begins with its first byte.
-fn lies_in_a_longer_frame(stream: &[u8], start: usize) -> bool {
+/// True if the exception at `start` is a part of a longer frame, or one begins within it. The
+/// frames of a stream follow each other; the first begins with its first byte.
+fn shares_bytes_with_a_longer_frame(stream: &[u8], start: usize) -> bool {
     let mut begin = 0;
     for end in 1..=stream.len() {
         if end - begin >= 4 && crc_of(&stream[begin..end]) == 0 {
-            if begin <= start && start + EXCEPTION_FRAME <= end && end - begin > EXCEPTION_FRAME {
+            let shares = start < end && begin < start + EXCEPTION_FRAME;
+            if shares && end - begin > EXCEPTION_FRAME {
                 return true;
             }
             begin = end;
