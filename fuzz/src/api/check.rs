@@ -1,11 +1,12 @@
 //! Checks that hold for every call with any arguments.
 
 use super::world::World;
+use mbm_c::MBM_CONNECT_TIMED_OUT;
 
 pub const OK: u8 = 0;
 pub const PENDING: u8 = 235;
 /// The greatest status.
-const LAST: u8 = 244;
+const LAST: u8 = MBM_CONNECT_TIMED_OUT;
 
 /// Calls a function of the C API. `$object` is marked as in use during the call.
 macro_rules! call {
