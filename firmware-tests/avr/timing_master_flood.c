@@ -15,8 +15,8 @@ typedef struct flood {
     wire *bus;
     uint8_t (*byte)(unsigned i);
     unsigned played, taken, finished; /* finished: taken by polls that have ended */
-    uint16_t tail, status; /* their addresses in the sketch */
-    uint8_t at;            /* where the core's next byte to read was last */
+    uint16_t tail, status;            /* their addresses in the sketch */
+    uint8_t at;                       /* where the core's next byte to read was last */
     uint64_t began, longest;
     int takes;
     /* the cycles of polls with bytes to read, and of all others */

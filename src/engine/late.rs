@@ -17,20 +17,8 @@
 //!
 //! A reply that arrives while no request has been sent shows that the replies are late, too.
 
-use super::{Engine, Outcome, Phase, RequestSpec, Storage};
+use super::{Engine, Outcome, Phase, Probation, RequestSpec, Storage};
 use crate::port::Port;
-
-/// Whether the reply to the pending request may be a late one, which is held.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[repr(u8)]
-pub(super) enum Probation {
-    /// It is none.
-    No,
-    /// The next reply will be held.
-    Yes,
-    /// A reply is or was held.
-    Held,
-}
 
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// The byte of `late_units` that has the bit of the pending request's unit, and that bit.

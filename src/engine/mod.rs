@@ -32,8 +32,6 @@ pub use settings::{Setting, Settings};
 pub use spec::RequestSpec;
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 
-use late::Probation;
-
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 
@@ -58,6 +56,18 @@ enum Phase {
     Flush,
     /// Keeps the driver on for the post-flush hold.
     PostFlush,
+}
+
+/// Whether the reply to the pending request may be a late one, which is held.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(u8)]
+enum Probation {
+    /// The reply is not late.
+    No,
+    /// The next reply will be held.
+    Yes,
+    /// A reply is or was held.
+    Held,
 }
 
 /// One request and its reply, over a port and in the caller's storage.

@@ -21,12 +21,13 @@ use crate::FIRMWARE;
 /// Length of the frame of an exception: unit, function, code, CRC.
 const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 
-/// True if the CRC of a reply is derived from the CRC of all bytes since the last frame. That
-/// takes code, and pays only where the CRC of a long reply takes long. (Hosts test it.)
-pub(super) const DERIVES_CRC: bool =
-    cfg!(feature = "diagnosis") && cfg!(any(target_arch = "avr", not(target_os = "none")));
-
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+    /// True if the CRC of a reply is derived from the CRC of all bytes since the last frame. That
+    /// takes code, and pays only where the CRC of a long reply takes long. (Hosts test it.)
+    pub(super) const DERIVES_CRC: bool = Q::HAS_FIXED_REPLY
+        && cfg!(feature = "diagnosis")
+        && (cfg!(target_arch = "avr") || !FIRMWARE);
+
     /// Searches the `received` bytes that the port has written to the frame buffer from `first`
     /// on. True if the request ends. The bytes after the reply are dropped then.
     #[inline(always)]
@@ -223,7 +224,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     #[inline(always)]
     fn is_right(&mut self, front: S::Count, length: S::Count) -> bool {
         let known = self.known();
-        if !DERIVES_CRC || length != self.length || front < known {
+        if !Self::DERIVES_CRC || length != self.length || front < known {
             return rtu::is_frame(self.storage.slice(front, length));
         }
         let before = self.before.with(self.storage.slice(known, front - known));
@@ -248,7 +249,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Drops the bytes before `front`.
     #[inline(always)]
     pub(super) fn drop_to(&mut self, front: S::Count) {
-        if DERIVES_CRC && self.known() < front {
+        if Self::DERIVES_CRC && self.known() < front {
             let known = self.known();
             self.before = self.before.with(self.storage.slice(known, front - known));
         }
@@ -274,7 +275,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             self.run = Crc16::START;
             self.run_kind = Outcome::MALFORMED;
         }
-        if DERIVES_CRC {
+        if Self::DERIVES_CRC {
             self.before = Crc16::START;
         }
     }

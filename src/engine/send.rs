@@ -1,6 +1,5 @@
 //! Sends one request: writes the frame, waits until its last bit has left.
 
-use super::search::DERIVES_CRC;
 use super::{Count, Engine, Outcome, Phase, Probation, RequestSpec, Storage, BROADCAST};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
@@ -51,7 +50,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.end = S::Count::ZERO;
         self.content = S::Count::ZERO;
         self.length = self.request.reply_length();
-        if DERIVES_CRC {
+        if Self::DERIVES_CRC {
             self.weight = Crc16::RESIDUE;
         }
         self.seen = Outcome::NOTHING;
