@@ -75,7 +75,7 @@ static void publish_unit(uint8_t unit)
 /* A unit is online while it answers one of its reads. */
 static void update_unit(uint16_t field, uint8_t status)
 {
-    const uint8_t number = fields.planned[field].unit;
+    const uint8_t number = (uint8_t)fields.planned[field].unit;
     unit_state *unit = &units[number];
     published *was = &last[field];
     const uint8_t answered = (uint8_t)is_answer(status);
