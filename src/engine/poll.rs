@@ -170,7 +170,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             Phase::Turnaround => Status::PENDING,
             _ => self.send(),
         };
-        // In time, before the count of foreign frames is too great.
+        // So many bytes are fewer than 256 foreign frames, which the engine counts in 8 bits.
         if status != Status::PENDING || self.received >= 0x200 {
             self.tally(status);
         }
@@ -386,8 +386,8 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     }
 
     /// Microseconds from `now` for which poll will find nothing to do unless a byte arrives; 0 if
-    /// the last poll has left bytes unread; `u32::MAX` if no request is pending. A phase that has just begun counts its time from
-    /// this call, so the caller may sleep for the returned time.
+    /// the last poll has left bytes unread; `u32::MAX` if no request is pending. A phase that has
+    /// just begun counts its time from this call, so the caller may sleep for the returned time.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
         self.look_at_clock(now);
         match self.phase {

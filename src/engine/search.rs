@@ -234,12 +234,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         before.since_start(self.weight) == self.run
     }
 
-    /// How many bytes of the frame buffer the search uses.
-    #[inline(always)]
-    pub(super) fn space(&self) -> S::Count {
-        self.storage.capacity() - self.kept
-    }
-
     /// The index in the buffer up to which `before` is the CRC since the last frame.
     #[inline(always)]
     fn known(&self) -> S::Count {
@@ -249,8 +243,8 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Drops the bytes before `front`.
     #[inline(always)]
     pub(super) fn drop_to(&mut self, front: S::Count) {
-        if Self::DERIVES_CRC && self.known() < front {
-            let known = self.known();
+        let known = self.known();
+        if Self::DERIVES_CRC && known < front {
             self.before = self.before.with(self.storage.slice(known, front - known));
         }
         self.content = S::Count::ZERO;
@@ -355,6 +349,12 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         if !self.seen.is_response() && self.seen < fault {
             self.seen = fault;
         }
+    }
+
+    /// How many bytes of the frame buffer the search uses.
+    #[inline(always)]
+    pub(super) fn space(&self) -> S::Count {
+        self.storage.capacity() - self.kept
     }
 
     /// Makes space in a full frame buffer. A held reply is dropped, because too many bytes

@@ -24,7 +24,7 @@ const fn tables() -> [[Table; 4]; 4] {
         while following < 16 {
             let mut bit = 0;
             while bit < 8 {
-                crc = (crc >> 1) ^ ((crc & 1) * POLYNOMIAL);
+                crc = shifted(crc);
                 bit += 1;
             }
             tables[following / 4][following % 4][byte] = crc;
@@ -33,6 +33,16 @@ const fn tables() -> [[Table; 4]; 4] {
         byte += 1;
     }
     tables
+}
+
+/// The CRC after one more bit, which is 0.
+#[inline(always)]
+const fn shifted(crc: u16) -> u16 {
+    if crc & 1 != 0 {
+        crc >> 1 ^ POLYNOMIAL
+    } else {
+        crc >> 1
+    }
 }
 
 /// The CRC after `bytes`, by tables: 16 bytes in one step, then 4, then 1. The bytes of one step
@@ -189,11 +199,7 @@ impl Crc16 {
                 product ^= weight.0;
             }
             difference <<= 1;
-            let is_odd = weight.0 & 1 != 0;
-            weight.0 >>= 1;
-            if is_odd {
-                weight.0 ^= POLYNOMIAL;
-            }
+            weight.0 = shifted(weight.0);
         }
         Crc16(product)
     }
