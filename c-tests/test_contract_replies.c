@@ -448,9 +448,7 @@ static void counters_miss_no_frame_of_a_crowded_line(void **state)
     NODE;
 
     for (i = 0; i < 30; i++)
-        sim_answer(s, 1, 30000 * (unsigned)i,
-                   "12 07 + / 12 07 + / 12 07 + / 12 07 + / 12 07 + / 12 07 + / 12 07 + / "
-                   "12 07 + / 12 07 + / 12 07 +");
+        sim_answer(s, 1, 30000 * (unsigned)i, TEN("12 07 + / "));
     sim_answer(s, 1, 900000, "11 03 02 00 2A +");
     OK(mbm_master_readHoldingRegisters(n, 0, 1));
     assert_int_equal(s->counters.foreignFrames, 300);

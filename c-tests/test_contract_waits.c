@@ -289,8 +289,6 @@ static uint8_t poll_as_rarely_as_allowed(sim *s)
     return status;
 }
 
-#define TEN(text) text text text text text text text text text text
-
 /* A poll does not take all of 407 bytes. Those that are left need no wait, also if the deadline
  * has passed. */
 static void a_reply_behind_400_bytes_is_found_by_polls_without_a_wait(void **state)

@@ -28,9 +28,6 @@ int main(void)
 {
     begin();
     uart = CALL(ONE_MORE);
-    for (;;) {
-        if (CALL(mbm_master_readHoldingRegisters(&node, 2, 10)) == MBM_OK)
-            transmit[0] = response[0];
-        uart = CALL(mbm_master_writeMultipleRegisters(&node, 2, 10));
-    }
+    for (;;)
+        CALL_FC03_AND_FC16();
 }

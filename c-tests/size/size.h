@@ -66,6 +66,14 @@ static inline void begin(void)
 
 #endif
 
+/* Reads holding registers, and writes them from the transmit words. */
+#define CALL_FC03_AND_FC16()                                                                       \
+    do {                                                                                           \
+        if (CALL(mbm_master_readHoldingRegisters(&node, 2, 10)) == MBM_OK)                         \
+            transmit[0] = response[0];                                                             \
+        uart = CALL(mbm_master_writeMultipleRegisters(&node, 2, 10));                              \
+    } while (0)
+
 /* Calls the ten functions of the master, and reaches its words. */
 #define CALL_TEN_FUNCTIONS()                                                                       \
     do {                                                                                           \

@@ -86,6 +86,9 @@ int sim_teardown(void **state);
 /* Begins the master for `unit` over the simulated wire, with its hooks. */
 void sim_begin(sim *s, uint8_t unit);
 
+/* A text ten times, for sim_bytes and those that call it. */
+#define TEN(text) text text text text text text text text text text
+
 /* Converts a text such as "11 03 02 00 0A +" to bytes: + is the CRC of the frame so far, /
  * begins another frame. Returns how many bytes. */
 size_t sim_bytes(uint8_t *bytes, const char *text);
