@@ -63,7 +63,7 @@ static int is_answer(uint8_t status)
            status != MBM_GATEWAY_TARGET_FAILED_TO_RESPOND;
 }
 
-static void publish_unit(uint8_t unit)
+static void publish_unit(unsigned unit)
 {
     char name[16];
 
@@ -75,7 +75,7 @@ static void publish_unit(uint8_t unit)
 /* A unit is online while it answers one of its reads. */
 static void update_unit(uint16_t field, uint8_t status)
 {
-    const uint8_t number = (uint8_t)fields.planned[field].unit;
+    const uint16_t number = fields.planned[field].unit;
     unit_state *unit = &units[number];
     published *was = &last[field];
     const uint8_t answered = (uint8_t)is_answer(status);
@@ -154,7 +154,7 @@ static void publish_all(void)
 
     for (number = 1; number < 256; number++)
         if (units[number].state != UNKNOWN)
-            publish_unit((uint8_t)number);
+            publish_unit(number);
     for (field = 0; field < fields.count; field++)
         if (last[field].has_ended)
             publish_value(field);
