@@ -20,7 +20,8 @@ enum { UNIT = 17, ADDRESS = 7, QUANTITY = 10, ROUNDS = 11, PER_ROUND = 2000, WAR
 /* Makes one transaction. Returns 0 if it did not bring the right data. */
 typedef int (*transact)(void);
 
-static mbm_master node;
+static mbm_line line;
+static mbm_node node;
 static mbm_tty tty;
 static uint16_t response[QUANTITY];
 static uint16_t transmit[1];
@@ -36,7 +37,7 @@ static void fail(const char *what)
 
 static int by_mbm(void)
 {
-    return mbm_master_readHoldingRegisters(&node, ADDRESS, QUANTITY) == MBM_OK &&
+    return mbm_node_readHoldingRegisters(&node, ADDRESS, QUANTITY) == MBM_OK &&
            memcmp(response, expected, sizeof expected) == 0;
 }
 
@@ -59,10 +60,9 @@ static void begin_clients(int fd)
         fail("tty");
     port = mbm_tty_port(&tty);
     /* libmodbus keeps no gap before a request, so mbm keeps none here either. */
-    if (mbm_master_beginRtu(&node, UNIT, &port) != MBM_OK ||
-        mbm_master_setBuffers(&node, response, QUANTITY, transmit, 1, frame, sizeof frame) !=
-            MBM_OK ||
-        mbm_master_setGap(&node, 0) != MBM_OK)
+    if (mbm_line_beginRtu(&line, &port, frame, sizeof frame) != MBM_OK ||
+        mbm_node_begin(&node, &line, UNIT, response, QUANTITY, transmit, 1) != MBM_OK ||
+        mbm_line_setGap(&line, 0) != MBM_OK)
         fail("mbm");
     /* Both use the same descriptor, which is non-blocking as libmodbus's own would be.
      * libmodbus needs the name only to make its object. */

@@ -79,7 +79,8 @@ static void line_off(void *context)
 int main(int argc, char **argv)
 {
     static line l;
-    static mbm_master master;
+    static mbm_line bus;
+    static mbm_node node;
     static uint16_t words[WORDS];
     static uint8_t frame[MBM_FRAME_BYTES(WORDS)];
     const mbm_port port = {.context = &l,
@@ -101,17 +102,17 @@ int main(int argc, char **argv)
     for (bytes = argv[4]; l.length < sizeof l.reply && sscanf(bytes, "%2x%n", &byte, &read) == 1;
          bytes += read)
         l.reply[l.length++] = (uint8_t)byte;
-    mbm_master_setBuffers(&master, words, WORDS, NULL, 0, frame, sizeof frame);
-    mbm_master_beginRtu(&master, UNIT, &port);
-    mbm_master_setBaudRate(&master, (uint32_t)strtoul(argv[1], NULL, 10));
-    mbm_master_setPostFlushHold(&master, (uint8_t)strtoul(argv[2], NULL, 10));
-    mbm_master_setResponseTimeout(&master, 100);
-    mbm_master_setBlocking(&master, 0);
-    mbm_master_lineUsed(&master);
-    status = mbm_master_readHoldingRegisters(&master, 107, WORDS);
+    mbm_line_beginRtu(&bus, &port, frame, sizeof frame);
+    mbm_node_begin(&node, &bus, UNIT, words, WORDS, NULL, 0);
+    mbm_line_setBaudRate(&bus, (uint32_t)strtoul(argv[1], NULL, 10));
+    mbm_line_setPostFlushHold(&bus, (uint8_t)strtoul(argv[2], NULL, 10));
+    mbm_node_setResponseTimeout(&node, 100);
+    mbm_node_setBlocking(&node, 0);
+    mbm_line_used(&bus);
+    status = mbm_node_readHoldingRegisters(&node, 107, WORDS);
     while (status == MBM_PENDING && l.now < LONGEST) {
         l.now += STEP;
-        status = mbm_master_poll(&master);
+        status = mbm_node_poll(&node);
     }
     printf("%lu status %02X: %u, %u, %u\n", (unsigned long)l.now, status, words[0], words[1],
            words[2]);

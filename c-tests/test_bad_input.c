@@ -7,100 +7,99 @@
 #include <string.h>
 
 /* Calls the functions that make a request. */
-static void all_requests_answer(mbm_master *m, uint8_t status)
+static void all_requests_answer(mbm_node *m, uint8_t status)
 {
-    IS(status, mbm_master_readCoils(m, 0, 1));
-    IS(status, mbm_master_readDiscreteInputs(m, 0, 1));
-    IS(status, mbm_master_readHoldingRegisters(m, 0, 1));
-    IS(status, mbm_master_readInputRegisters(m, 0, 1));
-    IS(status, mbm_master_writeSingleCoil(m, 0, 1));
-    IS(status, mbm_master_writeSingleRegister(m, 0, 1));
-    IS(status, mbm_master_writeMultipleCoils(m, 0, 1));
-    IS(status, mbm_master_writeQueuedCoils(m));
-    IS(status, mbm_master_writeMultipleRegisters(m, 0, 1));
-    IS(status, mbm_master_writeQueuedRegisters(m));
-    IS(status, mbm_master_maskWriteRegister(m, 0, 1, 2));
-    IS(status, mbm_master_readWriteMultipleRegisters(m, 0, 1, 0, 1));
-    IS(status, mbm_master_readWriteQueuedRegisters(m, 0, 1));
-    assert_int_equal(mbm_master_requestFrom(m, 0, 1), 0);
+    IS(status, mbm_node_readCoils(m, 0, 1));
+    IS(status, mbm_node_readDiscreteInputs(m, 0, 1));
+    IS(status, mbm_node_readHoldingRegisters(m, 0, 1));
+    IS(status, mbm_node_readInputRegisters(m, 0, 1));
+    IS(status, mbm_node_writeSingleCoil(m, 0, 1));
+    IS(status, mbm_node_writeSingleRegister(m, 0, 1));
+    IS(status, mbm_node_writeMultipleCoils(m, 0, 1));
+    IS(status, mbm_node_writeQueuedCoils(m));
+    IS(status, mbm_node_writeMultipleRegisters(m, 0, 1));
+    IS(status, mbm_node_writeQueuedRegisters(m));
+    IS(status, mbm_node_maskWriteRegister(m, 0, 1, 2));
+    IS(status, mbm_node_readWriteMultipleRegisters(m, 0, 1, 0, 1));
+    IS(status, mbm_node_readWriteQueuedRegisters(m, 0, 1));
+    assert_int_equal(mbm_node_requestFrom(m, 0, 1), 0);
 }
 
-/* Calls all others except begin, setBuffers, setWords and statusText. */
-static void all_others_answer(mbm_master *m, uint8_t status)
+/* Calls all others except begin, setFrame and statusText. */
+static void all_others_answer(mbm_line *l, mbm_node *m, uint8_t status)
 {
-    mbm_turn turn = {0};
     mbm_counters counters;
-    uint8_t frame[8];
 
-    IS(status, mbm_master_setFrame(m, frame, sizeof frame));
-    IS(status, mbm_master_poll(m));
-    IS(status, mbm_master_cancel(m));
-    IS(status, mbm_master_status(m));
-    IS(status, mbm_master_setSlaveID(m, 1));
-    IS(status, mbm_master_setResponseTimeout(m, 1));
-    IS(status, mbm_master_setBaudRate(m, 9600));
-    IS(status, mbm_master_setGap(m, 1));
-    IS(status, mbm_master_setTurnaroundDelay(m, 1));
-    IS(status, mbm_master_setQuietTime(m, 1));
-    IS(status, mbm_master_setRetries(m, 1));
-    IS(status, mbm_master_setEchoDiscard(m, 1));
-    IS(status, mbm_master_setLenient(m, 1));
-    IS(status, mbm_master_setPostFlushHold(m, 1));
-    IS(status, mbm_master_setBlocking(m, 1));
-    IS(status, mbm_master_setCounters(m, &counters));
-    IS(status, mbm_master_setCounters(m, NULL));
-    IS(status, mbm_master_lineUsed(m));
-    IS(status, mbm_master_lineUsedAt(m, 0));
-    IS(status, mbm_master_takeTurn(m, &turn));
-    IS(status, mbm_master_endTurn(m, &turn));
-    IS(status, mbm_master_clearResponseBuffer(m));
-    IS(status, mbm_master_setTransmitBuffer(m, 0, 1));
-    IS(status, mbm_master_clearTransmitBuffer(m));
-    IS(status, mbm_master_beginTransmission(m, 1));
-    IS(status, mbm_master_send(m, 1));
-    IS(status, mbm_master_send(m, 1));
-    IS(status, mbm_master_send32(m, 1));
-    IS(status, mbm_master_sendBit(m, 1));
-    assert_int_equal(mbm_master_getExceptionCode(m), 0);
-    assert_int_equal(mbm_master_getSlaveID(m), 0);
-    assert_int_equal(mbm_master_getResponseBuffer(m, 0), 0xFFFF);
-    assert_int_equal(mbm_master_available(m), 0);
-    assert_int_equal(mbm_master_receive(m), 0xFFFF);
+    IS(status, mbm_node_poll(m));
+    IS(status, mbm_node_cancel(m));
+    IS(status, mbm_node_status(m));
+    IS(status, mbm_node_setSlaveID(m, 1));
+    IS(status, mbm_node_setResponseTimeout(m, 1));
+    IS(status, mbm_line_setBaudRate(l, 9600));
+    IS(status, mbm_line_setGap(l, 1));
+    IS(status, mbm_line_setTurnaroundDelay(l, 1));
+    IS(status, mbm_line_setQuietTime(l, 1));
+    IS(status, mbm_line_setRetries(l, 1));
+    IS(status, mbm_line_setEchoDiscard(l, 1));
+    IS(status, mbm_node_setLenient(m, 1));
+    IS(status, mbm_line_setPostFlushHold(l, 1));
+    IS(status, mbm_node_setBlocking(m, 1));
+    IS(status, mbm_line_setCounters(l, &counters));
+    IS(status, mbm_line_setCounters(l, NULL));
+    IS(status, mbm_line_used(l));
+    IS(status, mbm_line_usedAt(l, 0));
+    IS(status, mbm_line_cancel(l));
+    IS(status, mbm_node_clearResponseBuffer(m));
+    IS(status, mbm_node_setTransmitBuffer(m, 0, 1));
+    IS(status, mbm_node_clearTransmitBuffer(m));
+    IS(status, mbm_node_beginTransmission(m, 1));
+    IS(status, mbm_node_send(m, 1));
+    IS(status, mbm_node_send(m, 1));
+    IS(status, mbm_node_send32(m, 1));
+    IS(status, mbm_node_sendBit(m, 1));
+    assert_int_equal(mbm_node_getExceptionCode(m), 0);
+    assert_int_equal(mbm_node_getSlaveID(m), 0);
+    assert_int_equal(mbm_node_getResponseBuffer(m, 0), 0xFFFF);
+    assert_int_equal(mbm_node_available(m), 0);
+    assert_int_equal(mbm_node_receive(m), 0xFFFF);
 }
 
 static void null_is_an_invalid_argument_everywhere(void **state)
 {
-    mbm_master m;
+    mbm_line l = MBM_INIT;
+    mbm_node m = MBM_INIT;
     uint16_t words[2] = {0, 0};
     uint8_t frame[16];
-    NODE;
+    SIM;
 
-    (void)n;
     all_requests_answer(NULL, MBM_INVALID_ARGUMENT);
-    all_others_answer(NULL, MBM_INVALID_ARGUMENT);
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(NULL, 1, &s->port));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(NULL, 1, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtuWith(NULL, 1, &s->port, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(NULL, words, 2, words, 2, frame, 16));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_setWords(NULL, words, 2, words, 2));
-    memset(&m, 0, sizeof m);
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, NULL, 1, words, 2, frame, 16));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, words, 2, NULL, 1, frame, 16));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, words, 2, words, 2, NULL, 16));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, words, 2, words, 2, NULL, 0));
+    all_others_answer(NULL, NULL, MBM_INVALID_ARGUMENT);
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(NULL, &s->port, frame, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(NULL, NULL, frame, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_setFrame(NULL, frame, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_node_begin(NULL, &l, 1, words, 2, words, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&l, NULL, frame, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&l, &s->port, NULL, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_setFrame(&l, NULL, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_setFrame(&l, NULL, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_node_begin(&m, NULL, 1, words, 2, words, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_node_begin(&m, &l, 1, NULL, 1, words, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_node_begin(&m, &l, 1, words, 2, NULL, 1));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
-    all_others_answer(&m, MBM_NOT_INITIALISED);
+    all_others_answer(&l, &m, MBM_NOT_INITIALISED);
 }
 
 static void a_zeroed_object_is_not_initialised_and_stays_zero(void **state)
 {
-    static mbm_master m;
-    static const mbm_master zero;
+    static mbm_line l;
+    static const mbm_line zero_line;
+    static mbm_node m;
+    static const mbm_node zero;
 
     (void)state;
     all_requests_answer(&m, MBM_NOT_INITIALISED);
-    all_others_answer(&m, MBM_NOT_INITIALISED);
+    all_others_answer(&l, &m, MBM_NOT_INITIALISED);
+    assert_memory_equal(&l, &zero_line, sizeof l);
     assert_memory_equal(&m, &zero, sizeof m);
 }
 
@@ -116,70 +115,62 @@ static void every_status_has_a_text(void **state)
     assert_string_not_equal(mbm_status_text(MBM_OK), mbm_status_text(MBM_INVALID_CRC));
 }
 
-static void an_object_without_buffers_makes_no_request(void **state)
+static void a_line_without_a_frame_buffer_sends_no_request(void **state)
 {
-    mbm_master m;
-    NODE;
+    mbm_line l = MBM_INIT;
+    mbm_node m = MBM_INIT;
+    SIM;
 
-    (void)n;
-    memset(&m, 0, sizeof m);
-    OK(mbm_master_beginRtu(&m, 17, &s->port));
+    OK(mbm_line_beginRtu(&l, &s->port, NULL, 0));
+    OK(mbm_node_begin(&m, &l, 17, NULL, 0, NULL, 0));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
     sim_assert_order(s, "PWFOIR", "");
-    assert_int_equal(mbm_master_getResponseBuffer(&m, 0), 0xFFFF);
-    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_setTransmitBuffer(&m, 0, 1));
-    IS(MBM_BUFFER_TOO_SMALL, mbm_master_send(&m, 1));
-    IS(MBM_BUFFER_TOO_SMALL, mbm_master_send32(&m, 1));
-    IS(MBM_BUFFER_TOO_SMALL, mbm_master_sendBit(&m, 1));
-    OK(mbm_master_clearResponseBuffer(&m));
-    OK(mbm_master_clearTransmitBuffer(&m));
-    IS(MBM_NOT_INITIALISED, mbm_master_poll(&m));
+    assert_int_equal(mbm_node_getResponseBuffer(&m, 0), 0xFFFF);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_setTransmitBuffer(&m, 0, 1));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_send(&m, 1));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_send32(&m, 1));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_sendBit(&m, 1));
+    OK(mbm_node_clearResponseBuffer(&m));
+    OK(mbm_node_clearTransmitBuffer(&m));
+    IS(MBM_NOT_INITIALISED, mbm_node_poll(&m));
 }
 
-/* requestFrom returns a number of words and no status, so the program needs mbm_master_status. */
+/* requestFrom returns a number of words and no status, so the program needs mbm_node_status. */
 static void status_says_why_request_from_returned_0(void **state)
 {
-    mbm_master m;
-    NODE;
+    mbm_line l = MBM_INIT;
+    mbm_node m = MBM_INIT;
+    SIM;
 
-    (void)n;
-    memset(&m, 0, sizeof m);
-    OK(mbm_master_beginRtu(&m, 17, &s->port));
-    assert_int_equal(mbm_master_requestFrom(&m, 0, 1), 0);
-    IS(MBM_NOT_INITIALISED, mbm_master_status(&m));
+    OK(mbm_line_beginRtu(&l, &s->port, NULL, 0));
+    OK(mbm_node_begin(&m, &l, 17, NULL, 0, NULL, 0));
+    assert_int_equal(mbm_node_requestFrom(&m, 0, 1), 0);
+    IS(MBM_NOT_INITIALISED, mbm_node_status(&m));
 }
 
-static void an_object_with_buffers_but_never_begun_makes_no_request(void **state)
+static void a_line_without_a_port_sends_no_request(void **state)
 {
-    mbm_master m;
+    mbm_line l = MBM_INIT;
+    mbm_node m = MBM_INIT;
     uint16_t words[2] = {0, 0};
     uint8_t frame[32];
 
     (void)state;
-    memset(&m, 0, sizeof m);
-    OK(mbm_master_setBuffers(&m, words, 1, words + 1, 1, frame, sizeof frame));
+    OK(mbm_node_begin(&m, &l, 17, words, 1, words + 1, 1));
+    OK(mbm_line_setFrame(&l, frame, sizeof frame));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
-    IS(MBM_NOT_INITIALISED, mbm_master_poll(&m));
-    mbm_master_lineUsed(&m);
-    mbm_master_lineUsedAt(&m, 1);
-    mbm_master_cancel(&m);
-}
-
-static void an_object_with_buffers_but_never_begun_has_the_default_slave_id(void **state)
-{
-    mbm_master m;
-    uint8_t frame[32];
-
-    (void)state;
-    memset(&m, 0, sizeof m);
-    OK(mbm_master_setBuffers(&m, NULL, 0, NULL, 0, frame, sizeof frame));
-    assert_int_equal(mbm_master_getSlaveID(&m), 1);
+    IS(MBM_NOT_INITIALISED, mbm_node_poll(&m));
+    OK(mbm_line_used(&l));
+    OK(mbm_line_usedAt(&l, 1));
+    OK(mbm_line_cancel(&l));
+    OK(mbm_node_cancel(&m));
 }
 
 static void a_port_without_its_three_hooks_is_refused(void **state)
 {
     mbm_port read_less, write_less, clock_less, empty;
-    mbm_master m;
+    mbm_line l = MBM_INIT;
+    mbm_node m = MBM_INIT;
     NODE;
 
     read_less = write_less = clock_less = s->port;
@@ -187,17 +178,17 @@ static void a_port_without_its_three_hooks_is_refused(void **state)
     write_less.write = NULL;
     clock_less.micros = NULL;
     memset(&empty, 0, sizeof empty);
-    memset(&m, 0, sizeof m);
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &read_less));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &write_less));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &clock_less));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &empty));
+    OK(mbm_node_begin(&m, &l, 1, NULL, 0, NULL, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&l, &read_less, s->buffer, MBM_MAX_FRAME));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&l, &write_less, s->buffer, MBM_MAX_FRAME));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&l, &clock_less, s->buffer, MBM_MAX_FRAME));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&l, &empty, s->buffer, MBM_MAX_FRAME));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
-    /* A begin that is refused leaves a master that was begun before as it was. */
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(n, 1, &empty));
-    assert_int_equal(mbm_master_getSlaveID(n), 17);
+    /* A begin that is refused leaves a line that was begun before as it was. */
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&s->line, &empty, s->buffer, 8));
+    assert_int_equal(mbm_node_getSlaveID(n), 17);
     sim_answer(s, 1, 500, "11 03 02 00 01 +");
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
 static void forbidden_quantities_return_3_and_nothing_is_sent(void **state)
@@ -208,24 +199,24 @@ static void forbidden_quantities_return_3_and_nothing_is_sent(void **state)
     NODE;
 
     for (i = 0; i < COUNT(beyond); i++) {
-        IS(3, mbm_master_readCoils(n, 0, beyond[i]));
-        IS(3, mbm_master_readDiscreteInputs(n, 0, beyond[i]));
-        IS(3, mbm_master_writeMultipleCoils(n, 0, beyond[i]));
+        IS(3, mbm_node_readCoils(n, 0, beyond[i]));
+        IS(3, mbm_node_readDiscreteInputs(n, 0, beyond[i]));
+        IS(3, mbm_node_writeMultipleCoils(n, 0, beyond[i]));
     }
-    IS(3, mbm_master_writeMultipleCoils(n, 0, 1969));
+    IS(3, mbm_node_writeMultipleCoils(n, 0, 1969));
     for (i = 0; i < COUNT(registers); i++) {
-        IS(3, mbm_master_readHoldingRegisters(n, 0, registers[i]));
-        IS(3, mbm_master_readInputRegisters(n, 0, registers[i]));
-        IS(3, mbm_master_writeMultipleRegisters(n, 0, registers[i]));
-        IS(3, mbm_master_readWriteMultipleRegisters(n, 0, registers[i], 0, 1));
-        IS(3, mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, registers[i]));
-        assert_int_equal(mbm_master_requestFrom(n, 0, registers[i]), 0);
-        IS(3, mbm_master_status(n));
+        IS(3, mbm_node_readHoldingRegisters(n, 0, registers[i]));
+        IS(3, mbm_node_readInputRegisters(n, 0, registers[i]));
+        IS(3, mbm_node_writeMultipleRegisters(n, 0, registers[i]));
+        IS(3, mbm_node_readWriteMultipleRegisters(n, 0, registers[i], 0, 1));
+        IS(3, mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, registers[i]));
+        assert_int_equal(mbm_node_requestFrom(n, 0, registers[i]), 0);
+        IS(3, mbm_node_status(n));
     }
-    IS(3, mbm_master_writeMultipleRegisters(n, 0, 124));
-    IS(3, mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 122));
+    IS(3, mbm_node_writeMultipleRegisters(n, 0, 124));
+    IS(3, mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, 122));
     assert_int_equal(s->sent, 0);
-    assert_int_equal(mbm_master_getExceptionCode(n), 0);
+    assert_int_equal(mbm_node_getExceptionCode(n), 0);
     sim_assert_order(s, "PWO", "");
 }
 
@@ -233,18 +224,18 @@ static void ranges_beyond_65535_return_2_and_nothing_is_sent(void **state)
 {
     NODE;
 
-    IS(2, mbm_master_readCoils(n, 65535, 2));
-    IS(2, mbm_master_readDiscreteInputs(n, 63537, 2000));
-    IS(2, mbm_master_readHoldingRegisters(n, 65412, 125));
-    IS(2, mbm_master_readInputRegisters(n, 65535, 2));
-    IS(2, mbm_master_writeMultipleCoils(n, 65535, 2));
-    IS(2, mbm_master_writeMultipleRegisters(n, 65414, 123));
-    IS(2, mbm_master_readWriteMultipleRegisters(n, 65535, 2, 0, 1));
-    IS(2, mbm_master_readWriteMultipleRegisters(n, 0, 1, 65535, 2));
-    assert_int_equal(mbm_master_requestFrom(n, 65535, 2), 0);
-    IS(2, mbm_master_status(n));
+    IS(2, mbm_node_readCoils(n, 65535, 2));
+    IS(2, mbm_node_readDiscreteInputs(n, 63537, 2000));
+    IS(2, mbm_node_readHoldingRegisters(n, 65412, 125));
+    IS(2, mbm_node_readInputRegisters(n, 65535, 2));
+    IS(2, mbm_node_writeMultipleCoils(n, 65535, 2));
+    IS(2, mbm_node_writeMultipleRegisters(n, 65414, 123));
+    IS(2, mbm_node_readWriteMultipleRegisters(n, 65535, 2, 0, 1));
+    IS(2, mbm_node_readWriteMultipleRegisters(n, 0, 1, 65535, 2));
+    assert_int_equal(mbm_node_requestFrom(n, 65535, 2), 0);
+    IS(2, mbm_node_status(n));
     /* The quantity is checked before the address, as a device does. */
-    IS(3, mbm_master_readHoldingRegisters(n, 65535, 126));
+    IS(3, mbm_node_readHoldingRegisters(n, 65535, 126));
     assert_int_equal(s->sent, 0);
 }
 
@@ -253,15 +244,15 @@ static void request_from_returns_0_if_it_is_refused_after_a_read(void **state)
     NODE;
 
     sim_answer(s, 1, 500, "11 03 02 00 07 +");
-    assert_int_equal(mbm_master_requestFrom(n, 0, 1), 1);
-    assert_int_equal(mbm_master_requestFrom(n, 0, 0), 0);
-    IS(3, mbm_master_status(n));
-    assert_int_equal(mbm_master_requestFrom(n, 65535, 2), 0);
-    IS(2, mbm_master_status(n));
-    OK(mbm_master_setBlocking(n, 0));
-    IS(MBM_PENDING, mbm_master_writeSingleRegister(n, 0, 1));
-    assert_int_equal(mbm_master_requestFrom(n, 0, 1), 0);
-    IS(MBM_PENDING, mbm_master_status(n));
+    assert_int_equal(mbm_node_requestFrom(n, 0, 1), 1);
+    assert_int_equal(mbm_node_requestFrom(n, 0, 0), 0);
+    IS(3, mbm_node_status(n));
+    assert_int_equal(mbm_node_requestFrom(n, 65535, 2), 0);
+    IS(2, mbm_node_status(n));
+    OK(mbm_node_setBlocking(n, 0));
+    IS(MBM_PENDING, mbm_node_writeSingleRegister(n, 0, 1));
+    assert_int_equal(mbm_node_requestFrom(n, 0, 1), 0);
+    IS(MBM_PENDING, mbm_node_status(n));
 }
 
 static void the_last_address_can_be_read_and_written(void **state)
@@ -269,13 +260,13 @@ static void the_last_address_can_be_read_and_written(void **state)
     NODE;
 
     sim_answer(s, 1, 500, "11 03 02 00 07 +");
-    OK(mbm_master_readHoldingRegisters(n, 65535, 1));
+    OK(mbm_node_readHoldingRegisters(n, 65535, 1));
     sim_answer(s, 1, 500, "11 0F FF FE 00 02 +");
-    OK(mbm_master_writeMultipleCoils(n, 65534, 2));
+    OK(mbm_node_writeMultipleCoils(n, 65534, 2));
     sim_answer(s, 1, 500, "11 06 FF FF 00 02 +");
-    OK(mbm_master_writeSingleRegister(n, 65535, 2));
+    OK(mbm_node_writeSingleRegister(n, 65535, 2));
     sim_answer(s, 1, 500, "11 17 02 00 07 +");
-    OK(mbm_master_readWriteMultipleRegisters(n, 65535, 1, 65535, 1));
+    OK(mbm_node_readWriteMultipleRegisters(n, 65535, 1, 65535, 1));
 }
 
 /* Buffers of exactly these sizes, so that sanitizers report an access to one byte more. */
@@ -294,14 +285,14 @@ static buffers give_buffers(sim *s, uint16_t response, uint16_t transmit, uint16
     assert_true(b.response && b.transmit && b.frame);
     b.response = (uint16_t *)realloc(b.response, response ? response * 2u : 1u);
     b.transmit = (uint16_t *)realloc(b.transmit, transmit ? transmit * 2u : 1u);
-    OK(mbm_master_setBuffers(&s->master, b.response, response, b.transmit, transmit, b.frame,
-                             frame));
+    OK(mbm_node_begin(&s->node, &s->line, 17, b.response, response, b.transmit, transmit));
+    OK(mbm_line_setFrame(&s->line, b.frame, frame));
     return b;
 }
 
 static void free_buffers(sim *s, buffers b)
 {
-    OK(mbm_master_setBuffers(&s->master, s->response, 125, s->transmit, 123, s->buffer, 256));
+    sim_begin(s, 17);
     free(b.response);
     free(b.transmit);
     free(b.frame);
@@ -310,15 +301,14 @@ static void free_buffers(sim *s, buffers b)
 static void a_frame_buffer_below_8_bytes_is_refused(void **state)
 {
     uint16_t bytes;
-    NODE;
+    SIM;
 
+    for (bytes = 1; bytes < 8; bytes++)
+        IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&s->line, &s->port, s->buffer, bytes));
     for (bytes = 0; bytes < 8; bytes++)
-        IS(MBM_INVALID_ARGUMENT,
-           mbm_master_setBuffers(n, s->response, 125, s->transmit, 123, s->buffer, bytes));
-    for (bytes = 0; bytes < 8; bytes++)
-        IS(MBM_INVALID_ARGUMENT, mbm_master_setFrame(n, s->buffer, bytes));
-    OK(mbm_master_setFrame(n, s->buffer, 8));
-    OK(mbm_master_setBuffers(n, s->response, 125, s->transmit, 123, s->buffer, 8));
+        IS(MBM_INVALID_ARGUMENT, mbm_line_setFrame(&s->line, s->buffer, bytes));
+    OK(mbm_line_setFrame(&s->line, s->buffer, 8));
+    OK(mbm_line_beginRtu(&s->line, &s->port, s->buffer, 8));
 }
 
 static void a_request_is_sent_whole_or_not_at_all(void **state)
@@ -326,26 +316,26 @@ static void a_request_is_sent_whole_or_not_at_all(void **state)
     uint16_t bytes;
     NODE;
 
-    mbm_master_setGap(n, 0);
-    mbm_master_setQuietTime(n, 0);
-    mbm_master_setResponseTimeout(n, 50);
+    mbm_line_setGap(&s->line, 0);
+    mbm_line_setQuietTime(&s->line, 0);
+    mbm_node_setResponseTimeout(n, 50);
     for (bytes = 8; bytes < 24; bytes++) {
         buffers b = give_buffers(s, 4, 4, bytes);
 
         s->sent = 0;
-        mbm_master_writeSingleRegister(n, 0, 1);
+        mbm_node_writeSingleRegister(n, 0, 1);
         assert_int_equal(s->sent, 1);
-        mbm_master_maskWriteRegister(n, 0, 1, 2);
+        mbm_node_maskWriteRegister(n, 0, 1, 2);
         assert_int_equal(s->sent, 1 + (bytes >= 10));
         s->sent = 0;
-        mbm_master_writeMultipleCoils(n, 0, 17);
+        mbm_node_writeMultipleCoils(n, 0, 17);
         assert_int_equal(s->sent, bytes >= 12);
         s->sent = 0;
-        mbm_master_writeMultipleRegisters(n, 0, 4);
+        mbm_node_writeMultipleRegisters(n, 0, 4);
         assert_int_equal(s->sent, bytes >= 17);
         s->sent = 0;
         IS(bytes >= 21 ? MBM_RESPONSE_TIMED_OUT : MBM_BUFFER_TOO_SMALL,
-           mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 4));
+           mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, 4));
         assert_int_equal(s->sent, bytes >= 21);
         free_buffers(s, b);
     }
@@ -361,13 +351,13 @@ static void a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing
 
         s->answered = 0;
         sim_answer(s, 1, 500, "11 03 08 11 11 22 22 33 33 44 44 +");
-        IS(bytes >= 13 ? MBM_OK : MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 4));
+        IS(bytes >= 13 ? MBM_OK : MBM_BUFFER_TOO_SMALL, mbm_node_readHoldingRegisters(n, 0, 4));
         assert_int_equal(b.response[3], bytes >= 13 ? 0x4444 : 0);
-        assert_int_equal(mbm_master_available(n), bytes >= 13 ? 4 : 0);
+        assert_int_equal(mbm_node_available(n), bytes >= 13 ? 4 : 0);
         sim_answer(s, 1, 500, "11 83 02 +");
-        IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_readHoldingRegisters(n, 0, 4));
+        IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_readHoldingRegisters(n, 0, 4));
         sim_answer(s, 1, 500, "11 03 02 12 34 +");
-        OK(mbm_master_readHoldingRegisters(n, 0, 1));
+        OK(mbm_node_readHoldingRegisters(n, 0, 1));
         free_buffers(s, b);
     }
 }
@@ -381,16 +371,16 @@ static void a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception
 
     b = give_buffers(s, 64, 64, MBM_FRAME_BYTES(64));
     sim_answer(s, 1, 500, "11 83 02 +");
-    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_readHoldingRegisters(n, 0, 66));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_readHoldingRegisters(n, 0, 66));
     sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
     for (i = 0; i < 132; i++)
         strcat(reply, " 77");
     strcat(reply, " +");
     sim_answer(s, 1, 500, reply);
-    IS(MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 66));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_readHoldingRegisters(n, 0, 66));
     for (i = 0; i < 64; i++)
         assert_int_equal(b.response[i], 0);
-    assert_int_equal(mbm_master_available(n), 0);
+    assert_int_equal(mbm_node_available(n), 0);
     free_buffers(s, b);
 }
 
@@ -401,19 +391,19 @@ static void a_reply_longer_than_the_response_words_changes_none(void **state)
 
     b = give_buffers(s, 2, 0, 256);
     sim_answer(s, 1, 500, "11 03 06 11 11 22 22 33 33 +");
-    IS(MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 3));
-    IS(MBM_BUFFER_TOO_SMALL, mbm_master_status(n));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_readHoldingRegisters(n, 0, 3));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_status(n));
     sim_answer(s, 1, 500, "11 01 05 11 11 22 22 33 +");
-    IS(MBM_BUFFER_TOO_SMALL, mbm_master_readCoils(n, 0, 33));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_readCoils(n, 0, 33));
     assert_int_equal(b.response[0], 0);
     assert_int_equal(b.response[1], 0);
     sim_answer(s, 1, 500, "11 01 04 11 11 22 22 +");
-    OK(mbm_master_readCoils(n, 0, 32));
+    OK(mbm_node_readCoils(n, 0, 32));
     free_buffers(s, b);
     b = give_buffers(s, 0, 0, 256);
     sim_answer(s, 1, 500, "11 03 02 11 11 +");
-    IS(MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0xFFFF);
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_readHoldingRegisters(n, 0, 1));
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0xFFFF);
     free_buffers(s, b);
 }
 
@@ -423,14 +413,14 @@ static void writes_beyond_the_transmit_words_return_3_and_nothing_is_sent(void *
     NODE;
 
     b = give_buffers(s, 2, 2, 256);
-    IS(3, mbm_master_writeMultipleRegisters(n, 0, 3));
-    IS(3, mbm_master_writeMultipleCoils(n, 0, 33));
-    IS(3, mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 3));
+    IS(3, mbm_node_writeMultipleRegisters(n, 0, 3));
+    IS(3, mbm_node_writeMultipleCoils(n, 0, 33));
+    IS(3, mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, 3));
     assert_int_equal(s->sent, 0);
     sim_answer(s, 1, 500, "11 0F 00 00 00 20 +");
-    OK(mbm_master_writeMultipleCoils(n, 0, 32));
+    OK(mbm_node_writeMultipleCoils(n, 0, 32));
     sim_answer(s, 1, 500, "11 10 00 00 00 02 +");
-    OK(mbm_master_writeMultipleRegisters(n, 0, 2));
+    OK(mbm_node_writeMultipleRegisters(n, 0, 2));
     free_buffers(s, b);
 }
 
@@ -441,11 +431,11 @@ static void single_writes_need_no_transmit_words(void **state)
 
     b = give_buffers(s, 0, 0, 16);
     sim_answer(s, 1, 500, "11 06 00 01 12 34 +");
-    OK(mbm_master_writeSingleRegister(n, 1, 0x1234));
+    OK(mbm_node_writeSingleRegister(n, 1, 0x1234));
     sim_answer(s, 1, 500, "11 16 00 01 12 34 56 78 +");
-    OK(mbm_master_maskWriteRegister(n, 1, 0x1234, 0x5678));
+    OK(mbm_node_maskWriteRegister(n, 1, 0x1234, 0x5678));
     sim_answer(s, 1, 500, "11 05 00 01 FF 00 +");
-    OK(mbm_master_writeSingleCoil(n, 1, 1));
+    OK(mbm_node_writeSingleCoil(n, 1, 1));
     free_buffers(s, b);
 }
 
@@ -456,7 +446,7 @@ static void a_frame_buffer_of_64_kilobytes_works(void **state)
 
     b = give_buffers(s, 125, 123, 65535);
     sim_answer(s, 1, 500, "00 00 / 11 03 02 12 34 +");
-    OK(mbm_master_readHoldingRegisters(n, 1, 1));
+    OK(mbm_node_readHoldingRegisters(n, 1, 1));
     free_buffers(s, b);
 }
 
@@ -466,10 +456,9 @@ int main(void)
         SIM_TEST(null_is_an_invalid_argument_everywhere),
         SIM_TEST(a_zeroed_object_is_not_initialised_and_stays_zero),
         SIM_TEST(every_status_has_a_text),
-        SIM_TEST(an_object_without_buffers_makes_no_request),
+        SIM_TEST(a_line_without_a_frame_buffer_sends_no_request),
         SIM_TEST(status_says_why_request_from_returned_0),
-        SIM_TEST(an_object_with_buffers_but_never_begun_makes_no_request),
-        SIM_TEST(an_object_with_buffers_but_never_begun_has_the_default_slave_id),
+        SIM_TEST(a_line_without_a_port_sends_no_request),
         SIM_TEST(a_port_without_its_three_hooks_is_refused),
         SIM_TEST(forbidden_quantities_return_3_and_nothing_is_sent),
         SIM_TEST(ranges_beyond_65535_return_2_and_nothing_is_sent),

@@ -10,18 +10,17 @@ static void write_may_accept_a_byte_at_a_time(void **state)
 
     s->write_piece = 1;
     for (i = 0; i < 123; i++)
-        mbm_master_setTransmitBuffer(n, (uint8_t)i, (uint16_t)(i * 0x0101));
+        mbm_node_setTransmitBuffer(n, (uint8_t)i, (uint16_t)(i * 0x0101));
     sim_answer(s, 1, 500, "11 10 00 00 00 7B +");
-    OK(mbm_master_writeMultipleRegisters(n, 0, 123));
+    OK(mbm_node_writeMultipleRegisters(n, 0, 123));
     assert_int_equal(s->frames[0].length, 255);
     assert_int_equal(s->frames[0].bytes[7 + 2 * 99], 99);
 }
 
 static void read_may_return_a_byte_at_a_time(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->read_piece = 1;
     sim_deliver_text(s, s->now, "01 02 03 04 05");
     sim_reads(s, 500);
@@ -29,9 +28,8 @@ static void read_may_return_a_byte_at_a_time(void **state)
 
 static void a_write_that_never_accepts_a_byte_is_a_busy_line(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->write_never = 1;
     IS(MBM_LINE_BUSY, sim_read_one(s));
     assert_int_equal(s->sent, 0);
@@ -43,9 +41,8 @@ static void a_write_that_never_accepts_a_byte_is_a_busy_line(void **state)
 
 static void a_flush_that_never_drains_is_a_busy_line(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->flush_never = 1;
     IS(MBM_LINE_BUSY, sim_read_one(s));
     sim_assert_order(s, "PO", "PO");
@@ -60,7 +57,7 @@ static void a_link_lost_in_the_gap_sends_nothing(void **state)
 
     s->read_dead = 1;
     IS(MBM_LINK_LOST, sim_read_one(s));
-    IS(MBM_LINK_LOST, mbm_master_status(n));
+    IS(MBM_LINK_LOST, mbm_node_status(n));
     assert_int_equal(s->sent, 0);
     sim_assert_order(s, "PWO", "");
     s->read_dead = 0;
@@ -75,9 +72,9 @@ static void die_mid_reply(sim *s)
 
 static void a_link_lost_mid_reply_ends_the_request_at_once(void **state)
 {
-    NODE;
+    SIM;
 
-    mbm_master_setRetries(n, 3);
+    mbm_line_setRetries(&s->line, 3);
     s->on_idle = die_mid_reply;
     sim_answer(s, 1, 500, "11 03 02 00 07 +");
     IS(MBM_LINK_LOST, sim_read_one(s));
@@ -91,9 +88,8 @@ static void a_link_lost_mid_reply_ends_the_request_at_once(void **state)
 static void a_link_lost_mid_write_switches_the_driver_off(void **state)
 {
     uint16_t at;
-    NODE;
+    SIM;
 
-    (void)n;
     s->cut_allowed = 7;
     for (at = 1; at <= 8; at++) {
         s->write_dies_at = at;
@@ -109,9 +105,8 @@ static void a_link_lost_mid_write_switches_the_driver_off(void **state)
  * for one frame. */
 static void the_gap_is_kept_after_a_link_lost_mid_write(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->character = 0; /* bytes are on the wire as soon as they are handed over */
     s->cut_allowed = 1;
     s->write_dies_at = 5;
@@ -123,9 +118,8 @@ static void the_gap_is_kept_after_a_link_lost_mid_write(void **state)
 
 static void hooks_that_claim_too_many_bytes_do_no_harm(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->overclaim = 1000;
     sim_reads(s, 500);
     assert_int_equal(s->counters.bytesSent, 8);
@@ -149,10 +143,10 @@ static void the_clock_may_wrap_at_any_time_of_a_transaction(void **state)
         assert_int_equal(sim_setup(&inner), 0);
         s = (sim *)inner;
         s->clock_start = (uint32_t)(0u - ahead - s->now);
-        mbm_master_setPostFlushHold(&s->master, 1);
-        mbm_master_setResponseTimeout(&s->master, 5);
+        mbm_line_setPostFlushHold(&s->line, 1);
+        mbm_node_setResponseTimeout(&s->node, 5);
         sim_begin(s, 17);
-        OK(mbm_master_lineUsed(&s->master));
+        OK(mbm_line_used(&s->line));
         sim_answer(s, 1, 3000, "11 03 02 00 2A +");
         OK(sim_read_one(s));
         assert_in_range(s->frames[0].silence, 4000, 4100);
@@ -180,8 +174,8 @@ static void the_clock_may_wrap_in_a_long_wait(void **state)
         assert_in_range(s->now - s->frames[0].end, 2000000, 2000100);
         sim_reads(s, 500);
         assert_in_range(s->frames[1].silence, 2000000 + 100000, 2000000 + 100200);
-        mbm_master_setSlaveID(&s->master, 0);
-        OK(mbm_master_writeSingleCoil(&s->master, 0, 0));
+        mbm_node_setSlaveID(&s->node, 0);
+        OK(mbm_node_writeSingleCoil(&s->node, 0, 0));
         assert_in_range(s->now - s->frames[2].end, 100000, 100100);
         sim_teardown(&inner);
     }

@@ -15,15 +15,14 @@ static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
     unsigned i;
 
     if (f->function == 6) {
-        *status = mbm_master_writeSingleRegister(&n->master, (uint16_t)number, (uint16_t)~number);
+        *status = mbm_node_writeSingleRegister(&n->node, (uint16_t)number, (uint16_t)~number);
         return *status == MBM_OK ? '.' : 'F';
     }
-    *status =
-        mbm_master_readHoldingRegisters(&n->master, (uint16_t)(100 * number), FAULT_REGISTERS);
+    *status = mbm_node_readHoldingRegisters(&n->node, (uint16_t)(100 * number), FAULT_REGISTERS);
     if (*status != MBM_OK)
         return 'F';
     for (i = 0; i < FAULT_REGISTERS; i++)
-        if (mbm_master_getResponseBuffer(&n->master, (uint8_t)i) != fault_value(100 * number + i))
+        if (mbm_node_getResponseBuffer(&n->node, (uint8_t)i) != fault_value(100 * number + i))
             return 'W';
     return '.';
 }
@@ -41,10 +40,10 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     node_begin(&n, device.line.ours, FAULT_UNIT);
     port = mbm_tty_port(&n.tty);
     port = fault_port(&device, &port);
-    mbm_master_beginRtu(&n.master, FAULT_UNIT, &port);
-    mbm_master_setResponseTimeout(&n.master, 400);
-    mbm_master_setEchoDiscard(&n.master, f->echo);
-    mbm_master_setRetries(&n.master, retries);
+    mbm_line_beginRtu(&n.line, &port, n.frame, MBM_MAX_FRAME);
+    mbm_node_setResponseTimeout(&n.node, 400);
+    mbm_line_setEchoDiscard(&n.line, f->echo);
+    mbm_line_setRetries(&n.line, retries);
     for (i = 0; i < FAULT_TRANSACTIONS; i++) {
         outcomes[i] = transact(&n, f, i + 1, &status);
         if (i == 0)

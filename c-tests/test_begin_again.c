@@ -10,7 +10,8 @@
 static hooked_port wire, other_wire;
 static mbm_port port, other_port;
 static mbm_client client;
-static mbm_master master;
+static mbm_line line;
+static mbm_node master;
 static uint8_t frame[MBM_MAX_ASCII_FRAME], other_frame[MBM_MAX_ASCII_FRAME];
 static uint8_t outgoing[MBM_MAX_TCP_FRAME];
 static mbm_clientRequest requests[3];
@@ -30,6 +31,7 @@ static int reset(void **state)
 
     (void)state;
     memset(&client, 0, sizeof client);
+    memset(&line, 0, sizeof line);
     memset(&master, 0, sizeof master);
     memset(&wire, 0, sizeof wire);
     memset(&other_wire, 0, sizeof other_wire);
@@ -170,12 +172,11 @@ static void a_client_that_is_suspended_is_not_begun_again(void **state)
     (void)state;
     OK(begin(MBM_FRAMING_RTU, &port));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &requests[0], 0, 1));
-    OK(mbm_master_setBuffers(&master, words, 4, NULL, 0, other_frame, 256));
-    OK(mbm_client_suspend(&client, &master));
+    OK(mbm_client_suspend(&client, &line));
     for (framing = 0; framing < 4; framing++)
         REFUSED(MBM_BUSY, client, begin(framing, &other_port));
     IS(MBM_PENDING, requests[0].status);
-    OK(mbm_client_resume(&client, &master));
+    OK(mbm_client_resume(&client, &line));
     OK(begin(MBM_FRAMING_TCP, &other_port));
     IS(MBM_CANCELLED, requests[0].status);
 }
@@ -208,30 +209,33 @@ static void a_client_may_begin_again_when_a_request_is_done(void **state)
     ask_over_the_other_port(MBM_FRAMING_TCP);
 }
 
-static void a_master_gives_up_its_request_and_keeps_settings_and_buffers(void **state)
+static void a_line_and_a_node_keep_their_settings(void **state)
 {
     mbm_counters counters = {0};
     unsigned i;
 
     (void)state;
-    OK(mbm_master_setBuffers(&master, words, 4, NULL, 0, other_frame, 256));
-    OK(mbm_master_beginRtu(&master, 17, &port));
-    OK(mbm_master_setBlocking(&master, 0));
-    OK(mbm_master_setCounters(&master, &counters));
-    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&master, 0, 1));
+    OK(mbm_line_beginRtu(&line, &port, other_frame, 256));
+    OK(mbm_node_begin(&master, &line, 17, words, 4, NULL, 0));
+    OK(mbm_node_setBlocking(&master, 0));
+    OK(mbm_line_setCounters(&line, &counters));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&master, 0, 1));
     for (i = 0; i < 1000 && wire.length == 0; i++)
-        IS(MBM_PENDING, mbm_master_poll(&master));
-    OK(mbm_master_beginRtu(&master, 18, &other_port));
-    IS(MBM_CANCELLED, mbm_master_status(&master));
-    IS(MBM_CANCELLED, mbm_master_poll(&master));
-    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&master, 0, 1));
+        IS(MBM_PENDING, mbm_node_poll(&master));
+    IS(MBM_BUSY, mbm_line_beginRtu(&line, &other_port, other_frame, 256));
+    OK(mbm_node_cancel(&master));
+    OK(mbm_line_beginRtu(&line, &other_port, other_frame, 256));
+    OK(mbm_node_begin(&master, &line, 18, words, 4, NULL, 0));
+    IS(MBM_CANCELLED, mbm_node_status(&master));
+    IS(MBM_CANCELLED, mbm_node_poll(&master));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&master, 0, 1));
     for (i = 0; i < 10000 && other_wire.called[HOOK_POST] == 0; i++)
-        IS(MBM_PENDING, mbm_master_poll(&master));
+        IS(MBM_PENDING, mbm_node_poll(&master));
     hooked_port_arrive_rtu(&other_wire, 18, "\x03\x02\x56\x78", 4);
     /* After a request that was given up, a reply is held for the quiet time. */
-    for (i = 0; i < 10000 && mbm_master_poll(&master) == MBM_PENDING; i++)
+    for (i = 0; i < 10000 && mbm_node_poll(&master) == MBM_PENDING; i++)
         ;
-    OK(mbm_master_status(&master));
+    OK(mbm_node_status(&master));
     assert_int_equal(words[0], 0x5678);
     assert_int_equal(counters.requests, 2);
 }
@@ -312,7 +316,7 @@ int main(void)
                                reset),
         cmocka_unit_test_setup(a_client_that_is_suspended_is_not_begun_again, reset),
         cmocka_unit_test_setup(a_client_may_begin_again_when_a_request_is_done, reset),
-        cmocka_unit_test_setup(a_master_gives_up_its_request_and_keeps_settings_and_buffers, reset),
+        cmocka_unit_test_setup(a_line_and_a_node_keep_their_settings, reset),
         cmocka_unit_test_setup(a_server_drops_what_it_received_and_serves_the_new_port, reset),
         cmocka_unit_test_setup(a_sniffer_forgets_bytes_and_requests, reset),
         cmocka_unit_test_setup(a_ring_is_empty_and_has_lost_nothing, reset),

@@ -21,7 +21,7 @@ static void a_uart_that_the_board_lacks_falls_back_to_the_first(void **)
 
 static void objects_are_small(void **)
 {
-    assert_in_range(sizeof(ModbusMaster), 2 * 128, 2 * 128 + sizeof(mbm_master) + 80);
+    assert_in_range(sizeof(ModbusMaster), 2 * 128, 2 * 128 + sizeof(mbm_node) + 80);
 }
 
 static void objects_may_share_the_frame_buffer(void **)

@@ -204,65 +204,61 @@ static void the_master_uses_the_line_between_the_clients_requests(void **state)
 {
     uint16_t words[4], more[4], none[1];
     uint8_t frame[64];
-    mbm_master node;
+    mbm_line line = MBM_INIT;
+    mbm_node node = MBM_INIT;
     mbm_clientRequest r = asker_request(UNIT, words, sizeof words, NULL);
     server s;
 
     (void)state;
-    memset(&node, 0, sizeof node);
     server_start(&s, UNIT);
     asker_begin_rtu(&a, s.line.ours);
-    OK(mbm_master_setBuffers(&node, more, 4, none, 1, frame, sizeof frame));
-    IS(MBM_NOT_INITIALISED, mbm_master_readHoldingRegisters(&node, 0, 4));
+    OK(mbm_line_setFrame(&line, frame, sizeof frame));
+    OK(mbm_node_begin(&node, &line, UNIT, more, 4, none, 1));
+    IS(MBM_NOT_INITIALISED, mbm_node_readHoldingRegisters(&node, 0, 4));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 4));
     (void)mbm_client_poll(&a.client);
-    IS(MBM_BUSY, mbm_client_suspend(&a.client, &node));
+    IS(MBM_BUSY, mbm_client_suspend(&a.client, &line));
     asker_wait_all(&a);
-    OK(mbm_client_suspend(&a.client, &node));
-    IS(MBM_BUSY, mbm_client_suspend(&a.client, &node));
+    OK(mbm_client_suspend(&a.client, &line));
+    IS(MBM_BUSY, mbm_client_suspend(&a.client, &line));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 4));
     IS(MBM_BUSY, mbm_client_poll(&a.client));
     a.port.idle = NULL;
-    OK(mbm_master_setSlaveID(&node, UNIT));
-    OK(mbm_master_setBlocking(&node, 0));
-    OK(mbm_master_setResponseTimeout(&node, PATIENCE_MS));
-    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&node, 0, 4));
-    IS(MBM_BUSY, mbm_client_resume(&a.client, &node));
-    while (mbm_master_poll(&node) == MBM_PENDING)
+    OK(mbm_node_setBlocking(&node, 0));
+    OK(mbm_node_setResponseTimeout(&node, PATIENCE_MS));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&node, 0, 4));
+    IS(MBM_BUSY, mbm_client_resume(&a.client, &line));
+    while (mbm_node_poll(&node) == MBM_PENDING)
         ;
-    OK(mbm_master_status(&node));
-    OK(mbm_client_resume(&a.client, &node));
-    IS(MBM_INVALID_ARGUMENT, mbm_client_resume(&a.client, &node));
+    OK(mbm_node_status(&node));
+    OK(mbm_client_resume(&a.client, &line));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_resume(&a.client, &line));
     assert_int_equal(asker_wait(&a, &r), MBM_OK);
     assert_memory_equal(words, more, sizeof words);
-    IS(MBM_NOT_INITIALISED, mbm_master_readHoldingRegisters(&node, 0, 4));
+    IS(MBM_NOT_INITIALISED, mbm_node_readHoldingRegisters(&node, 0, 4));
     server_stop(&s);
 }
 
 static void a_master_gets_no_line_that_carries_other_frames(void **state)
 {
     static mbm_client tcp, ascii;
-    static mbm_master node;
-    static uint16_t words[2];
-    static uint8_t frame[MBM_FRAME_BYTES(2)];
-    pty line;
+    static mbm_line line;
+    pty wire;
 
     (void)state;
-    pty_open(&line);
+    pty_open(&wire);
     memset(&a, 0, sizeof a);
-    assert_int_equal(mbm_tty_attach(&a.tty, line.ours), 0);
+    assert_int_equal(mbm_tty_attach(&a.tty, wire.ours), 0);
     a.port = mbm_tty_port(&a.tty);
-    OK(mbm_master_setBuffers(&node, words, 2, words, 2, frame, sizeof frame));
-    OK(mbm_master_beginRtu(&node, UNIT, &a.port));
     OK(mbm_client_beginTcp(&tcp, &a.port, a.incoming, 260, a.outgoing, 260));
-    IS(MBM_INVALID_ARGUMENT, mbm_client_suspend(&tcp, &node));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_suspend(&tcp, &line));
     OK(mbm_client_beginAscii(&ascii, &a.port, a.incoming, 513));
-    IS(MBM_INVALID_ARGUMENT, mbm_client_suspend(&ascii, &node));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_suspend(&ascii, &line));
     OK(mbm_client_poll(&ascii));
     /* A program may suspend a TCP client for a purpose of its own. */
     OK(mbm_client_suspend(&tcp, NULL));
     OK(mbm_client_resume(&tcp, NULL));
-    pty_close(&line);
+    pty_close(&wire);
 }
 
 static void bad_calls_are_refused_with_a_status(void **state)

@@ -10,9 +10,10 @@
 
 static memory_port m, other_m;
 static mbm_client *client; /* on the heap, so that the sanitizer finds each use after its end */
-static mbm_master master, other;
+static mbm_line line, other_line;
+static mbm_node node, other;
 static mbm_link *kept;
-static uint8_t frame[256], master_frame[256], other_frame[256];
+static uint8_t frame[256], line_frame[256], other_frame[256];
 static uint16_t words[4], other_words[4];
 
 static uint8_t opened(void *context)
@@ -29,7 +30,9 @@ static void begin(int framing, int has_link)
 
     memset(&m, 0, sizeof m);
     memset(&other_m, 0, sizeof other_m);
-    memset(&master, 0, sizeof master);
+    memset(&line, 0, sizeof line);
+    memset(&other_line, 0, sizeof other_line);
+    memset(&node, 0, sizeof node);
     memset(&other, 0, sizeof other);
     client = (mbm_client *)calloc(1, sizeof *client);
     kept = (mbm_link *)calloc(1, sizeof *kept);
@@ -41,10 +44,12 @@ static void begin(int framing, int has_link)
         OK(mbm_link_begin(kept, client, &hooks));
         OK(mbm_client_poll(client));
     }
-    OK(mbm_master_setBuffers(&master, words, 4, words, 4, master_frame, sizeof master_frame));
-    OK(mbm_master_setBuffers(&other, other_words, 4, NULL, 0, other_frame, sizeof other_frame));
-    OK(mbm_master_setBlocking(&master, 0));
-    OK(mbm_master_setBlocking(&other, 0));
+    OK(mbm_line_setFrame(&line, line_frame, sizeof line_frame));
+    OK(mbm_node_begin(&node, &line, 17, words, 4, words, 4));
+    OK(mbm_line_setFrame(&other_line, other_frame, sizeof other_frame));
+    OK(mbm_node_begin(&other, &other_line, 1, other_words, 4, NULL, 0));
+    OK(mbm_node_setBlocking(&node, 0));
+    OK(mbm_node_setBlocking(&other, 0));
 }
 
 static void end(void)
@@ -67,30 +72,30 @@ static void each_variant(void (*test)(void))
 
 static void resume_in_turn(void)
 {
-    static mbm_master fresh;
+    static mbm_line fresh;
 
-    OK(mbm_client_suspend(client, &master));
+    OK(mbm_client_suspend(client, &line));
     REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &other));
-    REFUSED(MBM_INVALID_ARGUMENT, other, mbm_client_resume(client, &other));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &other_line));
+    REFUSED(MBM_INVALID_ARGUMENT, other_line, mbm_client_resume(client, &other_line));
     REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &fresh));
     /* The master still has the line. */
-    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
+    IS(MBM_PENDING, mbm_node_readCoils(&node, 0, 1));
     REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, NULL));
-    REFUSED(MBM_BUSY, *client, mbm_client_resume(client, &master));
-    OK(mbm_master_cancel(&master));
+    REFUSED(MBM_BUSY, *client, mbm_client_resume(client, &line));
+    OK(mbm_node_cancel(&node));
     IS(MBM_BUSY, mbm_client_poll(client));
-    OK(mbm_client_resume(client, &master));
+    OK(mbm_client_resume(client, &line));
     OK(mbm_client_poll(client));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &master));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &line));
 
     OK(mbm_client_suspend(client, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &master));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &line));
     OK(mbm_client_resume(client, NULL));
     /* The next one to whom the line is given counts, not the one before. */
-    OK(mbm_client_suspend(client, &other));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &master));
-    OK(mbm_client_resume(client, &other));
+    OK(mbm_client_suspend(client, &other_line));
+    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &line));
+    OK(mbm_client_resume(client, &other_line));
 }
 
 static void a_client_resumes_only_from_the_one_who_has_its_line(void **state)
@@ -101,16 +106,16 @@ static void a_client_resumes_only_from_the_one_who_has_its_line(void **state)
 
 static void lend_and_end(void)
 {
-    OK(mbm_client_suspend(client, &master));
+    OK(mbm_client_suspend(client, &line));
     (void)mbm_client_resume(client, NULL);
-    OK(mbm_client_resume(client, &master));
+    OK(mbm_client_resume(client, &line));
     end();
     client = NULL;
     kept = NULL;
-    IS(MBM_NOT_INITIALISED, mbm_master_readCoils(&master, 0, 1));
-    assert_int_equal(mbm_master_pollDelay(&master), UINT32_MAX);
-    OK(mbm_master_lineUsed(&master));
-    OK(mbm_master_cancel(&master));
+    IS(MBM_NOT_INITIALISED, mbm_node_readCoils(&node, 0, 1));
+    assert_int_equal(mbm_node_pollDelay(&node), UINT32_MAX);
+    OK(mbm_line_used(&line));
+    OK(mbm_node_cancel(&node));
 }
 
 static void a_master_uses_nothing_of_a_client_that_has_resumed(void **state)
@@ -125,8 +130,8 @@ static void the_master_keeps_the_other_port(void)
     end();
     client = NULL;
     kept = NULL;
-    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
-    while (other_m.sent_count == 0 && mbm_master_poll(&master) == MBM_PENDING)
+    IS(MBM_PENDING, mbm_node_readCoils(&node, 0, 1));
+    while (other_m.sent_count == 0 && mbm_node_poll(&node) == MBM_PENDING)
         other_m.now += 100;
     assert_int_equal(other_m.sent_count, 8);
 }
@@ -135,9 +140,9 @@ static void begin_the_master(void)
 {
     const mbm_port port = memory_port_of(&other_m);
 
-    OK(mbm_client_suspend(client, &master));
-    OK(mbm_master_beginRtu(&master, 17, &port));
-    OK(mbm_client_resume(client, &master));
+    OK(mbm_client_suspend(client, &line));
+    OK(mbm_line_beginRtu(&line, &port, line_frame, sizeof line_frame));
+    OK(mbm_client_resume(client, &line));
     the_master_keeps_the_other_port();
 }
 
@@ -155,13 +160,13 @@ static void lend_to_the_master_of_another(void)
 
     memset(&second, 0, sizeof second);
     OK(mbm_client_beginRtu(&second, &port, second_frame, sizeof second_frame));
-    OK(mbm_client_suspend(client, &master));
-    OK(mbm_client_suspend(&second, &master));
-    OK(mbm_client_resume(client, &master));
+    OK(mbm_client_suspend(client, &line));
+    OK(mbm_client_suspend(&second, &line));
+    OK(mbm_client_resume(client, &line));
     the_master_keeps_the_other_port();
-    OK(mbm_master_cancel(&master));
-    OK(mbm_client_resume(&second, &master));
-    IS(MBM_NOT_INITIALISED, mbm_master_readCoils(&master, 0, 1));
+    OK(mbm_node_cancel(&node));
+    OK(mbm_client_resume(&second, &line));
+    IS(MBM_NOT_INITIALISED, mbm_node_readCoils(&node, 0, 1));
 }
 
 static void a_master_with_the_lines_of_two_clients_keeps_the_second(void **state)
@@ -172,12 +177,12 @@ static void a_master_with_the_lines_of_two_clients_keeps_the_second(void **state
 
 static void forget_the_master(void)
 {
-    OK(mbm_client_suspend(client, &master));
-    memset(&master, 0, sizeof master);
+    OK(mbm_client_suspend(client, &line));
+    memset(&line, 0, sizeof line);
     IS(MBM_INVALID_ARGUMENT, mbm_client_resume(client, NULL));
-    OK(mbm_client_resume(client, &master));
+    OK(mbm_client_resume(client, &line));
     OK(mbm_client_poll(client));
-    IS(MBM_NOT_INITIALISED, mbm_master_cancel(&master));
+    IS(MBM_NOT_INITIALISED, mbm_line_cancel(&line));
 }
 
 static void a_client_resumes_from_a_master_that_was_zeroed(void **state)
@@ -196,7 +201,7 @@ static void lend(void *context, mbm_clientRequest *request)
     (void)context;
     (void)request;
     ended++;
-    OK(mbm_client_suspend(client, &master));
+    OK(mbm_client_suspend(client, &line));
 }
 
 static void suspend_when_done(void)
@@ -219,9 +224,9 @@ static void suspend_when_done(void)
     assert_int_equal(ended, 1);
     /* The line is the master's: the next request waits. */
     assert_int_equal(m.sent_count, 8);
-    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
-    OK(mbm_master_cancel(&master));
-    OK(mbm_client_resume(client, &master));
+    IS(MBM_PENDING, mbm_node_readCoils(&node, 0, 1));
+    OK(mbm_node_cancel(&node));
+    OK(mbm_client_resume(client, &line));
     IS(MBM_PENDING, requests[1].status);
     for (i = 0; i < 100 && m.sent_count == 8; i++, m.now += 10000)
         IS(MBM_PENDING, mbm_client_poll(client));

@@ -6,19 +6,19 @@
 #include <stdio.h>
 #include <string.h>
 
-#define WORD(index) mbm_master_getResponseBuffer(n, index)
+#define WORD(index) mbm_node_getResponseBuffer(&s->node, index)
 
 static uint8_t read_words(sim *s, uint16_t quantity, const char *reply)
 {
     sim_answer(s, 1, 500, reply);
-    return mbm_master_readHoldingRegisters(&s->master, 0, quantity);
+    return mbm_node_readHoldingRegisters(&s->node, 0, quantity);
 }
 
 /* The bytes of the previous transaction must not spoil the next one. */
 static void recovers_at_once(sim *s)
 {
     OK(read_words(s, 1, "11 03 02 00 2A +"));
-    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
+    assert_int_equal(mbm_node_getResponseBuffer(&s->node, 0), 42);
 }
 
 static void found_after(sim *s, const char *noise)
@@ -27,8 +27,8 @@ static void found_after(sim *s, const char *noise)
 
     snprintf(reply, sizeof reply, "%s / 11 03 04 12 34 56 78 +", noise);
     OK(read_words(s, 2, reply));
-    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 0x1234);
-    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 1), 0x5678);
+    assert_int_equal(mbm_node_getResponseBuffer(&s->node, 0), 0x1234);
+    assert_int_equal(mbm_node_getResponseBuffer(&s->node, 1), 0x5678);
     recovers_at_once(s);
 }
 
@@ -43,14 +43,14 @@ static void exception_codes_of_the_device_are_returned_unchanged(void **state)
         snprintf(reply, sizeof reply, "11 83 %02X +", code);
         s->answered = 0;
         assert_int_equal(read_words(s, 1, reply), code);
-        assert_int_equal(mbm_master_getExceptionCode(n), code);
-        assert_int_equal(mbm_master_status(n), code);
+        assert_int_equal(mbm_node_getExceptionCode(n), code);
+        assert_int_equal(mbm_node_status(n), code);
         if (s->sent > SIM_FRAMES - 2)
             s->sent = 0;
     }
     assert_int_equal(s->counters.exceptions, 0x7F);
     recovers_at_once(s);
-    assert_int_equal(mbm_master_getExceptionCode(n), 0);
+    assert_int_equal(mbm_node_getExceptionCode(n), 0);
 }
 
 static void an_exception_code_of_0_or_from_80_on_is_malformed_and_kept(void **state)
@@ -58,11 +58,11 @@ static void an_exception_code_of_0_or_from_80_on_is_malformed_and_kept(void **st
     NODE;
 
     assert_int_equal(read_words(s, 1, "11 83 00 +"), MBM_MALFORMED_REPLY);
-    assert_int_equal(mbm_master_getExceptionCode(n), 0);
+    assert_int_equal(mbm_node_getExceptionCode(n), 0);
     assert_int_equal(read_words(s, 1, "11 83 80 +"), MBM_MALFORMED_REPLY);
-    assert_int_equal(mbm_master_getExceptionCode(n), 0x80);
+    assert_int_equal(mbm_node_getExceptionCode(n), 0x80);
     assert_int_equal(read_words(s, 1, "11 83 E2 +"), MBM_MALFORMED_REPLY);
-    assert_int_equal(mbm_master_getExceptionCode(n), 0xE2);
+    assert_int_equal(mbm_node_getExceptionCode(n), 0xE2);
     recovers_at_once(s);
 }
 
@@ -71,7 +71,7 @@ static void an_exception_with_a_bad_crc_is_no_exception(void **state)
     NODE;
 
     assert_int_equal(read_words(s, 1, "11 83 02 00 00"), MBM_INVALID_CRC);
-    assert_int_equal(mbm_master_getExceptionCode(n), 0);
+    assert_int_equal(mbm_node_getExceptionCode(n), 0);
     assert_int_equal(s->counters.badCrc, 1);
     recovers_at_once(s);
 }
@@ -88,7 +88,7 @@ static void response_words_survive_a_failure(void **state)
         "",
     };
     size_t i;
-    NODE;
+    SIM;
 
     OK(read_words(s, 2, "11 03 04 12 34 56 78 +"));
     for (i = 0; i < COUNT(replies); i++) {
@@ -101,7 +101,7 @@ static void response_words_survive_a_failure(void **state)
 
 static void each_failure_has_its_status(void **state)
 {
-    NODE;
+    SIM;
 
     assert_int_equal(read_words(s, 1, ""), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_words(s, 1, "12 03 02 00 01 +"), MBM_INVALID_SLAVE_ID);
@@ -111,14 +111,12 @@ static void each_failure_has_its_status(void **state)
     assert_int_equal(read_words(s, 1, "11 03 04 00 01 00 02 +"), MBM_MALFORMED_REPLY);
     assert_int_equal(read_words(s, 1, "11 03 02 00"), MBM_RESPONSE_TIMED_OUT);
     recovers_at_once(s);
-    (void)n;
 }
 
 static void the_most_specific_failure_is_reported(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     assert_int_equal(read_words(s, 1, "12 03 02 00 01 + / 11 04 02 00 01 +"), MBM_INVALID_FUNCTION);
     assert_int_equal(read_words(s, 1, "11 04 02 00 01 + / 12 03 02 00 01 +"), MBM_INVALID_FUNCTION);
     assert_int_equal(read_words(s, 1, "11 03 04 00 01 00 02 + / 11 04 02 00 01 +"),
@@ -129,9 +127,8 @@ static void the_most_specific_failure_is_reported(void **state)
 static void a_bad_crc_fails_after_t35_and_not_after_the_timeout(void **state)
 {
     uint64_t over;
-    NODE;
+    SIM;
 
-    (void)n;
     assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
     over = s->frames[0].end + 500 + 7 * s->character;
     assert_in_range(s->now, over + 4000, over + 4100);
@@ -150,23 +147,22 @@ static void all_125_registers_and_2000_bits_are_readable(void **state)
     snprintf(text + at, sizeof text - at, "+");
     assert_int_equal(sim_bytes(reply, text), 255);
     OK(read_words(s, 125, text));
-    assert_int_equal(mbm_master_available(n), 125);
+    assert_int_equal(mbm_node_available(n), 125);
     for (i = 0; i < 125; i++)
-        assert_int_equal(mbm_master_receive(n), (2 * i) << 8 | (2 * i + 1));
+        assert_int_equal(mbm_node_receive(n), (2 * i) << 8 | (2 * i + 1));
     text[4] = '1';
     sim_answer(s, 1, 500, text);
-    OK(mbm_master_readCoils(n, 0, 2000));
+    OK(mbm_node_readCoils(n, 0, 2000));
     for (i = 0; i < 125; i++)
         assert_int_equal(WORD((uint8_t)i), (2 * i + 1) << 8 | (2 * i));
 }
 
 static void reads_of_65_registers_and_more_are_sent(void **state)
 {
-    NODE;
+    SIM;
 
     assert_int_equal(read_words(s, 66, "11 83 02 +"), MBM_ILLEGAL_DATA_ADDRESS);
     sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
-    (void)n;
 }
 
 static void a_byte_count_of_251_to_255_is_malformed(void **state)
@@ -174,7 +170,7 @@ static void a_byte_count_of_251_to_255_is_malformed(void **state)
     unsigned count;
     NODE;
 
-    mbm_master_setResponseTimeout(n, 100);
+    mbm_node_setResponseTimeout(n, 100);
     for (count = 251; count < 256; count++) {
         char reply[40];
 
@@ -195,9 +191,9 @@ static void a_byte_count_that_does_not_suit_the_request_is_malformed(void **stat
     assert_int_equal(read_words(s, 4, "11 03 02 AA AA +"), MBM_MALFORMED_REPLY);
     assert_int_equal(WORD(0), 0x1111);
     sim_answer(s, 1, 500, "11 01 02 FF FF +");
-    assert_int_equal(mbm_master_readCoils(n, 0, 8), MBM_MALFORMED_REPLY);
+    assert_int_equal(mbm_node_readCoils(n, 0, 8), MBM_MALFORMED_REPLY);
     sim_answer(s, 1, 500, "11 17 02 FF FF +");
-    assert_int_equal(mbm_master_readWriteMultipleRegisters(n, 0, 2, 0, 1), MBM_MALFORMED_REPLY);
+    assert_int_equal(mbm_node_readWriteMultipleRegisters(n, 0, 2, 0, 1), MBM_MALFORMED_REPLY);
     recovers_at_once(s);
 }
 
@@ -211,46 +207,44 @@ static void an_echo_with_another_address_or_value_is_malformed(void **state)
 {
     NODE;
 
-    mbm_master_setResponseTimeout(n, 100);
+    mbm_node_setResponseTimeout(n, 100);
     sim_answer(s, 1, 500, "11 05 00 02 FF 00 +");
-    malformed(s, mbm_master_writeSingleCoil(n, 1, 1));
+    malformed(s, mbm_node_writeSingleCoil(n, 1, 1));
     sim_answer(s, 1, 500, "11 05 00 01 00 00 +");
-    malformed(s, mbm_master_writeSingleCoil(n, 1, 1));
+    malformed(s, mbm_node_writeSingleCoil(n, 1, 1));
     sim_answer(s, 1, 500, "11 06 00 02 12 34 +");
-    malformed(s, mbm_master_writeSingleRegister(n, 1, 0x1234));
+    malformed(s, mbm_node_writeSingleRegister(n, 1, 0x1234));
     sim_answer(s, 1, 500, "11 06 00 01 12 35 +");
-    malformed(s, mbm_master_writeSingleRegister(n, 1, 0x1234));
+    malformed(s, mbm_node_writeSingleRegister(n, 1, 0x1234));
     sim_answer(s, 1, 500, "11 0F 00 01 00 08 +");
-    malformed(s, mbm_master_writeMultipleCoils(n, 1, 9));
+    malformed(s, mbm_node_writeMultipleCoils(n, 1, 9));
     sim_answer(s, 1, 500, "11 0F 00 00 00 09 +");
-    malformed(s, mbm_master_writeMultipleCoils(n, 1, 9));
+    malformed(s, mbm_node_writeMultipleCoils(n, 1, 9));
     sim_answer(s, 1, 500, "11 10 00 01 00 01 +");
-    malformed(s, mbm_master_writeMultipleRegisters(n, 1, 2));
+    malformed(s, mbm_node_writeMultipleRegisters(n, 1, 2));
     sim_answer(s, 1, 500, "11 10 01 01 00 02 +");
-    malformed(s, mbm_master_writeMultipleRegisters(n, 1, 2));
+    malformed(s, mbm_node_writeMultipleRegisters(n, 1, 2));
     sim_answer(s, 1, 500, "11 16 00 01 00 02 00 04 +");
-    malformed(s, mbm_master_maskWriteRegister(n, 1, 2, 3));
+    malformed(s, mbm_node_maskWriteRegister(n, 1, 2, 3));
     sim_answer(s, 1, 500, "11 16 00 01 00 06 00 03 +");
-    malformed(s, mbm_master_maskWriteRegister(n, 1, 2, 3));
+    malformed(s, mbm_node_maskWriteRegister(n, 1, 2, 3));
 }
 
 static void the_reply_is_found_after_stray_bytes(void **state)
 {
-    NODE;
+    SIM;
 
     found_after(s, "00");
     found_after(s, "FF FE 7F 00 33");
     found_after(s, "11");
     found_after(s, "11 11 11 11");
     assert_int_equal(s->counters.resynchronisations, 4);
-    (void)n;
 }
 
 static void the_reply_is_found_after_noise_that_looks_like_its_header(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     found_after(s, "11 03");
     found_after(s, "11 03 04");
     found_after(s, "11 03 04 00");
@@ -271,15 +265,14 @@ static void an_exception_after_noise_that_looks_like_a_longer_reply_is_found(voi
     assert_int_equal(read_words(s, 10, "11 03 14 00 / 11 83 02 +"), MBM_ILLEGAL_DATA_ADDRESS);
     sim_answer(s, 1, 500, "11 03 14 00");
     sim_answer(s, 1, 20000, "11 83 02 +");
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 10), MBM_ILLEGAL_DATA_ADDRESS);
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 10), MBM_ILLEGAL_DATA_ADDRESS);
     assert_true(s->now - s->frames[1].end < 30000);
 }
 
 static void the_reply_is_found_after_a_frame_of_another_unit(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     found_after(s, "12 03 04 AA AA BB BB +");
     found_after(s, "12 83 02 +");
     found_after(s, "12 03 00 00 00 02 + / 12 03 04 AA AA BB BB +");
@@ -288,9 +281,8 @@ static void the_reply_is_found_after_a_frame_of_another_unit(void **state)
 
 static void the_reply_is_found_after_a_late_reply_of_another_function_or_length(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     found_after(s, "11 04 04 AA AA BB BB +");
     found_after(s, "11 03 02 AA AA +");
     found_after(s, "11 06 00 01 00 02 +");
@@ -304,7 +296,7 @@ static void a_reply_in_two_pieces_is_found_at_the_end_of_the_second(void **state
     sim_answer(s, 1, 500, "11 03 04 12 34");
     /* The CRC of the whole frame, as a device would send it. */
     sim_answer(s, 1, 50000, "56 78 90 C6");
-    OK(mbm_master_readHoldingRegisters(n, 0, 2));
+    OK(mbm_node_readHoldingRegisters(n, 0, 2));
     assert_int_equal(WORD(1), 0x5678);
 }
 
@@ -317,10 +309,10 @@ static void a_reply_after_noise_and_a_pause_is_not_taken_for_the_next(void **sta
 
     sim_answer(s, 1, 500, "11 03 02 00 00 00 00");
     sim_answer(s, 1, 6500, "11 03 02 11 11 +");
-    status = mbm_master_readHoldingRegisters(n, 100, 1);
+    status = mbm_node_readHoldingRegisters(n, 100, 1);
     assert_true(status == MBM_OK || status == MBM_INVALID_CRC);
     sim_answer(s, 1, 5000, "11 03 02 22 22 +");
-    if (mbm_master_readHoldingRegisters(n, 200, 1) == MBM_OK)
+    if (mbm_node_readHoldingRegisters(n, 200, 1) == MBM_OK)
         assert_int_equal(WORD(0), 0x2222);
 }
 
@@ -331,7 +323,7 @@ static void a_pause_after_data_like_a_damaged_exception_does_not_end_the_request
 
     sim_answer(s, 1, 500, "11 03 08 11 83 01 02 03 04");
     sim_answer(s, 1, 50000, "05 06 09 D9");
-    OK(mbm_master_readHoldingRegisters(n, 0, 4));
+    OK(mbm_node_readHoldingRegisters(n, 0, 4));
     assert_int_equal(WORD(3), 0x0506);
 }
 
@@ -341,50 +333,50 @@ static void foreign_data_like_our_damaged_reply_do_not_end_the_request(void **st
 
     sim_answer(s, 1, 500, "12 03 06 11 83 01 02 03 04 +");
     sim_answer(s, 1, 20000, "11 03 02 00 2A +");
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
 static void an_echo_is_dropped_with_echo_discard_on(void **state)
 {
     NODE;
 
-    OK(mbm_master_setEchoDiscard(n, 1));
+    OK(mbm_line_setEchoDiscard(&s->line, 1));
     s->echo = 1;
     OK(read_words(s, 1, "11 03 02 00 2A +"));
     sim_answer(s, 1, 500, "11 06 00 01 00 02 +");
-    OK(mbm_master_writeSingleRegister(n, 1, 2));
+    OK(mbm_node_writeSingleRegister(n, 1, 2));
     sim_answer(s, 1, 500, "11 10 00 01 00 02 +");
-    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+    OK(mbm_node_writeMultipleRegisters(n, 1, 2));
     sim_answer(s, 1, 500, "11 0F 00 01 00 09 +");
-    OK(mbm_master_writeMultipleCoils(n, 1, 9));
+    OK(mbm_node_writeMultipleCoils(n, 1, 9));
     sim_answer(s, 1, 500, "11 16 00 01 00 02 00 03 +");
-    OK(mbm_master_maskWriteRegister(n, 1, 2, 3));
+    OK(mbm_node_maskWriteRegister(n, 1, 2, 3));
     sim_answer(s, 1, 500, "11 17 02 00 2A +");
-    OK(mbm_master_readWriteMultipleRegisters(n, 1, 1, 3, 1));
+    OK(mbm_node_readWriteMultipleRegisters(n, 1, 1, 3, 1));
     sim_answer(s, 1, 500, "11 05 00 01 FF 00 +");
-    OK(mbm_master_writeSingleCoil(n, 1, 1));
+    OK(mbm_node_writeSingleCoil(n, 1, 1));
 }
 
 static void a_damaged_echo_does_not_hide_the_reply(void **state)
 {
     NODE;
 
-    OK(mbm_master_setEchoDiscard(n, 1));
-    mbm_master_setTransmitBuffer(n, 0, 0x1111);
-    mbm_master_setTransmitBuffer(n, 1, 0x2222);
+    OK(mbm_line_setEchoDiscard(&s->line, 1));
+    mbm_node_setTransmitBuffer(n, 0, 0x1111);
+    mbm_node_setTransmitBuffer(n, 1, 0x2222);
     sim_answer(s, 1, 0, "11 10 00 01 00 02 04 11 11 22 23 AB 23");
     sim_answer(s, 1, 3000, "11 10 00 01 00 02 +");
-    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+    OK(mbm_node_writeMultipleRegisters(n, 1, 2));
     s->echo = 1;
     sim_answer(s, 1, 500, "11 10 00 01 00 02 +");
-    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+    OK(mbm_node_writeMultipleRegisters(n, 1, 2));
 }
 
 static void noise_before_the_echo_does_not_hide_a_foreign_frame_after_it(void **state)
 {
-    NODE;
+    SIM;
 
-    OK(mbm_master_setEchoDiscard(n, 1));
+    OK(mbm_line_setEchoDiscard(&s->line, 1));
     assert_int_equal(read_words(s, 1, "00 / 11 03 00 00 00 01 + / 12 03 02 00 01 +"),
                      MBM_INVALID_SLAVE_ID);
     assert_int_equal(s->counters.foreignFrames, 1);
@@ -394,13 +386,13 @@ static void an_echo_alone_is_no_success(void **state)
 {
     NODE;
 
-    OK(mbm_master_setEchoDiscard(n, 1));
-    OK(mbm_master_setResponseTimeout(n, 100));
+    OK(mbm_line_setEchoDiscard(&s->line, 1));
+    OK(mbm_node_setResponseTimeout(n, 100));
     s->echo = 1;
-    assert_int_equal(mbm_master_writeSingleRegister(n, 1, 2), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(mbm_master_writeSingleCoil(n, 1, 1), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(mbm_master_writeMultipleRegisters(n, 1, 2), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(mbm_master_maskWriteRegister(n, 1, 2, 3), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 2), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_writeSingleCoil(n, 1, 1), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_writeMultipleRegisters(n, 1, 2), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_maskWriteRegister(n, 1, 2, 3), MBM_RESPONSE_TIMED_OUT);
 }
 
 static void with_discard_off_an_echo_that_is_no_reply_is_skipped(void **state)
@@ -410,14 +402,14 @@ static void with_discard_off_an_echo_that_is_no_reply_is_skipped(void **state)
     s->echo = 1;
     OK(read_words(s, 1, "11 03 02 00 2A +"));
     sim_answer(s, 1, 500, "11 10 00 01 00 02 +");
-    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+    OK(mbm_node_writeMultipleRegisters(n, 1, 2));
 }
 
 static void a_device_that_does_not_echo_still_answers_reads_with_discard_on(void **state)
 {
-    NODE;
+    SIM;
 
-    OK(mbm_master_setEchoDiscard(n, 1));
+    OK(mbm_line_setEchoDiscard(&s->line, 1));
     OK(read_words(s, 1, "11 03 02 00 2A +"));
 }
 
@@ -425,7 +417,7 @@ static void counters_count_what_happened(void **state)
 {
     NODE;
 
-    mbm_master_setResponseTimeout(n, 100);
+    mbm_node_setResponseTimeout(n, 100);
     recovers_at_once(s);
     assert_int_equal(read_words(s, 1, "11 83 02 +"), 2);
     assert_int_equal(read_words(s, 1, ""), MBM_RESPONSE_TIMED_OUT);
@@ -437,7 +429,7 @@ static void counters_count_what_happened(void **state)
     assert_int_equal(s->counters.badCrc, 1);
     assert_int_equal(s->counters.bytesSent, 32);
     assert_int_equal(s->counters.bytesReceived, 7 + 5 + 7);
-    OK(mbm_master_setCounters(n, NULL));
+    OK(mbm_line_setCounters(&s->line, NULL));
     recovers_at_once(s);
     assert_int_equal(s->counters.requests, 4);
 }
@@ -450,7 +442,7 @@ static void counters_miss_no_frame_of_a_crowded_line(void **state)
     for (i = 0; i < 30; i++)
         sim_answer(s, 1, 30000 * (unsigned)i, TEN("12 07 + / "));
     sim_answer(s, 1, 900000, "11 03 02 00 2A +");
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
     assert_int_equal(s->counters.foreignFrames, 300);
     assert_int_equal(s->counters.bytesReceived, 300 * 4 + 7);
     assert_int_equal(s->counters.requests, 1);

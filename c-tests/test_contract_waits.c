@@ -17,7 +17,7 @@ static void a_reply_may_take_2000_ms(void **state)
 {
     NODE;
 
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
     sim_assert_time(s->now - sim_time_of(s, 'O'), 2000000);
     assert_true(s->idles > 1000);
     assert_int_equal(s->counters.timeouts, 1);
@@ -28,10 +28,10 @@ static void the_response_timeout_can_be_set(void **state)
 {
     NODE;
 
-    OK(mbm_master_setResponseTimeout(n, 7));
+    OK(mbm_node_setResponseTimeout(n, 7));
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     sim_assert_time(s->now - sim_time_of(s, 'O'), 7000);
-    OK(mbm_master_setResponseTimeout(n, 65535));
+    OK(mbm_node_setResponseTimeout(n, 65535));
     s->limit = 140000000; /* the reply is held, because the one before it may be late */
     sim_reads(s, 65000000);
 }
@@ -44,9 +44,8 @@ static void pass_3_seconds(sim *s)
 
 static void a_reply_that_is_complete_as_the_deadline_passes_is_a_success(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->on_idle = pass_3_seconds;
     sim_reads(s, 1500000);
 }
@@ -54,9 +53,8 @@ static void a_reply_that_is_complete_as_the_deadline_passes_is_a_success(void **
 /* Ports such as Arduino's return one byte for each read. The result must be the same. */
 static void a_reply_read_byte_by_byte_after_the_deadline_is_a_success(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->on_idle = pass_3_seconds;
     s->read_piece = 1;
     sim_reads(s, 1500000);
@@ -68,7 +66,7 @@ static void endless_bytes_do_not_keep_a_request_from_ending(void **state)
     static const uint8_t noise[8000] = {0};
     NODE;
 
-    mbm_master_setResponseTimeout(n, 50);
+    mbm_node_setResponseTimeout(n, 50);
     s->step = 100;
     s->read_piece = 1;
     s->character = 0;
@@ -82,7 +80,7 @@ static void a_long_idle_while_a_reply_arrives_is_tolerated(void **state)
 {
     NODE;
 
-    mbm_master_setResponseTimeout(n, 10000);
+    mbm_node_setResponseTimeout(n, 10000);
     s->on_idle = pass_3_seconds;
     sim_reads(s, 100);
     assert_true(s->idles < 1000);
@@ -91,7 +89,7 @@ static void a_long_idle_while_a_reply_arrives_is_tolerated(void **state)
 static void the_quiet_time_is_kept_after_a_timeout(void **state)
 {
     uint64_t failed;
-    NODE;
+    SIM;
 
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     failed = s->now;
@@ -102,7 +100,7 @@ static void the_quiet_time_is_kept_after_a_timeout(void **state)
     sim_reads(s, 500);
     sim_reads(s, 500);
     sim_assert_time(s->frames[3].silence, 4000);
-    OK(mbm_master_setQuietTime(n, 250));
+    OK(mbm_line_setQuietTime(&s->line, 250));
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     failed = s->now;
     sim_reads(s, 500);
@@ -112,9 +110,8 @@ static void the_quiet_time_is_kept_after_a_timeout(void **state)
 static void a_reply_in_the_quiet_time_is_dropped(void **state)
 {
     uint64_t failed;
-    NODE;
+    SIM;
 
-    (void)n;
     sim_answer(s, 1, 2050000, "11 03 02 66 66 +");
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     failed = s->now;
@@ -130,7 +127,7 @@ static void a_reply_late_in_the_quiet_time_does_not_make_the_line_busy(void **st
 {
     NODE;
 
-    mbm_master_setResponseTimeout(n, 50);
+    mbm_node_setResponseTimeout(n, 50);
     sim_answer(s, 1, 130000, "11 03 02 66 66 +");
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     sim_reads(s, 500);
@@ -140,7 +137,7 @@ static void a_foreign_frame_in_the_quiet_time_does_not_lengthen_it(void **state)
 {
     NODE;
 
-    mbm_master_setResponseTimeout(n, 50);
+    mbm_node_setResponseTimeout(n, 50);
     /* Within the frame is what seems to be a damaged exception. */
     sim_answer(s, 1, 60000, "05 03 06 11 83 00 00 00 00 +");
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
@@ -150,9 +147,9 @@ static void a_foreign_frame_in_the_quiet_time_does_not_lengthen_it(void **state)
 
 static void a_request_without_a_reply_is_repeated_as_often_as_set(void **state)
 {
-    NODE;
+    SIM;
 
-    OK(mbm_master_setRetries(n, 2));
+    OK(mbm_line_setRetries(&s->line, 2));
     sim_answer(s, 3, 500, "11 03 02 00 2A +");
     OK(sim_read_one(s));
     assert_int_equal(s->sent, 3);
@@ -166,9 +163,9 @@ static void a_request_without_a_reply_is_repeated_as_often_as_set(void **state)
 
 static void damaged_and_malformed_replies_are_retried_exceptions_are_not(void **state)
 {
-    NODE;
+    SIM;
 
-    OK(mbm_master_setRetries(n, 1));
+    OK(mbm_line_setRetries(&s->line, 1));
     sim_answer(s, 1, 500, "11 03 02 00 2A 00 00");
     sim_answer(s, 2, 500, "11 03 02 00 2A +");
     OK(sim_read_one(s));
@@ -185,16 +182,16 @@ static void a_broadcast_succeeds_after_the_turnaround_delay(void **state)
 {
     NODE;
 
-    OK(mbm_master_setSlaveID(n, 0));
-    OK(mbm_master_writeSingleRegister(n, 1, 2));
+    OK(mbm_node_setSlaveID(n, 0));
+    OK(mbm_node_writeSingleRegister(n, 1, 2));
     sim_assert_sent(s, 0, "00 06 00 01 00 02 +");
     sim_assert_time(s->now - sim_time_of(s, 'O'), 100000);
     sim_assert_order(s, "OI", "IOI");
-    OK(mbm_master_setTurnaroundDelay(n, 30));
-    OK(mbm_master_writeMultipleCoils(n, 1, 9));
+    OK(mbm_line_setTurnaroundDelay(&s->line, 30));
+    OK(mbm_node_writeMultipleCoils(n, 1, 9));
     sim_assert_time(s->now - s->frames[1].end, 30000);
-    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
-    OK(mbm_master_maskWriteRegister(n, 1, 2, 3));
+    OK(mbm_node_writeMultipleRegisters(n, 1, 2));
+    OK(mbm_node_maskWriteRegister(n, 1, 2, 3));
     assert_int_equal(s->counters.replies, 0);
     assert_int_equal(s->idle_while_driving, 0);
 }
@@ -203,14 +200,13 @@ static void a_read_is_not_broadcast(void **state)
 {
     NODE;
 
-    mbm_master_setSlaveID(n, 0);
-    assert_int_equal(mbm_master_readCoils(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(mbm_master_readDiscreteInputs(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(mbm_master_readInputRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 1),
-                     MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(mbm_master_requestFrom(n, 0, 1), 0);
+    mbm_node_setSlaveID(n, 0);
+    assert_int_equal(mbm_node_readCoils(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_node_readDiscreteInputs(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_node_readInputRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_node_requestFrom(n, 0, 1), 0);
     assert_int_equal(s->sent, 0);
 }
 
@@ -220,7 +216,7 @@ static void a_line_that_never_falls_silent_is_busy(void **state)
     unsigned i;
     NODE;
 
-    OK(mbm_master_setResponseTimeout(n, 100));
+    OK(mbm_node_setResponseTimeout(n, 100));
     s->limit = 1000000;
     for (i = 0; i < 10; i++)
         sim_deliver(s, 30000u * i, noise, sizeof noise);
@@ -234,7 +230,7 @@ static void a_flood_is_bounded_even_if_every_read_returns_bytes(void **state)
     static const uint8_t noise[8000] = {0};
     NODE;
 
-    OK(mbm_master_setResponseTimeout(n, 1));
+    OK(mbm_node_setResponseTimeout(n, 1));
     s->character = 0;
     s->step = 250; /* so the flood lasts longer than the timeout and the gap */
     sim_deliver(s, 0, noise, sizeof noise);
@@ -249,10 +245,10 @@ static void a_request_that_takes_longer_than_the_response_timeout_is_sent(void *
     NODE;
 
     s->character = 1146;
-    OK(mbm_master_setBaudRate(n, 9600));
-    OK(mbm_master_setResponseTimeout(n, 100));
+    OK(mbm_line_setBaudRate(&s->line, 9600));
+    OK(mbm_node_setResponseTimeout(n, 100));
     sim_answer(s, 1, 500, "11 10 00 00 00 64 +");
-    OK(mbm_master_writeMultipleRegisters(n, 0, 100));
+    OK(mbm_node_writeMultipleRegisters(n, 0, 100));
 }
 
 static void a_port_that_accepts_a_byte_now_and_then_is_not_busy(void **state)
@@ -262,16 +258,16 @@ static void a_port_that_accepts_a_byte_now_and_then_is_not_busy(void **state)
     s->character = 1146;
     s->write_piece = 1;
     s->write_busy = 500; /* one byte in 1 ms */
-    OK(mbm_master_setResponseTimeout(n, 100));
+    OK(mbm_node_setResponseTimeout(n, 100));
     sim_answer(s, 1, 500, "11 10 00 00 00 64 +");
-    OK(mbm_master_writeMultipleRegisters(n, 0, 100));
+    OK(mbm_node_writeMultipleRegisters(n, 0, 100));
 }
 
 static void a_gap_longer_than_the_timeout_is_waited_for(void **state)
 {
     NODE;
 
-    OK(mbm_master_setResponseTimeout(n, 3));
+    OK(mbm_node_setResponseTimeout(n, 3));
     gap_after_reply(s, 4000);
 }
 
@@ -282,8 +278,8 @@ static uint8_t poll_as_rarely_as_allowed(sim *s)
     uint8_t status;
     unsigned polls = 0;
 
-    while ((status = mbm_master_poll(&s->master)) == MBM_PENDING) {
-        s->now += mbm_master_pollDelay(&s->master);
+    while ((status = mbm_node_poll(&s->node)) == MBM_PENDING) {
+        s->now += mbm_node_pollDelay(&s->node);
         assert_true(polls++ < 1000);
     }
     return status;
@@ -297,7 +293,7 @@ static void a_reply_behind_400_bytes_is_found_by_polls_without_a_wait(void **sta
     unsigned i;
     NODE;
 
-    OK(mbm_master_setBlocking(n, 0));
+    OK(mbm_node_setBlocking(n, 0));
     s->character = 100;
     for (i = 0; i < 2; i++) {
         const unsigned sent = s->sent;
@@ -306,16 +302,16 @@ static void a_reply_behind_400_bytes_is_found_by_polls_without_a_wait(void **sta
         sim_answer(s, 1, 0, TEN(TEN("12 07 + / ")) "11 03 02 00 2A +");
         assert_int_equal(sim_read_one(s), MBM_PENDING);
         while (s->sent == sent) {
-            assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+            assert_int_equal(mbm_node_poll(n), MBM_PENDING);
             s->now += 100;
         }
         s->now += 1000;
-        assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+        assert_int_equal(mbm_node_poll(n), MBM_PENDING);
         s->now += pauses[i];
         at = s->now;
         OK(poll_as_rarely_as_allowed(s));
         assert_in_range(s->now - at, 0, 1000);
-        assert_int_equal(mbm_master_getResponseBuffer(n, 0), 42);
+        assert_int_equal(mbm_node_getResponseBuffer(n, 0), 42);
     }
 }
 
@@ -324,14 +320,14 @@ static void sleeping_for_poll_delay_does_not_lengthen_a_timeout(void **state)
     uint64_t begin;
     NODE;
 
-    OK(mbm_master_setBlocking(n, 0));
-    OK(mbm_master_setResponseTimeout(n, 500));
+    OK(mbm_node_setBlocking(n, 0));
+    OK(mbm_node_setResponseTimeout(n, 500));
     assert_int_equal(sim_read_one(s), MBM_PENDING);
     assert_int_equal(poll_as_rarely_as_allowed(s), MBM_RESPONSE_TIMED_OUT);
     sim_assert_time(s->now - s->frames[0].end, 500000);
 
     /* Each repetition waits for the quiet time and for its own reply. */
-    OK(mbm_master_setRetries(n, 2));
+    OK(mbm_line_setRetries(&s->line, 2));
     begin = s->now;
     assert_int_equal(sim_read_one(s), MBM_PENDING);
     assert_int_equal(poll_as_rarely_as_allowed(s), MBM_RESPONSE_TIMED_OUT);
@@ -343,10 +339,10 @@ static void sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay(void **
 {
     NODE;
 
-    OK(mbm_master_setBlocking(n, 0));
-    OK(mbm_master_setSlaveID(n, 0));
-    OK(mbm_master_setTurnaroundDelay(n, 200));
-    assert_int_equal(mbm_master_writeSingleRegister(n, 0, 1), MBM_PENDING);
+    OK(mbm_node_setBlocking(n, 0));
+    OK(mbm_node_setSlaveID(n, 0));
+    OK(mbm_line_setTurnaroundDelay(&s->line, 200));
+    assert_int_equal(mbm_node_writeSingleRegister(n, 0, 1), MBM_PENDING);
     assert_int_equal(poll_as_rarely_as_allowed(s), MBM_OK);
     sim_assert_time(s->now - s->frames[0].end, 200000);
 }
@@ -355,14 +351,14 @@ static void sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply(void *
 {
     NODE;
 
-    OK(mbm_master_setBlocking(n, 0));
-    OK(mbm_master_setResponseTimeout(n, 500));
+    OK(mbm_node_setBlocking(n, 0));
+    OK(mbm_node_setResponseTimeout(n, 500));
     assert_int_equal(sim_read_one(s), MBM_PENDING);
     assert_int_equal(poll_as_rarely_as_allowed(s), MBM_RESPONSE_TIMED_OUT);
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
     assert_int_equal(sim_read_one(s), MBM_PENDING);
     while (s->sent < 2 || s->now < s->frames[1].end + 2000) {
-        assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+        assert_int_equal(mbm_node_poll(n), MBM_PENDING);
         s->now += s->idle_step;
     }
     OK(poll_as_rarely_as_allowed(s));
@@ -377,24 +373,24 @@ static void the_longest_gap_is_2_to_the_31_microseconds(void **state)
     NODE;
 
     s->limit = UINT64_MAX;
-    OK(mbm_master_setBlocking(n, 0));
+    OK(mbm_node_setBlocking(n, 0));
     for (i = 0; i < COUNT(gaps); i++) {
         uint64_t begin = s->now;
 
-        OK(mbm_master_setGap(n, gaps[i]));
-        OK(mbm_master_lineUsed(n));
+        OK(mbm_line_setGap(&s->line, gaps[i]));
+        OK(mbm_line_used(&s->line));
         assert_int_equal(sim_read_one(s), MBM_PENDING);
         while (s->now < begin + 0x7FFF0000) {
-            assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+            assert_int_equal(mbm_node_poll(n), MBM_PENDING);
             assert_int_equal(s->sent, i);
             s->now += 1000000;
         }
         while (s->sent == i) {
-            assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+            assert_int_equal(mbm_node_poll(n), MBM_PENDING);
             s->now += 1000;
             assert_true(s->now < begin + 0x80100000);
         }
-        OK(mbm_master_cancel(n));
+        OK(mbm_node_cancel(n));
     }
 }
 
@@ -402,9 +398,8 @@ static void the_longest_gap_of_a_client_is_2_to_the_31_microseconds(void **state
 {
     static mbm_client client;
     mbm_clientRequest request = {0};
-    NODE;
+    SIM;
 
-    (void)n;
     s->limit = UINT64_MAX;
     memset(&client, 0, sizeof client);
     OK(mbm_client_beginRtu(&client, &s->port, s->buffer, sizeof s->buffer));

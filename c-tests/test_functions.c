@@ -33,10 +33,10 @@ static void reads_holding_registers(void **state)
 
     (void)state;
     for (q = 0; q < COUNT(quantities); q++) {
-        assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 3, quantities[q]), MBM_OK);
-        assert_int_equal(mbm_master_available(&n.master), quantities[q]);
+        assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 3, quantities[q]), MBM_OK);
+        assert_int_equal(mbm_node_available(&n.node), quantities[q]);
         for (i = 0; i < quantities[q]; i++)
-            assert_int_equal(mbm_master_getResponseBuffer(&n.master, (uint8_t)i),
+            assert_int_equal(mbm_node_getResponseBuffer(&n.node, (uint8_t)i),
                              server_pattern(3 + i));
     }
 }
@@ -49,9 +49,9 @@ static void reads_input_registers(void **state)
 
     (void)state;
     for (q = 0; q < COUNT(quantities); q++) {
-        assert_int_equal(mbm_master_readInputRegisters(&n.master, 9, quantities[q]), MBM_OK);
+        assert_int_equal(mbm_node_readInputRegisters(&n.node, 9, quantities[q]), MBM_OK);
         for (i = 0; i < quantities[q]; i++)
-            assert_int_equal(mbm_master_getResponseBuffer(&n.master, (uint8_t)i),
+            assert_int_equal(mbm_node_getResponseBuffer(&n.node, (uint8_t)i),
                              (uint16_t)~server_pattern(9 + i));
     }
 }
@@ -65,7 +65,7 @@ static void reads_coils(void **state)
 
     (void)state;
     for (q = 0; q < COUNT(bit_quantities); q++) {
-        assert_int_equal(mbm_master_readCoils(&n.master, 5, bit_quantities[q]), MBM_OK);
+        assert_int_equal(mbm_node_readCoils(&n.node, 5, bit_quantities[q]), MBM_OK);
         for (i = 0; i < bit_quantities[q]; i++)
             assert_int_equal(node_bit(&n, i), server_bit_pattern(5 + i));
         for (; i % 16; i++)
@@ -80,7 +80,7 @@ static void reads_discrete_inputs(void **state)
 
     (void)state;
     for (q = 0; q < COUNT(bit_quantities); q++) {
-        assert_int_equal(mbm_master_readDiscreteInputs(&n.master, 7, bit_quantities[q]), MBM_OK);
+        assert_int_equal(mbm_node_readDiscreteInputs(&n.node, 7, bit_quantities[q]), MBM_OK);
         for (i = 0; i < bit_quantities[q]; i++)
             assert_int_equal(node_bit(&n, i), !server_bit_pattern(7 + i));
         for (; i % 16; i++)
@@ -91,21 +91,21 @@ static void reads_discrete_inputs(void **state)
 static void writes_a_single_coil(void **state)
 {
     (void)state;
-    assert_int_equal(mbm_master_writeSingleCoil(&n.master, 30, 0), MBM_OK);
+    assert_int_equal(mbm_node_writeSingleCoil(&n.node, 30, 0), MBM_OK);
     assert_int_equal(peer.mapping->tab_bits[30], 0);
-    assert_int_equal(mbm_master_writeSingleCoil(&n.master, 30, 1), MBM_OK);
+    assert_int_equal(mbm_node_writeSingleCoil(&n.node, 30, 1), MBM_OK);
     assert_int_equal(peer.mapping->tab_bits[30], 1);
-    assert_int_equal(mbm_master_writeSingleCoil(&n.master, 30, 0), MBM_OK);
-    assert_int_equal(mbm_master_writeSingleCoil(&n.master, 30, 0xAA), MBM_OK);
+    assert_int_equal(mbm_node_writeSingleCoil(&n.node, 30, 0), MBM_OK);
+    assert_int_equal(mbm_node_writeSingleCoil(&n.node, 30, 0xAA), MBM_OK);
     assert_int_equal(peer.mapping->tab_bits[30], 1);
 }
 
 static void writes_a_single_register(void **state)
 {
     (void)state;
-    assert_int_equal(mbm_master_writeSingleRegister(&n.master, 499, 0xBEEF), MBM_OK);
+    assert_int_equal(mbm_node_writeSingleRegister(&n.node, 499, 0xBEEF), MBM_OK);
     assert_int_equal(peer.mapping->tab_registers[499], 0xBEEF);
-    assert_int_equal(mbm_master_writeSingleRegister(&n.master, 0, 0), MBM_OK);
+    assert_int_equal(mbm_node_writeSingleRegister(&n.node, 0, 0), MBM_OK);
     assert_int_equal(peer.mapping->tab_registers[0], 0);
 }
 
@@ -123,7 +123,7 @@ static void writes_multiple_coils(void **state)
         peer.mapping->tab_bits[11 + quantity] = 1;
         for (i = 0; i < 1968; i++)
             node_set_bit(&n, i, i % 3 == 0 || i + 1 == quantity);
-        assert_int_equal(mbm_master_writeMultipleCoils(&n.master, 11, quantity), MBM_OK);
+        assert_int_equal(mbm_node_writeMultipleCoils(&n.node, 11, quantity), MBM_OK);
         assert_int_equal(peer.mapping->tab_bits[10], 0);
         for (i = 0; i < quantity; i++)
             assert_int_equal(peer.mapping->tab_bits[11 + i], i % 3 == 0 || i + 1 == quantity);
@@ -144,9 +144,9 @@ static void writes_multiple_registers(void **state)
         memset(peer.mapping->tab_registers, 0, 2 * SERVER_REGISTERS);
         for (i = 0; i < 123; i++)
             assert_int_equal(
-                mbm_master_setTransmitBuffer(&n.master, (uint8_t)i, (uint16_t)(i * 257 + quantity)),
+                mbm_node_setTransmitBuffer(&n.node, (uint8_t)i, (uint16_t)(i * 257 + quantity)),
                 MBM_OK);
-        assert_int_equal(mbm_master_writeMultipleRegisters(&n.master, 21, quantity), MBM_OK);
+        assert_int_equal(mbm_node_writeMultipleRegisters(&n.node, 21, quantity), MBM_OK);
         for (i = 0; i < quantity; i++)
             assert_int_equal(peer.mapping->tab_registers[21 + i], (uint16_t)(i * 257 + quantity));
         assert_int_equal(peer.mapping->tab_registers[21 + quantity], 0);
@@ -157,7 +157,7 @@ static void mask_writes_a_register(void **state)
 {
     (void)state;
     peer.mapping->tab_registers[4] = 0x0012;
-    assert_int_equal(mbm_master_maskWriteRegister(&n.master, 4, 0x00F2, 0x0025), MBM_OK);
+    assert_int_equal(mbm_node_maskWriteRegister(&n.node, 4, 0x00F2, 0x0025), MBM_OK);
     /* The standard's example, 6.16. */
     assert_int_equal(peer.mapping->tab_registers[4], 0x0017);
 }
@@ -173,10 +173,10 @@ static void reads_and_writes_multiple_registers(void **state)
     (void)state;
     for (q = 0; q < COUNT(quantities); q++) {
         for (i = 0; i < quantities[q].write; i++)
-            mbm_master_setTransmitBuffer(&n.master, (uint8_t)i, (uint16_t)(0x4000 + i * 3));
+            mbm_node_setTransmitBuffer(&n.node, (uint8_t)i, (uint16_t)(0x4000 + i * 3));
         peer.mapping->tab_registers[300 + quantities[q].write] = 0x7777;
-        assert_int_equal(mbm_master_readWriteMultipleRegisters(&n.master, 300, quantities[q].read,
-                                                               300, quantities[q].write),
+        assert_int_equal(mbm_node_readWriteMultipleRegisters(&n.node, 300, quantities[q].read, 300,
+                                                             quantities[q].write),
                          MBM_OK);
         assert_int_equal(peer.mapping->tab_registers[300 + quantities[q].write], 0x7777);
         /* The server writes before it reads. */
@@ -185,7 +185,7 @@ static void reads_and_writes_multiple_registers(void **state)
 
             if (i < quantities[q].write)
                 assert_int_equal(value, 0x4000 + i * 3);
-            assert_int_equal(mbm_master_getResponseBuffer(&n.master, (uint8_t)i), value);
+            assert_int_equal(mbm_node_getResponseBuffer(&n.node, (uint8_t)i), value);
         }
     }
 }
@@ -193,55 +193,54 @@ static void reads_and_writes_multiple_registers(void **state)
 static void writes_queued_words_and_bits(void **state)
 {
     (void)state;
-    mbm_master_beginTransmission(&n.master, 40);
-    mbm_master_send(&n.master, 0x1122);
-    mbm_master_send(&n.master, 0x33);
-    mbm_master_send32(&n.master, 0x44556677);
-    assert_int_equal(mbm_master_writeQueuedRegisters(&n.master), MBM_OK);
+    mbm_node_beginTransmission(&n.node, 40);
+    mbm_node_send(&n.node, 0x1122);
+    mbm_node_send(&n.node, 0x33);
+    mbm_node_send32(&n.node, 0x44556677);
+    assert_int_equal(mbm_node_writeQueuedRegisters(&n.node), MBM_OK);
     assert_int_equal(peer.mapping->tab_registers[40], 0x1122);
     assert_int_equal(peer.mapping->tab_registers[41], 0x0033);
     assert_int_equal(peer.mapping->tab_registers[42], 0x6677);
     assert_int_equal(peer.mapping->tab_registers[43], 0x4455);
 
     memset(peer.mapping->tab_bits, 1, SERVER_BITS);
-    mbm_master_beginTransmission(&n.master, 50);
-    mbm_master_sendBit(&n.master, 0);
-    mbm_master_sendBit(&n.master, 7);
-    mbm_master_sendBit(&n.master, 0);
-    assert_int_equal(mbm_master_writeQueuedCoils(&n.master), MBM_OK);
+    mbm_node_beginTransmission(&n.node, 50);
+    mbm_node_sendBit(&n.node, 0);
+    mbm_node_sendBit(&n.node, 7);
+    mbm_node_sendBit(&n.node, 0);
+    assert_int_equal(mbm_node_writeQueuedCoils(&n.node), MBM_OK);
     assert_memory_equal(peer.mapping->tab_bits + 49, "\1\0\1\0\1", 5);
 
-    mbm_master_beginTransmission(&n.master, 60);
-    mbm_master_send(&n.master, 0xABCD);
-    assert_int_equal(mbm_master_readWriteQueuedRegisters(&n.master, 59, 2), MBM_OK);
-    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 0), server_pattern(59));
-    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 1), 0xABCD);
+    mbm_node_beginTransmission(&n.node, 60);
+    mbm_node_send(&n.node, 0xABCD);
+    assert_int_equal(mbm_node_readWriteQueuedRegisters(&n.node, 59, 2), MBM_OK);
+    assert_int_equal(mbm_node_getResponseBuffer(&n.node, 0), server_pattern(59));
+    assert_int_equal(mbm_node_getResponseBuffer(&n.node, 1), 0xABCD);
 }
 
 static void requests_words_to_receive(void **state)
 {
     (void)state;
-    assert_int_equal(mbm_master_requestFrom(&n.master, 10, 3), 3);
-    assert_int_equal(mbm_master_available(&n.master), 3);
-    assert_int_equal(mbm_master_receive(&n.master), server_pattern(10));
-    assert_int_equal(mbm_master_receive(&n.master), server_pattern(11));
-    assert_int_equal(mbm_master_available(&n.master), 1);
-    assert_int_equal(mbm_master_receive(&n.master), server_pattern(12));
-    assert_int_equal(mbm_master_available(&n.master), 0);
-    assert_int_equal(mbm_master_receive(&n.master), 0xFFFF);
+    assert_int_equal(mbm_node_requestFrom(&n.node, 10, 3), 3);
+    assert_int_equal(mbm_node_available(&n.node), 3);
+    assert_int_equal(mbm_node_receive(&n.node), server_pattern(10));
+    assert_int_equal(mbm_node_receive(&n.node), server_pattern(11));
+    assert_int_equal(mbm_node_available(&n.node), 1);
+    assert_int_equal(mbm_node_receive(&n.node), server_pattern(12));
+    assert_int_equal(mbm_node_available(&n.node), 0);
+    assert_int_equal(mbm_node_receive(&n.node), 0xFFFF);
 }
 
 static void returns_exceptions_of_the_server(void **state)
 {
     (void)state;
-    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, SERVER_REGISTERS, 1),
+    assert_int_equal(mbm_node_readHoldingRegisters(&n.node, SERVER_REGISTERS, 1),
                      MBM_ILLEGAL_DATA_ADDRESS);
-    assert_int_equal(mbm_master_getExceptionCode(&n.master), 2);
-    assert_int_equal(mbm_master_writeSingleCoil(&n.master, SERVER_BITS, 1),
-                     MBM_ILLEGAL_DATA_ADDRESS);
+    assert_int_equal(mbm_node_getExceptionCode(&n.node), 2);
+    assert_int_equal(mbm_node_writeSingleCoil(&n.node, SERVER_BITS, 1), MBM_ILLEGAL_DATA_ADDRESS);
     assert_int_equal(n.counters.exceptions, 2);
-    assert_int_equal(mbm_master_readCoils(&n.master, 0, 1), MBM_OK);
-    assert_int_equal(mbm_master_getExceptionCode(&n.master), 0);
+    assert_int_equal(mbm_node_readCoils(&n.node, 0, 1), MBM_OK);
+    assert_int_equal(mbm_node_getExceptionCode(&n.node), 0);
 }
 
 static void reaches_unit(uint8_t unit)
@@ -250,8 +249,8 @@ static void reaches_unit(uint8_t unit)
 
     server_start(&other, unit);
     node_begin(&n, other.line.ours, unit);
-    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 0, 1), MBM_OK);
-    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 0), server_pattern(0));
+    assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 0, 1), MBM_OK);
+    assert_int_equal(mbm_node_getResponseBuffer(&n.node, 0), server_pattern(0));
     server_stop(&other);
     node_begin(&n, peer.line.ours, 17);
 }
@@ -266,23 +265,23 @@ static void reaches_units_1_and_247(void **state)
 static void an_absent_unit_times_out(void **state)
 {
     (void)state;
-    mbm_master_setSlaveID(&n.master, 18);
-    mbm_master_setResponseTimeout(&n.master, 50);
-    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 0, 1), MBM_RESPONSE_TIMED_OUT);
+    mbm_node_setSlaveID(&n.node, 18);
+    mbm_node_setResponseTimeout(&n.node, 50);
+    assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 0, 1), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(n.counters.timeouts, 1);
 }
 
 static void a_broadcast_reaches_the_server_and_succeeds(void **state)
 {
     (void)state;
-    mbm_master_setSlaveID(&n.master, 0);
-    mbm_master_setTurnaroundDelay(&n.master, 60);
-    assert_int_equal(mbm_master_writeSingleRegister(&n.master, 70, 0x5A5A), MBM_OK);
+    mbm_node_setSlaveID(&n.node, 0);
+    mbm_line_setTurnaroundDelay(&n.line, 60);
+    assert_int_equal(mbm_node_writeSingleRegister(&n.node, 70, 0x5A5A), MBM_OK);
     AWAIT(peer.mapping->tab_registers[70] == 0x5A5A);
-    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 70, 1), MBM_BROADCAST_NOT_ALLOWED);
-    mbm_master_setSlaveID(&n.master, 17);
-    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 70, 1), MBM_OK);
-    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 0), 0x5A5A);
+    assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 70, 1), MBM_BROADCAST_NOT_ALLOWED);
+    mbm_node_setSlaveID(&n.node, 17);
+    assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 70, 1), MBM_OK);
+    assert_int_equal(mbm_node_getResponseBuffer(&n.node, 0), 0x5A5A);
 }
 
 static void a_non_blocking_request_is_pending_until_polled_to_its_end(void **state)
@@ -291,18 +290,18 @@ static void a_non_blocking_request_is_pending_until_polled_to_its_end(void **sta
     unsigned polls = 0;
 
     (void)state;
-    mbm_master_setBlocking(&n.master, 0);
-    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 3, 2), MBM_PENDING);
-    assert_int_equal(mbm_master_writeSingleRegister(&n.master, 3, 1), MBM_BUSY);
+    mbm_node_setBlocking(&n.node, 0);
+    assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 3, 2), MBM_PENDING);
+    assert_int_equal(mbm_node_writeSingleRegister(&n.node, 3, 1), MBM_BUSY);
     assert_int_equal(n.counters.requests, 0);
-    while ((status = mbm_master_poll(&n.master)) == MBM_PENDING)
+    while ((status = mbm_node_poll(&n.node)) == MBM_PENDING)
         polls++;
     assert_int_equal(status, MBM_OK);
     /* One poll sends the request. How many polls find no reply depends on the server. */
     assert_true(polls > 0);
     assert_int_equal(n.counters.requests, 1);
-    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 1), server_pattern(4));
-    assert_int_equal(mbm_master_poll(&n.master), MBM_OK);
+    assert_int_equal(mbm_node_getResponseBuffer(&n.node, 1), server_pattern(4));
+    assert_int_equal(mbm_node_poll(&n.node), MBM_OK);
 }
 
 #define TEST(test) cmocka_unit_test_setup_teardown(test, start, stop)

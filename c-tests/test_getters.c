@@ -5,7 +5,8 @@
 
 #include <string.h>
 
-static mbm_master master;
+static mbm_line line;
+static mbm_node node;
 static mbm_client client;
 static mbm_server server;
 static mbm_sniffer sniffer;
@@ -42,7 +43,8 @@ static const mbm_port port = {.read = no_read, .write = no_write, .micros = cloc
 static int reset(void **state)
 {
     (void)state;
-    memset(&master, 0, sizeof master);
+    memset(&line, 0, sizeof line);
+    memset(&node, 0, sizeof node);
     memset(&client, 0, sizeof client);
     memset(&server, 0, sizeof server);
     memset(&sniffer, 0, sizeof sniffer);
@@ -50,19 +52,19 @@ static int reset(void **state)
     return 0;
 }
 
-static void all_are_zero(const mbm_master *m, const mbm_client *c, const mbm_server *s,
-                         const mbm_sniffer *n)
+static void all_are_zero(const mbm_line *l, const mbm_node *m, const mbm_client *c,
+                         const mbm_server *s, const mbm_sniffer *n)
 {
-    assert_int_equal(mbm_master_getResponseTimeout(m), 0);
-    assert_int_equal(mbm_master_getGap(m), 0);
-    assert_int_equal(mbm_master_getTurnaroundDelay(m), 0);
-    assert_int_equal(mbm_master_getQuietTime(m), 0);
-    assert_int_equal(mbm_master_getRetries(m), 0);
-    assert_int_equal(mbm_master_getEchoDiscard(m), 0);
-    assert_int_equal(mbm_master_getLenient(m), 0);
-    assert_int_equal(mbm_master_getPostFlushHold(m), 0);
-    assert_int_equal(mbm_master_getBlocking(m), 0);
-    assert_int_equal(mbm_master_getWordOrder(m), MBM_ORDER_ABCD);
+    assert_int_equal(mbm_node_getResponseTimeout(m), 0);
+    assert_int_equal(mbm_line_getGap(l), 0);
+    assert_int_equal(mbm_line_getTurnaroundDelay(l), 0);
+    assert_int_equal(mbm_line_getQuietTime(l), 0);
+    assert_int_equal(mbm_line_getRetries(l), 0);
+    assert_int_equal(mbm_line_getEchoDiscard(l), 0);
+    assert_int_equal(mbm_node_getLenient(m), 0);
+    assert_int_equal(mbm_line_getPostFlushHold(l), 0);
+    assert_int_equal(mbm_node_getBlocking(m), 0);
+    assert_int_equal(mbm_node_getWordOrder(m), MBM_ORDER_ABCD);
     assert_int_equal(mbm_client_getResponseTimeout(c), 0);
     assert_int_equal(mbm_client_getGap(c), 0);
     assert_int_equal(mbm_client_getTurnaroundDelay(c), 0);
@@ -80,17 +82,17 @@ static void all_are_zero(const mbm_master *m, const mbm_client *c, const mbm_ser
 static void an_object_that_was_never_begun_has_no_settings(void **state)
 {
     (void)state;
-    all_are_zero(NULL, NULL, NULL, NULL);
-    all_are_zero(&master, &client, &server, &sniffer);
+    all_are_zero(NULL, NULL, NULL, NULL, NULL);
+    all_are_zero(&line, &node, &client, &server, &sniffer);
 }
 
 static unsigned hooks_called;
 
-static void within_the_master(void)
+static void within_the_line(void)
 {
     hooks_called++;
-    assert_int_equal(mbm_master_getResponseTimeout(&master), 0);
-    assert_int_equal(mbm_master_getBlocking(&master), 0);
+    assert_int_equal(mbm_line_getGap(&line), 0);
+    assert_int_equal(mbm_line_getRetries(&line), 0);
 }
 
 static void within_the_client(void)
@@ -110,9 +112,9 @@ static void a_hook_gets_no_settings_of_its_object(void **state)
 {
     (void)state;
     hooks_called = 0;
-    OK(mbm_master_beginRtu(&master, 1, &port));
-    on_clock = within_the_master;
-    OK(mbm_master_lineUsed(&master));
+    OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
+    on_clock = within_the_line;
+    OK(mbm_line_used(&line));
     assert_int_equal(hooks_called, 1);
     on_clock = within_the_client;
     OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
@@ -125,52 +127,55 @@ static void a_hook_gets_no_settings_of_its_object(void **state)
     assert_true(hooks_called > 0);
 }
 
-static void a_master_returns_its_settings(void **state)
+static void a_line_and_a_node_return_their_settings(void **state)
 {
     unsigned order;
 
     (void)state;
-    OK(mbm_master_beginRtu(&master, 1, &port));
-    assert_int_equal(mbm_master_getResponseTimeout(&master), 2000);
-    assert_int_equal(mbm_master_getGap(&master), 4000);
-    assert_int_equal(mbm_master_getTurnaroundDelay(&master), 100);
-    assert_int_equal(mbm_master_getQuietTime(&master), 100);
-    assert_int_equal(mbm_master_getRetries(&master), 0);
-    assert_int_equal(mbm_master_getBlocking(&master), 1);
-    assert_int_equal(mbm_master_getWordOrder(&master), MBM_ORDER_ABCD);
-    OK(mbm_master_setResponseTimeout(&master, 65535));
-    OK(mbm_master_setTurnaroundDelay(&master, 1));
-    OK(mbm_master_setQuietTime(&master, 60001));
-    OK(mbm_master_setRetries(&master, 255));
-    OK(mbm_master_setEchoDiscard(&master, 1));
-    OK(mbm_master_setLenient(&master, 3));
-    OK(mbm_master_setPostFlushHold(&master, 7));
-    OK(mbm_master_setBlocking(&master, 0));
-    assert_int_equal(mbm_master_getResponseTimeout(&master), 65535);
-    assert_int_equal(mbm_master_getTurnaroundDelay(&master), 1);
-    assert_int_equal(mbm_master_getQuietTime(&master), 60001);
-    assert_int_equal(mbm_master_getRetries(&master), 255);
-    assert_int_equal(mbm_master_getEchoDiscard(&master), 1);
-    assert_int_equal(mbm_master_getLenient(&master), 1);
-    assert_int_equal(mbm_master_getPostFlushHold(&master), 7);
-    assert_int_equal(mbm_master_getBlocking(&master), 0);
+    OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
+    OK(mbm_node_begin(&node, &line, 1, NULL, 0, NULL, 0));
+    assert_int_equal(mbm_node_getResponseTimeout(&node), 2000);
+    assert_int_equal(mbm_line_getGap(&line), 4000);
+    assert_int_equal(mbm_line_getTurnaroundDelay(&line), 100);
+    assert_int_equal(mbm_line_getQuietTime(&line), 100);
+    assert_int_equal(mbm_line_getRetries(&line), 0);
+    assert_int_equal(mbm_node_getBlocking(&node), 1);
+    assert_int_equal(mbm_node_getWordOrder(&node), MBM_ORDER_ABCD);
+    OK(mbm_node_setResponseTimeout(&node, 65535));
+    OK(mbm_line_setTurnaroundDelay(&line, 1));
+    OK(mbm_line_setQuietTime(&line, 60001));
+    OK(mbm_line_setRetries(&line, 255));
+    OK(mbm_line_setEchoDiscard(&line, 1));
+    OK(mbm_node_setLenient(&node, 3));
+    OK(mbm_line_setPostFlushHold(&line, 7));
+    OK(mbm_node_setBlocking(&node, 0));
+    assert_int_equal(mbm_node_getResponseTimeout(&node), 65535);
+    assert_int_equal(mbm_line_getTurnaroundDelay(&line), 1);
+    assert_int_equal(mbm_line_getQuietTime(&line), 60001);
+    assert_int_equal(mbm_line_getRetries(&line), 255);
+    assert_int_equal(mbm_line_getEchoDiscard(&line), 1);
+    assert_int_equal(mbm_node_getLenient(&node), 1);
+    assert_int_equal(mbm_line_getPostFlushHold(&line), 7);
+    assert_int_equal(mbm_node_getBlocking(&node), 0);
     /* The gap is what is in effect. */
-    OK(mbm_master_setBaudRate(&master, 9600));
-    assert_int_equal(mbm_master_getGap(&master), 4011);
-    OK(mbm_master_setGap(&master, 0xFFFFFFFF));
-    assert_int_equal(mbm_master_getGap(&master), 0x80000000u);
-    OK(mbm_master_setBaudRate(&master, 115200));
-    assert_int_equal(mbm_master_getGap(&master), 1750);
+    OK(mbm_line_setBaudRate(&line, 9600));
+    assert_int_equal(mbm_line_getGap(&line), 4011);
+    OK(mbm_line_setGap(&line, 0xFFFFFFFF));
+    assert_int_equal(mbm_line_getGap(&line), 0x80000000u);
+    OK(mbm_line_setBaudRate(&line, 115200));
+    assert_int_equal(mbm_line_getGap(&line), 1750);
     for (order = MBM_ORDER_ABCD; order <= MBM_ORDER_DCBA; order++) {
-        OK(mbm_master_setWordOrder(&master, (uint8_t)order));
-        assert_int_equal(mbm_master_getWordOrder(&master), order);
+        OK(mbm_node_setWordOrder(&node, (uint8_t)order));
+        assert_int_equal(mbm_node_getWordOrder(&node), order);
     }
-    IS(MBM_INVALID_ARGUMENT, mbm_master_setWordOrder(&master, 99));
-    assert_int_equal(mbm_master_getWordOrder(&master), MBM_ORDER_DCBA);
-    /* Settings stay when a master begins again. */
-    OK(mbm_master_beginRtu(&master, 2, &port));
-    assert_int_equal(mbm_master_getResponseTimeout(&master), 65535);
-    assert_int_equal(mbm_master_getBlocking(&master), 0);
+    IS(MBM_INVALID_ARGUMENT, mbm_node_setWordOrder(&node, 99));
+    assert_int_equal(mbm_node_getWordOrder(&node), MBM_ORDER_DCBA);
+    /* Settings stay when a line and a node begin again. */
+    OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
+    OK(mbm_node_begin(&node, &line, 2, NULL, 0, NULL, 0));
+    assert_int_equal(mbm_line_getRetries(&line), 255);
+    assert_int_equal(mbm_node_getResponseTimeout(&node), 65535);
+    assert_int_equal(mbm_node_getBlocking(&node), 0);
 }
 
 static void a_client_returns_its_settings(void **state)
@@ -260,7 +265,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(an_object_that_was_never_begun_has_no_settings),
         TEST(a_hook_gets_no_settings_of_its_object),
-        TEST(a_master_returns_its_settings),
+        TEST(a_line_and_a_node_return_their_settings),
         TEST(a_client_returns_its_settings),
         TEST(a_server_returns_its_settings),
         TEST(a_sniffer_returns_its_settings),

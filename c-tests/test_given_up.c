@@ -7,27 +7,29 @@
 
 static void call_back(sim *s)
 {
-    mbm_master *n = &s->master;
+    mbm_node *n = &s->node;
     unsigned sent = s->sent;
     uint16_t address = 3;
 
-    IS(MBM_PENDING, mbm_master_status(n));
-    IS(MBM_BUSY, mbm_master_readCoils(n, 0, 1));
-    IS(MBM_BUSY, mbm_master_readDiscreteInputs(n, 0, 1));
-    IS(MBM_BUSY, mbm_master_readHoldingRegisters(n, 0, 1));
-    IS(MBM_BUSY, mbm_master_readInputRegisters(n, 0, 1));
-    IS(MBM_BUSY, mbm_master_writeSingleCoil(n, address, 1));
-    IS(MBM_BUSY, mbm_master_writeSingleRegister(n, address, 0x9999));
-    IS(MBM_BUSY, mbm_master_writeMultipleCoils(n, address, 1));
-    IS(MBM_BUSY, mbm_master_writeQueuedCoils(n));
-    IS(MBM_BUSY, mbm_master_writeMultipleRegisters(n, address, 1));
-    IS(MBM_BUSY, mbm_master_writeQueuedRegisters(n));
-    IS(MBM_BUSY, mbm_master_maskWriteRegister(n, address, 1, 2));
-    IS(MBM_BUSY, mbm_master_readWriteMultipleRegisters(n, 0, 1, address, 1));
-    IS(MBM_BUSY, mbm_master_readWriteQueuedRegisters(n, 0, 1));
-    IS(MBM_BUSY, mbm_master_setBuffers(n, s->response, 1, s->transmit, 1, s->buffer, 8));
-    assert_int_equal(mbm_master_getSlaveID(n), 17);
-    assert_int_equal(mbm_master_getExceptionCode(n), 0);
+    IS(MBM_PENDING, mbm_node_status(n));
+    IS(MBM_BUSY, mbm_node_readCoils(n, 0, 1));
+    IS(MBM_BUSY, mbm_node_readDiscreteInputs(n, 0, 1));
+    IS(MBM_BUSY, mbm_node_readHoldingRegisters(n, 0, 1));
+    IS(MBM_BUSY, mbm_node_readInputRegisters(n, 0, 1));
+    IS(MBM_BUSY, mbm_node_writeSingleCoil(n, address, 1));
+    IS(MBM_BUSY, mbm_node_writeSingleRegister(n, address, 0x9999));
+    IS(MBM_BUSY, mbm_node_writeMultipleCoils(n, address, 1));
+    IS(MBM_BUSY, mbm_node_writeQueuedCoils(n));
+    IS(MBM_BUSY, mbm_node_writeMultipleRegisters(n, address, 1));
+    IS(MBM_BUSY, mbm_node_writeQueuedRegisters(n));
+    IS(MBM_BUSY, mbm_node_maskWriteRegister(n, address, 1, 2));
+    IS(MBM_BUSY, mbm_node_readWriteMultipleRegisters(n, 0, 1, address, 1));
+    IS(MBM_BUSY, mbm_node_readWriteQueuedRegisters(n, 0, 1));
+    IS(MBM_BUSY, mbm_line_beginRtu(&s->line, &s->port, s->buffer, 8));
+    IS(MBM_BUSY, mbm_line_setFrame(&s->line, s->buffer, 8));
+    IS(MBM_BUSY, mbm_node_begin(n, &s->line, 3, s->response, 1, s->transmit, 1));
+    assert_int_equal(mbm_node_getSlaveID(n), 17);
+    assert_int_equal(mbm_node_getExceptionCode(n), 0);
     assert_int_equal(s->transmit[0], 0x1111);
     assert_int_equal(s->sent, sent);
 }
@@ -36,28 +38,27 @@ static void requests_in_an_idle_hook_return_busy_and_change_nothing(void **state
 {
     NODE;
 
-    mbm_master_setTransmitBuffer(n, 0, 0x1111);
-    mbm_master_beginTransmission(n, 0x55);
+    mbm_node_setTransmitBuffer(n, 0, 0x1111);
+    mbm_node_beginTransmission(n, 0x55);
     s->on_idle = call_back;
     sim_reads(s, 500);
     assert_true(s->idles > 10);
     s->on_idle = NULL;
     /* The write address is still the one that was set before. */
-    mbm_master_send(n, 0x2222);
+    mbm_node_send(n, 0x2222);
     sim_answer(s, 1, 500, "11 10 00 55 00 01 +");
-    OK(mbm_master_writeQueuedRegisters(n));
+    OK(mbm_node_writeQueuedRegisters(n));
 }
 
 static void request_from_idle(sim *s)
 {
-    mbm_master_requestFrom(&s->master, 0, 1);
+    mbm_node_requestFrom(&s->node, 0, 1);
 }
 
 static void request_from_in_an_idle_hook_changes_nothing(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->on_idle = request_from_idle;
     sim_reads(s, 500);
     assert_int_equal(s->sent, 1);
@@ -65,14 +66,13 @@ static void request_from_in_an_idle_hook_changes_nothing(void **state)
 
 static void poll_from_idle(sim *s)
 {
-    mbm_master_poll(&s->master);
+    mbm_node_poll(&s->node);
 }
 
 static void an_idle_hook_that_polls_does_no_harm(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->on_idle = poll_from_idle;
     sim_reads(s, 500);
 }
@@ -80,7 +80,7 @@ static void an_idle_hook_that_polls_does_no_harm(void **state)
 static void cancel_after_20_idles(sim *s)
 {
     if (s->idles == 20)
-        OK(mbm_master_cancel(&s->master));
+        OK(mbm_node_cancel(&s->node));
 }
 
 static void an_idle_hook_may_cancel_before_a_byte_is_sent(void **state)
@@ -89,7 +89,7 @@ static void an_idle_hook_may_cancel_before_a_byte_is_sent(void **state)
 
     s->on_idle = cancel_after_20_idles;
     IS(MBM_CANCELLED, sim_read_one(s));
-    IS(MBM_CANCELLED, mbm_master_status(n));
+    IS(MBM_CANCELLED, mbm_node_status(n));
     assert_int_equal(s->sent, 0);
     s->on_idle = NULL;
     sim_reads(s, 500);
@@ -98,14 +98,14 @@ static void an_idle_hook_may_cancel_before_a_byte_is_sent(void **state)
 static void cancel_in_the_reply(sim *s)
 {
     if (s->sent == 1)
-        OK(mbm_master_cancel(&s->master));
+        OK(mbm_node_cancel(&s->node));
 }
 
 static void an_idle_hook_may_cancel_while_the_reply_is_waited_for(void **state)
 {
-    NODE;
+    SIM;
 
-    mbm_master_setRetries(n, 3);
+    mbm_line_setRetries(&s->line, 3);
     s->on_idle = cancel_in_the_reply;
     IS(MBM_CANCELLED, sim_read_one(s));
     assert_int_equal(s->sent, 1);
@@ -115,9 +115,8 @@ static void an_idle_hook_may_cancel_while_the_reply_is_waited_for(void **state)
 
 static void idle_is_not_called_again_once_it_has_cancelled(void **state)
 {
-    NODE;
+    SIM;
 
-    (void)n;
     s->on_idle = cancel_after_20_idles;
     IS(MBM_CANCELLED, sim_read_one(s));
     assert_int_equal(s->idles, 20);
@@ -126,66 +125,71 @@ static void idle_is_not_called_again_once_it_has_cancelled(void **state)
 static void poll_until(sim *s, unsigned bytes)
 {
     while (s->sent == 0 || s->frames[s->sent - 1].length < bytes)
-        IS(MBM_PENDING, mbm_master_poll(&s->master));
+        IS(MBM_PENDING, mbm_node_poll(&s->node));
 }
 
 static void a_non_blocking_request_is_ended_by_poll(void **state)
 {
     NODE;
 
-    OK(mbm_master_poll(n));
-    OK(mbm_master_status(n));
-    OK(mbm_master_setBlocking(n, 0));
+    OK(mbm_node_poll(n));
+    OK(mbm_node_status(n));
+    OK(mbm_node_setBlocking(n, 0));
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
     IS(MBM_PENDING, sim_read_one(s));
-    IS(MBM_PENDING, mbm_master_status(n));
+    IS(MBM_PENDING, mbm_node_status(n));
     IS(MBM_BUSY, sim_read_one(s));
     OK(sim_poll(s));
-    OK(mbm_master_poll(n));
-    assert_int_equal(mbm_master_receive(n), 42);
+    OK(mbm_node_poll(n));
+    assert_int_equal(mbm_node_receive(n), 42);
     assert_int_equal(s->idles, 0);
     sim_answer(s, 1, 500, "11 83 04 +");
-    assert_int_equal(mbm_master_requestFrom(n, 0, 1), 0);
+    assert_int_equal(mbm_node_requestFrom(n, 0, 1), 0);
     IS(4, sim_poll(s));
-    IS(4, mbm_master_poll(n));
-    OK(mbm_master_setBlocking(n, 1));
+    IS(4, mbm_node_poll(n));
+    OK(mbm_node_setBlocking(n, 1));
     sim_reads(s, 500);
 }
 
-static void set_buffers_while_pending_is_busy_and_changes_nothing(void **state)
+static void buffers_of_a_pending_request_do_not_change(void **state)
 {
     uint16_t words[1];
     uint8_t frame[8];
     NODE;
 
-    mbm_master_setBlocking(n, 0);
+    mbm_node_setBlocking(n, 0);
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
     IS(MBM_PENDING, sim_read_one(s));
-    IS(MBM_BUSY, mbm_master_setBuffers(n, words, 1, NULL, 0, frame, 8));
+    IS(MBM_BUSY, mbm_node_begin(n, &s->line, 17, words, 1, NULL, 0));
+    IS(MBM_BUSY, mbm_line_setFrame(&s->line, frame, 8));
     poll_until(s, 8);
-    IS(MBM_BUSY, mbm_master_setBuffers(n, words, 1, NULL, 0, frame, 8));
+    IS(MBM_BUSY, mbm_node_begin(n, &s->line, 17, words, 1, NULL, 0));
+    IS(MBM_BUSY, mbm_line_setFrame(&s->line, frame, 8));
     OK(sim_poll(s));
     assert_int_equal(s->response[0], 42);
-    OK(mbm_master_setBuffers(n, words, 1, NULL, 0, frame, 8));
-    OK(mbm_master_setBuffers(n, s->response, 125, s->transmit, 123, s->buffer, 256));
+    OK(mbm_node_begin(n, &s->line, 17, words, 1, NULL, 0));
+    OK(mbm_line_setFrame(&s->line, frame, 8));
+    OK(mbm_node_setBlocking(n, 1));
+    sim_reads(s, 500);
+    assert_int_equal(words[0], 42);
 }
 
 static void a_cancel_mid_send_switches_the_driver_off(void **state)
 {
     NODE;
 
-    mbm_master_setBlocking(n, 0);
+    mbm_node_setBlocking(n, 0);
     s->write_piece = 1;
     s->cut_allowed = 1;
     IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 3);
-    OK(mbm_master_cancel(n));
+    OK(mbm_node_cancel(n));
     sim_assert_order(s, "PO", "PO");
-    IS(MBM_CANCELLED, mbm_master_poll(n));
-    OK(mbm_master_cancel(n));
-    IS(MBM_CANCELLED, mbm_master_status(n));
+    IS(MBM_CANCELLED, mbm_node_poll(n));
+    OK(mbm_node_cancel(n));
+    IS(MBM_CANCELLED, mbm_node_status(n));
     sim_assert_order(s, "PO", "PO");
-    mbm_master_setBlocking(n, 1);
+    mbm_node_setBlocking(n, 1);
     sim_reads(s, 500);
 }
 
@@ -193,14 +197,14 @@ static void the_gap_is_kept_after_a_cancel_mid_send(void **state)
 {
     NODE;
 
-    mbm_master_setBlocking(n, 0);
+    mbm_node_setBlocking(n, 0);
     s->write_piece = 1;
     s->character = 0; /* bytes are on the wire as soon as they are handed over */
     s->cut_allowed = 1;
     IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 3);
-    OK(mbm_master_cancel(n));
-    mbm_master_setBlocking(n, 1);
+    OK(mbm_node_cancel(n));
+    mbm_node_setBlocking(n, 1);
     sim_reads(s, 500);
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
@@ -209,13 +213,13 @@ static void a_cancel_while_the_port_drains_switches_the_driver_off(void **state)
 {
     NODE;
 
-    mbm_master_setBlocking(n, 0);
+    mbm_node_setBlocking(n, 0);
     IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 8);
-    OK(mbm_master_cancel(n));
+    OK(mbm_node_cancel(n));
     sim_assert_order(s, "PO", "PO");
     s->post_before_last_bit = 0; /* the test does this on purpose */
-    mbm_master_setBlocking(n, 1);
+    mbm_node_setBlocking(n, 1);
     sim_reads(s, 500);
 }
 
@@ -223,23 +227,23 @@ static void a_cancel_in_the_hold_switches_the_driver_off(void **state)
 {
     NODE;
 
-    mbm_master_setBlocking(n, 0);
-    mbm_master_setPostFlushHold(n, 100);
+    mbm_node_setBlocking(n, 0);
+    mbm_line_setPostFlushHold(&s->line, 100);
     IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 8);
     while (s->now < s->transmitted + 1000)
-        IS(MBM_PENDING, mbm_master_poll(n));
+        IS(MBM_PENDING, mbm_node_poll(n));
     assert_int_not_equal(s->driver_on, 0);
-    OK(mbm_master_cancel(n));
+    OK(mbm_node_cancel(n));
     sim_assert_order(s, "PO", "PO");
 }
 
-static void begin_mid_send_switches_the_driver_off_on_the_old_port(void **state)
+static void begin_mid_send_is_refused_until_the_request_is_given_up(void **state)
 {
     mbm_port other;
     NODE;
 
-    mbm_master_setBlocking(n, 0);
+    mbm_node_setBlocking(n, 0);
     s->write_piece = 1;
     s->character = 0; /* bytes are on the wire as soon as they are handed over */
     s->cut_allowed = 1;
@@ -247,11 +251,15 @@ static void begin_mid_send_switches_the_driver_off_on_the_old_port(void **state)
     poll_until(s, 3);
     other = s->port;
     other.postTransmission = NULL;
-    OK(mbm_master_beginRtu(n, 3, &other));
+    IS(MBM_BUSY, mbm_line_beginRtu(&s->line, &other, s->buffer, MBM_MAX_FRAME));
+    IS(MBM_BUSY, mbm_node_begin(n, &s->line, 3, s->response, 1, NULL, 0));
+    sim_assert_order(s, "P", "P");
+    OK(mbm_line_cancel(&s->line));
     sim_assert_order(s, "PO", "PO");
-    IS(MBM_CANCELLED, mbm_master_status(n));
-    IS(MBM_CANCELLED, mbm_master_poll(n));
-    mbm_master_setBlocking(n, 1);
+    OK(mbm_line_beginRtu(&s->line, &other, s->buffer, MBM_MAX_FRAME));
+    IS(MBM_CANCELLED, mbm_node_poll(n));
+    IS(MBM_CANCELLED, mbm_node_status(n));
+    mbm_node_setBlocking(n, 1);
     sim_begin(s, 17);
     sim_reads(s, 500);
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
@@ -263,11 +271,13 @@ static void a_refused_begin_leaves_the_request_under_way(void **state)
     NODE;
 
     memset(&empty, 0, sizeof empty);
-    mbm_master_setBlocking(n, 0);
+    mbm_node_setBlocking(n, 0);
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
     IS(MBM_PENDING, sim_read_one(s));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(n, 3, &empty));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(n, 3, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&s->line, &empty, s->buffer, MBM_MAX_FRAME));
+    IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&s->line, NULL, s->buffer, MBM_MAX_FRAME));
+    IS(MBM_INVALID_ARGUMENT, mbm_node_begin(n, NULL, 17, s->response, 1, NULL, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_node_begin(n, &s->line, 17, NULL, 1, NULL, 0));
     OK(sim_poll(s));
 }
 
@@ -281,12 +291,12 @@ int main(void)
         SIM_TEST(an_idle_hook_may_cancel_while_the_reply_is_waited_for),
         SIM_TEST(idle_is_not_called_again_once_it_has_cancelled),
         SIM_TEST(a_non_blocking_request_is_ended_by_poll),
-        SIM_TEST(set_buffers_while_pending_is_busy_and_changes_nothing),
+        SIM_TEST(buffers_of_a_pending_request_do_not_change),
         SIM_TEST(a_cancel_mid_send_switches_the_driver_off),
         SIM_TEST(the_gap_is_kept_after_a_cancel_mid_send),
         SIM_TEST(a_cancel_while_the_port_drains_switches_the_driver_off),
         SIM_TEST(a_cancel_in_the_hold_switches_the_driver_off),
-        SIM_TEST(begin_mid_send_switches_the_driver_off_on_the_old_port),
+        SIM_TEST(begin_mid_send_is_refused_until_the_request_is_given_up),
         SIM_TEST(a_refused_begin_leaves_the_request_under_way),
     };
 

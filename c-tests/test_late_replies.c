@@ -66,21 +66,21 @@ static void answer_in_order(sim *s, const sim_frame *request)
     s->limit = 2000000000;                                                                         \
     s->device = answer_in_order;                                                                   \
     s->context = &device;                                                                          \
-    OK(mbm_master_setResponseTimeout(n, TIMEOUT_MS))
+    OK(mbm_node_setResponseTimeout(n, TIMEOUT_MS))
 
 static void assert_reads(sim *s, uint16_t address, uint16_t quantity)
 {
     uint16_t i;
 
-    OK(mbm_master_readHoldingRegisters(&s->master, address, quantity));
+    OK(mbm_node_readHoldingRegisters(&s->node, address, quantity));
     for (i = 0; i < quantity; i++)
-        assert_int_equal(mbm_master_getResponseBuffer(&s->master, (uint8_t)i),
+        assert_int_equal(mbm_node_getResponseBuffer(&s->node, (uint8_t)i),
                          fault_value(address + i));
 }
 
 static uint8_t read_at(sim *s, uint16_t address)
 {
-    return mbm_master_readHoldingRegisters(&s->master, address, 1);
+    return mbm_node_readHoldingRegisters(&s->node, address, 1);
 }
 
 static void one_late_reply_does_not_shift_the_answers_of_later_requests(void **state)
@@ -100,7 +100,7 @@ static void a_late_reply_does_not_shift_the_answers_after_a_retry(void **state)
     DEVICE;
 
     device.takes[1] = 50000; /* longer than the gap before the next request */
-    OK(mbm_master_setRetries(n, 1));
+    OK(mbm_line_setRetries(&s->line, 1));
     for (i = 0; i < 100; i++)
         assert_reads(s, i, 1);
 }
@@ -111,7 +111,7 @@ static void a_late_reply_of_the_longest_length_does_not_shift_later_answers(void
     uint16_t i;
     DEVICE;
 
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
     for (i = 1; i < 10; i++)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
@@ -121,9 +121,9 @@ static void a_late_reply_to_a_write_of_the_same_value_costs_one_request(void **s
     unsigned i;
     DEVICE;
 
-    assert_int_equal(mbm_master_writeSingleRegister(n, 1, 5), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 5), MBM_RESPONSE_TIMED_OUT);
     for (i = 0; i < 10; i++)
-        OK(mbm_master_writeSingleRegister(n, 1, 5));
+        OK(mbm_node_writeSingleRegister(n, 1, 5));
     assert_reads(s, 9, 1);
 }
 
@@ -135,7 +135,7 @@ static void several_late_replies_in_a_row_are_all_skipped(void **state)
     device.takes[0] = 1700000; /* after two more requests */
     for (i = 0; i < 3; i++)
         assert_int_equal(read_at(s, i), i < 2 ? MBM_RESPONSE_TIMED_OUT : MBM_OK);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), fault_value(2));
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), fault_value(2));
     for (; i < 50; i++)
         assert_reads(s, i, 1);
 }
@@ -164,7 +164,7 @@ static void a_late_exception_is_not_the_answer_to_a_later_request(void **state)
         device.exception = codes[i];
         assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
         assert_reads(s, 1, 1);
-        assert_int_equal(mbm_master_getExceptionCode(n), 0);
+        assert_int_equal(mbm_node_getExceptionCode(n), 0);
         assert_reads(s, 2, 1);
     }
 }
@@ -189,7 +189,7 @@ static void a_held_reply_is_no_answer_if_the_next_one_is_damaged(void **state)
     device.damaged = 2;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_at(s, 1), MBM_INVALID_CRC);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0);
     assert_reads(s, 2, 1);
     assert_reads(s, 3, 1);
 }
@@ -201,7 +201,7 @@ static void a_held_reply_is_no_answer_if_the_next_one_is_cut_off(void **state)
     device.cut = 2;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_at(s, 1), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0);
     assert_reads(s, 2, 1);
     assert_reads(s, 3, 1);
 }
@@ -217,7 +217,7 @@ static void a_byte_of_noise_after_a_held_reply_does_not_spoil_it(void **state)
     for (i = 1; i < 10; i++)
         assert_reads(s, i, 1);
     device.requests = 0;
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
     for (i = 1; i < 10; i++)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
@@ -257,17 +257,17 @@ static void a_program_that_polls_late_does_not_lengthen_the_hold(void **state)
 
     device.takes[0] = 0;
     device.damaged = 1;
-    OK(mbm_master_setBlocking(n, 0));
+    OK(mbm_node_setBlocking(n, 0));
     assert_int_equal(read_at(s, 0), MBM_PENDING);
     while (s->sent == 0 || s->now < s->frames[0].end + 1000) {
-        assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+        assert_int_equal(mbm_node_poll(n), MBM_PENDING);
         s->now += 100;
     }
     s->now += 600000000;
-    while (mbm_master_poll(n) == MBM_PENDING)
+    while (mbm_node_poll(n) == MBM_PENDING)
         s->now += 100;
-    assert_int_equal(mbm_master_status(n), MBM_INVALID_CRC);
-    OK(mbm_master_setBlocking(n, 1));
+    assert_int_equal(mbm_node_status(n), MBM_INVALID_CRC);
+    OK(mbm_node_setBlocking(n, 1));
     assert_reads(s, 1, 1);
     assert_in_range(s->now - s->last_byte, QUIET, QUIET + SIM_SLACK);
 }
@@ -312,7 +312,7 @@ static void without_a_quiet_time_no_reply_is_held(void **state)
 {
     DEVICE;
 
-    OK(mbm_master_setQuietTime(n, 0));
+    OK(mbm_line_setQuietTime(&s->line, 0));
     device.takes[0] = 0xFFFFFFFF;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     memset(&device, 0, sizeof device);
@@ -326,10 +326,10 @@ static void the_reply_of_another_unit_does_not_end_the_holding(void **state)
     DEVICE;
 
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
-    OK(mbm_master_setSlaveID(n, 18));
+    OK(mbm_node_setSlaveID(n, 18));
     assert_reads(s, 5, 1);
     sim_assert_time(s->now - s->last_byte, 0);
-    OK(mbm_master_setSlaveID(n, 17));
+    OK(mbm_node_setSlaveID(n, 17));
     assert_reads(s, 1, 1);
     assert_reads(s, 2, 1);
 }
@@ -436,7 +436,7 @@ static void a_device_that_never_stops_answering_does_not_keep_a_request_from_end
     assert_in_range(s->now - at, 1000 * TIMEOUT_MS, 1000 * 3 * TIMEOUT_MS + QUIET + 1000);
 }
 
-/* The program polls when a byte has arrived, and else when mbm_master_pollDelay says. */
+/* The program polls when a byte has arrived, and else when mbm_node_pollDelay says. */
 static void a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_most(void **state)
 {
     uint8_t frame[16];
@@ -452,10 +452,10 @@ static void a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_
     for (at = s->now + QUIET + 10000; at < s->now + QUIET + 1000 * 3 * TIMEOUT_MS - 30000;
          at += 10000)
         sim_deliver(s, at, frame, length);
-    OK(mbm_master_setBlocking(n, 0));
+    OK(mbm_node_setBlocking(n, 0));
     assert_int_equal(read_at(s, 7), MBM_PENDING);
-    while (mbm_master_poll(n) == MBM_PENDING) {
-        uint64_t next = s->now + mbm_master_pollDelay(n);
+    while (mbm_node_poll(n) == MBM_PENDING) {
+        uint64_t next = s->now + mbm_node_pollDelay(n);
 
         if (s->first < s->last && s->incoming[s->first].at < next)
             next = s->incoming[s->first].at;

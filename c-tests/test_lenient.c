@@ -1,4 +1,4 @@
-/* Devices that deviate from the standard, and mbm_master_setLenient: a reply with the
+/* Devices that deviate from the standard, and mbm_node_setLenient: a reply with the
  * right unit, function and CRC is accepted if no better one comes. On the simulated
  * clock; unit 17 is 11 on the wire. */
 #include "sim.h"
@@ -14,8 +14,8 @@ enum { TIMEOUT_MS = 200, TIMEOUT = 200000 };
 #define LENIENT                                                                                    \
     NODE;                                                                                          \
                                                                                                    \
-    OK(mbm_master_setResponseTimeout(n, TIMEOUT_MS));                                              \
-    OK(mbm_master_setLenient(n, 1))
+    OK(mbm_node_setResponseTimeout(n, TIMEOUT_MS));                                                \
+    OK(mbm_node_setLenient(n, 1))
 
 static void a_write_whose_reply_repeats_other_content_is_accepted(void **state)
 {
@@ -25,17 +25,17 @@ static void a_write_whose_reply_repeats_other_content_is_accepted(void **state)
 
     for (i = 0; i < 2; i++) {
         sim_answer(s, 1, 500, values[i]);
-        OK(mbm_master_writeSingleRegister(n, 1, 7));
+        OK(mbm_node_writeSingleRegister(n, 1, 7));
         assert_true(s->now - s->frames[s->sent - 1].end >= TIMEOUT);
     }
     sim_answer(s, 1, 500, "11 05 00 01 00 00 +");
-    OK(mbm_master_writeSingleCoil(n, 1, 1));
+    OK(mbm_node_writeSingleCoil(n, 1, 1));
     sim_answer(s, 1, 500, "11 10 00 01 00 01 +");
-    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+    OK(mbm_node_writeMultipleRegisters(n, 1, 2));
     sim_answer(s, 1, 500, "11 0F 00 02 00 02 +");
-    OK(mbm_master_writeMultipleCoils(n, 1, 2));
+    OK(mbm_node_writeMultipleCoils(n, 1, 2));
     sim_answer(s, 1, 500, "11 16 00 01 00 02 00 04 +");
-    OK(mbm_master_maskWriteRegister(n, 1, 2, 3));
+    OK(mbm_node_maskWriteRegister(n, 1, 2, 3));
     assert_int_equal(s->counters.replies, 6);
     assert_int_equal(s->counters.timeouts, 0);
 }
@@ -44,11 +44,11 @@ static void without_it_the_same_replies_are_malformed(void **state)
 {
     LENIENT;
 
-    OK(mbm_master_setLenient(n, 0));
+    OK(mbm_node_setLenient(n, 0));
     sim_answer(s, 1, 500, "11 06 00 01 00 08 +");
-    assert_int_equal(mbm_master_writeSingleRegister(n, 1, 7), MBM_MALFORMED_REPLY);
+    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_MALFORMED_REPLY);
     sim_answer(s, 1, 500, "11 03 04 00 01 00 02 +");
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_MALFORMED_REPLY);
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_MALFORMED_REPLY);
 }
 
 static void a_read_takes_the_registers_that_come(void **state)
@@ -56,23 +56,23 @@ static void a_read_takes_the_registers_that_come(void **state)
     LENIENT;
 
     sim_answer(s, 1, 500, "11 03 06 00 01 00 02 00 03 +");
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_master_available(n), 3);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 1);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 2), 3);
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
+    assert_int_equal(mbm_node_available(n), 3);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 1);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 2), 3);
     sim_answer(s, 1, 500, "11 04 02 00 09 +");
-    OK(mbm_master_readInputRegisters(n, 0, 4));
-    assert_int_equal(mbm_master_available(n), 1);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 9);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 2), 3); /* as it was */
+    OK(mbm_node_readInputRegisters(n, 0, 4));
+    assert_int_equal(mbm_node_available(n), 1);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 9);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 2), 3); /* as it was */
     sim_answer(s, 1, 500, "11 01 03 FF 01 02 +");
-    OK(mbm_master_readCoils(n, 0, 3));
-    assert_int_equal(mbm_master_available(n), 2);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0x01FF);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 1), 0x0002);
+    OK(mbm_node_readCoils(n, 0, 3));
+    assert_int_equal(mbm_node_available(n), 2);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x01FF);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 1), 0x0002);
     sim_answer(s, 1, 500, "11 03 05 00 01 00 02 07 +"); /* half a register too many */
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_master_available(n), 2);
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
+    assert_int_equal(mbm_node_available(n), 2);
     assert_int_equal(s->counters.replies, 4);
     assert_int_equal(s->counters.foreignFrames, 0);
 }
@@ -85,16 +85,16 @@ static void the_bytes_may_come_one_at_a_time_or_all_at_once(void **state)
     for (piece = 1; piece < 20; piece++) {
         s->read_piece = piece;
         sim_answer(s, 1, 500, "11 03 06 00 01 11 03 11 83 +"); /* data like the head of a reply */
-        OK(mbm_master_readHoldingRegisters(n, 0, 1));
-        assert_int_equal(mbm_master_available(n), 3);
-        assert_int_equal(mbm_master_getResponseBuffer(n, 1), 0x1103);
-        assert_int_equal(mbm_master_getResponseBuffer(n, 2), 0x1183);
+        OK(mbm_node_readHoldingRegisters(n, 0, 1));
+        assert_int_equal(mbm_node_available(n), 3);
+        assert_int_equal(mbm_node_getResponseBuffer(n, 1), 0x1103);
+        assert_int_equal(mbm_node_getResponseBuffer(n, 2), 0x1183);
     }
     s->character = 0; /* all at once, with the next frame */
     s->read_piece = 0;
     sim_answer(s, 1, 500, "11 03 06 00 01 00 02 00 03 + / 09 03 02 00 01 +");
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_master_available(n), 3);
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
+    assert_int_equal(mbm_node_available(n), 3);
 }
 
 static void a_right_reply_is_better_before_and_after_it(void **state)
@@ -102,18 +102,18 @@ static void a_right_reply_is_better_before_and_after_it(void **state)
     LENIENT;
 
     sim_answer(s, 1, 500, "11 03 04 00 01 00 02 + / 11 03 02 00 2A +");
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_master_available(n), 1);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0x2A);
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
+    assert_int_equal(mbm_node_available(n), 1);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x2A);
     assert_true(s->now - s->frames[0].end < 100000);
     sim_answer(s, 1, 500, "11 03 02 00 2B + / 11 03 04 00 01 00 02 +");
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0x2B);
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x2B);
     sim_answer(s, 1, 500, "11 06 00 01 00 08 + / 11 06 00 01 00 07 +");
-    OK(mbm_master_writeSingleRegister(n, 1, 7));
+    OK(mbm_node_writeSingleRegister(n, 1, 7));
     assert_true(s->now - s->frames[2].end < 100000);
     sim_answer(s, 1, 500, "11 06 00 01 00 08 + / 11 86 02 +");
-    assert_int_equal(mbm_master_writeSingleRegister(n, 1, 7), MBM_ILLEGAL_DATA_ADDRESS);
+    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_ILLEGAL_DATA_ADDRESS);
 }
 
 static void half_a_reply_in_front_hides_no_right_one(void **state)
@@ -121,9 +121,9 @@ static void half_a_reply_in_front_hides_no_right_one(void **state)
     LENIENT;
 
     sim_answer(s, 1, 500, "11 03 20 00 01 / 11 03 02 00 2A +");
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0x2A);
-    assert_int_equal(mbm_master_available(n), 1);
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x2A);
+    assert_int_equal(mbm_node_available(n), 1);
 }
 
 /* Unit, function and CRC must be right, and the byte count must be that of the frame. */
@@ -144,22 +144,22 @@ static void what_is_no_reply_to_the_request_is_not_accepted(void **state)
     unsigned i;
     LENIENT;
 
-    mbm_master_setQuietTime(n, 0);
+    mbm_line_setQuietTime(&s->line, 0);
     for (i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         uint8_t status;
         sim_answer(s, 1, 500, rows[i].bytes);
-        status = mbm_master_readHoldingRegisters(n, 0, 1);
+        status = mbm_node_readHoldingRegisters(n, 0, 1);
         if (i == 2)
             assert_int_not_equal(status, MBM_OK);
         else
             assert_int_equal(status, rows[i].status);
-        assert_int_equal(mbm_master_available(n), 0);
-        assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0);
+        assert_int_equal(mbm_node_available(n), 0);
+        assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0);
     }
     sim_answer(s, 1, 500, "11 10 00 01 00 01 02 00 00 +"); /* an echo */
-    assert_int_not_equal(mbm_master_writeMultipleRegisters(n, 1, 1), MBM_OK);
+    assert_int_not_equal(mbm_node_writeMultipleRegisters(n, 1, 1), MBM_OK);
     sim_answer(s, 1, 500, "11 86 00 +");
-    assert_int_equal(mbm_master_writeSingleRegister(n, 1, 7), MBM_MALFORMED_REPLY);
+    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_MALFORMED_REPLY);
 }
 
 /* A reply of 125 registers: values 0 to 124. */
@@ -192,19 +192,20 @@ static void a_read_of_more_words_than_the_buffer_fills_it(void **state)
     LENIENT;
 
     s->device = answer_largest;
-    OK(mbm_master_setQuietTime(n, 0));
+    OK(mbm_line_setQuietTime(&s->line, 0));
     for (i = 0; i < 2; i++) {
-        OK(mbm_master_setBuffers(n, s->response, 64, s->transmit, 64, s->buffer, frames[i]));
+        OK(mbm_node_begin(n, &s->line, 17, s->response, 64, s->transmit, 64));
+        OK(mbm_line_setFrame(&s->line, s->buffer, frames[i]));
         memset(s->response, 0xFF, sizeof s->response);
-        OK(mbm_master_readHoldingRegisters(n, 0, 125));
-        assert_int_equal(mbm_master_available(n), 64);
+        OK(mbm_node_readHoldingRegisters(n, 0, 125));
+        assert_int_equal(mbm_node_available(n), 64);
         for (word = 0; word < 64; word++)
             assert_int_equal(s->response[word], word);
         assert_int_equal(s->response[64], 0xFFFF);
         assert_true(s->now - s->frames[s->sent - 1].end < 255 * s->character + 20000);
-        OK(mbm_master_setLenient(n, 0));
-        assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 125), MBM_BUFFER_TOO_SMALL);
-        OK(mbm_master_setLenient(n, 1));
+        OK(mbm_node_setLenient(n, 0));
+        assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 125), MBM_BUFFER_TOO_SMALL);
+        OK(mbm_node_setLenient(n, 1));
     }
 }
 
@@ -214,8 +215,9 @@ static void what_the_buffer_does_not_hold_is_checked_too(void **state)
 
     s->device = answer_largest;
     s->context = s;
-    OK(mbm_master_setBuffers(n, s->response, 64, s->transmit, 64, s->buffer, MBM_FRAME_BYTES(64)));
-    assert_int_not_equal(mbm_master_readHoldingRegisters(n, 0, 125), MBM_OK);
+    OK(mbm_node_begin(n, &s->line, 17, s->response, 64, s->transmit, 64));
+    OK(mbm_line_setFrame(&s->line, s->buffer, MBM_FRAME_BYTES(64)));
+    assert_int_not_equal(mbm_node_readHoldingRegisters(n, 0, 125), MBM_OK);
     assert_int_equal(s->response[0], 0);
 }
 
@@ -230,16 +232,16 @@ static void a_small_frame_buffer_is_not_left(void **state)
         uint8_t status;
 
         assert_non_null(frame);
-        OK(mbm_master_setBuffers(n, s->response, 125, s->transmit, 4, frame, size));
-        status = mbm_master_readHoldingRegisters(n, 0, 125);
+        OK(mbm_line_setFrame(&s->line, frame, size));
+        status = mbm_node_readHoldingRegisters(n, 0, 125);
         if (status == MBM_OK) {
-            assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0);
-            assert_in_range(mbm_master_available(n), 1, (size - 3) / 2);
+            assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0);
+            assert_in_range(mbm_node_available(n), 1, (size - 3) / 2);
         } else {
             assert_int_equal(status, MBM_BUFFER_TOO_SMALL);
             assert_true(size < 20);
         }
-        OK(mbm_master_setBuffers(n, s->response, 125, s->transmit, 4, s->buffer, 255));
+        OK(mbm_line_setFrame(&s->line, s->buffer, 255));
         free(frame);
     }
 }
@@ -248,33 +250,33 @@ static void a_read_from_unit_0_is_sent_and_its_reply_accepted(void **state)
 {
     LENIENT;
 
-    OK(mbm_master_setSlaveID(n, 0));
+    OK(mbm_node_setSlaveID(n, 0));
     sim_answer(s, 1, 150000, "00 03 02 00 2A +"); /* later than the turnaround delay */
-    OK(mbm_master_readHoldingRegisters(n, 0, 1));
+    OK(mbm_node_readHoldingRegisters(n, 0, 1));
     sim_assert_sent(s, 0, "00 03 00 00 00 01 +");
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0x2A);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x2A);
     assert_true(s->now - s->frames[0].end < 170000);
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
     assert_in_range(s->now - s->frames[1].end, TIMEOUT, TIMEOUT + 500);
     /* A write is a broadcast as before. */
-    OK(mbm_master_writeSingleRegister(n, 1, 2));
+    OK(mbm_node_writeSingleRegister(n, 1, 2));
     assert_in_range(s->now - s->frames[2].end, 100000, 100500);
-    OK(mbm_master_setLenient(n, 0));
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    OK(mbm_node_setLenient(n, 0));
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
 }
 
 static void it_cannot_be_set_while_a_request_is_under_way(void **state)
 {
     LENIENT;
 
-    OK(mbm_master_setBlocking(n, 0));
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_PENDING);
-    assert_int_equal(mbm_master_setLenient(n, 0), MBM_BUSY);
+    OK(mbm_node_setBlocking(n, 0));
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_PENDING);
+    assert_int_equal(mbm_node_setLenient(n, 0), MBM_BUSY);
     sim_answer(s, 1, 500, "11 03 04 00 01 00 02 +");
     OK(sim_poll(s));
-    assert_int_equal(mbm_master_available(n), 2);
-    OK(mbm_master_setLenient(n, 0));
-    assert_int_equal(mbm_master_setLenient(NULL, 1), MBM_INVALID_ARGUMENT);
+    assert_int_equal(mbm_node_available(n), 2);
+    OK(mbm_node_setLenient(n, 0));
+    assert_int_equal(mbm_node_setLenient(NULL, 1), MBM_INVALID_ARGUMENT);
 }
 
 /* After a failure a reply is held, for it may be the late one. */
@@ -282,14 +284,14 @@ static void a_late_reply_that_deviates_is_not_better_than_the_next(void **state)
 {
     LENIENT;
 
-    assert_int_equal(mbm_master_writeSingleRegister(n, 1, 7), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_RESPONSE_TIMED_OUT);
     sim_answer(s, 1, 500, "11 06 00 01 00 07 + / 11 06 00 02 00 08 +");
-    OK(mbm_master_writeSingleRegister(n, 2, 8));
-    assert_int_equal(mbm_master_readHoldingRegisters(n, 1, 1), MBM_RESPONSE_TIMED_OUT);
+    OK(mbm_node_writeSingleRegister(n, 2, 8));
+    assert_int_equal(mbm_node_readHoldingRegisters(n, 1, 1), MBM_RESPONSE_TIMED_OUT);
     sim_answer(s, 1, 500, "11 03 02 00 01 + / 11 03 04 00 02 00 03 +");
-    OK(mbm_master_readHoldingRegisters(n, 2, 2));
-    assert_int_equal(mbm_master_available(n), 2);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 2);
+    OK(mbm_node_readHoldingRegisters(n, 2, 2));
+    assert_int_equal(mbm_node_available(n), 2);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 2);
 }
 
 int main(void)

@@ -176,17 +176,20 @@ static void a_link_begun_again_has_its_default_settings(void **state)
 
 static void a_suspended_client_leaves_its_link_alone(void **state)
 {
-    static mbm_master master;
+    static mbm_line line;
+    static mbm_node node;
     static uint16_t registers[2];
     static uint8_t buffer[16];
     mbm_link second = {0};
 
     (void)state;
-    memset(&master, 0, sizeof master);
+    memset(&line, 0, sizeof line);
+    memset(&node, 0, sizeof node);
     begin_up(MBM_FRAMING_RTU);
-    OK(mbm_master_setBuffers(&master, registers, 2, registers, 0, buffer, sizeof buffer));
-    OK(mbm_master_setBlocking(&master, 0));
-    OK(mbm_client_suspend(&client, &master));
+    OK(mbm_line_setFrame(&line, buffer, sizeof buffer));
+    OK(mbm_node_begin(&node, &line, 1, registers, 2, registers, 0));
+    OK(mbm_node_setBlocking(&node, 0));
+    OK(mbm_client_suspend(&client, &line));
     memory_port_bytes(&m, frame, 1);
     IS(MBM_BUSY, mbm_client_poll(&client));
     assert_int_equal(m.arriving_count, 1);
@@ -196,17 +199,17 @@ static void a_suspended_client_leaves_its_link_alone(void **state)
     IS(MBM_BUSY, mbm_link_begin(&second, &client, &hooks));
     /* The master learns of the loss, and then the client. */
     m.is_lost = 1;
-    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
-    IS(MBM_LINK_LOST, mbm_master_poll(&master));
-    OK(mbm_client_resume(&client, &master));
+    IS(MBM_PENDING, mbm_node_readCoils(&node, 0, 1));
+    IS(MBM_LINK_LOST, mbm_node_poll(&node));
+    OK(mbm_client_resume(&client, &line));
     OK(mbm_client_poll(&client));
     assert_string_equal(events, "LE6 ");
     /* A master on a link that is down learns it too. */
     connects_with = MBM_LINK_LOST;
-    OK(mbm_client_suspend(&client, &master));
-    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
-    IS(MBM_LINK_LOST, mbm_master_poll(&master));
-    OK(mbm_client_resume(&client, &master));
+    OK(mbm_client_suspend(&client, &line));
+    IS(MBM_PENDING, mbm_node_readCoils(&node, 0, 1));
+    IS(MBM_LINK_LOST, mbm_node_poll(&node));
+    OK(mbm_client_resume(&client, &line));
 }
 
 static void a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link(void **state)

@@ -1,6 +1,6 @@
-/* Random lives of two clients with their links, and of two masters that use the clients' lines.
- * Ports stall and are lost, devices respond late or not at all, `done` and the callback of a link
- * call the library too. In half of the lives the clock jumps.
+/* Random lives of two clients with their links, and of two nodes whose lines use the clients'
+ * ports. Ports stall and are lost, devices respond late or not at all, `done` and the callback of a
+ * link call the library too. In half of the lives the clock jumps.
  *
  * - Each request ends, once, when the clock moves on by what mbm_client_pollDelay returns.
  * - A request that has ended is not sent. Each request has an address of its own, which the other
@@ -40,9 +40,10 @@ typedef struct job {
 
 static line lines[LINES];
 static job jobs[JOBS];
-static mbm_master *masters[2];
-static uint16_t master_words[2][8], asked_by[2]; /* the address of a master's request, or 0 */
-static uint8_t master_frames[2][64];
+static mbm_line *borrowers[2];
+static mbm_node *nodes[2];
+static uint16_t node_words[2][8], asked_by[2]; /* the address of a node's request, or 0 */
+static uint8_t node_frames[2][64];
 
 /* The moment at which each request ended; 0 while it is pending. */
 static unsigned long ended[IDS], moment;
@@ -152,7 +153,7 @@ static void take(line *l, uint8_t byte)
 
         HOLDS(id > 0 && id < next_id);
         HOLDS(ended[id] == 0 || ended[id] > l->began);
-        /* While the client is suspended, the line is the master's. */
+        /* While the client is suspended, the wire is the borrower's. */
         HOLDS(!l->is_suspended || (l->borrower >= 0 && id == asked_by[l->borrower]));
     }
     if (is_whole) {
@@ -418,44 +419,44 @@ static void use_link(line *l)
 static void lend(line *l)
 {
     const int i = (int)below(3);
-    mbm_master *master = i < 2 ? masters[i] : NULL;
+    mbm_line *borrower = i < 2 ? borrowers[i] : NULL;
 
-    if (master && (asked_by[i] || lines[0].borrower == i || lines[1].borrower == i))
+    if (borrower && (asked_by[i] || lines[0].borrower == i || lines[1].borrower == i))
         return;
-    if (mbm_client_suspend(l->client, master) == MBM_OK) {
+    if (mbm_client_suspend(l->client, borrower) == MBM_OK) {
         l->is_suspended = 1;
-        l->borrower = master ? i : -1;
+        l->borrower = borrower ? i : -1;
     }
 }
 
 static void take_back(line *l)
 {
-    mbm_master *master = l->borrower < 0 ? NULL : masters[l->borrower];
-    mbm_master *other = l->borrower == 0 ? masters[1] : masters[0];
+    mbm_line *borrower = l->borrower < 0 ? NULL : borrowers[l->borrower];
+    mbm_line *other = l->borrower == 0 ? borrowers[1] : borrowers[0];
 
     IS(MBM_INVALID_ARGUMENT, mbm_client_resume(l->client, other));
     if (!l->is_suspended)
         return;
-    if (master)
+    if (borrower)
         IS(MBM_INVALID_ARGUMENT, mbm_client_resume(l->client, NULL));
-    if (master && asked_by[l->borrower]) {
-        IS(MBM_BUSY, mbm_client_resume(l->client, master));
+    if (borrower && asked_by[l->borrower]) {
+        IS(MBM_BUSY, mbm_client_resume(l->client, borrower));
         return;
     }
-    OK(mbm_client_resume(l->client, master));
+    OK(mbm_client_resume(l->client, borrower));
     l->is_suspended = 0;
     l->borrower = -1;
 }
 
-/* Polls a master, or makes a request with it; it may have no line. */
-static void use_master(int i)
+/* Polls a node, or makes a request with it; its line may have no port. */
+static void use_node(int i)
 {
     const int has_line = lines[0].borrower == i || lines[1].borrower == i;
 
     if (asked_by[i]) {
         if (below(8) == 0)
-            OK(mbm_master_cancel(masters[i]));
-        else if (mbm_master_poll(masters[i]) == MBM_PENDING)
+            OK(mbm_node_cancel(nodes[i]));
+        else if (mbm_node_poll(nodes[i]) == MBM_PENDING)
             return;
         ends(asked_by[i]);
         asked_by[i] = 0;
@@ -465,7 +466,7 @@ static void use_master(int i)
         return;
     ended[next_id] = 0;
     IS(has_line ? MBM_PENDING : MBM_NOT_INITIALISED,
-       mbm_master_writeSingleRegister(masters[i], next_id, 1));
+       mbm_node_writeSingleRegister(nodes[i], next_id, 1));
     if (has_line)
         asked_by[i] = next_id;
     next_id++;
@@ -527,7 +528,7 @@ static void step(void)
     case 9:
     case 10: take_back(l); break;
     case 11:
-    case 12: use_master(at); break;
+    case 12: use_node(at); break;
     case 13:
         if (below(4) == 0)
             begin(l);
@@ -558,7 +559,7 @@ static void all_end(line *l)
     uint64_t time = 0;
 
     if (l->borrower >= 0 && asked_by[l->borrower]) {
-        OK(mbm_master_cancel(masters[l->borrower]));
+        OK(mbm_node_cancel(nodes[l->borrower]));
         ends(asked_by[l->borrower]);
         asked_by[l->borrower] = 0;
     }
@@ -598,9 +599,11 @@ static void live(void)
         lines[i].takes = 600;
         lines[i].borrower = -1;
         begin(&lines[i]);
-        masters[i] = (mbm_master *)calloc(1, sizeof *masters[i]);
-        OK(mbm_master_setBuffers(masters[i], master_words[i], 8, NULL, 0, master_frames[i], 64));
-        OK(mbm_master_setBlocking(masters[i], 0));
+        borrowers[i] = (mbm_line *)calloc(1, sizeof *borrowers[i]);
+        nodes[i] = (mbm_node *)calloc(1, sizeof *nodes[i]);
+        OK(mbm_line_setFrame(borrowers[i], node_frames[i], 64));
+        OK(mbm_node_begin(nodes[i], borrowers[i], 1, node_words[i], 8, NULL, 0));
+        OK(mbm_node_setBlocking(nodes[i], 0));
     }
     for (i = 0; i < STEPS; i++)
         step();
@@ -621,8 +624,9 @@ static void live(void)
     }
     /* Their lines are gone. */
     for (i = 0; i < 2; i++) {
-        IS(MBM_NOT_INITIALISED, mbm_master_readCoils(masters[i], 0, 1));
-        free(masters[i]);
+        IS(MBM_NOT_INITIALISED, mbm_node_readCoils(nodes[i], 0, 1));
+        free(nodes[i]);
+        free(borrowers[i]);
     }
 }
 

@@ -31,25 +31,39 @@ static void reset(void)
 /* Each of these begins an object and uses it. It returns the status of the begin function, which
  * was refused if that is not MBM_OK. */
 
-static uint8_t use_master(void *object)
+static uint8_t use_line_and_node(mbm_line *line, mbm_node *node)
 {
-    mbm_master *const master = object;
-    const uint8_t begun = mbm_master_beginRtu(master, 17, &port);
+    uint8_t begun = mbm_line_beginRtu(line, &port, frame, sizeof frame);
 
+    if (begun == MBM_OK)
+        begun = mbm_node_begin(node, line, 17, words, 4, NULL, 0);
     if (begun != MBM_OK)
         return begun;
-    OK(mbm_master_setBuffers(master, words, 4, NULL, 0, frame, sizeof frame));
-    OK(mbm_master_setBlocking(master, 0));
-    IS(MBM_PENDING, mbm_master_readHoldingRegisters(master, 0, 1));
+    OK(mbm_node_setBlocking(node, 0));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(node, 0, 1));
     while (wire.called[HOOK_POST] == 0)
-        IS(MBM_PENDING, mbm_master_poll(master));
+        IS(MBM_PENDING, mbm_node_poll(node));
     hooked_port_arrive_rtu(&wire, 17, "\x03\x02\x12\x34", 4);
-    while (mbm_master_poll(master) == MBM_PENDING)
+    while (mbm_node_poll(node) == MBM_PENDING)
         ;
-    OK(mbm_master_status(master));
+    OK(mbm_node_status(node));
     assert_int_equal(words[0], 0x1234);
-    assert_int_equal(mbm_master_getRetries(master), 0);
+    assert_int_equal(mbm_line_getRetries(line), 0);
     return MBM_OK;
+}
+
+static uint8_t use_line(void *object)
+{
+    mbm_node node = MBM_INIT;
+
+    return use_line_and_node(object, &node);
+}
+
+static uint8_t use_node(void *object)
+{
+    mbm_line line = MBM_INIT;
+
+    return use_line_and_node(&line, object);
 }
 
 static uint8_t use_client(mbm_client *client, uint8_t begun, int is_rtu)
@@ -245,7 +259,7 @@ static void count_record(void *context, const mbm_traceRecord *record)
 static uint8_t use_trace(void *object)
 {
     mbm_framing framing = MBM_INIT;
-    mbm_master master = MBM_INIT;
+    mbm_line line = MBM_INIT;
     unsigned records = 0;
     const uint8_t begun = mbm_trace_beginClient(object, &port, &framing, outgoing, sizeof outgoing,
                                                 count_record, &records);
@@ -253,7 +267,7 @@ static uint8_t use_trace(void *object)
     if (begun != MBM_OK)
         return begun;
     port = *mbm_trace_port(object);
-    OK(use_master(&master));
+    OK(use_line(&line));
     assert_int_equal(records, 2);
     return MBM_OK;
 }
@@ -274,7 +288,8 @@ static uint8_t use_ring(void *object)
 }
 
 static union {
-    mbm_master master;
+    mbm_line line;
+    mbm_node node;
     mbm_client client;
     mbm_server server;
     mbm_link link;
@@ -289,10 +304,10 @@ static const struct {
     uint8_t (*use)(void *object);
     int is_cleared_on_hosts_only;
 } objects[] = {
-    {use_master, 1},        {use_rtu_client, 0},    {use_ascii_client, 0}, {use_tcp_client, 0},
-    {use_rtu_server, 1},    {use_stream_client, 0}, {use_ascii_server, 1}, {use_tcp_server, 1},
-    {use_link, 0},          {use_plan, 0},          {use_gateway, 0},      {use_sniffer, 0},
-    {use_stream_server, 1}, {use_trace, 0},         {use_ring, 0},
+    {use_line, 1},       {use_node, 1},          {use_rtu_client, 0},    {use_ascii_client, 0},
+    {use_tcp_client, 0}, {use_rtu_server, 1},    {use_stream_client, 0}, {use_ascii_server, 1},
+    {use_tcp_server, 1}, {use_link, 0},          {use_plan, 0},          {use_gateway, 0},
+    {use_sniffer, 0},    {use_stream_server, 1}, {use_trace, 0},         {use_ring, 0},
 };
 
 static void use_all(void)
@@ -356,7 +371,8 @@ static void a_begin_function_works_in_memory_with_random_bytes(void **state)
 static void every_object_works_with_the_initialiser(void **state)
 {
     (void)state;
-    WORKS(mbm_master, use_master);
+    WORKS(mbm_line, use_line);
+    WORKS(mbm_node, use_node);
     WORKS(mbm_client, use_rtu_client);
     WORKS(mbm_client, use_ascii_client);
     WORKS(mbm_client, use_tcp_client);

@@ -55,7 +55,8 @@ static void a_request_that_was_refused_here_is_no_exception_of_the_device(void *
 {
     static mbm_client client;
     static mbm_clientRequest request;
-    static mbm_master master;
+    static mbm_line line;
+    static mbm_node node;
     static uint8_t buffer[MBM_MAX_FRAME];
     static uint16_t words[1];
     static hooked_port wire;
@@ -76,12 +77,12 @@ static void a_request_that_was_refused_here_is_no_exception_of_the_device(void *
     }
     /* As a master and a client fill both in. */
     wire.step = 500;
-    OK(mbm_master_beginRtu(&master, 17, &port));
-    OK(mbm_master_setBuffers(&master, words, 1, NULL, 0, buffer, sizeof buffer));
-    refused = mbm_master_readHoldingRegisters(&master, 0, 126);
+    OK(mbm_line_beginRtu(&line, &port, buffer, sizeof buffer));
+    OK(mbm_node_begin(&node, &line, 17, words, 1, NULL, 0));
+    refused = mbm_node_readHoldingRegisters(&node, 0, 126);
     IS(MBM_ILLEGAL_DATA_VALUE, refused);
     assert_string_equal(
-        mbm_status_textOf(refused, mbm_master_getExceptionCode(&master)),
+        mbm_status_textOf(refused, mbm_node_getExceptionCode(&node)),
         "refused, nothing was sent: the standard or a buffer does not allow the quantity or value");
     OK(mbm_client_beginRtu(&client, &port, buffer, sizeof buffer));
     request.unit = 17;

@@ -187,32 +187,32 @@ static uint16_t quantity(run *r, uint32_t most)
 /* Makes a request of a random kind to a random unit. */
 static uint8_t make_request(sim *s, run *r)
 {
-    mbm_master *n = &s->master;
+    mbm_node *n = &s->node;
     uint16_t address = (uint16_t)draw(r, MODEL_CELLS);
     uint16_t other = (uint16_t)draw(r, MODEL_CELLS);
     uint8_t i, words = (uint8_t)(1 + draw(r, 123));
 
     for (i = 0; i < words; i++)
-        mbm_master_setTransmitBuffer(n, i, (uint16_t)draw(r, 65536));
-    mbm_master_setSlaveID(n, (uint8_t)(MODEL_FIRST_UNIT + draw(r, MODEL_UNITS)));
+        mbm_node_setTransmitBuffer(n, i, (uint16_t)draw(r, 65536));
+    mbm_node_setSlaveID(n, (uint8_t)(MODEL_FIRST_UNIT + draw(r, MODEL_UNITS)));
     s->echo = draw(r, 12) == 0;
-    mbm_master_setEchoDiscard(n, s->echo);
-    mbm_master_setBlocking(n, draw(r, 2) != 0);
+    mbm_line_setEchoDiscard(&s->line, s->echo);
+    mbm_node_setBlocking(n, draw(r, 2) != 0);
     s->read_piece = (uint16_t)(draw(r, 3) ? 0 : 1 + draw(r, 5));
     s->write_piece = (uint16_t)(draw(r, 3) ? 0 : 8 + draw(r, 5));
     switch (draw(r, 10)) {
-    case 0: return mbm_master_readCoils(n, address, quantity(r, 2000));
-    case 1: return mbm_master_readDiscreteInputs(n, address, quantity(r, 2000));
-    case 2: return mbm_master_readHoldingRegisters(n, address, quantity(r, 125));
-    case 3: return mbm_master_readInputRegisters(n, address, quantity(r, 125));
-    case 4: return mbm_master_writeSingleCoil(n, address, (uint8_t)draw(r, 2));
-    case 5: return mbm_master_writeSingleRegister(n, address, other);
-    case 6: return mbm_master_writeMultipleCoils(n, address, quantity(r, 1968));
-    case 7: return mbm_master_writeMultipleRegisters(n, address, quantity(r, 123));
-    case 8: return mbm_master_maskWriteRegister(n, address, other, (uint16_t)draw(r, 65536));
+    case 0: return mbm_node_readCoils(n, address, quantity(r, 2000));
+    case 1: return mbm_node_readDiscreteInputs(n, address, quantity(r, 2000));
+    case 2: return mbm_node_readHoldingRegisters(n, address, quantity(r, 125));
+    case 3: return mbm_node_readInputRegisters(n, address, quantity(r, 125));
+    case 4: return mbm_node_writeSingleCoil(n, address, (uint8_t)draw(r, 2));
+    case 5: return mbm_node_writeSingleRegister(n, address, other);
+    case 6: return mbm_node_writeMultipleCoils(n, address, quantity(r, 1968));
+    case 7: return mbm_node_writeMultipleRegisters(n, address, quantity(r, 123));
+    case 8: return mbm_node_maskWriteRegister(n, address, other, (uint16_t)draw(r, 65536));
     default:
-        return mbm_master_readWriteMultipleRegisters(n, address, quantity(r, 125), other,
-                                                     quantity(r, 121));
+        return mbm_node_readWriteMultipleRegisters(n, address, quantity(r, 125), other,
+                                                   quantity(r, 121));
     }
 }
 
@@ -350,8 +350,8 @@ static unsigned run_faults(sim *s, unsigned retries)
     s->idle_step = 200;
     s->clock_start = 0xFFFFF000u;
     sim_begin(s, MODEL_FIRST_UNIT);
-    mbm_master_setResponseTimeout(&s->master, TIMEOUT_MS);
-    mbm_master_setRetries(&s->master, (uint8_t)retries);
+    mbm_node_setResponseTimeout(&s->node, TIMEOUT_MS);
+    mbm_line_setRetries(&s->line, (uint8_t)retries);
     for (i = 0; i < transactions(); i++)
         transact(s, r, retries);
     print_message("faults: seed %lu, retries %u, transactions %u: right %u (exceptions %u), "

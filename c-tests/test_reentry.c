@@ -1,4 +1,4 @@
-/* Every function of a master or server, called from within each of its hooks. Where no call
+/* Every function of a line, a node or a server, called from within each of its hooks. Where no call
  * is allowed, it returns MBM_BUSY and changes nothing. Where calls are allowed, they work. */
 #include "hooked_port.h"
 #include "test.h"
@@ -12,7 +12,8 @@ static mbm_port port;
 static uint8_t small_frame[MBM_MAX_TCP_FRAME], other_frame[MBM_MAX_TCP_FRAME];
 static uint16_t words[8];
 
-static mbm_master master;
+static mbm_line line;
+static mbm_node master;
 static mbm_server server;
 static mbm_unit unit;
 
@@ -20,6 +21,7 @@ static int reset(void **state)
 {
     (void)state;
     memset(&wire, 0, sizeof wire);
+    memset(&line, 0, sizeof line);
     memset(&master, 0, sizeof master);
     memset(&server, 0, sizeof server);
     memset(&unit, 0, sizeof unit);
@@ -32,84 +34,96 @@ static int reset(void **state)
 
 /* --- master --- */
 
-static void every_function_of_the_master_is_busy(void)
+static void every_function_of_the_line_is_busy(void)
 {
-    mbm_master *m = &master;
     mbm_counters counters;
-    mbm_registers view;
-    mbm_turn turn = {0};
+    mbm_node *m = &master;
 
-    IS(MBM_BUSY, mbm_master_beginRtu(m, 1, &port));
-    IS(MBM_BUSY, mbm_master_setBuffers(m, words, 1, words, 1, other_frame, 8));
-    IS(MBM_BUSY, mbm_master_setWords(m, words, 1, words, 1));
-    IS(MBM_BUSY, mbm_master_setFrame(m, other_frame, 8));
-    IS(MBM_BUSY, mbm_master_poll(m));
-    assert_int_equal(mbm_master_pollDelay(m), 0);
-    IS(MBM_BUSY, mbm_master_cancel(m));
-    IS(MBM_BUSY, mbm_master_status(m));
-    IS(MBM_BUSY, mbm_master_setSlaveID(m, 1));
-    IS(MBM_BUSY, mbm_master_setResponseTimeout(m, 1));
-    IS(MBM_BUSY, mbm_master_setBaudRate(m, 1));
-    IS(MBM_BUSY, mbm_master_setGap(m, 1));
-    IS(MBM_BUSY, mbm_master_setTurnaroundDelay(m, 1));
-    IS(MBM_BUSY, mbm_master_setQuietTime(m, 1));
-    IS(MBM_BUSY, mbm_master_setRetries(m, 1));
-    IS(MBM_BUSY, mbm_master_setEchoDiscard(m, 1));
-    IS(MBM_BUSY, mbm_master_setLenient(m, 1));
-    IS(MBM_BUSY, mbm_master_setPostFlushHold(m, 1));
-    IS(MBM_BUSY, mbm_master_setBlocking(m, 0));
-    IS(MBM_BUSY, mbm_master_setCounters(m, &counters));
-    IS(MBM_BUSY, mbm_master_setWordOrder(m, 2));
-    IS(MBM_BUSY, mbm_master_lineUsed(m));
-    IS(MBM_BUSY, mbm_master_lineUsedAt(m, 0));
-    IS(MBM_BUSY, mbm_master_beginRtuWith(m, 1, &port, NULL));
-    IS(MBM_BUSY, mbm_master_takeTurn(m, &turn));
-    IS(MBM_BUSY, mbm_master_endTurn(m, &turn));
-    assert_null(turn.master);
-    IS(MBM_BUSY, mbm_master_clearResponseBuffer(m));
-    IS(MBM_BUSY, mbm_master_setTransmitBuffer(m, 0, 1));
-    IS(MBM_BUSY, mbm_master_clearTransmitBuffer(m));
-    IS(MBM_BUSY, mbm_master_beginTransmission(m, 1));
-    IS(MBM_BUSY, mbm_master_send(m, 1));
-    IS(MBM_BUSY, mbm_master_send(m, 1));
-    IS(MBM_BUSY, mbm_master_send32(m, 1));
-    IS(MBM_BUSY, mbm_master_sendBit(m, 1));
-    IS(MBM_BUSY, mbm_master_getResponseRegisters(m, 0, &view));
-    IS(MBM_BUSY, mbm_master_getTransmitRegisters(m, 0, &view));
-    IS(MBM_BUSY, mbm_master_readCoils(m, 0, 1));
-    IS(MBM_BUSY, mbm_master_readDiscreteInputs(m, 0, 1));
-    IS(MBM_BUSY, mbm_master_readHoldingRegisters(m, 0, 1));
-    IS(MBM_BUSY, mbm_master_readInputRegisters(m, 0, 1));
-    IS(MBM_BUSY, mbm_master_writeSingleCoil(m, 0, 1));
-    IS(MBM_BUSY, mbm_master_writeSingleRegister(m, 0, 1));
-    IS(MBM_BUSY, mbm_master_writeMultipleCoils(m, 0, 1));
-    IS(MBM_BUSY, mbm_master_writeQueuedCoils(m));
-    IS(MBM_BUSY, mbm_master_writeMultipleRegisters(m, 0, 1));
-    IS(MBM_BUSY, mbm_master_writeQueuedRegisters(m));
-    IS(MBM_BUSY, mbm_master_maskWriteRegister(m, 0, 1, 2));
-    IS(MBM_BUSY, mbm_master_readWriteMultipleRegisters(m, 0, 1, 0, 1));
-    IS(MBM_BUSY, mbm_master_readWriteQueuedRegisters(m, 0, 1));
-    assert_int_equal(mbm_master_requestFrom(m, 0, 1), 0);
-    assert_int_equal(mbm_master_getSlaveID(m), 0);
-    assert_int_equal(mbm_master_getExceptionCode(m), 0);
-    assert_int_equal(mbm_master_getResponseBuffer(m, 0), 0xFFFF);
-    assert_int_equal(mbm_master_available(m), 0);
-    assert_int_equal(mbm_master_receive(m), 0xFFFF);
+    IS(MBM_BUSY, mbm_line_beginRtu(&line, &port, other_frame, 8));
+    IS(MBM_BUSY, mbm_line_setFrame(&line, other_frame, 8));
+    IS(MBM_BUSY, mbm_line_cancel(&line));
+    IS(MBM_BUSY, mbm_line_setBaudRate(&line, 1));
+    IS(MBM_BUSY, mbm_line_setGap(&line, 1));
+    IS(MBM_BUSY, mbm_line_setTurnaroundDelay(&line, 1));
+    IS(MBM_BUSY, mbm_line_setQuietTime(&line, 1));
+    IS(MBM_BUSY, mbm_line_setRetries(&line, 1));
+    IS(MBM_BUSY, mbm_line_setEchoDiscard(&line, 1));
+    IS(MBM_BUSY, mbm_line_setPostFlushHold(&line, 1));
+    IS(MBM_BUSY, mbm_line_setCounters(&line, &counters));
+    IS(MBM_BUSY, mbm_line_used(&line));
+    IS(MBM_BUSY, mbm_line_usedAt(&line, 0));
+    IS(MBM_BUSY, mbm_node_readCoils(m, 0, 1));
+    IS(MBM_BUSY, mbm_node_readDiscreteInputs(m, 0, 1));
+    IS(MBM_BUSY, mbm_node_readHoldingRegisters(m, 0, 1));
+    IS(MBM_BUSY, mbm_node_readInputRegisters(m, 0, 1));
+    IS(MBM_BUSY, mbm_node_writeSingleCoil(m, 0, 1));
+    IS(MBM_BUSY, mbm_node_writeSingleRegister(m, 0, 1));
+    IS(MBM_BUSY, mbm_node_writeMultipleCoils(m, 0, 1));
+    IS(MBM_BUSY, mbm_node_writeQueuedCoils(m));
+    IS(MBM_BUSY, mbm_node_writeMultipleRegisters(m, 0, 1));
+    IS(MBM_BUSY, mbm_node_writeQueuedRegisters(m));
+    IS(MBM_BUSY, mbm_node_maskWriteRegister(m, 0, 1, 2));
+    IS(MBM_BUSY, mbm_node_readWriteMultipleRegisters(m, 0, 1, 0, 1));
+    IS(MBM_BUSY, mbm_node_readWriteQueuedRegisters(m, 0, 1));
+    assert_int_equal(mbm_node_requestFrom(m, 0, 1), 0);
 }
+
+/* Of a node whose request is under way. */
+static void its_request_is_busy(void)
+{
+    IS(MBM_BUSY, mbm_node_setLenient(&master, 1));
+    IS(MBM_BUSY, mbm_node_begin(&master, &line, 1, words, 1, words, 1));
+    IS(MBM_BUSY, mbm_node_poll(&master));
+    assert_int_equal(mbm_node_pollDelay(&master), 0);
+    IS(MBM_BUSY, mbm_node_cancel(&master));
+    IS(MBM_BUSY, mbm_node_status(&master));
+}
+
+/* A node's own words and settings may be used. */
+static void its_words_and_settings_are_free(void)
+{
+    mbm_node *m = &master;
+    mbm_registers view;
+
+    assert_int_equal(mbm_node_getSlaveID(m), 17);
+    OK(mbm_node_setSlaveID(m, 17));
+    OK(mbm_node_setResponseTimeout(m, 2000));
+    OK(mbm_node_setWordOrder(m, MBM_ORDER_ABCD));
+    OK(mbm_node_setTransmitBuffer(m, 1, 0x55));
+    OK(mbm_node_beginTransmission(m, 1));
+    OK(mbm_node_send(m, 0x77));
+    OK(mbm_node_clearTransmitBuffer(m));
+    OK(mbm_node_getResponseRegisters(m, 0, &view));
+    OK(mbm_node_getTransmitRegisters(m, 0, &view));
+    assert_int_equal(mbm_node_getExceptionCode(m), 0);
+    assert_int_equal(mbm_node_available(m), 0);
+    assert_int_equal(mbm_node_receive(m), 0xFFFF);
+}
+
+/* A request is under way. */
+static int is_pending;
 
 static void within_master(int hook)
 {
-    if (hook != HOOK_IDLE)
-        UNCHANGED_BY(master, every_function_of_the_master_is_busy());
+    if (hook != HOOK_IDLE) {
+        UNCHANGED_BY(line, every_function_of_the_line_is_busy());
+        UNCHANGED_BY(master, every_function_of_the_line_is_busy());
+        if (is_pending) {
+            UNCHANGED_BY(line, its_request_is_busy());
+            UNCHANGED_BY(master, its_request_is_busy());
+        }
+        its_words_and_settings_are_free();
+    }
     if (hook == HOOK_POST)
         hooked_port_arrive_rtu(&wire, 17, "\3\2\x12\x34", 4);
 }
 
 static void begin_master(void)
 {
-    OK(mbm_master_setBuffers(&master, words, 4, words + 4, 4, small_frame, 64));
-    OK(mbm_master_beginRtu(&master, 17, &port));
+    OK(mbm_line_beginRtu(&line, &port, small_frame, 64));
+    OK(mbm_node_begin(&master, &line, 17, words, 4, words + 4, 4));
     wire.within = within_master;
+    is_pending = 0;
 }
 
 static void no_hook_of_a_masters_port_may_call_the_master(void **state)
@@ -118,26 +132,28 @@ static void no_hook_of_a_masters_port_may_call_the_master(void **state)
 
     (void)state;
     begin_master();
-    OK(mbm_master_readHoldingRegisters(&master, 0, 1));
-    assert_int_equal(mbm_master_receive(&master), 0x1234);
+    is_pending = 1;
+    OK(mbm_node_readHoldingRegisters(&master, 0, 1));
+    assert_int_equal(mbm_node_receive(&master), 0x1234);
     for (i = 0; i < HOOKS; i++)
         assert_true(wire.called[i] > 0);
     /* The same outside of a request. */
     entered = 0;
-    OK(mbm_master_lineUsed(&master));
-    OK(mbm_master_beginRtu(&master, 17, &port));
-    OK(mbm_master_setBlocking(&master, 0));
-    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&master, 0, 1));
-    assert_true(mbm_master_pollDelay(&master) < 0xFFFFFFFFu);
+    is_pending = 0;
+    OK(mbm_line_used(&line));
+    is_pending = 1;
+    OK(mbm_node_setBlocking(&master, 0));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&master, 0, 1));
+    assert_true(mbm_node_pollDelay(&master) < 0xFFFFFFFFu);
     assert_true(entered >= 2);
     /* A cancel calls the hook that switches the driver off. */
     entered = 0;
     wire.called[HOOK_POST] = 0;
     while (wire.called[HOOK_WRITE] < 2)
-        IS(MBM_PENDING, mbm_master_poll(&master));
-    OK(mbm_master_cancel(&master));
+        IS(MBM_PENDING, mbm_node_poll(&master));
+    OK(mbm_node_cancel(&master));
     assert_true(entered > 0);
-    OK(mbm_master_getSlaveID(&master) == 17 ? MBM_OK : MBM_BUSY);
+    OK(mbm_node_getSlaveID(&master) == 17 ? MBM_OK : MBM_BUSY);
 }
 
 /* What the idle hook does. Each value is tried in a request of its own. */
@@ -145,7 +161,7 @@ static int idle_does;
 
 static void within_idle(int hook)
 {
-    mbm_master fresh;
+    mbm_node fresh;
 
     if (hook == HOOK_POST && idle_does != 2)
         hooked_port_arrive_rtu(&wire, 17, "\3\2\x12\x34", 4);
@@ -154,16 +170,17 @@ static void within_idle(int hook)
     entered++;
     switch (idle_does) {
     case 0:
-        IS(MBM_BUSY, mbm_master_readCoils(&master, 0, 1));
-        IS(MBM_BUSY, mbm_master_setBuffers(&master, words, 1, words, 1, small_frame, 8));
-        IS(MBM_PENDING, mbm_master_status(&master));
-        assert_int_equal(mbm_master_getSlaveID(&master), 17);
-        assert_true(mbm_master_pollDelay(&master) < 0xFFFFFFFFu);
-        OK(mbm_master_setQuietTime(&master, 1));
+        IS(MBM_BUSY, mbm_node_readCoils(&master, 0, 1));
+        IS(MBM_BUSY, mbm_node_begin(&master, &line, 17, words, 1, words, 1));
+        IS(MBM_BUSY, mbm_line_setFrame(&line, small_frame, 8));
+        IS(MBM_PENDING, mbm_node_status(&master));
+        assert_int_equal(mbm_node_getSlaveID(&master), 17);
+        assert_true(mbm_node_pollDelay(&master) < 0xFFFFFFFFu);
+        OK(mbm_line_setQuietTime(&line, 1));
         break;
-    case 1: mbm_master_poll(&master); break;
-    case 2: OK(mbm_master_cancel(&master)); break;
-    case 3: OK(mbm_master_beginRtu(&master, 17, &port)); break;
+    case 1: mbm_node_poll(&master); break;
+    case 2: OK(mbm_node_cancel(&master)); break;
+    case 3: OK(mbm_line_cancel(&line)); break;
     default: memset(&fresh, 0, sizeof fresh); memcpy(&master, &fresh, sizeof master);
     }
 }
@@ -178,9 +195,10 @@ static void an_idle_hook_may_call_its_master(void **state)
         begin_master();
         entered = 0;
         wire.within = within_idle;
-        IS(ends[idle_does], mbm_master_readHoldingRegisters(&master, 0, 1));
+        IS(ends[idle_does], mbm_node_readHoldingRegisters(&master, 0, 1));
         assert_true(entered > 0);
         wire.within = NULL;
+        OK(mbm_line_cancel(&line)); /* the last node is lost with its request */
     }
 }
 

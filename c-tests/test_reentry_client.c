@@ -109,8 +109,8 @@ static void an_identification_answers(uint8_t status)
 
 static void every_function_of_the_client_is_busy(void)
 {
-    static mbm_master master;
-    static const mbm_master zero;
+    static mbm_line borrower;
+    static const mbm_node zero;
     static const mbm_linkHooks link = {.context = NULL};
     static uint8_t asked[sizeof another];
 
@@ -131,9 +131,9 @@ static void every_function_of_the_client_is_busy(void)
     IS(MBM_BUSY, mbm_client_setDelimiter(&client, '!'));
     IS(MBM_BUSY, mbm_client_reconnect(&client, &link));
     IS(MBM_BUSY, mbm_client_suspend(&client, NULL));
-    IS(MBM_BUSY, mbm_client_suspend(&client, &master));
-    IS(MBM_BUSY, mbm_client_resume(&client, &master));
-    assert_memory_equal(&master, &zero, sizeof zero);
+    IS(MBM_BUSY, mbm_client_suspend(&client, &borrower));
+    IS(MBM_BUSY, mbm_client_resume(&client, &borrower));
+    assert_memory_equal(&borrower, &zero, sizeof zero);
     IS(MBM_BUSY, mbm_client_poll(&client));
     assert_int_equal(mbm_client_pollDelay(&client), 0);
     assert_int_equal(mbm_client_pending(&client), 0);
@@ -228,7 +228,7 @@ static void connect_anew(void *context)
 static void done(void *context, mbm_clientRequest *ended)
 {
     const mbm_linkHooks link = {.disconnect = connect_anew};
-    static mbm_master master;
+    static mbm_line borrower;
 
     (void)context;
     entered++;
@@ -251,11 +251,10 @@ static void done(void *context, mbm_clientRequest *ended)
         OK(mbm_client_suspend(&client, NULL));
         IS(MBM_BUSY, mbm_client_suspend(&client, NULL));
         OK(mbm_client_resume(&client, NULL));
-        memset(&master, 0, sizeof master);
-        OK(mbm_master_setBuffers(&master, words, 1, words, 1, other_frame, 8));
+        memset(&borrower, 0, sizeof borrower);
         if (framing_of_done % 3 == 0) {
-            OK(mbm_client_suspend(&client, &master));
-            OK(mbm_client_resume(&client, &master));
+            OK(mbm_client_suspend(&client, &borrower));
+            OK(mbm_client_resume(&client, &borrower));
         }
         break;
     case 3:
@@ -298,21 +297,20 @@ static void a_done_function_may_call_its_client(void **state)
     }
 }
 
-static void the_clock_may_not_call_the_client_that_gives_its_line_to_a_master(void **state)
+static void the_clock_may_not_call_the_client_that_gives_its_port_to_a_line(void **state)
 {
-    static mbm_master master_on_the_line;
+    static mbm_line line;
 
     (void)state;
-    memset(&master_on_the_line, 0, sizeof master_on_the_line);
+    memset(&line, 0, sizeof line);
     begin_client(0);
-    OK(mbm_master_setBuffers(&master_on_the_line, words, 1, words, 1, other_frame, 8));
     request.unit = 17;
     IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 1));
     wire.within = within_client;
-    OK(mbm_client_suspend(&client, &master_on_the_line));
+    OK(mbm_client_suspend(&client, &line));
     wire.within = NULL;
     assert_int_equal(entered, 1);
-    OK(mbm_client_resume(&client, &master_on_the_line));
+    OK(mbm_client_resume(&client, &line));
 }
 
 #define TEST(test) cmocka_unit_test_setup(test, reset)
@@ -322,7 +320,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client),
         TEST(a_done_function_may_call_its_client),
-        TEST(the_clock_may_not_call_the_client_that_gives_its_line_to_a_master),
+        TEST(the_clock_may_not_call_the_client_that_gives_its_port_to_a_line),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -174,7 +174,8 @@ static void refused_records_are_unchanged(void **state)
 
 static void a_master_goes_on_after_refused_calls(void **state)
 {
-    static mbm_master m;
+    static mbm_line line;
+    static mbm_node m;
     uint8_t *frame = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(8);
     uint16_t *response = (uint16_t *)malloc(250), *transmit = (uint16_t *)malloc(4), one[1];
     uint8_t answer[252] = {3, 250};
@@ -183,48 +184,52 @@ static void a_master_goes_on_after_refused_calls(void **state)
     unsigned i;
 
     (void)state;
+    memset(&line, 0, sizeof line);
     memset(&m, 0, sizeof m);
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtu(&m, 1, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_beginRtu(&line, NULL, small, 8));
     mute.write = NULL;
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtu(&m, 1, &mute));
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setBuffers(&m, one, 1, one, 1, small, 7));
-    OK(mbm_master_beginRtu(&m, 17, &port));
-    OK(mbm_master_setBuffers(&m, response, 125, transmit, 2, frame, MBM_MAX_FRAME));
-    OK(mbm_master_setBlocking(&m, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_beginRtu(&line, &mute, small, 8));
+    REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_beginRtu(&line, &port, small, 7));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_node_begin(&m, NULL, 17, one, 1, one, 1));
+    OK(mbm_line_beginRtu(&line, &port, frame, MBM_MAX_FRAME));
+    OK(mbm_node_begin(&m, &line, 17, response, 125, transmit, 2));
+    OK(mbm_node_setBlocking(&m, 0));
     transmit[0] = transmit[1] = 0x1234;
-    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&m, 0, 125));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&m, 0, 125));
 
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtu(&m, 1, &mute));
-    REFUSED(MBM_BUSY, m, mbm_master_setBuffers(&m, one, 1, one, 1, small, 8));
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setBuffers(&m, one, 256, one, 1, small, 8));
-    REFUSED(MBM_BUSY, m, mbm_master_readCoils(&m, 0, 1));
-    REFUSED(MBM_BUSY, m, mbm_master_writeSingleRegister(&m, 1, 2));
-    REFUSED(MBM_BUSY, m, mbm_master_writeMultipleRegisters(&m, 1, 2));
-    REFUSED(MBM_BUSY, m, mbm_master_writeQueuedRegisters(&m));
-    REFUSED(MBM_BUSY, m, mbm_master_maskWriteRegister(&m, 1, 2, 3));
-    REFUSED(MBM_BUSY, m, mbm_master_readWriteMultipleRegisters(&m, 1, 2, 3, 2));
-    REFUSED(0, m, mbm_master_requestFrom(&m, 1, 2));
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setWordOrder(&m, 5));
-    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, m, mbm_master_setTransmitBuffer(&m, 2, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_getResponseRegisters(&m, 0, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_beginRtu(&line, &mute, small, 8));
+    REFUSED(MBM_BUSY, line, mbm_line_beginRtu(&line, &port, small, 8));
+    REFUSED(MBM_BUSY, line, mbm_line_setFrame(&line, small, 8));
+    REFUSED(MBM_BUSY, m, mbm_node_begin(&m, &line, 17, one, 1, one, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_node_begin(&m, &line, 17, one, 256, one, 1));
+    REFUSED(MBM_BUSY, m, mbm_node_readCoils(&m, 0, 1));
+    REFUSED(MBM_BUSY, m, mbm_node_writeSingleRegister(&m, 1, 2));
+    REFUSED(MBM_BUSY, m, mbm_node_writeMultipleRegisters(&m, 1, 2));
+    REFUSED(MBM_BUSY, m, mbm_node_writeQueuedRegisters(&m));
+    REFUSED(MBM_BUSY, m, mbm_node_maskWriteRegister(&m, 1, 2, 3));
+    REFUSED(MBM_BUSY, m, mbm_node_readWriteMultipleRegisters(&m, 1, 2, 3, 2));
+    REFUSED(0, m, mbm_node_requestFrom(&m, 1, 2));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_node_setWordOrder(&m, 5));
+    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, m, mbm_node_setTransmitBuffer(&m, 2, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_node_getResponseRegisters(&m, 0, NULL));
     assert_int_equal(transmit[0], 0x1234);
     assert_int_equal(transmit[1], 0x1234);
     memset(&view, 0x33, sizeof view);
-    REFUSED(MBM_INVALID_ARGUMENT, view, mbm_master_getResponseRegisters(NULL, 0, &view));
+    REFUSED(MBM_INVALID_ARGUMENT, view, mbm_node_getResponseRegisters(NULL, 0, &view));
 
     for (i = 0; i < 300 && wire.length == 0; i++)
-        IS(MBM_PENDING, mbm_master_poll(&m));
+        IS(MBM_PENDING, mbm_node_poll(&m));
     hooked_port_arrive_rtu(&wire, 17, answer, sizeof answer);
-    for (i = 0; i < 300 && mbm_master_poll(&m) == MBM_PENDING; i++) {
+    for (i = 0; i < 300 && mbm_node_poll(&m) == MBM_PENDING; i++) {
     }
-    OK(mbm_master_status(&m));
+    OK(mbm_node_status(&m));
     /* The queue of words is full. */
-    OK(mbm_master_send(&m, 1));
-    OK(mbm_master_send(&m, 2));
-    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send(&m, 3));
-    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send(&m, 3));
-    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send32(&m, 3));
-    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_sendBit(&m, 1));
+    OK(mbm_node_send(&m, 1));
+    OK(mbm_node_send(&m, 2));
+    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_node_send(&m, 3));
+    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_node_send(&m, 3));
+    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_node_send32(&m, 3));
+    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_node_sendBit(&m, 1));
     free(frame);
     free(small);
     free(response);
@@ -233,26 +238,28 @@ static void a_master_goes_on_after_refused_calls(void **state)
 
 static void request_from_returns_0_whenever_it_is_refused(void **state)
 {
-    static mbm_master m;
+    static mbm_line line;
+    static mbm_node m;
     static uint16_t response[4], transmit[4];
     static uint8_t frame[MBM_FRAME_BYTES(4)];
     unsigned i;
 
     (void)state;
+    memset(&line, 0, sizeof line);
     memset(&m, 0, sizeof m);
-    OK(mbm_master_beginRtu(&m, 17, &port));
-    OK(mbm_master_setBuffers(&m, response, 4, transmit, 4, frame, sizeof frame));
-    OK(mbm_master_setBlocking(&m, 0));
-    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&m, 0, 2));
+    OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
+    OK(mbm_node_begin(&m, &line, 17, response, 4, transmit, 4));
+    OK(mbm_node_setBlocking(&m, 0));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&m, 0, 2));
     for (i = 0; i < 300 && wire.length == 0; i++)
-        IS(MBM_PENDING, mbm_master_poll(&m));
+        IS(MBM_PENDING, mbm_node_poll(&m));
     hooked_port_arrive_rtu(&wire, 17, "\3\4\0\1\0\2", 6);
-    for (i = 0; i < 300 && mbm_master_poll(&m) == MBM_PENDING; i++) {
+    for (i = 0; i < 300 && mbm_node_poll(&m) == MBM_PENDING; i++) {
     }
-    assert_int_equal(mbm_master_available(&m), 2);
-    assert_int_equal(mbm_master_requestFrom(&m, 0, 126), 0);
-    IS(MBM_PENDING, mbm_master_writeSingleRegister(&m, 0, 2));
-    assert_int_equal(mbm_master_requestFrom(&m, 0, 1), 0);
+    assert_int_equal(mbm_node_available(&m), 2);
+    assert_int_equal(mbm_node_requestFrom(&m, 0, 126), 0);
+    IS(MBM_PENDING, mbm_node_writeSingleRegister(&m, 0, 2));
+    assert_int_equal(mbm_node_requestFrom(&m, 0, 1), 0);
 }
 
 /* --- sniffer and ring --- */

@@ -9,9 +9,10 @@
 #include "refused_wire.h"
 
 static mbm_client client;
-static mbm_master master;
-static uint16_t master_words[2];
-static uint8_t master_frame[16];
+static mbm_line line;
+static mbm_node node;
+static uint16_t node_words[2];
+static uint8_t line_frame[16];
 static uint8_t *incoming, *outgoing;
 
 /* Begins in framing 0 to 3, with buffers of exactly this size. */
@@ -74,7 +75,7 @@ static void all_settings_out_of_range_are_refused(int framing)
 static void a_client_goes_on_after_refused_calls(void **state)
 {
     static uint8_t small[20];
-    static const mbm_master zero;
+    static const mbm_line zero;
     static uint16_t reply[125];
     mbm_clientRequest request, other;
     uint32_t delay;
@@ -85,7 +86,8 @@ static void a_client_goes_on_after_refused_calls(void **state)
         memset(&client, 0, sizeof client);
         memset(&request, 0, sizeof request);
         memset(&other, 0, sizeof other);
-        memset(&master, 0, sizeof master);
+        memset(&line, 0, sizeof line);
+        memset(&node, 0, sizeof node);
         OK(begin_client(framing, 600, 600));
         all_settings_out_of_range_are_refused(framing);
         request.unit = 17;
@@ -110,8 +112,8 @@ static void a_client_goes_on_after_refused_calls(void **state)
         REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_readCoils(&client, NULL, 0, 1));
         REFUSED(MBM_BUSY, client, mbm_client_suspend(&client, NULL));
         REFUSED(framing == 0 || framing == 3 ? MBM_BUSY : MBM_INVALID_ARGUMENT, client,
-                mbm_client_suspend(&client, &master));
-        assert_memory_equal(&master, &zero, sizeof master);
+                mbm_client_suspend(&client, &line));
+        assert_memory_equal(&line, &zero, sizeof line);
         /* A refused request has the status of the refusal and is not queued. */
         other.unit = 17;
         other.transaction = 7;
@@ -148,12 +150,13 @@ static void a_client_goes_on_after_refused_calls(void **state)
 static void a_full_queue_and_a_suspended_client_change_nothing(void **state)
 {
     static mbm_clientRequest requests[MBM_CLIENT_DEPTH + 1];
-    static const mbm_master zero;
+    static const mbm_line zero;
     unsigned i;
 
     (void)state;
     memset(&client, 0, sizeof client);
-    memset(&master, 0, sizeof master);
+    memset(&line, 0, sizeof line);
+    memset(&node, 0, sizeof node);
     memset(requests, 0, sizeof requests);
     OK(begin_client(0, 256, 1));
     for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
@@ -163,21 +166,22 @@ static void a_full_queue_and_a_suspended_client_change_nothing(void **state)
     requests[i].unit = 17;
     REFUSED(MBM_QUEUE_FULL, client, mbm_client_readCoils(&client, &requests[i], 0, 1));
     OK(mbm_client_suspend(&client, NULL));
-    REFUSED(MBM_BUSY, client, mbm_client_suspend(&client, &master));
-    assert_memory_equal(&master, &zero, sizeof master);
+    REFUSED(MBM_BUSY, client, mbm_client_suspend(&client, &line));
+    assert_memory_equal(&line, &zero, sizeof line);
     REFUSED(MBM_BUSY, client, mbm_client_poll(&client));
     REFUSED(MBM_BUSY, client, mbm_client_reconnect(&client, NULL));
     OK(mbm_client_resume(&client, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_resume(&client, NULL));
     /* While a master has a request under way, it can be neither given the line nor lose it. */
-    OK(mbm_master_setBuffers(&master, master_words, 2, master_words, 0, master_frame, 16));
-    OK(mbm_client_suspend(&client, &master));
-    OK(mbm_master_setBlocking(&master, 0));
-    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
-    REFUSED(MBM_BUSY, client, mbm_client_resume(&client, &master));
-    REFUSED(MBM_BUSY, master, mbm_client_resume(&client, &master));
-    OK(mbm_master_cancel(&master));
-    OK(mbm_client_resume(&client, &master));
+    OK(mbm_line_setFrame(&line, line_frame, 16));
+    OK(mbm_node_begin(&node, &line, 1, node_words, 2, node_words, 0));
+    OK(mbm_client_suspend(&client, &line));
+    OK(mbm_node_setBlocking(&node, 0));
+    IS(MBM_PENDING, mbm_node_readCoils(&node, 0, 1));
+    REFUSED(MBM_BUSY, client, mbm_client_resume(&client, &line));
+    REFUSED(MBM_BUSY, line, mbm_client_resume(&client, &line));
+    OK(mbm_node_cancel(&node));
+    OK(mbm_client_resume(&client, &line));
     free(incoming);
     free(outgoing);
     incoming = outgoing = NULL;

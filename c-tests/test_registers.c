@@ -434,41 +434,41 @@ static void a_view_for_reading_is_not_written(void **state)
     assert_int_equal(bytes[1], 2);
 }
 
-static void a_masters_words_are_registers(void **state)
+static void a_nodes_words_are_registers(void **state)
 {
-    static mbm_master node;
-    static const mbm_master fresh;
+    static mbm_line line;
+    static mbm_node node;
+    static const mbm_node fresh;
     uint16_t response[4] = {0x4366, 0x8000, 0x8000, 0x4366}, transmit[2] = {0};
-    uint8_t frame[MBM_FRAME_BYTES(4)];
     mbm_registers r;
     float value;
 
     (void)state;
-    IS(MBM_NOT_INITIALISED, mbm_master_getResponseRegisters(&fresh, 0, &r));
-    IS(MBM_NOT_INITIALISED, mbm_master_setWordOrder(&node, MBM_ORDER_CDAB));
-    OK(mbm_master_setBuffers(&node, response, 4, transmit, 2, frame, sizeof frame));
-    OK(mbm_master_getResponseRegisters(&node, 100, &r));
+    IS(MBM_NOT_INITIALISED, mbm_node_getResponseRegisters(&fresh, 0, &r));
+    IS(MBM_NOT_INITIALISED, mbm_node_setWordOrder(&node, MBM_ORDER_CDAB));
+    OK(mbm_node_begin(&node, &line, 1, response, 4, transmit, 2));
+    OK(mbm_node_getResponseRegisters(&node, 100, &r));
     assert_int_equal(r.count, 4);
     OK(mbm_registers_getFloat(&r, 100, MBM_ORDER_DEFAULT, &value));
     assert_true(value == 230.5f);
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getFloat(&r, 103, MBM_ORDER_DEFAULT, &value));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setFloat(&r, 100, MBM_ORDER_DEFAULT, &value));
 
-    OK(mbm_master_setWordOrder(&node, MBM_ORDER_CDAB));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_setWordOrder(&node, 5));
-    OK(mbm_master_getResponseRegisters(&node, 0, &r));
+    OK(mbm_node_setWordOrder(&node, MBM_ORDER_CDAB));
+    IS(MBM_INVALID_ARGUMENT, mbm_node_setWordOrder(&node, 5));
+    OK(mbm_node_getResponseRegisters(&node, 0, &r));
     OK(mbm_registers_getFloat(&r, 2, MBM_ORDER_DEFAULT, &value));
     assert_true(value == 230.5f);
-    OK(mbm_master_getTransmitRegisters(&node, 65534, &r));
+    OK(mbm_node_getTransmitRegisters(&node, 65534, &r));
     OK(mbm_registers_setFloat(&r, 65534, MBM_ORDER_DEFAULT, &value));
     assert_int_equal(transmit[0], 0x8000);
     assert_int_equal(transmit[1], 0x4366);
     /* Near the last address a view has fewer words. */
-    OK(mbm_master_getResponseRegisters(&node, 65534, &r));
+    OK(mbm_node_getResponseRegisters(&node, 65534, &r));
     assert_int_equal(r.count, 2);
     OK(mbm_registers_getFloat(&r, 65534, MBM_ORDER_ABCD, &value));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_getResponseRegisters(&node, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_getTransmitRegisters(NULL, 0, &r));
+    IS(MBM_INVALID_ARGUMENT, mbm_node_getResponseRegisters(&node, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_node_getTransmitRegisters(NULL, 0, &r));
 }
 
 int main(void)
@@ -488,7 +488,7 @@ int main(void)
         cmocka_unit_test(a_view_beyond_register_65535_is_refused),
         cmocka_unit_test(null_and_bad_arguments_return_a_status),
         cmocka_unit_test(a_view_for_reading_is_not_written),
-        cmocka_unit_test(a_masters_words_are_registers),
+        cmocka_unit_test(a_nodes_words_are_registers),
     };
 
     return cmocka_run_group_tests_name("registers", tests, NULL, NULL);

@@ -164,18 +164,17 @@ static void sleep_until_a_byte(world *w, uint32_t delay)
     w->now = until;
 }
 
-static uint8_t master_reads(world *w, mbm_master *m, uint8_t unit, uint16_t address,
-                            uint16_t *value)
+static uint8_t node_reads(world *w, mbm_node *m, uint8_t unit, uint16_t address, uint16_t *value)
 {
     uint8_t status;
 
-    OK(mbm_master_setSlaveID(m, unit));
-    status = mbm_master_readHoldingRegisters(m, address, 1);
+    OK(mbm_node_setSlaveID(m, unit));
+    status = mbm_node_readHoldingRegisters(m, address, 1);
     while (status == MBM_PENDING) {
-        sleep_until_a_byte(w, mbm_master_pollDelay(m));
-        status = mbm_master_poll(m);
+        sleep_until_a_byte(w, mbm_node_pollDelay(m));
+        status = mbm_node_poll(m);
     }
-    *value = mbm_master_getResponseBuffer(m, 0);
+    *value = mbm_node_getResponseBuffer(m, 0);
     return status;
 }
 
@@ -199,7 +198,8 @@ static uint8_t client_reads(world *w, mbm_client *c, uint8_t unit, uint16_t addr
 typedef struct user {
     world w;
     mbm_port port;
-    mbm_master master;
+    mbm_line line;
+    mbm_node node;
     mbm_client client;
     uint8_t buffer[MBM_MAX_FRAME];
     uint16_t words[1];
@@ -209,7 +209,7 @@ typedef struct user {
 static uint8_t reads(user *u, uint8_t unit, uint16_t address, uint16_t *value)
 {
     return u->has_client ? client_reads(&u->w, &u->client, unit, address, value)
-                         : master_reads(&u->w, &u->master, unit, address, value);
+                         : node_reads(&u->w, &u->node, unit, address, value);
 }
 
 static void begin(user *u, int has_client, uint32_t timeout)
@@ -221,11 +221,11 @@ static void begin(user *u, int has_client, uint32_t timeout)
         OK(mbm_client_setBaudRate(&u->client, 115200));
         OK(mbm_client_setResponseTimeout(&u->client, (uint16_t)(timeout / MS)));
     } else {
-        OK(mbm_master_setBuffers(&u->master, u->words, 1, NULL, 0, u->buffer, sizeof u->buffer));
-        OK(mbm_master_beginRtu(&u->master, UNIT, &u->port));
-        OK(mbm_master_setBaudRate(&u->master, 115200));
-        OK(mbm_master_setResponseTimeout(&u->master, (uint16_t)(timeout / MS)));
-        OK(mbm_master_setBlocking(&u->master, 0));
+        OK(mbm_line_beginRtu(&u->line, &u->port, u->buffer, sizeof u->buffer));
+        OK(mbm_node_begin(&u->node, &u->line, UNIT, u->words, 1, NULL, 0));
+        OK(mbm_line_setBaudRate(&u->line, 115200));
+        OK(mbm_node_setResponseTimeout(&u->node, (uint16_t)(timeout / MS)));
+        OK(mbm_node_setBlocking(&u->node, 0));
     }
 }
 

@@ -408,7 +408,8 @@ static void *device(void *argument)
 
 static void a_master_reads_rtu_through_a_stream(void **state)
 {
-    static mbm_master node;
+    static mbm_line line;
+    static mbm_node node;
     static uint16_t response[100];
     static uint8_t frame[MBM_FRAME_BYTES(100)];
     static model memory;
@@ -423,16 +424,16 @@ static void a_master_reads_rtu_through_a_stream(void **state)
     snprintf(service, sizeof service, "%u", listener.port);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     port = mbm_tcp_port(&tcp);
-    OK(mbm_master_setBuffers(&node, response, 100, NULL, 0, frame, sizeof frame));
-    OK(mbm_master_beginRtu(&node, MODEL_FIRST_UNIT, &port));
-    OK(mbm_master_setGap(&node, 0));
-    OK(mbm_master_setResponseTimeout(&node, PATIENCE_MS));
+    OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
+    OK(mbm_node_begin(&node, &line, MODEL_FIRST_UNIT, response, 100, NULL, 0));
+    OK(mbm_line_setGap(&line, 0));
+    OK(mbm_node_setResponseTimeout(&node, PATIENCE_MS));
     for (i = 1; i <= 100; i++) {
-        OK(mbm_master_readHoldingRegisters(&node, (uint16_t)i, (uint16_t)i));
+        OK(mbm_node_readHoldingRegisters(&node, (uint16_t)i, (uint16_t)i));
         assert_memory_equal(response, &memory.holding[0][i], 2 * i);
     }
     mbm_tcp_disconnect(&tcp);
-    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&node, 0, 1));
+    IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&node, 0, 1));
     pthread_join(thread, NULL);
     mbm_tcp_closeListener(&listener);
 }

@@ -8,7 +8,8 @@ enum { UNIT = 17, FIRST = 100, WORDS = 20, TICK_US = 1000 };
 
 static tls_pair pair;
 static mbm_server server;
-static mbm_master master;
+static mbm_line line;
+static mbm_node master;
 static mbm_unit unit;
 static mbm_registerTable holding;
 static uint16_t words[WORDS], response[WORDS];
@@ -37,8 +38,8 @@ static int begin(void **state)
         words[i] = (uint16_t)(0xC000 + i);
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
     OK(mbm_server_beginRtuOverTcp(&server, &pair.server.port, &unit, 1, frame, sizeof frame));
-    OK(mbm_master_setBuffers(&master, response, WORDS, NULL, 0, own_frame, sizeof own_frame));
-    OK(mbm_master_beginRtu(&master, UNIT, &pair.client.port));
+    OK(mbm_line_beginRtu(&line, &pair.client.port, own_frame, sizeof own_frame));
+    OK(mbm_node_begin(&master, &line, UNIT, response, WORDS, NULL, 0));
     return 0;
 }
 
@@ -58,7 +59,7 @@ static void a_master_reads_while_its_idle_hook_lets_the_port_below_sleep(void **
     idles = 0;
     for (i = 0; i < 3; i++) {
         memset(response, 0, sizeof response);
-        OK(mbm_master_readHoldingRegisters(&master, FIRST, WORDS));
+        OK(mbm_node_readHoldingRegisters(&master, FIRST, WORDS));
         assert_memory_equal(response, words, sizeof words);
     }
     assert_true(idles > 0);
@@ -68,7 +69,7 @@ static void a_master_without_a_session_reports_a_lost_link(void **state)
 {
     (void)state;
     mbm_tls_close(&pair.client.tls);
-    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&master, FIRST, WORDS));
+    IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&master, FIRST, WORDS));
 }
 
 int main(void)

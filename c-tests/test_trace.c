@@ -18,7 +18,8 @@ typedef struct kept {
 static hooked_port wire;
 static mbm_port port;
 static mbm_trace trace;
-static mbm_master master;
+static mbm_line line;
+static mbm_node master;
 static mbm_client client;
 static mbm_server server;
 static mbm_clientRequest request;
@@ -78,8 +79,8 @@ static void begin_master(void)
 {
     OK(mbm_trace_beginClient(&trace, &port, FRAMING(MBM_FRAMING_RTU), buffer, sizeof buffer, keep,
                              "line"));
-    OK(mbm_master_setBuffers(&master, words, 8, words, 8, frame, sizeof frame));
-    OK(mbm_master_beginRtu(&master, 17, mbm_trace_port(&trace)));
+    OK(mbm_line_beginRtu(&line, mbm_trace_port(&trace), frame, sizeof frame));
+    OK(mbm_node_begin(&master, &line, 17, words, 8, words, 8));
 }
 
 static const uint8_t READ[] = {17, 3, 0, 1, 0, 2}, REPLY[] = {17, 3, 4, 0, 1, 0, 2};
@@ -90,12 +91,12 @@ static void a_blocking_master_works_through_a_trace(void **state)
     begin_master();
     hooked_port_arrive_rtu(&wire, 17, REPLY + 1, sizeof REPLY - 1);
     wire.last = 0; /* it arrives after the request */
-    mbm_master_setBlocking(&master, 0);
-    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&master, 1, 2));
-    while (mbm_master_poll(&master) == MBM_PENDING)
+    mbm_node_setBlocking(&master, 0);
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&master, 1, 2));
+    while (mbm_node_poll(&master) == MBM_PENDING)
         if (wire.length > 0)
             wire.last = sizeof REPLY + 2;
-    assert_int_equal(mbm_master_available(&master), 2);
+    assert_int_equal(mbm_node_available(&master), 2);
     assert_int_equal(count, 2);
     is_record(0, MBM_TRACE_SENT, MBM_PACKET_REQUEST, MBM_OK, wire.sent, 8);
     is_record(1, MBM_TRACE_RECEIVED, MBM_PACKET_RESPONSE, MBM_OK, wire.arriving, 9);
@@ -105,8 +106,8 @@ static void a_blocking_master_works_through_a_trace(void **state)
     assert_true(records[1].record.timeUs <= wire.now);
 
     /* Blocking: the hook `idle` gets the master, and the others are called. */
-    mbm_master_setBlocking(&master, 1);
-    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_readHoldingRegisters(&master, 1, 2));
+    mbm_node_setBlocking(&master, 1);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_readHoldingRegisters(&master, 1, 2));
     assert_true(wire.called[HOOK_IDLE] > 0 && wire.called[HOOK_FLUSH] > 0);
     assert_int_equal(wire.called[HOOK_PRE], 2);
     assert_int_equal(wire.called[HOOK_POST], 2);
@@ -199,18 +200,20 @@ static void a_server_works_through_a_trace(void **state)
 
 static void two_masters_share_a_traced_port(void **state)
 {
-    static mbm_master second;
+    static mbm_line second_line;
+    static mbm_node second;
     static uint8_t more[16];
 
     (void)state;
     begin_master();
+    memset(&second_line, 0, sizeof second_line);
     memset(&second, 0, sizeof second);
-    OK(mbm_master_setBuffers(&second, words, 1, words, 1, more, sizeof more));
-    OK(mbm_master_beginRtu(&second, 18, mbm_trace_port(&trace)));
-    OK(mbm_master_setResponseTimeout(&master, 10));
-    OK(mbm_master_setResponseTimeout(&second, 10));
-    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_writeSingleCoil(&master, 1, 1));
-    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_writeSingleCoil(&second, 1, 1));
+    OK(mbm_line_beginRtu(&second_line, mbm_trace_port(&trace), more, sizeof more));
+    OK(mbm_node_begin(&second, &second_line, 18, words, 1, words, 1));
+    OK(mbm_node_setResponseTimeout(&master, 10));
+    OK(mbm_node_setResponseTimeout(&second, 10));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleCoil(&master, 1, 1));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleCoil(&second, 1, 1));
     assert_int_equal(count, 2);
     assert_int_equal(records[0].bytes[0], 17);
     assert_int_equal(records[1].bytes[0], 18);
@@ -227,9 +230,9 @@ static void two_links_are_told_apart_by_their_contexts(void **state)
     /* A trace before a trace: both hand the frame out. */
     OK(mbm_trace_beginClient(&second, mbm_trace_port(&trace), FRAMING(MBM_FRAMING_RTU), more,
                              sizeof more, keep, "outer"));
-    OK(mbm_master_beginRtu(&master, 17, mbm_trace_port(&second)));
-    OK(mbm_master_setResponseTimeout(&master, 10));
-    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_writeSingleCoil(&master, 1, 1));
+    OK(mbm_line_beginRtu(&line, mbm_trace_port(&second), frame, sizeof frame));
+    OK(mbm_node_setResponseTimeout(&master, 10));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleCoil(&master, 1, 1));
     assert_int_equal(count, 2);
     assert_string_equal(records[0].link, "line");
     assert_string_equal(records[1].link, "outer");
@@ -362,8 +365,8 @@ static void try_everything(void)
             mbm_trace_beginClient(&trace, &port, FRAMING(MBM_FRAMING_RTU), buffer, 64, keep, NULL));
     assert_null(mbm_trace_port(&trace));
     assert_int_equal(mbm_trace_getFrameTimeout(&trace), 0);
-    IS(MBM_BUSY, mbm_master_poll(&master));
-    IS(MBM_BUSY, mbm_master_cancel(&master));
+    IS(MBM_BUSY, mbm_node_poll(&master));
+    IS(MBM_BUSY, mbm_node_cancel(&master));
 }
 
 /* The trace is at work in these hooks of the port. */
@@ -377,14 +380,14 @@ static void calls_from_within_the_hook_are_refused(void **state)
 {
     (void)state;
     begin_master();
-    OK(mbm_master_setResponseTimeout(&master, 10));
+    OK(mbm_node_setResponseTimeout(&master, 10));
     within_hook = try_everything;
     tried = 0;
-    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_writeSingleCoil(&master, 1, 1));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleCoil(&master, 1, 1));
     assert_int_equal(tried, 1);
     within_hook = NULL;
     wire.within = try_from_the_port;
-    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_writeSingleCoil(&master, 1, 1));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleCoil(&master, 1, 1));
     assert_true(tried > 2);
     assert_int_equal(count, 2);
 }

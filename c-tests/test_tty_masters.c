@@ -16,7 +16,8 @@
 enum { TIMEOUT_MS = 20 };
 
 typedef struct node {
-    mbm_master master;
+    mbm_line line;
+    mbm_node node;
     uint16_t words[2];
     uint8_t frame[MBM_FRAME_BYTES(2)];
 } node;
@@ -57,15 +58,15 @@ static int end(void **state)
 
 static void begin_node(node *n, uint8_t unit, const mbm_port *port)
 {
-    OK(mbm_master_setBuffers(&n->master, n->words, 2, n->words, 2, n->frame, sizeof n->frame));
-    OK(mbm_master_beginRtu(&n->master, unit, port));
-    OK(mbm_master_setResponseTimeout(&n->master, TIMEOUT_MS));
-    OK(mbm_master_setQuietTime(&n->master, 0));
+    OK(mbm_line_beginRtu(&n->line, port, n->frame, sizeof n->frame));
+    OK(mbm_node_begin(&n->node, &n->line, unit, n->words, 2, n->words, 2));
+    OK(mbm_node_setResponseTimeout(&n->node, TIMEOUT_MS));
+    OK(mbm_line_setQuietTime(&n->line, 0));
 }
 
 static void times_out(node *n)
 {
-    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_readHoldingRegisters(&n->master, 0, 1));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_readHoldingRegisters(&n->node, 0, 1));
 }
 
 static void both_time_out(void)
@@ -95,7 +96,7 @@ static void a_tty_closed_and_opened_again_keeps_its_port(void **state)
     begin_node(&first, 1, &port);
     times_out(&first);
     mbm_tty_close(&tty);
-    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+    IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&first.node, 0, 1));
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
     times_out(&first);
 }
@@ -107,7 +108,7 @@ static void a_port_made_before_the_tty_is_open_works_once_it_is(void **state)
     (void)state;
     begin_node(&first, 1, &port);
     /* The descriptor in a zeroed tty is 0, the program's standard input. */
-    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+    IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&first.node, 0, 1));
     assert_int_equal(tty.error, EBADF);
     assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), -1);
     mbm_tty_close(&tty);
@@ -145,7 +146,7 @@ static void noise_does_not_keep_a_request_from_ending(void **state)
     (void)state;
     begin_node(&first, 1, &port);
     assert_int_equal(write(line.ours, "\x07\x03\x02", 3), 3);
-    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_readHoldingRegisters(&first.node, 0, 1));
 }
 
 static void a_socket_closed_and_opened_again_keeps_its_port(void **state)
@@ -156,7 +157,7 @@ static void a_socket_closed_and_opened_again_keeps_its_port(void **state)
     begin_node(&first, 1, &port);
     times_out(&first);
     mbm_tcp_close(&tcp);
-    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+    IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&first.node, 0, 1));
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     times_out(&first);
 }
@@ -167,7 +168,7 @@ static void a_port_made_before_the_socket_is_open_works_once_it_is(void **state)
 
     (void)state;
     begin_node(&first, 1, &port);
-    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+    IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&first.node, 0, 1));
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     times_out(&first);
 }

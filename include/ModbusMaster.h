@@ -24,11 +24,10 @@
 #include "ModbusTransmission.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusMasterConstants.h"
-#include "ModbusMasterFrame.h"
 #include "ModbusMasterHelpers.h"
+#include "ModbusMasterLine.h"
 #include "ModbusMasterOptions.h"
 #include "ModbusMasterPorts.h"
-#include "ModbusMasterTurn.h"
 #include "ModbusMasterValues.h"
 #include "ModbusStatusText.h"
 #include "mbm.h"
@@ -47,7 +46,7 @@ class ModbusMaster : public ModbusMasterStatics<void>,
                      public ModbusTransmissionHooks<ModbusMaster> {
 public:
     /** For slave 1, with begin(baud) opening Serial. Uses neither clock nor port. */
-    ModbusMaster() : state() { setBuffers(); }
+    ModbusMaster() : state() { attach(1); }
 
     /** As ModbusMaster(), for `slave` (1 to 247; 0 is broadcast). */
     ModbusMaster(uint8_t slave) : ModbusMaster() { setSlaveID(slave); }
@@ -78,20 +77,17 @@ public:
      */
     ModbusMaster &operator=(const ModbusMaster &other)
     {
-        if (this != &other && mbm_master_status(&other.state.master) != MBM_BUSY &&
-            mbm_master_cancel(&state.master) != MBM_BUSY) {
+        if (this != &other && mbm_node_status(&other.state.node) != MBM_BUSY &&
+            mbm_node_cancel(&state.node) != MBM_BUSY) {
             state = other.state;
             adoptCopy();
         }
         return *this;
     }
 
-#if defined(MODBUSMASTER_SHARE_FRAME)
-    /** Ends a request under way. Call cancel before, or the RS-485 driver may stay on. */
-    ~ModbusMaster()
-    {
-        Turn::end(state.master);
-    }
+#if defined(MODBUSMASTER_SHARE_LINE)
+    /** Cancels a request under way. */
+    ~ModbusMaster() { Line::giveUp(state.node); }
 #endif
 
     /**
@@ -108,8 +104,11 @@ public:
      */
     void begin(uint8_t slave, Stream &stream)
     {
-        if (attach(slave) == MBM_OK)
+        Line::giveUp(state.node);
+        if (attach(slave) == MBM_OK) {
             state.stream = &stream;
+            beginLine();
+        }
     }
 
 #if defined(MODBUSMASTER_SERIAL0)
@@ -158,7 +157,7 @@ public:
     /** Sets the address of later writes without one; empties the queue of send. */
     void beginTransmission(uint16_t address)
     {
-        mbm_master_beginTransmission(&state.master, address);
+        mbm_node_beginTransmission(&state.node, address);
     }
 
     /**
@@ -184,7 +183,7 @@ public:
     uint8_t send(long value) { return sendWords(static_cast<uint32_t>(value)); }
 
     /** Queues a bit, lowest of a word first; returns as send does. */
-    uint8_t sendBit(bool on) { return mbm_master_sendBit(&state.master, on); }
+    uint8_t sendBit(bool on) { return mbm_node_sendBit(&state.node, on); }
 
     /**
      * Reads 1 to 125 holding registers, which receive then returns one by one.
@@ -197,9 +196,9 @@ public:
         return readHoldingRegisters(address, quantity) == ku8MBSuccess ? available() : 0;
     }
     /** How many words of the last successful read receive has not returned yet. */
-    uint8_t available() const { return mbm_master_available(&state.master); }
+    uint8_t available() const { return mbm_node_available(&state.node); }
     /** The next word of the last successful read; 0xFFFF when none is left. */
-    uint16_t receive() { return mbm_master_receive(&state.master); }
+    uint16_t receive() { return mbm_node_receive(&state.node); }
 
     /**
      * Function 01: reads 1 to 2000 coils, 16 to a response word, lowest bit first.
@@ -213,106 +212,106 @@ public:
      */
     uint8_t readCoils(uint16_t address, uint16_t quantity)
     {
-        return request(wordsOf(quantity), mbm_master_readCoils, address, quantity);
+        return request(wordsOf(quantity), mbm_node_readCoils, address, quantity);
     }
     /** Function 02: as readCoils, of 1 to 2000 discrete inputs. */
     uint8_t readDiscreteInputs(uint16_t address, uint16_t quantity)
     {
-        return request(wordsOf(quantity), mbm_master_readDiscreteInputs, address, quantity);
+        return request(wordsOf(quantity), mbm_node_readDiscreteInputs, address, quantity);
     }
     /** Function 03: reads 1 to 125 holding registers; see readCoils. */
     uint8_t readHoldingRegisters(uint16_t address, uint16_t quantity)
     {
-        return request(quantity, mbm_master_readHoldingRegisters, address, quantity);
+        return request(quantity, mbm_node_readHoldingRegisters, address, quantity);
     }
     /** Function 04: reads 1 to 125 input registers; see readCoils. */
     template <typename Quantity> uint8_t readInputRegisters(uint16_t address, Quantity quantity)
     {
         const uint16_t words = static_cast<uint16_t>(quantity);
-        return request(words, mbm_master_readInputRegisters, address, words);
+        return request(words, mbm_node_readInputRegisters, address, words);
     }
     /** As above, with the parameter types of ModbusMaster 2.0.1, for pointers to members. */
     uint8_t readInputRegisters(uint16_t address, uint8_t quantity)
     {
-        return request(quantity, mbm_master_readInputRegisters, address, uint16_t{quantity});
+        return request(quantity, mbm_node_readInputRegisters, address, uint16_t{quantity});
     }
     /** Function 05: switches a coil; every `on` other than 0 means on. See readCoils. */
     uint8_t writeSingleCoil(uint16_t address, uint8_t on)
     {
-        return request(1, mbm_master_writeSingleCoil, address, on);
+        return request(1, mbm_node_writeSingleCoil, address, on);
     }
     /** Function 06: stores the value in word 0 and writes it. See readCoils. */
     uint8_t writeSingleRegister(uint16_t address, uint16_t value)
     {
-        return request(1, mbm_master_writeSingleRegister, address, value);
+        return request(1, mbm_node_writeSingleRegister, address, value);
     }
     /** Function 0F: writes coils from word 0 on, lowest bit first. See readCoils. */
     uint8_t writeMultipleCoils(uint16_t address, uint16_t quantity)
     {
-        return request(wordsOf(quantity), mbm_master_writeMultipleCoils, address, quantity);
+        return request(wordsOf(quantity), mbm_node_writeMultipleCoils, address, quantity);
     }
     /** Function 0F: writes the queued bits to the last write address. */
-    uint8_t writeMultipleCoils() { return request(transmitWords, mbm_master_writeQueuedCoils); }
+    uint8_t writeMultipleCoils() { return request(transmitWords, mbm_node_writeQueuedCoils); }
     /** Function 10: writes 1 to 123 registers from word 0 on. See readCoils. */
     uint8_t writeMultipleRegisters(uint16_t address, uint16_t quantity)
     {
-        return request(quantity, mbm_master_writeMultipleRegisters, address, quantity);
+        return request(quantity, mbm_node_writeMultipleRegisters, address, quantity);
     }
     /** Function 10: writes the queued complete words to the last write address. */
     uint8_t writeMultipleRegisters()
     {
-        return request(transmitWords, mbm_master_writeQueuedRegisters);
+        return request(transmitWords, mbm_node_writeQueuedRegisters);
     }
     /** Function 16: (register & andMask) | (orMask & ~andMask); stores the masks in words 0 and 1. */
     uint8_t maskWriteRegister(uint16_t address, uint16_t andMask, uint16_t orMask)
     {
-        return request(2, mbm_master_maskWriteRegister, address, andMask, orMask);
+        return request(2, mbm_node_maskWriteRegister, address, andMask, orMask);
     }
     /** Function 17: writes 1 to 121 registers from word 0 on, then reads 1 to 125. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity,
                                        uint16_t writeAddress, uint16_t writeQuantity)
     {
         const uint16_t words = readQuantity > writeQuantity ? readQuantity : writeQuantity;
-        return request(words, mbm_master_readWriteMultipleRegisters, readAddress, readQuantity,
+        return request(words, mbm_node_readWriteMultipleRegisters, readAddress, readQuantity,
                        writeAddress, writeQuantity);
     }
     /** Function 17: writes the queued words to the last write address, then reads. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity)
     {
-        return request(mostWords, mbm_master_readWriteQueuedRegisters, readAddress, readQuantity);
+        return request(mostWords, mbm_node_readWriteQueuedRegisters, readAddress, readQuantity);
     }
 
     /** Milliseconds from the end of a request to the end of its reply, 0 to 1000000; 2000 at
         first. A longer time changes nothing. */
-    void setResponseTimeout(uint32_t ms) { mbm_master_setResponseTimeout(&state.master, ms); }
+    void setResponseTimeout(uint32_t ms) { mbm_node_setResponseTimeout(&state.node, ms); }
     /** What setResponseTimeout has set. */
-    uint32_t getResponseTimeout() const { return mbm_master_getResponseTimeout(&state.master); }
+    uint32_t getResponseTimeout() const { return mbm_node_getResponseTimeout(&state.node); }
     /** The unit of later requests: 1 to 247; 248 to 255 are sent as they are, 0 broadcasts. */
-    void setSlaveID(uint8_t slave) { mbm_master_setSlaveID(&state.master, slave); }
+    void setSlaveID(uint8_t slave) { mbm_node_setSlaveID(&state.node, slave); }
     /** The unit of later requests. */
-    uint8_t getSlaveID() const { return mbm_master_getSlaveID(&state.master); }
+    uint8_t getSlaveID() const { return mbm_node_getSlaveID(&state.node); }
     /** Bits per second, from which t3.5 follows; 0: unknown, a silence of 4 ms. The Stream stays as it is. */
-    void setBaudRate(uint32_t baud) { mbm_master_setBaudRate(&state.master, baud); }
+    void setBaudRate(uint32_t baud) { mbm_line_setBaudRate(line(), baud); }
     /** Microseconds of silence before a request, instead of t3.5. */
-    void setGap(uint32_t us) { mbm_master_setGap(&state.master, us); }
+    void setGap(uint32_t us) { mbm_line_setGap(line(), us); }
     /** The silence in effect: of setGap, or t3.5 of setBaudRate. */
-    uint32_t getGap() const { return mbm_master_getGap(&state.master); }
+    uint32_t getGap() const { return mbm_line_getGap(line()); }
     /** Milliseconds from a broadcast to the next request; 100 at first. */
-    void setTurnaroundDelay(uint32_t ms) { mbm_master_setTurnaroundDelay(&state.master, ms); }
+    void setTurnaroundDelay(uint32_t ms) { mbm_line_setTurnaroundDelay(line(), ms); }
     /** What setTurnaroundDelay has set. */
-    uint16_t getTurnaroundDelay() const { return mbm_master_getTurnaroundDelay(&state.master); }
+    uint16_t getTurnaroundDelay() const { return mbm_line_getTurnaroundDelay(line()); }
     /** Milliseconds after a failed request before the next one is sent; 100 at first. */
-    void setQuietTime(uint32_t ms) { mbm_master_setQuietTime(&state.master, ms); }
+    void setQuietTime(uint32_t ms) { mbm_line_setQuietTime(line(), ms); }
     /** What setQuietTime has set. */
-    uint16_t getQuietTime() const { return mbm_master_getQuietTime(&state.master); }
+    uint16_t getQuietTime() const { return mbm_line_getQuietTime(line()); }
     /** How often a request is repeated if its reply is missing, damaged or malformed; 0 at first. */
-    void setRetries(uint8_t retries) { mbm_master_setRetries(&state.master, retries); }
+    void setRetries(uint8_t retries) { mbm_line_setRetries(line(), retries); }
     /** What setRetries has set. */
-    uint8_t getRetries() const { return mbm_master_getRetries(&state.master); }
+    uint8_t getRetries() const { return mbm_line_getRetries(line()); }
     /** Discards the local echo, if the receiver receives what the driver sends; off at first. */
-    void setEchoDiscard(bool on) { mbm_master_setEchoDiscard(&state.master, on); }
+    void setEchoDiscard(bool on) { mbm_line_setEchoDiscard(line(), on); }
     /** What setEchoDiscard has set. */
-    bool getEchoDiscard() const { return mbm_master_getEchoDiscard(&state.master) != 0; }
+    bool getEchoDiscard() const { return mbm_line_getEchoDiscard(line()) != 0; }
     /**
      * Accepts replies that deviate from the standard if no correct one arrives in time:
      * another echoed address or value, another number of registers. A read of more words
@@ -322,39 +321,39 @@ public:
     {
         // The reply may be longer than the one asked for.
         if (on)
-            Frame::keep();
-        mbm_master_setLenient(&state.master, on);
+            Line::keep();
+        mbm_node_setLenient(&state.node, on);
     }
     /** What setLenient has set. */
-    bool getLenient() const { return mbm_master_getLenient(&state.master) != 0; }
+    bool getLenient() const { return mbm_node_getLenient(&state.node) != 0; }
     /** Character times that the driver stays on after flush, for cores whose flush returns early; 0 at first. */
     void setPostFlushHold(uint8_t characters)
     {
-        mbm_master_setPostFlushHold(&state.master, characters);
+        mbm_line_setPostFlushHold(line(), characters);
     }
     /** What setPostFlushHold has set. */
-    uint8_t getPostFlushHold() const { return mbm_master_getPostFlushHold(&state.master); }
+    uint8_t getPostFlushHold() const { return mbm_line_getPostFlushHold(line()); }
     /** false: the functions return ku8MBPending at once, and poll completes the request. */
     void setBlocking(bool on)
     {
         // The request outlives the function that makes it.
         if (!on)
-            Frame::keep();
-        mbm_master_setBlocking(&state.master, on);
+            Line::mayOutlive();
+        mbm_node_setBlocking(&state.node, on);
     }
     /** What setBlocking has set; true at first. */
-    bool getBlocking() const { return mbm_master_getBlocking(&state.master) != 0; }
+    bool getBlocking() const { return mbm_node_getBlocking(&state.node) != 0; }
     /** Counts into `counters`; set them to 0 before. nullptr stops counting. Copies share them. */
-    void setCounters(mbm_counters *counters) { mbm_master_setCounters(&state.master, counters); }
+    void setCounters(mbm_counters *counters) { mbm_line_setCounters(line(), counters); }
 
     /** Continues a non-blocking request: ku8MBPending until it has ended, then its status. */
-    uint8_t poll() { return mbm_master_poll(&state.master); }
+    uint8_t poll() { return mbm_node_poll(&state.node); }
     /** Cancels a non-blocking request and switches the driver off. */
-    void cancel() { mbm_master_cancel(&state.master); }
+    void cancel() { mbm_node_cancel(&state.node); }
     /** The status of the last request; ku8MBPending while it is under way. */
-    uint8_t status() const { return mbm_master_status(&state.master); }
+    uint8_t status() const { return mbm_node_status(&state.node); }
     /** The raw exception code of the last reply; 0 if it was no exception. */
-    uint8_t getExceptionCode() const { return mbm_master_getExceptionCode(&state.master); }
+    uint8_t getExceptionCode() const { return mbm_node_getExceptionCode(&state.node); }
 
 private:
     static_assert(MODBUSMASTER_RESPONSE_WORDS >= 1 && MODBUSMASTER_RESPONSE_WORDS <= 125,
@@ -370,9 +369,11 @@ private:
         frameBytes = frameOfWords < 255 ? +frameOfWords : 255
     };
 
-    typedef ModbusMasterFrame<frameBytes> Frame;
+    struct State;
+
+    typedef ModbusMasterLine<State, frameBytes> Line;
     typedef ModbusMasterPorts<void> Ports;
-    typedef ModbusMasterTurn<void> Turn;
+    typedef ModbusMasterWire<State> Wire;
 
     friend class ModbusMasterValues<ModbusMaster>;
     friend class ModbusTransmissionHooks<ModbusMaster>;
@@ -380,99 +381,114 @@ private:
     struct State {
         // The members that the hooks use come first: AVR reaches 63 bytes with one instruction.
         Stream *stream;
-        Stream *counting; // the last Stream whose write returned another number than 0
         ModbusTransmissionHook onIdle;
         ModbusTransmissionHook onPre;
         ModbusTransmissionHook onPost;
-        bool sent; // the request is on the wire, so a reply is waited for
         uint8_t port;
-        mbm_master master;
+        mbm_node node;
         uint16_t response[responseWords];
         uint16_t transmit[transmitWords];
-#if !defined(MODBUSMASTER_SHARE_FRAME)
-        uint8_t frame[frameBytes];
+#if !defined(MODBUSMASTER_SHARE_LINE)
+        Line own;
 #endif
     };
 
     State state;
 
-    static State &stateOf(void *context) { return *static_cast<State *>(context); }
-
     ModbusTransmissionHook &preHookOf() { return state.onPre; }
     ModbusTransmissionHook &postHookOf() { return state.onPost; }
 
-    void setBuffers()
-    {
-        mbm_master_setWords(&state.master, state.response, responseWords, state.transmit,
-                            transmitWords);
-#if !defined(MODBUSMASTER_SHARE_FRAME)
-        mbm_master_setFrame(&state.master, state.frame, frameBytes);
-#endif
-    }
-
-    // Uses the clock and the driver, not the Stream.
     uint8_t attach(uint8_t slave)
     {
-        static const mbm_port hooks = {nullptr,   readHook, writeHook, clockHook,
-                                       flushHook, preHook,  postHook,  idleHook};
-        return mbm_master_beginRtuWith(&state.master, slave, &hooks, &state);
-    }
-
-    // After a copy: sets this object's buffers and context, and cancels the copied request.
-    void adoptCopy()
-    {
-        cancel();
-        setBuffers();
-        if (state.stream != nullptr)
-            attach(getSlaveID());
-    }
-
-    // Every request calls this. Returns false while another object has a request under way
-    // and objects have no frame buffers.
-    bool mayRequest()
-    {
-        if (!Turn::take(state.master))
-            return false;
-        state.sent = false;
-        return true;
+        return mbm_node_begin(&state.node, line(), slave, state.response, responseWords,
+                              state.transmit, transmitWords);
     }
 
     // How many words hold `bits` bits, or one more.
     static uint16_t wordsOf(uint16_t bits) { return (bits / 16u + 1u) & 0xFFFFu; }
 
+#if defined(MODBUSMASTER_SHARE_LINE)
+    static mbm_line *line() { return &Line::wire.line; }
+    static Wire &wireOf(void *) { return Line::wire; }
+
+    // Uses the clock and the driver, not the Stream. The hooks find the object in the wire.
+    static void beginLine()
+    {
+        static const mbm_port hooks = {nullptr,   readHook, writeHook, clockHook,
+                                       flushHook, preHook,  postHook,  idleHook};
+        mbm_line_beginRtu(line(), &hooks, nullptr, 0);
+    }
+
+    // After a copy: a request under way stays that of the original.
+    void adoptCopy()
+    {
+        Line::giveUp(state.node);
+        attach(getSlaveID());
+    }
+
     // Makes a request that reads or writes at most `words` words, by calling `function`.
-#if defined(MODBUSMASTER_SHARE_FRAME)
     // Not inline: the memory of the frame is free when it returns.
     template <typename... Parameters>
-    __attribute__((noinline)) uint8_t
-    request(uint16_t words, uint8_t (*function)(mbm_master *, Parameters...),
-            Parameters... arguments)
+    __attribute__((noinline)) uint8_t request(uint16_t words,
+                                              uint8_t (*function)(mbm_node *, Parameters...),
+                                              Parameters... arguments)
     {
-        uint8_t *frame = Frame::kept;
+        uint8_t *frame = Line::kept;
         uint8_t bytes = frameBytes;
         if (frame == nullptr) {
-            bytes = Frame::bytesOf(words);
+            bytes = Line::bytesOf(words);
             frame = static_cast<uint8_t *>(__builtin_alloca(bytes));
         }
-        if (!mayRequest() || mbm_master_setFrame(&state.master, frame, bytes) != MBM_OK)
+        if (state.stream == nullptr)
+            return ku8MBNotInitialised;
+        if (mbm_line_setFrame(line(), frame, bytes) != MBM_OK)
             return ku8MBBusy;
-        return function(&state.master, arguments...);
+        Line::wire.user = &state;
+        Line::wire.sent = false;
+        return function(&state.node, arguments...);
     }
 #else
+    mbm_line *line() { return &state.own.wire.line; }
+    const mbm_line *line() const { return &state.own.wire.line; }
+    static Wire &wireOf(void *context) { return *static_cast<Wire *>(context); }
+
+    void beginLine()
+    {
+        Wire &wire = state.own.wire;
+        wire.user = &state;
+        state.own.port = modbusPort(&wire, readHook, writeHook, clockHook, flushHook, preHook,
+                                    postHook);
+        state.own.port.idle = idleHook;
+        mbm_line_beginRtu(&wire.line, &state.own.port, state.own.frame, frameBytes);
+    }
+
+    // After a copy: a request under way stays that of the original.
+    void adoptCopy()
+    {
+        cancel();
+        mbm_line_cancel(line());
+        attach(getSlaveID());
+        if (state.stream != nullptr)
+            beginLine();
+    }
+
+    // Makes a request by calling `function`.
     template <typename... Parameters>
-    uint8_t request(uint16_t, uint8_t (*function)(mbm_master *, Parameters...),
+    uint8_t request(uint16_t, uint8_t (*function)(mbm_node *, Parameters...),
                     Parameters... arguments)
     {
-        return mayRequest() ? function(&state.master, arguments...) : ku8MBBusy;
+        ModbusMasterUse<void>::tell(*line());
+        state.own.wire.sent = false;
+        return function(&state.node, arguments...);
     }
 #endif
 
-    uint8_t sendWord(uint16_t word) { return mbm_master_send(&state.master, word); }
-    uint8_t sendWords(uint32_t words) { return mbm_master_send32(&state.master, words); }
+    uint8_t sendWord(uint16_t word) { return mbm_node_send(&state.node, word); }
+    uint8_t sendWords(uint32_t words) { return mbm_node_send32(&state.node, words); }
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
-        Stream &stream = *stateOf(context).stream;
+        Stream &stream = *wireOf(context).user->stream;
         const uint8_t *const first = bytes, *const end = bytes + capacity;
         while (bytes != end) {
             MODBUSMASTER_DEBUG(A, true);
@@ -483,24 +499,24 @@ private:
             *bytes++ = static_cast<uint8_t>(byte);
         }
         if (bytes != first)
-            Turn::used();
+            Line::used();
         return static_cast<int16_t>(static_cast<uint16_t>(bytes - first));
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
-        State &state = stateOf(context);
+        Wire &wire = wireOf(context);
 #if !defined(__AVR__)
-        if (state.counting == state.stream)
-            return static_cast<int16_t>(state.stream->write(bytes, length));
+        if (wire.counting == wire.user->stream)
+            return static_cast<int16_t>(wire.counting->write(bytes, length));
 #endif
         // Byte by byte: if the write of a block returns 0, it took one byte or all. A
         // request of this class has 4 to 255 bytes; an 8-bit counter saves flash on AVR.
         uint8_t left = static_cast<uint8_t>(length);
         do {
-            Stream &stream = *state.stream;
+            Stream &stream = *wire.user->stream;
             if (stream.write(*bytes) != 0)
-                state.counting = &stream;
-            else if (state.counting == &stream || stream.getWriteError() != 0)
+                wire.counting = &stream;
+            else if (wire.counting == &stream || stream.getWriteError() != 0)
                 break;
             bytes++;
         } while (--left != 0);
@@ -509,24 +525,25 @@ private:
     static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
     static uint8_t flushHook(void *context)
     {
-        stateOf(context).stream->flush();
+        wireOf(context).user->stream->flush();
         return 1;
     }
-    static void preHook(void *context) { stateOf(context).onPre.call(); }
+    static void preHook(void *context) { wireOf(context).user->onPre.call(); }
     static void postHook(void *context)
     {
-        stateOf(context).sent = true;
-        Turn::used();
-        stateOf(context).onPost.call();
+        Wire &wire = wireOf(context);
+        wire.sent = true;
+        Line::used();
+        wire.user->onPost.call();
     }
-    static void idleHook(void *context, mbm_master *)
+    static void idleHook(void *context, mbm_node *)
     {
-        State &state = stateOf(context);
-        if (state.sent) {
+        Wire &wire = wireOf(context);
+        if (wire.sent) {
             MODBUSMASTER_DEBUG(B, true);
-            state.onIdle.call();
+            wire.user->onIdle.call();
             MODBUSMASTER_DEBUG(B, false);
-            state.sent = true; // a refused request of the callback has cleared it
+            wire.sent = true; // a refused request of the callback has cleared it
         }
         MODBUSMASTER_YIELD();
     }

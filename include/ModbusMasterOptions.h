@@ -10,12 +10,13 @@
  *   else 125. A longer read returns ku8MBBufferTooSmall.
  * - MODBUSMASTER_TRANSMIT_WORDS  words that a write sends, 2 to 123; 64 on AVR,
  *   else 123. A longer write returns ku8MBIllegalDataValue.
- * - MODBUSMASTER_SHARE_FRAME  objects without a frame buffer: while a function waits, the
- *   frame is on its stack. It is defined on AVR boards of at most 2.5 KB of RAM. A request
- *   while another object's request is under way returns ku8MBBusy. Do not define it if
- *   several threads use objects.
- * - MODBUSMASTER_OWN_FRAMES  a frame buffer in each object on those boards too, so
- *   that several objects may have a request under way at the same time.
+ * - MODBUSMASTER_SHARE_LINE  one line for all objects, with one set of settings, and no frame
+ *   buffer: while a function waits, the frame is on its stack. It is defined on AVR boards of at
+ *   most 2.5 KB of RAM. A request while another object's request is under way returns ku8MBBusy.
+ *   Of the settings, only the response timeout, setBlocking and setWordOrder belong to one
+ *   object. Do not define it if several threads use objects.
+ * - MODBUSMASTER_OWN_LINES  a line and a frame buffer in each object on those boards too, so that
+ *   several objects may have a request under way at the same time, and have their own settings.
  * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  the UARTs that begin(baud) opens, if
  *   the core does not say which UARTs the board has.
  * - MODBUSMASTER_YIELD()  is called while a function waits; yield() if the core has it.
@@ -45,9 +46,9 @@
 #endif
 
 // The Uno has 2 KB of RAM, the Leonardo 2.5.
-#if defined(RAMEND) && RAMEND < 0x0B00 && !defined(MODBUSMASTER_OWN_FRAMES)
-#undef MODBUSMASTER_SHARE_FRAME
-#define MODBUSMASTER_SHARE_FRAME
+#if defined(RAMEND) && RAMEND < 0x0B00 && !defined(MODBUSMASTER_OWN_LINES)
+#undef MODBUSMASTER_SHARE_LINE
+#define MODBUSMASTER_SHARE_LINE
 #endif
 
 // With NO_GLOBAL_* the core defines no ports; the sketch defines them.

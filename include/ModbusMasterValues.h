@@ -31,11 +31,11 @@ class ModbusMasterValues : public ModbusWordOrder,
                            public ModbusNumbers<ModbusMasterValues<Master>> {
 public:
     /** The order of values for calls without an order; orderABCD at first. */
-    void setWordOrder(WordOrder order) { mbm_master_setWordOrder(&core(), order); }
+    void setWordOrder(WordOrder order) { mbm_node_setWordOrder(&core(), order); }
     /** The order in effect. */
     WordOrder getWordOrder() const
     {
-        return static_cast<WordOrder>(mbm_master_getWordOrder(&core()));
+        return static_cast<WordOrder>(mbm_node_getWordOrder(&core()));
     }
 
     /** An integer in the response: a word, 0 to 65535; only the bytes of its order matter. */
@@ -251,18 +251,18 @@ private:
     using Numbers::set;
     using Numbers::valueOf;
 
-    const mbm_master &core() const { return static_cast<const Master *>(this)->state.master; }
-    mbm_master &core() { return static_cast<Master *>(this)->state.master; }
+    const mbm_node &core() const { return static_cast<const Master *>(this)->state.node; }
+    mbm_node &core() { return static_cast<Master *>(this)->state.node; }
 
     uint8_t toRead(mbm_registers &space, const mbm_registers *&words) const
     {
         words = &space;
-        return mbm_master_getResponseRegisters(&core(), 0, &space);
+        return mbm_node_getResponseRegisters(&core(), 0, &space);
     }
     uint8_t toWrite(mbm_registers &space, const mbm_registers *&words)
     {
         words = &space;
-        return mbm_master_getTransmitRegisters(&core(), 0, &space);
+        return mbm_node_getTransmitRegisters(&core(), 0, &space);
     }
 };
 

@@ -13,13 +13,14 @@
  * - No function is re-entrant on one object. Call no function from an interrupt unless its
  *   comment allows it. You may use any number of objects side by side, each from one thread.
  * - You may call a begin function again at any time, but not from a hook of the object. The
- *   object then gives up what was pending; requests get the status MBM_CANCELLED.
+ *   object then gives up what was pending; requests get the status MBM_CANCELLED. Only a line
+ *   and a node refuse it with MBM_BUSY while a request is under way.
  *
  * A unit id and a time that you pass have a wider type than they need, so that a number that is
  * too large is refused and not narrowed. Other numbers, such as retries, the length of an array,
  * addresses and quantities, have the type that they need, which costs less flash: C reduces a
- * larger one modulo 256 or 65536 before the library sees it. So it does with `slave` of the
- * mbm_master functions. -Wconversion shows where.
+ * larger one modulo 256 or 65536 before the library sees it. So it does with `unit` of the
+ * mbm_node functions. -Wconversion shows where.
  *
  * "V1.1b3" is the Modbus application protocol specification, "serial line guide V1.02" the
  * guide for RTU and ASCII.
@@ -85,7 +86,7 @@
 extern "C" {
 #endif
 
-struct mbm_master;
+struct mbm_node;
 struct mbm_object;
 struct mbm_packet;
 struct mbm_unit;
@@ -237,7 +238,7 @@ const char *mbm_version(void);
 #define MBM_NOT_INITIALISED 234u
 
 /**
- * The request is under way: call mbm_master_poll again.
+ * The request is under way: call mbm_node_poll again.
  */
 #define MBM_PENDING 235u
 
@@ -324,7 +325,7 @@ const char *mbm_status_text(uint8_t status);
  *
  * @param status         the status of the request
  * @param exceptionCode  `exception` of the mbm_clientRequest, or what
- *                       mbm_master_getExceptionCode returns: 0 if the device sent no exception
+ *                       mbm_node_getExceptionCode returns: 0 if the device sent no exception
  * @return a constant string, never NULL
  */
 const char *mbm_status_textOf(uint8_t status,
@@ -335,15 +336,16 @@ const char *mbm_status_textOf(uint8_t status,
 /**
  * What your firmware supplies: a byte stream, a clock, and optional hooks.
  *
- * A master keeps a pointer to its port. The port must stay valid and unchanged for as long
- * as the master is used; it may be a constant. A client and a server copy their port.
+ * A line keeps a pointer to its port. The port must stay valid and unchanged for as long
+ * as the line is used; it may be a constant. A client and a server copy their port.
  * `read`, `write` and `micros` must not be NULL. The other hooks may be NULL: then they are
  * not called.
  *
  * A hook must not use the object that calls it. If it calls a function on that object, the
  * function returns MBM_BUSY and changes nothing; a getter returns what it returns for an
- * object that was never begun. The hook `idle` is the exception: it may call every
- * function, but one that starts a request returns MBM_BUSY.
+ * object that was never begun. So it is with a line, and with the request of a node that is
+ * under way; the words and the settings of a node may be used. The hook `idle` is the exception:
+ * it may call every function, but one that starts a request returns MBM_BUSY.
  */
 typedef struct mbm_port {
     /**
@@ -368,7 +370,7 @@ typedef struct mbm_port {
     uint32_t (*micros)(void *context);
     /**
      * Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
-     * also wait until the last bit was sent, and return 1. Without it, a master and a client
+     * also wait until the last bit was sent, and return 1. Without it, a line and a client
      * that know the baud rate wait for a reply longer by the time of the request's characters,
      * since bytes may remain to be sent after `write` has taken them.
      */
@@ -382,11 +384,11 @@ typedef struct mbm_port {
      */
     void (*postTransmission)(void *context);
     /**
-     * Optional: called repeatedly while a blocking function of `master` waits, but never
+     * Optional: called repeatedly while a blocking function of `node` waits, but never
      * between preTransmission and postTransmission. It may sleep until a byte arrives, at
-     * most for the time that mbm_master_pollDelay(master) returns.
+     * most for the time that mbm_node_pollDelay(node) returns.
      */
-    void (*idle)(void *context, struct mbm_master *master);
+    void (*idle)(void *context, struct mbm_node *node);
 } mbm_port;
 
 /**
@@ -785,548 +787,222 @@ typedef struct mbm_framing {
 /* ==== 5. Master ===================================================================== */
 
 /**
- * A Modbus RTU master: one line, one request at a time.
+ * A node: a device on a line, as the master sees it, with the words of its requests and
+ * replies.
  *
- * You own the storage. Initialise it with MBM_INIT (`mbm_master node = MBM_INIT;`). Before
- * you use settings and words, call mbm_master_beginRtu or mbm_master_setBuffers; before you
- * make requests, call both. Use an object from one thread only, and never from an interrupt.
- * Several objects are independent of each other. mbm_port says which functions the hooks of
- * the port may call.
+ * You own the storage. Initialise it with MBM_INIT (`mbm_node meter = MBM_INIT;`) and call
+ * mbm_node_begin before all else. Nodes of different lines are independent of each other. Of
+ * the nodes of one line, one may have a request under way; a request of another one returns
+ * MBM_BUSY meanwhile. Use a line and its nodes from one thread only, and never from an
+ * interrupt. mbm_port says which functions the hooks of the port may call.
  *
  * A call that is refused changes nothing. Exceptions are the functions that make a request,
- * as mbm_master_readCoils describes, and mbm_master_send32.
+ * as mbm_node_readCoils describes, and mbm_node_send32.
  */
-typedef struct mbm_master {
+typedef struct mbm_node {
     /**
      * Private.
      */
-    void *pointers[17];
+    void *pointers[7];
     /**
      * Private.
      */
-    uint32_t words[21];
-} mbm_master;
+    uint32_t words[3];
+} mbm_node;
 
 /**
- * Records which of several masters uses a shared line, or a shared frame buffer. You own the
- * storage. Initialise it with MBM_INIT.
+ * A serial line with RTU frames: a port, a frame buffer, settings, and the request under way.
+ * The nodes on the line use it, one request at a time: see mbm_node.
  *
- * Use all objects of one turn from one thread. Call mbm_master_endTurn before you release the
- * storage of an object.
+ * You own the storage. Initialise it with MBM_INIT (`mbm_line line = MBM_INIT;`). Use a line
+ * and its nodes from one thread only, and never from an interrupt. Several lines are
+ * independent of each other. mbm_port says which functions the hooks of the port may call.
+ *
+ * A call that is refused changes nothing.
  */
-typedef struct mbm_turn {
+typedef struct mbm_line {
     /**
-     * The object that has the turn; NULL if none has it.
+     * Private.
      */
-    struct mbm_master *master;
+    void *pointers[14];
     /**
-     * When an object that had the turn before used the line last, in microseconds.
+     * Private.
      */
-    uint32_t lastUse;
-} mbm_turn;
+    uint32_t words[19];
+} mbm_line;
 
 /**
- * Begins a master of RTU frames that sends its requests to a unit over a port.
+ * Begins a line with RTU frames on a port.
  *
- * It may be called again at any time, to use another unit or another port; this is cheap.
- * Settings, buffers and the words in them stay. The master discards what mbm_master_send
- * queued, and gives up a request under way with the status MBM_CANCELLED. It does not open
- * the port: that must be open already. The first request waits for no gap, unless bytes
- * arrive or mbm_master_lineUsed was called.
+ * It may be called again, for another port or frame buffer, whenever no request is under way;
+ * this is cheap. Settings stay. It does not open the port: that must be open already. The first
+ * request waits for no gap, unless bytes arrive or mbm_line_used was called.
  *
- * @param master  the object; initialised with MBM_INIT before the first call
- * @param slave   the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
- *                2.2). The master also sends to 248 to 255, which the standard reserves
- * @param port    the port. It is not copied: it must stay valid and unchanged for as long as
- *                the object is used. read, write and micros must not be NULL
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
- *         from within a hook of this object's port except `idle`
+ * @param line        the object; initialised with MBM_INIT before the first call
+ * @param port        the port. It is not copied: it must stay valid and unchanged for as long
+ *                    as the object is used. read, write and micros must not be NULL
+ * @param frame       as for mbm_line_setFrame; also NULL, if you call that function later
+ * @param frameBytes  as for mbm_line_setFrame; 0 if `frame` is NULL
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or too small a frame
+ *         buffer; MBM_BUSY while a request is under way
  */
-uint8_t mbm_master_beginRtu(struct mbm_master *master,
-                            uint8_t slave,
-                            const struct mbm_port *port);
+uint8_t mbm_line_beginRtu(struct mbm_line *line,
+                          const struct mbm_port *port,
+                          uint8_t *frame,
+                          uint16_t frameBytes);
 
 /**
- * As mbm_master_beginRtu, but with a separate context. Several objects can then share one
- * port, which may be a constant, and each object has its own context.
+ * Begins a node: a unit on a line, with your words for its requests and replies.
  *
- * @param master   the object; initialised with MBM_INIT before the first call
- * @param slave    as for mbm_master_beginRtu
- * @param port     as for mbm_master_beginRtu; its `context` is not used
- * @param context  your pointer, passed to every hook; may be NULL
- * @return as for mbm_master_beginRtu
+ * It may be called again, for another unit, line or words, whenever the node has no request
+ * under way; this is cheap. Settings and the content of the words stay. The node discards what
+ * mbm_node_send queued. The line may be begun before or afterwards.
+ *
+ * The words must not overlap, and must stay valid for as long as the object is used. Any number
+ * of nodes may share words. Keep a node until its request has ended.
+ *
+ * @param node           the object; initialised with MBM_INIT before the first call
+ * @param line           the line, which must stay valid for as long as the object is used
+ * @param unit           the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
+ *                       2.2). Requests to 248 to 255, which the standard reserves, are sent too
+ * @param response       the words that reads fill; NULL only if `responseWords` is 0
+ * @param responseWords  0 to 255; 125 hold any reply
+ * @param transmit       the words that writes send; NULL only if `transmitWords` is 0
+ * @param transmitWords  0 to 255; 123 hold any request
+ * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY while a request of the node is under way
  */
-uint8_t mbm_master_beginRtuWith(struct mbm_master *master,
-                                uint8_t slave,
-                                const struct mbm_port *port,
-                                void *context);
+uint8_t mbm_node_begin(struct mbm_node *node,
+                       struct mbm_line *line,
+                       uint8_t unit,
+                       uint16_t *response,
+                       uint16_t responseWords,
+                       uint16_t *transmit,
+                       uint16_t transmitWords);
 
 /**
- * Sets the write address and empties the queue of mbm_master_send. The transmit words do not
+ * Sets the write address and empties the queue of mbm_node_send. The transmit words do not
  * change.
  *
- * @param master   the object
+ * @param node  the object
  * @param address  the address to which the functions with Queued in their name write, 0 to
  *                 65535
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_beginTransmission(struct mbm_master *master,
-                                     uint16_t address);
+uint8_t mbm_node_beginTransmission(struct mbm_node *node,
+                                   uint16_t address);
 
 /**
- * Sets the buffers for requests and replies, before or after mbm_master_beginRtu.
+ * Sets the buffer of one frame. The line uses it only while a request is under way. So in
+ * blocking mode it may lie on the stack of a function that sets it and makes the request.
  *
- * The buffers must not overlap, and must stay valid for as long as the object is used. A
- * frame buffer of MBM_FRAME_BYTES(words) bytes suffices for every request and reply with
- * that number of words. If a request or a reply does not fit into a smaller buffer, the
- * function that makes the request returns a status. Data are never cut off.
+ * A frame buffer of MBM_FRAME_BYTES(words) bytes suffices for every request and reply with
+ * that number of words. MBM_FRAME_BYTES(2 * words) bytes also hold a late reply beside the
+ * right one. If a request or a reply does not fit, the function that makes the request returns
+ * a status. Data are never cut off.
  *
- * @param master         the object; initialised with MBM_INIT before the first call
- * @param response       the words that reads fill; NULL only if `responseWords` is 0
- * @param responseWords  0 to 255; 125 hold any reply
- * @param transmit       the words that writes send; NULL only if `transmitWords` is 0
- * @param transmitWords  0 to 255; 123 hold any request
- * @param frame          the buffer of one frame. Its content is not used between requests
- * @param frameBytes     bytes of `frame`, at least 8; 256 hold any frame
- * @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
- */
-uint8_t mbm_master_setBuffers(struct mbm_master *master,
-                              uint16_t *response,
-                              uint16_t responseWords,
-                              uint16_t *transmit,
-                              uint16_t transmitWords,
-                              uint8_t *frame,
-                              uint16_t frameBytes);
-
-/**
- * Sets the words for requests and replies, as mbm_master_setBuffers does. The frame buffer stays
- * as it is.
- *
- * @param master         the object; initialised with MBM_INIT before the first call
- * @param response       the words that reads fill; NULL only if `responseWords` is 0
- * @param responseWords  0 to 255; 125 hold any reply
- * @param transmit       the words that writes send; NULL only if `transmitWords` is 0
- * @param transmitWords  0 to 255; 123 hold any request
- * @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
- */
-uint8_t mbm_master_setWords(struct mbm_master *master,
-                            uint16_t *response,
-                            uint16_t responseWords,
-                            uint16_t *transmit,
-                            uint16_t transmitWords);
-
-/**
- * Sets the frame buffer, as mbm_master_setBuffers does. The master uses it only while a request
- * is under way. So in blocking mode it may lie on the stack of a function that sets it and makes
- * the request. Several masters may use one buffer in turn.
- *
- * For a request of `n` words, MBM_FRAME_BYTES(2 * n) bytes are enough to hold a late reply beside
- * the right one.
- *
- * @param master      the object, with words or begun
- * @param frame       the buffer of one frame
+ * @param line        the object; initialised with MBM_INIT before the first call
+ * @param frame       the buffer. Its content is not used between requests
  * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
- * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED, or MBM_BUSY while a request is under
- *         way
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
  */
-uint8_t mbm_master_setFrame(struct mbm_master *master,
-                            uint8_t *frame,
-                            uint16_t frameBytes);
+uint8_t mbm_line_setFrame(struct mbm_line *line,
+                          uint8_t *frame,
+                          uint16_t frameBytes);
 
 /**
- * Sends and receives for a non-blocking request, without waiting.
+ * Gives up the request under way, whichever node has made it, and switches the driver off. The
+ * status of that node becomes MBM_CANCELLED when you poll it. Call it if the node is lost.
+ * If no request is under way, it does nothing.
  *
- * Call it as often as you like. If your port does not buffer received bytes, call it at
- * least once in the time of a character.
- *
- * @param master  the object
- * @return MBM_PENDING until the request has ended. Then, at every call, the status of the
- *         request. MBM_OK if there was no request yet; MBM_BUSY from within a hook of the
- *         port except `idle`; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param line  the object
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY from within a hook of
+ *         the port except `idle`
  */
-uint8_t mbm_master_poll(struct mbm_master *master);
+uint8_t mbm_line_cancel(struct mbm_line *line);
 
 /**
- * Returns how long mbm_master_poll will have nothing to do unless a byte arrives. A program
- * or the hook `idle` may sleep for that time. A waiting time that has just started counts
- * from this call, so sleeping makes no timeout longer.
+ * Returns the silence before a request that is in effect: what mbm_line_setGap set, or t3.5
+ * of the rate that mbm_line_setBaudRate set, or 4 ms.
  *
- * @param master  the object
- * @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
- *         0xFFFFFFFF means that no request is under way
- */
-uint32_t mbm_master_pollDelay(struct mbm_master *master);
-
-/**
- * Gives up the request under way and switches the driver off. The status of the request
- * becomes MBM_CANCELLED. If no request is under way, it does nothing.
- *
- * @param master  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_cancel(struct mbm_master *master);
-
-/**
- * Returns the status of the last request.
- *
- * @param master  the object
- * @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
- *         request; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_status(const struct mbm_master *master);
-
-/**
- * Returns the exception code of the last reply as received, also a code that the standard
- * does not allow (V1.1b3, 7).
- *
- * @param master  the object
- * @return the code; 0 if the last request ended without an exception
- */
-uint8_t mbm_master_getExceptionCode(const struct mbm_master *master);
-
-/**
- * Returns the response timeout: see mbm_master_setResponseTimeout.
- *
- * @param master  the object
- * @return milliseconds; 0 for an object that was never begun
- */
-uint32_t mbm_master_getResponseTimeout(const struct mbm_master *master);
-
-/**
- * Returns the silence before a request that is in effect: what mbm_master_setGap set, or t3.5
- * of the rate that mbm_master_setBaudRate set, or 4 ms.
- *
- * @param master  the object
+ * @param line  the object
  * @return microseconds; 0 for an object that was never begun
  */
-uint32_t mbm_master_getGap(const struct mbm_master *master);
+uint32_t mbm_line_getGap(const struct mbm_line *line);
 
 /**
- * Returns the turnaround delay: see mbm_master_setTurnaroundDelay.
+ * Returns the turnaround delay: see mbm_line_setTurnaroundDelay.
  *
- * @param master  the object
+ * @param line  the object
  * @return milliseconds; 0 for an object that was never begun
  */
-uint16_t mbm_master_getTurnaroundDelay(const struct mbm_master *master);
+uint16_t mbm_line_getTurnaroundDelay(const struct mbm_line *line);
 
 /**
- * Returns the quiet time: see mbm_master_setQuietTime.
+ * Returns the quiet time: see mbm_line_setQuietTime.
  *
- * @param master  the object
+ * @param line  the object
  * @return milliseconds; 0 for an object that was never begun
  */
-uint16_t mbm_master_getQuietTime(const struct mbm_master *master);
+uint16_t mbm_line_getQuietTime(const struct mbm_line *line);
 
 /**
- * Returns how often a request is repeated: see mbm_master_setRetries.
+ * Returns how often a request is repeated: see mbm_line_setRetries.
  *
- * @param master  the object
+ * @param line  the object
  * @return 0 to 255; 0 for an object that was never begun
  */
-uint8_t mbm_master_getRetries(const struct mbm_master *master);
+uint8_t mbm_line_getRetries(const struct mbm_line *line);
 
 /**
- * Returns whether echo discarding is on: see mbm_master_setEchoDiscard.
+ * Returns whether echo discarding is on: see mbm_line_setEchoDiscard.
  *
- * @param master  the object
+ * @param line  the object
  * @return 1 or 0; 0 for an object that was never begun
  */
-uint8_t mbm_master_getEchoDiscard(const struct mbm_master *master);
+uint8_t mbm_line_getEchoDiscard(const struct mbm_line *line);
 
 /**
- * Returns whether deviating replies are accepted: see mbm_master_setLenient.
+ * Returns how long the driver stays on after the flush: see mbm_line_setPostFlushHold.
  *
- * @param master  the object
- * @return 1 or 0; 0 for an object that was never begun
- */
-uint8_t mbm_master_getLenient(const struct mbm_master *master);
-
-/**
- * Returns how long the driver stays on after the flush: see mbm_master_setPostFlushHold.
- *
- * @param master  the object
+ * @param line  the object
  * @return characters; 0 for an object that was never begun
  */
-uint8_t mbm_master_getPostFlushHold(const struct mbm_master *master);
-
-/**
- * Returns whether requests block: see mbm_master_setBlocking.
- *
- * @param master  the object
- * @return 1 for blocking, 0 for non-blocking; 0 for an object that was never begun
- */
-uint8_t mbm_master_getBlocking(const struct mbm_master *master);
-
-/**
- * Returns the order of values: see mbm_master_setWordOrder.
- *
- * @param master  the object
- * @return one of MBM_ORDER_...; MBM_ORDER_ABCD for an object that was never begun
- */
-uint8_t mbm_master_getWordOrder(const struct mbm_master *master);
-
-/**
- * Function 01: reads coils into the response words, 16 in each word. The first coil is the
- * lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
- *
- * All functions that make a request behave as follows. In blocking mode they return when
- * the request has ended. In non-blocking mode they return MBM_PENDING at once, and you call
- * mbm_master_poll until the request has ended.
- *
- * They empty the queue of mbm_master_send, and mbm_master_receive starts again at the first
- * word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or MBM_INVALID_ARGUMENT. The
- * response words change only on success. The transmit words do not change, except that 06
- * and 16 store their arguments there.
- *
- * The master does not send a request that no device could accept, with a quantity that the
- * standard forbids or addresses beyond 65535. The status is then the exception with which a
- * device would answer.
- *
- * @param master    the object
- * @param address   the first coil, 0 to 65535, as on the wire
- * @param quantity  the number of coils, 1 to 2000
- * @return MBM_OK, or an exception of the device (0x01 to 0x7F), or
- *         MBM_PENDING (non-blocking mode), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
- *         MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION,
- *         MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
- *         MBM_BROADCAST_NOT_ALLOWED, MBM_BUSY, MBM_CANCELLED,
- *         MBM_NOT_INITIALISED, MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_master_readCoils(struct mbm_master *master,
-                             uint16_t address,
-                             uint16_t quantity);
-
-/**
- * Function 02: reads discrete inputs into the response words, 16 in each word. The first
- * input is the lowest bit; the last word is padded with zeros (V1.1b3, 6.2).
- *
- * @param master    the object
- * @param address   the first input, 0 to 65535, as on the wire
- * @param quantity  the number of inputs, 1 to 2000
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_readDiscreteInputs(struct mbm_master *master,
-                                      uint16_t address,
-                                      uint16_t quantity);
-
-/**
- * Function 03: reads holding registers into the response words (V1.1b3, 6.3).
- *
- * @param master    the object
- * @param address   the first register, 0 to 65535, as on the wire
- * @param quantity  the number of registers, 1 to 125
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_readHoldingRegisters(struct mbm_master *master,
-                                        uint16_t address,
-                                        uint16_t quantity);
-
-/**
- * Function 04: reads input registers into the response words (V1.1b3, 6.4).
- *
- * @param master    the object
- * @param address   the first register, 0 to 65535, as on the wire
- * @param quantity  the number of registers, 1 to 125
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_readInputRegisters(struct mbm_master *master,
-                                      uint16_t address,
-                                      uint16_t quantity);
-
-/**
- * Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
- *
- * @param master   the object
- * @param address  the coil, 0 to 65535; becomes the write address
- * @param state    0 is off, any other value is on
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_writeSingleCoil(struct mbm_master *master,
-                                   uint16_t address,
-                                   uint8_t state);
-
-/**
- * Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
- *
- * @param master   the object
- * @param address  the register, 0 to 65535; becomes the write address
- * @param value    its value; also becomes transmit word 0
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_writeSingleRegister(struct mbm_master *master,
-                                       uint16_t address,
-                                       uint16_t value);
-
-/**
- * Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
- * the lowest bit (V1.1b3, 6.11). With unit 0 it is a broadcast.
- *
- * @param master    the object
- * @param address   the first coil, 0 to 65535; becomes the write address
- * @param quantity  the number of coils, 1 to 1968, and not more than the transmit words hold
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_writeMultipleCoils(struct mbm_master *master,
-                                      uint16_t address,
-                                      uint16_t quantity);
-
-/**
- * Function 0F: writes the queued bits to coils, starting at the last write address. Call
- * mbm_master_beginTransmission and mbm_master_sendBit before.
- *
- * @param master  the object
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_writeQueuedCoils(struct mbm_master *master);
-
-/**
- * Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
- * With unit 0 it is a broadcast.
- *
- * @param master    the object
- * @param address   the first register, 0 to 65535; becomes the write address
- * @param quantity  the number of registers, 1 to 123, and not more than the transmit words
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_writeMultipleRegisters(struct mbm_master *master,
-                                          uint16_t address,
-                                          uint16_t quantity);
-
-/**
- * Function 10: writes the queued complete words to registers, starting at the last write
- * address. Call mbm_master_beginTransmission and mbm_master_send before.
- *
- * @param master  the object
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_writeQueuedRegisters(struct mbm_master *master);
-
-/**
- * Function 16: the device sets a register to
- * (register AND andMask) OR (orMask AND NOT andMask) (V1.1b3, 6.16).
- * With unit 0 it is a broadcast.
- *
- * @param master   the object
- * @param address  the register, 0 to 65535; becomes the write address
- * @param andMask  1 for each bit of the register to keep; also becomes transmit word 0
- * @param orMask   the new value of the bits that are not kept; also becomes transmit word 1
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_maskWriteRegister(struct mbm_master *master,
-                                     uint16_t address,
-                                     uint16_t andMask,
-                                     uint16_t orMask);
-
-/**
- * Function 17: the device writes the transmit words to registers first. Then it reads
- * registers, which arrive in the response words. Both in one request (V1.1b3, 6.17).
- *
- * @param master         the object
- * @param readAddress    the first register to read, 0 to 65535
- * @param readQuantity   the number of registers to read, 1 to 125
- * @param writeAddress   the first register to write, 0 to 65535; becomes the write
- *                       address
- * @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
- *                       transmit words
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_readWriteMultipleRegisters(struct mbm_master *master,
-                                              uint16_t readAddress,
-                                              uint16_t readQuantity,
-                                              uint16_t writeAddress,
-                                              uint16_t writeQuantity);
-
-/**
- * Function 17: as mbm_master_readWriteMultipleRegisters, but writes the queued complete
- * words, starting at the last write address.
- *
- * @param master        the object
- * @param readAddress   the first register to read, 0 to 65535
- * @param readQuantity  the number of registers to read, 1 to 125
- * @return a status; see mbm_master_readCoils
- */
-uint8_t mbm_master_readWriteQueuedRegisters(struct mbm_master *master,
-                                            uint16_t readAddress,
-                                            uint16_t readQuantity);
-
-/**
- * Reads holding registers. mbm_master_receive then returns them one after the other.
- *
- * @param master    the object
- * @param address   the first register, 0 to 65535
- * @param quantity  the number of registers, 1 to 125
- * @return the number of words that mbm_master_receive will return; 0 if the request failed
- *         (mbm_master_status returns why), if another request is under way, and in
- *         non-blocking mode
- */
-uint8_t mbm_master_requestFrom(struct mbm_master *master,
-                               uint16_t address,
-                               uint16_t quantity);
-
-/**
- * Sets the unit to which the master sends later requests.
- *
- * @param master  the object
- * @param slave   the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248
- *                to 255, which the standard reserves
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_setSlaveID(struct mbm_master *master,
-                              uint8_t slave);
-
-/**
- * Returns the unit to which the master sends requests.
- *
- * @param master  the object
- * @return the unit identifier, 1 by default; 0 for an object that was never begun
- */
-uint8_t mbm_master_getSlaveID(const struct mbm_master *master);
-
-/**
- * Sets the response timeout: the maximum time from the last bit of the request to the last
- * byte of the reply.
- *
- * @param master        the object
- * @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_setResponseTimeout(struct mbm_master *master,
-                                      uint32_t timeoutMs);
+uint8_t mbm_line_getPostFlushHold(const struct mbm_line *line);
 
 /**
  * Sets the baud rate from which the master computes the gap before a request (t3.5, serial
  * line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure the
  * serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
  *
- * @param master  the object
+ * @param line  the object
  * @param baud    bits per second; 0 (the default): unknown
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setBaudRate(struct mbm_master *master,
-                               uint32_t baud);
+uint8_t mbm_line_setBaudRate(struct mbm_line *line,
+                             uint32_t baud);
 
 /**
  * Sets the silence before a request, instead of t3.5. Use 0 if no device on the line needs
  * the gap, and more than t3.5 for devices that need longer before they can receive again.
- * A later call of mbm_master_setBaudRate sets it back to t3.5.
+ * A later call of mbm_line_setBaudRate sets it back to t3.5.
  *
- * @param master        the object
+ * @param line  the object
  * @param gapUs         microseconds from the last byte received or sent; a value above 2^31
  *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setGap(struct mbm_master *master,
-                          uint32_t gapUs);
+uint8_t mbm_line_setGap(struct mbm_line *line,
+                        uint32_t gapUs);
 
 /**
  * Sets the turnaround delay: how long the master waits after a broadcast, which no device
  * answers (serial line guide V1.02, 2.4.1).
  *
- * @param master        the object
+ * @param line  the object
  * @param delayMs       milliseconds, 0 to 65535; the default is 100
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint32_t delayMs);
+uint8_t mbm_line_setTurnaroundDelay(struct mbm_line *line, uint32_t delayMs);
 
 /**
  * Sets the quiet time. It prevents that the master accepts a late reply as the reply to a
@@ -1352,224 +1028,508 @@ uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint32_t delayM
  * response timeout may be taken for the reply to the next request, and so may all that
  * follow.
  *
- * @param master        the object
+ * @param line  the object
  * @param quietMs       milliseconds, 0 to 65535; the default is 100
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setQuietTime(struct mbm_master *master,
-                                uint32_t quietMs);
+uint8_t mbm_line_setQuietTime(struct mbm_line *line,
+                              uint32_t quietMs);
 
 /**
  * Sets how often the master repeats a request whose reply is missing, damaged or malformed.
  * It does not repeat a request that was answered with an exception.
  *
- * @param master   the object
+ * @param line  the object
  * @param retries  0 to 255; the default is 0
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setRetries(struct mbm_master *master,
-                              uint8_t retries);
+uint8_t mbm_line_setRetries(struct mbm_line *line,
+                            uint8_t retries);
 
 /**
  * Switches echo discarding on or off. Switch it on if the receiver also receives what the
  * driver sends: then the master discards the copy of each request that arrives before the
  * reply.
  *
- * @param master  the object
+ * @param line  the object
  * @param on      0 (the default) or 1
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setEchoDiscard(struct mbm_master *master, uint8_t on);
+uint8_t mbm_line_setEchoDiscard(struct mbm_line *line, uint8_t on);
+
+/**
+ * Sets how long the driver stays on after the port's flush, for platforms whose flush
+ * returns before the last bit was sent.
+ *
+ * @param line  the object
+ * @param characters  the time in characters at the baud rate of mbm_line_setBaudRate
+ *                    (without one, at 9600); the default is 0
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_line_setPostFlushHold(struct mbm_line *line, uint8_t characters);
+
+/**
+ * Sets your storage for counters, in which the master counts from now on. You may read and
+ * zero the counters at any time, but not from an interrupt.
+ *
+ * @param line  the object
+ * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_line_setCounters(struct mbm_line *line,
+                             struct mbm_counters *counters);
+
+/**
+ * Reports when another user of the wire, for example another object, used it last.
+ * The gap before the next request counts from that time. A time before the last use that
+ * the object knows changes nothing.
+ *
+ * @param line  the object
+ * @param timeUs        the time in microseconds on the clock of the object's port, at most
+ *                      2^31 microseconds (36 minutes) ago
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_line_usedAt(struct mbm_line *line,
+                        uint32_t timeUs);
+
+/**
+ * Reports that another user of the wire has just used it: as mbm_line_usedAt with the
+ * present time.
+ *
+ * @param line  the object
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_line_used(struct mbm_line *line);
+
+/**
+ * Sends and receives for a non-blocking request, without waiting.
+ *
+ * Call it as often as you like. If your port does not buffer received bytes, call it at
+ * least once in the time of a character.
+ *
+ * @param node  the object
+ * @return MBM_PENDING until the request has ended. Then, at every call, the status of the
+ *         request. MBM_OK if there was no request yet; MBM_BUSY from within a hook of the
+ *         port except `idle`, while the request is under way; MBM_INVALID_ARGUMENT or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_node_poll(struct mbm_node *node);
+
+/**
+ * Returns how long mbm_node_poll will have nothing to do unless a byte arrives. A program
+ * or the hook `idle` may sleep for that time. A waiting time that has just started counts
+ * from this call, so sleeping makes no timeout longer.
+ *
+ * @param node  the object
+ * @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
+ *         0xFFFFFFFF means that the node has no request under way
+ */
+uint32_t mbm_node_pollDelay(struct mbm_node *node);
+
+/**
+ * Gives up the request under way and switches the driver off. The status of the request
+ * becomes MBM_CANCELLED. If the node has no request under way, it does nothing.
+ *
+ * @param node  the object
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY from within a hook of
+ *         the port except `idle`, while the request is under way
+ */
+uint8_t mbm_node_cancel(struct mbm_node *node);
+
+/**
+ * Returns the status of the last request.
+ *
+ * @param node  the object
+ * @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
+ *         request; MBM_BUSY from within a hook of the port except `idle`, while the request is
+ *         under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_node_status(const struct mbm_node *node);
+
+/**
+ * Returns the exception code of the last reply as received, also a code that the standard
+ * does not allow (V1.1b3, 7).
+ *
+ * @param node  the object
+ * @return the code; 0 if the last request ended without an exception
+ */
+uint8_t mbm_node_getExceptionCode(const struct mbm_node *node);
+
+/**
+ * Function 01: reads coils into the response words, 16 in each word. The first coil is the
+ * lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
+ *
+ * All functions that make a request behave as follows. In blocking mode they return when
+ * the request has ended. In non-blocking mode they return MBM_PENDING at once, and you call
+ * mbm_node_poll until the request has ended.
+ *
+ * They empty the queue of mbm_node_send, and mbm_node_receive starts again at the first
+ * word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or MBM_INVALID_ARGUMENT. The
+ * response words change only on success. The transmit words do not change, except that 06
+ * and 16 store their arguments there.
+ *
+ * The master does not send a request that no device could accept, with a quantity that the
+ * standard forbids or addresses beyond 65535. The status is then the exception with which a
+ * device would answer.
+ *
+ * @param node  the object
+ * @param address   the first coil, 0 to 65535, as on the wire
+ * @param quantity  the number of coils, 1 to 2000
+ * @return MBM_OK, or an exception of the device (0x01 to 0x7F), or
+ *         MBM_PENDING (non-blocking mode), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
+ *         MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION,
+ *         MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
+ *         MBM_BROADCAST_NOT_ALLOWED, MBM_BUSY, MBM_CANCELLED,
+ *         MBM_NOT_INITIALISED, MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_node_readCoils(struct mbm_node *node,
+                           uint16_t address,
+                           uint16_t quantity);
+
+/**
+ * Function 02: reads discrete inputs into the response words, 16 in each word. The first
+ * input is the lowest bit; the last word is padded with zeros (V1.1b3, 6.2).
+ *
+ * @param node  the object
+ * @param address   the first input, 0 to 65535, as on the wire
+ * @param quantity  the number of inputs, 1 to 2000
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_readDiscreteInputs(struct mbm_node *node,
+                                    uint16_t address,
+                                    uint16_t quantity);
+
+/**
+ * Function 03: reads holding registers into the response words (V1.1b3, 6.3).
+ *
+ * @param node  the object
+ * @param address   the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_readHoldingRegisters(struct mbm_node *node,
+                                      uint16_t address,
+                                      uint16_t quantity);
+
+/**
+ * Function 04: reads input registers into the response words (V1.1b3, 6.4).
+ *
+ * @param node  the object
+ * @param address   the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_readInputRegisters(struct mbm_node *node,
+                                    uint16_t address,
+                                    uint16_t quantity);
+
+/**
+ * Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
+ *
+ * @param node  the object
+ * @param address  the coil, 0 to 65535; becomes the write address
+ * @param state    0 is off, any other value is on
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_writeSingleCoil(struct mbm_node *node, uint16_t address, uint8_t state);
+
+/**
+ * Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
+ *
+ * @param node  the object
+ * @param address  the register, 0 to 65535; becomes the write address
+ * @param value    its value; also becomes transmit word 0
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_writeSingleRegister(struct mbm_node *node,
+                                     uint16_t address,
+                                     uint16_t value);
+
+/**
+ * Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
+ * the lowest bit (V1.1b3, 6.11). With unit 0 it is a broadcast.
+ *
+ * @param node  the object
+ * @param address   the first coil, 0 to 65535; becomes the write address
+ * @param quantity  the number of coils, 1 to 1968, and not more than the transmit words hold
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_writeMultipleCoils(struct mbm_node *node,
+                                    uint16_t address,
+                                    uint16_t quantity);
+
+/**
+ * Function 0F: writes the queued bits to coils, starting at the last write address. Call
+ * mbm_node_beginTransmission and mbm_node_sendBit before.
+ *
+ * @param node  the object
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_writeQueuedCoils(struct mbm_node *node);
+
+/**
+ * Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
+ * With unit 0 it is a broadcast.
+ *
+ * @param node  the object
+ * @param address   the first register, 0 to 65535; becomes the write address
+ * @param quantity  the number of registers, 1 to 123, and not more than the transmit words
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_writeMultipleRegisters(struct mbm_node *node,
+                                        uint16_t address,
+                                        uint16_t quantity);
+
+/**
+ * Function 10: writes the queued complete words to registers, starting at the last write
+ * address. Call mbm_node_beginTransmission and mbm_node_send before.
+ *
+ * @param node  the object
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_writeQueuedRegisters(struct mbm_node *node);
+
+/**
+ * Function 16: the device sets a register to
+ * (register AND andMask) OR (orMask AND NOT andMask) (V1.1b3, 6.16).
+ * With unit 0 it is a broadcast.
+ *
+ * @param node  the object
+ * @param address  the register, 0 to 65535; becomes the write address
+ * @param andMask  1 for each bit of the register to keep; also becomes transmit word 0
+ * @param orMask   the new value of the bits that are not kept; also becomes transmit word 1
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_maskWriteRegister(struct mbm_node *node,
+                                   uint16_t address,
+                                   uint16_t andMask,
+                                   uint16_t orMask);
+
+/**
+ * Function 17: the device writes the transmit words to registers first. Then it reads
+ * registers, which arrive in the response words. Both in one request (V1.1b3, 6.17).
+ *
+ * @param node  the object
+ * @param readAddress    the first register to read, 0 to 65535
+ * @param readQuantity   the number of registers to read, 1 to 125
+ * @param writeAddress   the first register to write, 0 to 65535; becomes the write
+ *                       address
+ * @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
+ *                       transmit words
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_readWriteMultipleRegisters(struct mbm_node *node,
+                                            uint16_t readAddress,
+                                            uint16_t readQuantity,
+                                            uint16_t writeAddress,
+                                            uint16_t writeQuantity);
+
+/**
+ * Function 17: as mbm_node_readWriteMultipleRegisters, but writes the queued complete
+ * words, starting at the last write address.
+ *
+ * @param node  the object
+ * @param readAddress   the first register to read, 0 to 65535
+ * @param readQuantity  the number of registers to read, 1 to 125
+ * @return a status; see mbm_node_readCoils
+ */
+uint8_t mbm_node_readWriteQueuedRegisters(struct mbm_node *node,
+                                          uint16_t readAddress,
+                                          uint16_t readQuantity);
+
+/**
+ * Reads holding registers. mbm_node_receive then returns them one after the other.
+ *
+ * @param node  the object
+ * @param address   the first register, 0 to 65535
+ * @param quantity  the number of registers, 1 to 125
+ * @return the number of words that mbm_node_receive will return; 0 if the request failed
+ *         (mbm_node_status returns why), if another request is under way, and in
+ *         non-blocking mode
+ */
+uint8_t mbm_node_requestFrom(struct mbm_node *node, uint16_t address, uint16_t quantity);
+
+/**
+ * Sets the unit to which the master sends later requests.
+ *
+ * @param node  the object
+ * @param slave   the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248
+ *                to 255, which the standard reserves
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_node_setSlaveID(struct mbm_node *node,
+                            uint8_t slave);
+
+/**
+ * Returns the unit to which the master sends requests.
+ *
+ * @param node  the object
+ * @return the unit identifier, 1 by default; 0 for an object that was never begun
+ */
+uint8_t mbm_node_getSlaveID(const struct mbm_node *node);
+
+/**
+ * Sets the response timeout: the maximum time from the last bit of the request to the last
+ * byte of the reply.
+ *
+ * @param node  the object
+ * @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_node_setResponseTimeout(struct mbm_node *node,
+                                    uint32_t timeoutMs);
+
+/**
+ * Switches between blocking and non-blocking mode. In blocking mode, the default, a function
+ * that makes a request returns when the request has ended. In non-blocking mode it returns
+ * MBM_PENDING at once, and you call mbm_node_poll until the request has ended.
+ *
+ * @param node  the object
+ * @param on      1 blocking, 0 non-blocking; it applies from the next request on
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_node_setBlocking(struct mbm_node *node,
+                             uint8_t on);
+
+/**
+ * Returns the response timeout: see mbm_node_setResponseTimeout.
+ *
+ * @param node  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint32_t mbm_node_getResponseTimeout(const struct mbm_node *node);
+
+/**
+ * Returns whether requests block: see mbm_node_setBlocking.
+ *
+ * @param node  the object
+ * @return 1 for blocking, 0 for non-blocking; 0 for an object that was never begun
+ */
+uint8_t mbm_node_getBlocking(const struct mbm_node *node);
+
+/**
+ * Returns the order of values: see mbm_node_setWordOrder.
+ *
+ * @param node  the object
+ * @return one of MBM_ORDER_...; MBM_ORDER_ABCD for an object that was never begun
+ */
+uint8_t mbm_node_getWordOrder(const struct mbm_node *node);
 
 /**
  * Accepts replies of devices that deviate from the standard. It has these effects:
  * - The master accepts a reply with the right unit, function and CRC although it repeats
  *   another address, value or quantity, or carries more or fewer data than were requested.
  *   It accepts such a reply at the end of the response timeout, if no right reply has
- *   arrived. mbm_master_available returns the number of words that arrived.
+ *   arrived. mbm_node_available returns the number of words that arrived.
  * - A read of more words than the response words hold succeeds and fills all of them.
  *   (If the reply is longer than the frame buffer, no noise may have arrived before it.)
  * - The master also sends requests that read to unit 0, and accepts a reply from unit 0.
  *
- * Set a short response timeout (mbm_master_setResponseTimeout) if the device deviates in
+ * Set a short response timeout (mbm_node_setResponseTimeout) if the device deviates in
  * every reply.
  *
- * @param master  the object
+ * @param node  the object
  * @param on      0 (the default) or 1
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY while a request is
  *         under way
  */
-uint8_t mbm_master_setLenient(struct mbm_master *master,
-                              uint8_t on);
+uint8_t mbm_node_setLenient(struct mbm_node *node,
+                            uint8_t on);
 
 /**
- * Sets how long the driver stays on after the port's flush, for platforms whose flush
- * returns before the last bit was sent.
+ * Returns whether deviating replies are accepted: see mbm_node_setLenient.
  *
- * @param master      the object
- * @param characters  the time in characters at the baud rate of mbm_master_setBaudRate
- *                    (without one, at 9600); the default is 0
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param node  the object
+ * @return 1 or 0; 0 for an object that was never begun
  */
-uint8_t mbm_master_setPostFlushHold(struct mbm_master *master, uint8_t characters);
-
-/**
- * Switches between blocking and non-blocking mode. In blocking mode, the default, a function
- * that makes a request returns when the request has ended. In non-blocking mode it returns
- * MBM_PENDING at once, and you call mbm_master_poll until the request has ended.
- *
- * @param master  the object
- * @param on      1 blocking, 0 non-blocking; it applies from the next request on
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_setBlocking(struct mbm_master *master,
-                               uint8_t on);
-
-/**
- * Sets your storage for counters, in which the master counts from now on. You may read and
- * zero the counters at any time, but not from an interrupt.
- *
- * @param master    the object
- * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_setCounters(struct mbm_master *master,
-                               struct mbm_counters *counters);
-
-/**
- * Reports when another user of the line, for example another object, used the line last.
- * The gap before the next request counts from that time. A time before the last use that
- * the object knows changes nothing.
- *
- * @param master        the object
- * @param timeUs        the time in microseconds on the clock of the object's port, at most
- *                      2^31 microseconds (36 minutes) ago
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_lineUsedAt(struct mbm_master *master,
-                              uint32_t timeUs);
-
-/**
- * Reports that another user of the line has just used it: as mbm_master_lineUsedAt with the
- * present time.
- *
- * @param master  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_lineUsed(struct mbm_master *master);
-
-/**
- * Gives the turn to an object. Call it before a request. The gap before that request counts
- * from the last use of the line by any object that had the turn before.
- *
- * @param master  the object, with buffers or begun
- * @param turn    the turn that all objects on the line, or with the frame buffer, share
- * @return MBM_OK; MBM_BUSY, with nothing changed, while another object has the turn
- *         and a request under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_takeTurn(struct mbm_master *master,
-                            struct mbm_turn *turn);
-
-/**
- * Ends the turn of an object, before you release its storage. It does nothing if the object
- * does not have the turn. It does not end a request under way: call mbm_master_cancel
- * before, so that the driver is switched off.
- *
- * @param master  the object
- * @param turn    as for mbm_master_takeTurn
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_endTurn(struct mbm_master *master,
-                           struct mbm_turn *turn);
+uint8_t mbm_node_getLenient(const struct mbm_node *node);
 
 /**
  * Returns a word of the last successful read.
  *
- * @param master  the object
+ * @param node  the object
  * @param index   0 to 255
  * @return the word; 0xFFFF if `index` is past the end of the response buffer
  */
-uint16_t mbm_master_getResponseBuffer(const struct mbm_master *master, uint8_t index);
+uint16_t mbm_node_getResponseBuffer(const struct mbm_node *node, uint8_t index);
 
 /**
- * Zeroes the response words. The position of mbm_master_receive does not change.
+ * Zeroes the response words. The position of mbm_node_receive does not change.
  *
- * @param master  the object
+ * @param node  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_clearResponseBuffer(struct mbm_master *master);
+uint8_t mbm_node_clearResponseBuffer(struct mbm_node *node);
 
 /**
- * Sets a transmit word for the functions that write. The queue of mbm_master_send does not
+ * Sets a transmit word for the functions that write. The queue of mbm_node_send does not
  * change.
  *
- * @param master  the object
+ * @param node  the object
  * @param index   0 to the number of transmit words - 1
  * @param value   the word
  * @return MBM_OK; MBM_ILLEGAL_DATA_ADDRESS if `index` is past the end of the buffer;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setTransmitBuffer(struct mbm_master *master,
-                                     uint8_t index,
-                                     uint16_t value);
+uint8_t mbm_node_setTransmitBuffer(struct mbm_node *node, uint8_t index, uint16_t value);
 
 /**
- * Zeroes the transmit words. The queue of mbm_master_send does not change its length.
+ * Zeroes the transmit words. The queue of mbm_node_send does not change its length.
  *
- * @param master  the object
+ * @param node  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_clearTransmitBuffer(struct mbm_master *master);
+uint8_t mbm_node_clearTransmitBuffer(struct mbm_node *node);
 
 /**
  * Queues a word after the words queued before. If the last word holds queued bits, the new
  * word goes into the next one.
  *
- * @param master  the object
+ * @param node  the object
  * @param word    the word
  * @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_send(struct mbm_master *master,
-                        uint16_t word);
+uint8_t mbm_node_send(struct mbm_node *node,
+                      uint16_t word);
 
 /**
  * Queues two words, the low one first. If only one word fits, it queues the low one alone.
  *
- * @param master  the object
+ * @param node  the object
  * @param value   both words
  * @return MBM_OK; MBM_BUFFER_TOO_SMALL if a word did not fit;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_send32(struct mbm_master *master,
-                          uint32_t value);
+uint8_t mbm_node_send32(struct mbm_node *node,
+                        uint32_t value);
 
 /**
  * Queues a bit after the bits queued before, starting at the lowest bit of a word.
  *
- * @param master  the object
+ * @param node  the object
  * @param on      0 is off, any other value is on
  * @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_sendBit(struct mbm_master *master,
-                           uint8_t on);
+uint8_t mbm_node_sendBit(struct mbm_node *node,
+                         uint8_t on);
 
 /**
- * Returns how many words of the last successful read mbm_master_receive has not returned yet.
+ * Returns how many words of the last successful read mbm_node_receive has not returned yet.
  *
- * @param master  the object
+ * @param node  the object
  * @return 0 to 125
  */
-uint8_t mbm_master_available(const struct mbm_master *master);
+uint8_t mbm_node_available(const struct mbm_node *node);
 
 /**
  * Returns the next word of the last successful read.
  *
- * @param master  the object
+ * @param node  the object
  * @return the word; 0xFFFF if no word is left
  */
-uint16_t mbm_master_receive(struct mbm_master *master);
+uint16_t mbm_node_receive(struct mbm_node *node);
 
 /* ==== 6. Client ===================================================================== */
 
@@ -2079,31 +2039,30 @@ uint8_t mbm_client_reconnect(struct mbm_client *client,
 uint8_t mbm_client_isConnected(const struct mbm_client *client);
 
 /**
- * Suspends the client, so that a master can use its port. The client's requests wait until
- * mbm_client_resume. Until then the master uses the client's storage, and the client remembers
- * the master: keep both.
+ * Suspends the client, so that a line can use its port. The client's requests wait until
+ * mbm_client_resume. Until then the line uses the client's storage, and the client remembers
+ * the line: keep both.
  *
- * @param client  the object. If `master` is not NULL, it must use RTU or RTU over TCP
- * @param master  a master with buffers, which then uses the client's port; NULL if you use
- *                the line in another way
+ * @param client  the object. If `line` is not NULL, it must use RTU or RTU over TCP
+ * @param line    a line, which then uses the client's port; NULL if you use the wire in another
+ *                way
  * @return MBM_OK; MBM_BUSY, with both objects unchanged, if a request is under way or the
  *         client is suspended already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_suspend(struct mbm_client *client,
-                           struct mbm_master *master);
+                           struct mbm_line *line);
 
 /**
- * Resumes the client. The master then has no port: its functions that make a request return
- * MBM_NOT_INITIALISED. A master that was begun on another port meanwhile keeps that port.
+ * Resumes the client. The line then has no port: requests of its nodes return
+ * MBM_NOT_INITIALISED. A line that was begun on another port meanwhile keeps that port.
  *
  * @param client  the object
- * @param master  the master that was passed to mbm_client_suspend; NULL if none was
- * @return MBM_OK; MBM_BUSY while the master has a request under way;
- *         MBM_INVALID_ARGUMENT if the client was not suspended, and for any other master;
+ * @param line    the line that was passed to mbm_client_suspend; NULL if none was
+ * @return MBM_OK; MBM_BUSY while a request is under way on the line;
+ *         MBM_INVALID_ARGUMENT if the client was not suspended, and for any other line;
  *         MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_resume(struct mbm_client *client,
-                          struct mbm_master *master);
+uint8_t mbm_client_resume(struct mbm_client *client, struct mbm_line *line);
 
 /**
  * Sends and receives for all requests, without waiting, and calls `done` of those that have
@@ -2708,7 +2667,7 @@ uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint32_t delayM
 
 /**
  * Sets the quiet time of a serial line. It prevents that the client accepts a late reply as
- * the reply to a later request: see mbm_master_setQuietTime. It has no effect in TCP frames,
+ * the reply to a later request: see mbm_line_setQuietTime. It has no effect in TCP frames,
  * whose transaction identifier shows to which request a reply belongs.
  *
  * The client does not hold the reply to mbm_client_diagnostics with sub-function 0, which
@@ -4974,7 +4933,7 @@ uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
 
 /**
  * mbm_registers.kind: words that may only be read, for example the response words of
- * mbm_master.
+ * mbm_node.
  */
 #define MBM_REGISTERS_OF_WORDS 1u
 
@@ -4999,7 +4958,7 @@ uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
  * view owns nothing: `data` points to memory of the program.
  *
  * mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in; so do
- * mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters. You may also set
+ * mbm_node_getResponseRegisters and mbm_node_getTransmitRegisters. You may also set
  * each field yourself. The get and set functions do not change the view. Several threads
  * may use one view at the same time as long as none of them writes the registers.
  */
@@ -5097,7 +5056,7 @@ uint8_t mbm_bits_set(uint8_t *bytes,
 
 /**
  * As mbm_bits_pack, but into words, 16 bits in each word; for example the transmit words
- * of a master.
+ * of a node.
  *
  * @param coils     one byte for each coil: 0 is off, any other value is on
  * @param quantity  the number of coils, 0 to 65535
@@ -5112,7 +5071,7 @@ uint8_t mbm_bits_packWords(const uint8_t *coils,
                            uint16_t length);
 
 /**
- * As mbm_bits_unpack, but from words, for example the response words of a master.
+ * As mbm_bits_unpack, but from words, for example the response words of a node.
  *
  * @param words     the bits, 16 in each word; the first coil is the lowest bit
  * @param length    the number of words
@@ -5127,7 +5086,7 @@ uint8_t mbm_bits_unpackWords(const uint16_t *words,
                              uint16_t quantity);
 
 /**
- * As mbm_bits_isSet, but in words, for example the response words of a master.
+ * As mbm_bits_isSet, but in words, for example the response words of a node.
  *
  * @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
  * @param first     the address of the first coil of the read
@@ -5145,7 +5104,7 @@ uint8_t mbm_bits_isSetInWords(const uint16_t *words,
                               uint8_t *on);
 
 /**
- * As mbm_bits_set, but in words, for example the transmit words of a master.
+ * As mbm_bits_set, but in words, for example the transmit words of a node.
  *
  * @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
  * @param first     the address of the first coil of the write
@@ -5163,15 +5122,14 @@ uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint8_t on);
 
 /**
- * Sets the byte and word order of values in the views that mbm_master_getResponseRegisters
- * and mbm_master_getTransmitRegisters fill in from now on.
+ * Sets the byte and word order of values in the views that mbm_node_getResponseRegisters
+ * and mbm_node_getTransmitRegisters fill in from now on.
  *
- * @param master  the object
+ * @param node  the object
  * @param order   one of MBM_ORDER_...; the default is MBM_ORDER_ABCD
  * @return MBM_OK; MBM_INVALID_ARGUMENT, also for an unknown order; MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setWordOrder(struct mbm_master *master,
-                                uint8_t order);
+uint8_t mbm_node_setWordOrder(struct mbm_node *node, uint8_t order);
 
 /**
  * Fills in a view of the response words as registers, from which you can get values. The
@@ -5180,29 +5138,29 @@ uint8_t mbm_master_setWordOrder(struct mbm_master *master,
  * The view includes all words of the buffer, also words that the last read did not
  * change. Get values only after the read has succeeded.
  *
- * @param master     the object; do not change its buffers while you use the view
+ * @param node  the object; do not change its buffers while you use the view
  * @param first      the address in the device of word 0: the address of the read, or 0 if
  *                   you want to count from word 0
  * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
-                                        uint16_t first,
-                                        struct mbm_registers *registers);
+uint8_t mbm_node_getResponseRegisters(const struct mbm_node *node,
+                                      uint16_t first,
+                                      struct mbm_registers *registers);
 
 /**
  * Fills in a view of the transmit words as registers, in which you can set values for the
- * functions that write. The queue of mbm_master_send does not change.
+ * functions that write. The queue of mbm_node_send does not change.
  *
- * @param master     the object; do not change its buffers while you use the view
+ * @param node  the object; do not change its buffers while you use the view
  * @param first      the address in the device of word 0: the address of the write, or 0 if
  *                   you want to count from word 0
  * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
-                                        uint16_t first,
-                                        struct mbm_registers *registers);
+uint8_t mbm_node_getTransmitRegisters(const struct mbm_node *node,
+                                      uint16_t first,
+                                      struct mbm_registers *registers);
 
 /**
  * Fills in a view of words that were read as registers. The order is MBM_ORDER_ABCD
@@ -5210,7 +5168,7 @@ uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
  * words.
  *
  * @param registers  the view to fill in; without data after an error
- * @param words      the words, for example the response words of mbm_master; must stay
+ * @param words      the words, for example the response words of mbm_node; must stay
  *                   valid while the view is used. NULL only if `count` is 0
  * @param count      how many words
  * @param first      the device's address of the first register, 0 to 65535
@@ -5240,7 +5198,7 @@ uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
 
 /**
  * As mbm_registers_ofWords, for words that you also write, for example the transmit
- * words of mbm_master.
+ * words of mbm_node.
  *
  * @param registers  the view to fill in; without data after an error
  * @param words      the words to write; must stay valid while the view is used
@@ -6478,11 +6436,11 @@ uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size)
 #define MBM_TRACE_SENT 1u
 
 /**
- * A trace: stands between a port and the master, client or server that uses it, passes
+ * A trace: stands between a port and the line, client or server that uses it, passes
  * everything on, and calls your hook for each frame that is sent or received.
  *
  * You provide the storage. Initialise it with MBM_INIT. Call mbm_trace_beginClient or
- * mbm_trace_beginServer, then begin the master, client or server with mbm_trace_port instead
+ * mbm_trace_beginServer, then begin the line, client or server with mbm_trace_port instead
  * of your port. The object must not move while its port is in use. A program that begins no
  * trace contains no part of it. Not re-entrant: use it from the thread of the object that
  * uses its port.
@@ -6537,10 +6495,10 @@ typedef struct mbm_traceRecord {
 } mbm_traceRecord;
 
 /**
- * Begins the trace of a master or client. Then begin that master or client with
+ * Begins the trace of a line or client. Then begin that line or client with
  * mbm_trace_port.
  *
- * The hook is called from within the functions of the master or client, when the last byte
+ * The hook is called from within the functions of the node or client, when the last byte
  * of a frame was sent or read. Bytes that are not followed by the rest of a frame are handed
  * out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a serial
  * line when the next frame is sent, when the link is lost, or by mbm_trace_flush. `record`
@@ -6602,7 +6560,7 @@ uint8_t mbm_trace_beginServer(struct mbm_trace *trace,
 
 /**
  * Returns the port that passes everything on to the port of the trace. Pass it to the begin
- * function of a master, client or server.
+ * function of a node, client or server.
  *
  * @param trace  the object
  * @return the port, which is valid for as long as the trace is used. NULL for a trace that

@@ -10,8 +10,8 @@ sys.dont_write_bytecode = True
 from boards import SETS  # noqa: E402
 from project import ROOT  # noqa: E402
 
-HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterFrame.h", "ModbusMasterHelpers.h",
-           "ModbusMasterOptions.h", "ModbusMasterPorts.h", "ModbusMasterTurn.h", "util/crc16.h", "util/word.h",
+HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterHelpers.h",
+           "ModbusMasterOptions.h", "ModbusMasterPorts.h", "ModbusMasterLine.h", "util/crc16.h", "util/word.h",
            "ModbusMasterValues.h", "ModbusServer.h", "ModbusServerTables.h", "ModbusStatusText.h", "mbm.h",
            "ModbusClient.h", "ModbusClientCalls.h", "ModbusRequest.h", "ModbusValues.h", "ModbusNumbers.h",
            "ModbusCallback.h", "ModbusTransmission.h",

@@ -57,7 +57,7 @@
 //! // The frame buffer, the words to be read, the words to be written.
 //! let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
 //! let mut master = Master::new(17, uart, buffers);
-//! master.set_baud_rate(9600);
+//! master.settings().set_baud_rate(9600);
 //!
 //! assert_eq!(master.read_holding_registers(107, 2), Status::PENDING);
 //! while master.poll() == Status::PENDING {
@@ -252,6 +252,7 @@ pub mod trace;
 pub mod client;
 pub mod gateway;
 pub mod master;
+pub mod node;
 pub mod plan;
 pub mod server;
 

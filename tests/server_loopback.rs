@@ -95,7 +95,7 @@ impl Loop {
         let wire = Rc::new(RefCell::new(Wire::default()));
         let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
         let mut master = Master::new(17, End(wire.clone(), 0), buffers);
-        master.set_baud_rate(115_200);
+        master.settings().set_baud_rate(115_200);
         master.settings().response_timeout = Setting::new(100_000);
         let mut server = Server::with_framing(Framing::Rtu, End(wire.clone(), 1), [0; 256]);
         server.set_silence(mbm::time::silence(115_200));

@@ -4,22 +4,25 @@
 
 #ifdef COUNTERS
 static mbm_counters counters;
-#define ONE_MORE mbm_master_setCounters(&node, &counters)
+#define ONE_MORE mbm_line_setCounters(&line, &counters)
 #elif defined(LENIENT)
-#define ONE_MORE mbm_master_setLenient(&node, 1)
-#elif defined(TURN)
-static mbm_turn turn;
-#define ONE_MORE (mbm_master_takeTurn(&node, &turn) | mbm_master_endTurn(&node, &turn))
+#define ONE_MORE mbm_node_setLenient(&node, 1)
+#elif defined(NODE)
+static mbm_node other;
+static uint16_t more[WORDS];
+#define ONE_MORE                                                                                   \
+    (mbm_node_begin(&other, &line, 2, more, WORDS, transmit, WORDS) |                              \
+     mbm_node_readHoldingRegisters(&other, 2, 10))
 #elif defined(POLL)
-#define ONE_MORE (mbm_master_setBlocking(&node, 0) | mbm_master_poll(&node))
+#define ONE_MORE (mbm_node_setBlocking(&node, 0) | mbm_node_poll(&node))
 #elif defined(BAUD)
-#define ONE_MORE mbm_master_setBaudRate(&node, 19200)
+#define ONE_MORE mbm_line_setBaudRate(&line, 19200)
 #elif defined(TIMEOUT)
-#define ONE_MORE mbm_master_setResponseTimeout(&node, 500)
+#define ONE_MORE mbm_node_setResponseTimeout(&node, 500)
 #elif defined(RETRIES)
-#define ONE_MORE mbm_master_setRetries(&node, 2)
+#define ONE_MORE mbm_line_setRetries(&line, 2)
 #elif defined(ECHO)
-#define ONE_MORE mbm_master_setEchoDiscard(&node, 1)
+#define ONE_MORE mbm_line_setEchoDiscard(&line, 1)
 #else
 #define ONE_MORE 0
 #endif

@@ -5,7 +5,7 @@ int main(void)
 {
     begin();
     for (;;) {
-        if (CALL(mbm_master_readHoldingRegisters(&node, 2, 10)) == MBM_OK)
-            uart = (uint8_t)CALL(mbm_master_getResponseBuffer(&node, 0));
+        if (CALL(mbm_node_readHoldingRegisters(&node, 2, 10)) == MBM_OK)
+            uart = (uint8_t)CALL(mbm_node_getResponseBuffer(&node, 0));
     }
 }

@@ -49,7 +49,8 @@ static uint32_t port_micros(void *context)
 
 #ifndef SIZE_CLIENT_H
 #ifndef WITHOUT_MBM
-static mbm_master node;
+static mbm_line line;
+static mbm_node node;
 #endif
 
 static inline void begin(void)
@@ -60,8 +61,8 @@ static inline void begin(void)
     USED(response);
     USED(transmit);
     USED(frame);
-    (void)CALL(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame));
-    (void)CALL(mbm_master_beginRtu(&node, 1, &port));
+    (void)CALL(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
+    (void)CALL(mbm_node_begin(&node, &line, 1, response, WORDS, transmit, WORDS));
 }
 
 #endif
@@ -69,26 +70,26 @@ static inline void begin(void)
 /* Reads holding registers, and writes them from the transmit words. */
 #define CALL_FC03_AND_FC16()                                                                       \
     do {                                                                                           \
-        if (CALL(mbm_master_readHoldingRegisters(&node, 2, 10)) == MBM_OK)                         \
+        if (CALL(mbm_node_readHoldingRegisters(&node, 2, 10)) == MBM_OK)                           \
             transmit[0] = response[0];                                                             \
-        uart = CALL(mbm_master_writeMultipleRegisters(&node, 2, 10));                              \
+        uart = CALL(mbm_node_writeMultipleRegisters(&node, 2, 10));                                \
     } while (0)
 
 /* Calls the ten functions of the master, and reaches its words. */
 #define CALL_TEN_FUNCTIONS()                                                                       \
     do {                                                                                           \
-        uart = CALL(mbm_master_readCoils(&node, 2, 10));                                           \
-        uart = CALL(mbm_master_readDiscreteInputs(&node, 2, 10));                                  \
-        uart = CALL(mbm_master_readHoldingRegisters(&node, 2, 10));                                \
-        uart = CALL(mbm_master_readInputRegisters(&node, 2, 10));                                  \
-        uart = CALL(mbm_master_writeSingleCoil(&node, 2, 1));                                      \
-        uart = CALL(mbm_master_writeSingleRegister(&node, 2, 10));                                 \
-        uart = CALL(mbm_master_writeMultipleCoils(&node, 2, 10));                                  \
-        uart = CALL(mbm_master_writeMultipleRegisters(&node, 2, 10));                              \
-        uart = CALL(mbm_master_maskWriteRegister(&node, 2, 0xFF00, 0x0012));                       \
-        uart = CALL(mbm_master_readWriteMultipleRegisters(&node, 2, 10, 20, 10));                  \
-        (void)CALL(mbm_master_setTransmitBuffer(&node, 0, 1));                                     \
-        uart = (uint8_t)CALL(mbm_master_getResponseBuffer(&node, 0));                              \
+        uart = CALL(mbm_node_readCoils(&node, 2, 10));                                             \
+        uart = CALL(mbm_node_readDiscreteInputs(&node, 2, 10));                                    \
+        uart = CALL(mbm_node_readHoldingRegisters(&node, 2, 10));                                  \
+        uart = CALL(mbm_node_readInputRegisters(&node, 2, 10));                                    \
+        uart = CALL(mbm_node_writeSingleCoil(&node, 2, 1));                                        \
+        uart = CALL(mbm_node_writeSingleRegister(&node, 2, 10));                                   \
+        uart = CALL(mbm_node_writeMultipleCoils(&node, 2, 10));                                    \
+        uart = CALL(mbm_node_writeMultipleRegisters(&node, 2, 10));                                \
+        uart = CALL(mbm_node_maskWriteRegister(&node, 2, 0xFF00, 0x0012));                         \
+        uart = CALL(mbm_node_readWriteMultipleRegisters(&node, 2, 10, 20, 10));                    \
+        (void)CALL(mbm_node_setTransmitBuffer(&node, 0, 1));                                       \
+        uart = (uint8_t)CALL(mbm_node_getResponseBuffer(&node, 0));                                \
     } while (0)
 
 #endif

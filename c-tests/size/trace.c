@@ -24,9 +24,9 @@ int main(void)
     USED(buffer);
     begin();
     (void)CALL(mbm_trace_beginClient(&trace, &port, &rtu, buffer, sizeof buffer, take, NULL));
-    (void)CALL(mbm_master_beginRtu(&node, 1, mbm_trace_port(&trace)));
+    (void)CALL(mbm_line_beginRtu(&line, mbm_trace_port(&trace), frame, sizeof frame));
     for (;;) {
-        uart = CALL(mbm_master_readHoldingRegisters(&node, 2, 10));
-        uart = (uint8_t)CALL(mbm_master_getResponseBuffer(&node, 0));
+        uart = CALL(mbm_node_readHoldingRegisters(&node, 2, 10));
+        uart = (uint8_t)CALL(mbm_node_getResponseBuffer(&node, 0));
     }
 }

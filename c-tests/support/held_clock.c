@@ -145,11 +145,11 @@ static uint8_t clock_flush(void *context)
     return c->port.flush(c->port.context);
 }
 
-static void clock_idle(void *context, mbm_master *master)
+static void clock_idle(void *context, mbm_node *node)
 {
     const held_clock *c = (held_clock *)context;
 
-    c->port.idle(c->port.context, master);
+    c->port.idle(c->port.context, node);
 }
 
 mbm_port held_clock_port(held_clock *c, const mbm_port *line)

@@ -64,9 +64,9 @@ static void hooked_post(void *context)
     call(context, HOOK_POST);
 }
 
-static void hooked_idle(void *context, mbm_master *master)
+static void hooked_idle(void *context, mbm_node *node)
 {
-    (void)master;
+    (void)node;
     call(context, HOOK_IDLE);
 }
 

@@ -1,11 +1,12 @@
-/* A master with buffers of full size on a terminal. */
+/* A line on a terminal with one node, with buffers of full size. */
 #ifndef NODE_H
 #define NODE_H
 
 #include "mbm_tty.h"
 
 typedef struct node {
-    mbm_master master;
+    mbm_line line;
+    mbm_node node;
     mbm_tty tty;
     mbm_port port;
     mbm_counters counters;

@@ -160,13 +160,13 @@ static void post(void *context)
         s->post_before_last_bit++;
 }
 
-static void idle(void *context, mbm_master *master)
+static void idle(void *context, mbm_node *node)
 {
     sim *s = (sim *)context;
     uint64_t next = s->now + s->idle_step;
 
     note(s, 'I');
-    s->waits = master;
+    s->waits = node;
     s->idles++;
     if (s->driver_on)
         s->idle_while_driving++;
@@ -187,7 +187,15 @@ void sim_begin(sim *s, uint8_t unit)
     s->port.preTransmission = pre;
     s->port.postTransmission = post;
     s->port.idle = idle;
-    assert_int_equal(mbm_master_beginRtu(&s->master, unit, &s->port), MBM_OK);
+    assert_int_equal(mbm_line_beginRtu(&s->line, &s->port, s->buffer, MBM_MAX_FRAME), MBM_OK);
+    sim_node(s, unit);
+}
+
+void sim_node(sim *s, uint8_t unit)
+{
+    assert_int_equal(mbm_node_begin(&s->node, &s->line, unit, s->response, MBM_MAX_READ_REGISTERS,
+                                    s->transmit, MBM_MAX_WRITE_REGISTERS),
+                     MBM_OK);
 }
 
 int sim_setup(void **state)
@@ -201,12 +209,8 @@ int sim_setup(void **state)
     s->idle_step = 20;
     s->character = 100;
     s->limit = 100000000;
-    assert_int_equal(mbm_master_setBuffers(&s->master, s->response, MBM_MAX_READ_REGISTERS,
-                                           s->transmit, MBM_MAX_WRITE_REGISTERS, s->buffer,
-                                           MBM_MAX_FRAME),
-                     MBM_OK);
     sim_begin(s, 17);
-    assert_int_equal(mbm_master_setCounters(&s->master, &s->counters), MBM_OK);
+    assert_int_equal(mbm_line_setCounters(&s->line, &s->counters), MBM_OK);
     s->last_byte = s->now;
     return 0;
 }
@@ -293,7 +297,7 @@ uint8_t sim_poll(sim *s)
 {
     uint8_t status;
 
-    while ((status = mbm_master_poll(&s->master)) == MBM_PENDING)
+    while ((status = mbm_node_poll(&s->node)) == MBM_PENDING)
         s->now += s->idle_step;
     return status;
 }
@@ -313,12 +317,12 @@ void sim_assert_time(uint64_t time, uint64_t wanted)
 
 uint8_t sim_read_one(sim *s)
 {
-    return mbm_master_readHoldingRegisters(&s->master, 0, 1);
+    return mbm_node_readHoldingRegisters(&s->node, 0, 1);
 }
 
 void sim_reads(sim *s, uint32_t delay)
 {
     sim_answer(s, 1, delay, "11 03 02 00 2A +");
     OK(sim_read_one(s));
-    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
+    assert_int_equal(mbm_node_getResponseBuffer(&s->node, 0), 42);
 }

@@ -1,4 +1,4 @@
-/* One master on a simulated wire with a clock of its own. Nothing waits, all times are
+/* A line with one node on a simulated wire with a clock of its own. Nothing waits, all times are
  * exact, and everything that happens is recorded. */
 #ifndef SIM_H
 #define SIM_H
@@ -22,7 +22,8 @@ typedef struct sim_frame {
 } sim_frame;
 
 struct sim {
-    mbm_master master;
+    mbm_line line;
+    mbm_node node;
     mbm_port port;
     mbm_counters counters;
     uint16_t response[MBM_MAX_READ_REGISTERS], transmit[MBM_MAX_WRITE_REGISTERS];
@@ -33,7 +34,7 @@ struct sim {
     uint64_t limit;       /* the test fails when `now` passes it: the call hangs */
     uint32_t clock_start; /* the time that the clock showed when `now` was 0 */
     uint32_t step;        /* microseconds that each read of the clock takes */
-    mbm_master *waits;    /* the master that the idle hook was called for last */
+    mbm_node *waits;      /* the node that the idle hook was called for last */
     uint32_t idle_step;   /* microseconds that an idle hook takes, less if a byte arrives */
 
     /* the wire and its faults; 0 means none */
@@ -78,12 +79,12 @@ struct sim {
     uint16_t busy;
 };
 
-/* cmocka's setup and teardown. Setup makes a master that is begun for unit 17, with full
+/* cmocka's setup and teardown. Setup makes a line with a node that is begun for unit 17, with full
  * buffers, in *state. Teardown fails if a malformed frame was sent. */
 int sim_setup(void **state);
 int sim_teardown(void **state);
 
-/* Begins the master for `unit` over the simulated wire, with its hooks. */
+/* Begins the line on the simulated wire, with its hooks, and the node for `unit`. */
 void sim_begin(sim *s, uint8_t unit);
 
 /* A text ten times, for sim_bytes and those that call it. */
@@ -122,10 +123,14 @@ void sim_assert_time(uint64_t time, uint64_t wanted);
 uint8_t sim_read_one(sim *s);
 void sim_reads(sim *s, uint32_t delay);
 
-/* Declares the simulation and its master in a test. */
+/* Begins only the node again, for `unit`. */
+void sim_node(sim *s, uint8_t unit);
+
+/* Declares the simulation in a test; the simulation and its node. */
+#define SIM sim *s = (sim *)*state
 #define NODE                                                                                       \
-    sim *s = (sim *)*state;                                                                        \
-    mbm_master *n = &s->master
+    SIM;                                                                                           \
+    mbm_node *n = &s->node
 
 #define SIM_TEST(test) cmocka_unit_test_setup_teardown(test, sim_setup, sim_teardown)
 

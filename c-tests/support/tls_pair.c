@@ -79,10 +79,10 @@ static uint32_t micros_end(void *context)
     return current->now;
 }
 
-static void idle_end(void *context, struct mbm_master *master)
+static void idle_end(void *context, struct mbm_node *node)
 {
     (void)context;
-    (void)master;
+    (void)node;
     if (current->idle)
         current->idle();
 }

@@ -156,7 +156,7 @@ pub unsafe extern "C" fn mbm_bits_set(
 }
 
 /// As mbm_bits_pack, but into words, 16 bits in each word; for example the transmit words
-/// of a master.
+/// of a node.
 ///
 /// @param coils     one byte for each coil: 0 is off, any other value is on
 /// @param quantity  the number of coils, 0 to 65535
@@ -175,7 +175,7 @@ pub unsafe extern "C" fn mbm_bits_packWords(
     unsafe { pack(coils, quantity, words, length) }
 }
 
-/// As mbm_bits_unpack, but from words, for example the response words of a master.
+/// As mbm_bits_unpack, but from words, for example the response words of a node.
 ///
 /// @param words     the bits, 16 in each word; the first coil is the lowest bit
 /// @param length    the number of words
@@ -194,7 +194,7 @@ pub unsafe extern "C" fn mbm_bits_unpackWords(
     unsafe { unpack(words, length, coils, quantity) }
 }
 
-/// As mbm_bits_isSet, but in words, for example the response words of a master.
+/// As mbm_bits_isSet, but in words, for example the response words of a node.
 ///
 /// @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
 /// @param first     the address of the first coil of the read
@@ -216,7 +216,7 @@ pub unsafe extern "C" fn mbm_bits_isSetInWords(
     unsafe { is_set(words, first, quantity, address, on) }
 }
 
-/// As mbm_bits_set, but in words, for example the transmit words of a master.
+/// As mbm_bits_set, but in words, for example the transmit words of a node.
 ///
 /// @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
 /// @param first     the address of the first coil of the write

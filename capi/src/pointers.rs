@@ -147,6 +147,16 @@ pub(crate) unsafe fn check_once<O: CObject>(object: *const O) -> Status {
         return Status::INVALID_ARGUMENT;
     }
     // SAFETY: not NULL, so storage of an object.
+    unsafe { check_mark(object) }
+}
+
+/// As [`check`], for storage of an object.
+///
+/// # Safety
+/// `object` points to storage of an object, zeroed or begun.
+#[inline(always)]
+pub(crate) unsafe fn check_mark<O: CObject>(object: *const O) -> Status {
+    // SAFETY: as the caller promises.
     match unsafe { O::mark(object).read() } {
         BEGUN => Status::OK,
         IN_HOOK => Status::BUSY,

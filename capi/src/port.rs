@@ -1,21 +1,22 @@
 //! The port: what the C program supplies for a line.
 
-use super::master::object::mbm_master;
+use super::node::object::mbm_node;
 use core::ffi::c_void;
 use core::ptr::null;
 use mbm::port::Port;
 
 /// What your firmware supplies: a byte stream, a clock, and optional hooks.
 ///
-/// A master keeps a pointer to its port. The port must stay valid and unchanged for as long
-/// as the master is used; it may be a constant. A client and a server copy their port.
+/// A line keeps a pointer to its port. The port must stay valid and unchanged for as long
+/// as the line is used; it may be a constant. A client and a server copy their port.
 /// `read`, `write` and `micros` must not be NULL. The other hooks may be NULL: then they are
 /// not called.
 ///
 /// A hook must not use the object that calls it. If it calls a function on that object, the
 /// function returns MBM_BUSY and changes nothing; a getter returns what it returns for an
-/// object that was never begun. The hook `idle` is the exception: it may call every
-/// function, but one that starts a request returns MBM_BUSY.
+/// object that was never begun. So it is with a line, and with the request of a node that is
+/// under way; the words and the settings of a node may be used. The hook `idle` is the exception:
+/// it may call every function, but one that starts a request returns MBM_BUSY.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_port {
@@ -34,7 +35,7 @@ pub struct mbm_port {
     /// millisecond tick returns `tick * 1000`.
     pub micros: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
     /// Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
-    /// also wait until the last bit was sent, and return 1. Without it, a master and a client
+    /// also wait until the last bit was sent, and return 1. Without it, a line and a client
     /// that know the baud rate wait for a reply longer by the time of the request's characters,
     /// since bytes may remain to be sent after `write` has taken them.
     pub flush: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
@@ -42,10 +43,10 @@ pub struct mbm_port {
     pub preTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
     /// Optional: called after the last bit of a frame was sent (RS-485 driver off).
     pub postTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
-    /// Optional: called repeatedly while a blocking function of `master` waits, but never
+    /// Optional: called repeatedly while a blocking function of `node` waits, but never
     /// between preTransmission and postTransmission. It may sleep until a byte arrives, at
-    /// most for the time that mbm_master_pollDelay(master) returns.
-    pub idle: Option<unsafe extern "C" fn(context: *mut c_void, master: *mut mbm_master)>,
+    /// most for the time that mbm_node_pollDelay(node) returns.
+    pub idle: Option<unsafe extern "C" fn(context: *mut c_void, node: *mut mbm_node)>,
 }
 
 impl mbm_port {
@@ -156,11 +157,10 @@ impl Port for mbm_port {
     }
 }
 
-/// A pointer to a port, and the context that its hooks receive.
-#[repr(C)]
+/// A pointer to a port.
+#[repr(transparent)]
 pub(super) struct PortRef {
     port: *const mbm_port,
-    context: *mut c_void,
 }
 
 impl PortRef {
@@ -168,8 +168,8 @@ impl PortRef {
     ///
     /// # Safety
     /// As for [`PortRef::set`].
-    pub(super) const unsafe fn new(port: *const mbm_port, context: *mut c_void) -> PortRef {
-        PortRef { port, context }
+    pub(super) const unsafe fn new(port: *const mbm_port) -> PortRef {
+        PortRef { port }
     }
 
     /// Refers to a port.
@@ -177,9 +177,8 @@ impl PortRef {
     /// # Safety
     /// The port is complete, and does not change for as long as this refers to it.
     #[inline(always)]
-    pub(super) unsafe fn set(&mut self, port: *const mbm_port, context: *mut c_void) {
+    pub(super) unsafe fn set(&mut self, port: *const mbm_port) {
         self.port = port;
-        self.context = context;
     }
 
     /// Refers to no port, if it refers to `port`.
@@ -195,11 +194,11 @@ impl PortRef {
     /// `this` refers to a port. No reference to the object that holds `this` lives, because
     /// the hook may use that object.
     #[inline(always)]
-    pub(super) unsafe fn idle(this: *const PortRef, master: *mut mbm_master) {
+    pub(super) unsafe fn idle(this: *const PortRef, node: *mut mbm_node) {
         // SAFETY: as the caller promises.
         unsafe {
             if let Some(idle) = (*(*this).port).idle {
-                idle((*this).context, master);
+                idle((*(*this).port).context, node);
             }
         }
     }
@@ -216,7 +215,7 @@ impl Port for PortRef {
         // SAFETY: see above.
         let count = unsafe {
             let read = (*self.port).read.unwrap_unchecked();
-            read(self.context, bytes.as_mut_ptr(), bytes.len() as u16)
+            read((*self.port).context, bytes.as_mut_ptr(), bytes.len() as u16)
         };
         count.min(bytes.len() as i16)
     }
@@ -225,21 +224,21 @@ impl Port for PortRef {
         // SAFETY: see above.
         let count = unsafe {
             let write = (*self.port).write.unwrap_unchecked();
-            write(self.context, bytes.as_ptr(), bytes.len() as u16)
+            write((*self.port).context, bytes.as_ptr(), bytes.len() as u16)
         };
         count.min(bytes.len() as i16)
     }
 
     fn micros(&mut self) -> u32 {
         // SAFETY: see above.
-        unsafe { (*self.port).micros.unwrap_unchecked()(self.context) }
+        unsafe { (*self.port).micros.unwrap_unchecked()((*self.port).context) }
     }
 
     fn flush(&mut self) -> bool {
         // SAFETY: see above.
         unsafe {
             match (*self.port).flush {
-                Some(flush) => flush(self.context) != 0,
+                Some(flush) => flush((*self.port).context) != 0,
                 None => true,
             }
         }
@@ -254,7 +253,7 @@ impl Port for PortRef {
         // SAFETY: see above.
         unsafe {
             if let Some(hook) = (*self.port).preTransmission {
-                hook(self.context)
+                hook((*self.port).context)
             }
         }
     }
@@ -263,7 +262,7 @@ impl Port for PortRef {
         // SAFETY: see above.
         unsafe {
             if let Some(hook) = (*self.port).postTransmission {
-                hook(self.context)
+                hook((*self.port).context)
             }
         }
     }

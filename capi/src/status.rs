@@ -74,7 +74,7 @@ pub const MBM_BROADCAST_NOT_ALLOWED: u8 = 0xE8;
 pub const MBM_BUFFER_TOO_SMALL: u8 = 0xE9;
 /// The object was never begun, or has no buffers.
 pub const MBM_NOT_INITIALISED: u8 = 0xEA;
-/// The request is under way: call mbm_master_poll again.
+/// The request is under way: call mbm_node_poll again.
 pub const MBM_PENDING: u8 = 0xEB;
 /// The line was not silent, or the port accepted no bytes, for as long as the response
 /// timeout.
@@ -163,7 +163,7 @@ pub extern "C" fn mbm_status_text(status: u8) -> *const c_char {
 ///
 /// @param status         the status of the request
 /// @param exceptionCode  `exception` of the mbm_clientRequest, or what
-///                       mbm_master_getExceptionCode returns: 0 if the device sent no exception
+///                       mbm_node_getExceptionCode returns: 0 if the device sent no exception
 /// @return a constant string, never NULL
 #[no_mangle]
 pub extern "C" fn mbm_status_textOf(status: u8, exceptionCode: u8) -> *const c_char {

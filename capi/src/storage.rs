@@ -2,7 +2,8 @@
 
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::bytes::copy_words;
-use mbm::engine::{Storage, Words, COUNTERS};
+use mbm::engine::{Setting, Settings, Storage, Words, COUNTERS};
+use mbm::time::millis;
 use mbm::FIRMWARE;
 
 /// Counters of what happened on the line since you zeroed them. Each wraps at 2^32.
@@ -32,25 +33,48 @@ pub struct mbm_counters {
 
 const _: () = assert!(size_of::<mbm_counters>() == COUNTERS * size_of::<u32>());
 
-/// The arguments of mbm_master_setBuffers.
-// The order of the fields saves flash: see `Engine`.
+/// The words of a node, which mbm_node_begin sets, and the time that its replies may take.
 #[repr(C)]
-pub(super) struct MasterBuffers {
-    pub(super) frame_bytes: u8,
+pub(super) struct NodeWords {
     pub(super) response_words: u8,
     pub(super) transmit_words: u8,
     pub(super) response: *mut u16,
     pub(super) transmit: *mut u16,
+    pub(super) response_timeout: Setting<{ millis(2000) }>,
+}
+
+impl NodeWords {
+    /// The words that reads fill.
+    pub(super) fn response(&mut self) -> &mut [u16] {
+        // SAFETY: as the header of mbm_node_begin demands.
+        unsafe { words(self.response, self.response_words) }
+    }
+
+    /// The words that writes send.
+    pub(super) fn transmit(&mut self) -> &mut [u16] {
+        // SAFETY: as the header of mbm_node_begin demands.
+        unsafe { words(self.transmit, self.transmit_words) }
+    }
+}
+
+/// The frame buffer and the counters of a line, and the words of the node whose request is
+/// under way.
+// The order of the fields saves flash: see `Engine`.
+#[repr(C)]
+pub(super) struct LineStorage {
+    pub(super) frame_bytes: u8,
     pub(super) frame: *mut u8,
+    /// Set before each request; not used without one.
+    pub(super) words: *mut NodeWords,
     pub(super) counters: *mut mbm_counters,
 }
 
-impl MasterBuffers {
+impl LineStorage {
     /// Sets the frame buffer.
     #[inline(always)]
     pub(super) fn set_frame(&mut self, frame: *mut u8, bytes: u16) {
         self.frame = frame;
-        // No frame of a master is longer than 255 bytes.
+        // No frame of a node is longer than 255 bytes.
         self.frame_bytes = bytes.min(u8::MAX.into()) as u8;
     }
 }
@@ -125,8 +149,8 @@ macro_rules! frame_storage {
 }
 pub(crate) use frame_storage;
 
-// Before mbm_master_setBuffers, the engine refuses every request.
-impl Storage for MasterBuffers {
+// Without a frame buffer, the engine refuses every request.
+impl Storage for LineStorage {
     frame_storage!(u8);
 
     // Volatile: otherwise LLVM would call memmove of libc, which costs flash.
@@ -145,15 +169,23 @@ impl Storage for MasterBuffers {
     }
 }
 
-// SAFETY, below: the engine keeps every index below the number of words, too.
-impl Words for MasterBuffers {
+// SAFETY, below: a request is under way, so `words` points to those of its node. The engine keeps
+// every index below the number of words, too.
+impl Words for LineStorage {
+    #[inline(always)]
+    fn response_timeout(&self, _settings: &Settings) -> u32 {
+        // SAFETY: see above.
+        unsafe { (*self.words).response_timeout.get() }
+    }
+
     fn transmit(&mut self) -> &mut [u16] {
         // SAFETY: see above.
-        unsafe { words(self.transmit, self.transmit_words) }
+        unsafe { (*self.words).transmit() }
     }
 
     fn transmit_words(&self) -> u8 {
-        self.transmit_words
+        // SAFETY: see above.
+        unsafe { (*self.words).transmit_words }
     }
 
     #[inline(always)]
@@ -161,11 +193,11 @@ impl Words for MasterBuffers {
         // SAFETY: within `transmit_words` and `frame_bytes`, see above.
         unsafe {
             if !FIRMWARE && high_first {
-                let words = from_raw_parts(self.transmit.cast(), count.into());
+                let words = from_raw_parts((*self.words).transmit.cast(), count.into());
                 return copy_words(self.bytes(to, count), words);
             }
             let flip = flip(high_first);
-            let words = self.transmit.cast::<u8>();
+            let words = (*self.words).transmit.cast::<u8>();
             let mut place = self.frame.add(to.into());
             for index in 0..count {
                 *place = *words.add((index ^ flip).into());
@@ -176,11 +208,12 @@ impl Words for MasterBuffers {
 
     fn response(&mut self) -> &mut [u16] {
         // SAFETY: see above.
-        unsafe { words(self.response, self.response_words) }
+        unsafe { (*self.words).response() }
     }
 
     fn response_words(&self) -> u8 {
-        self.response_words
+        // SAFETY: see above.
+        unsafe { (*self.words).response_words }
     }
 
     #[inline(always)]
@@ -188,10 +221,10 @@ impl Words for MasterBuffers {
         // SAFETY: within `frame_bytes` and `response_words`, see above.
         unsafe {
             if !FIRMWARE && high_first {
-                let words = from_raw_parts_mut(self.response.cast(), count.into());
+                let words = from_raw_parts_mut((*self.words).response.cast(), count.into());
                 return copy_words(words, self.slice(from, count));
             }
-            let mut word = self.response;
+            let mut word = (*self.words).response;
             let mut byte = self.frame.add(from.into());
             // An odd last byte is padded with 0. This overwrites a byte of the CRC, which
             // has been checked.

@@ -22,12 +22,12 @@ macro_rules! probes {
 
 fn probes() -> Vec<(String, u64)> {
     probes! {
-        sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function
+        sizes: mbm_port mbm_counters mbm_line mbm_node mbm_registers mbm_ring mbm_rule mbm_function
             mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
             mbm_service mbm_registerTable mbm_bitTable mbm_dataCallbacks mbm_file mbm_files mbm_fifo
             mbm_fifos mbm_access mbm_accessHooks mbm_recordHooks mbm_exceptionStatus mbm_serverId mbm_serverIdentification mbm_request mbm_custom
             mbm_functionMask mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_linkHooks
-            mbm_turn mbm_plan mbm_planPosition mbm_planRead mbm_planSetup mbm_planUnitLimits
+            mbm_plan mbm_planPosition mbm_planRead mbm_planSetup mbm_planUnitLimits
             mbm_planExcludedRange mbm_planReadInfo mbm_planField mbm_trace mbm_traceRecord
             mbm_gateway mbm_gatewayRoute mbm_gatewayLine mbm_gatewayConnection mbm_gatewayRequest
             mbm_gatewayConfig mbm_identification mbm_link mbm_linkCounters;
@@ -42,7 +42,6 @@ fn probes() -> Vec<(String, u64)> {
                 timeoutMs }
             mbm_linkHooks { context disconnect connect status }
             mbm_linkCounters { attempts failed connected lost }
-            mbm_turn { master lastUse }
             mbm_planUnitLimits { bitsPerRead registersPerRead unit }
             mbm_planExcludedRange { first last unit table }
             mbm_planReadInfo { intervalMs address quantity unit table status }

@@ -106,33 +106,72 @@ unsafe extern "C" fn changed(context: *mut c_void, event: u8, _: u8) {
     }
 }
 
+/// A line with two nodes, which share their words.
+struct LineOfTwo {
+    line: *mut mbm_line,
+    node: *mut mbm_node,
+    other: *mut mbm_node,
+    words: *mut [u16; 8],
+    frame: *mut [u8; 64],
+}
+
+impl LineOfTwo {
+    unsafe fn begin(state: *mut HookState, port: *const mbm_port) -> LineOfTwo {
+        unsafe {
+            let (line, node, other) = (boxed::<mbm_line>(), boxed::<mbm_node>(), boxed());
+            let (words, frame) = (boxed::<[u16; 8]>(), boxed::<[u8; 64]>());
+            let first = words.cast::<u16>();
+            assert_eq!(mbm_line_beginRtu(line, port, frame.cast(), 64), MBM_OK);
+            let status = mbm_node_begin(node, line, 17, first, 4, first.add(4), 4);
+            assert_eq!(status, MBM_OK);
+            let status = mbm_node_begin(other, line, 3, first, 2, first, 2);
+            assert_eq!(status, MBM_OK);
+            assert_eq!(mbm_node_setResponseTimeout(node, 20), MBM_OK);
+            (*state).line = line;
+            (*state).node = node;
+            (*state).other = other;
+            (*state).words = first;
+            LineOfTwo {
+                line,
+                node,
+                other,
+                words,
+                frame,
+            }
+        }
+    }
+
+    unsafe fn end(self) {
+        unsafe {
+            drop((Box::from_raw(self.line), Box::from_raw(self.node)));
+            drop((Box::from_raw(self.other), Box::from_raw(self.words)));
+            drop(Box::from_raw(self.frame));
+        }
+    }
+}
+
 #[test]
 fn hooks_use_the_trace_that_called_them() {
     unsafe {
-        let (state, master, trace) = (new_state(), boxed::<mbm_master>(), boxed::<mbm_trace>());
-        let (words, frame) = (boxed::<[u16; 8]>(), boxed::<[u8; 64]>());
+        let (state, trace) = (new_state(), boxed::<mbm_trace>());
         let (buffer, framing) = (boxed::<[u8; 64]>(), boxed::<mbm_framing>());
-        (*state).master = master;
         (*state).trace = trace;
-        let (first, bytes) = (words.cast::<u16>(), frame.cast::<u8>());
-        let status = mbm_master_setBuffers(master, first, 4, first.add(4), 4, bytes, 64);
-        assert_eq!(status, MBM_OK);
         let port = port(state.cast());
         let place = buffer.cast();
         let hook = Some(traced as unsafe extern "C" fn(_, _));
         let status = mbm_trace_beginClient(trace, &port, framing, place, 64, hook, state.cast());
         assert_eq!(status, MBM_OK);
-        let status = mbm_master_beginRtu(master, 17, mbm_trace_port(trace));
-        assert_eq!(status, MBM_OK);
-        assert_eq!(mbm_master_setResponseTimeout(master, 20), MBM_OK);
+        let line = LineOfTwo::begin(state, mbm_trace_port(trace));
         (*state).received = vec![17, 3];
-        let status = mbm_master_readHoldingRegisters(master, 0, 1);
+        let status = mbm_node_readHoldingRegisters(line.node, 0, 1);
         assert_eq!(status, MBM_RESPONSE_TIMED_OUT);
+        // No request is under way when the trace calls the hook now.
+        (*state).line = null_mut();
         assert_eq!(mbm_trace_flush(trace), MBM_OK);
         assert_eq!((*state).done, 2);
         assert!((*state).calls > 10);
-        drop((Box::from_raw(state), Box::from_raw(master)));
-        drop((Box::from_raw(words), Box::from_raw(frame)));
+        line.end();
+        drop(Box::from_raw(state));
         drop((Box::from_raw(buffer), Box::from_raw(framing)));
         drop(Box::from_raw(trace));
     }
@@ -189,28 +228,99 @@ unsafe extern "C" fn link_random(context: *mut c_void) -> u32 {
 }
 
 #[test]
-fn hooks_and_idle_use_the_master_that_called_them() {
+fn hooks_and_idle_use_the_line_and_the_node_that_called_them() {
     unsafe {
-        let (state, master) = (new_state(), boxed::<mbm_master>());
-        let (words, frame) = (boxed::<[u16; 8]>(), boxed::<[u8; 64]>());
-        (*state).master = master;
-        let (first, bytes) = (words.cast::<u16>(), frame.cast::<u8>());
-        let status = mbm_master_setBuffers(master, first, 4, first.add(4), 4, bytes, 64);
-        assert_eq!(status, MBM_OK);
+        let state = new_state();
         let port = port(state.cast());
-        assert_eq!(mbm_master_beginRtu(master, 17, &port), MBM_OK);
-        assert_eq!(mbm_master_setResponseTimeout(master, 20), MBM_OK);
+        let line = LineOfTwo::begin(state, &port);
+        let node = line.node;
         assert_eq!(
-            mbm_master_readHoldingRegisters(master, 0, 1),
+            mbm_node_readHoldingRegisters(node, 0, 1),
             MBM_RESPONSE_TIMED_OUT
         );
-        assert_eq!(mbm_master_setBlocking(master, 0), MBM_OK);
-        assert_eq!(mbm_master_writeSingleRegister(master, 0, 1), MBM_PENDING);
-        assert_eq!(mbm_master_poll(master), MBM_PENDING);
-        assert_eq!(mbm_master_cancel(master), MBM_OK);
+        assert_eq!(mbm_node_setBlocking(node, 0), MBM_OK);
+        assert_eq!(mbm_node_writeSingleRegister(node, 0, 1), MBM_PENDING);
+        assert_eq!(mbm_node_poll(node), MBM_PENDING);
+        mbm_node_pollDelay(node);
+        assert_eq!(mbm_node_cancel(node), MBM_OK);
+        assert_eq!(mbm_node_readCoils(node, 0, 1), MBM_PENDING);
+        assert_eq!(mbm_node_poll(node), MBM_PENDING);
+        assert_eq!(mbm_line_cancel(line.line), MBM_OK);
+        assert_eq!(mbm_node_poll(node), MBM_CANCELLED);
         assert!((*state).calls > 10);
-        drop((Box::from_raw(state), Box::from_raw(master)));
-        drop((Box::from_raw(words), Box::from_raw(frame)));
+        line.end();
+        drop(Box::from_raw(state));
+    }
+}
+
+/// A reply of the unit 17: the registers 1 and 2.
+fn reply() -> Vec<u8> {
+    let data = [17, 3, 4, 0, 1, 0, 2];
+    let crc = unsafe { mbm_frame_crc16(data.as_ptr(), data.len() as u16) };
+    [&data[..], &crc.to_le_bytes()].concat()
+}
+
+#[test]
+fn hooks_use_a_node_whose_reply_arrives() {
+    unsafe {
+        let state = new_state();
+        let port = port(state.cast());
+        let line = LineOfTwo::begin(state, &port);
+        assert_eq!(mbm_line_setQuietTime(line.line, 0), MBM_OK);
+        assert_eq!(mbm_line_setGap(line.line, 0), MBM_OK);
+        assert_eq!(mbm_node_setBlocking(line.node, 0), MBM_OK);
+        assert_eq!(mbm_node_readHoldingRegisters(line.node, 0, 2), MBM_PENDING);
+        // The poll that sends the request discards what has arrived.
+        assert_eq!(mbm_node_poll(line.node), MBM_PENDING);
+        (*state).received = reply();
+        for _ in 0..8 {
+            mbm_node_poll(line.node);
+        }
+        assert_eq!(mbm_node_status(line.node), MBM_OK);
+        assert_eq!(mbm_node_receive(line.node), 1);
+        assert_eq!(mbm_node_receive(line.node), 2);
+        assert!((*state).calls > 5);
+        line.end();
+        drop(Box::from_raw(state));
+    }
+}
+
+#[test]
+fn the_hook_idle_ends_the_request_for_which_it_was_called() {
+    type Action = unsafe fn(*mut mbm_line, *mut mbm_node, *mut mbm_node);
+    unsafe fn cancel(_: *mut mbm_line, node: *mut mbm_node, _: *mut mbm_node) {
+        assert_eq!(unsafe { mbm_node_cancel(node) }, MBM_OK);
+    }
+    unsafe fn pass_on(line: *mut mbm_line, _: *mut mbm_node, other: *mut mbm_node) {
+        unsafe {
+            assert_eq!(mbm_line_cancel(line), MBM_OK);
+            assert_eq!(mbm_node_setBlocking(other, 0), MBM_OK);
+            assert_eq!(mbm_node_readCoils(other, 0, 1), MBM_PENDING);
+        }
+    }
+    unsafe fn zero_line(line: *mut mbm_line, _: *mut mbm_node, _: *mut mbm_node) {
+        unsafe { line.write_bytes(0, 1) };
+    }
+    unsafe fn zero_node(_: *mut mbm_line, node: *mut mbm_node, _: *mut mbm_node) {
+        unsafe { node.write_bytes(0, 1) };
+    }
+    let actions: [(Action, u8); 4] = [
+        (cancel, MBM_CANCELLED),
+        (pass_on, MBM_CANCELLED),
+        (zero_line, MBM_NOT_INITIALISED),
+        (zero_node, MBM_NOT_INITIALISED),
+    ];
+    for (action, expected) in actions {
+        unsafe {
+            let state = new_state();
+            let port = port(state.cast());
+            let line = LineOfTwo::begin(state, &port);
+            (*state).last_call = Some(action);
+            let status = mbm_node_readHoldingRegisters(line.node, 0, 1);
+            assert_eq!(status, expected);
+            line.end();
+            drop(Box::from_raw(state));
+        }
     }
 }
 

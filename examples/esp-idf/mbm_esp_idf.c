@@ -84,10 +84,10 @@ void mbm_espIdf_wait(uint32_t timeoutUs)
         vTaskDelay(1);
 }
 
-static void line_idle(void *context, mbm_master *master)
+static void line_idle(void *context, mbm_node *node)
 {
     (void)context;
-    mbm_espIdf_wait(mbm_master_pollDelay(master));
+    mbm_espIdf_wait(mbm_node_pollDelay(node));
 }
 
 static esp_err_t set_driver(const mbm_espIdfLine *line)

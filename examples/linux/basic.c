@@ -12,7 +12,8 @@
 enum { READ_WORDS = 6, WRITE_WORDS = 2 };
 
 /* All storage is the program's own; mbm allocates nothing. */
-static mbm_master node = MBM_INIT;
+static mbm_line line = MBM_INIT;
+static mbm_node node = MBM_INIT;
 static uint16_t response[READ_WORDS];
 static uint16_t transmit[WRITE_WORDS];
 static uint8_t frame[MBM_FRAME_BYTES(READ_WORDS)];
@@ -21,7 +22,7 @@ static int failed(const char *what, uint8_t status)
 {
     if (status != MBM_OK)
         fprintf(stderr, "%s: %s\n", what,
-                mbm_status_textOf(status, mbm_master_getExceptionCode(&node)));
+                mbm_status_textOf(status, mbm_node_getExceptionCode(&node)));
     return status != MBM_OK;
 }
 
@@ -45,18 +46,18 @@ int main(int argc, char **argv)
         return 1;
     }
     port = trace_client(mbm_tty_port(&tty), MBM_FRAMING_RTU, argv[1]);
-    mbm_master_setBuffers(&node, response, READ_WORDS, transmit, WRITE_WORDS, frame, sizeof frame);
-    mbm_master_beginRtu(&node, (uint8_t)slave, &port);
-    mbm_master_setBaudRate(&node, baud);
+    mbm_line_beginRtu(&line, &port, frame, sizeof frame);
+    mbm_line_setBaudRate(&line, baud);
+    mbm_node_begin(&node, &line, (uint8_t)slave, response, READ_WORDS, transmit, WRITE_WORDS);
 
     /* Two words to registers 0 and 1, then six words from register 2 on. */
-    mbm_master_setTransmitBuffer(&node, 0, 0x1234);
-    mbm_master_setTransmitBuffer(&node, 1, 0xABCD);
-    if (failed("write", mbm_master_writeMultipleRegisters(&node, 0, WRITE_WORDS)) ||
-        failed("read", mbm_master_readHoldingRegisters(&node, 2, READ_WORDS)))
+    mbm_node_setTransmitBuffer(&node, 0, 0x1234);
+    mbm_node_setTransmitBuffer(&node, 1, 0xABCD);
+    if (failed("write", mbm_node_writeMultipleRegisters(&node, 0, WRITE_WORDS)) ||
+        failed("read", mbm_node_readHoldingRegisters(&node, 2, READ_WORDS)))
         return 1;
     for (i = 0; i < READ_WORDS; i++)
-        printf("register %d: 0x%04X\n", 2 + i, mbm_master_getResponseBuffer(&node, i));
+        printf("register %d: 0x%04X\n", 2 + i, mbm_node_getResponseBuffer(&node, i));
 
     mbm_tty_close(&tty);
     return 0;

@@ -23,7 +23,8 @@ static mbm_trace wire = MBM_INIT;
 static uint8_t incomplete[2 * MBM_MAX_FRAME];
 static recording sent, received;
 static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
-static mbm_master node = MBM_INIT;
+static mbm_line line = MBM_INIT;
+static mbm_node node = MBM_INIT;
 static mbm_counters counters = MBM_INIT;
 static uint16_t response[WORDS];
 static uint16_t transmit[WORDS];
@@ -87,7 +88,7 @@ static int was_read(void)
  * words of a read. */
 static void show(uint8_t status, uint8_t expected_status)
 {
-    uint8_t words = was_read() ? mbm_master_available(&node) : 0;
+    uint8_t words = was_read() ? mbm_node_available(&node) : 0;
     uint8_t i;
 
     requests++;
@@ -96,7 +97,7 @@ static void show(uint8_t status, uint8_t expected_status)
     print_frame(MBM_PACKET_RESPONSE, &received);
     printf("  result   %s", mbm_status_text(status));
     for (i = 0; i < words; i++)
-        printf("%s0x%04X", i == 0 ? ": " : " ", mbm_master_getResponseBuffer(&node, i));
+        printf("%s0x%04X", i == 0 ? ": " : " ", mbm_node_getResponseBuffer(&node, i));
     printf("\n");
     expect(status == expected_status, mbm_status_text(expected_status));
 }
@@ -112,7 +113,7 @@ static void show(uint8_t status, uint8_t expected_status)
 /* Returns whether the words of the response are those in the server's memory. */
 static int read_words(const uint16_t *there, size_t count)
 {
-    return mbm_master_available(&node) == count && memcmp(response, there, 2 * count) == 0;
+    return mbm_node_available(&node) == count && memcmp(response, there, 2 * count) == 0;
 }
 
 /* Returns whether the bits of the response are those in the server's memory, one byte each. */
@@ -121,7 +122,7 @@ static int read_bits(const uint8_t *there, unsigned count)
     unsigned i;
 
     for (i = 0; i < count; i++) {
-        if ((mbm_master_getResponseBuffer(&node, (uint8_t)(i / 16)) >> i % 16 & 1) != there[i])
+        if ((mbm_node_getResponseBuffer(&node, (uint8_t)(i / 16)) >> i % 16 & 1) != there[i])
             return 0;
     }
     return 1;
@@ -138,12 +139,11 @@ static void begin(void)
     expect(mbm_trace_beginClient(&wire, &port, &rtu, incomplete, sizeof incomplete, keep, NULL) ==
                MBM_OK,
            "a trace");
-    expect(mbm_master_beginRtu(&node, UNIT, mbm_trace_port(&wire)) == MBM_OK, "begin");
-    expect(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame) ==
-               MBM_OK,
-           "setBuffers");
-    expect(mbm_master_setBaudRate(&node, 115200) == MBM_OK, "setBaudRate");
-    expect(mbm_master_setCounters(&node, &counters) == MBM_OK, "setCounters");
+    expect(mbm_line_beginRtu(&line, mbm_trace_port(&wire), frame, sizeof frame) == MBM_OK,
+           "beginRtu");
+    expect(mbm_line_setBaudRate(&line, 115200) == MBM_OK, "setBaudRate");
+    expect(mbm_line_setCounters(&line, &counters) == MBM_OK, "setCounters");
+    expect(mbm_node_begin(&node, &line, UNIT, response, WORDS, transmit, WORDS) == MBM_OK, "begin");
     printf("mbm %s as master, a libmodbus server as unit %d, RTU between them over %s\n\n",
            MBM_VERSION, UNIT, device.line.path);
 }
@@ -155,13 +155,13 @@ static void basic_sketch(void)
     const uint16_t *registers = device.mapping->tab_registers;
 
     counter++;
-    printf("counter 0x%08X: mbm_master_setTransmitBuffer(&node, 0, low), ..(&node, 1, high)\n",
+    printf("counter 0x%08X: mbm_node_setTransmitBuffer(&node, 0, low), ..(&node, 1, high)\n",
            (unsigned)counter);
-    mbm_master_setTransmitBuffer(&node, 0, (uint16_t)counter);
-    mbm_master_setTransmitBuffer(&node, 1, (uint16_t)(counter >> 16));
-    REQUEST(mbm_master_writeMultipleRegisters(&node, 0, 2), MBM_OK);
+    mbm_node_setTransmitBuffer(&node, 0, (uint16_t)counter);
+    mbm_node_setTransmitBuffer(&node, 1, (uint16_t)(counter >> 16));
+    REQUEST(mbm_node_writeMultipleRegisters(&node, 0, 2), MBM_OK);
     expect(registers[0] == 1 && registers[1] == 1, "the counter in registers 0 and 1");
-    REQUEST(mbm_master_readHoldingRegisters(&node, 2, 6), MBM_OK);
+    REQUEST(mbm_node_readHoldingRegisters(&node, 2, 6), MBM_OK);
     expect(read_words(registers + 2, 6), "registers 2 to 7");
 }
 
@@ -169,14 +169,14 @@ static void other_registers(void)
 {
     uint16_t *registers = device.mapping->tab_registers;
 
-    REQUEST(mbm_master_writeSingleRegister(&node, 40, 0xBEEF), MBM_OK);
+    REQUEST(mbm_node_writeSingleRegister(&node, 40, 0xBEEF), MBM_OK);
     expect(registers[40] == 0xBEEF, "0xBEEF in register 40");
-    REQUEST(mbm_master_readInputRegisters(&node, 8, 1), MBM_OK);
+    REQUEST(mbm_node_readInputRegisters(&node, 8, 1), MBM_OK);
     expect(read_words(device.mapping->tab_input_registers + 8, 1), "input register 8");
-    REQUEST(mbm_master_maskWriteRegister(&node, 40, 0xFF00, 0x0012), MBM_OK);
+    REQUEST(mbm_node_maskWriteRegister(&node, 40, 0xFF00, 0x0012), MBM_OK);
     expect(registers[40] == 0xBE12, "0xBE12 in register 40");
-    mbm_master_setTransmitBuffer(&node, 0, 0x0A0B);
-    REQUEST(mbm_master_readWriteMultipleRegisters(&node, 40, 2, 41, 1), MBM_OK);
+    mbm_node_setTransmitBuffer(&node, 0, 0x0A0B);
+    REQUEST(mbm_node_readWriteMultipleRegisters(&node, 40, 2, 41, 1), MBM_OK);
     expect(registers[41] == 0x0A0B && read_words(registers + 40, 2), "registers 40 and 41");
 }
 
@@ -184,14 +184,14 @@ static void bits(void)
 {
     uint8_t *coils = device.mapping->tab_bits;
 
-    REQUEST(mbm_master_writeSingleCoil(&node, 20, 1), MBM_OK);
+    REQUEST(mbm_node_writeSingleCoil(&node, 20, 1), MBM_OK);
     expect(coils[20] == 1, "coil 20 on");
-    mbm_master_setTransmitBuffer(&node, 0, 0x0155);
-    REQUEST(mbm_master_writeMultipleCoils(&node, 21, 9), MBM_OK);
+    mbm_node_setTransmitBuffer(&node, 0, 0x0155);
+    REQUEST(mbm_node_writeMultipleCoils(&node, 21, 9), MBM_OK);
     expect(coils[21] == 1 && coils[22] == 0 && coils[28] == 0 && coils[29] == 1, "coils 21 to 29");
-    REQUEST(mbm_master_readCoils(&node, 20, 10), MBM_OK);
+    REQUEST(mbm_node_readCoils(&node, 20, 10), MBM_OK);
     expect(read_bits(coils + 20, 10), "coils 20 to 29");
-    REQUEST(mbm_master_readDiscreteInputs(&node, 30, 8), MBM_OK);
+    REQUEST(mbm_node_readDiscreteInputs(&node, 30, 8), MBM_OK);
     expect(read_bits(device.mapping->tab_input_bits + 30, 8), "inputs 30 to 37");
 }
 
@@ -201,29 +201,29 @@ static void without_waiting(void)
     unsigned rounds = 0;
     uint8_t status;
 
-    mbm_master_setBlocking(&node, 0);
+    mbm_node_setBlocking(&node, 0);
     forget_frames();
-    printf("mbm_master_setBlocking(&node, 0), then mbm_master_readHoldingRegisters(&node, 0, 2)\n");
-    status = mbm_master_readHoldingRegisters(&node, 0, 2);
+    printf("mbm_node_setBlocking(&node, 0), then mbm_node_readHoldingRegisters(&node, 0, 2)\n");
+    status = mbm_node_readHoldingRegisters(&node, 0, 2);
     expect(status == MBM_PENDING, "pending at once");
     printf("  at once  %s\n", mbm_status_text(status));
-    while ((status = mbm_master_poll(&node)) == MBM_PENDING)
+    while ((status = mbm_node_poll(&node)) == MBM_PENDING)
         rounds++;
-    printf("  while mbm_master_poll(&node) said so, the program went round its loop %u times\n",
+    printf("  while mbm_node_poll(&node) said so, the program went round its loop %u times\n",
            rounds);
     show(status, MBM_OK);
     expect(rounds > 0 && read_words(device.mapping->tab_registers, 2), "registers 0 and 1");
-    mbm_master_setBlocking(&node, 1);
+    mbm_node_setBlocking(&node, 1);
 }
 
 static void failing_requests(void)
 {
-    REQUEST(mbm_master_readHoldingRegisters(&node, SERVER_REGISTERS, 1), MBM_ILLEGAL_DATA_ADDRESS);
-    printf("mbm_master_setSlaveID(&node, %d), mbm_master_setResponseTimeout(&node, 200), then\n",
+    REQUEST(mbm_node_readHoldingRegisters(&node, SERVER_REGISTERS, 1), MBM_ILLEGAL_DATA_ADDRESS);
+    printf("mbm_node_setSlaveID(&node, %d), mbm_node_setResponseTimeout(&node, 200), then\n",
            ABSENT_UNIT);
-    mbm_master_setSlaveID(&node, ABSENT_UNIT);
-    mbm_master_setResponseTimeout(&node, 200);
-    REQUEST(mbm_master_readHoldingRegisters(&node, 0, 1), MBM_RESPONSE_TIMED_OUT);
+    mbm_node_setSlaveID(&node, ABSENT_UNIT);
+    mbm_node_setResponseTimeout(&node, 200);
+    REQUEST(mbm_node_readHoldingRegisters(&node, 0, 1), MBM_RESPONSE_TIMED_OUT);
 }
 
 static void show_counters(void)

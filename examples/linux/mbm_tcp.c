@@ -458,9 +458,9 @@ static uint32_t tcp_micros(void *context)
     return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
 }
 
-static void tcp_idle(void *context, mbm_master *master)
+static void tcp_idle(void *context, mbm_node *node)
 {
-    mbm_tcp_wait((mbm_tcp *)context, 1, NULL, -1, mbm_master_pollDelay(master));
+    mbm_tcp_wait((mbm_tcp *)context, 1, NULL, -1, mbm_node_pollDelay(node));
 }
 
 mbm_port mbm_tcp_port(mbm_tcp *tcp)

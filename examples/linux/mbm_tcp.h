@@ -248,8 +248,8 @@ static inline mbm_linkHooks mbm_tcp_link(mbm_tcp *tcp)
 /**
  * Returns the port for the begin functions. It may be made before the socket is open, stays
  * valid when the socket is closed and opened again, and may be given to several objects.
- * While a blocking call of a master waits, the port sleeps until bytes arrive, at most for
- * the time of that master's mbm_master_pollDelay.
+ * While a blocking call of a node waits, the port sleeps until bytes arrive, at most for
+ * the time of mbm_node_pollDelay.
  *
  * @param tcp  must outlive the port
  * @return the port; its read and write set `error` to errno when the link is lost

@@ -381,12 +381,12 @@ static uint32_t tls_micros(void *context)
     return tls->below.micros ? now(tls) : 0;
 }
 
-static void tls_idle(void *context, struct mbm_master *master)
+static void tls_idle(void *context, struct mbm_node *node)
 {
     mbm_tls *tls = (mbm_tls *)context;
 
     if (tls->below.idle && mbm_tls_pollDelay(tls) != 0)
-        tls->below.idle(tls->below.context, master);
+        tls->below.idle(tls->below.context, node);
 }
 
 mbm_port mbm_tls_port(mbm_tls *tls)

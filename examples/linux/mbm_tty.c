@@ -505,9 +505,9 @@ int mbm_tty_wait(mbm_tty *tty, uint32_t timeoutUs)
 }
 
 /* Sleeps until bytes arrive or the master has something else to do. */
-static void tty_idle(void *context, mbm_master *master)
+static void tty_idle(void *context, mbm_node *node)
 {
-    mbm_tty_wait((mbm_tty *)context, mbm_master_pollDelay(master));
+    mbm_tty_wait((mbm_tty *)context, mbm_node_pollDelay(node));
 }
 
 mbm_port mbm_tty_port(mbm_tty *tty)

@@ -195,8 +195,8 @@ int mbm_tty_wait(mbm_tty *tty, uint32_t timeoutUs);
 /**
  * Returns the port for the begin functions. It may be made before the terminal is open,
  * stays valid when the terminal is closed and opened again, and may be given to several
- * objects. While a blocking call of a master waits, the port sleeps until bytes arrive, at
- * most for the time of that master's mbm_master_pollDelay.
+ * objects. While a blocking call of a node waits, the port sleeps until bytes arrive, at
+ * most for the time of mbm_node_pollDelay.
  *
  * @param tty  must outlive the port
  * @return the port; its read and write set `error` to errno when the link is lost, to

@@ -72,10 +72,10 @@ void mbm_rtThread_wait(uint32_t timeoutUs)
         rt_thread_delay(1);
 }
 
-static void line_idle(void *context, mbm_master *master)
+static void line_idle(void *context, mbm_node *node)
 {
     (void)context;
-    mbm_rtThread_wait(mbm_master_pollDelay(master));
+    mbm_rtThread_wait(mbm_node_pollDelay(node));
 }
 
 static rt_err_t open_device(const mbm_rtThreadLine *line, rt_device_t device)

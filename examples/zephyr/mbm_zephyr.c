@@ -114,9 +114,9 @@ static void driver_off(void *context)
     gpio_pin_set_dt(&line->driver, 0);
 }
 
-static void line_idle(void *context, mbm_master *master)
+static void line_idle(void *context, mbm_node *node)
 {
-    mbm_zephyr_wait(context, mbm_master_pollDelay(master));
+    mbm_zephyr_wait(context, mbm_node_pollDelay(node));
 }
 
 /* --- opening */

@@ -8,10 +8,10 @@
 //! the frame that is being received to the end of the frame buffer, in reverse order, as far as
 //! they fill response words. So a valid reply always wins.
 //!
-//! Only [`Engine::set_lenient`] names this module. A program that does not call that function
+//! Only [`Engine::lenient`] names this module. A program that does not call that function
 //! contains none of this code.
 
-use super::{Engine, Event, Outcome, Storage, Words};
+use super::{Engine, Event, Observer, Outcome, Storage, Words};
 use crate::frame::rtu;
 use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
@@ -28,13 +28,23 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
     pub fn is_lenient(&self) -> bool {
         self.observer.is_some()
     }
+
+    /// Sets the function that sees the received bytes of later requests. Call it only while no
+    /// request is pending.
+    pub fn set_observer(&mut self, observer: Option<Observer<P, S, Q>>) {
+        self.observer = observer;
+    }
 }
 
 impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
-    /// Sets whether a deviating reply is accepted. A read may then be sent to unit 0, which has
-    /// to reply.
-    pub fn set_lenient(&mut self, on: bool) {
-        self.observer = if on { Some(observe) } else { None };
+    /// What [`Engine::set_observer`] takes so that a deviating reply is accepted, if `on`. A read
+    /// may then be sent to unit 0, which has to reply.
+    pub const fn lenient(on: bool) -> Option<Observer<P, S, MasterRequest>> {
+        if on {
+            Some(observe)
+        } else {
+            None
+        }
     }
 
     /// Keeps the byte if it may belong to a deviating response to a read. Notes a deviating

@@ -2,6 +2,7 @@
 //! length of its reply.
 
 use super::{Engine, RequestSpec, Words};
+use crate::error::Status;
 use crate::frame::rtu;
 use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
@@ -21,6 +22,11 @@ impl<P, S: Words> RequestSpec<P, S> for MasterRequest {
     #[inline(always)]
     fn may_be_broadcast(&self) -> bool {
         !self.is_read()
+    }
+
+    #[inline(always)]
+    fn response_timeout(engine: &mut Engine<P, S, Self>) -> u32 {
+        engine.storage.response_timeout(&engine.settings)
     }
 
     #[inline(always)]
@@ -94,6 +100,18 @@ fn clear_unused_bits<P, S: Words>(engine: &mut Engine<P, S, MasterRequest>, inde
 }
 
 impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
+    /// [`Status::OK`] if a request may be made, otherwise the reason.
+    #[inline(always)]
+    pub fn ready(&self) -> Status {
+        if self.is_pending() {
+            return Status::BUSY;
+        }
+        if self.port.is_ready() && self.storage.capacity() > 0 {
+            return Status::OK;
+        }
+        Status::NOT_INITIALISED
+    }
+
     /// Copies the data of the reply into the response words. False, with nothing copied, if
     /// there are too few words.
     #[cfg_attr(target_os = "none", inline(never))]

@@ -1,5 +1,6 @@
 //! The caller's memory: a frame buffer, transmit words, response words and counters.
 
+use super::Settings;
 use crate::bytes::move_to_front;
 use core::fmt::Debug;
 use core::hash::Hash;
@@ -116,6 +117,11 @@ pub trait Storage {
 /// The memory of a master: transmit and response words beside the frame buffer. The engine
 /// uses at most [`Words::transmit_words`] and [`Words::response_words`] words.
 pub trait Words: Storage<Count = u8> {
+    /// The response timeout in microseconds. `settings` has that of the line.
+    fn response_timeout(&self, settings: &Settings) -> u32 {
+        settings.response_timeout.get()
+    }
+
     /// The transmit words, at most 255: write requests send them.
     fn transmit(&mut self) -> &mut [u16];
 

@@ -2,7 +2,7 @@
 
 use super::object::{mbm_client, on_transport, queue, SerialTransport, TcpTransport};
 use crate::framing::MBM_FRAMING_RTU;
-use crate::master::{self, mbm_master, Core};
+use crate::line::{self, mbm_line};
 use crate::pointers;
 use core::ffi::c_void;
 use mbm::client::Transport as _;
@@ -87,32 +87,27 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
     unsafe { pointers::read(client, 0, |object| queue(object).connected.into()) }
 }
 
-/// Suspends the client, so that a master can use its port. The client's requests wait until
-/// mbm_client_resume. Until then the master uses the client's storage, and the client remembers
-/// the master: keep both.
+/// Suspends the client, so that a line can use its port. The client's requests wait until
+/// mbm_client_resume. Until then the line uses the client's storage, and the client remembers
+/// the line: keep both.
 ///
-/// @param client  the object. If `master` is not NULL, it must use RTU or RTU over TCP
-/// @param master  a master with buffers, which then uses the client's port; NULL if you use
-///                the line in another way
+/// @param client  the object. If `line` is not NULL, it must use RTU or RTU over TCP
+/// @param line    a line, which then uses the client's port; NULL if you use the wire in another
+///                way
 /// @return MBM_OK; MBM_BUSY, with both objects unchanged, if a request is under way or the
 ///         client is suspended already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_client_suspend(
-    client: *mut mbm_client,
-    master: *mut mbm_master,
-) -> u8 {
+pub unsafe extern "C" fn mbm_client_suspend(client: *mut mbm_client, line: *mut mbm_line) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         let status = pointers::with(client, |object| {
-            if !master.is_null() {
+            if !line.is_null() {
                 if (*(*object).kind).framing != MBM_FRAMING_RTU {
-                    // A master uses RTU frames only.
+                    // A line uses RTU frames only.
                     return Status::INVALID_ARGUMENT;
                 }
-                match pointers::check(master) {
-                    Status::OK if pointers::object(master).core().is_pending() => {
-                        return Status::BUSY;
-                    }
+                match pointers::check(line) {
+                    Status::OK if pointers::object(line).is_pending() => return Status::BUSY,
                     Status::OK | Status::NOT_INITIALISED => {}
                     refused => return refused,
                 }
@@ -120,50 +115,47 @@ pub unsafe extern "C" fn mbm_client_suspend(
             if !on_transport!(object, transport => transport.suspend(&mut (*object).queue)) {
                 return Status::BUSY;
             }
-            (*object).borrower = master;
-            if !master.is_null() {
-                master::prepare(master);
+            (*object).borrower = line;
+            if !line.is_null() {
+                line::prepare(line);
                 let port = (*(*object).kind).port(object);
-                pointers::object(master)
-                    .core()
-                    .port()
-                    .set(port, (*port).context);
+                pointers::object(line).port.set(port);
             }
             Status::OK
         });
-        if status == Status::OK.code() && !master.is_null() {
-            pointers::with_hooks(client, || master::with_hooks(master, Core::line_used));
+        if status == Status::OK.code() && !line.is_null() {
+            pointers::with_hooks(client, || line::with_hooks(line, line::Core::line_used));
         }
         status
     }
 }
 
-/// Resumes the client. The master then has no port: its functions that make a request return
-/// MBM_NOT_INITIALISED. A master that was begun on another port meanwhile keeps that port.
+/// Resumes the client. The line then has no port: requests of its nodes return
+/// MBM_NOT_INITIALISED. A line that was begun on another port meanwhile keeps that port.
 ///
 /// @param client  the object
-/// @param master  the master that was passed to mbm_client_suspend; NULL if none was
-/// @return MBM_OK; MBM_BUSY while the master has a request under way;
-///         MBM_INVALID_ARGUMENT if the client was not suspended, and for any other master;
+/// @param line    the line that was passed to mbm_client_suspend; NULL if none was
+/// @return MBM_OK; MBM_BUSY while a request is under way on the line;
+///         MBM_INVALID_ARGUMENT if the client was not suspended, and for any other line;
 ///         MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, master: *mut mbm_master) -> u8 {
+pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, line: *mut mbm_line) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if !queue(object).suspended || (*object).borrower != master {
+            if !queue(object).suspended || (*object).borrower != line {
                 return Status::INVALID_ARGUMENT;
             }
-            match pointers::check(master) {
+            match pointers::check(line) {
                 Status::OK => {
-                    let core = pointers::object(master).core();
+                    let core = pointers::object(line);
                     if core.is_pending() {
                         return Status::BUSY;
                     }
-                    core.port().clear_if((*(*object).kind).port(object));
+                    core.port.clear_if((*(*object).kind).port(object));
                 }
                 Status::BUSY => return Status::BUSY,
-                // There is no master, or it was zeroed.
+                // There is no line, or it was zeroed.
                 _ => {}
             }
             queue(object).suspended = false;

@@ -3,7 +3,7 @@
 use super::request::RequestPtr;
 use super::storage::ClientBuffers;
 use super::MBM_CLIENT_DEPTH;
-use crate::master::mbm_master;
+use crate::line::mbm_line;
 use crate::pointers::CObject;
 use crate::port::mbm_port;
 use core::ffi::c_void;
@@ -43,8 +43,8 @@ pub struct Object {
     /// `kind` is the first field of a [`LinkedKind`].
     pub(crate) linked: bool,
     pub(crate) kind: *const TransportKind,
-    /// The master that uses the port while the client is suspended; NULL if none does.
-    pub(super) borrower: *mut mbm_master,
+    /// The line that uses the port while the client is suspended; NULL if none does.
+    pub(super) borrower: *mut mbm_line,
     pub(crate) queue: RequestQueue<RequestPtr, DEPTH>,
     pub(super) transport: Transports,
 }

@@ -124,7 +124,7 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
 }
 
 /// Sets the quiet time of a serial line. It prevents that the client accepts a late reply as
-/// the reply to a later request: see mbm_master_setQuietTime. It has no effect in TCP frames,
+/// the reply to a later request: see mbm_line_setQuietTime. It has no effect in TCP frames,
 /// whose transaction identifier shows to which request a reply belongs.
 ///
 /// The client does not hold the reply to mbm_client_diagnostics with sub-function 0, which

@@ -4,7 +4,7 @@
 
 use super::object::Object;
 use crate::client::object as client;
-use crate::master::mbm_master;
+use crate::node::mbm_node;
 use crate::port::mbm_port;
 use core::ffi::c_void;
 
@@ -106,12 +106,12 @@ unsafe extern "C" fn post_transmission(context: *mut c_void) {
     }
 }
 
-unsafe extern "C" fn idle(context: *mut c_void, master: *mut mbm_master) {
+unsafe extern "C" fn idle(context: *mut c_void, node: *mut mbm_node) {
     // SAFETY: see above.
     unsafe {
         let own = &(*context.cast::<Object>()).port;
         if let Some(hook) = own.idle {
-            hook(own.context, master);
+            hook(own.context, node);
         }
     }
 }

@@ -27,7 +27,7 @@ pub const MBM_ORDER_BADC: u8 = 3;
 pub const MBM_ORDER_DCBA: u8 = 4;
 
 /// mbm_registers.kind: words that may only be read, for example the response words of
-/// mbm_master.
+/// mbm_node.
 pub const MBM_REGISTERS_OF_WORDS: u8 = 1;
 /// mbm_registers.kind: bytes that may only be read, the high byte of each register first.
 pub const MBM_REGISTERS_OF_BYTES: u8 = 2;
@@ -41,7 +41,7 @@ pub const MBM_REGISTERS_INTO_BYTES: u8 = 4;
 /// view owns nothing: `data` points to memory of the program.
 ///
 /// mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in; so do
-/// mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters. You may also set
+/// mbm_node_getResponseRegisters and mbm_node_getTransmitRegisters. You may also set
 /// each field yourself. The get and set functions do not change the view. Several threads
 /// may use one view at the same time as long as none of them writes the registers.
 #[repr(C)]
@@ -202,7 +202,7 @@ unsafe fn fill(
 /// words.
 ///
 /// @param registers  the view to fill in; without data after an error
-/// @param words      the words, for example the response words of mbm_master; must stay
+/// @param words      the words, for example the response words of mbm_node; must stay
 ///                   valid while the view is used. NULL only if `count` is 0
 /// @param count      how many words
 /// @param first      the device's address of the first register, 0 to 65535
@@ -256,7 +256,7 @@ pub unsafe extern "C" fn mbm_registers_ofBytes(
 }
 
 /// As mbm_registers_ofWords, for words that you also write, for example the transmit
-/// words of mbm_master.
+/// words of mbm_node.
 ///
 /// @param registers  the view to fill in; without data after an error
 /// @param words      the words to write; must stay valid while the view is used

@@ -6,7 +6,7 @@ pub use record::{mbm_traceRecord, mbm_trace_ofEvent, MBM_TRACE_RECEIVED, MBM_TRA
 
 use crate::framing::{is_delimiter, mbm_framing};
 use crate::functions::declared;
-use crate::master::mbm_master;
+use crate::node::mbm_node;
 use crate::pointers::{
     array_or_empty, check, get, object, read as read_object, with, with_hooks, CObject, BEGUN,
     IN_HOOK,
@@ -28,11 +28,11 @@ pub const MBM_MIN_TRACE_BUFFER: u16 = 32;
 
 const _: () = assert!(MBM_MIN_TRACE_BUFFER as usize == MIN_BUFFER);
 
-/// A trace: stands between a port and the master, client or server that uses it, passes
+/// A trace: stands between a port and the line, client or server that uses it, passes
 /// everything on, and calls your hook for each frame that is sent or received.
 ///
 /// You provide the storage. Initialise it with MBM_INIT. Call mbm_trace_beginClient or
-/// mbm_trace_beginServer, then begin the master, client or server with mbm_trace_port instead
+/// mbm_trace_beginServer, then begin the line, client or server with mbm_trace_port instead
 /// of your port. The object must not move while its port is in use. A program that begins no
 /// trace contains no part of it. Not re-entrant: use it from the thread of the object that
 /// uses its port.
@@ -191,12 +191,12 @@ unsafe extern "C" fn post_transmission(context: *mut c_void) {
     let _ = unsafe { with_core(context.cast(), Core::post_transmission) };
 }
 
-unsafe extern "C" fn idle(context: *mut c_void, master: *mut mbm_master) {
+unsafe extern "C" fn idle(context: *mut c_void, node: *mut mbm_node) {
     // SAFETY: see above. No reference lives, because the hook may use every object.
     unsafe {
         let port = inner(context);
         if let Some(hook) = (*port).idle {
-            hook((*port).context, master);
+            hook((*port).context, node);
         }
     }
 }
@@ -243,7 +243,7 @@ unsafe fn begin(
             size,
         };
         let object = trace.cast::<Object>();
-        let passed_on = PortRef::new(&raw const (*object).inner, port.context);
+        let passed_on = PortRef::new(&raw const (*object).inner);
         object.write(Object {
             mark: BEGUN,
             outer: mbm_port {
@@ -287,10 +287,10 @@ fn code(result: Result<(), Status>) -> u8 {
     result.err().unwrap_or(Status::OK).code()
 }
 
-/// Begins the trace of a master or client. Then begin that master or client with
+/// Begins the trace of a line or client. Then begin that line or client with
 /// mbm_trace_port.
 ///
-/// The hook is called from within the functions of the master or client, when the last byte
+/// The hook is called from within the functions of the node or client, when the last byte
 /// of a frame was sent or read. Bytes that are not followed by the rest of a frame are handed
 /// out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a serial
 /// line when the next frame is sent, when the link is lost, or by mbm_trace_flush. `record`
@@ -360,7 +360,7 @@ pub unsafe extern "C" fn mbm_trace_beginServer(
 }
 
 /// Returns the port that passes everything on to the port of the trace. Pass it to the begin
-/// function of a master, client or server.
+/// function of a node, client or server.
 ///
 /// @param trace  the object
 /// @return the port, which is valid for as long as the trace is used. NULL for a trace that

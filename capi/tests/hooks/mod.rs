@@ -11,13 +11,20 @@ pub const BUSY: u8 = MBM_BUSY;
 pub struct HookState {
     pub client: *mut mbm_client,
     pub link: *mut mbm_link,
-    pub master: *mut mbm_master,
+    pub line: *mut mbm_line,
+    pub node: *mut mbm_node,
+    /// Another node of the same line, without a request.
+    pub other: *mut mbm_node,
     pub server: *mut mbm_server,
     pub trace: *mut mbm_trace,
     pub unit: *mut mbm_unit,
     pub function_mask: *mut mbm_functionMask,
     pub request: *mut mbm_clientRequest,
     pub again: *mut mbm_clientRequest,
+    /// Two words that nodes share.
+    pub words: *mut u16,
+    /// What the hook `idle` calls when it is called next.
+    pub last_call: Option<unsafe fn(*mut mbm_line, *mut mbm_node, *mut mbm_node)>,
     pub received: Vec<u8>,
     pub now: u32,
     pub calls: u32,
@@ -31,13 +38,13 @@ pub unsafe fn state<'a>(context: *mut c_void) -> &'a mut HookState {
 /// Calls functions on each object, which the library must refuse.
 pub unsafe fn use_objects(context: *mut c_void) {
     unsafe {
-        let (client, link, master, server, trace) = {
+        let (client, link, line, server, trace) = {
             let state = state(context);
             state.calls += 1;
             (
                 state.client,
                 state.link,
-                state.master,
+                state.line,
                 state.server,
                 state.trace,
             )
@@ -53,11 +60,8 @@ pub unsafe fn use_objects(context: *mut c_void) {
             assert_eq!(mbm_client_reconnect(client, null()), BUSY);
             mbm_client_pollDelay(client);
         }
-        if !master.is_null() {
-            assert_eq!(mbm_master_poll(master), BUSY);
-            assert_eq!(mbm_master_setSlaveID(master, 9), BUSY);
-            assert_eq!(mbm_master_cancel(master), BUSY);
-            mbm_master_pollDelay(master);
+        if !line.is_null() {
+            use_line(context);
         }
         if !server.is_null() {
             assert_eq!(mbm_server_poll(server), BUSY);
@@ -69,6 +73,49 @@ pub unsafe fn use_objects(context: *mut c_void) {
             mbm_trace_flush(trace);
             mbm_trace_setFrameTimeout(trace, 10);
         }
+    }
+}
+
+/// Calls the functions of a line whose node has a request under way, and those of its nodes.
+unsafe fn use_line(context: *mut c_void) {
+    unsafe {
+        let (line, node, other) = {
+            let state = state(context);
+            (state.line, state.node, state.other)
+        };
+        let mut word = 0;
+        let port = port(context);
+        assert_eq!(mbm_line_setRetries(line, 9), BUSY);
+        assert_eq!(mbm_line_cancel(line), BUSY);
+        assert_eq!(mbm_line_used(line), BUSY);
+        assert_eq!(mbm_line_beginRtu(line, &port, null_mut(), 0), BUSY);
+        assert_eq!(mbm_line_getRetries(line), 0);
+        assert_eq!(mbm_node_poll(node), BUSY);
+        assert_eq!(mbm_node_status(node), BUSY);
+        assert_eq!(mbm_node_cancel(node), BUSY);
+        assert_eq!(mbm_node_readCoils(node, 0, 1), BUSY);
+        assert_eq!(mbm_node_pollDelay(node), 0);
+        let status = mbm_node_begin(node, line, 17, &mut word, 1, null_mut(), 0);
+        assert_eq!(status, BUSY);
+        // The words and the settings of the node are not the line's.
+        assert_eq!(mbm_node_setSlaveID(node, 17), MBM_OK);
+        assert_eq!(mbm_node_setResponseTimeout(node, 20), MBM_OK);
+        assert_eq!(mbm_node_setTransmitBuffer(node, 1, 7), MBM_OK);
+        assert_eq!(mbm_node_clearTransmitBuffer(node), MBM_OK);
+        assert_eq!(mbm_node_send(node, 5), MBM_OK);
+        assert_eq!(mbm_node_beginTransmission(node, 3), MBM_OK);
+        mbm_node_getResponseBuffer(node, 0);
+        mbm_node_receive(node);
+        // Nor is another node the line's, but its requests are refused.
+        let words = {
+            let state = state(context);
+            state.words
+        };
+        assert_eq!(mbm_node_begin(other, line, 3, words, 2, words, 2), MBM_OK);
+        assert_eq!(mbm_node_readCoils(other, 0, 1), BUSY);
+        assert_eq!(mbm_node_poll(other), MBM_OK);
+        assert_eq!(mbm_node_cancel(other), MBM_OK);
+        assert_eq!(mbm_node_pollDelay(other), u32::MAX);
     }
 }
 
@@ -113,12 +160,24 @@ pub unsafe extern "C" fn driver(context: *mut c_void) {
     unsafe { use_objects(context) }
 }
 
-unsafe extern "C" fn idle(context: *mut c_void, _master: *mut mbm_master) {
+unsafe extern "C" fn idle(context: *mut c_void, node: *mut mbm_node) {
     unsafe {
-        let master = state(context).master;
-        assert_eq!(mbm_master_readCoils(master, 0, 1), BUSY);
-        assert_eq!(mbm_master_setQuietTime(master, 1), MBM_OK);
-        mbm_master_poll(master);
+        let (line, other) = {
+            let state = state(context);
+            assert!(std::ptr::addr_eq(node, state.node));
+            (state.line, state.other)
+        };
+        assert_eq!(mbm_node_readCoils(node, 0, 1), BUSY);
+        assert_eq!(mbm_node_readCoils(other, 0, 1), BUSY);
+        assert_eq!(mbm_node_status(node), MBM_PENDING);
+        assert_eq!(mbm_line_setQuietTime(line, 1), MBM_OK);
+        assert_eq!(mbm_line_setFrame(line, null_mut(), 0), MBM_INVALID_ARGUMENT);
+        mbm_node_pollDelay(node);
+        mbm_node_poll(node);
+        let last = state(context).last_call.take();
+        if let Some(last) = last {
+            last(line, node, other);
+        }
     }
 }
 
@@ -175,13 +234,17 @@ pub fn new_state() -> *mut HookState {
     Box::into_raw(Box::new(HookState {
         client: null_mut(),
         link: null_mut(),
-        master: null_mut(),
+        line: null_mut(),
+        node: null_mut(),
+        other: null_mut(),
         server: null_mut(),
         trace: null_mut(),
         unit: null_mut(),
         function_mask: null_mut(),
         request: null_mut(),
         again: null_mut(),
+        words: null_mut(),
+        last_call: None,
         received: Vec::new(),
         now: 0,
         calls: 0,

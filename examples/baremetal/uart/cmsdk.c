@@ -24,7 +24,7 @@ void uart_start(void)
 #include "polled.h"
 
 /* The last byte may still be in the shift register, which this UART does not show. With an
- * RS-485 driver, mbm_master_setPostFlushHold adds the time of that byte. */
+ * RS-485 driver, mbm_line_setPostFlushHold adds the time of that byte. */
 uint8_t uart_flush(void *context)
 {
     (void)context;

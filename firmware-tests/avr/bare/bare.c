@@ -62,7 +62,8 @@ static uint32_t micros(void *context)
 static usart served = {&UCSR0A, &UDR0, 0}, asked = {&UCSR1A, &UDR1, 0};
 static mbm_server server = MBM_INIT;
 static mbm_unit unit = MBM_INIT;
-static mbm_master master = MBM_INIT;
+static mbm_line line = MBM_INIT;
+static mbm_node device = MBM_INIT;
 static uint8_t frame[MBM_MAX_FRAME], request[MBM_FRAME_BYTES(CELLS)];
 static uint16_t words[CELLS], replies[CELLS];
 static mbm_registerTable table = MBM_INIT;
@@ -103,8 +104,8 @@ int main(void)
     mbm_unit_serveHoldingRegisters(&unit, &table);
     mbm_server_beginRtu(&server, &serving, &unit, 1, frame, sizeof frame);
     mbm_server_setBaudRate(&server, 9600);
-    mbm_master_beginRtu(&master, 1, &asking);
-    mbm_master_setBuffers(&master, replies, CELLS, 0, 0, request, sizeof request);
+    mbm_line_beginRtu(&line, &asking, request, sizeof request);
+    mbm_node_begin(&device, &line, 1, replies, CELLS, 0, 0);
     for (;;) {
         uint8_t i;
 
@@ -114,8 +115,8 @@ int main(void)
         /* The response has been sent: reads three registers as the master, and serves the
          * status and values. */
         is_wanted = 0;
-        words[1] = mbm_master_readHoldingRegisters(&master, FIRST, COUNT);
+        words[1] = mbm_node_readHoldingRegisters(&device, FIRST, COUNT);
         for (i = 0; i < COUNT; i++)
-            words[2 + i] = mbm_master_getResponseBuffer(&master, i);
+            words[2 + i] = mbm_node_getResponseBuffer(&device, i);
     }
 }

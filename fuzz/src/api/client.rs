@@ -170,14 +170,14 @@ fn line(w: &World, client: *mut mbm_client) {
             assert!(connected <= 1);
         }
         choice => {
-            let master = w.masters.pick(w);
-            let spans = [span(client), span(master)];
-            refused_changes_nothing(w, &spans, "lend or takeBack", || match choice {
+            let line = w.lines.pick(w);
+            let spans = [span(client), span(line)];
+            refused_changes_nothing(w, &spans, "suspend or resume", || match choice {
                 2 => {
                     w.lenders.borrow_mut().push(client);
-                    call!(w, client, mbm_client_suspend(client, master))
+                    call!(w, client, mbm_client_suspend(client, line))
                 }
-                _ => call!(w, client, mbm_client_resume(client, master)),
+                _ => call!(w, client, mbm_client_resume(client, line)),
             });
         }
     }

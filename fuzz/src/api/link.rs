@@ -91,7 +91,7 @@ fn set(w: &World, link: *mut mbm_link) {
 /// Makes one call with a link or with its client.
 pub fn step(w: &World) {
     let (client, link) = pick(w);
-    // A master that was copied while it had a client's port may still use the port.
+    // A line that was copied while it had a client's port may still use the port.
     let lenders = w.lenders.borrow().clone();
     let lent = w
         .linked

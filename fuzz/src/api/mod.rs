@@ -13,9 +13,10 @@ mod frame;
 mod gateway;
 mod identification;
 mod life;
+mod line;
 mod link;
-mod master;
 mod memory;
+mod node;
 mod packet;
 mod plan;
 mod pool;
@@ -39,7 +40,8 @@ use world::World;
 /// Makes one step: calls with an object of one noun, a change of a port, or time.
 fn step(w: &World) {
     match w.byte() % 32 {
-        0..=4 => master::step(w),
+        0 | 1 => line::step(w),
+        2..=4 => node::step(w),
         5..=8 => client::step(w),
         9 | 10 => plan::step(w),
         11 | 12 => link::step(w),

@@ -2,44 +2,51 @@
 
 use super::memory::Memory;
 use mbm_c::*;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 /// Objects of one type, each in its own block of the heap.
-pub struct Pool<T>(RefCell<Vec<*mut T>>);
+pub struct Pool<T> {
+    all: RefCell<Vec<*mut T>>,
+    /// The last object that was copied, and its copy.
+    last_copy: Cell<Option<(*mut T, *mut T)>>,
+}
 
 impl<T> Pool<T> {
     pub const fn new() -> Self {
-        Pool(RefCell::new(Vec::new()))
+        Pool {
+            all: RefCell::new(Vec::new()),
+            last_copy: Cell::new(None),
+        }
     }
 
     /// All objects.
     pub fn all(&self) -> Vec<*mut T> {
-        self.0.borrow().clone()
+        self.all.borrow().clone()
     }
 
     /// One of the objects, a new zeroed one, a copy of one, or NULL.
     pub fn pick(&self, memory: &Memory) -> *mut T {
         let choice = memory.byte();
-        let count = self.0.borrow().len();
+        let count = self.all.borrow().len();
         match choice {
             0xF8.. => std::ptr::null_mut(),
             0xF4..0xF8 if count > 0 && count < 8 => self.copy(memory),
             0xF0..0xF4 if count < 6 => self.make(memory),
             _ if count == 0 => self.make(memory),
-            _ => self.0.borrow()[usize::from(choice) % count],
+            _ => self.all.borrow()[usize::from(choice) % count],
         }
     }
 
     /// Adds a zeroed object.
     pub fn make(&self, memory: &Memory) -> *mut T {
         let new = memory.zeroed::<T>();
-        self.0.borrow_mut().push(new);
+        self.all.borrow_mut().push(new);
         new
     }
 
     /// The newest object, or NULL.
     pub fn any(&self) -> *mut T {
-        self.0
+        self.all
             .borrow()
             .last()
             .copied()
@@ -48,22 +55,28 @@ impl<T> Pool<T> {
 
     /// Adds an object, up to 64.
     pub fn keep(&self, other: *mut T) {
-        let mut all = self.0.borrow_mut();
+        let mut all = self.all.borrow_mut();
         if all.len() < 64 {
             all.push(other);
         }
     }
 
+    /// The object that was copied since the last call, and its copy.
+    pub fn take_copy(&self) -> Option<(*mut T, *mut T)> {
+        self.last_copy.take()
+    }
+
     /// Adds a copy of one of the objects.
     fn copy(&self, memory: &Memory) -> *mut T {
         let from = {
-            let all = self.0.borrow();
+            let all = self.all.borrow();
             all[memory.below(all.len())]
         };
         let new = self.make(memory);
         memory.note(|| format!("memcpy({new:?}, {from:?}, {})", size_of::<T>()));
         // SAFETY: both blocks have this size.
         unsafe { std::ptr::copy_nonoverlapping(from, new, 1) };
+        self.last_copy.set(Some((from, new)));
         new
     }
 }

@@ -4,7 +4,7 @@ use super::check::call;
 use super::port::Port;
 use super::traffic;
 use super::world::{Grant, World};
-use mbm_c::{mbm_master, mbm_port};
+use mbm_c::{mbm_node, mbm_port};
 use std::ffi::c_void;
 
 /// Changes the behaviour of a port, most often to a good one.
@@ -44,16 +44,6 @@ pub fn port(w: &World, framing: u8) -> *const mbm_port {
         return call!(w, trace, mbm_trace_port(trace));
     }
     plain(w, framing)
-}
-
-/// The context with which the hooks of a port may be called.
-pub fn context(port: *const mbm_port, index: u8) -> *mut c_void {
-    // SAFETY: NULL or a port.
-    match unsafe { port.as_ref() } {
-        // A trace, or the index of a port.
-        Some(port) if port.context as usize >= 4 => port.context,
-        _ => usize::from(index % 4) as *mut c_void,
-    }
 }
 
 /// A port for an object of this framing; sometimes one that lacks a hook.
@@ -181,13 +171,10 @@ unsafe extern "C" fn transmission(context: *mut c_void) {
     enter(context, Grant::Nothing, 64);
 }
 
-unsafe extern "C" fn idle(context: *mut c_void, master: *mut mbm_master) {
+unsafe extern "C" fn idle(context: *mut c_void, node: *mut mbm_node) {
     let (w, _) = enter(context, Grant::All, 16);
-    assert!(
-        w.masters.all().contains(&master),
-        "`idle` gets an unknown master"
-    );
+    assert!(w.nodes.all().contains(&node), "`idle` gets an unknown node");
     w.inside(Grant::All, || {
-        call!(w, master, mbm_master_pollDelay(master));
+        call!(w, node, mbm_node_pollDelay(node));
     });
 }

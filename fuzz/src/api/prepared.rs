@@ -14,7 +14,7 @@ use mbm_c::*;
 pub fn prepare(w: &World) {
     let what = w.byte();
     if what & 1 == 0 {
-        master(w);
+        line(w, what >> 7);
     }
     if what & 2 == 0 {
         client(w, what >> 4);
@@ -37,17 +37,22 @@ pub fn prepare(w: &World) {
     }
 }
 
-fn master(w: &World) {
-    let master = w.masters.make(w);
+/// A line with one node, or with two that share their words.
+fn line(w: &World, more: u8) {
+    let line = w.lines.make(w);
     let port = ports::good(w, 0, MBM_FRAMING_RTU);
     let (response, transmit) = (w.noise(250).cast(), w.noise(246).cast());
     let frame = w.noise(256);
-    call!(w, master, mbm_master_beginRtu(master, 1, port));
-    call!(
-        w,
-        master,
-        mbm_master_setBuffers(master, response, 125, transmit, 123, frame, 256)
-    );
+    call!(w, line, mbm_line_beginRtu(line, port, frame, 256));
+    for unit in 1..=1 + more {
+        let node = w.nodes.make(w);
+        call!(
+            w,
+            node,
+            mbm_node_begin(node, line, unit, response, 125, transmit, 123)
+        );
+        w.set_line_of(node, line);
+    }
 }
 
 fn client(w: &World, framing: u8) {

@@ -5,6 +5,7 @@ use super::pool::{Pool, Records};
 use super::port::Port;
 use mbm_c::*;
 use std::cell::{Cell, RefCell};
+use std::collections::HashMap;
 use std::ops::Deref;
 use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
 
@@ -48,11 +49,13 @@ pub struct World {
     pub wild: bool,
     frames: RefCell<Vec<Frame>>,
     pub ports: [Port; 4],
-    pub masters: Pool<mbm_master>,
-    turn: Cell<*mut mbm_turn>,
+    pub lines: Pool<mbm_line>,
+    pub nodes: Pool<mbm_node>,
+    /// The line of each node that was begun.
+    line_of: RefCell<HashMap<*const u8, *mut mbm_line>>,
     pub clients: Pool<mbm_client>,
     pub plans: Pool<mbm_plan>,
-    /// Clients whose port a master uses, or used when it was copied.
+    /// Clients whose port a line uses, or used when it was copied.
     pub lenders: RefCell<Vec<*mut mbm_client>>,
     /// Clients with their links. They are not copied.
     pub linked: RefCell<Vec<(*mut mbm_client, *mut mbm_link)>>,
@@ -98,8 +101,9 @@ impl World {
             wild: seed & 3 == 3,
             frames: RefCell::default(),
             ports: std::array::from_fn(Port::new),
-            masters: Pool::new(),
-            turn: Cell::new(std::ptr::null_mut()),
+            lines: Pool::new(),
+            nodes: Pool::new(),
+            line_of: RefCell::default(),
             clients: Pool::new(),
             plans: Pool::new(),
             lenders: RefCell::default(),
@@ -134,22 +138,47 @@ impl World {
         self.is_used_up() || self.calls.get() >= MOST_CALLS
     }
 
-    /// The object through which masters take turns; sometimes NULL.
-    pub fn turn(&self, byte: u8) -> *mut mbm_turn {
-        if byte >= 0xF0 {
-            return std::ptr::null_mut();
-        }
-        if self.turn.get().is_null() {
-            self.turn.set(self.zeroed());
-        }
-        self.turn.get()
+    /// The line of a node; NULL if the node was not begun.
+    pub fn line_of(&self, node: *const mbm_node) -> *mut mbm_line {
+        self.line_of_object(node.cast())
     }
 
-    /// True if a hook is running that may do nothing with the object.
+    fn line_of_object(&self, object: *const u8) -> *mut mbm_line {
+        let lines = self.line_of.borrow();
+        lines.get(&object).copied().unwrap_or(std::ptr::null_mut())
+    }
+
+    /// The node on whose behalf the running hook was called, if there is one. Chosen by some of
+    /// the steps in hooks, which would rarely pick it.
+    pub fn calling_node(&self) -> Option<*mut mbm_node> {
+        if !self.is_inside() || self.random().is_multiple_of(2) {
+            return None;
+        }
+        let object = self.frames.borrow().last()?.object;
+        let mut nodes = self.nodes.all().into_iter();
+        nodes.find(|node| node.cast_const().cast() == object)
+    }
+
+    /// Notes that a node was begun on a line, or on none.
+    pub fn set_line_of(&self, node: *const mbm_node, line: *mut mbm_line) {
+        self.line_of.borrow_mut().insert(node.cast(), line);
+    }
+
+    /// True if a hook is running that may do nothing with the object. A call of a node keeps its
+    /// line, too.
     pub fn is_locked(&self, object: *const u8) -> bool {
         let frames = self.frames.borrow();
-        let mut own = frames.iter().filter(|frame| frame.object == object);
+        let mut own = frames.iter().filter(|frame| {
+            frame.object == object
+                || self.line_of_object(frame.object).cast_const().cast() == object
+        });
         !object.is_null() && own.any(|frame| frame.grant.get() == Grant::Nothing)
+    }
+
+    /// True if no call is running, or only such whose hooks may do everything.
+    pub fn is_free(&self) -> bool {
+        let frames = self.frames.borrow();
+        frames.iter().all(|frame| frame.grant.get() == Grant::All)
     }
 
     /// True if a hook is running.

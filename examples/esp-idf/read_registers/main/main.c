@@ -19,7 +19,7 @@ enum { FIRST = 100, COUNT = 2 };
 #define CONFIG_METER_DRIVER_PIN UART_PIN_NO_CHANGE
 #endif
 
-static mbm_espIdfLine line = {
+static mbm_espIdfLine serial = {
     .uart = (uart_port_t)CONFIG_METER_UART,
     .txPin = CONFIG_METER_TX_PIN,
     .rxPin = CONFIG_METER_RX_PIN,
@@ -29,7 +29,8 @@ static mbm_espIdfLine line = {
     .parity = UART_PARITY_EVEN,
 };
 static mbm_port port;
-static mbm_master master = MBM_INIT;
+static mbm_line line = MBM_INIT;
+static mbm_node meter = MBM_INIT;
 static uint16_t response[COUNT];
 static uint8_t frame[MBM_FRAME_BYTES(COUNT)];
 
@@ -37,13 +38,13 @@ void app_main(void)
 {
     uint8_t status;
 
-    ESP_ERROR_CHECK(mbm_espIdf_open(&line, &port));
-    mbm_master_setBuffers(&master, response, COUNT, NULL, 0, frame, sizeof frame);
-    mbm_master_beginRtu(&master, CONFIG_METER_UNIT, &port);
-    mbm_master_setBaudRate(&master, CONFIG_METER_BAUD);
-    mbm_master_setResponseTimeout(&master, 500); /* milliseconds */
+    ESP_ERROR_CHECK(mbm_espIdf_open(&serial, &port));
+    mbm_line_beginRtu(&line, &port, frame, sizeof frame);
+    mbm_line_setBaudRate(&line, CONFIG_METER_BAUD);
+    mbm_node_begin(&meter, &line, CONFIG_METER_UNIT, response, COUNT, NULL, 0);
+    mbm_node_setResponseTimeout(&meter, 500); /* milliseconds */
     for (;;) {
-        status = mbm_master_readHoldingRegisters(&master, FIRST, COUNT);
+        status = mbm_node_readHoldingRegisters(&meter, FIRST, COUNT);
         if (status == MBM_OK)
             printf("registers %d and %d: %u %u\n", FIRST, FIRST + 1, response[0], response[1]);
         else

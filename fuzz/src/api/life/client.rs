@@ -283,7 +283,7 @@ pub fn lend(life: &Life, at: usize) {
     let client = line.client.get();
     let choice = usize::from(w.byte()) % 3;
     let borrower = (choice < 2).then_some(choice);
-    let master = borrower.map_or(null_mut(), |choice| life.masters[choice].master);
+    let own = borrower.map_or(null_mut(), |choice| life.masters[choice].line);
     if let Some(index) = borrower {
         // One line for each master at a time.
         if life.masters[index].pending.get().is_some()
@@ -295,20 +295,20 @@ pub fn lend(life: &Life, at: usize) {
             return;
         }
         let (words, frame): (*mut u16, _) = (w.noise(64).cast(), w.noise(256));
-        call!(
-            w,
-            master,
-            mbm_master_setBuffers(master, words, 16, words.wrapping_add(16), 16, frame, 256)
-        );
-        call!(w, master, mbm_master_setBlocking(master, 0));
-        call!(w, master, mbm_master_setSlaveID(master, 1));
-        call!(w, master, mbm_master_setResponseTimeout(master, 200));
+        let status = call!(w, own, mbm_line_setFrame(own, frame, 256));
+        assert_eq!(status, OK, "a line without a request");
+        for node in life.masters[index].nodes {
+            let (read, write) = (words, words.wrapping_add(16));
+            call!(w, node, mbm_node_begin(node, own, 1, read, 16, write, 16));
+            call!(w, node, mbm_node_setBlocking(node, 0));
+            call!(w, node, mbm_node_setResponseTimeout(node, 200));
+        }
     }
-    if call!(w, client, mbm_client_suspend(client, master)) == OK {
+    if call!(w, client, mbm_client_suspend(client, own)) == OK {
         line.is_suspended.set(true);
         line.borrower.set(borrower);
         if let Some(index) = borrower {
-            life.masters[index].line.set(at);
+            life.masters[index].at.set(at);
         }
     }
 }
@@ -320,12 +320,12 @@ pub fn take_back(life: &Life, at: usize) {
     let client = line.client.get();
     let choice = usize::from(w.byte()) % 3;
     let wrong = (choice < 2).then_some(choice);
-    let pointer = |master: Option<usize>| master.map_or(null_mut(), |at| life.masters[at].master);
+    let pointer = |master: Option<usize>| master.map_or(null_mut(), |at| life.masters[at].line);
     if wrong != line.borrower.get() || !line.is_suspended.get() {
-        let master = pointer(wrong);
+        let other = pointer(wrong);
         let before = bytes(span(client));
-        let status = call!(w, client, mbm_client_resume(client, master));
-        assert_eq!(status, MBM_INVALID_ARGUMENT, "resume with another master");
+        let status = call!(w, client, mbm_client_resume(client, other));
+        assert_eq!(status, MBM_INVALID_ARGUMENT, "resume with another line");
         assert!(
             bytes(span(client)) == before,
             "resume was refused and changed the client"
@@ -338,8 +338,8 @@ pub fn take_back(life: &Life, at: usize) {
         .borrower
         .get()
         .is_some_and(|at| life.masters[at].pending.get().is_some());
-    let master = pointer(line.borrower.get());
-    let status = call!(w, client, mbm_client_resume(client, master));
+    let own = pointer(line.borrower.get());
+    let status = call!(w, client, mbm_client_resume(client, own));
     assert_eq!(status, if is_pending { MBM_BUSY } else { OK }, "resume");
     if status == OK {
         line.is_suspended.set(false);
@@ -347,42 +347,60 @@ pub fn take_back(life: &Life, at: usize) {
     }
 }
 
-/// Makes a request with a master, whether it has a line or not.
+/// Makes a request with a node of a master, whether the master has a port or not.
 pub fn master_request(life: &Life) {
     let w = &life.w;
     let index = usize::from(w.byte()) % life.masters.len();
     let own: &Master = &life.masters[index];
-    let has_line = life
+    let has_port = life
         .lines
         .iter()
         .any(|line| line.borrower.get() == Some(index));
-    let master = own.master;
+    let asker = usize::from(w.byte() & 1);
+    let node = own.nodes[asker];
     if own.pending.get().is_some() {
+        let status = call!(w, node, mbm_node_readHoldingRegisters(node, 0, 2));
+        assert_eq!(status, MBM_BUSY, "a second request on a line");
         if w.byte() & 3 == 0 {
-            call!(w, master, mbm_master_cancel(master));
-            let (id, _) = own.pending.take().expect("a pending request");
-            life.ends(id);
+            cancel_master(life, own);
         }
         return;
     }
     let id = life.id();
     let status = match w.byte() & 1 {
-        0 => call!(w, master, mbm_master_readHoldingRegisters(master, id, 2)),
-        _ => call!(w, master, mbm_master_writeSingleRegister(master, id, id)),
+        0 => call!(w, node, mbm_node_readHoldingRegisters(node, id, 2)),
+        _ => call!(w, node, mbm_node_writeSingleRegister(node, id, id)),
     };
-    assert_eq!(status == PENDING, has_line, "a master's request: {status}");
+    assert_eq!(status == PENDING, has_port, "a master's request: {status}");
     if status == PENDING {
         own.pending.set(Some((id, life.now.get())));
+        own.asker.set(asker);
         life.begins(id);
     }
+}
+
+/// Cancels the request that is pending, with the node or with the line.
+fn cancel_master(life: &Life, own: &Master) {
+    let w = &life.w;
+    let (line, node) = (own.line, own.nodes[own.asker.get()]);
+    match w.byte() & 1 {
+        0 => call!(w, node, mbm_node_cancel(node)),
+        _ => call!(w, line, mbm_line_cancel(line)),
+    };
+    let status = call!(w, node, mbm_node_poll(node));
+    assert_eq!(status, MBM_CANCELLED, "a request that was cancelled");
+    let (id, _) = own.pending.take().expect("a pending request");
+    life.ends(id);
 }
 
 pub fn poll_master(life: &Life, own: &Master) {
     let Some((id, _)) = own.pending.get() else {
         return;
     };
-    let master = own.master;
-    if call!(&life.w, master, mbm_master_poll(master)) != PENDING {
+    let [asker, other] = [own.asker.get(), 1 - own.asker.get()].map(|index| own.nodes[index]);
+    let status = call!(&life.w, other, mbm_node_poll(other));
+    assert!(status != PENDING, "two nodes have a request under way");
+    if call!(&life.w, asker, mbm_node_poll(asker)) != PENDING {
         own.pending.set(None);
         life.ends(id);
     }

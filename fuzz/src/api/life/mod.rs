@@ -59,7 +59,8 @@ fn pass(life: &Life) {
     }
     for master in &life.masters {
         if master.pending.get().is_some() {
-            let own = call!(w, master.master, mbm_master_pollDelay(master.master));
+            let node = master.nodes[master.asker.get()];
+            let own = call!(w, node, mbm_node_pollDelay(node));
             delay = delay.min(own.into());
         }
     }
@@ -113,7 +114,7 @@ fn check(life: &Life) {
     }
     for master in &life.masters {
         if let Some((id, since)) = master.pending.get() {
-            let line = &life.lines[master.line.get()];
+            let line = &life.lines[master.at.get()];
             let lasts = life.now.get() - since;
             assert!(
                 lasts <= life.bound(line),

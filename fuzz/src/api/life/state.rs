@@ -39,11 +39,15 @@ pub struct Line {
     pub awake: Cell<u64>,
 }
 
-/// A master, and its pending request.
+/// A master that uses the port of a client: a line with two nodes, and its pending request.
 pub struct Master {
-    pub master: *mut mbm_master,
+    pub line: *mut mbm_line,
+    pub nodes: [*mut mbm_node; 2],
     pub pending: Cell<Option<(u16, u64)>>,
-    pub line: Cell<usize>,
+    /// The index of the node whose request is pending.
+    pub asker: Cell<usize>,
+    /// The index of the simulated line.
+    pub at: Cell<usize>,
 }
 
 /// A request of the program.
@@ -147,9 +151,11 @@ impl Life {
             }
         });
         let masters = (0..2).map(|_| Master {
-            master: w.zeroed(),
+            line: w.zeroed(),
+            nodes: [w.zeroed(), w.zeroed()],
             pending: Cell::new(None),
-            line: Cell::new(0),
+            asker: Cell::new(0),
+            at: Cell::new(0),
         });
         let jobs = (0..JOBS).map(|_| Job {
             request: w.zeroed(),

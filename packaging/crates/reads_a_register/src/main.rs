@@ -41,7 +41,7 @@ impl Port for Line {
 fn main() {
     let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
     let mut master = Master::new(17, Line::default(), buffers);
-    master.set_baud_rate(19200);
+    master.settings().set_baud_rate(19200);
     assert_eq!(master.read_holding_registers(2, 1), Status::PENDING);
     while master.poll() == Status::PENDING {}
     assert_eq!(master.status(), Status::OK);

@@ -77,7 +77,8 @@ static uint32_t clock_micros(void *context)
 }
 
 static const mbm_port port = {.read = uart_read, .write = uart_write, .micros = clock_micros};
-static mbm_master master = MBM_INIT;
+static mbm_line line = MBM_INIT;
+static mbm_node meter = MBM_INIT;
 static uint16_t response[COUNT];
 static uint8_t frame[MBM_FRAME_BYTES(COUNT)];
 
@@ -85,10 +86,10 @@ int main(void)
 {
     uint8_t status;
 
-    mbm_master_setBuffers(&master, response, COUNT, NULL, 0, frame, sizeof frame);
-    mbm_master_beginRtu(&master, 17, &port);
-    mbm_master_setBaudRate(&master, BAUD);
-    status = mbm_master_readHoldingRegisters(&master, FIRST, COUNT);
+    mbm_line_beginRtu(&line, &port, frame, sizeof frame);
+    mbm_line_setBaudRate(&line, BAUD);
+    mbm_node_begin(&meter, &line, 17, response, COUNT, NULL, 0);
+    status = mbm_node_readHoldingRegisters(&meter, FIRST, COUNT);
     if (status != MBM_OK) {
         print(mbm_status_text(status));
         return 1;
@@ -97,7 +98,7 @@ int main(void)
         print("register ");
         print_number((uint16_t)(FIRST + i));
         print(": ");
-        print_number(mbm_master_getResponseBuffer(&master, i));
+        print_number(mbm_node_getResponseBuffer(&meter, i));
         print("\n");
     }
     return 0;

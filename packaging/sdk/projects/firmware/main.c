@@ -5,7 +5,8 @@
 #include "mbm.h"
 
 /* All memory is the program's own: mbm allocates nothing. */
-static mbm_master master = MBM_INIT;
+static mbm_line line = MBM_INIT;
+static mbm_node meter = MBM_INIT;
 static uint16_t response[1];
 static uint8_t frame[MBM_FRAME_BYTES(1)];
 
@@ -27,11 +28,11 @@ int main(void)
 
     uart_start();
     clock_start();
-    mbm_master_setBuffers(&master, response, 1, 0, 0, frame, sizeof frame);
-    mbm_master_beginRtu(&master, 17, &port);
-    mbm_master_setBaudRate(&master, BAUD);
+    mbm_line_beginRtu(&line, &port, frame, sizeof frame);
+    mbm_line_setBaudRate(&line, BAUD);
+    mbm_node_begin(&meter, &line, 17, response, 1, 0, 0);
 
-    status = mbm_master_readHoldingRegisters(&master, 100, 1);
+    status = mbm_node_readHoldingRegisters(&meter, 100, 1);
     if (status == MBM_OK) {
         console_print("register 100: ");
         print_hexadecimal(response[0]);

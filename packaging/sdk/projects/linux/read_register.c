@@ -8,7 +8,8 @@
 #include <stdio.h>
 
 /* All memory is the program's own: mbm allocates nothing. */
-static mbm_master master = MBM_INIT;
+static mbm_line line = MBM_INIT;
+static mbm_node meter = MBM_INIT;
 static uint16_t response[1];
 static uint8_t frame[MBM_FRAME_BYTES(1)];
 
@@ -23,11 +24,11 @@ int main(int argc, char **argv)
         return 1;
     }
     port = mbm_tty_port(&tty);
-    mbm_master_setBuffers(&master, response, 1, NULL, 0, frame, sizeof frame);
-    mbm_master_beginRtu(&master, 17, &port);
-    mbm_master_setBaudRate(&master, 19200);
+    mbm_line_beginRtu(&line, &port, frame, sizeof frame);
+    mbm_line_setBaudRate(&line, 19200);
+    mbm_node_begin(&meter, &line, 17, response, 1, NULL, 0);
 
-    status = mbm_master_readHoldingRegisters(&master, 100, 1);
+    status = mbm_node_readHoldingRegisters(&meter, 100, 1);
     if (status == MBM_OK)
         printf("register 100: 0x%04X\n", response[0]);
     else

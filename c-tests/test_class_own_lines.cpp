@@ -1,14 +1,15 @@
-/* A board with as little RAM as an Uno, and objects that have a frame buffer each. */
+/* A board with as little RAM as an Uno, and objects that have a line each. */
 #define SHIM_UARTS 1
 #define RAMEND 0x08FF
-#define MODBUSMASTER_OWN_FRAMES
+#define MODBUSMASTER_OWN_LINES
 #include "wire.h"
 
 static HardwareSerial other_line;
 
-static void objects_have_a_frame_buffer_each(void **)
+static void objects_have_a_line_each(void **)
 {
-    assert_in_range(sizeof(ModbusMaster), 2 * (125 + 123) + sizeof(mbm_master) + 255, 1200);
+    assert_in_range(sizeof(ModbusMaster),
+                    2 * (125 + 123) + sizeof(mbm_line) + sizeof(mbm_node) + 255, 1200);
 }
 
 static void two_objects_have_a_request_under_way_at_the_same_time(void **)
@@ -36,9 +37,9 @@ static void two_objects_have_a_request_under_way_at_the_same_time(void **)
 int main()
 {
     const struct CMUnitTest tests[] = {
-        TEST(objects_have_a_frame_buffer_each),
+        TEST(objects_have_a_line_each),
         TEST(two_objects_have_a_request_under_way_at_the_same_time),
     };
-    return cmocka_run_group_tests_name("ModbusMaster with frame buffers on a small board", tests,
-                                       nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusMaster with lines on a small board", tests, nullptr,
+                                       nullptr);
 }

@@ -1,6 +1,6 @@
 //! The ten functions, and those of them that use the queue of words to send.
 
-use super::{call, mbm_master, request};
+use super::{call, mbm_node, request};
 use mbm::error::Status;
 use mbm::pdu::function_spec::FunctionSpec;
 use mbm::pdu::master_request::MasterSpec;
@@ -10,9 +10,9 @@ use mbm::pdu::master_request::MasterSpec;
 ///
 /// All functions that make a request behave as follows. In blocking mode they return when
 /// the request has ended. In non-blocking mode they return MBM_PENDING at once, and you call
-/// mbm_master_poll until the request has ended.
+/// mbm_node_poll until the request has ended.
 ///
-/// They empty the queue of mbm_master_send, and mbm_master_receive starts again at the first
+/// They empty the queue of mbm_node_send, and mbm_node_receive starts again at the first
 /// word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or MBM_INVALID_ARGUMENT. The
 /// response words change only on success. The transmit words do not change, except that 06
 /// and 16 store their arguments there.
@@ -21,7 +21,7 @@ use mbm::pdu::master_request::MasterSpec;
 /// standard forbids or addresses beyond 65535. The status is then the exception with which a
 /// device would answer.
 ///
-/// @param master    the object
+/// @param node  the object
 /// @param address   the first coil, 0 to 65535, as on the wire
 /// @param quantity  the number of coils, 1 to 2000
 /// @return MBM_OK, or an exception of the device (0x01 to 0x7F), or
@@ -31,15 +31,15 @@ use mbm::pdu::master_request::MasterSpec;
 ///         MBM_BROADCAST_NOT_ALLOWED, MBM_BUSY, MBM_CANCELLED,
 ///         MBM_NOT_INITIALISED, MBM_INVALID_ARGUMENT
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_readCoils(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_readCoils(
+    node: *mut mbm_node,
     address: u16,
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         call(
-            master,
+            node,
             address,
             quantity,
             MasterSpec::new(FunctionSpec::READ_COILS),
@@ -50,20 +50,20 @@ pub unsafe extern "C" fn mbm_master_readCoils(
 /// Function 02: reads discrete inputs into the response words, 16 in each word. The first
 /// input is the lowest bit; the last word is padded with zeros (V1.1b3, 6.2).
 ///
-/// @param master    the object
+/// @param node  the object
 /// @param address   the first input, 0 to 65535, as on the wire
 /// @param quantity  the number of inputs, 1 to 2000
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_readDiscreteInputs(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_readDiscreteInputs(
+    node: *mut mbm_node,
     address: u16,
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         call(
-            master,
+            node,
             address,
             quantity,
             MasterSpec::new(FunctionSpec::READ_DISCRETE_INPUTS),
@@ -73,20 +73,20 @@ pub unsafe extern "C" fn mbm_master_readDiscreteInputs(
 
 /// Function 03: reads holding registers into the response words (V1.1b3, 6.3).
 ///
-/// @param master    the object
+/// @param node  the object
 /// @param address   the first register, 0 to 65535, as on the wire
 /// @param quantity  the number of registers, 1 to 125
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_readHoldingRegisters(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_readHoldingRegisters(
+    node: *mut mbm_node,
     address: u16,
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         call(
-            master,
+            node,
             address,
             quantity,
             MasterSpec::new(FunctionSpec::READ_HOLDING_REGISTERS),
@@ -96,20 +96,20 @@ pub unsafe extern "C" fn mbm_master_readHoldingRegisters(
 
 /// Function 04: reads input registers into the response words (V1.1b3, 6.4).
 ///
-/// @param master    the object
+/// @param node  the object
 /// @param address   the first register, 0 to 65535, as on the wire
 /// @param quantity  the number of registers, 1 to 125
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_readInputRegisters(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_readInputRegisters(
+    node: *mut mbm_node,
     address: u16,
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         call(
-            master,
+            node,
             address,
             quantity,
             MasterSpec::new(FunctionSpec::READ_INPUT_REGISTERS),
@@ -119,40 +119,40 @@ pub unsafe extern "C" fn mbm_master_readInputRegisters(
 
 /// Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
 ///
-/// @param master   the object
+/// @param node  the object
 /// @param address  the coil, 0 to 65535; becomes the write address
 /// @param state    0 is off, any other value is on
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_writeSingleCoil(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_writeSingleCoil(
+    node: *mut mbm_node,
     address: u16,
     state: u8,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        request(master, |master| {
-            master.write_single_coil(address, state.into())
+        request(node, |node, line| {
+            node.write_single_coil(line, address, state.into())
         })
     }
 }
 
 /// Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
 ///
-/// @param master   the object
+/// @param node  the object
 /// @param address  the register, 0 to 65535; becomes the write address
 /// @param value    its value; also becomes transmit word 0
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_writeSingleRegister(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_writeSingleRegister(
+    node: *mut mbm_node,
     address: u16,
     value: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        request(master, |master| {
-            master.write_single_register(address, value)
+        request(node, |node, line| {
+            node.write_single_register(line, address, value)
         })
     }
 }
@@ -160,20 +160,20 @@ pub unsafe extern "C" fn mbm_master_writeSingleRegister(
 /// Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
 /// the lowest bit (V1.1b3, 6.11). With unit 0 it is a broadcast.
 ///
-/// @param master    the object
+/// @param node  the object
 /// @param address   the first coil, 0 to 65535; becomes the write address
 /// @param quantity  the number of coils, 1 to 1968, and not more than the transmit words hold
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_writeMultipleCoils(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_writeMultipleCoils(
+    node: *mut mbm_node,
     address: u16,
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         call(
-            master,
+            node,
             address,
             quantity,
             MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_COILS),
@@ -182,33 +182,33 @@ pub unsafe extern "C" fn mbm_master_writeMultipleCoils(
 }
 
 /// Function 0F: writes the queued bits to coils, starting at the last write address. Call
-/// mbm_master_beginTransmission and mbm_master_sendBit before.
+/// mbm_node_beginTransmission and mbm_node_sendBit before.
 ///
-/// @param master  the object
-/// @return a status; see mbm_master_readCoils
+/// @param node  the object
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_writeQueuedCoils(master: *mut mbm_master) -> u8 {
+pub unsafe extern "C" fn mbm_node_writeQueuedCoils(node: *mut mbm_node) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { request(master, |master| master.write_queued_coils()) }
+    unsafe { request(node, |node, line| node.write_queued_coils(line)) }
 }
 
 /// Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
 /// With unit 0 it is a broadcast.
 ///
-/// @param master    the object
+/// @param node  the object
 /// @param address   the first register, 0 to 65535; becomes the write address
 /// @param quantity  the number of registers, 1 to 123, and not more than the transmit words
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_writeMultipleRegisters(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_writeMultipleRegisters(
+    node: *mut mbm_node,
     address: u16,
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         call(
-            master,
+            node,
             address,
             quantity,
             MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_REGISTERS),
@@ -217,36 +217,36 @@ pub unsafe extern "C" fn mbm_master_writeMultipleRegisters(
 }
 
 /// Function 10: writes the queued complete words to registers, starting at the last write
-/// address. Call mbm_master_beginTransmission and mbm_master_send before.
+/// address. Call mbm_node_beginTransmission and mbm_node_send before.
 ///
-/// @param master  the object
-/// @return a status; see mbm_master_readCoils
+/// @param node  the object
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_writeQueuedRegisters(master: *mut mbm_master) -> u8 {
+pub unsafe extern "C" fn mbm_node_writeQueuedRegisters(node: *mut mbm_node) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { request(master, |master| master.write_queued_registers()) }
+    unsafe { request(node, |node, line| node.write_queued_registers(line)) }
 }
 
 /// Function 16: the device sets a register to
 /// (register AND andMask) OR (orMask AND NOT andMask) (V1.1b3, 6.16).
 /// With unit 0 it is a broadcast.
 ///
-/// @param master   the object
+/// @param node  the object
 /// @param address  the register, 0 to 65535; becomes the write address
 /// @param andMask  1 for each bit of the register to keep; also becomes transmit word 0
 /// @param orMask   the new value of the bits that are not kept; also becomes transmit word 1
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_maskWriteRegister(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_maskWriteRegister(
+    node: *mut mbm_node,
     address: u16,
     andMask: u16,
     orMask: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        request(master, |master| {
-            master.mask_write_register(address, andMask, orMask)
+        request(node, |node, line| {
+            node.mask_write_register(line, address, andMask, orMask)
         })
     }
 }
@@ -254,17 +254,17 @@ pub unsafe extern "C" fn mbm_master_maskWriteRegister(
 /// Function 17: the device writes the transmit words to registers first. Then it reads
 /// registers, which arrive in the response words. Both in one request (V1.1b3, 6.17).
 ///
-/// @param master         the object
+/// @param node  the object
 /// @param readAddress    the first register to read, 0 to 65535
 /// @param readQuantity   the number of registers to read, 1 to 125
 /// @param writeAddress   the first register to write, 0 to 65535; becomes the write
 ///                       address
 /// @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
 ///                       transmit words
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_readWriteMultipleRegisters(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_readWriteMultipleRegisters(
+    node: *mut mbm_node,
     readAddress: u16,
     readQuantity: u16,
     writeAddress: u16,
@@ -272,57 +272,53 @@ pub unsafe extern "C" fn mbm_master_readWriteMultipleRegisters(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        request(master, |master| {
-            master.read_write_multiple_registers(
-                readAddress,
-                readQuantity,
-                writeAddress,
-                writeQuantity,
-            )
+        request(node, |node, line| {
+            let (read, write) = ((readAddress, readQuantity), (writeAddress, writeQuantity));
+            node.read_write_multiple_registers(line, read, write)
         })
     }
 }
 
-/// Function 17: as mbm_master_readWriteMultipleRegisters, but writes the queued complete
+/// Function 17: as mbm_node_readWriteMultipleRegisters, but writes the queued complete
 /// words, starting at the last write address.
 ///
-/// @param master        the object
+/// @param node  the object
 /// @param readAddress   the first register to read, 0 to 65535
 /// @param readQuantity  the number of registers to read, 1 to 125
-/// @return a status; see mbm_master_readCoils
+/// @return a status; see mbm_node_readCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_readWriteQueuedRegisters(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_readWriteQueuedRegisters(
+    node: *mut mbm_node,
     readAddress: u16,
     readQuantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        request(master, |master| {
-            master.read_write_queued_registers(readAddress, readQuantity)
+        request(node, |node, line| {
+            node.read_write_queued_registers(line, (readAddress, readQuantity))
         })
     }
 }
 
-/// Reads holding registers. mbm_master_receive then returns them one after the other.
+/// Reads holding registers. mbm_node_receive then returns them one after the other.
 ///
-/// @param master    the object
+/// @param node  the object
 /// @param address   the first register, 0 to 65535
 /// @param quantity  the number of registers, 1 to 125
-/// @return the number of words that mbm_master_receive will return; 0 if the request failed
-///         (mbm_master_status returns why), if another request is under way, and in
+/// @return the number of words that mbm_node_receive will return; 0 if the request failed
+///         (mbm_node_status returns why), if another request is under way, and in
 ///         non-blocking mode
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_requestFrom(
-    master: *mut mbm_master,
+pub unsafe extern "C" fn mbm_node_requestFrom(
+    node: *mut mbm_node,
     address: u16,
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        if mbm_master_readHoldingRegisters(master, address, quantity) != Status::OK.code() {
+        if mbm_node_readHoldingRegisters(node, address, quantity) != Status::OK.code() {
             return 0;
         }
-        super::mbm_master_available(master)
+        super::mbm_node_available(node)
     }
 }

@@ -1,0 +1,234 @@
+//! The settings of a line, and who else uses it.
+
+use super::{mbm_line, with_hooks};
+use crate::pointers::{check, with};
+use crate::storage::mbm_counters;
+use mbm::engine::Setting;
+use mbm::error::Status;
+use mbm::port::Port;
+use mbm::time::millis;
+
+/// Makes a change if the archive contains the code for it; otherwise refuses it.
+#[inline(always)]
+fn if_built_in(built_in: bool, change: impl FnOnce()) -> Status {
+    if built_in {
+        change();
+        Status::OK
+    } else {
+        Status::INVALID_ARGUMENT
+    }
+}
+
+/// Sets the baud rate from which the master computes the gap before a request (t3.5, serial
+/// line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure the
+/// serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
+///
+/// @param line  the object
+/// @param baud    bits per second; 0 (the default): unknown
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_setBaudRate(line: *mut mbm_line, baud: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(line, |line| {
+            line.settings.set_baud_rate(baud);
+            Status::OK
+        })
+    }
+}
+
+/// Sets the silence before a request, instead of t3.5. Use 0 if no device on the line needs
+/// the gap, and more than t3.5 for devices that need longer before they can receive again.
+/// A later call of mbm_line_setBaudRate sets it back to t3.5.
+///
+/// @param line  the object
+/// @param gapUs         microseconds from the last byte received or sent; a value above 2^31
+///                      (36 minutes) means 2^31
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_setGap(line: *mut mbm_line, gapUs: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(line, |line| {
+            line.settings.set_gap(gapUs);
+            Status::OK
+        })
+    }
+}
+
+/// Sets the turnaround delay: how long the master waits after a broadcast, which no device
+/// answers (serial line guide V1.02, 2.4.1).
+///
+/// @param line  the object
+/// @param delayMs       milliseconds, 0 to 65535; the default is 100
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_setTurnaroundDelay(line: *mut mbm_line, delayMs: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(line, |line| {
+            let Ok(delay) = u16::try_from(delayMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            line.settings.turnaround_delay = Setting::new(millis(delay));
+            Status::OK
+        })
+    }
+}
+
+/// Sets the quiet time. It prevents that the master accepts a late reply as the reply to a
+/// later request. In RTU the two cannot be distinguished if unit, function and length are the
+/// same, or if the late reply is an exception to the same function.
+///
+/// After a request without a right reply, the master does two things. It waits for the quiet
+/// time before it sends the next request, and discards bytes that arrive meanwhile. Then it
+/// holds the next reply of that unit, until no byte has arrived for the response timeout; after
+/// MBM_INVALID_CRC for the quiet time, because the damaged reply is not late. A second reply
+/// replaces the held one, because a device answers in order. If the second reply is damaged,
+/// the request fails. A right reply that arrives before a request is sent shows that replies
+/// are late; the next reply is then held for the response timeout.
+///
+/// So a device that answers in order and within the response timeout never gives the data of
+/// another request, whatever its usual latency and however late one of its replies was. The
+/// request after a timeout ends one response timeout after the last reply that arrives, and at
+/// the latest three response timeouts after it was sent; all others take no longer. A wrong
+/// reading remains possible if the device takes longer than the response timeout for two
+/// requests in a row.
+///
+/// With a quiet time of 0 the master waits and holds nothing: a reply that is later than the
+/// response timeout may be taken for the reply to the next request, and so may all that
+/// follow.
+///
+/// @param line  the object
+/// @param quietMs       milliseconds, 0 to 65535; the default is 100
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_setQuietTime(line: *mut mbm_line, quietMs: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(line, |line| {
+            let Ok(quiet) = u16::try_from(quietMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            line.settings.quiet_time = Setting::new(millis(quiet));
+            Status::OK
+        })
+    }
+}
+
+/// Sets how often the master repeats a request whose reply is missing, damaged or malformed.
+/// It does not repeat a request that was answered with an exception.
+///
+/// @param line  the object
+/// @param retries  0 to 255; the default is 0
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_setRetries(line: *mut mbm_line, retries: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(line, |line| {
+            if_built_in(cfg!(feature = "retries") || retries == 0, || {
+                line.settings.retries = retries;
+            })
+        })
+    }
+}
+
+/// Switches echo discarding on or off. Switch it on if the receiver also receives what the
+/// driver sends: then the master discards the copy of each request that arrives before the
+/// reply.
+///
+/// @param line  the object
+/// @param on      0 (the default) or 1
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_setEchoDiscard(line: *mut mbm_line, on: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(line, |line| {
+            if_built_in(cfg!(feature = "echo") || on == 0, || {
+                line.settings.echo_discard = on != 0;
+            })
+        })
+    }
+}
+
+/// Sets how long the driver stays on after the port's flush, for platforms whose flush
+/// returns before the last bit was sent.
+///
+/// @param line  the object
+/// @param characters  the time in characters at the baud rate of mbm_line_setBaudRate
+///                    (without one, at 9600); the default is 0
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_setPostFlushHold(line: *mut mbm_line, characters: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(line, |line| {
+            if_built_in(cfg!(feature = "hold") || characters == 0, || {
+                line.settings.post_flush_hold = characters;
+            })
+        })
+    }
+}
+
+/// Sets your storage for counters, in which the master counts from now on. You may read and
+/// zero the counters at any time, but not from an interrupt.
+///
+/// @param line  the object
+/// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_setCounters(
+    line: *mut mbm_line,
+    counters: *mut mbm_counters,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(line, |line| {
+            line.storage.counters = counters;
+            line.set_counting();
+            Status::OK
+        })
+    }
+}
+
+/// Reports when another user of the wire, for example another object, used it last.
+/// The gap before the next request counts from that time. A time before the last use that
+/// the object knows changes nothing.
+///
+/// @param line  the object
+/// @param timeUs        the time in microseconds on the clock of the object's port, at most
+///                      2^31 microseconds (36 minutes) ago
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_usedAt(line: *mut mbm_line, timeUs: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(line, |line| {
+            line.line_used_at(timeUs);
+            Status::OK
+        })
+    }
+}
+
+/// Reports that another user of the wire has just used it: as mbm_line_usedAt with the
+/// present time.
+///
+/// @param line  the object
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_line_used(line: *mut mbm_line) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let status = check(line);
+        if status == Status::OK {
+            with_hooks(line, |core| {
+                if core.port.is_ready() {
+                    core.line_used();
+                }
+            });
+        }
+        status.code()
+    }
+}

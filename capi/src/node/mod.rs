@@ -1,0 +1,368 @@
+//! `mbm_node_*`: a device on a line, for C.
+
+pub(crate) mod object;
+mod requests;
+mod settings;
+mod values;
+mod words;
+
+pub use object::*;
+pub use requests::*;
+pub use settings::*;
+pub use values::*;
+pub use words::*;
+
+use super::line::{self, mbm_line};
+use super::pointers::{self, CObject};
+use super::port::PortRef;
+use super::storage::{LineStorage, NodeWords};
+use mbm::engine::Observer;
+use mbm::error::Status;
+use mbm::node::Node;
+use mbm::pdu::master_request::{MasterRequest, MasterSpec};
+use mbm::port::Port;
+use mbm::FIRMWARE;
+
+/// The fields in the storage of an `mbm_node`.
+#[repr(C)]
+pub(super) struct Object {
+    mark: u8,
+    non_blocking: bool,
+    core: Node,
+    line: *mut mbm_line,
+    words: NodeWords,
+    /// What the line's engine gets: a function if deviating replies are accepted.
+    observer: Option<Observer<PortRef, LineStorage, MasterRequest>>,
+    /// The order of words in values: one of `MBM_ORDER_...`; 0 if it was never set.
+    order: u8,
+}
+
+const _: () = {
+    let space = size_of::<mbm_node>();
+    let used = size_of::<Object>();
+    assert!(align_of::<mbm_node>() >= align_of::<Object>());
+    assert!(used <= space);
+    // Hiding the fields may waste 5 % where RAM is scarce.
+    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
+};
+
+// SAFETY: the mark is a field of its own. No function changes it while the object is used: what a
+// hook may not do meanwhile, the mark of the line refuses.
+unsafe impl CObject for mbm_node {
+    type Access<'a> = &'a mut Object;
+
+    unsafe fn mark(node: *const mbm_node) -> *mut u8 {
+        // SAFETY: as the caller promises; every object is writable storage.
+        unsafe { &raw mut (*node.cast::<Object>().cast_mut()).mark }
+    }
+
+    unsafe fn access<'a>(node: *mut mbm_node) -> &'a mut Object {
+        // SAFETY: begun, so every field is valid; exclusive as the caller promises.
+        unsafe { &mut *node.cast() }
+    }
+}
+
+/// Begins a node: a unit on a line, with your words for its requests and replies.
+///
+/// It may be called again, for another unit, line or words, whenever the node has no request
+/// under way; this is cheap. Settings and the content of the words stay. The node discards what
+/// mbm_node_send queued. The line may be begun before or afterwards.
+///
+/// The words must not overlap, and must stay valid for as long as the object is used. Any number
+/// of nodes may share words. Keep a node until its request has ended.
+///
+/// @param node           the object; initialised with MBM_INIT before the first call
+/// @param line           the line, which must stay valid for as long as the object is used
+/// @param unit           the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
+///                       2.2). Requests to 248 to 255, which the standard reserves, are sent too
+/// @param response       the words that reads fill; NULL only if `responseWords` is 0
+/// @param responseWords  0 to 255; 125 hold any reply
+/// @param transmit       the words that writes send; NULL only if `transmitWords` is 0
+/// @param transmitWords  0 to 255; 123 hold any request
+/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY while a request of the node is under way
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_begin(
+    node: *mut mbm_node,
+    line: *mut mbm_line,
+    unit: u8,
+    response: *mut u16,
+    responseWords: u16,
+    transmit: *mut u16,
+    transmitWords: u16,
+) -> u8 {
+    let is_refused = node.is_null()
+        || line.is_null()
+        || (response.is_null() && responseWords > 0)
+        || (transmit.is_null() && transmitWords > 0)
+        || (responseWords | transmitWords) > 255;
+    // SAFETY: as the header demands; not NULL.
+    unsafe {
+        if is_refused {
+            return Status::INVALID_ARGUMENT.code();
+        }
+        if pointers::check_once(node) != Status::OK {
+            // Hosts tolerate storage that was not zeroed.
+            if !FIRMWARE {
+                pointers::zero(node);
+            }
+            mbm_node::mark(node).write(pointers::BEGUN);
+        }
+        if (*node.cast::<Object>()).core.is_pending() {
+            return Status::BUSY.code();
+        }
+        // A line whose request is under way may get a further node.
+        line::prepare(line);
+        let object = pointers::object(node);
+        object.core.begin(unit);
+        object.line = line;
+        object.words.response_words = responseWords as u8;
+        object.words.transmit_words = transmitWords as u8;
+        object.words.response = response;
+        object.words.transmit = transmit;
+        Status::OK.code()
+    }
+}
+
+/// Whether a hook of the line's port makes the call: [`Status::BUSY`], otherwise [`Status::OK`];
+/// [`Status::NOT_INITIALISED`] if the line was zeroed.
+///
+/// # Safety
+/// The node was begun, so it has a line.
+#[inline(always)]
+unsafe fn check_line(object: *mut Object) -> Status {
+    // SAFETY: as the caller promises.
+    unsafe { pointers::check_mark((*object).line) }
+}
+
+/// True if the request under way on the line is that of the node.
+///
+/// # Safety
+/// [`check_line`] returned [`Status::OK`] for the node.
+#[inline(always)]
+unsafe fn has_line(object: *mut Object) -> bool {
+    // SAFETY: as the caller promises, so the line was begun and has no reference.
+    unsafe { pointers::object((*object).line).storage.words == &raw mut (*object).words }
+}
+
+/// Sends and receives for a non-blocking request, without waiting.
+///
+/// Call it as often as you like. If your port does not buffer received bytes, call it at
+/// least once in the time of a character.
+///
+/// @param node  the object
+/// @return MBM_PENDING until the request has ended. Then, at every call, the status of the
+///         request. MBM_OK if there was no request yet; MBM_BUSY from within a hook of the
+///         port except `idle`, while the request is under way; MBM_INVALID_ARGUMENT or
+///         MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_poll(node: *mut mbm_node) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { poll(node) }
+}
+
+/// As [`mbm_node_poll`].
+///
+/// # Safety
+/// As for [`pointers::with`].
+#[cfg_attr(not(target_os = "none"), inline(always))]
+unsafe extern "C" fn poll(node: *mut mbm_node) -> u8 {
+    // SAFETY: as the caller promises. No reference to the node lives while hooks run; the line's
+    // mark keeps them from the line.
+    unsafe {
+        match pointers::check(node) {
+            Status::OK => {}
+            refused => return refused.code(),
+        }
+        let object = node.cast::<Object>();
+        let core = &raw mut (*object).core;
+        if (*core).is_pending() {
+            match check_line(object) {
+                Status::OK => {}
+                refused => return refused.code(),
+            }
+            if has_line(object) {
+                let line = (*object).line;
+                let status = line::with_hooks(line, |line| {
+                    let now = line.port.micros();
+                    line.poll(now)
+                });
+                (*core).take(status, pointers::object(line));
+            } else {
+                // The line has given the request up.
+                (*core).end(Status::CANCELLED);
+            }
+        }
+        (*core).status().code()
+    }
+}
+
+/// Returns how long mbm_node_poll will have nothing to do unless a byte arrives. A program
+/// or the hook `idle` may sleep for that time. A waiting time that has just started counts
+/// from this call, so sleeping makes no timeout longer.
+///
+/// @param node  the object
+/// @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
+///         0xFFFFFFFF means that the node has no request under way
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_pollDelay(node: *mut mbm_node) -> u32 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let object = node.cast::<Object>();
+        if pointers::check(node) != Status::OK || !(*object).core.is_pending() {
+            return u32::MAX;
+        }
+        match check_line(object) {
+            Status::OK if has_line(object) => line::with_hooks((*object).line, |line| {
+                let now = line.port.micros();
+                line.poll_delay(now)
+            }),
+            _ => 0,
+        }
+    }
+}
+
+/// Gives up the request under way and switches the driver off. The status of the request
+/// becomes MBM_CANCELLED. If the node has no request under way, it does nothing.
+///
+/// @param node  the object
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY from within a hook of
+///         the port except `idle`, while the request is under way
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
+    // SAFETY: as the header demands. No reference to the node lives while hooks run.
+    unsafe {
+        let mut status = pointers::check(node);
+        let object = node.cast::<Object>();
+        if status == Status::OK && (*object).core.is_pending() {
+            status = check_line(object);
+            if status == Status::OK {
+                if has_line(object) {
+                    line::with_hooks((*object).line, line::Core::cancel);
+                }
+                (*object).core.end(Status::CANCELLED);
+            }
+        }
+        status.code()
+    }
+}
+
+/// Returns the status of the last request.
+///
+/// @param node  the object
+/// @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
+///         request; MBM_BUSY from within a hook of the port except `idle`, while the request is
+///         under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_status(node: *const mbm_node) -> u8 {
+    // SAFETY: as the header demands; every object is writable storage.
+    unsafe {
+        pointers::with(node.cast_mut(), |node| match check_line(node) {
+            Status::BUSY if node.core.is_pending() => Status::BUSY,
+            _ => node.core.status(),
+        })
+    }
+}
+
+/// Returns the exception code of the last reply as received, also a code that the standard
+/// does not allow (V1.1b3, 7).
+///
+/// @param node  the object
+/// @return the code; 0 if the last request ended without an exception
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_getExceptionCode(node: *const mbm_node) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { pointers::read(node, 0, |node| node.core.exception_code()) }
+}
+
+/// Starts a request that has an address and a word and, in blocking mode, polls until it has
+/// ended.
+///
+/// # Safety
+/// As for [`pointers::with`].
+unsafe fn call(pointer: *mut mbm_node, address: u16, word: u16, spec: MasterSpec) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        request(pointer, |node, line| {
+            node.request(line, address, word, spec)
+        })
+    }
+}
+
+/// Starts a request and, in blocking mode, polls until it has ended.
+///
+/// # Safety
+/// As for [`pointers::with`].
+unsafe fn request(
+    pointer: *mut mbm_node,
+    start: impl FnOnce(&mut Node, &mut line::Core) -> Status,
+) -> u8 {
+    // SAFETY: as the caller promises. The line reads the node's words, which are not in its core.
+    unsafe {
+        let mut status = take_line(pointer);
+        if status == Status::OK {
+            let object = pointer.cast::<Object>();
+            status = start(&mut (*object).core, pointers::object((*object).line));
+        }
+        finish(pointer, status.code())
+    }
+}
+
+/// Gives the line the words and the timeout of the node, if the node may make a request:
+/// [`Status::OK`]; otherwise the reason.
+///
+/// # Safety
+/// As for [`pointers::with`].
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn take_line(node: *mut mbm_node) -> Status {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let mut status = pointers::check(node);
+        let object = node.cast::<Object>();
+        if status == Status::OK {
+            status = check_line(object);
+        }
+        if status == Status::OK {
+            let line = pointers::object((*object).line);
+            status = line.ready();
+            if status != Status::BUSY {
+                (*object).core.end(status);
+            }
+            if status == Status::OK {
+                line.storage.words = &raw mut (*object).words;
+                line.set_observer((*object).observer);
+            }
+        }
+        status
+    }
+}
+
+/// In blocking mode, polls until the request has ended, and calls the hook `idle` whenever
+/// there is nothing to do.
+///
+/// # Safety
+/// As for [`pointers::with`]; `status` is the one that the last call on that node returned.
+#[inline(never)]
+unsafe fn finish(pointer: *mut mbm_node, mut status: u8) -> u8 {
+    if status != Status::PENDING.code() {
+        return status;
+    }
+    // SAFETY: pending, so begun. No reference lives while the hook is called, because the
+    // hook may use the object. `poll` checks the object again.
+    unsafe {
+        let object = pointer.cast::<Object>();
+        loop {
+            if (*object).non_blocking {
+                break;
+            }
+            status = poll(pointer);
+            if status != Status::PENDING.code() {
+                break;
+            }
+            let line = line::core_of((*object).line);
+            if (*line).is_waiting() {
+                PortRef::idle(&raw const (*line).port, pointer);
+            }
+        }
+    }
+    status
+}

@@ -1,0 +1,146 @@
+//! The settings of a node.
+
+use super::mbm_node;
+use crate::line::Core;
+use crate::pointers::{read, with};
+use crate::registers::MBM_ORDER_ABCD;
+use mbm::engine::Setting;
+use mbm::error::Status;
+use mbm::time::{timeout, to_millis};
+
+/// Sets the unit to which the master sends later requests.
+///
+/// @param node  the object
+/// @param slave   the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248
+///                to 255, which the standard reserves
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, slave: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(node, |node| {
+            node.core.set_unit(slave);
+            Status::OK
+        })
+    }
+}
+
+/// Returns the unit to which the master sends requests.
+///
+/// @param node  the object
+/// @return the unit identifier, 1 by default; 0 for an object that was never begun
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_getSlaveID(node: *const mbm_node) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { read(node, 0, |node| node.core.unit()) }
+}
+
+/// Sets the response timeout: the maximum time from the last bit of the request to the last
+/// byte of the reply.
+///
+/// @param node  the object
+/// @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeoutMs: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(node, |node| {
+            let Some(timeout) = timeout(timeoutMs) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            node.words.response_timeout = Setting::new(timeout);
+            Status::OK
+        })
+    }
+}
+
+/// Switches between blocking and non-blocking mode. In blocking mode, the default, a function
+/// that makes a request returns when the request has ended. In non-blocking mode it returns
+/// MBM_PENDING at once, and you call mbm_node_poll until the request has ended.
+///
+/// @param node  the object
+/// @param on      1 blocking, 0 non-blocking; it applies from the next request on
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(node, |node| {
+            node.non_blocking = on == 0;
+            Status::OK
+        })
+    }
+}
+
+/// Returns the response timeout: see mbm_node_setResponseTimeout.
+///
+/// @param node  the object
+/// @return milliseconds; 0 for an object that was never begun
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_getResponseTimeout(node: *const mbm_node) -> u32 {
+    // SAFETY: as the header demands.
+    unsafe { read(node, 0, |node| to_millis(node.words.response_timeout.get())) }
+}
+
+/// Returns whether requests block: see mbm_node_setBlocking.
+///
+/// @param node  the object
+/// @return 1 for blocking, 0 for non-blocking; 0 for an object that was never begun
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_getBlocking(node: *const mbm_node) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { read(node, 0, |node| (!node.non_blocking).into()) }
+}
+
+/// Returns the order of values: see mbm_node_setWordOrder.
+///
+/// @param node  the object
+/// @return one of MBM_ORDER_...; MBM_ORDER_ABCD for an object that was never begun
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_getWordOrder(node: *const mbm_node) -> u8 {
+    // SAFETY: as the header demands.
+    let order = unsafe { read(node, 0, |node| node.order) };
+    // 0 in a master whose order was never set.
+    order.max(MBM_ORDER_ABCD)
+}
+
+/// Accepts replies of devices that deviate from the standard. It has these effects:
+/// - The master accepts a reply with the right unit, function and CRC although it repeats
+///   another address, value or quantity, or carries more or fewer data than were requested.
+///   It accepts such a reply at the end of the response timeout, if no right reply has
+///   arrived. mbm_node_available returns the number of words that arrived.
+/// - A read of more words than the response words hold succeeds and fills all of them.
+///   (If the reply is longer than the frame buffer, no noise may have arrived before it.)
+/// - The master also sends requests that read to unit 0, and accepts a reply from unit 0.
+///
+/// Set a short response timeout (mbm_node_setResponseTimeout) if the device deviates in
+/// every reply.
+///
+/// @param node  the object
+/// @param on      0 (the default) or 1
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY while a request is
+///         under way
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_setLenient(node: *mut mbm_node, on: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(node, |node| {
+            if node.core.is_pending() {
+                return Status::BUSY;
+            }
+            node.observer = Core::lenient(on != 0);
+            Status::OK
+        })
+    }
+}
+
+/// Returns whether deviating replies are accepted: see mbm_node_setLenient.
+///
+/// @param node  the object
+/// @return 1 or 0; 0 for an object that was never begun
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_getLenient(node: *const mbm_node) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { read(node, 0, |node| node.observer.is_some().into()) }
+}

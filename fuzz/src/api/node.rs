@@ -1,0 +1,244 @@
+//! Nodes.
+
+use super::check::{
+    bytes, call, checked_call, is_status, refused_changes_nothing, span, unchanged_if_refused,
+    Span, PENDING,
+};
+use super::line;
+use super::world::World;
+use mbm_c::*;
+use std::ptr::null_mut;
+
+/// One of the nodes, a new one, a copy of one, or NULL.
+fn pick(w: &World) -> *mut mbm_node {
+    if let Some(node) = w.calling_node() {
+        return node;
+    }
+    let node = w.nodes.pick(w);
+    if let Some((from, new)) = w.nodes.take_copy() {
+        w.set_line_of(new, w.line_of(from));
+    }
+    node
+}
+
+fn begin(w: &World, node: *mut mbm_node) {
+    let (unit, line) = (w.unit_id(), w.lines.pick(w));
+    let words = |w: &World| match w.byte() {
+        0..0x80 => 125,
+        0x80..0xE0 => u16::from(w.byte()),
+        0xE0..0xF0 => 0,
+        _ => w.word(),
+    };
+    let (response, transmit) = (words(w), words(w));
+    let place = |w: &World, count: u16| -> *mut u16 {
+        if count == 0 && w.rarely(2) {
+            null_mut()
+        } else {
+            w.buffer(2 * usize::from(count)).cast()
+        }
+    };
+    let (responses, transmits) = (place(w, response), place(w, transmit));
+    let spans = [span(node), span(line)];
+    let status = refused_changes_nothing(w, &spans, "mbm_node_begin", || {
+        call!(
+            w,
+            node,
+            mbm_node_begin(node, line, unit, responses, response, transmits, transmit)
+        )
+    });
+    if status == MBM_OK {
+        w.set_line_of(node, line);
+    }
+}
+
+/// Settings. They may be set in hooks of the line, too.
+fn set(w: &World, node: *mut mbm_node) {
+    let (byte, word, long) = (w.byte(), w.word(), w.long());
+    let choice = w.byte() % 4;
+    let time = if byte < 0xF0 { word.into() } else { long };
+    unchanged_if_refused(w, &[span(node)], "mbm_node_set", || match choice {
+        0 => call!(w, node, mbm_node_setSlaveID(node, byte)),
+        1 => call!(w, node, mbm_node_setResponseTimeout(node, time)),
+        2 => call!(w, node, mbm_node_setBlocking(node, byte & 1)),
+        _ => call!(w, node, mbm_node_setWordOrder(node, byte % 8)),
+    });
+    get(w, node);
+}
+
+/// Reads the settings.
+fn get(w: &World, node: *mut mbm_node) {
+    assert!(call!(w, node, mbm_node_getResponseTimeout(node)) <= 1_000_000);
+    assert!(call!(w, node, mbm_node_getBlocking(node)) <= 1);
+    let order = call!(w, node, mbm_node_getWordOrder(node));
+    assert!((MBM_ORDER_ABCD..=MBM_ORDER_DCBA).contains(&order));
+    call!(w, node, mbm_node_getSlaveID(node));
+}
+
+/// The object that a hook must not use if it must not make a request of the node: the line while
+/// its hooks run, otherwise the node.
+fn lock(w: &World, node: *mut mbm_node) -> Span {
+    let line = w.line_of(node);
+    if w.is_locked(line.cast()) {
+        span(line)
+    } else {
+        span(node)
+    }
+}
+
+/// Starts a request, most often of a node that was begun. A blocking one must return.
+fn request(w: &World, node: *mut mbm_node) {
+    if w.line_of(node).is_null() && !w.rarely(4) {
+        begin(w, node);
+    }
+    let (a, b, c, d) = (w.word(), w.word(), w.word(), w.word());
+    let choice = w.byte() % 14;
+    if choice == 13 {
+        let words = call!(w, node, mbm_node_requestFrom(node, a, b));
+        assert!(words <= 125, "{words} words to receive");
+        return;
+    }
+    let spans = [span(node), span(w.line_of(node))];
+    let before = spans.map(bytes);
+    let inner = w.inner_calls.get();
+    let status = checked_call(w, lock(w, node), "a request", || match choice {
+        0 => call!(w, node, mbm_node_readCoils(node, a, b)),
+        1 => call!(w, node, mbm_node_readDiscreteInputs(node, a, b)),
+        2 => call!(w, node, mbm_node_readHoldingRegisters(node, a, b)),
+        3 => call!(w, node, mbm_node_readInputRegisters(node, a, b)),
+        4 => call!(w, node, mbm_node_writeSingleCoil(node, a, b as u8)),
+        5 => call!(w, node, mbm_node_writeSingleRegister(node, a, b)),
+        6 => call!(w, node, mbm_node_writeMultipleCoils(node, a, b)),
+        7 => call!(w, node, mbm_node_writeQueuedCoils(node)),
+        8 => call!(w, node, mbm_node_writeMultipleRegisters(node, a, b)),
+        9 => call!(w, node, mbm_node_writeQueuedRegisters(node)),
+        10 => call!(w, node, mbm_node_maskWriteRegister(node, a, b, c)),
+        11 => call!(
+            w,
+            node,
+            mbm_node_readWriteMultipleRegisters(node, a, b, c, d)
+        ),
+        _ => call!(w, node, mbm_node_readWriteQueuedRegisters(node, a, b)),
+    });
+    if w.inner_calls.get() - inner != u32::from(w.is_inside()) {
+        // A hook may have changed anything.
+        return;
+    }
+    match status {
+        MBM_BUSY | MBM_NOT_INITIALISED | MBM_INVALID_ARGUMENT => {
+            assert!(
+                spans.map(bytes) == before,
+                "a request returned {status}, and changed the node or its line"
+            );
+        }
+        PENDING => others_are_refused(w, node),
+        _ => {}
+    }
+    if status == MBM_NOT_INITIALISED && !w.rarely(4) {
+        // The next request may find a line with a port and a frame buffer.
+        line::begin(w, w.line_of(node));
+    }
+}
+
+/// While a request of the node is under way, the line takes none of another node.
+fn others_are_refused(w: &World, node: *mut mbm_node) {
+    let line = w.line_of(node);
+    let is_other = |other: &*mut mbm_node| *other != node && w.line_of(*other) == line;
+    if let Some(other) = w.nodes.all().into_iter().find(is_other) {
+        let spans = [span(other), span(node), span(line)];
+        let status = unchanged_if_refused(w, &spans, "a request", || {
+            call!(w, other, mbm_node_readCoils(other, 0, 1))
+        });
+        assert_eq!(status, MBM_BUSY, "a second request on a line");
+    }
+}
+
+/// Polls a few times, or until the request has ended.
+fn poll(w: &World, node: *mut mbm_node) {
+    for _ in 0..1 + w.byte() % 16 {
+        let status = checked_call(w, span(node), "mbm_node_poll", || {
+            call!(w, node, mbm_node_poll(node))
+        });
+        if status != PENDING {
+            return;
+        }
+    }
+}
+
+fn words(w: &World, node: *mut mbm_node) {
+    let (byte, word, long) = (w.byte(), w.word(), w.long());
+    match w.byte() % 14 {
+        0 => drop(call!(w, node, mbm_node_getResponseBuffer(node, byte))),
+        1 => drop(call!(w, node, mbm_node_clearResponseBuffer(node))),
+        2 => drop(call!(w, node, mbm_node_setTransmitBuffer(node, byte, word))),
+        3 => drop(call!(w, node, mbm_node_clearTransmitBuffer(node))),
+        4 => drop(call!(w, node, mbm_node_beginTransmission(node, word))),
+        5 => {
+            for _ in 0..byte % 130 {
+                call!(w, node, mbm_node_send(node, word));
+            }
+        }
+        6 => drop(call!(w, node, mbm_node_send(node, u16::from(byte)))),
+        7 => drop(call!(w, node, mbm_node_send32(node, long))),
+        8 => {
+            for _ in 0..byte {
+                call!(w, node, mbm_node_sendBit(node, byte & 1));
+            }
+        }
+        9 => {
+            let count = call!(w, node, mbm_node_available(node));
+            assert!(count <= 125, "{count} words to receive");
+        }
+        10 => {
+            for _ in 0..byte % 8 {
+                call!(w, node, mbm_node_receive(node));
+            }
+        }
+        choice @ (11 | 12) => {
+            let view = w.views.pick(w);
+            let spans = [span(view)];
+            let status = unchanged_if_refused(w, &spans, "a view of words", || match choice {
+                11 => call!(w, node, mbm_node_getResponseRegisters(node, word, view)),
+                _ => call!(w, node, mbm_node_getTransmitRegisters(node, word, view)),
+            });
+            is_status("a view of words", status);
+        }
+        _ => drop(call!(w, node, mbm_node_getExceptionCode(node))),
+    }
+}
+
+/// Makes one call with a node.
+pub fn step(w: &World) {
+    let node = pick(w);
+    match w.byte() % 16 {
+        0 | 1 => begin(w, node),
+        2 => set(w, node),
+        3..=7 => request(w, node),
+        8 | 9 => words(w, node),
+        10 => {
+            let delay = call!(w, node, mbm_node_pollDelay(node));
+            if w.byte() & 1 == 0 && delay < 0x0100_0000 {
+                w.clock.set(w.clock.get().wrapping_add(delay));
+            }
+        }
+        11 => {
+            refused_changes_nothing(w, &[span(node)], "mbm_node_cancel", || {
+                call!(w, node, mbm_node_cancel(node))
+            });
+        }
+        12 => {
+            let status = call!(w, node, mbm_node_status(node));
+            is_status("mbm_node_status", status);
+            assert!(!w.is_locked(node.cast()) || status == MBM_BUSY);
+        }
+        13 if w.byte() & 1 == 0 => {
+            // The user may zero a node at any time, also in the hook `idle`.
+            if !node.is_null() && w.is_free() {
+                w.note(|| format!("memset({node:?}, 0, node)"));
+                // SAFETY: no function uses the node now.
+                unsafe { node.cast::<u8>().write_bytes(0, size_of::<mbm_node>()) };
+                w.set_line_of(node, null_mut());
+            }
+        }
+        _ => poll(w, node),
+    }
+}

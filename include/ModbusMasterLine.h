@@ -1,0 +1,125 @@
+/**
+ * @file ModbusMasterLine.h
+ * @brief The line that ModbusMaster objects use.
+ *
+ * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h.
+ */
+
+#ifndef MODBUSMASTER_LINE_H
+#define MODBUSMASTER_LINE_H
+
+#include <Arduino.h>
+#include <stdint.h>
+
+#include "ModbusMasterOptions.h"
+#include "mbm.h"
+
+/** @cond private to ModbusMaster */
+// What the hooks of the port need. `User` is the object whose request is under way.
+template <typename User> struct ModbusMasterWire {
+    mbm_line line;
+    User *user;
+    Stream *counting; // the last Stream whose write returned another number than 0
+    bool sent;        // the request is on the wire, so a reply is waited for
+};
+
+#if defined(MODBUSMASTER_SHARE_LINE)
+// One line for all objects. While a function waits for its reply, the frame lies on the stack of
+// that function, and has only the bytes that the request needs. A request that outlives its
+// function, or whose reply may be longer, needs the buffer of `Bytes` bytes. A sketch that never
+// calls keep or mayOutlive contains neither that buffer nor the code to give a request up. It is
+// a template, because in C++11 only a template's static members can be defined in a header.
+template <typename User, uint8_t Bytes> class ModbusMasterLine {
+public:
+    static ModbusMasterWire<User> wire;
+
+    // Has all later requests use the buffer.
+    static void keep()
+    {
+        static uint8_t buffer[Bytes];
+        kept = buffer;
+    }
+
+    // Requests may outlive the function that makes them.
+    static void mayOutlive()
+    {
+        keep();
+        cancel = mbm_node_cancel;
+    }
+
+    // Gives up the request of a node.
+    static void giveUp(mbm_node &node)
+    {
+        if (cancel != nullptr)
+            cancel(&node);
+    }
+
+    // The buffer; nullptr before keep.
+    static uint8_t *kept;
+
+    // How many bytes the frame of a request needs: those of the request, or of its reply beside
+    // a late reply of the same length. `words` are those that it writes or reads, whichever are
+    // more.
+    static uint8_t bytesOf(uint16_t words)
+    {
+        return words < (Bytes - MBM_FRAME_BYTES(0)) / 4u
+                   ? static_cast<uint8_t>(MBM_FRAME_BYTES(2u * words))
+                   : Bytes;
+    }
+
+    // The line knows when it was used.
+    static void used() {}
+
+private:
+    static uint8_t (*cancel)(mbm_node *);
+};
+
+template <typename User, uint8_t Bytes>
+ModbusMasterWire<User> ModbusMasterLine<User, Bytes>::wire = {};
+template <typename User, uint8_t Bytes> uint8_t *ModbusMasterLine<User, Bytes>::kept = nullptr;
+template <typename User, uint8_t Bytes>
+uint8_t (*ModbusMasterLine<User, Bytes>::cancel)(mbm_node *) = nullptr;
+
+#else
+// When any object used a line last. All objects may share a line, so the silence before a
+// request counts from that time.
+template <typename Unused> class ModbusMasterUse {
+public:
+    // A line was used just now.
+    static void note() { time = micros() & 0xFFFFFFFFu; }
+
+    // Tells the line of an object when another object used a line last.
+    static void tell(mbm_line &line)
+    {
+        if (last != &line) {
+            last = &line;
+            mbm_line_usedAt(&line, time);
+        }
+    }
+
+private:
+    // The pointer is only compared. Two threads, each with its own line, may race for it;
+    // at worst one of them waits for a silence that was not needed.
+    static const mbm_line *last;
+    static uint32_t time;
+};
+
+template <typename Unused> const mbm_line *ModbusMasterUse<Unused>::last = nullptr;
+template <typename Unused> uint32_t ModbusMasterUse<Unused>::time = 0;
+
+// A line for each object, with its port and its frame buffer.
+template <typename User, uint8_t Bytes> class ModbusMasterLine {
+public:
+    ModbusMasterWire<User> wire;
+    mbm_port port;
+    uint8_t frame[Bytes];
+
+    static void keep() {}
+    static void mayOutlive() {}
+    static void giveUp(mbm_node &node) { mbm_node_cancel(&node); }
+    static void used() { ModbusMasterUse<void>::note(); }
+};
+#endif
+/** @endcond */
+
+#endif
