@@ -16,14 +16,6 @@ pub struct Master<P, S: Words> {
 }
 
 impl<P, S: Words> Master<P, S> {
-    /// A master that sends requests to the unit `slave` through `port`.
-    pub const fn new(slave: u8, port: P, storage: S) -> Self {
-        Master {
-            node: Node::new(slave),
-            line: Line::new(port, storage),
-        }
-    }
-
     /// The port.
     pub fn port(&mut self) -> &mut P {
         &mut self.line.port
@@ -103,6 +95,14 @@ macro_rules! request {
 }
 
 impl<P: Port, S: Words> Master<P, S> {
+    /// A master that sends requests to the unit `slave` through `port`.
+    pub const fn new(slave: u8, port: P, storage: S) -> Self {
+        Master {
+            node: Node::new(slave),
+            line: Line::new(port, storage),
+        }
+    }
+
     /// Changes to the unit `slave`, and to the port that the function `port` sets up. Settings,
     /// buffers and their words do not change. A request in progress is cancelled, as by
     /// [`Master::cancel`].

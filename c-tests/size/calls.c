@@ -19,10 +19,8 @@ static uint16_t more[WORDS];
 #define ONE_MORE mbm_line_setBaudRate(&line, 19200)
 #elif defined(TIMEOUT)
 #define ONE_MORE mbm_node_setResponseTimeout(&node, 500)
-#elif defined(RETRIES)
+#elif defined(EXTRAS)
 #define ONE_MORE mbm_line_setRetries(&line, 2)
-#elif defined(ECHO)
-#define ONE_MORE mbm_line_setEchoDiscard(&line, 1)
 #else
 #define ONE_MORE 0
 #endif

@@ -7,6 +7,7 @@
 //! - `send` writes the request and waits until the port has sent it.
 //! - `search` finds the reply in RTU frames: for each byte it asks whether the reply ends there.
 //! - `late` keeps a late reply from being delivered as the answer to a later request.
+//! - `extras` has retries, echo discarding and the post-flush hold.
 //! - `tally` counts the attempts that end, if the program has counters.
 //! - `ascii` finds the reply in ASCII frames; `lenient` accepts replies that deviate from the
 //!   standard.
@@ -15,6 +16,7 @@
 //! time, which fit into the registers, and the code is small.
 
 pub mod ascii;
+mod extras;
 mod late;
 mod lenient;
 mod master_request;
@@ -27,6 +29,7 @@ mod spec;
 mod storage;
 mod tally;
 
+pub use extras::{Extras, Moment};
 pub use outcome::Outcome;
 pub use settings::{Setting, Settings};
 pub use spec::RequestSpec;
@@ -138,17 +141,19 @@ pub struct Engine<P, S: Storage, Q> {
     wait: u32,
     /// The time of the current poll.
     now: u32,
-    pub(crate) request: Q,
-    /// Times and options of the requests.
-    pub settings: Settings,
     /// When the phase began.
     begun: u32,
-    /// The units that did not answer their last request. Each bit stands for the units whose
-    /// numbers are equal modulo 32.
-    late_units: [u8; 4],
     /// Counts attempts and bytes. (A pointer, so that a program without counters does not
     /// contain its code.)
     tally: Option<fn(&mut Self, Status)>,
+    pub(crate) request: Q,
+    /// Times and options of the requests.
+    pub settings: Settings,
+    /// The units that did not answer their last request. Each bit stands for the units whose
+    /// numbers are equal modulo 32.
+    late_units: [u8; 4],
+    /// Retries, echo discarding and the post-flush hold (see `extras`).
+    extras: Option<Extras<P, S, Q>>,
     /// Sees every received byte if deviating replies are accepted (see `lenient`).
     observer: Option<Observer<P, S, Q>>,
 }

@@ -1,6 +1,8 @@
 //! Moves a request on, from its start to its end.
 
-use super::{Count, Engine, Event, Outcome, Phase, Probation, RequestSpec, Settings, Storage};
+use super::{
+    Count, Engine, Event, Moment, Outcome, Phase, Probation, RequestSpec, Settings, Storage,
+};
 use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;
@@ -9,48 +11,6 @@ use crate::time::{elapsed, has_elapsed, LONGEST};
 use crate::FIRMWARE;
 
 impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
-    /// An engine without a request.
-    pub const fn new(port: P, storage: S) -> Self {
-        Engine {
-            phase: Phase::Idle,
-            phase_begins: false,
-            unit: 0,
-            retries: 0,
-            exception: 0,
-            seen: Outcome::OK,
-            is_early: false,
-            probation: Probation::No,
-            is_late: false,
-            has_slow_unit: false,
-            awaits_end: false,
-            has_more: false,
-            run_kind: Outcome::MALFORMED,
-            run_length: S::Count::ZERO,
-            length: S::Count::ZERO,
-            end: S::Count::ZERO,
-            kept: S::Count::ZERO,
-            content: S::Count::ZERO,
-            outgoing: S::Count::ZERO,
-            sent: S::Count::ZERO,
-            foreign_frames: 0,
-            run: Crc16::START,
-            before: Crc16::START,
-            weight: Crc16::RESIDUE,
-            received: 0,
-            storage,
-            since: 0,
-            wait: 0,
-            begun: 0,
-            now: 0,
-            late_units: [0; 4],
-            port,
-            request: Q::NONE,
-            tally: Some(Engine::count),
-            observer: None,
-            settings: Settings::DEFAULT,
-        }
-    }
-
     /// True while a request is pending.
     pub fn is_pending(&self) -> bool {
         self.phase != Phase::Idle
@@ -137,6 +97,49 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 }
 
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+    /// An engine without a request.
+    pub const fn new(port: P, storage: S) -> Self {
+        Engine {
+            phase: Phase::Idle,
+            phase_begins: false,
+            unit: 0,
+            retries: 0,
+            exception: 0,
+            seen: Outcome::OK,
+            is_early: false,
+            probation: Probation::No,
+            is_late: false,
+            has_slow_unit: false,
+            awaits_end: false,
+            has_more: false,
+            run_kind: Outcome::MALFORMED,
+            run_length: S::Count::ZERO,
+            length: S::Count::ZERO,
+            end: S::Count::ZERO,
+            kept: S::Count::ZERO,
+            content: S::Count::ZERO,
+            outgoing: S::Count::ZERO,
+            sent: S::Count::ZERO,
+            foreign_frames: 0,
+            run: Crc16::START,
+            before: Crc16::START,
+            weight: Crc16::RESIDUE,
+            received: 0,
+            storage,
+            since: 0,
+            wait: 0,
+            begun: 0,
+            now: 0,
+            late_units: [0; 4],
+            port,
+            request: Q::NONE,
+            tally: Some(Engine::count),
+            extras: Some(Engine::extras),
+            observer: None,
+            settings: Settings::DEFAULT,
+        }
+    }
+
     /// Notes that the line is in use now. The gap counts from now. Nothing changes while a
     /// request is on the line.
     pub fn line_used(&mut self) {
@@ -268,8 +271,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
                 self.since = self.now;
             }
             // Received bytes extend the wait, but not for ever.
-            let limit = self.wait.wrapping_add(Q::response_timeout(self));
-            is_old = self.now.wrapping_sub(self.begun) >= limit;
+            is_old = self.is_overdue(self.begun);
         }
         let is_over = !self.has_more && self.has_expired();
         if self.phase == Phase::Gap {
@@ -292,6 +294,13 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             self.seen = Outcome::NOTHING;
         }
         self.settle()
+    }
+
+    /// True if the wait and the response timeout after it have passed since the time `since`.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn is_overdue(&mut self, since: u32) -> bool {
+        let limit = self.wait.wrapping_add(Q::response_timeout(self));
+        has_elapsed(limit, self.now, since)
     }
 
     /// Lets silence end the wait for the reply, if it is known what the request ends with then.
@@ -345,19 +354,16 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             self.expect_no_late_reply();
             return status;
         }
-        if !cfg!(feature = "retries")
-            || !Q::HAS_FIXED_REPLY
-            || self.retries == 0
-            || status == Status::BUFFER_TOO_SMALL
-        {
-            return status;
+        if status != Status::BUFFER_TOO_SMALL && self.has_extra(Moment::Failed) {
+            return Status::PENDING;
         }
-        self.retries -= 1;
-        self.tally(status);
-        // The damaged reply may have been noise, so the right reply may still come.
-        self.expect_late_reply();
-        self.since = self.now;
-        self.begin()
+        status
+    }
+
+    /// True if the engine has extras, and they replace what follows at this moment.
+    #[inline(always)]
+    pub(super) fn has_extra(&mut self, moment: Moment) -> bool {
+        self.extras.is_some_and(|extras| extras(self, moment))
     }
 
     /// Cancels the request and switches the driver off. If the request was sent completely,

@@ -10,7 +10,7 @@
 //! right, these bytes were a whole frame. If that frame is not the reply, it is skipped, and an
 //! exception or a damaged reply that seemed to lie in it is forgotten.
 
-use super::{Count, Engine, Event, Outcome, Phase, RequestSpec, Storage};
+use super::{Count, Engine, Event, Moment, Outcome, Phase, RequestSpec, Storage};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::frame::rtu::{self, MIN_FRAME};
@@ -86,14 +86,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.end += 1u8.into();
         let is_whole = self.continue_frame(byte);
         let function = self.request.function();
-        if cfg!(feature = "echo")
-            && self.outgoing > S::Count::ZERO
-            && self.ends_with(self.outgoing, function)
-            && Q::is_echo(self, self.end - self.outgoing)
-        {
-            self.outgoing = S::Count::ZERO;
-            self.begin_frame();
-            self.forget();
+        if self.has_extra(Moment::Byte) {
             return false;
         }
         let is_response = if self.ends_with(EXCEPTION_FRAME.into(), function | EXCEPTION) {
@@ -327,7 +320,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 
     /// Forgets what was seen, because it lies within another frame, and waits for the reply again.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.is_early = false;
         self.exception = 0;
         self.seen = Outcome::NOTHING;

@@ -1,10 +1,10 @@
 //! Sends one request: writes the frame, waits until its last bit has left.
 
-use super::{Count, Engine, Outcome, Phase, Probation, RequestSpec, Storage, BROADCAST};
+use super::{Count, Engine, Moment, Outcome, Phase, Probation, RequestSpec, Storage, BROADCAST};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::port::Port;
-use crate::time::{characters, has_elapsed};
+use crate::time::characters;
 
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Starts the request to `unit`; the calls of `poll` send it. A refused request sends
@@ -24,7 +24,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             return Status::BUFFER_TOO_SMALL;
         }
         self.unit = unit;
-        if cfg!(feature = "retries") && Q::HAS_FIXED_REPLY {
+        if Q::HAS_FIXED_REPLY {
             self.retries = self.settings.retries;
         }
         self.begin()
@@ -117,24 +117,15 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
                 .wait
                 .wrapping_add(u32::from(self.settings.any_character()) << 8);
         }
-        if cfg!(feature = "hold") && self.phase == Phase::PostFlush {
-            if !self.has_expired() {
-                return Status::PENDING;
-            }
-        } else {
-            if !self.port.flush() {
-                return self.stalled();
-            }
-            let hold = self.settings.post_flush_hold;
-            if cfg!(feature = "hold") && hold > 0 {
-                let time = characters(self.settings.any_character(), hold);
-                self.enter(Phase::PostFlush, time);
-                return Status::PENDING;
-            }
+        if self.phase == Phase::Flush && !self.port.flush() {
+            return self.stalled();
+        }
+        if self.has_extra(Moment::Sent) {
+            return Status::PENDING;
         }
         // The request has been sent: the driver goes off, and the wait for the reply begins.
         self.begin_search();
-        if !(cfg!(feature = "echo") && self.settings.echo_discard) {
+        if !self.settings.echo_discard {
             self.outgoing = S::Count::ZERO;
         }
         self.port.post_transmission();
@@ -153,8 +144,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn stalled(&mut self) -> Status {
         // As long as the request waits for its reply, after as long as it waited for silence.
-        let time = self.wait.wrapping_add(Q::response_timeout(self));
-        if has_elapsed(time, self.now, self.since) {
+        if self.is_overdue(self.since) {
             Status::LINE_BUSY
         } else {
             Status::PENDING

@@ -38,6 +38,25 @@ pub(super) unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> 
     }
 }
 
+/// Changes a setting that has no effect on TCP, and whose code only those programs contain that
+/// set it.
+///
+/// # Safety
+/// As for [`pointers::with`].
+unsafe fn set_extra(client: *mut mbm_client, change: impl FnOnce(&mut Settings)) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        pointers::with(client, |object| {
+            let kind = &*(*object).kind;
+            change(kind.settings(object));
+            if kind.framing != MBM_FRAMING_TCP {
+                transport::<SerialTransport>(object).engine.use_extras();
+            }
+            Status::OK
+        })
+    }
+}
+
 /// Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the
 /// request has been sent. In TCP frames it starts when mbm_client_poll puts the request into
 /// the outgoing buffer, also if the port accepts it later. `timeoutMs` of a request or of a unit
@@ -158,13 +177,7 @@ pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietM
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setEchoDiscard(client: *mut mbm_client, on: u8) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            if_built_in(cfg!(feature = "echo") || on == 0, || {
-                parts.settings.echo_discard = on != 0;
-            })
-        })
-    }
+    unsafe { set_extra(client, |settings| settings.echo_discard = on != 0) }
 }
 
 /// Sets how long the driver stays on after the port's flush, for platforms whose flush
@@ -180,24 +193,7 @@ pub unsafe extern "C" fn mbm_client_setPostFlushHold(
     characters: u8,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            if_built_in(cfg!(feature = "hold") || characters == 0, || {
-                parts.settings.post_flush_hold = characters;
-            })
-        })
-    }
-}
-
-/// Makes a change if the archive contains the code for it; otherwise refuses it.
-#[inline(always)]
-fn if_built_in(built_in: bool, change: impl FnOnce()) -> Status {
-    if built_in {
-        change();
-        Status::OK
-    } else {
-        Status::INVALID_ARGUMENT
-    }
+    unsafe { set_extra(client, |settings| settings.post_flush_hold = characters) }
 }
 
 /// Sets your storage for counters, in which the client counts from now on. You may read and

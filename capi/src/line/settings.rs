@@ -8,17 +8,6 @@ use mbm::error::Status;
 use mbm::port::Port;
 use mbm::time::millis;
 
-/// Makes a change if the archive contains the code for it; otherwise refuses it.
-#[inline(always)]
-fn if_built_in(built_in: bool, change: impl FnOnce()) -> Status {
-    if built_in {
-        change();
-        Status::OK
-    } else {
-        Status::INVALID_ARGUMENT
-    }
-}
-
 /// Sets the baud rate from which the master computes the gap before a request (t3.5, serial
 /// line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure the
 /// serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
@@ -127,9 +116,9 @@ pub unsafe extern "C" fn mbm_line_setRetries(line: *mut mbm_line, retries: u8) -
     // SAFETY: as the header demands.
     unsafe {
         with(line, |line| {
-            if_built_in(cfg!(feature = "retries") || retries == 0, || {
-                line.settings.retries = retries;
-            })
+            line.settings.retries = retries;
+            line.use_extras();
+            Status::OK
         })
     }
 }
@@ -146,9 +135,9 @@ pub unsafe extern "C" fn mbm_line_setEchoDiscard(line: *mut mbm_line, on: u8) ->
     // SAFETY: as the header demands.
     unsafe {
         with(line, |line| {
-            if_built_in(cfg!(feature = "echo") || on == 0, || {
-                line.settings.echo_discard = on != 0;
-            })
+            line.settings.echo_discard = on != 0;
+            line.use_extras();
+            Status::OK
         })
     }
 }
@@ -165,9 +154,9 @@ pub unsafe extern "C" fn mbm_line_setPostFlushHold(line: *mut mbm_line, characte
     // SAFETY: as the header demands.
     unsafe {
         with(line, |line| {
-            if_built_in(cfg!(feature = "hold") || characters == 0, || {
-                line.settings.post_flush_hold = characters;
-            })
+            line.settings.post_flush_hold = characters;
+            line.use_extras();
+            Status::OK
         })
     }
 }

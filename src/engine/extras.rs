@@ -1,0 +1,80 @@
+//! What few programs ask for: retries, echo discarding, and the post-flush hold.
+//!
+//! Only [`Engine::use_extras`] names this module. A program that sets none of the three in C
+//! contains none of this code.
+
+use super::{Count, Engine, Phase, RequestSpec, Storage};
+use crate::error::Status;
+use crate::port::Port;
+use crate::time::characters;
+
+/// A function that does something at a moment of a request. `true` if that replaces what follows.
+pub type Extras<P, S, Q> = fn(&mut Engine<P, S, Q>, Moment) -> bool;
+
+/// When [`Extras`] are called.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Moment {
+    /// A byte has arrived. `true` if it ends the echo of the request.
+    Byte,
+    /// The port has sent the last bit. `true` if the driver must stay on.
+    Sent,
+    /// The request has failed. `true` if it is repeated.
+    Failed,
+}
+
+impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+    /// Makes the settings `retries`, `echo_discard` and `post_flush_hold` effective.
+    pub fn use_extras(&mut self) {
+        self.extras = Some(Engine::extras);
+    }
+
+    /// See [`Extras`].
+    pub(super) fn extras(&mut self, moment: Moment) -> bool {
+        match moment {
+            Moment::Byte => self.ends_echo(),
+            Moment::Sent => self.holds_driver(),
+            Moment::Failed => self.is_repeated(),
+        }
+    }
+
+    /// True if the last byte ends the echo of the request.
+    fn ends_echo(&mut self) -> bool {
+        let length = self.outgoing;
+        if length == S::Count::ZERO
+            || !self.ends_with(length, self.request.function())
+            || !Q::is_echo(self, self.end - length)
+        {
+            return false;
+        }
+        self.outgoing = S::Count::ZERO;
+        self.begin_frame();
+        self.forget();
+        true
+    }
+
+    /// True while the driver must stay on after the port has sent the last bit.
+    fn holds_driver(&mut self) -> bool {
+        let hold = self.settings.post_flush_hold;
+        if self.phase == Phase::PostFlush {
+            return !self.has_expired();
+        }
+        if hold > 0 {
+            let time = characters(self.settings.any_character(), hold);
+            self.enter(Phase::PostFlush, time);
+        }
+        hold > 0
+    }
+
+    /// True if the request is begun again.
+    fn is_repeated(&mut self) -> bool {
+        if !Q::HAS_FIXED_REPLY || self.retries == 0 {
+            return false;
+        }
+        self.retries -= 1;
+        self.tally(self.seen.status());
+        // The damaged reply may have been noise, so the right reply may still come.
+        self.expect_late_reply();
+        self.since = self.now;
+        self.begin() == Status::PENDING
+    }
+}
