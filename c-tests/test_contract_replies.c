@@ -448,9 +448,22 @@ static void counters_miss_no_frame_of_a_crowded_line(void **state)
     assert_int_equal(s->counters.requests, 1);
 }
 
+/* So the exception begins as a reply of one register does. */
+static void an_exception_whose_code_is_the_byte_count_is_a_whole_frame(void **state)
+{
+    SIM;
+
+    sim_answer(s, 1, 500, "11 83 02 +");
+    IS(2, sim_read_one(s));
+    assert_int_equal(s->counters.exceptions, 1);
+    assert_int_equal(s->counters.resynchronisations, 0);
+    assert_int_equal(s->counters.foreignFrames, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        SIM_TEST(an_exception_whose_code_is_the_byte_count_is_a_whole_frame),
         SIM_TEST(exception_codes_of_the_device_are_returned_unchanged),
         SIM_TEST(an_exception_code_of_0_or_from_80_on_is_malformed_and_kept),
         SIM_TEST(an_exception_with_a_bad_crc_is_no_exception),

@@ -367,6 +367,16 @@ static void what_begin_keeps_and_drops(void **state)
     IS(MBM_ILLEGAL_DATA_VALUE, mbm_node_writeQueuedRegisters(&m));
 }
 
+static void a_line_gives_up_the_request_of_any_node(void **state)
+{
+    (void)state;
+    REFUSED(MBM_OK, line, mbm_line_cancel(&line)); /* there is none */
+    IS(MBM_PENDING, read_holding(0, 1));
+    OK(mbm_line_cancel(&line));
+    IS(MBM_CANCELLED, mbm_node_poll(&m));
+    OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
+}
+
 static void views_check_their_arguments(void **state)
 {
     mbm_registers view;
@@ -529,6 +539,7 @@ int main(void)
         TEST(a_frame_is_used_only_while_a_request_is_under_way),
         TEST(an_ended_request_leaves_its_frame_alone),
         TEST(what_begin_keeps_and_drops),
+        TEST(a_line_gives_up_the_request_of_any_node),
         TEST(views_check_their_arguments),
         TEST(settings_have_the_defaults_and_ranges_of_the_header),
         TEST(lenient_is_refused_while_a_request_is_under_way),

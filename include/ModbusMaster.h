@@ -290,6 +290,8 @@ public:
     void setSlaveID(uint8_t slave) { mbm_node_setSlaveID(&state.node, slave); }
     /** The unit of later requests. */
     uint8_t getSlaveID() const { return mbm_node_getSlaveID(&state.node); }
+    // They are static only where objects share a line.
+    // NOLINTBEGIN(readability-convert-member-functions-to-static)
     /** Bits per second, from which t3.5 follows; 0: unknown, a silence of 4 ms. The Stream stays as it is. */
     void setBaudRate(uint32_t baud) { mbm_line_setBaudRate(line(), baud); }
     /** Microseconds of silence before a request, instead of t3.5. */
@@ -338,13 +340,14 @@ public:
     {
         // The request outlives the function that makes it.
         if (!on)
-            Line::mayOutlive();
+            Line::keep();
         mbm_node_setBlocking(&state.node, on);
     }
     /** What setBlocking has set; true at first. */
     bool getBlocking() const { return mbm_node_getBlocking(&state.node) != 0; }
     /** Counts into `counters`; set them to 0 before. nullptr stops counting. Copies share them. */
     void setCounters(mbm_counters *counters) { mbm_line_setCounters(line(), counters); }
+    // NOLINTEND(readability-convert-member-functions-to-static)
 
     /** Continues a non-blocking request: ku8MBPending until it has ended, then its status. */
     uint8_t poll() { return mbm_node_poll(&state.node); }
@@ -433,9 +436,11 @@ private:
                                               uint8_t (*function)(mbm_node *, Parameters...),
                                               Parameters... arguments)
     {
-        uint8_t *frame = Line::kept;
+        uint8_t *frame;
         uint8_t bytes = frameBytes;
-        if (frame == nullptr) {
+        if (Line::kept != nullptr) {
+            frame = Line::kept->frame;
+        } else {
             bytes = Line::bytesOf(words);
             frame = static_cast<uint8_t *>(__builtin_alloca(bytes));
         }

@@ -27,35 +27,34 @@ template <typename User> struct ModbusMasterWire {
 // One line for all objects. While a function waits for its reply, the frame lies on the stack of
 // that function, and has only the bytes that the request needs. A request that outlives its
 // function, or whose reply may be longer, needs the buffer of `Bytes` bytes. A sketch that never
-// calls keep or mayOutlive contains neither that buffer nor the code to give a request up. It is
+// calls keep contains neither that buffer nor the code to give a request up. It is
 // a template, because in C++11 only a template's static members can be defined in a header.
 template <typename User, uint8_t Bytes> class ModbusMasterLine {
 public:
     static ModbusMasterWire<User> wire;
 
+    // What requests need that may outlive the function that makes them.
+    struct Kept {
+        uint8_t (*cancel)(mbm_node *);
+        uint8_t frame[Bytes];
+    };
+
     // Has all later requests use the buffer.
     static void keep()
     {
-        static uint8_t buffer[Bytes];
-        kept = buffer;
-    }
-
-    // Requests may outlive the function that makes them.
-    static void mayOutlive()
-    {
-        keep();
-        cancel = mbm_node_cancel;
+        static Kept all = {mbm_node_cancel, {}};
+        kept = &all;
     }
 
     // Gives up the request of a node.
     static void giveUp(mbm_node &node)
     {
-        if (cancel != nullptr)
-            cancel(&node);
+        if (kept != nullptr)
+            kept->cancel(&node);
     }
 
-    // The buffer; nullptr before keep.
-    static uint8_t *kept;
+    // nullptr before keep.
+    static Kept *kept;
 
     // How many bytes the frame of a request needs: those of the request, or of its reply beside
     // a late reply of the same length. `words` are those that it writes or reads, whichever are
@@ -69,16 +68,12 @@ public:
 
     // The line knows when it was used.
     static void used() {}
-
-private:
-    static uint8_t (*cancel)(mbm_node *);
 };
 
 template <typename User, uint8_t Bytes>
 ModbusMasterWire<User> ModbusMasterLine<User, Bytes>::wire = {};
-template <typename User, uint8_t Bytes> uint8_t *ModbusMasterLine<User, Bytes>::kept = nullptr;
 template <typename User, uint8_t Bytes>
-uint8_t (*ModbusMasterLine<User, Bytes>::cancel)(mbm_node *) = nullptr;
+typename ModbusMasterLine<User, Bytes>::Kept *ModbusMasterLine<User, Bytes>::kept = nullptr;
 
 #else
 // When any object used a line last. All objects may share a line, so the silence before a
@@ -115,7 +110,6 @@ public:
     uint8_t frame[Bytes];
 
     static void keep() {}
-    static void mayOutlive() {}
     static void giveUp(mbm_node &node) { mbm_node_cancel(&node); }
     static void used() { ModbusMasterUse<void>::note(); }
 };

@@ -824,11 +824,11 @@ typedef struct mbm_line {
     /**
      * Private.
      */
-    void *pointers[14];
+    void *pointers[13];
     /**
      * Private.
      */
-    uint32_t words[19];
+    uint32_t words[20];
 } mbm_line;
 
 /**
@@ -1583,7 +1583,7 @@ typedef struct mbm_client {
     /**
      * Private.
      */
-    void *pointers[49];
+    void *pointers[50];
     /**
      * Private.
      */

@@ -86,7 +86,14 @@ impl Node {
         P: Port,
     {
         self.status = match status {
-            Status::OK if line.request().is_read() => self.store_words(line),
+            Status::OK if line.request().is_read() => {
+                if line.store_words() {
+                    self.response_words = line.response_words();
+                    Status::OK
+                } else {
+                    Status::BUFFER_TOO_SMALL
+                }
+            }
             status => status,
         };
         self.exception = line.exception_code();
@@ -96,16 +103,6 @@ impl Node {
     /// Notes why a request was given up or refused.
     pub fn end(&mut self, status: Status) {
         self.status = status;
-    }
-
-    /// Copies the data of a successful reply to the response words.
-    #[inline(always)]
-    fn store_words<P: Port, S: Words>(&mut self, line: &mut Line<P, S>) -> Status {
-        if !line.store_words() {
-            return Status::BUFFER_TOO_SMALL;
-        }
-        self.response_words = line.response_words();
-        Status::OK
     }
 
     /// Starts the request of the function `spec`, with an address and a quantity or value

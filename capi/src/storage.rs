@@ -3,6 +3,7 @@
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::bytes::copy_words;
 use mbm::engine::{Setting, Settings, Storage, Words, COUNTERS};
+use mbm::node::NO_WORD;
 use mbm::time::millis;
 use mbm::FIRMWARE;
 
@@ -48,6 +49,15 @@ impl NodeWords {
     pub(super) fn response(&mut self) -> &mut [u16] {
         // SAFETY: as the header of mbm_node_begin demands.
         unsafe { words(self.response, self.response_words) }
+    }
+
+    /// The word at `index` that a read has filled; [`NO_WORD`] past the end.
+    pub(super) fn response_word(&self, index: u8) -> u16 {
+        if index >= self.response_words {
+            return NO_WORD;
+        }
+        // SAFETY: below `response_words`, as the header of mbm_node_begin demands.
+        unsafe { *self.response.add(index.into()) }
     }
 
     /// The words that writes send.

@@ -3,24 +3,10 @@
 //! Only [`Engine::use_extras`] names this module. A program that sets none of the three in C
 //! contains none of this code.
 
-use super::{Count, Engine, Phase, RequestSpec, Storage};
+use super::{Count, Engine, Moment, Outcome, Phase, RequestSpec, Storage};
 use crate::error::Status;
 use crate::port::Port;
 use crate::time::characters;
-
-/// A function that does something at a moment of a request. `true` if that replaces what follows.
-pub type Extras<P, S, Q> = fn(&mut Engine<P, S, Q>, Moment) -> bool;
-
-/// When [`Extras`] are called.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Moment {
-    /// A byte has arrived. `true` if it ends the echo of the request.
-    Byte,
-    /// The port has sent the last bit. `true` if the driver must stay on.
-    Sent,
-    /// The request has failed. `true` if it is repeated.
-    Failed,
-}
 
 impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Makes the settings `retries`, `echo_discard` and `post_flush_hold` effective.
@@ -28,7 +14,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.extras = Some(Engine::extras);
     }
 
-    /// See [`Extras`].
+    /// See [`super::Extras`].
     pub(super) fn extras(&mut self, moment: Moment) -> bool {
         match moment {
             Moment::Byte => self.ends_echo(),
@@ -40,9 +26,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// True if the last byte ends the echo of the request.
     fn ends_echo(&mut self) -> bool {
         let length = self.outgoing;
-        if length == S::Count::ZERO
-            || !self.ends_with(length, self.request.function())
-            || !Q::is_echo(self, self.end - length)
+        if !self.ends_with(length, self.request.function()) || !Q::is_echo(self, self.end - length)
         {
             return false;
         }
@@ -67,7 +51,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 
     /// True if the request is begun again.
     fn is_repeated(&mut self) -> bool {
-        if !Q::HAS_FIXED_REPLY || self.retries == 0 {
+        if !Q::HAS_FIXED_REPLY || self.retries == 0 || self.seen == Outcome::TOO_LONG {
             return false;
         }
         self.retries -= 1;

@@ -114,8 +114,8 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
 
     /// Copies the data of the reply into the response words. False, with nothing copied, if
     /// there are too few words.
-    #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
+    #[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
+    #[cfg_attr(not(all(target_os = "none", not(target_arch = "avr"))), inline(always))]
     pub fn store_words(&mut self) -> bool {
         let count = self.request.reads();
         if self.response_words() > self.storage.response_words() {

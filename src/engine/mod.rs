@@ -29,7 +29,6 @@ mod spec;
 mod storage;
 mod tally;
 
-pub use extras::{Extras, Moment};
 pub use outcome::Outcome;
 pub use settings::{Setting, Settings};
 pub use spec::RequestSpec;
@@ -103,6 +102,8 @@ pub struct Engine<P, S: Storage, Q> {
     awaits_end: bool,
     /// The last poll may have left bytes unread.
     has_more: bool,
+    /// The frame that is being received begins as the reply to a read does.
+    is_begun: bool,
     /// What the frame that is being received is if it ends with a right CRC.
     run_kind: Outcome,
     /// How many bytes have arrived since the last frame ended.
@@ -169,3 +170,17 @@ pub enum Event {
 
 /// A function that sees the bytes beside the search, and the end of the request.
 pub type Observer<P, S, Q> = fn(&mut Engine<P, S, Q>, Event);
+
+/// A function that does something at a moment of a request. `true` if that replaces what follows.
+pub type Extras<P, S, Q> = fn(&mut Engine<P, S, Q>, Moment) -> bool;
+
+/// When [`Extras`] are called.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Moment {
+    /// A byte has arrived, and the echo of the request may. `true` if the byte ends it.
+    Byte,
+    /// The port has sent the last bit. `true` if the driver must stay on.
+    Sent,
+    /// The request has failed. `true` if it is repeated.
+    Failed,
+}

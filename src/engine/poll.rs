@@ -112,6 +112,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             has_slow_unit: false,
             awaits_end: false,
             has_more: false,
+            is_begun: false,
             run_kind: Outcome::MALFORMED,
             run_length: S::Count::ZERO,
             length: S::Count::ZERO,
@@ -354,7 +355,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             self.expect_no_late_reply();
             return status;
         }
-        if status != Status::BUFFER_TOO_SMALL && self.has_extra(Moment::Failed) {
+        if self.has_extra(Moment::Failed) {
             return Status::PENDING;
         }
         status

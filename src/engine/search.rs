@@ -18,6 +18,9 @@ use crate::pdu::EXCEPTION;
 use crate::port::Port;
 use crate::FIRMWARE;
 
+/// Bytes of the frame of the reply to a read beside its data: unit, function, byte count, CRC.
+const AROUND_DATA: u8 = rtu::OVERHEAD as u8 + 2;
+
 /// Length of the frame of an exception: unit, function, code, CRC.
 const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 
@@ -86,7 +89,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         self.end += 1u8.into();
         let is_whole = self.continue_frame(byte);
         let function = self.request.function();
-        if self.has_extra(Moment::Byte) {
+        if self.outgoing > S::Count::ZERO && self.has_extra(Moment::Byte) {
             return false;
         }
         let is_response = if self.ends_with(EXCEPTION_FRAME.into(), function | EXCEPTION) {
@@ -145,25 +148,14 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         S::Count::ZERO
     }
 
-    /// Notes that the reply to a read begins with the last three bytes, if the frame buffer
-    /// cannot hold that reply.
+    /// Notes that the reply to a read has begun, if the frame buffer cannot hold that reply.
     #[cold]
     #[inline(always)]
     fn note_too_long(&mut self) {
-        if self.end >= 3u8.into() && self.begins_read(self.end - 3u8.into()) {
+        if self.is_begun && self.run_length == 3u8.into() {
             self.note(Outcome::TOO_LONG);
             self.is_early = true;
         }
-    }
-
-    /// True if the bytes at `front` are those with which the reply to a read begins: unit,
-    /// function code and byte count.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn begins_read(&self, front: S::Count) -> bool {
-        let count: u16 = (self.length - 5u8.into()).into();
-        self.storage.byte(front) == self.unit
-            && self.storage.byte(front + 1u8.into()) == self.request.function()
-            && u16::from(self.storage.byte(front + 2u8.into())) == count
     }
 
     /// Moves the frame of `length` bytes at the end of the buffer to its front, and makes it the
@@ -255,12 +247,14 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     }
 
     /// The next byte begins a frame.
-    #[inline(always)]
+    #[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
+    #[cfg_attr(target_arch = "avr", inline(always))]
     pub(super) fn begin_frame(&mut self) {
         self.run_length = S::Count::ZERO;
         if cfg!(feature = "diagnosis") {
             self.run = Crc16::START;
             self.run_kind = Outcome::MALFORMED;
+            self.is_begun = false;
         }
         if Self::DERIVES_CRC {
             self.before = Crc16::START;
@@ -271,18 +265,24 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// last frame form a frame.
     #[inline(always)]
     fn continue_frame(&mut self, byte: u8) -> bool {
-        self.run_length = self.run_length.saturating_add(1u8.into());
+        self.run_length = self.run_length.next();
         if !cfg!(feature = "diagnosis") {
             return false;
         }
         if self.run_length == 1u8.into() && byte != self.unit {
             self.run_kind = Outcome::OTHER_UNIT;
         }
-        if self.run_length == 2u8.into()
-            && byte & !EXCEPTION != self.request.function()
-            && self.run_kind == Outcome::MALFORMED
-        {
-            self.run_kind = Outcome::OTHER_FUNCTION;
+        if self.run_kind == Outcome::MALFORMED {
+            if self.run_length == 2u8.into() {
+                self.is_begun = byte == self.request.function();
+                if byte & !EXCEPTION != self.request.function() {
+                    self.run_kind = Outcome::OTHER_FUNCTION;
+                }
+            }
+            if self.run_length == 3u8.into() {
+                let length: u16 = self.length.into();
+                self.is_begun &= byte == length.wrapping_sub(AROUND_DATA.into()) as u8;
+            }
         }
         let last = self.storage.slice(self.end - 1u8.into(), 1u8.into());
         self.run = self.run.with(last);
@@ -290,8 +290,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             return false;
         }
         // By chance, the CRC may be right before the end of the reply.
-        let is_here = self.run_length < self.length && self.run_length <= self.end - self.content;
-        !(is_here && self.begins_read(self.end - self.run_length))
+        !(self.is_begun && self.run_length < self.length)
     }
 
     /// Skips a whole frame that is not the reply. True if it is the reply but the frame buffer
@@ -337,7 +336,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     }
 
     /// Notes a fault if it is more severe than the noted one. A response stays.
-    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
     pub(crate) fn note(&mut self, fault: Outcome) {
         if !self.seen.is_response() && self.seen < fault {
             self.seen = fault;
@@ -352,7 +351,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 
     /// Makes space in a full frame buffer. A held reply is dropped, because too many bytes
     /// follow it. Of the other bytes those stay with which the reply may begin.
-    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn make_space(&mut self) {
         let mut keep = self.end - self.content;
         if self.content > S::Count::ZERO {

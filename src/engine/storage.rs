@@ -54,8 +54,8 @@ pub trait Count:
     /// This number of bytes of a frame buffer.
     fn of(bytes: usize) -> Self;
 
-    /// The sum; the greatest number if the sum is greater.
-    fn saturating_add(self, other: Self) -> Self;
+    /// The next number; the greatest one stays.
+    fn next(self) -> Self;
 }
 
 impl Count for u8 {
@@ -65,8 +65,8 @@ impl Count for u8 {
         bytes as u8
     }
 
-    fn saturating_add(self, other: Self) -> Self {
-        self.saturating_add(other)
+    fn next(self) -> Self {
+        self.wrapping_add(u8::from(self != u8::MAX))
     }
 }
 
@@ -77,8 +77,8 @@ impl Count for u16 {
         bytes as u16
     }
 
-    fn saturating_add(self, other: Self) -> Self {
-        self.saturating_add(other)
+    fn next(self) -> Self {
+        self.saturating_add(1)
     }
 }
 

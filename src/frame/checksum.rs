@@ -189,7 +189,6 @@ impl Crc16 {
     /// The CRC of a run of bytes that ends with a frame whose CRC is right. `self` is the CRC of
     /// the bytes before that frame, `weight` the weight of the frame's length. (The CRC is
     /// linear: the bytes before the frame add a difference, multiplied by the weight.)
-    #[cfg_attr(target_os = "none", inline(never))]
     #[must_use]
     pub fn since_start(self, mut weight: Crc16) -> Crc16 {
         let mut difference = self.0 ^ Crc16::START.0;

@@ -99,7 +99,6 @@ impl MasterRequest {
     /// `word`. Returns [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the standard does
     /// not allow, [`Status::ILLEGAL_DATA_ADDRESS`] if the range goes beyond address 65535,
     /// otherwise [`Status::OK`].
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn set(&mut self, spec: MasterSpec, address: u16, word: u16) -> Status {
         let ([a, b], [c, d]) = (address.to_be_bytes(), word.to_be_bytes());
         let [at_0, at_1, at_2, at_3, at_4, ..] = &mut self.head;

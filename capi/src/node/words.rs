@@ -3,7 +3,7 @@
 use super::mbm_node;
 use crate::pointers::{read, with};
 use mbm::error::Status;
-use mbm::node::{set_word, word, NO_WORD};
+use mbm::node::{set_word, NO_WORD};
 
 /// Returns a word of the last successful read.
 ///
@@ -13,11 +13,7 @@ use mbm::node::{set_word, word, NO_WORD};
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_getResponseBuffer(node: *const mbm_node, index: u8) -> u16 {
     // SAFETY: as the header demands.
-    unsafe {
-        read(node, NO_WORD, |node| {
-            word(node.words.response(), usize::from(index))
-        })
-    }
+    unsafe { read(node, NO_WORD, |node| node.words.response_word(index)) }
 }
 
 /// Zeroes the response words. The position of mbm_node_receive does not change.

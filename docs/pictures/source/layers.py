@@ -7,7 +7,7 @@ GAP = 6
 
 # The rows of the core from the top on: modules side by side, and what each is for.
 CORE = [
-    [("master",), ("client",), ("plan",), ("server",), ("gateway",)],
+    [("line, node",), ("client",), ("plan",), ("server",), ("gateway",)],
     [("engine", "one request"), ("sniffer", "others' frames"), ("trace", "each frame")],
     [("text", "frames, events and statuses in words")],
     [("packet", "any frame as fields, and back")],
@@ -34,7 +34,7 @@ def draw():
     drawing = Drawing(
         "The layers of mbm, from a sketch to the port",
         "Sketches use C++ classes, which use the C interface mbm.h. C and C++ programs use mbm.h. Rust firmware uses "
-        "the core. In the core, from top to bottom: master, client, plan, server and gateway; engine, sniffer and "
+        "the core. In the core, from top to bottom: line and node, client, plan, server and gateway; engine, sniffer and "
         "trace; text; packet; pdu; frame; data and port; error and time. Each layer uses only layers below it. "
         "The port calls functions of yours: read, write, clock, driver on and off, flush.")
     third = (INNER - 2 * GAP) / 3

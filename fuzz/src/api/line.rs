@@ -44,7 +44,7 @@ fn set_frame(w: &World, line: *mut mbm_line) {
 
 fn set(w: &World, line: *mut mbm_line) {
     let (byte, word, long) = (w.byte(), w.word(), w.long());
-    let choice = w.byte() % 9;
+    let choice = w.byte() % 8;
     let counters: *mut mbm_counters = if byte & 1 == 0 {
         null_mut()
     } else {
@@ -60,8 +60,7 @@ fn set(w: &World, line: *mut mbm_line) {
         4 => call!(w, line, mbm_line_setRetries(line, byte)),
         5 => call!(w, line, mbm_line_setEchoDiscard(line, byte & 3)),
         6 => call!(w, line, mbm_line_setPostFlushHold(line, byte)),
-        7 => call!(w, line, mbm_line_setCounters(line, counters)),
-        _ => call!(w, line, mbm_line_setLenient(line, byte & 1)),
+        _ => call!(w, line, mbm_line_setCounters(line, counters)),
     });
     get(w, line);
 }
@@ -71,8 +70,7 @@ fn get(w: &World, line: *mut mbm_line) {
     let gap = call!(w, line, mbm_line_getGap(line));
     assert!(gap <= 1 << 31);
     let echo = call!(w, line, mbm_line_getEchoDiscard(line));
-    let lenient = call!(w, line, mbm_line_getLenient(line));
-    assert!(echo <= 1 && lenient <= 1);
+    assert!(echo <= 1);
     let others = [
         call!(w, line, mbm_line_getTurnaroundDelay(line)),
         call!(w, line, mbm_line_getQuietTime(line)),
@@ -80,7 +78,7 @@ fn get(w: &World, line: *mut mbm_line) {
         call!(w, line, mbm_line_getPostFlushHold(line)).into(),
     ];
     if w.is_locked(line.cast()) {
-        assert_eq!((gap, echo, lenient, others), (0, 0, 0, [0; 4]));
+        assert_eq!((gap, echo, others), (0, 0, [0; 4]));
     }
 }
 

@@ -5,6 +5,7 @@ use super::check::{
     Span, PENDING,
 };
 use super::line;
+use super::ports;
 use super::world::World;
 use mbm_c::*;
 use std::ptr::null_mut;
@@ -54,12 +55,13 @@ fn begin(w: &World, node: *mut mbm_node) {
 /// Settings. They may be set in hooks of the line, too.
 fn set(w: &World, node: *mut mbm_node) {
     let (byte, word, long) = (w.byte(), w.word(), w.long());
-    let choice = w.byte() % 4;
+    let choice = w.byte() % 5;
     let time = if byte < 0xF0 { word.into() } else { long };
     unchanged_if_refused(w, &[span(node)], "mbm_node_set", || match choice {
         0 => call!(w, node, mbm_node_setSlaveID(node, byte)),
         1 => call!(w, node, mbm_node_setResponseTimeout(node, time)),
         2 => call!(w, node, mbm_node_setBlocking(node, byte & 1)),
+        3 => call!(w, node, mbm_node_setLenient(node, byte & 1)),
         _ => call!(w, node, mbm_node_setWordOrder(node, byte % 8)),
     });
     get(w, node);
@@ -69,6 +71,7 @@ fn set(w: &World, node: *mut mbm_node) {
 fn get(w: &World, node: *mut mbm_node) {
     assert!(call!(w, node, mbm_node_getResponseTimeout(node)) <= 1_000_000);
     assert!(call!(w, node, mbm_node_getBlocking(node)) <= 1);
+    assert!(call!(w, node, mbm_node_getLenient(node)) <= 1);
     let order = call!(w, node, mbm_node_getWordOrder(node));
     assert!((MBM_ORDER_ABCD..=MBM_ORDER_DCBA).contains(&order));
     call!(w, node, mbm_node_getSlaveID(node));
@@ -130,7 +133,7 @@ fn request(w: &World, node: *mut mbm_node) {
                 "a request returned {status}, and changed the node or its line"
             );
         }
-        PENDING => others_are_refused(w, node),
+        PENDING => changes_are_refused(w, node),
         _ => {}
     }
     if status == MBM_NOT_INITIALISED && !w.rarely(4) {
@@ -139,8 +142,9 @@ fn request(w: &World, node: *mut mbm_node) {
     }
 }
 
-/// While a request of the node is under way, the line takes none of another node.
-fn others_are_refused(w: &World, node: *mut mbm_node) {
+/// While a request of the node is under way, the line takes none of another node, and neither
+/// the line nor the node can be begun again.
+fn changes_are_refused(w: &World, node: *mut mbm_node) {
     let line = w.line_of(node);
     let is_other = |other: &*mut mbm_node| *other != node && w.line_of(*other) == line;
     if let Some(other) = w.nodes.all().into_iter().find(is_other) {
@@ -149,6 +153,21 @@ fn others_are_refused(w: &World, node: *mut mbm_node) {
             call!(w, other, mbm_node_readCoils(other, 0, 1))
         });
         assert_eq!(status, MBM_BUSY, "a second request on a line");
+    }
+    if !w.rarely(8) {
+        return;
+    }
+    let (new, frame): (*mut mbm_line, _) = (w.zeroed(), w.noise(256));
+    let port = ports::good(w, 0, MBM_FRAMING_RTU);
+    let spans = [span(node), span(line), span(new)];
+    for choice in 0..3 {
+        let none = null_mut();
+        let status = unchanged_if_refused(w, &spans, "a begin", || match choice {
+            0 => call!(w, node, mbm_node_begin(node, new, 1, none, 0, none, 0)),
+            1 => call!(w, line, mbm_line_beginRtu(line, port, frame, 256)),
+            _ => call!(w, line, mbm_line_setFrame(line, frame, 256)),
+        });
+        assert_eq!(status, MBM_BUSY, "a change while a request is under way");
     }
 }
 

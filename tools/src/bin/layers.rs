@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The layers from left to right. Modules of one layer may not use each other.
-const LAYERS: [&[&str]; 9] = [
+const LAYERS: [&[&str]; 10] = [
     &["atomic", "error", "time"],
     &["port", "ring", "data"],
     &["bytes"],
@@ -18,7 +18,8 @@ const LAYERS: [&[&str]; 9] = [
     &["packet"],
     &["text"],
     &["sniffer", "trace", "engine"],
-    &["master", "client", "plan", "server", "gateway"],
+    &["node", "client", "plan", "server", "gateway"],
+    &["master"],
 ];
 
 fn layer(module: &str) -> Option<usize> {
