@@ -127,10 +127,18 @@ fn request(w: &World, node: *mut mbm_node) {
         return;
     }
     match status {
-        MBM_BUSY | MBM_NOT_INITIALISED | MBM_INVALID_ARGUMENT => {
+        MBM_BUSY | MBM_INVALID_ARGUMENT => {
             assert!(
                 spans.map(bytes) == before,
                 "a request returned {status}, and changed the node or its line"
+            );
+        }
+        // The node keeps that status.
+        MBM_NOT_INITIALISED => {
+            let [_, line] = spans.map(bytes);
+            assert!(
+                line == before[1],
+                "a request without a port changed the line"
             );
         }
         PENDING => changes_are_refused(w, node),
