@@ -148,14 +148,29 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         S::Count::ZERO
     }
 
-    /// Notes that the reply to a read has begun, if the frame buffer cannot hold that reply.
+    /// Notes that the reply to a read begins with the last three bytes, if the frame buffer
+    /// cannot hold that reply.
     #[cold]
     #[inline(always)]
     fn note_too_long(&mut self) {
-        if self.is_begun && self.run_length == 3u8.into() {
+        if self.end < 3u8.into() {
+            return;
+        }
+        let front = self.end - 3u8.into();
+        if self.storage.byte(front) == self.unit
+            && self.storage.byte(front + 1u8.into()) == self.request.function()
+            && self.storage.byte(front + 2u8.into()) == self.data_length()
+        {
             self.note(Outcome::TOO_LONG);
             self.is_early = true;
         }
+    }
+
+    /// The byte count with which the reply to a read begins.
+    #[inline(always)]
+    fn data_length(&self) -> u8 {
+        let length: u16 = self.length.into();
+        length.wrapping_sub(AROUND_DATA.into()) as u8
     }
 
     /// Moves the frame of `length` bytes at the end of the buffer to its front, and makes it the
@@ -280,8 +295,7 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
                 }
             }
             if self.run_length == 3u8.into() {
-                let length: u16 = self.length.into();
-                self.is_begun &= byte == length.wrapping_sub(AROUND_DATA.into()) as u8;
+                self.is_begun &= byte == self.data_length();
             }
         }
         let last = self.storage.slice(self.end - 1u8.into(), 1u8.into());
