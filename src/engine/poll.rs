@@ -157,11 +157,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// The time at which the line was last in use, by the clock of the port.
-    pub fn last_use(&self) -> u32 {
-        self.since
-    }
-
     /// Does what the request has to do at the time `now`, without waiting. Returns
     /// [`Status::PENDING`] until the request has ended, then its status.
     #[cfg_attr(not(target_os = "none"), inline(always))]
