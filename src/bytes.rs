@@ -19,31 +19,6 @@ pub(crate) fn move_items<T: Copy>(to: &[Cell<T>], from: &[Cell<T>]) {
     }
 }
 
-/// Copies words and converts them from big-endian to the machine's byte order, or back. It
-/// copies eight words at a time; the last eight may overlap the ones before. Only hosts
-/// use it.
-#[inline(always)]
-pub fn copy_words(to: &mut [u8], from: &[u8]) {
-    let (words, places) = (from.as_chunks().0, to.as_chunks_mut().0);
-    let from_big_endian = |word| u16::from_be_bytes(word).to_ne_bytes();
-    for (place, eight) in places
-        .as_chunks_mut::<8>()
-        .0
-        .iter_mut()
-        .zip(words.as_chunks().0)
-    {
-        *place = eight.map(from_big_endian);
-    }
-    match (places.last_chunk_mut(), words.last_chunk::<8>()) {
-        (Some(place), Some(eight)) => *place = eight.map(from_big_endian),
-        _ => {
-            for (place, word) in places.iter_mut().zip(words) {
-                *place = from_big_endian(*word);
-            }
-        }
-    }
-}
-
 /// Reads a byte slice from its front.
 #[derive(Clone, Copy)]
 pub struct Reader<'a> {
@@ -161,28 +136,6 @@ mod tests {
         assert_eq!(reader.rest(), [5]);
         assert!(reader.is_empty());
         assert_eq!(reader.u8(), None);
-    }
-
-    #[test]
-    fn words_are_copied_whatever_their_number() {
-        let bytes: [u8; 54] = core::array::from_fn(|index| index as u8);
-        for count in 0..=27 {
-            let mut words = [0u16; 27];
-            let mut copy = [0xEE; 54];
-            copy_words(&mut copy[..2 * count], &bytes[..2 * count]);
-            for (word, bytes) in words.iter_mut().zip(copy.as_chunks().0) {
-                *word = u16::from_ne_bytes(*bytes);
-            }
-            for (index, word) in words.iter().enumerate() {
-                let [high, low] = [2 * index as u16, 2 * index as u16 + 1];
-                let expected = if index < count {
-                    high << 8 | low
-                } else {
-                    0xEEEE
-                };
-                assert_eq!(*word, expected, "{count} words, word {index}");
-            }
-        }
     }
 
     #[test]

@@ -111,8 +111,8 @@
 //!     fn byte(&self, _: usize) -> u8 {
 //!         0 // A read sends no data.
 //!     }
-//!     fn put(&mut self, index: usize, byte: u8) {
-//!         self.received[index] = byte;
+//!     fn store(&mut self, data: &[u8], _: u8) {
+//!         self.received[..data.len()].copy_from_slice(data);
 //!     }
 //! }
 //!
@@ -255,11 +255,3 @@ pub mod master;
 pub mod node;
 pub mod plan;
 pub mod server;
-
-/// True if the crate is compiled for firmware. Some functions have a longer, faster branch
-/// for hosts, and firmware runs the shorter, slower one.
-///
-/// Every branch on the target reads this constant, or has the same condition as a
-/// `cfg` attribute. `--cfg mbm_firmware` selects the firmware's code on a host, so that
-/// tests run it there.
-pub const FIRMWARE: bool = cfg!(any(target_os = "none", mbm_firmware));

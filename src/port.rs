@@ -2,6 +2,12 @@
 
 /// A byte stream and a clock. No function may block.
 pub trait Port {
+    /// True if a master and a client's line read one byte at a time: that takes less code, 56
+    /// bytes on a Cortex-M0+ and 140 on an AVR. If false, they read what has arrived in one call,
+    /// and compare a whole reply before they search it, which saves a host system calls and two
+    /// instructions of three.
+    const READS_SINGLE_BYTES: bool = cfg!(target_os = "none");
+
     /// True if the port can be used. Otherwise no other function is called.
     fn is_ready(&self) -> bool {
         true

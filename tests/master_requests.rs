@@ -17,7 +17,7 @@ use vectors::{right_pdus, Direction};
 /// Calls the master's function `function`, and delivers `frame` as the reply. Returns the
 /// status and the response words.
 fn reply(unit: u8, function: u8, words: &[u16], frame: &[u8]) -> (Status, Vec<u16>) {
-    let mut master = TestMaster::new(unit, 256);
+    let mut master = TestMaster::<false>::new(unit, 256);
     let status = master.request(Call::new(function, words), frame, 256, 100);
     (status, master.words())
 }
@@ -86,7 +86,7 @@ fn call(request: &Request) -> Option<(Call, Vec<u16>)> {
 /// returns the same.
 fn built(call: Call) -> Result<(), Status> {
     let built = call.query().map(drop);
-    let mut master = TestMaster::new(17, 256);
+    let mut master = TestMaster::<false>::new(17, 256);
     let started = master.start(call, &[]);
     assert_eq!(started, built.err().unwrap_or(Status::PENDING), "{call:?}");
     built
@@ -229,7 +229,7 @@ fn a_write_reply_with_another_address_or_value_is_malformed() {
         let mut pdu = [6, 0, 0x6B, 1, 1];
         pdu[at] = wrong;
         let frame = sealed(&[&[9], &pdu[..]].concat());
-        let mut master = TestMaster::new(9, 256);
+        let mut master = TestMaster::<false>::new(9, 256);
         let status = master.request(Call::new(6, &[0x6B, 0x0101]), &frame, 256, 100);
         assert_eq!(status, Status::MALFORMED_REPLY);
         let foreign = master.0.storage().counters[Counter::ForeignFrames as usize];
@@ -244,7 +244,7 @@ fn exception_codes_of_0_and_from_80_are_malformed() {
             1..=0x7F => Status::from_code(code),
             _ => Status::MALFORMED_REPLY,
         };
-        let mut master = TestMaster::new(9, 256);
+        let mut master = TestMaster::<false>::new(9, 256);
         let frame = sealed(&[9, 0x86, code]);
         let status = master.request(Call::new(6, &[1, 2]), &frame, 256, 100);
         assert_eq!(status, expected);

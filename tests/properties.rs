@@ -138,7 +138,7 @@ proptest! {
         let _ = Request::parse(&bytes);
         let unit = bytes.first().copied().unwrap_or(1).max(1);
         let request_length = usize::from(request.query().unwrap().length()) + 3;
-        let mut master = TestMaster::new(unit, size.max(request_length));
+        let mut master = TestMaster::<false>::new(unit, size.max(request_length));
         master.0.settings().echo_discard = echo;
         master.request(request, &bytes, piece, step);
         // The bytes as the PDU of a frame. Then again after a timeout, when the master holds
@@ -159,9 +159,9 @@ proptest! {
     ) {
         let reply = right_reply(1, request, seed);
         let bytes = [noise, reply].concat();
-        let mut master = TestMaster::new(1, 256);
-        prop_assert_eq!(master.request(request, &bytes, piece, step), Status::OK);
-        prop_assert_eq!(master.words(), right_words(request, seed));
+        let right = (Status::OK, right_words(request, seed));
+        prop_assert_eq!(outcome::<false>((1, 256), request, &bytes, piece, step), right.clone());
+        prop_assert_eq!(outcome::<true>((1, 256), request, &bytes, piece, step), right);
     }
 
     #[test]
@@ -179,10 +179,11 @@ proptest! {
         let bytes: Vec<u8> = false_heads.flatten().chain(&reply).copied().collect();
         prop_assume!(!is_answered_before(17, request, &bytes, reply.len()));
         let least = reply.len().max(usize::from(query.length()) + 3);
-        let mut master = TestMaster::new(17, least + space);
+        let right = (Status::OK, right_words(request, seed));
+        let master = (17, least + space);
         // The polls are closer together than the silence that ends a frame.
-        prop_assert_eq!(master.request(request, &bytes, piece, 100), Status::OK);
-        prop_assert_eq!(master.words(), right_words(request, seed));
+        prop_assert_eq!(outcome::<false>(master, request, &bytes, piece, 100), right.clone());
+        prop_assert_eq!(outcome::<true>(master, request, &bytes, piece, 100), right);
     }
 
     #[test]
@@ -195,16 +196,19 @@ proptest! {
         let mut reply = right_reply(1, request, seed);
         let bit = bit.index(8 * reply.len());
         reply[bit / 8] ^= 1 << (bit % 8);
-        let mut master = TestMaster::new(1, 256);
-        let status = master.request(request, &reply, piece, 100);
-        prop_assert!(status.is_failure(), "{:?}", status);
-        prop_assert_eq!(master.words(), []);
+        for (status, words) in [
+            outcome::<false>((1, 256), request, &reply, piece, 100),
+            outcome::<true>((1, 256), request, &reply, piece, 100),
+        ] {
+            prop_assert!(status.is_failure(), "{:?}", status);
+            prop_assert_eq!(words, []);
+        }
     }
 
     #[test]
     fn a_right_reply_ends_the_request_with_ok(request in any_request(), seed: u8) {
         let reply = right_reply(1, request, seed);
-        let mut master = TestMaster::new(1, 256);
+        let mut master = TestMaster::<false>::new(1, 256);
         prop_assert_eq!(master.request(request, &reply, 300, 100), Status::OK);
         prop_assert_eq!(master.0.exception_code(), 0);
         prop_assert_eq!(master.words(), right_words(request, seed));
@@ -215,4 +219,18 @@ fn emit_words(function: u8, words: &[u16]) -> Vec<u8> {
     let mut pdu = vec![function];
     pdu.extend(words.iter().flat_map(|word| word.to_be_bytes()));
     pdu
+}
+
+/// The status and the words of a request to which `bytes` arrive, of a master with this unit and
+/// size of the frame buffer.
+fn outcome<const SINGLE: bool>(
+    (unit, size): (u8, usize),
+    request: Call,
+    bytes: &[u8],
+    piece: usize,
+    step: u32,
+) -> (Status, Vec<u16>) {
+    let mut master = TestMaster::<SINGLE>::new(unit, size);
+    let status = master.request(request, bytes, piece, step);
+    (status, master.words())
 }

@@ -159,7 +159,7 @@ proptest! {
         let longest = query.length().max(query.response_length());
         for space in [space, usize::from(query.length()) + 3, usize::from(longest) + 3] {
             let lent = Buffers::new(vec![0; space], vec![0; words.0], vec![0; words.1]);
-            let mut master = Master::new(17, Line::default(), Strict { lent });
+            let mut master = Master::new(17, <Line>::default(), Strict { lent });
             master.settings().retries = retries;
             master.settings().echo_discard = echo;
             master.set_lenient(lenient);

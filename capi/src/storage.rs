@@ -1,11 +1,9 @@
 //! The buffers and counters that belong to the C program.
 
-use core::slice::{from_raw_parts, from_raw_parts_mut};
-use mbm::bytes::copy_words;
+use core::slice::from_raw_parts_mut;
 use mbm::engine::{Setting, Settings, Storage, Words, COUNTERS};
 use mbm::node::NO_WORD;
 use mbm::time::millis;
-use mbm::FIRMWARE;
 
 /// Counters of what happened on the line since you zeroed them. Each wraps at 2^32.
 #[repr(C)]
@@ -202,10 +200,6 @@ impl Words for LineStorage {
     fn load_words(&mut self, to: u8, count: u8, high_first: bool) {
         // SAFETY: within `transmit_words` and `frame_bytes`, see above.
         unsafe {
-            if !FIRMWARE && high_first {
-                let words = from_raw_parts((*self.words).transmit.cast(), count.into());
-                return copy_words(self.bytes(to, count), words);
-            }
             let flip = flip(high_first);
             let words = (*self.words).transmit.cast::<u8>();
             let mut place = self.frame.add(to.into());
@@ -230,10 +224,6 @@ impl Words for LineStorage {
     fn store_words(&mut self, from: u8, count: u8, high_first: bool) {
         // SAFETY: within `frame_bytes` and `response_words`, see above.
         unsafe {
-            if !FIRMWARE && high_first {
-                let words = from_raw_parts_mut((*self.words).response.cast(), count.into());
-                return copy_words(words, self.slice(from, count));
-            }
             let mut word = (*self.words).response;
             let mut byte = self.frame.add(from.into());
             // An odd last byte is padded with 0. This overwrites a byte of the CRC, which

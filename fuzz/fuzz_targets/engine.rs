@@ -22,7 +22,8 @@ enum Next {
     LinkLost,
 }
 
-struct Line {
+/// The master reads single bytes if `SINGLE` is true, as in firmware.
+struct Line<const SINGLE: bool> {
     now: u32,
     /// The events, each with its delay after the previous one in microseconds.
     script: VecDeque<(u32, Next)>,
@@ -41,7 +42,9 @@ struct Line {
     lost: bool,
 }
 
-impl Port for Line {
+impl<const SINGLE: bool> Port for Line<SINGLE> {
+    const READS_SINGLE_BYTES: bool = SINGLE;
+
     fn read(&mut self, bytes: &mut [u8]) -> i16 {
         assert!(!self.driver, "the engine reads while it sends");
         let Some((delay, next)) = self.script.front_mut() else {
@@ -108,12 +111,19 @@ impl Port for Line {
 }
 
 type Lent = Buffers<Vec<u8>, Vec<u16>, Vec<u16>>;
-type MasterEngine = Engine<Line, Lent, MasterRequest>;
+type MasterEngine<const SINGLE: bool> = Engine<Line<SINGLE>, Lent, MasterRequest>;
 
 fuzz_target!(|data: &[u8]| {
     let mut input = Input(data);
-    let input = &mut input;
-    let line = Line {
+    match input.u8() & 1 {
+        0 => requests::<false>(&mut input),
+        _ => requests::<true>(&mut input),
+    }
+});
+
+/// Makes two requests.
+fn requests<const SINGLE: bool>(input: &mut Input) {
+    let line = Line::<SINGLE> {
         now: u32::from(input.u16()) << 16,
         script: VecDeque::new(),
         since: 0,
@@ -165,9 +175,15 @@ fuzz_target!(|data: &[u8]| {
         // No held reply takes space in the frame buffer any more.
         assert_eq!(usize::from(engine.storage.capacity()), space);
     }
-});
+}
 
-fn run(engine: &mut MasterEngine, asked: &Asked, space: usize, step: u32, is_early: &mut bool) {
+fn run<const SINGLE: bool>(
+    engine: &mut MasterEngine<SINGLE>,
+    asked: &Asked,
+    space: usize,
+    step: u32,
+    is_early: &mut bool,
+) {
     engine.clear_outcome();
     *engine.request() = asked.request;
     engine.port.requests.clear();
@@ -216,8 +232,8 @@ fn run(engine: &mut MasterEngine, asked: &Asked, space: usize, step: u32, is_ear
 
 /// Checks that the bytes received by a failed request contain no right reply. Skips requests
 /// that may fail for other reasons.
-fn check_no_reply_missed(
-    engine: &mut MasterEngine,
+fn check_no_reply_missed<const SINGLE: bool>(
+    engine: &mut MasterEngine<SINGLE>,
     asked: &Asked,
     space: usize,
     status: Status,
@@ -258,7 +274,7 @@ fn right_replies<'a>(bytes: &'a [u8], asked: &'a Asked) -> impl Iterator<Item = 
     })
 }
 
-fn validate(engine: &mut MasterEngine, asked: &Asked, status: Status) {
+fn validate<const SINGLE: bool>(engine: &mut MasterEngine<SINGLE>, asked: &Asked, status: Status) {
     let port = &engine.port;
     assert!(!port.driver && !engine.is_pending());
     let frame = asked.frame();

@@ -9,7 +9,6 @@ use crate::pdu::diagnostics::REPORT_SERVER_ID;
 use crate::pdu::header::RequestHeader;
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
-use crate::FIRMWARE;
 use core::num::NonZeroU8;
 
 /// The engine of a client on a serial line.
@@ -63,13 +62,7 @@ impl<P, S: ClientStorage, J: ClientRequest> ActiveRequest<P, S, J> {
             return;
         };
         let header = &client_request.state().header;
-        match (header.two_words(), &mut *pdu) {
-            (Some(words), [function, rest @ ..]) if rest.len() == words.len() => {
-                *function = header.function();
-                rest.copy_from_slice(words);
-            }
-            _ => header.emit(pdu, data_of(client_request)),
-        }
+        header.emit(pdu, data_of(client_request));
     }
 }
 
@@ -138,10 +131,6 @@ impl<P, S: ClientStorage, J: ClientRequest> RequestSpec<P, S> for ActiveRequest<
             return false;
         };
         let header = &client_request.state().header;
-        // Most requests of a host are reads, and this saves 70 instructions.
-        if let (false, Some(data)) = (FIRMWARE, header.data_of_read()) {
-            return pdu.get(1) == Some(&data);
-        }
         let expected = header.expected(pdu, whole.into()).map_or(0, NonZeroU8::get);
         u16::from(expected) == whole
             && header.validate(pdu, data_of(client_request)) != Status::MALFORMED_REPLY

@@ -7,7 +7,6 @@ use crate::time::{elapsed, timeout_at_most};
 impl RequestState {
     /// Microseconds until the request is due.
     #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn remaining_wait(&self, now: u32, storage: &mut impl ClientStorage) -> u32 {
         let wait = match self.wait {
             0 => 0,

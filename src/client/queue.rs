@@ -8,7 +8,6 @@ use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
 use crate::error::Status;
 use crate::time::{elapsed, LONGEST};
-use crate::FIRMWARE;
 use heapless::Vec;
 
 /// The requests and the policy of a client.
@@ -179,24 +178,11 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     /// Removes the request at the index `at` from the queue.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn remove(&mut self, at: usize) -> Option<J> {
-        if !FIRMWARE && at == 0 && self.queue.len() > 1 {
-            return self.remove_first();
-        }
         let mut moved = self.queue.pop()?;
         for place in self.queue.get_mut(at..)?.iter_mut().rev() {
             core::mem::swap(place, &mut moved);
         }
         Some(moved)
-    }
-
-    /// Removes the first request from the queue. (Faster on a host than [`RequestQueue::remove`]:
-    /// all others move with one copy.)
-    #[inline(never)]
-    fn remove_first(&mut self) -> Option<J> {
-        match self.queue.is_empty() {
-            true => None,
-            false => Some(self.queue.remove(0)),
-        }
     }
 
     /// Inserts a request at the front of the queue, which has space for it.
@@ -211,10 +197,6 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     /// Removes the first request that is due from the queue. If there is none, records when
     /// the next request is due.
     pub(super) fn take_due(&mut self, now: u32, storage: &mut impl ClientStorage) -> Option<J> {
-        // Firmware without mbm_client_pollDelay has no other use for the delay.
-        if !FIRMWARE && self.delay(now) > 0 {
-            return None;
-        }
         let mut least = u32::MAX;
         let found = self.queue.iter().position(|request| {
             let wait = request.state().remaining_wait(now, storage);
@@ -237,7 +219,6 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
 
     /// Ends the request at the index `at` with `status`: returns it, or leaves it there for
     /// a retry.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn end(
         &mut self,
         at: usize,
@@ -335,11 +316,7 @@ fn end_or_retry(
     storage: &mut impl ClientStorage,
 ) -> bool {
     // No reference that may write the request's state exists while `storage` may call a hook.
-    let again = if !FIRMWARE && status == Status::OK {
-        None
-    } else {
-        storage.again(policy, request.state(), status)
-    };
+    let again = storage.again(policy, request.state(), status);
     storage.note(request.state().unit(), status, again.is_some(), now);
     let state = request.state_mut();
     let Some(wait) = again else {

@@ -5,7 +5,6 @@ use crate::engine::BROADCAST;
 use crate::error::Status;
 use crate::pdu::header::RequestHeader;
 use crate::time::LONGEST_TIMEOUT_MS;
-use crate::FIRMWARE;
 
 /// The stage of a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -147,16 +146,9 @@ pub trait ClientRequest {
     /// Returns byte `index` of the data to send, in the order of the wire.
     fn byte(&self, index: usize) -> u8;
 
-    /// Stores byte `index` of the response's data, in the order of the wire. `index` is
-    /// less than [`RequestState::capacity`].
-    fn put(&mut self, index: usize, byte: u8);
-
-    /// Stores all of the response's data.
-    fn store_all(&mut self, bytes: &[u8]) {
-        for (index, byte) in bytes.iter().enumerate() {
-            self.put(index, *byte);
-        }
-    }
+    /// Stores the response's data, in the order of the wire: at most as many bytes as
+    /// [`RequestState::capacity`]. `mask` has the bits that are used in the last byte.
+    fn store(&mut self, data: &[u8], mask: u8);
 
     /// False if the caller has no use for the response's data.
     fn wants_data(&self) -> bool {
@@ -170,7 +162,6 @@ pub(super) fn is_answer(ended: Status) -> bool {
 }
 
 /// Stores the data of the complete response `pdu` in the request.
-#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) fn store_response<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
     let at = usize::from(request.state().header.data_at());
     match pdu.get(at..) {
@@ -180,7 +171,6 @@ pub(super) fn store_response<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> S
 }
 
 /// Stores the data of a response in the request.
-#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) fn store_data<J: ClientRequest>(request: &mut J, data: &[u8]) -> Status {
     if !request.wants_data() {
         return Status::OK;
@@ -190,26 +180,8 @@ pub(super) fn store_data<J: ClientRequest>(request: &mut J, data: &[u8]) -> Stat
         return Status::BUFFER_TOO_SMALL;
     }
     state.length = data.len() as u8;
-    let words = state.header.takes_words();
-    // The mask clears the unused bits of the last byte.
-    if FIRMWARE {
-        let mask = state.header.mask();
-        for (index, byte) in data.iter().enumerate() {
-            let is_last = index + 1 == data.len();
-            request.put(index, if is_last { *byte & mask } else { *byte });
-        }
-        return Status::OK;
-    }
-    request.store_all(data);
-    if words {
-        return Status::OK;
-    }
-    let mask = request.state().header.mask();
-    if mask != 0xFF {
-        if let Some((last, before)) = data.split_last() {
-            request.put(before.len(), *last & mask);
-        }
-    }
+    let mask = state.header.mask();
+    request.store(data, mask);
     Status::OK
 }
 

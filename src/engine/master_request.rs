@@ -69,7 +69,6 @@ impl<P, S: Words> RequestSpec<P, S> for MasterRequest {
 
 /// Writes the frame of the request.
 #[cfg_attr(target_os = "none", inline(never))]
-#[cfg_attr(not(target_os = "none"), inline(always))]
 fn write<P, S: Words>(engine: &mut Engine<P, S, MasterRequest>) {
     engine.storage.set_byte(0, engine.unit);
     let mut end = 0;

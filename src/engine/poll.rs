@@ -8,7 +8,6 @@ use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;
 use crate::port::Port;
 use crate::time::{elapsed, has_elapsed, LONGEST};
-use crate::FIRMWARE;
 
 impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// True while a request is pending.
@@ -159,7 +158,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 
     /// Does what the request has to do at the time `now`, without waiting. Returns
     /// [`Status::PENDING`] until the request has ended, then its status.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self, now: u32) -> Status {
         self.look_at_clock(now);
         let status = match self.phase {
@@ -215,11 +213,10 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
             if self.end == self.space() {
                 self.make_space();
             }
-            // Firmware reads single bytes, which takes less code: 56 bytes on a Cortex-M0+, 140
-            // on an AVR. The observer uses the end of the buffer, so it must see each byte
-            // before the next one.
+            // The observer uses the end of the buffer, so it must see each byte before the next
+            // one.
             let first = self.end;
-            let space = if FIRMWARE || self.is_lenient() {
+            let space = if P::READS_SINGLE_BYTES || self.is_lenient() {
                 1u8.into()
             } else {
                 self.space() - first
@@ -340,7 +337,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 
     /// Ends the request with what was seen.
     #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn settle(&mut self) -> Status {
         if let Some(observe) = self.observer {
             observe(self, Event::End);

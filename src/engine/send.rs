@@ -32,7 +32,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 
     /// Writes the frame of the request and enters the phase that waits for silence.
     #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn begin(&mut self) -> Status {
         Q::write(self);
         self.begin_search();
@@ -43,7 +42,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
 
     /// Prepares the search for the reply to the request.
     #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn begin_search(&mut self) {
         self.kept = S::Count::ZERO;
         self.awaits_end = false;
@@ -94,7 +92,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Writes the frame to the port, waits until the port has sent it, and keeps the driver on
     /// for the post-flush hold.
     #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn send(&mut self) -> Status {
         if self.phase == Phase::Send {
             let left = self.outgoing - self.sent;
@@ -154,7 +151,6 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Waits for the reply until the response timeout, or for the turnaround delay. A port that
     /// does not know when the last bit has left may have bytes left to send.
     #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn wait_for_reply(&mut self) {
         self.wait = if self.phase == Phase::Turnaround {
             self.settings.turnaround_delay.get()

@@ -63,28 +63,6 @@ pub const fn next_part(have: usize) -> usize {
     }
 }
 
-/// The first eight bytes of a frame as one big-endian number: the header and the function code.
-/// `length` is the length of the PDU.
-#[inline]
-pub fn start(transaction: u16, length: u8, unit: u8, function: u8) -> u64 {
-    let first = u32::from(transaction) << 16;
-    let second = (u32::from(length) + 1) << 16 | u32::from(unit) << 8 | u32::from(function);
-    u64::from(first) << 32 | u64::from(second)
-}
-
-/// The frame of a [`start`] and two words.
-#[inline]
-pub fn short(start: u64, words: [u8; 4]) -> [u8; 12] {
-    let mut frame = [0; 12];
-    if let Some(place) = frame.first_chunk_mut() {
-        *place = start.to_be_bytes();
-    }
-    if let Some(place) = frame.last_chunk_mut() {
-        *place = words;
-    }
-    frame
-}
-
 /// The error for an incomplete header.
 #[cold]
 fn partial_header_error(bytes: &[u8]) -> Status {
@@ -169,12 +147,6 @@ mod tests {
             Ok(5)
         });
         assert_eq!((length, buffer), (Ok(12), FRAME));
-    }
-
-    #[test]
-    fn short_writes_a_frame_of_two_words() {
-        let start = start(0x8180, 5, 0x10, 1);
-        assert_eq!(short(start, [0, 0x6B, 0, 3]), FRAME);
     }
 
     #[test]

@@ -47,11 +47,6 @@ pub(super) fn check_end_and_range(
     }
 }
 
-/// True if [`check_range`] accepts the range.
-pub(super) fn is_range(address: u16, quantity: u16, most: u16) -> bool {
-    check_range(address, quantity, most) == Status::OK
-}
-
 /// Checks that the PDU ends here.
 pub(super) fn expect_end(reader: &Reader) -> Result<(), Status> {
     if reader.is_empty() {

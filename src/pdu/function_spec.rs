@@ -88,13 +88,6 @@ impl FunctionSpec {
         FunctionSpec(spec | function as u32)
     }
 
-    /// True if the response is the function code and two words of the request.
-    #[inline]
-    pub(super) const fn repeats_two_words(self) -> bool {
-        let fields = 7 << HEAD_LENGTH | 7 << LENGTH | 7 << REPEATED | KIND | REPEATS_DATA;
-        self.0 & fields == 5 << HEAD_LENGTH | 5 << LENGTH | 5 << REPEATED
-    }
-
     /// A request that the response repeats.
     pub(super) const fn echoed(function: u8, flags: u32) -> FunctionSpec {
         FunctionSpec::new(function, flags | BROADCAST, 5, 5, 5, 0)

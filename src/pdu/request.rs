@@ -1,18 +1,13 @@
 //! Parses and writes complete request PDUs. The data of a parsed request borrow from its
 //! bytes.
 
-use super::fields::is_range;
 use super::files::{Reads, Writes};
 use super::length::{self, Length};
-use super::limits::{
-    MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
-    MAX_WRITE_REGISTERS,
-};
+use super::limits::MAX_PDU;
 pub use super::message::Request;
 use super::{bits, custom, diagnostics, files, identification, registers};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
-use crate::FIRMWARE;
 use core::mem::discriminant;
 
 impl<'a> Request<'a> {
@@ -108,8 +103,6 @@ impl<'a> Request<'a> {
     /// # Errors
     /// The error that [`Request::parse`] returns for such a request, so that no malformed
     /// request is sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
-    // Inlined on a host, where the compiler then drops all variants but the one written.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
         let mut writer = Writer::new(pdu);
         self.write(&mut writer);
@@ -118,11 +111,6 @@ impl<'a> Request<'a> {
         }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
-        // Not in firmware, where size matters more than speed.
-        if !FIRMWARE && self.is_known_valid() {
-            debug_assert!(Request::parse(written).is_ok());
-            return Ok(length);
-        }
         let same = match self {
             // The caller chose the function code, also outside the user-defined ranges.
             Request::Custom { function, .. } => custom::is_free(*function),
@@ -136,69 +124,6 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// A quick check: true for a frequent request that is valid by the standard. Other
-    /// requests are checked by parsing the written PDU.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn is_known_valid(&self) -> bool {
-        match *self {
-            Request::ReadBits {
-                function,
-                address,
-                quantity,
-            } => {
-                matches!(function, bits::READ_COILS | bits::READ_DISCRETE_INPUTS)
-                    && is_range(address, quantity, MAX_READ_BITS)
-            }
-            Request::ReadRegisters {
-                function,
-                address,
-                quantity,
-            } => {
-                matches!(
-                    function,
-                    registers::READ_HOLDING_REGISTERS | registers::READ_INPUT_REGISTERS
-                ) && is_range(address, quantity, MAX_READ_REGISTERS)
-            }
-            Request::WriteMultipleCoils {
-                address,
-                quantity,
-                data,
-            } => {
-                is_range(address, quantity, MAX_WRITE_BITS)
-                    && data.len() == usize::from(quantity.div_ceil(8))
-            }
-            Request::WriteMultipleRegisters {
-                address,
-                quantity,
-                data,
-            } => {
-                is_range(address, quantity, MAX_WRITE_REGISTERS)
-                    && data.len() == 2 * usize::from(quantity)
-            }
-            Request::ReadWriteMultipleRegisters {
-                read_address,
-                read_quantity,
-                write_address,
-                write_quantity,
-                data,
-            } => {
-                is_range(read_address, read_quantity, MAX_READ_REGISTERS)
-                    && is_range(write_address, write_quantity, MAX_READ_WRITE_REGISTERS)
-                    && data.len() == 2 * usize::from(write_quantity)
-            }
-            Request::WriteSingleCoil { .. }
-            | Request::WriteSingleRegister { .. }
-            | Request::MaskWriteRegister { .. }
-            | Request::ReadExceptionStatus
-            | Request::GetCommEventCounter
-            | Request::GetCommEventLog
-            | Request::ReportServerId
-            | Request::ReadFifoQueue { .. } => true,
-            _ => false,
-        }
-    }
-
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn write(&self, writer: &mut Writer) {
         match *self {
             Request::ReadBits {

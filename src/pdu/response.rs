@@ -1,14 +1,12 @@
 //! Parses and writes complete response PDUs. The data of a parsed response borrow from its
 //! bytes.
 
-use super::fields::is_range;
 use super::files::{Records, Writes};
 use super::limits::{MAX_PDU, MAX_WRITE_BITS, MAX_WRITE_REGISTERS};
 pub use super::message::Response;
 use super::{bits, custom, diagnostics, files, identification, length, registers, EXCEPTION};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
-use crate::FIRMWARE;
 use core::mem::discriminant;
 
 impl<'a> Response<'a> {
@@ -17,7 +15,6 @@ impl<'a> Response<'a> {
     /// # Errors
     /// [`Status::INVALID_FUNCTION`] for an unknown function, [`Status::MALFORMED_REPLY`] for
     /// all other errors.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn parse(pdu: &'a [u8]) -> Result<Self, Status> {
         Response::parse_with(pdu, &[])
     }
@@ -27,7 +24,6 @@ impl<'a> Response<'a> {
     ///
     /// # Errors
     /// As [`Response::parse`].
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Status> {
         let mut reader = Reader::new(pdu);
         // The variable is changed in place: moving it would cost as much time as parsing.
@@ -42,7 +38,6 @@ impl<'a> Response<'a> {
         response
     }
 
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn read(
         pdu: &[u8],
         reader: &mut Reader<'a>,
@@ -122,8 +117,6 @@ impl<'a> Response<'a> {
     /// # Errors
     /// The error that [`Response::parse`] returns for such a response, so that no malformed
     /// response is sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
-    // Inlined on a host, where the compiler then drops all variants but the one written.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
         let mut writer = Writer::new(pdu);
         self.write(&mut writer);
@@ -132,11 +125,6 @@ impl<'a> Response<'a> {
         }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
-        // Not in firmware, where size matters more than speed.
-        if !FIRMWARE && self.is_known_valid() {
-            debug_assert!(Response::parse(written).is_ok());
-            return Ok(length);
-        }
         let same = match self {
             // The caller chose the function code, also outside the user-defined ranges.
             Response::Custom { function, .. } => custom::is_free(*function),
@@ -151,43 +139,6 @@ impl<'a> Response<'a> {
         }
     }
 
-    /// A quick check: true for a frequent response that is valid by the standard. Other
-    /// responses are checked by parsing the written PDU.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn is_known_valid(&self) -> bool {
-        match *self {
-            Response::ReadBits { function, data } => {
-                matches!(function, bits::READ_COILS | bits::READ_DISCRETE_INPUTS)
-                    && bits::is_response_data(data)
-            }
-            Response::ReadRegisters { function, data } => {
-                matches!(
-                    function,
-                    registers::READ_HOLDING_REGISTERS
-                        | registers::READ_INPUT_REGISTERS
-                        | registers::READ_WRITE_MULTIPLE_REGISTERS
-                ) && registers::is_response_data(data)
-            }
-            Response::WriteMultiple {
-                function: bits::WRITE_MULTIPLE_COILS,
-                address,
-                quantity,
-            } => is_range(address, quantity, MAX_WRITE_BITS),
-            Response::WriteMultiple {
-                function: registers::WRITE_MULTIPLE_REGISTERS,
-                address,
-                quantity,
-            } => is_range(address, quantity, MAX_WRITE_REGISTERS),
-            Response::WriteSingleCoil { .. }
-            | Response::WriteSingleRegister { .. }
-            | Response::MaskWriteRegister { .. }
-            | Response::ExceptionStatus { .. }
-            | Response::CommEventCounter { .. } => true,
-            _ => false,
-        }
-    }
-
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn write(&self, writer: &mut Writer) {
         match *self {
             Response::ReadBits { function, data } | Response::ReadRegisters { function, data } => {

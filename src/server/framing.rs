@@ -1,7 +1,7 @@
 //! How each framing finds a request in the received bytes, and encodes a response.
 
 use super::info::SERIAL;
-use super::line::{EncodeAdu, Receive, Server, ServerPhase, ServerStorage};
+use super::line::{EncodeAdu, Receive, Server, ServerStorage};
 use crate::error::Status;
 use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::checksum::Crc16;
@@ -11,7 +11,6 @@ use crate::pdu::length::{self, Length};
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
 use crate::time;
-use crate::FIRMWARE;
 
 /// Bytes that a full buffer drops at a time. A smaller number costs more time. A greater number
 /// could drop the start of a request that nearly fills the buffer.
@@ -30,10 +29,14 @@ const STREAM_TIMEOUT: u32 = time::millis(500);
 /// Bytes of the shortest TCP frame.
 const MIN_TCP: usize = tcp::PDU + 1;
 
-/// Bytes that the server reads from a TCP stream before the header is known. On a host it is the
-/// length of most requests, so that one call of the port is enough.
-/// [`Server::keep_read_ahead`] can store 4 bytes that belong to the next frame.
-const FIRST_READ: usize = if FIRMWARE { MIN_TCP } else { MIN_TCP + 4 };
+/// Bytes that the server reads from a TCP stream before the header is known: the length of most
+/// requests, so that one call of the port is enough. [`Server::keep_read_ahead`] can store
+/// bytes that belong to the next frame.
+const FIRST_READ: usize = MIN_TCP + READ_AHEAD;
+
+/// Most bytes of the next frame that the server has read. The shortest frame buffer has space
+/// for as many after each frame that is shorter than [`FIRST_READ`].
+const READ_AHEAD: usize = 4;
 
 /// Bytes of an RTU buffer that are free for the PDU. They may be more than the longest PDU: a
 /// user-defined function may keep its request there while it writes the response after it.
@@ -50,16 +53,6 @@ pub(super) const fn ascii_space(buffer: usize) -> usize {
 /// As [`rtu_space`], for TCP.
 pub(super) const fn tcp_space(buffer: usize) -> usize {
     buffer.saturating_sub(tcp::PDU)
-}
-
-/// The status if the port returned no byte: `received` is 0, or negative if the link is lost.
-#[inline(always)]
-fn no_byte_status(received: i16) -> Status {
-    if received < 0 {
-        Status::LINK_LOST
-    } else {
-        Status::OK
-    }
 }
 
 impl<P: Port, B: ServerStorage> Server<P, B> {
@@ -97,6 +90,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             Self::receive_tcp,
             |server, length| server.encode_tcp(length),
         );
+        self.read_ahead = 0;
         self.set_silence(0);
     }
 
@@ -113,7 +107,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Handles a port that returned no byte: if the silence is long enough, the frame has ended.
     #[cfg_attr(target_os = "none", inline(always))]
-    #[cfg_attr(not(target_os = "none"), inline(never))]
     fn receive_no_more(&mut self, received: i16) -> Status {
         if received < 0 {
             return Status::LINK_LOST;
@@ -191,7 +184,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             self.sent = 0;
         } else {
             // No sleep may hide the end of the silence from the server.
-            self.phase = ServerPhase::Unread;
+            self.request.again = true;
         }
         Status::OK
     }
@@ -200,7 +193,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// The newest byte is at index 0. Returns the index to which it was moved. A buffer has more
     /// bytes than are dropped.
     #[cfg_attr(target_os = "none", inline(always))]
-    #[cfg_attr(not(target_os = "none"), inline(never))]
     pub(super) fn drop_oldest(&mut self) -> usize {
         self.request.overrun = true;
         let capacity = self.storage.capacity();
@@ -355,113 +347,51 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// the whole buffer. After a very short frame, a few bytes of the next frame may be read
     /// too; see [`Server::keep_read_ahead`].
     fn receive_tcp(&mut self) -> Status {
-        self.continue_receive()
-    }
-
-    /// As [`Server::receive_tcp`], if the buffer is empty: reads the length of most requests at
-    /// once. For hosts.
-    #[inline(always)]
-    pub(super) fn receive_first(&mut self) -> Status {
-        let Some(front) = self.storage.frame().first_chunk_mut::<FIRST_READ>() else {
-            return self.continue_receive();
-        };
-        let received = self.port.read(front);
-        if received != FIRST_READ as i16 {
-            return self.received_fewer(received);
+        if self.read_ahead != 0 {
+            self.use_read_ahead();
         }
-        self.end = FIRST_READ as u16;
-        match tcp::header(front) {
-            Ok(header) if header.total == FIRST_READ => {
-                self.found_for(header.unit, (FIRST_READ - tcp::PDU) as u16)
-            }
-            Ok(header) if header.total > FIRST_READ => self.receive_rest(header.total, header.unit),
-            _ => self.continue_receive(),
-        }
-    }
-
-    /// Continues after the port returned fewer bytes than most requests have, or none.
-    #[inline(never)]
-    fn received_fewer(&mut self, received: i16) -> Status {
-        if received <= 0 {
-            return no_byte_status(received);
-        }
-        self.end = received as u16;
-        self.continue_receive()
-    }
-
-    /// Reads the rest of a frame of `total` bytes.
-    #[inline(never)]
-    fn receive_rest(&mut self, total: usize, unit: u8) -> Status {
-        let received = self.read_stream(total);
-        if usize::from(self.end) == total {
-            return self.found_for(unit, (total - tcp::PDU) as u16);
-        }
-        if received > 0 {
-            return self.continue_receive();
-        }
-        no_byte_status(received)
-    }
-
-    /// Receives the rest of the frame whose first bytes are in the buffer.
-    #[cfg_attr(not(target_os = "none"), inline(never))]
-    fn continue_receive(&mut self) -> Status {
         loop {
             let end = usize::from(self.end);
             let mut until = FIRST_READ;
-            let frame = self.storage.frame();
-            match tcp::header(frame.get(..end).unwrap_or_default()) {
+            match tcp::header(self.storage.part(0, end)) {
+                Ok(header) if end >= header.total => {
+                    if end > header.total {
+                        self.keep_read_ahead(header.total);
+                    }
+                    return self.found(header.total - tcp::PDU);
+                }
                 Ok(header) => until = header.total,
                 Err(Status::INCOMPLETE_FRAME) => {}
                 Err(_) => return self.fail_stream(),
             }
-            if end >= until {
-                return self.found_in_stream(until);
+            let received = self.read_bytes_not_inlined(until);
+            if received < 0 {
+                return Status::LINK_LOST;
             }
-            let received = if FIRMWARE {
-                self.read_bytes_not_inlined(until)
-            } else {
-                self.read_stream(until)
-            };
-            if received <= 0 {
-                return no_byte_status(received);
+            if received == 0 {
+                return Status::OK;
             }
         }
     }
 
-    /// Handles a complete frame of `length` bytes at the front of the buffer.
+    /// Stores the bytes after a frame of `length` bytes, which is shorter than [`FIRST_READ`]. They
+    /// belong to the next frame. They are stored in `last_byte`, which TCP does not use as a time.
     #[inline(always)]
-    fn found_in_stream(&mut self, length: usize) -> Status {
-        let end = usize::from(self.end);
-        if FIRST_READ > MIN_TCP && end != length {
-            self.keep_read_ahead(length);
-        }
-        self.found(length - tcp::PDU)
-    }
-
-    /// Stores the bytes after a frame that is shorter than [`FIRST_READ`]. They belong to the next
-    /// frame. They are stored in `last_byte`, which TCP does not use as a time.
-    #[cold]
     fn keep_read_ahead(&mut self, length: usize) {
-        let end = usize::from(self.end);
-        let following = self.storage.frame().get(length..end).unwrap_or_default();
-        let mut stored = [0; 4];
-        for (place, byte) in stored.iter_mut().zip(following) {
-            *place = *byte;
+        self.read_ahead = self.end as u8 - length as u8;
+        if let [a, b, c, d] = *self.storage.part(length, length + READ_AHEAD) {
+            self.last_byte = u32::from_ne_bytes([a, b, c, d]);
         }
-        self.last_byte = u32::from_ne_bytes(stored);
-        self.read_ahead = following.len() as u8;
     }
 
     /// Begins the next frame with the bytes that [`Server::keep_read_ahead`] stored.
-    #[cold]
-    pub(super) fn use_read_ahead(&mut self) {
-        let stored = self.last_byte.to_ne_bytes();
-        let count = core::mem::take(&mut self.read_ahead);
-        let stored = stored.get(..count.into()).unwrap_or_default();
-        for (place, byte) in self.storage.frame().iter_mut().zip(stored) {
-            *place = *byte;
+    #[inline(always)]
+    fn use_read_ahead(&mut self) {
+        if let Some(front) = self.storage.part(0, READ_AHEAD).first_chunk_mut() {
+            *front = self.last_byte.to_ne_bytes();
         }
-        self.end = count.into();
+        self.end = self.read_ahead.into();
+        self.read_ahead = 0;
     }
 
     #[inline(always)]

@@ -16,7 +16,8 @@ pub struct RequestInfo {
     pub overrun: bool,
     /// Index of the PDU in the buffer.
     pub head: u8,
-    /// The frame was served before, and the service returned that it is not finished.
+    /// The frame was served before, and the service returned that it is not finished. After the
+    /// response: bytes may have arrived meanwhile, which the server has not read.
     pub again: bool,
     /// The exception code if no service of the unit answers: 01, or 02 as soon as a service has
     /// returned [`Reply::ABSENT`](super::Reply::ABSENT).

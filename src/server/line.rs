@@ -9,19 +9,14 @@ use super::{Reply, RequestInfo, Units};
 use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
-use crate::frame::{ascii, rtu, tcp, Framing};
+use crate::frame::{ascii, tcp, Framing};
 use crate::pdu::custom::Rule;
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
 use crate::time::{self, elapsed};
-use crate::FIRMWARE;
 
 /// Time until the next poll if only the port or a service can bring progress.
 const EXTERNAL_POLL_DELAY: u32 = time::millis(1);
-
-/// Most requests without a response that one call of [`Server::serve`] handles. So a flood of
-/// requests to other units does not block the program.
-pub const MOST_REQUESTS: u8 = 16;
 
 /// The storage that the caller supplies for a server.
 pub trait ServerStorage {
@@ -76,8 +71,6 @@ impl<const N: usize> ServerStorage for [u8; N] {
 pub(super) enum ServerPhase {
     /// The server waits for a request.
     Listen,
-    /// As `Listen`, but the port was not read since the last request. It may have bytes already.
-    Unread,
     /// A request was found. The server waits for its reply.
     Request,
     /// The port sends the response. The driver of the line is enabled.
@@ -173,9 +166,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.request.space = space as u16;
         self.receive = Some(receive);
         self.encode_adu = Some(encode_adu);
-        if !FIRMWARE {
-            self.read_ahead = 0;
-        }
+        self.request.again = true;
         self.listen();
     }
 
@@ -193,16 +184,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Waits for the next request.
     #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn listen(&mut self) {
-        self.phase = ServerPhase::Unread;
+        self.phase = ServerPhase::Listen;
         self.end = 0;
         self.request.overrun = false;
         self.resyncing = false;
         self.crc = Crc16::START;
-        if !FIRMWARE && self.read_ahead != 0 {
-            self.use_read_ahead();
-        }
     }
 
     /// True if the server has begun with a framing.
@@ -221,7 +208,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Returns [`Status::PENDING`] if a request waits for its reply; [`Status::LINK_LOST`];
     /// [`Status::MALFORMED_FRAME`] if the stream is not Modbus TCP;
     /// [`Status::NOT_INITIALISED`] without a framing; otherwise [`Status::OK`].
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self, now: u32) -> Status {
         match self.look(now) {
             Status::OK => self.go_on(),
@@ -236,10 +222,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         match self.phase {
             ServerPhase::Request => return Status::PENDING,
             ServerPhase::Send => return Status::OK,
-            ServerPhase::Listen | ServerPhase::Unread => self.phase = ServerPhase::Listen,
-        }
-        if !FIRMWARE && !self.keeps_time() && self.end == 0 {
-            return self.receive_first();
+            ServerPhase::Listen => self.request.again = false,
         }
         match self.receive {
             Some(receive) => receive(self),
@@ -283,11 +266,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             }
             end = start + received as usize;
             self.end = end as u16;
-            // Firmware computes the CRC for framings without a CRC too. That is less code, and
-            // firmware usually has one framing only.
-            if FIRMWARE || usize::from(self.request.head) == rtu::PDU {
-                self.crc = self.crc.with(self.storage.part(start, end));
-            }
+            // The CRC is computed for framings without one too: that is less code.
+            self.crc = self.crc.with(self.storage.part(start, end));
         }
         received
     }
@@ -296,24 +276,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[inline(never)]
     pub(super) fn read_bytes_not_inlined(&mut self, until: usize) -> i16 {
         self.read_bytes(until)
-    }
-
-    /// As [`Server::read_bytes`], but without CRC and time, and without dropping bytes.
-    #[inline(always)]
-    pub(super) fn read_stream(&mut self, until: usize) -> i16 {
-        let frame = self.storage.frame();
-        let until = until.min(frame.len());
-        let Some(space) = frame.get_mut(usize::from(self.end)..until) else {
-            return 0;
-        };
-        if space.is_empty() {
-            return 0;
-        }
-        let received = self.port.read(space);
-        if received > 0 {
-            self.end += received as u16;
-        }
-        received
     }
 
     /// True if the line has been silent for long enough to end a frame.
@@ -327,7 +289,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// bytes that arrived meanwhile may have ended a wait already.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.phase {
-            ServerPhase::Unread => 0,
+            ServerPhase::Listen if self.request.again => 0,
             ServerPhase::Listen if self.end == 0 || !self.keeps_time() => u32::MAX,
             ServerPhase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
             // On a serial line, neither the next byte nor switching off the driver may be late.
@@ -337,6 +299,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// Stores that a request was found, with a PDU of `length` bytes; 0 if it is damaged.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn found(&mut self, length: usize) -> Status {
         let unit = self.storage.byte(usize::from(self.request.head) - 1);
         self.found_for(unit, if length > MAX_PDU { 0 } else { length as u16 })
@@ -347,7 +310,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     pub(super) fn found_for(&mut self, unit: u8, length: u16) -> Status {
         self.request.to = unit;
         self.request.length = length;
-        self.request.again = false;
         self.phase = ServerPhase::Request;
         Status::PENDING
     }
@@ -362,20 +324,20 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             .unwrap_or_default()
     }
 
-    /// As [`Server::poll`], but `units` serve the requests, and their replies are sent.
+    /// As [`Server::poll`], but `units` serve the request, and their reply is sent. One call
+    /// serves one request at most, so a flood of requests does not block the program.
     pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Status {
-        for _ in 0..MOST_REQUESTS {
-            let status = self.poll(now);
-            if status != Status::PENDING {
-                return status;
-            }
+        let status = self.look(now);
+        if status == Status::PENDING {
             let info = self.request;
             let reply = units.serve(&info, self.pdu());
-            if let Some(status) = self.finish(reply) {
-                return status;
+            if !self.answer(reply) {
+                return Status::OK;
             }
+        } else if status != Status::OK {
+            return status;
         }
-        Status::OK
+        self.go_on()
     }
 
     /// Takes the reply to the request. The PDU of a response has overwritten that of the request.
@@ -405,81 +367,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         true
     }
 
-    /// As [`Server::answer`]. Returns the status that poll returns then, or `None` if poll has to
-    /// continue: it sends the response, or looks for the next request.
-    #[inline(always)]
-    pub fn finish(&mut self, reply: Reply) -> Option<Status> {
-        if !FIRMWARE {
-            return self.answer_at_once(reply);
-        }
-        if self.answer(reply) {
-            None
-        } else {
-            Some(Status::OK)
-        }
-    }
-
-    /// As [`Server::finish`], and sends as much as the port accepts. For hosts: it saves a call of
-    /// [`Server::poll`].
-    #[inline(always)]
-    pub(crate) fn answer_at_once(&mut self, reply: Reply) -> Option<Status> {
-        let mut length = reply.response_length();
-        if length == 0 {
-            length = match reply.exception_code() {
-                0 if reply != Reply::NOT_HANDLED => return self.send_nothing(reply),
-                _ => self.write_exception(reply),
-            };
-        }
-        self.port.pre_transmission();
-        let end = match self.encode_adu {
-            _ if !self.keeps_time() => self.encode_tcp(length),
-            Some(encode_adu) => {
-                let end = encode_adu(self, length);
-                self.sent = end as u16;
-                end
-            }
-            None => 0,
-        };
-        let sent = self.port.write(self.storage.part(0, end));
-        if usize::from(sent as u16) != end || !self.port.flush() {
-            return Some(self.sent_partly(end, sent));
-        }
-        self.end_transmission();
-        // The poll that read the request has sent the response too.
-        if !self.request.again {
-            self.phase = ServerPhase::Listen;
-        }
-        Some(Status::OK)
-    }
-
-    /// Handles a port that has not sent the whole response yet, or whose link is lost.
-    #[cold]
-    fn sent_partly(&mut self, end: usize, sent: i16) -> Status {
-        self.end = end as u16;
-        self.sent = sent.max(0) as u16;
-        if sent < 0 {
-            self.end_transmission();
-            return Status::LINK_LOST;
-        }
-        self.phase = ServerPhase::Send;
-        Status::OK
-    }
-
-    #[cold]
-    fn send_nothing(&mut self, reply: Reply) -> Option<Status> {
-        if self.answer(reply) {
-            None
-        } else {
-            Some(Status::OK)
-        }
-    }
-
-    #[inline(never)]
-    fn write_exception(&mut self, reply: Reply) -> usize {
-        reply.write_exception(self.pdu())
-    }
-
-    #[cfg_attr(not(target_os = "none"), inline(never))]
     fn send(&mut self) -> Status {
         let mut status = Status::OK;
         let rest = self.storage.part(self.sent.into(), self.end.into());
@@ -489,18 +376,16 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                 status = Status::LINK_LOST;
             } else {
                 self.sent += sent as u16;
-                if self.sent < self.end {
-                    return status;
-                }
             }
         }
-        if status == Status::LINK_LOST || self.port.flush() {
+        if status == Status::LINK_LOST || (self.sent == self.end && self.port.flush()) {
             self.end_transmission();
+        } else {
+            self.request.again = true;
         }
         status
     }
 
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn end_transmission(&mut self) {
         self.port.post_transmission();
         self.listen();

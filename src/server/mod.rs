@@ -24,6 +24,6 @@ pub mod table;
 mod units;
 
 pub use info::{only_writes, Addressing, RequestInfo, ANY};
-pub use line::{Server, ServerStorage, MOST_REQUESTS};
+pub use line::{Server, ServerStorage};
 pub use reply::Reply;
 pub use units::{dispatch, first_reply, Dispatch, Service, Unit, Units};

@@ -71,16 +71,6 @@ impl Reply {
         }
     }
 
-    /// Length of the response that has overwritten the request; 0 for any other reply.
-    #[inline(always)]
-    pub(super) const fn response_length(self) -> usize {
-        if self.0 < Reply::PENDING.0 {
-            self.0
-        } else {
-            0
-        }
-    }
-
     /// This reply, or exception 01 if no service served the function.
     #[inline(always)]
     pub(super) const fn or_illegal(self) -> Reply {

@@ -108,7 +108,6 @@ pub trait TableAccess {
 
 impl<T: DataModel> TableAccess for T {
     #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn access(
         &mut self,
         operation: TableOperation,

@@ -220,62 +220,6 @@ impl Context<'_> {
         }
     }
 
-    /// How many bytes the search needs, if the stream holds only the beginning of an RTU frame
-    /// and the line was not silent after it; otherwise `None`. The result is that of
-    /// [`Context::rtu`], at less cost.
-    pub fn bytes_to_continue(
-        &self,
-        framing: Framing,
-        stream: &RxStream,
-        part: &[u8],
-    ) -> Option<usize> {
-        let capacity = part.len();
-        let is_rtu = matches!(framing, Framing::Rtu | Framing::RtuOverTcp);
-        let is_quiet = stream.has_silence(self.now, &self.timing) || self.has_timed_out(stream);
-        if !is_rtu || stream.at != stream.start || is_quiet || stream.is_full(capacity) {
-            return None;
-        }
-        let bytes = part.get(stream.at.into()..stream.end.into())?;
-        let [unit, code, ..] = *bytes else {
-            return None;
-        };
-        // Function code 0 is invalid. For 08 and 11, the length depends on the request.
-        if matches!(code, 0 | EXCEPTION | DIAGNOSTICS | REPORT_SERVER_ID)
-            || bytes.len() >= rtu::MAX_FRAME
-        {
-            return None;
-        }
-        let pdu = bytes.get(rtu::PDU..)?;
-        let mut need = usize::MAX;
-        if self.request && code & EXCEPTION == 0 {
-            need = Self::bytes_needed(
-                PduKind::Request.length(pdu, self.functions),
-                bytes,
-                capacity,
-            )?;
-        }
-        if self.response && unit != 0 {
-            let length = PduKind::Response.length(pdu, self.functions);
-            need = need.min(Self::bytes_needed(length, bytes, capacity)?);
-        }
-        (need < usize::MAX).then_some(need)
-    }
-
-    /// As [`Context::need`], for one PDU length; `None` if the frame is complete or too long.
-    fn bytes_needed(length: Length, bytes: &[u8], capacity: usize) -> Option<usize> {
-        match length {
-            Length::Exactly(length) => match length + rtu::OVERHEAD {
-                total if total > capacity.min(rtu::MAX_FRAME) || total < MIN_RTU => None,
-                total if total > bytes.len() => Some(total),
-                total if rtu::is_frame(bytes.get(..total)?) => None,
-                _ => Some(usize::MAX),
-            },
-            Length::AtLeast(length) if length + rtu::OVERHEAD > rtu::MAX_FRAME => None,
-            Length::AtLeast(length) => Some((length + rtu::PDU).max(bytes.len() + 1)),
-            Length::Silence | Length::Unknown => Some(rtu::MAX_FRAME),
-        }
-    }
-
     /// True if a request with the unit and function of this frame is open.
     fn is_reply_expected(&self, frame: &[u8]) -> bool {
         match frame {

@@ -19,7 +19,6 @@ use crate::error::Status;
 use crate::frame::{ascii, Framing};
 use crate::pdu::custom::Function;
 use crate::time::{character, silence, DEFAULT_SILENCE};
-use crate::FIRMWARE;
 use find::{Candidate, Context};
 use pairing::Requests;
 use stream::{RxStream, Timing};
@@ -194,30 +193,13 @@ impl Sniffer {
         if is_ascii && bytes.iter().any(may_decide) {
             stream.resume();
         }
-        match bytes {
-            [byte] if !FIRMWARE && stream.feed_next(part, *byte, now, &self.timing) => 1,
-            _ => stream.feed(part, bytes, now, &self.timing),
-        }
+        stream.feed(part, bytes, now, &self.timing)
     }
 
     /// The next event up to `now` (microseconds); `None` if there is none yet. The event borrows
     /// from the buffer. Call this after each feed until it returns `None`, and regularly while
     /// nothing arrives. Pass the same functions each time.
     pub fn next<'b>(
-        &mut self,
-        buffer: &'b mut [u8],
-        functions: &[Function],
-        now: u32,
-    ) -> Option<Event<'b>> {
-        if self.only_waits(buffer, functions, now) {
-            return None;
-        }
-        self.look(buffer, functions, now)
-    }
-
-    /// As [`Sniffer::next`], if [`Sniffer::only_waits`] is false.
-    #[cfg_attr(not(target_os = "none"), inline(never))]
-    pub fn look<'b>(
         &mut self,
         buffer: &'b mut [u8],
         functions: &[Function],
@@ -276,46 +258,6 @@ impl Sniffer {
     /// How long a late reply is paired with its request, in microseconds.
     const fn late(&self) -> u32 {
         self.timeout.saturating_mul(LATE_TIMEOUTS)
-    }
-
-    /// True if no request is overdue and no stream holds more than the beginning of a frame.
-    /// [`Sniffer::look`] would then find no event, at more cost. Always false in firmware, which
-    /// saves the code of this function.
-    #[cfg_attr(not(target_os = "none"), inline(never))]
-    pub fn only_waits(&mut self, buffer: &mut [u8], functions: &[Function], now: u32) -> bool {
-        if FIRMWARE {
-            return false;
-        }
-        let only_bytes = self.is_unchanged(now);
-        if !only_bytes {
-            self.idle_from = now;
-            self.idle_for = self
-                .requests
-                .until_next_timeout(now, self.timeout, self.late());
-            if self.idle_for == 0 {
-                return false;
-            }
-        }
-        let framing = self.framing;
-        for index in 0..=usize::from(self.is_separate) {
-            let part = self.part(buffer, index);
-            let (context, stream) = self.split(functions, index, now);
-            if only_bytes && stream.is_suspended(now) {
-                continue;
-            }
-            let need = if stream.is_empty() {
-                Some(context.min_bytes(framing))
-            } else {
-                context.bytes_to_continue(framing, stream, part)
-            };
-            let Some(need) = need else {
-                // The other stream may not have been searched since the requests changed.
-                self.idle_for = if only_bytes { self.idle_for } else { 0 };
-                return false;
-            };
-            stream.suspend(need, part.len(), now, &context.timing);
-        }
-        true
     }
 
     /// The index of a request that is overdue, if any. Removes the requests whose late reply is

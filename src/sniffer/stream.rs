@@ -116,22 +116,6 @@ impl RxStream {
         self.count = self.count.saturating_sub(1);
     }
 
-    /// Takes one byte that follows the previous byte without silence, the most frequent case of
-    /// [`RxStream::feed`]. False, and nothing taken, in all other cases.
-    #[inline(always)]
-    pub fn feed_next(&mut self, buffer: &mut [u8], byte: u8, now: u32, timing: &Timing) -> bool {
-        let gap = elapsed(now, self.last).saturating_sub(timing.character);
-        if gap >= timing.silence || self.skip > 0 || self.start > 0 || self.end == 0 {
-            return false;
-        }
-        let Some(place) = buffer.get_mut(usize::from(self.end)) else {
-            return false;
-        };
-        *place = byte;
-        self.mark(1, now, false, timing);
-        true
-    }
-
     /// Takes bytes, the last of which arrived now. Returns how many fitted into the buffer.
     pub fn feed(&mut self, buffer: &mut [u8], bytes: &[u8], now: u32, timing: &Timing) -> usize {
         if bytes.is_empty() {

@@ -13,9 +13,10 @@ use std::collections::VecDeque;
 /// Microseconds that pass from one poll to the next once all bytes have arrived.
 const LONG: u32 = 50_000;
 
-/// Records what the master sends, and delivers the bytes of the reply.
+/// Records what the master sends, and delivers the bytes of the reply. The master reads them one
+/// by one if `SINGLE` is true, as in firmware.
 #[derive(Default)]
-pub struct Line {
+pub struct Line<const SINGLE: bool = false> {
     now: u32,
     /// Microseconds that pass from one poll to the next until all bytes have arrived.
     step: u32,
@@ -26,7 +27,7 @@ pub struct Line {
     pub sent: Vec<u8>,
 }
 
-impl Line {
+impl<const SINGLE: bool> Line<SINGLE> {
     /// Sets the bytes that arrive after the next request: in pieces of `piece` bytes, with
     /// `step` microseconds from one poll to the next.
     pub fn deliver(&mut self, bytes: &[u8], piece: usize, step: u32) {
@@ -36,7 +37,9 @@ impl Line {
     }
 }
 
-impl Port for Line {
+impl<const SINGLE: bool> Port for Line<SINGLE> {
+    const READS_SINGLE_BYTES: bool = SINGLE;
+
     fn read(&mut self, bytes: &mut [u8]) -> i16 {
         let Some(piece) = self.pieces.front_mut() else {
             return 0;
@@ -131,11 +134,11 @@ impl Call {
 type Lent = Buffers<Vec<u8>, [u16; 125], [u16; 125]>;
 
 /// A master that sends one request after the other.
-pub struct TestMaster(pub Master<Line, Lent>);
+pub struct TestMaster<const SINGLE: bool = false>(pub Master<Line<SINGLE>, Lent>);
 
-impl TestMaster {
+impl<const SINGLE: bool> TestMaster<SINGLE> {
     /// A master with a frame buffer of `size` bytes.
-    pub fn new(unit: u8, size: usize) -> TestMaster {
+    pub fn new(unit: u8, size: usize) -> Self {
         let buffers = Buffers::new(vec![0; size], [0; 125], [0; 125]);
         TestMaster(Master::new(unit, Line::default(), buffers))
     }
@@ -182,7 +185,7 @@ impl TestMaster {
 
 /// The frame of a request to `unit` that sends `words`.
 pub fn frame(unit: u8, call: Call, words: &[u16]) -> Vec<u8> {
-    TestMaster::new(unit, 256).send(call, words)
+    TestMaster::<false>::new(unit, 256).send(call, words)
 }
 
 /// The bytes followed by their CRC.

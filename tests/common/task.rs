@@ -129,7 +129,10 @@ impl ClientRequest for Task {
         self.data[index]
     }
 
-    fn put(&mut self, index: usize, byte: u8) {
-        self.reply[index] = byte;
+    fn store(&mut self, data: &[u8], mask: u8) {
+        self.reply[..data.len()].copy_from_slice(data);
+        if let Some(last) = data.len().checked_sub(1) {
+            self.reply[last] &= mask;
+        }
     }
 }

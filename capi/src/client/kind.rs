@@ -1,8 +1,6 @@
 //! The kinds of transport of the client, as tables. Only the mbm_client_begin functions use
 //! the tables, so firmware contains the code of the kinds that it begins, and of no others.
 
-#[cfg(not(any(target_os = "none", mbm_firmware)))]
-use super::object::mbm_client;
 use super::object::{transport, Object, SerialTransport, TcpTransport, TransportKind};
 use super::request::RequestPtr;
 use super::storage::ClientBuffers;
@@ -10,8 +8,6 @@ use crate::framing::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::port::mbm_port;
 use core::mem::offset_of;
 use mbm::client::{ClientEngine, Transport};
-#[cfg(not(any(target_os = "none", mbm_firmware)))]
-use mbm::error::Status;
 
 const TRANSPORT: usize = offset_of!(Object, transport);
 
@@ -20,8 +16,6 @@ const fn serial(start: unsafe fn(*mut Object), framing: u8, min_frame_bytes: u8)
     let engine = TRANSPORT + offset_of!(SerialTransport, engine);
     TransportKind {
         advance: advance::<SerialTransport>,
-        #[cfg(not(any(target_os = "none", mbm_firmware)))]
-        poll: poll::<SerialTransport>,
         release: release::<SerialTransport>,
         start,
         port: (engine + offset_of!(Engine, port)) as u16,
@@ -38,8 +32,6 @@ pub(super) static RTU_OVER_TCP: TransportKind = serial(start_stream, MBM_FRAMING
 pub(super) static ASCII: TransportKind = serial(start_ascii, MBM_FRAMING_ASCII, 17);
 pub(super) static TCP: TransportKind = TransportKind {
     advance: advance::<TcpTransport>,
-    #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    poll: poll::<TcpTransport>,
     release: release::<TcpTransport>,
     start: start_tcp,
     port: (TRANSPORT + offset_of!(TcpTransport, port)) as u16,
@@ -50,18 +42,7 @@ pub(super) static TCP: TransportKind = TransportKind {
 };
 
 /// # Safety
-/// As for [`advance_all`](super::poll::advance_all), with a transport of the type `T`.
-#[cfg(not(any(target_os = "none", mbm_firmware)))]
-unsafe fn poll<T: Transport<RequestPtr>>(client: *mut mbm_client) -> Status {
-    // SAFETY: as the caller promises.
-    unsafe { super::poll::advance_all(client, advance::<T>) }
-}
-
-/// On a host `poll` has a copy of its own. The table's copy is for a client with a link.
-///
-/// # Safety
 /// As for [`transport`].
-#[cfg_attr(not(any(target_os = "none", mbm_firmware)), inline(always))]
 unsafe fn advance<T: Transport<RequestPtr>>(
     object: *mut Object,
     now: u32,

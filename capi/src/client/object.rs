@@ -10,8 +10,6 @@ use core::ffi::c_void;
 use core::mem::ManuallyDrop;
 use mbm::client::{RequestQueue, Serial, Tcp};
 use mbm::engine::Settings;
-#[cfg(not(any(target_os = "none", mbm_firmware)))]
-use mbm::error::Status;
 
 pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 
@@ -100,9 +98,6 @@ pub(crate) type Advance = unsafe fn(*mut Object, now: u32, fresh: bool) -> Optio
 #[repr(C)]
 pub(crate) struct TransportKind {
     pub(crate) advance: Advance,
-    /// As [`advance_all`](super::poll::advance_all).
-    #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    pub(crate) poll: unsafe fn(*mut mbm_client) -> Status,
     /// As [`Transport::release`].
     pub(crate) release: unsafe fn(*mut Object, Option<&RequestPtr>),
     /// Completes the begin function of a client.

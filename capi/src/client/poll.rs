@@ -45,22 +45,17 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
             if (*object).polling || (*object).queue.suspended {
                 return Status::BUSY;
             }
-            let kind = (*object).kind;
-            #[cfg(not(any(target_os = "none", mbm_firmware)))]
-            return ((*kind).poll)(client);
-            #[cfg(any(target_os = "none", mbm_firmware))]
-            advance_all(client, (*kind).advance)
+            advance_all(client, (*(*object).kind).advance)
         })
     }
 }
 
-/// Advances the requests, and calls `done` of those that ended. Firmware has this function
-/// once, for all kinds of transport. On a host each kind has a copy, with `advance` inlined.
+/// Advances the requests, and calls `done` of those that ended. `advance` is
+/// that of the kind of transport.
 ///
 /// # Safety
 /// `client` is begun, and `advance` is that of its transport; no reference into it lives.
-#[cfg_attr(not(any(target_os = "none", mbm_firmware)), inline(always))]
-pub(crate) unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
+unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
     let object = pointers::object(client);
     // SAFETY: as the caller promises. No reference lives while `done` is called, because
     // `done` may use the object. If `done` zeroed the object, or began it again, `polling`

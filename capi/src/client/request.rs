@@ -3,8 +3,6 @@
 use core::ffi::c_void;
 use core::mem::offset_of;
 use core::ptr::NonNull;
-#[cfg(not(any(target_os = "none", mbm_firmware)))]
-use mbm::bytes::copy_words;
 use mbm::client::{ClientRequest, RequestState};
 
 /// A request to a device, and its result. You own the storage. Initialise it with MBM_INIT,
@@ -181,26 +179,17 @@ impl ClientRequest for RequestPtr {
         unsafe { *fields.data.add(at) }
     }
 
-    fn put(&mut self, index: usize, byte: u8) {
+    fn store(&mut self, data: &[u8], mask: u8) {
         let fields = self.fields_mut();
-        let at = place(index, fields.state.header.takes_words());
-        // SAFETY: the reply is not NULL and holds `capacity` bytes; `index` is less. Of words,
-        // the client receives an even number of bytes.
-        unsafe { *fields.reply.add(at) = byte }
-    }
-
-    // Not on a microcontroller, where the loop over bytes is in the image anyway.
-    #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    #[inline(always)]
-    fn store_all(&mut self, bytes: &[u8]) {
-        let fields = self.fields_mut();
-        // SAFETY: the reply is not NULL and holds `capacity` bytes, and `bytes` is not
-        // longer; nothing else uses the reply.
-        let reply = unsafe { core::slice::from_raw_parts_mut(fields.reply, bytes.len()) };
-        if fields.state.header.takes_words() {
-            copy_words(reply, bytes);
-        } else {
-            reply.copy_from_slice(bytes);
+        let words = fields.state.header.takes_words();
+        // SAFETY: the reply is not NULL and holds `capacity` bytes, and the data are not longer.
+        // Of words, the client receives an even number of bytes.
+        unsafe {
+            for (index, byte) in data.iter().enumerate() {
+                let is_last = index + 1 == data.len();
+                let byte = if is_last { *byte & mask } else { *byte };
+                *fields.reply.add(place(index, words)) = byte;
+            }
         }
     }
 

@@ -14,7 +14,6 @@ use crate::storage::LineStorage;
 use core::ptr::null_mut;
 use mbm::error::Status;
 use mbm::node::Line;
-use mbm::FIRMWARE;
 
 /// The fields in the storage of an `mbm_line`.
 #[repr(C)]
@@ -62,10 +61,6 @@ pub(crate) unsafe fn prepare(line: *mut mbm_line) -> Status {
     unsafe {
         match pointers::check_once(line) {
             Status::NOT_INITIALISED => {
-                // Hosts tolerate storage that was not zeroed.
-                if !FIRMWARE {
-                    pointers::zero(line);
-                }
                 mbm_line::mark(line).write(pointers::BEGUN);
                 Status::OK
             }

@@ -136,8 +136,6 @@ fn linked(transport: &TransportKind, client: *mut mbm_client) -> LinkedKind {
     LinkedKind {
         kind: TransportKind {
             advance: KIND.advance,
-            #[cfg(not(any(target_os = "none", mbm_firmware)))]
-            poll: KIND.poll,
             ..*transport
         },
         delay: KIND.delay,

@@ -3,8 +3,6 @@
 use crate::client::mbm_clientRequest;
 use crate::client::mbm_linkHooks;
 use crate::client::object::{self as client, LinkedKind, TransportKind};
-#[cfg(not(any(target_os = "none", mbm_firmware)))]
-use crate::client::poll::advance_all;
 use crate::client::request::RequestPtr;
 use crate::pointers::{self, CObject};
 use crate::port::mbm_port;
@@ -165,27 +163,12 @@ unsafe fn count(link: *mut Object, counter: fn(&mut mbm_linkCounters) -> &mut u3
 }
 
 /// The functions of a client that has a link.
-pub(super) const KIND: LinkedFunctions = LinkedFunctions {
-    advance,
-    #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    poll,
-    delay,
-};
+pub(super) const KIND: LinkedFunctions = LinkedFunctions { advance, delay };
 
 /// See [`KIND`].
 pub(super) struct LinkedFunctions {
     pub(super) advance: client::Advance,
-    #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    pub(super) poll: unsafe fn(*mut crate::client::mbm_client) -> Status,
     pub(super) delay: unsafe fn(*mut client::Object, now: u32, delay: u32) -> u32,
-}
-
-/// # Safety
-/// As for [`advance_all`], with a client that has a link.
-#[cfg(not(any(target_os = "none", mbm_firmware)))]
-unsafe fn poll(object: *mut crate::client::mbm_client) -> Status {
-    // SAFETY: as the caller promises.
-    unsafe { advance_all(object, advance) }
 }
 
 /// Advances link and client.

@@ -21,7 +21,6 @@ use mbm::error::Status;
 use mbm::node::Node;
 use mbm::pdu::master_request::{MasterRequest, MasterSpec};
 use mbm::port::Port;
-use mbm::FIRMWARE;
 
 /// The fields in the storage of an `mbm_node`.
 #[repr(C)]
@@ -101,10 +100,6 @@ pub unsafe extern "C" fn mbm_node_begin(
             return Status::INVALID_ARGUMENT.code();
         }
         if pointers::check_once(node) != Status::OK {
-            // Hosts tolerate storage that was not zeroed.
-            if !FIRMWARE {
-                pointers::zero(node);
-            }
             mbm_node::mark(node).write(pointers::BEGUN);
         }
         if (*node.cast::<Object>()).core.is_pending() {
@@ -164,7 +159,6 @@ pub unsafe extern "C" fn mbm_node_poll(node: *mut mbm_node) -> u8 {
 ///
 /// # Safety
 /// As for [`pointers::with`].
-#[cfg_attr(not(target_os = "none"), inline(always))]
 unsafe extern "C" fn poll(node: *mut mbm_node) -> u8 {
     // SAFETY: as the caller promises. No reference to the node lives while hooks run; the line's
     // mark keeps them from the line.

@@ -4,11 +4,10 @@ use super::buffers::Core;
 use super::units::have_ids;
 use super::{mbm_server, mbm_unit};
 use crate::framing::MBM_MAX_TCP_FRAME;
-use crate::pointers::{check, object, read, with_hooks, CObject, BEGUN, IN_HOOK};
+use crate::pointers::{check, object, read, with_hooks, CObject, IN_HOOK};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 use mbm::time;
-use mbm::FIRMWARE;
 
 /// The shortest frame buffer for RTU, in bytes.
 const MIN_FRAME: u16 = 16;
@@ -44,9 +43,8 @@ unsafe fn begin(
         }
         let core = object(server);
         with_hooks(server, || {
-            // The previous port must not keep its driver switched on. Hosts tolerate storage
-            // that was not zeroed.
-            if (FIRMWARE || mark == BEGUN) && (*core).is_sending() {
+            // The previous port must not keep its driver switched on.
+            if (*core).is_sending() {
                 if let Some(post) = (*core).port.postTransmission {
                     post((*core).port.context);
                 }

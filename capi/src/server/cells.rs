@@ -1,7 +1,5 @@
-//! Copies cells of a table: cell by cell, and on a host many at a time.
+//! Copies cells of a table, one by one.
 
-use core::slice::from_raw_parts_mut;
-use mbm::bytes::copy_words;
 use mbm::server::table::{MachineByte, TableKind};
 
 /// True if all `quantity` bits of a bitmap, from bit `first` on, are 1.
@@ -9,7 +7,6 @@ use mbm::server::table::{MachineByte, TableKind};
 /// # Safety
 /// The bitmap has these bits. `quantity` is at least 1.
 #[cfg_attr(target_os = "none", inline(always))]
-#[cfg_attr(not(target_os = "none"), inline(never))]
 pub(super) unsafe fn are_all_on(map: *const u8, first: usize, quantity: usize) -> bool {
     // SAFETY: as the caller promises.
     unsafe {
@@ -102,87 +99,5 @@ pub(super) unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
                 return;
             }
         }
-    }
-}
-
-/// Copies `quantity` cells, from cell `first` on, into `data`, or with `write` out of
-/// `data`.
-///
-/// # Safety
-/// `cells` and `data` contain these cells, which nothing else uses meanwhile.
-#[inline(always)]
-pub(super) unsafe fn transfer_many(
-    cells: *mut u8,
-    kind: TableKind,
-    write: bool,
-    first: u16,
-    quantity: u16,
-    data: *mut u8,
-) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        if !kind.is_bits() {
-            transfer_words(cells.cast(), write, first, quantity, data);
-        } else if write && quantity == 1 {
-            let cell = cells.add(usize::from(first >> 3));
-            let rest = *cell & !(1 << (first & 7));
-            *cell = rest | (*data & 1) << (first & 7);
-        } else {
-            let data = from_raw_parts_mut(data, usize::from(quantity.div_ceil(8)));
-            transfer_bits(cells, write, first, quantity, data);
-        }
-    }
-}
-
-/// As [`transfer_many`], for registers.
-///
-/// # Safety
-/// `words` and `data` contain these registers, which nothing else uses meanwhile.
-#[inline(always)]
-unsafe fn transfer_words(words: *mut u16, write: bool, first: u16, quantity: u16, data: *mut u8) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let bytes = 2 * usize::from(quantity);
-        let words = from_raw_parts_mut(words.add(first.into()).cast(), bytes);
-        let data = from_raw_parts_mut(data, bytes);
-        if write {
-            copy_words(words, data);
-        } else {
-            copy_words(data, words);
-        }
-    }
-}
-
-/// As [`transfer_many`], for bits, eight at a time.
-///
-/// # Safety
-/// `cells` contains every byte that has one of these bits; nothing else uses these bytes
-/// meanwhile.
-#[inline(never)]
-unsafe fn transfer_bits(cells: *mut u8, write: bool, first: u16, quantity: u16, data: &mut [u8]) {
-    let shift = first & 7;
-    let count = usize::from((shift + quantity).div_ceil(8));
-    // SAFETY: as the caller promises.
-    let cells = unsafe { from_raw_parts_mut(cells.add(usize::from(first >> 3)), count) };
-    let mut left = quantity;
-    for (index, byte) in data.iter_mut().enumerate() {
-        // The bits of this data byte that are copied. They lie in two bytes of the cells.
-        let mask = if left < 8 { (1u16 << left) - 1 } else { 0xFF };
-        let next_byte = cells.get(index + 1).copied().unwrap_or(0);
-        let Some(cell) = cells.get_mut(index) else {
-            return;
-        };
-        let both = u16::from_le_bytes([*cell, next_byte]);
-        if write {
-            let value = (both & !(mask << shift)) | ((u16::from(*byte) & mask) << shift);
-            let [low, high] = value.to_le_bytes();
-            *cell = low;
-            if let Some(next) = cells.get_mut(index + 1) {
-                *next = high;
-            }
-        } else {
-            *byte = (both >> shift & mask) as u8;
-        }
-        left = left.saturating_sub(8);
     }
 }

@@ -52,7 +52,6 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
 ///
 /// # Safety
 /// As for [`serve`].
-#[cfg_attr(not(target_os = "none"), inline(never))]
 unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises; no reference to the record is kept while its
     // function runs.

@@ -35,8 +35,7 @@ use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
-use mbm::server::{Reply, ServerStorage, MOST_REQUESTS};
-use mbm::FIRMWARE;
+use mbm::server::{Reply, ServerStorage};
 
 /// A Modbus server on one serial line or one connection.
 ///
@@ -60,13 +59,9 @@ pub struct mbm_server {
 /// The real content of an `mbm_server`.
 #[repr(C)]
 struct Object {
-    // The mark is first where one instruction then reaches it. On a host the core is
-    // first, so that it has the address of the object.
-    #[cfg(any(target_os = "none", mbm_firmware))]
+    // The mark is first: one instruction of a microcontroller then reaches it.
     mark: u8,
     core: Core,
-    #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    mark: u8,
 }
 
 const _: () = {
@@ -178,52 +173,23 @@ unsafe fn poll(core: *mut Core, mark: *const u8) -> Status {
     // SAFETY: as the caller promises. Units and the clock are code of the program; no
     // reference to the core lives while they run.
     unsafe {
-        // Firmware serves one request a poll, which is enough for the rate of a line.
-        if FIRMWARE {
-            let now = port::now(&raw const (*core).port);
-            core::hint::assert_unchecked((*core).has_framing());
-            let status = (*core).look(now);
-            if status == Status::PENDING {
-                let info = &raw const (*core).request;
-                let storage = &raw const (*core).storage;
-                let pdu = (*storage).frame.add((*info).head.into());
-                let reply = units::serve((*storage).units, (*storage).count, info, pdu);
-                core::hint::assert_unchecked(mark.read() != IN_HOOK || (*core).has_framing());
-                if mark.read() != IN_HOOK || !(*core).answer_served(Reply::from_number(reply)) {
-                    return Status::OK;
-                }
-            } else if status != Status::OK {
-                return status;
-            }
-            return (*core).go_on();
-        }
-        for _ in 0..MOST_REQUESTS {
-            let now = if (*core).keeps_time() {
-                port::now(&raw const (*core).port)
-            } else {
-                0
-            };
-            core::hint::assert_unchecked((*core).has_framing());
-            let status = (*core).look(now);
-            if status != Status::PENDING {
-                if status == Status::OK {
-                    return (*core).go_on();
-                }
-                return status;
-            }
+        let now = port::now(&raw const (*core).port);
+        core::hint::assert_unchecked((*core).has_framing());
+        let status = (*core).look(now);
+        if status == Status::PENDING {
             let info = &raw const (*core).request;
             let storage = &raw const (*core).storage;
             let pdu = (*storage).frame.add((*info).head.into());
             let reply = units::serve((*storage).units, (*storage).count, info, pdu);
-            if mark.read() != IN_HOOK {
+            core::hint::assert_unchecked(mark.read() != IN_HOOK || (*core).has_framing());
+            if mark.read() != IN_HOOK || !(*core).answer_served(Reply::from_number(reply)) {
                 return Status::OK;
             }
-            if let Some(status) = (*core).finish(Reply::from_number(reply)) {
-                return status;
-            }
+        } else if status != Status::OK {
+            return status;
         }
+        (*core).go_on()
     }
-    Status::OK
 }
 
 /// Returns how long the program may sleep before the next mbm_server_poll, unless bytes

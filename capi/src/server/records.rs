@@ -90,21 +90,6 @@ pub(super) unsafe fn is_custom(service: *const mbm_service) -> bool {
     unsafe { (*service).kind == CUSTOM }
 }
 
-/// True if this is the head of a user's function with another code than `function`.
-///
-/// # Safety
-/// As for [`is_custom`].
-#[inline(always)]
-pub(super) unsafe fn is_other_custom(service: *const mbm_service, function: u8) -> bool {
-    // SAFETY: as the caller promises; a record of that kind is a `mbm_custom`.
-    unsafe {
-        is_custom(service) && {
-            let code = (*service.cast::<mbm_custom>()).code;
-            code != function && code != 0
-        }
-    }
-}
-
 /// The counters, the event log and the listen only mode of a unit. Initialise the struct with
 /// MBM_INIT and pass it to mbm_unit_serveDiagnostics. The counters wrap at 65536; you may read
 /// them at any time. The sub-functions below are those of function 08 (V1.1b3, 6.8), in hex.

@@ -1,16 +1,14 @@
 //! The four tables of the data model, in arrays of the program.
 
-use super::cells::{are_all_on, transfer, transfer_many, Place};
+use super::cells::{are_all_on, transfer, Place};
 use super::hooks::mbm_recordHooks;
 use super::units::{add_as, is_ignored_broadcast, request};
 use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
-use core::hint::assert_unchecked;
 use core::mem::transmute;
 use mbm::error::Status;
 use mbm::server::table::{self, TableAccess, TableKind, TableOperation};
 use mbm::server::Reply;
-use mbm::FIRMWARE;
 
 /// Holding registers or input registers in an array of yours. Initialise the struct with
 /// MBM_INIT, set the fields that you need, and pass it to mbm_unit_serveHoldingRegisters or
@@ -129,14 +127,7 @@ impl TableAccess for Table {
                 reply = Reply::length(2 + bytes);
                 (from, to) = (place, data);
             }
-            // Firmware has the smaller code, which copies cell by cell; a host copies
-            // many at a time.
-            if FIRMWARE {
-                transfer(from, to, quantity);
-            } else {
-                let write = operation != TableOperation::READ;
-                transfer_many(cells, kind, write, first as u16, quantity as u16, data.byte);
-            }
+            transfer(from, to, quantity);
             reply
         }
     }
@@ -208,99 +199,17 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
     unsafe {
         let table = service.cast::<mbm_registerTable>();
         let kind = TableKind::from_code((*table).service.kind);
-        match table::operation(kind, *pdu) {
-            operation if FIRMWARE => serve_as(operation, table, pdu, info),
-            // A host has one compiled function for each operation.
-            TableOperation::READ if !kind.is_bits() && (*table).valid.is_null() => {
-                serve_read_words(table, pdu, info)
-            }
-            TableOperation::READ => serve_read(table, pdu, info),
-            TableOperation::WRITE_ONE => serve_write_one(table, pdu, info),
-            TableOperation::WRITE_SEVERAL => serve_write_several(table, pdu, info),
-            _ => Reply::NOT_HANDLED.code(),
-        }
-    }
-}
-
-/// Serves a request with this operation on the table.
-///
-/// # Safety
-/// As for [`serve`].
-#[inline(always)]
-unsafe fn serve_as(
-    operation: TableOperation,
-    table: *mut mbm_registerTable,
-    pdu: *mut u8,
-    info: *const c_void,
-) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
+        let operation = table::operation(kind, *pdu);
         let (pdu, length) = request(pdu, info);
-        let kind = TableKind::from_code((*table).service.kind);
         let cells = &mut Table(table, info);
-        if FIRMWARE || kind.is_bits() {
-            table::serve_as(operation, kind, cells, pdu, length).code()
-        } else {
-            table::serve_as(operation, TableKind::HOLDING_REGISTERS, cells, pdu, length).code()
-        }
+        table::serve_as(operation, kind, cells, pdu, length).code()
     }
-}
-
-/// [`serve_read`] for registers that all exist.
-///
-/// # Safety
-/// As for [`serve`].
-#[inline(never)]
-unsafe fn serve_read_words(
-    table: *mut mbm_registerTable,
-    pdu: *mut u8,
-    info: *const c_void,
-) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let is_bits = TableKind::from_code((*table).service.kind).is_bits();
-        assert_unchecked(!is_bits && (*table).valid.is_null());
-        serve_as(TableOperation::READ, table, pdu, info)
-    }
-}
-
-/// # Safety
-/// As for [`serve`].
-#[inline(never)]
-unsafe fn serve_read(table: *mut mbm_registerTable, pdu: *mut u8, info: *const c_void) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe { serve_as(TableOperation::READ, table, pdu, info) }
-}
-
-/// # Safety
-/// As for [`serve`].
-#[inline(never)]
-unsafe fn serve_write_one(
-    table: *mut mbm_registerTable,
-    pdu: *mut u8,
-    info: *const c_void,
-) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe { serve_as(TableOperation::WRITE_ONE, table, pdu, info) }
-}
-
-/// # Safety
-/// As for [`serve`].
-#[inline(never)]
-unsafe fn serve_write_several(
-    table: *mut mbm_registerTable,
-    pdu: *mut u8,
-    info: *const c_void,
-) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe { serve_as(TableOperation::WRITE_SEVERAL, table, pdu, info) }
 }
 
 /// Serves functions 16 and 17 (hex) of a table of holding registers.
 ///
 /// # Safety
 /// As for [`serve`].
-#[cfg_attr(not(target_os = "none"), inline(never))]
 unsafe fn serve_mask_and_read_write(
     table: *mut mbm_registerTable,
     pdu: *mut u8,
@@ -310,11 +219,8 @@ unsafe fn serve_mask_and_read_write(
     unsafe {
         let (pdu, length) = request(pdu, info);
         let mut cells = TableSnapshot(table.read(), info);
-        if FIRMWARE {
-            let cells: &mut dyn TableAccess = &mut cells;
-            return table::serve_mask_and_read_write(cells, pdu, length).code();
-        }
-        table::serve_mask_and_read_write(&mut cells, pdu, length).code()
+        let cells: &mut dyn TableAccess = &mut cells;
+        table::serve_mask_and_read_write(cells, pdu, length).code()
     }
 }
 

@@ -397,24 +397,12 @@ pub unsafe extern "C" fn mbm_sniffer_next(
     // SAFETY: as the header demands; begin demands that the buffer is valid.
     unsafe {
         read(sniffer, 0, |object| {
-            if object.core.is_idle(nowUs) || only_waits(object, nowUs) {
+            if object.core.is_idle(nowUs) {
                 return 0;
             }
             next(object, nowUs, event)
         })
     }
-}
-
-/// True if the sniffer has no event and no data to examine: see [`Sniffer::only_waits`].
-///
-/// # Safety
-/// The object was begun with a buffer that is still valid.
-unsafe fn only_waits(object: &mut Object, now: u32) -> bool {
-    // SAFETY: as the caller promises.
-    let buffer = unsafe { buffer(object.buffer, object.size) };
-    let functions = object.functions.get(..object.count.into());
-    let core = &mut object.core;
-    buffer.is_none_or(|buffer| core.only_waits(buffer, functions.unwrap_or_default(), now))
 }
 
 /// [`mbm_sniffer_next`] for the case that the sniffer has to examine data. A function of
@@ -432,7 +420,7 @@ unsafe fn next(object: &mut Object, now: u32, event: *mut mbm_event) -> u8 {
         };
         let functions = object.functions.get(..object.count.into());
         let functions = functions.unwrap_or_default();
-        match object.core.look(buffer, functions, now) {
+        match object.core.next(buffer, functions, now) {
             Some(found) => {
                 put(event, mbm_event::from_event(&found, functions));
                 1

@@ -3,17 +3,12 @@
 use super::Tcp;
 use crate::bytes::move_to_front;
 use crate::client::queue::RequestQueue;
-use crate::client::request::{
-    data_of, is_answer, store_data, store_response, ClientRequest, Stage,
-};
+use crate::client::request::{data_of, is_answer, store_response, ClientRequest};
 use crate::client::storage::ClientStorage;
 use crate::engine::Counter;
 use crate::error::Status;
 use crate::frame::tcp::{self, Header};
 use crate::port::Port;
-
-/// Index of the data in the response frame of a read, after function code and byte count.
-const READ_DATA: usize = tcp::PDU + 2;
 
 impl<P: Port, S: ClientStorage> Tcp<P, S> {
     /// Moves the bytes that were not searched yet to the start of the buffer.
@@ -24,40 +19,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         self.start = 0;
     }
 
-    /// As [`Tcp::find`], but finds only the most frequent response: a complete, right one to
-    /// the first request in the queue, if that request is a read.
-    #[inline]
-    pub(super) fn find_read<J: ClientRequest, const N: usize>(
-        &mut self,
-        queue: &mut RequestQueue<J, N>,
-        now: u32,
-    ) -> Option<J> {
-        let request = queue.queue.first_mut()?;
-        let state = request.state();
-        let asked = state.header.data_of_read()?;
-        let total = READ_DATA + usize::from(asked);
-        let begin = usize::from(self.start);
-        if usize::from(self.end) - begin < total {
-            return None;
-        }
-        let frame = self.storage.slice(self.start, total as u16);
-        let (start, rest) = frame.split_first_chunk()?;
-        let (count, data) = rest.split_first()?;
-        let function = state.header.function();
-        if u64::from_be_bytes(*start) != tcp::start(state.wire, asked + 2, state.unit(), function)
-            || *count != asked
-            || self.skip > 0
-            || !state.is(Stage::Sent)
-            || store_data(request, data) != Status::OK
-        {
-            return None;
-        }
-        self.start += total as u16;
-        self.answered(queue, 0, Status::OK, now)
-    }
-
     /// Ends the request at the index `at`, which was answered, with `status`.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn answered<J: ClientRequest, const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
@@ -184,9 +146,6 @@ fn is_answered_by<J: ClientRequest>(request: &J, header: &Header) -> bool {
 /// request.
 fn validate<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
     let header = &request.state().header;
-    if header.is_repeated_by(pdu) {
-        return store_response(request, pdu);
-    }
     let [function, ..] = *pdu else {
         return Status::MALFORMED_REPLY;
     };

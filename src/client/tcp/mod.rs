@@ -12,7 +12,6 @@ use crate::engine::{Counter, Settings};
 use crate::error::Status;
 use crate::frame::tcp;
 use crate::port::Port;
-use crate::FIRMWARE;
 
 /// A TCP stream with as many requests in flight as the queue holds. Received bytes are in
 /// the frame buffer, bytes to send in [`ClientStorage::outgoing`].
@@ -95,7 +94,6 @@ impl<P, S> Tcp<P, S> {
 
 impl<P: Port, S: ClientStorage> Tcp<P, S> {
     /// Reads the bytes that have arrived; false if the link is lost.
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn read_bytes(&mut self) -> bool {
         if self.start == self.end {
             self.start = 0;
@@ -248,24 +246,15 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         if self.in_flight >= self.max_in_flight {
             return Status::BUSY;
         }
-        let state = request.state();
-        let (unit, header) = (state.unit(), &state.header);
         let begin = usize::from(self.filled);
         let Some(space) = self.storage.outgoing().get_mut(begin..) else {
             return Status::BUSY;
         };
-        let length = match (header.two_words(), space.first_chunk_mut()) {
-            (Some(words), Some(frame)) => {
-                let start = tcp::start(self.next, 5, unit, header.function());
-                *frame = tcp::short(start, *words);
-                frame.len()
-            }
-            _ => match write_frame(request, space, self.next) {
-                Ok(length) => length,
-                Err(refused) if begin == 0 => return refused,
-                Err(_) if stuck => return Status::LINE_BUSY,
-                Err(_) => return Status::BUSY,
-            },
+        let length = match write_frame(request, space, self.next) {
+            Ok(length) => length,
+            Err(refused) if begin == 0 => return refused,
+            Err(_) if stuck => return Status::LINE_BUSY,
+            Err(_) => return Status::BUSY,
         };
         self.storage.count(Counter::Requests, 1);
         let wait = self.time_of(request.state());
@@ -424,11 +413,6 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
         let mut fresh = fresh && (self.in_flight > 0 || queue.delay(now) > 0);
         loop {
             if self.start < self.end {
-                if !FIRMWARE {
-                    if let Some(request) = self.find_read(queue, now) {
-                        return Some(request);
-                    }
-                }
                 if let Some(request) = self.find(queue, now) {
                     return Some(request);
                 }

@@ -31,7 +31,6 @@ impl RequestHeader {
 
     /// As [`RequestHeader::set`], with up to four words after the function code.
     #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn set_all(&mut self, spec: FunctionSpec, words: &[usize; 4]) -> Status {
         // `map` would compile to a loop.
         let (first, second) = (words[0] as u16, words[1] as u16);

@@ -16,7 +16,6 @@ use super::length::Length;
 use super::limits::{MAX_FIFO, MAX_PDU};
 use super::{diagnostics, files, length, EXCEPTION};
 use crate::error::Status;
-use crate::FIRMWARE;
 use core::num::NonZeroU8;
 
 /// Bytes of the longest head: that of 17, and that of 14 and 15 with one group (hex).
@@ -163,18 +162,6 @@ impl RequestHeader {
         byte(after_head)
     }
 
-    /// The two words of a request that consists of a function code and two words. Faster than
-    /// [`RequestHeader::emit`]. Firmware has only that, to save flash.
-    #[inline]
-    pub fn two_words(&self) -> Option<&[u8; 4]> {
-        let lengths = u16::from_ne_bytes([self.head_length, self.data_length]);
-        if !FIRMWARE && lengths == u16::from_ne_bytes([5, 0]) && !self.spec.has(COUNTED) {
-            self.head.first_chunk::<5>()?.last_chunk()
-        } else {
-            None
-        }
-    }
-
     /// Writes the request PDU into `pdu`, which has [`RequestHeader::request_length`] bytes.
     /// `byte` returns a byte of the data.
     #[inline]
@@ -198,19 +185,6 @@ impl RequestHeader {
             }
         }
         true
-    }
-
-    /// True if `pdu` is the whole response to a write of one or many coils or registers: it
-    /// repeats function code, address and value or quantity. Faster than
-    /// [`RequestHeader::validate`]. Firmware has only that, to save flash.
-    #[inline]
-    pub fn is_repeated_by(&self, pdu: &[u8]) -> bool {
-        let Some([function, words @ ..]) = self.head.first_chunk::<5>() else {
-            return false;
-        };
-        !FIRMWARE
-            && self.spec.repeats_two_words()
-            && matches!(pdu, [code, a, b, c, d] if code == function && [*a, *b, *c, *d] == *words)
     }
 
     /// Length of the PDU of a response that is no exception; 0 if the request does not determine
@@ -281,14 +255,6 @@ impl RequestHeader {
         }
     }
 
-    /// Bytes of data in the response to a read, after function code and byte count; `None`
-    /// for other requests, and for those whose data begin elsewhere.
-    #[inline]
-    pub fn data_of_read(&self) -> Option<u8> {
-        let kind = self.spec.0 & (KIND | 7 << DATA);
-        (kind == READ | 2 << DATA).then_some(self.length.wrapping_sub(2))
-    }
-
     /// The status of a complete response, which has the length
     /// [`RequestHeader::expected`]: [`Status::OK`], an exception, or
     /// [`Status::MALFORMED_REPLY`]. `byte` returns a byte of the data that were sent.
@@ -353,40 +319,5 @@ impl RequestHeader {
             length_at += 7;
         }
         at == pdu.len()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_response_that_repeats_two_words_also_passes_validate() {
-        let specs = [
-            FunctionSpec::WRITE_SINGLE_COIL,
-            FunctionSpec::WRITE_SINGLE_REGISTER,
-            FunctionSpec::WRITE_MULTIPLE_COILS,
-            FunctionSpec::WRITE_MULTIPLE_REGISTERS,
-            FunctionSpec::READ_COILS,
-            FunctionSpec::READ_HOLDING_REGISTERS,
-            FunctionSpec::READ_FIFO_QUEUE,
-        ];
-        for (index, spec) in specs.into_iter().enumerate() {
-            let mut header = RequestHeader::NONE;
-            assert_eq!(header.set(spec, 0x0107, 9), Status::OK);
-            let head = [header.function(), 1, 7, 0, 9];
-            assert_eq!(header.is_repeated_by(&head), !FIRMWARE && index < 4);
-            assert!(!header.is_repeated_by(&head[..4]));
-            assert!(!header.is_repeated_by(&[head.as_slice(), &[0]].concat()));
-            for at in 0..head.len() {
-                let mut other = head;
-                other[at] ^= 0x80;
-                assert!(!header.is_repeated_by(&other), "{other:?}");
-            }
-            if index < 4 {
-                assert_eq!(header.expected(&head, 5).map(NonZeroU8::get), Some(5));
-                assert_eq!(header.validate(&head, |_| 0), Status::OK);
-            }
-        }
     }
 }

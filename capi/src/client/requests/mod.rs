@@ -14,7 +14,6 @@ use mbm::error::Status;
 use mbm::pdu::function_spec::FunctionSpec;
 #[cfg(doc)]
 use mbm::pdu::header::RequestHeader;
-use mbm::FIRMWARE;
 
 /// The arguments of a C function that makes a request: its function code, and the arguments
 /// after `client` and `request`, which are the words at the start of the PDU.
@@ -100,56 +99,14 @@ unsafe fn submit(
     }
 }
 
-/// True if the request has ended on a client. Then it is in no client's queue.
-///
-/// # Safety
-/// As the header demands.
-#[inline(always)]
-unsafe fn is_free(client: *const mbm_client, request: *const mbm_clientRequest) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe {
-        pointers::check(client) == Status::OK
-            && !request.is_null()
-            && (*request.cast::<RequestFields>()).state.has_ended()
-    }
-}
-
-/// Queues a request. (A host first checks whether the request was used before, as most
-/// were: that check is faster. The calling convention of C extends the status to a word, as
-/// the calling function must return it: that saves 40 bytes on a Cortex-M0+.)
+/// Queues a request. (The calling convention of C extends the status to a word, as the calling
+/// function must return it: that saves 40 bytes on a Cortex-M0+.)
 ///
 /// # Safety
 /// As the header demands.
 #[cfg_attr(target_os = "none", inline(never))]
-#[cfg_attr(not(target_os = "none"), inline(always))]
 #[allow(improper_ctypes_definitions)] // C does not call it.
 unsafe extern "C" fn queue_request(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    arguments: &Arguments,
-    more: Option<More>,
-) -> u8 {
-    // SAFETY: as the caller promises; the request is free, or `queue_unknown` checks it.
-    unsafe {
-        if FIRMWARE {
-            return queue_unknown(client, request, arguments, more);
-        }
-        if is_free(client, request) {
-            return submit(client, request, arguments, more).code();
-        }
-        // A copy: so that only this path needs the arguments in memory.
-        queue_unknown(client, request, &{ *arguments }, more)
-    }
-}
-
-/// As [`queue_request`], for a request that may be pending.
-///
-/// # Safety
-/// As the header demands.
-#[cfg_attr(target_os = "none", inline(always))]
-#[cfg_attr(not(target_os = "none"), cold, inline(never))]
-#[allow(improper_ctypes_definitions)] // C does not call it.
-unsafe extern "C" fn queue_unknown(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
     arguments: &Arguments,
@@ -170,32 +127,7 @@ unsafe extern "C" fn queue_unknown(
 /// # Safety
 /// As the header demands.
 #[cfg_attr(target_os = "none", inline(never))]
-#[cfg_attr(not(target_os = "none"), inline(always))]
 unsafe extern "C" fn two_words(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    first: u16,
-    second: u16,
-    function: FunctionSpec,
-) -> u8 {
-    // SAFETY: as the caller promises; the request is free, or `two_words_unknown` checks it.
-    unsafe {
-        if !FIRMWARE && is_free(client, request) {
-            let arguments = Arguments::two_words(function, first, second);
-            return submit(client, request, &arguments, None).code();
-        }
-        two_words_unknown(client, request, first, second, function)
-    }
-}
-
-/// As [`two_words`], for a request that may be pending. (Registers hold its arguments, so
-/// `two_words` needs no stack on a host.)
-///
-/// # Safety
-/// As the header demands.
-#[cfg_attr(target_os = "none", inline(always))]
-#[cfg_attr(not(target_os = "none"), cold, inline(never))]
-unsafe extern "C" fn two_words_unknown(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
     first: u16,
