@@ -5,7 +5,6 @@ use crate::engine::{Settings, Words};
 use crate::error::Status;
 use crate::node::{set_word, word, Line, Node};
 use crate::pdu::function_spec::FunctionSpec;
-use crate::pdu::master_request::MasterSpec;
 use crate::port::Port;
 
 /// A line with one node, its port and its buffers.
@@ -89,7 +88,7 @@ macro_rules! requests {
 macro_rules! request {
     ($spec:ident, $address:ident, $word:ident) => {
         |node: &mut Node, line: &mut Line<P, S>| {
-            node.request(line, $address, $word, MasterSpec::new(FunctionSpec::$spec))
+            node.request(line, $address, $word, FunctionSpec::$spec.short())
         }
     };
 }

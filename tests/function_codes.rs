@@ -7,11 +7,12 @@ mod exchanges;
 #[path = "common/vectors.rs"]
 mod vectors;
 
+use mbm::pdu::functions;
 use mbm::pdu::header::RequestHeader;
+use mbm::pdu::is_public;
 use mbm::pdu::length::Length;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
-use mbm::pdu::{diagnostics, files, identification, is_public};
 use vectors::{right_pdus, Direction, Vector};
 
 /// The valid vectors of a direction, without exception responses.
@@ -29,7 +30,7 @@ fn public_codes() -> impl Iterator<Item = u8> {
 #[test]
 fn every_public_function_is_named_in_texts() {
     for code in 0..=255u8 {
-        let name = mbm::text::names::function(code);
+        let name = mbm::pdu::functions::name(code);
         let is_named = !matches!(name, "unknown function" | "user-defined function");
         assert_eq!(
             is_named,
@@ -70,10 +71,10 @@ fn every_public_function_has_a_vector_that_is_parsed_as_its_own_variant() {
 #[test]
 fn a_request_determines_the_length_of_its_response_unless_only_the_device_knows_it() {
     let only_the_device = [
-        diagnostics::GET_COMM_EVENT_LOG,
-        diagnostics::REPORT_SERVER_ID,
-        files::READ_FIFO_QUEUE,
-        identification::ENCAPSULATED_INTERFACE_TRANSPORT,
+        functions::GET_COMM_EVENT_LOG,
+        functions::REPORT_SERVER_ID,
+        functions::READ_FIFO_QUEUE,
+        functions::ENCAPSULATED_INTERFACE_TRANSPORT,
     ];
     for vector in vectors_of(Direction::Request) {
         let code = vector.bytes[0];
@@ -104,7 +105,7 @@ fn a_gateway_knows_the_length_of_the_response_of_every_public_function() {
         let mut header = RequestHeader::NONE;
         assert!(!header.forward(code, &request[1..]).is_failure());
         // The end of these responses is the end of the frame.
-        let own_end = code == diagnostics::REPORT_SERVER_ID || matches!(request, [0x2B, 0x0D, ..]);
+        let own_end = code == functions::REPORT_SERVER_ID || matches!(request, [0x2B, 0x0D, ..]);
         if is_public(code) && !own_end {
             let found = header.expected(response, response.len() + 9);
             assert_eq!(

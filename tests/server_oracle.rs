@@ -5,7 +5,7 @@
 use mbm::server::storage::{
     BitArray, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, RegisterArray,
 };
-use mbm::server::{RequestInfo, Service, Unit, Units};
+use mbm::server::{Indication, Service, Unit, Units};
 
 const BASE: u16 = 0xFFC0;
 const CELLS: usize = 48;
@@ -324,11 +324,11 @@ fn compare_with_model(edges: &'static [usize]) {
         services.extend(input_tables.iter_mut().map(|t| t as &mut dyn Service));
         services.extend(coil_tables.iter_mut().map(|t| t as &mut dyn Service));
         services.extend(discrete_tables.iter_mut().map(|t| t as &mut dyn Service));
-        let info = RequestInfo {
+        let info = Indication {
             to: 17,
             length: pdu.len() as u16,
             space: 253,
-            ..RequestInfo::NONE
+            ..Indication::NONE
         };
         let unit = Unit {
             id: 17,

@@ -7,7 +7,7 @@ use common::device::{sealed, Device};
 use common::line::Line;
 use mbm::error::Status;
 use mbm::frame::Framing;
-use mbm::server::{Reply, RequestInfo, Units};
+use mbm::server::{Indication, Reply, Units};
 
 const READ: [u8; 6] = [17, 3, 0, 100, 0, 1];
 const ANSWER: [u8; 5] = [17, 3, 2, 0x10, 0];
@@ -28,7 +28,7 @@ struct SlowUnits<'a> {
 }
 
 impl Units for SlowUnits<'_> {
-    fn serve(&mut self, info: &RequestInfo, pdu: &mut [u8]) -> Reply {
+    fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply {
         if pdu.first() != Some(&SLOW) || info.length == 0 {
             return self.device.with_unit(|unit| [unit].serve(info, pdu));
         }

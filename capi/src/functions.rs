@@ -2,8 +2,9 @@
 
 use mbm::error::Status;
 use mbm::pdu::custom::{Function, Rule};
+use mbm::pdu::functions;
 use mbm::pdu::limits::MAX_PDU;
-use mbm::pdu::{bits, diagnostics, files, identification, registers};
+use mbm::pdu::{diagnostics, identification};
 
 /// Read Coils (V1.1b3, 6.1).
 pub const MBM_FC_READ_COILS: u8 = 0x01;
@@ -98,25 +99,25 @@ pub const MBM_RULE_FIXED: u8 = 1;
 pub const MBM_RULE_COUNTED: u8 = 2;
 
 const _: () = {
-    assert!(MBM_FC_READ_COILS == bits::READ_COILS);
-    assert!(MBM_FC_READ_DISCRETE_INPUTS == bits::READ_DISCRETE_INPUTS);
-    assert!(MBM_FC_READ_HOLDING_REGISTERS == registers::READ_HOLDING_REGISTERS);
-    assert!(MBM_FC_READ_INPUT_REGISTERS == registers::READ_INPUT_REGISTERS);
-    assert!(MBM_FC_WRITE_SINGLE_COIL == bits::WRITE_SINGLE_COIL);
-    assert!(MBM_FC_WRITE_SINGLE_REGISTER == registers::WRITE_SINGLE_REGISTER);
-    assert!(MBM_FC_READ_EXCEPTION_STATUS == diagnostics::READ_EXCEPTION_STATUS);
-    assert!(MBM_FC_DIAGNOSTICS == diagnostics::DIAGNOSTICS);
-    assert!(MBM_FC_GET_COMM_EVENT_COUNTER == diagnostics::GET_COMM_EVENT_COUNTER);
-    assert!(MBM_FC_GET_COMM_EVENT_LOG == diagnostics::GET_COMM_EVENT_LOG);
-    assert!(MBM_FC_WRITE_MULTIPLE_COILS == bits::WRITE_MULTIPLE_COILS);
-    assert!(MBM_FC_WRITE_MULTIPLE_REGISTERS == registers::WRITE_MULTIPLE_REGISTERS);
-    assert!(MBM_FC_REPORT_SERVER_ID == diagnostics::REPORT_SERVER_ID);
-    assert!(MBM_FC_READ_FILE_RECORD == files::READ_FILE_RECORD);
-    assert!(MBM_FC_WRITE_FILE_RECORD == files::WRITE_FILE_RECORD);
-    assert!(MBM_FC_MASK_WRITE_REGISTER == registers::MASK_WRITE_REGISTER);
-    assert!(MBM_FC_READ_WRITE_MULTIPLE_REGISTERS == registers::READ_WRITE_MULTIPLE_REGISTERS);
-    assert!(MBM_FC_READ_FIFO_QUEUE == files::READ_FIFO_QUEUE);
-    assert!(MBM_FC_ENCAPSULATED_INTERFACE == identification::ENCAPSULATED_INTERFACE_TRANSPORT);
+    assert!(MBM_FC_READ_COILS == functions::READ_COILS);
+    assert!(MBM_FC_READ_DISCRETE_INPUTS == functions::READ_DISCRETE_INPUTS);
+    assert!(MBM_FC_READ_HOLDING_REGISTERS == functions::READ_HOLDING_REGISTERS);
+    assert!(MBM_FC_READ_INPUT_REGISTERS == functions::READ_INPUT_REGISTERS);
+    assert!(MBM_FC_WRITE_SINGLE_COIL == functions::WRITE_SINGLE_COIL);
+    assert!(MBM_FC_WRITE_SINGLE_REGISTER == functions::WRITE_SINGLE_REGISTER);
+    assert!(MBM_FC_READ_EXCEPTION_STATUS == functions::READ_EXCEPTION_STATUS);
+    assert!(MBM_FC_DIAGNOSTICS == functions::DIAGNOSTICS);
+    assert!(MBM_FC_GET_COMM_EVENT_COUNTER == functions::GET_COMM_EVENT_COUNTER);
+    assert!(MBM_FC_GET_COMM_EVENT_LOG == functions::GET_COMM_EVENT_LOG);
+    assert!(MBM_FC_WRITE_MULTIPLE_COILS == functions::WRITE_MULTIPLE_COILS);
+    assert!(MBM_FC_WRITE_MULTIPLE_REGISTERS == functions::WRITE_MULTIPLE_REGISTERS);
+    assert!(MBM_FC_REPORT_SERVER_ID == functions::REPORT_SERVER_ID);
+    assert!(MBM_FC_READ_FILE_RECORD == functions::READ_FILE_RECORD);
+    assert!(MBM_FC_WRITE_FILE_RECORD == functions::WRITE_FILE_RECORD);
+    assert!(MBM_FC_MASK_WRITE_REGISTER == functions::MASK_WRITE_REGISTER);
+    assert!(MBM_FC_READ_WRITE_MULTIPLE_REGISTERS == functions::READ_WRITE_MULTIPLE_REGISTERS);
+    assert!(MBM_FC_READ_FIFO_QUEUE == functions::READ_FIFO_QUEUE);
+    assert!(MBM_FC_ENCAPSULATED_INTERFACE == functions::ENCAPSULATED_INTERFACE_TRANSPORT);
     use diagnostics::sub_function::*;
     assert!(MBM_DIAGNOSTICS_RETURN_QUERY_DATA == RETURN_QUERY_DATA);
     assert!(MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS == RESTART_COMMUNICATIONS);

@@ -4,7 +4,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use mbm::error::Status;
-use mbm::pdu::diagnostics::REPORT_SERVER_ID;
+use mbm::pdu::functions::REPORT_SERVER_ID;
 use mbm::pdu::function_spec::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use mbm::pdu::identification::{IdentificationReply, INDIVIDUAL};

@@ -2,7 +2,7 @@
 
 use crate::{be, naive, Input};
 use mbm::pdu::function_spec::FunctionSpec;
-use mbm::pdu::master_request::{MasterRequest, MasterSpec};
+use mbm::pdu::master_request::MasterRequest;
 
 /// A request and its PDU.
 pub struct Asked {
@@ -29,26 +29,26 @@ impl Asked {
         let (a, b, c, d) = (input.u16(), input.u16(), input.u16(), input.u16());
         let words = words();
         let read = |function, most| {
-            let spec: MasterSpec = match function {
-                1 => MasterSpec::new(FunctionSpec::READ_COILS),
-                2 => MasterSpec::new(FunctionSpec::READ_DISCRETE_INPUTS),
-                3 => MasterSpec::new(FunctionSpec::READ_HOLDING_REGISTERS),
-                _ => MasterSpec::new(FunctionSpec::READ_INPUT_REGISTERS),
+            let short = match function {
+                1 => FunctionSpec::READ_COILS.short(),
+                2 => FunctionSpec::READ_DISCRETE_INPUTS.short(),
+                3 => FunctionSpec::READ_HOLDING_REGISTERS.short(),
+                _ => FunctionSpec::READ_INPUT_REGISTERS.short(),
             };
-            (function, spec, 1 + b % most)
+            (function, short, 1 + b % most)
         };
         let head = |function: u8, words: &[u16]| [vec![function], be(words)].concat();
         let counted = |head: Vec<u8>, data: Vec<u8>| [head, vec![data.len() as u8], data].concat();
         let (built, pdu, data) = match kind {
             0..=3 => {
-                let (function, spec, quantity) = read(kind + 1, if kind < 2 { 2000 } else { 125 });
+                let (function, short, quantity) = read(kind + 1, if kind < 2 { 2000 } else { 125 });
                 let data = match kind {
                     0 | 1 => usize::from(quantity).div_ceil(8),
                     _ => 2 * usize::from(quantity),
                 };
                 let pdu = head(function, &[a, quantity]);
                 (
-                    MasterRequest::build(|q| q.set(spec, a, quantity)),
+                    MasterRequest::build(|q| q.set(short, a, quantity)),
                     pdu,
                     Some(data),
                 )
@@ -56,13 +56,13 @@ impl Asked {
             4 => {
                 let value = if b == 0 { 0 } else { 0xFF00 };
                 let built = MasterRequest::build(|q| {
-                    q.set(MasterSpec::new(FunctionSpec::WRITE_SINGLE_COIL), a, value)
+                    q.set(FunctionSpec::WRITE_SINGLE_COIL.short(), a, value)
                 });
                 (built, head(5, &[a, value]), None)
             }
             5 => {
                 let built = MasterRequest::build(|q| {
-                    q.set(MasterSpec::new(FunctionSpec::WRITE_SINGLE_REGISTER), a, b)
+                    q.set(FunctionSpec::WRITE_SINGLE_REGISTER.short(), a, b)
                 });
                 (built, head(6, &[a, b]), None)
             }
@@ -70,11 +70,7 @@ impl Asked {
                 let quantity = 1 + b % 1968;
                 let pdu = counted(head(15, &[a, quantity]), naive::coils(&words, quantity));
                 let built = MasterRequest::build(|q| {
-                    q.set(
-                        MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_COILS),
-                        a,
-                        quantity,
-                    )
+                    q.set(FunctionSpec::WRITE_MULTIPLE_COILS.short(), a, quantity)
                 });
                 (built, pdu, None)
             }
@@ -82,11 +78,7 @@ impl Asked {
                 let quantity = 1 + b % 123;
                 let data = be(&words[..quantity.into()]);
                 let built = MasterRequest::build(|q| {
-                    q.set(
-                        MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_REGISTERS),
-                        a,
-                        quantity,
-                    )
+                    q.set(FunctionSpec::WRITE_MULTIPLE_REGISTERS.short(), a, quantity)
                 });
                 (built, counted(head(16, &[a, quantity]), data), None)
             }

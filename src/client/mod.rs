@@ -5,8 +5,6 @@
 //! queue holds. The caller implements [`ClientRequest`], which is a request with its data.
 //! The client copies data only between a request and a frame buffer.
 
-mod active;
-mod due;
 mod link;
 mod policy;
 mod queue;
@@ -15,10 +13,10 @@ mod retry;
 mod serial;
 mod storage;
 mod tcp;
+mod transaction;
 mod transport;
 mod units;
 
-pub use active::{ActiveRequest, ClientEngine};
 pub use link::{Link, LinkEvent, LinkHooks, LinkState};
 pub use policy::{Backoff, Policy};
 pub use queue::RequestQueue;
@@ -27,6 +25,7 @@ pub use retry::{again, again_when_busy, NO_RETRIES};
 pub use serial::Serial;
 pub use storage::ClientStorage;
 pub use tcp::Tcp;
+pub use transaction::{ClientEngine, ClientTransaction};
 pub use transport::Transport;
 pub use units::{find, note, rest, UnitRecord};
 

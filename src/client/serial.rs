@@ -1,10 +1,10 @@
 //! A client's serial line, or a TCP stream that carries the frames of a serial line. One
 //! request is in flight at a time.
 
-use super::active::ClientEngine;
 use super::queue::RequestQueue;
 use super::request::{is_answer, store_response, ClientRequest, Stage};
 use super::storage::ClientStorage;
+use super::transaction::ClientEngine;
 use super::transport::Transport;
 use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
 use crate::engine::{Engine, Setting};

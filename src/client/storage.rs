@@ -1,11 +1,12 @@
 //! The buffers, records and random numbers that a caller supplies to a client.
 
 use super::policy::Policy;
-use super::request::RequestState;
+use super::request::{RequestState, Stage};
 use super::retry::{again, again_when_busy};
 use super::units::{find, note, rest, UnitRecord};
 use crate::engine::{Frame, Storage};
 use crate::error::Status;
+use crate::time::{elapsed, timeout_at_most};
 
 /// The storage of a client: the frame buffer of [`Storage`], and more that is optional.
 pub trait ClientStorage: Storage<Count = u16> {
@@ -63,3 +64,32 @@ pub trait ClientStorage: Storage<Count = u16> {
 /// Only a frame buffer, enough for a client on a serial line. A TCP client needs
 /// [`ClientStorage::outgoing`] too and sends nothing without it.
 impl<F: AsRef<[u8]> + AsMut<[u8]>> ClientStorage for Frame<F> {}
+
+impl RequestState {
+    /// Microseconds until the request is due.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn remaining_wait(&self, now: u32, storage: &mut impl ClientStorage) -> u32 {
+        let wait = match self.wait {
+            0 => 0,
+            wait => wait.saturating_sub(elapsed(now, self.since)),
+        };
+        if self.is(Stage::Queued) {
+            wait.max(storage.rest(self.unit(), now))
+        } else {
+            wait
+        }
+    }
+
+    /// The response timeout in microseconds, if it is `line` on this line.
+    #[inline(always)]
+    pub(super) fn response_timeout(&self, storage: &mut impl ClientStorage, line: u32) -> u32 {
+        let timeout = match self.timeout_ms {
+            0 => storage.unit_timeout_ms(self.unit()),
+            own => own,
+        };
+        match timeout {
+            0 => line,
+            own => timeout_at_most(own),
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Finds the reply among the received characters of an ASCII line. Every frame begins with a
 //! colon; characters before a colon are noise.
 
-use super::{Count, Engine, Outcome, RequestSpec, Storage};
+use super::{Count, Engine, Outcome, Storage, Transaction};
 use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::ascii::{self, find, Decoded};
@@ -20,7 +20,7 @@ pub fn frame_length(length: u8) -> u16 {
     2 * (u16::from(length) + 1) + u16::from(OVERHEAD)
 }
 
-impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Searches the frame buffer, to which the port has appended `received` characters, for the
     /// reply in a frame that ends with `delimiter`. Leaves unit and PDU of the reply at the front
     /// of the buffer. True if the request ends.

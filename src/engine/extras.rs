@@ -3,12 +3,12 @@
 //! Only [`Engine::use_extras`] names this module. A program that sets none of the three in C
 //! contains none of this code.
 
-use super::{Count, Engine, Moment, Outcome, Phase, RequestSpec, Storage};
+use super::{Count, Engine, Moment, Outcome, Phase, Storage, Transaction};
 use crate::error::Status;
 use crate::port::Port;
 use crate::time::characters;
 
-impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Makes the settings `retries`, `echo_discard` and `post_flush_hold` effective.
     pub fn use_extras(&mut self) {
         self.extras = Some(Engine::extras);

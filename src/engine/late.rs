@@ -17,10 +17,10 @@
 //!
 //! A reply that arrives while no request has been sent shows that the replies are late, too.
 
-use super::{Engine, Outcome, Phase, Probation, RequestSpec, Storage};
+use super::{Engine, Outcome, Phase, Probation, Storage, Transaction};
 use crate::port::Port;
 
-impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// The byte of `late_units` that has the bit of the pending request's unit, and that bit.
     #[cfg_attr(target_os = "none", inline(never))]
     fn late_unit(&mut self) -> (&mut u8, u8) {

@@ -19,20 +19,19 @@ pub mod ascii;
 mod extras;
 mod late;
 mod lenient;
-mod master_request;
 mod outcome;
 mod poll;
 mod search;
 mod send;
 mod settings;
-mod spec;
 mod storage;
 mod tally;
+mod transaction;
 
 pub use outcome::Outcome;
 pub use settings::{Setting, Settings};
-pub use spec::RequestSpec;
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
+pub use transaction::Transaction;
 
 use crate::error::Status;
 use crate::frame::checksum::Crc16;

@@ -1,15 +1,14 @@
 //! Moves a request on, from its start to its end.
 
 use super::{
-    Count, Engine, Event, Moment, Outcome, Phase, Probation, RequestSpec, Settings, Storage,
+    Count, Engine, Event, Moment, Outcome, Phase, Probation, Settings, Storage, Transaction,
 };
 use crate::error::Status;
-use crate::frame::checksum::{crc16, Crc16};
-use crate::frame::rtu;
+use crate::frame::checksum::Crc16;
 use crate::port::Port;
 use crate::time::{elapsed, has_elapsed, LONGEST};
 
-impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// True while a request is pending.
     pub fn is_pending(&self) -> bool {
         self.phase != Phase::Idle
@@ -50,23 +49,6 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Appends the CRC to the `length` bytes in the frame buffer, and makes them the frame to
-    /// send.
-    #[inline(always)]
-    pub(crate) fn append_crc(&mut self, length: S::Count) {
-        let [low, high] = crc16(self.storage.slice(S::Count::ZERO, length)).to_bytes();
-        self.storage.set_byte(length, low);
-        self.storage.set_byte(length + 1u8.into(), high);
-        self.set_frame_length(length + rtu::CRC.into());
-    }
-
-    /// Sets how many bytes of the frame buffer are to be sent.
-    #[inline(always)]
-    pub(crate) fn set_frame_length(&mut self, length: S::Count) {
-        self.outgoing = length;
-        self.sent = S::Count::ZERO;
-    }
-
     /// Enters a phase that may last `wait` microseconds from the next look at the clock on.
     pub(super) fn enter(&mut self, phase: Phase, wait: u32) {
         self.phase = phase;
@@ -95,7 +77,7 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     }
 }
 
-impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// An engine without a request.
     pub const fn new(port: P, storage: S) -> Self {
         Engine {

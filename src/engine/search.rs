@@ -10,7 +10,7 @@
 //! right, these bytes were a whole frame. If that frame is not the reply, it is skipped, and an
 //! exception or a damaged reply that seemed to lie in it is forgotten.
 
-use super::{Count, Engine, Event, Moment, Outcome, Phase, RequestSpec, Storage};
+use super::{Count, Engine, Event, Moment, Outcome, Phase, Storage, Transaction};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::frame::rtu::{self, MIN_FRAME};
@@ -23,7 +23,7 @@ const AROUND_DATA: u8 = rtu::OVERHEAD as u8 + 2;
 /// Length of the frame of an exception: unit, function, code, CRC.
 const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 
-impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// True if the CRC of a reply is derived from the CRC of all bytes since the last frame. That
     /// takes 340 bytes of code on an AVR, where the CRC of a long reply takes longer than a
     /// character. (Hosts test it.)

@@ -1,12 +1,13 @@
 //! Sends one request: writes the frame, waits until its last bit has left.
 
-use super::{Count, Engine, Moment, Outcome, Phase, Probation, RequestSpec, Storage, BROADCAST};
+use super::{Count, Engine, Moment, Outcome, Phase, Probation, Storage, Transaction, BROADCAST};
 use crate::error::Status;
-use crate::frame::checksum::Crc16;
+use crate::frame::checksum::{crc16, Crc16};
+use crate::frame::rtu;
 use crate::port::Port;
 use crate::time::characters;
 
-impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Starts the request to `unit`; the calls of `poll` send it. A refused request sends
     /// nothing: [`Status::BROADCAST_NOT_ALLOWED`] for a request to unit 0 that may not be
     /// broadcast, [`Status::BUFFER_TOO_SMALL`] if the frame buffer cannot hold the request.
@@ -166,5 +167,24 @@ impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
                 self.wait += characters(character, high) << 8;
             }
         }
+    }
+}
+
+impl<P, S: Storage, Q> Engine<P, S, Q> {
+    /// Appends the CRC to the `length` bytes in the frame buffer, and makes them the frame to
+    /// send.
+    #[inline(always)]
+    pub(crate) fn append_crc(&mut self, length: S::Count) {
+        let [low, high] = crc16(self.storage.slice(S::Count::ZERO, length)).to_bytes();
+        self.storage.set_byte(length, low);
+        self.storage.set_byte(length + 1u8.into(), high);
+        self.set_frame_length(length + rtu::CRC.into());
+    }
+
+    /// Sets how many bytes of the frame buffer are to be sent.
+    #[inline(always)]
+    pub(crate) fn set_frame_length(&mut self, length: S::Count) {
+        self.outgoing = length;
+        self.sent = S::Count::ZERO;
     }
 }

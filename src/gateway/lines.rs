@@ -5,7 +5,8 @@ use super::state::Stage;
 use super::storage::{GatewayStorage, Outcome};
 use crate::error::Status;
 use crate::frame::tcp;
-use crate::pdu::diagnostics::{sub_function::FORCE_LISTEN_ONLY, DIAGNOSTICS};
+use crate::pdu::diagnostics::sub_function::FORCE_LISTEN_ONLY;
+use crate::pdu::functions::DIAGNOSTICS;
 use crate::time::elapsed;
 
 impl<S: GatewayStorage> Gateway<S> {

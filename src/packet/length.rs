@@ -5,7 +5,7 @@ use super::PduKind;
 use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::{is_user_defined, Function};
-use crate::pdu::diagnostics::REPORT_SERVER_ID;
+use crate::pdu::functions::REPORT_SERVER_ID;
 use crate::pdu::length::{response as response_length, Length};
 use crate::pdu::limits::MAX_PDU;
 use crate::pdu::request::Request;

@@ -1,19 +1,11 @@
 //! Coils and discrete inputs: functions 01, 02, 05 and 0F.
 
 use super::fields::{check_end_and_range, counted, word};
+use super::functions;
 use super::limits::{MAX_READ_BITS, MAX_WRITE_BITS};
 use super::message::{Request, Response};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
-
-/// Read Coils (clause 6.1).
-pub const READ_COILS: u8 = 0x01;
-/// Read Discrete Inputs (clause 6.2).
-pub const READ_DISCRETE_INPUTS: u8 = 0x02;
-/// Write Single Coil (clause 6.5).
-pub const WRITE_SINGLE_COIL: u8 = 0x05;
-/// Write Multiple Coils (clause 6.11).
-pub const WRITE_MULTIPLE_COILS: u8 = 0x0F;
 
 /// The value that switches a single coil on in a write; 0 switches it off.
 pub const ON: u16 = 0xFF00;
@@ -53,7 +45,7 @@ pub(super) fn parse_write_multiple<'a>(reader: &mut Reader<'a>) -> Result<Reques
 }
 
 pub(super) fn emit_write_single(writer: &mut Writer, address: u16, on: bool) {
-    writer.u8(WRITE_SINGLE_COIL);
+    writer.u8(functions::WRITE_SINGLE_COIL);
     writer.u16(address);
     writer.u16(if on { ON } else { 0 });
 }

@@ -1,21 +1,11 @@
 //! Status and diagnostics of a device on a serial line: functions 07, 08, 0B, 0C and 11.
 
 use super::fields::{byte, counted, word};
+use super::functions;
 use super::limits::MAX_EVENTS;
 use super::message::{Request, Response};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
-
-/// Read Exception Status (clause 6.7).
-pub const READ_EXCEPTION_STATUS: u8 = 0x07;
-/// Diagnostics (clause 6.8).
-pub const DIAGNOSTICS: u8 = 0x08;
-/// Get Comm Event Counter (clause 6.9).
-pub const GET_COMM_EVENT_COUNTER: u8 = 0x0B;
-/// Get Comm Event Log (clause 6.10).
-pub const GET_COMM_EVENT_LOG: u8 = 0x0C;
-/// Report Server ID (clause 6.13).
-pub const REPORT_SERVER_ID: u8 = 0x11;
 
 /// The sub-functions of 08 (clause 6.8.1).
 pub mod sub_function {
@@ -89,7 +79,7 @@ fn sub_function_and_data<'a>(reader: &mut Reader<'a>) -> Result<(u16, &'a [u8]),
 }
 
 pub(super) fn emit_diagnostics(writer: &mut Writer, sub_function: u16, data: &[u8]) {
-    writer.u8(DIAGNOSTICS);
+    writer.u8(functions::DIAGNOSTICS);
     writer.u16(sub_function);
     writer.put(data);
 }
@@ -133,7 +123,7 @@ pub(super) fn parse_event_log<'a>(reader: &mut Reader<'a>) -> Result<Response<'a
 }
 
 pub(super) fn emit_event_log(writer: &mut Writer, words: [u16; 3], log: &[u8]) {
-    writer.u8(GET_COMM_EVENT_LOG);
+    writer.u8(functions::GET_COMM_EVENT_LOG);
     writer.u8((log.len() as u8).wrapping_add(6));
     for word in words {
         writer.u16(word);

@@ -1,18 +1,12 @@
 //! File records and FIFO queues: functions 14, 15 and 18.
 
 use super::fields::{counted, expect_end, word};
+use super::functions;
 use super::limits::MAX_FIFO;
 use super::message::{Request, Response};
 pub use super::records::{Reads, Record, Records, Writes, REFERENCE_TYPE};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
-
-/// Read File Record (clause 6.14).
-pub const READ_FILE_RECORD: u8 = 0x14;
-/// Write File Record (clause 6.15).
-pub const WRITE_FILE_RECORD: u8 = 0x15;
-/// Read FIFO Queue (clause 6.18).
-pub const READ_FIFO_QUEUE: u8 = 0x18;
 
 pub(super) fn parse_read<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let bytes = counted(reader)?;
@@ -50,7 +44,7 @@ pub(super) fn parse_fifo_response<'a>(reader: &mut Reader<'a>) -> Result<Respons
 }
 
 pub(super) fn emit_fifo_response(writer: &mut Writer, data: &[u8]) {
-    writer.u8(READ_FIFO_QUEUE);
+    writer.u8(functions::READ_FIFO_QUEUE);
     writer.u16((data.len() as u16).wrapping_add(2));
     writer.u16(data.len() as u16 / 2);
     writer.put(data);

@@ -1,9 +1,10 @@
 //! One description of each function's request and response, for the master and the client.
 //!
-//! The client uses a [`FunctionSpec`] as it is. The compiler converts it for the master, see
-//! [`MasterSpec`](super::master_request::MasterSpec).
+//! The client uses a [`FunctionSpec`] as it is. The master uses its short form, see
+//! [`FunctionSpec::short`].
 
-use super::{bits, diagnostics, files, identification, registers};
+use super::custom::Rule;
+use super::functions::{self, Direction};
 
 /// How the request and the response of a function are composed: flags and small numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -58,9 +59,14 @@ impl FunctionSpec {
         repeated: u32,
         data: u32,
     ) -> FunctionSpec {
+        let broadcast = match functions::direction(function) {
+            Direction::Writes => BROADCAST,
+            _ => 0,
+        };
         FunctionSpec(
             function as u32
                 | flags
+                | broadcast
                 | head << HEAD_LENGTH
                 | length << LENGTH
                 | repeated << REPEATED
@@ -88,14 +94,19 @@ impl FunctionSpec {
         FunctionSpec(spec | function as u32)
     }
 
-    /// A request that the response repeats.
+    /// A request of five bytes that the response repeats.
     pub(super) const fn echoed(function: u8, flags: u32) -> FunctionSpec {
-        FunctionSpec::new(function, flags | BROADCAST, 5, 5, 5, 0)
+        FunctionSpec::new(function, flags, 5, 5, 5, 0)
     }
 
-    /// A request that is a function code alone.
-    pub(super) const fn bare(function: u8, flags: u32, length: u32, data: u32) -> FunctionSpec {
-        FunctionSpec::new(function, flags, 1, length, 0, data)
+    /// A request that is a function code alone. The table says how long its response is.
+    pub(super) const fn bare(function: u8, flags: u32, data: u32) -> FunctionSpec {
+        let (kind, length) = match functions::response(function) {
+            Some(Rule::Fixed(length)) => (FIXED, length),
+            Some(Rule::Counted(offset, _)) => (COUNTS, offset),
+            _ => (OWN, 0),
+        };
+        FunctionSpec::new(function, flags | kind, 1, length as u32, 0, data)
     }
 
     pub(super) const fn has(self, flag: u32) -> bool {
@@ -115,60 +126,58 @@ impl FunctionSpec {
     pub(super) const NONE: FunctionSpec = FunctionSpec(0);
 
     /// 01: address and quantity.
-    pub const READ_COILS: FunctionSpec = FunctionSpec::bits(bits::READ_COILS);
+    pub const READ_COILS: FunctionSpec = FunctionSpec::bits(functions::READ_COILS);
     /// 02: address and quantity.
-    pub const READ_DISCRETE_INPUTS: FunctionSpec = FunctionSpec::bits(bits::READ_DISCRETE_INPUTS);
+    pub const READ_DISCRETE_INPUTS: FunctionSpec =
+        FunctionSpec::bits(functions::READ_DISCRETE_INPUTS);
     /// 03: address and quantity.
     pub const READ_HOLDING_REGISTERS: FunctionSpec =
-        FunctionSpec::registers(registers::READ_HOLDING_REGISTERS);
+        FunctionSpec::registers(functions::READ_HOLDING_REGISTERS);
     /// 04: address and quantity.
     pub const READ_INPUT_REGISTERS: FunctionSpec =
-        FunctionSpec::registers(registers::READ_INPUT_REGISTERS);
+        FunctionSpec::registers(functions::READ_INPUT_REGISTERS);
     /// 05: address, and FF00 or 0.
-    pub const WRITE_SINGLE_COIL: FunctionSpec = FunctionSpec::echoed(bits::WRITE_SINGLE_COIL, 0);
+    pub const WRITE_SINGLE_COIL: FunctionSpec =
+        FunctionSpec::echoed(functions::WRITE_SINGLE_COIL, 0);
     /// 06: address and value.
     pub const WRITE_SINGLE_REGISTER: FunctionSpec =
-        FunctionSpec::echoed(registers::WRITE_SINGLE_REGISTER, 0);
+        FunctionSpec::echoed(functions::WRITE_SINGLE_REGISTER, 0);
     /// 07.
     pub const READ_EXCEPTION_STATUS: FunctionSpec =
-        FunctionSpec::bare(diagnostics::READ_EXCEPTION_STATUS, FIXED, 2, 1);
+        FunctionSpec::bare(functions::READ_EXCEPTION_STATUS, 0, 1);
     /// 0B: two words are received.
-    pub const GET_COMM_EVENT_COUNTER: FunctionSpec = FunctionSpec::bare(
-        diagnostics::GET_COMM_EVENT_COUNTER,
-        FIXED | TAKES_WORDS,
-        5,
-        1,
-    );
+    pub const GET_COMM_EVENT_COUNTER: FunctionSpec =
+        FunctionSpec::bare(functions::GET_COMM_EVENT_COUNTER, TAKES_WORDS, 1);
     /// 0C: status, event count and message count are received as words with the high byte
     /// first, then the events.
     pub const GET_COMM_EVENT_LOG: FunctionSpec =
-        FunctionSpec::bare(diagnostics::GET_COMM_EVENT_LOG, COUNTS, 1, 2);
+        FunctionSpec::bare(functions::GET_COMM_EVENT_LOG, 0, 2);
     /// 0F: address and quantity.
     pub const WRITE_MULTIPLE_COILS: FunctionSpec =
-        FunctionSpec::echoed(bits::WRITE_MULTIPLE_COILS, RANGE | BITS | COUNTED);
+        FunctionSpec::echoed(functions::WRITE_MULTIPLE_COILS, RANGE | BITS | COUNTED);
     /// 10: address and quantity.
     pub const WRITE_MULTIPLE_REGISTERS: FunctionSpec = FunctionSpec::echoed(
-        registers::WRITE_MULTIPLE_REGISTERS,
+        functions::WRITE_MULTIPLE_REGISTERS,
         RANGE | COUNTED | SENDS_WORDS,
     );
     /// 11. Its response may be longer than its byte count says.
     pub const REPORT_SERVER_ID: FunctionSpec =
-        FunctionSpec::bare(diagnostics::REPORT_SERVER_ID, OWN, 0, 2);
+        FunctionSpec::new(functions::REPORT_SERVER_ID, OWN, 1, 0, 0, 2);
     /// 16: address and AND mask; the OR mask is added later.
     pub const MASK_WRITE_REGISTER: FunctionSpec =
-        FunctionSpec::new(registers::MASK_WRITE_REGISTER, BROADCAST, 7, 7, 7, 0);
+        FunctionSpec::new(functions::MASK_WRITE_REGISTER, 0, 7, 7, 7, 0);
     /// 18: address.
     pub const READ_FIFO_QUEUE: FunctionSpec =
-        FunctionSpec::new(files::READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
+        FunctionSpec::new(functions::READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
 
     /// 17: address and quantity to read; the range to write is added later.
     pub const READ_WRITE_REGISTERS: FunctionSpec = FunctionSpec(
-        FunctionSpec::registers(registers::READ_WRITE_MULTIPLE_REGISTERS).0 | COUNTED | SENDS_WORDS,
+        FunctionSpec::registers(functions::READ_WRITE_MULTIPLE_REGISTERS).0 | COUNTED | SENDS_WORDS,
     );
 
     /// 08: a sub-function; the data are added later.
     pub const DIAGNOSTICS: FunctionSpec = FunctionSpec::new(
-        diagnostics::DIAGNOSTICS,
+        functions::DIAGNOSTICS,
         FIXED | SENDS_WORDS | TAKES_WORDS,
         3,
         0,
@@ -177,7 +186,7 @@ impl FunctionSpec {
     );
     /// 14: one group is added later.
     pub const READ_FILE_RECORD: FunctionSpec = FunctionSpec::new(
-        files::READ_FILE_RECORD,
+        functions::READ_FILE_RECORD,
         READ | GROUPS | TAKES_WORDS,
         0,
         0,
@@ -186,8 +195,8 @@ impl FunctionSpec {
     );
     /// 15: one group is added later.
     pub const WRITE_FILE_RECORD: FunctionSpec = FunctionSpec::new(
-        files::WRITE_FILE_RECORD,
-        FIXED | SENDS_WORDS | REPEATS_DATA | BROADCAST,
+        functions::WRITE_FILE_RECORD,
+        FIXED | SENDS_WORDS | REPEATS_DATA,
         0,
         0,
         0,
@@ -195,7 +204,7 @@ impl FunctionSpec {
     );
     /// 14: the caller supplies the groups.
     pub const READ_FILE_RECORDS: FunctionSpec = FunctionSpec::new(
-        files::READ_FILE_RECORD,
+        functions::READ_FILE_RECORD,
         COUNTS | GROUPS | COUNTED,
         1,
         1,
@@ -204,31 +213,19 @@ impl FunctionSpec {
     );
     /// 15: the caller supplies the groups.
     pub const WRITE_FILE_RECORDS: FunctionSpec = FunctionSpec::new(
-        files::WRITE_FILE_RECORD,
-        FIXED | COUNTED | REPEATS_DATA | BROADCAST,
+        functions::WRITE_FILE_RECORD,
+        FIXED | COUNTED | REPEATS_DATA,
         1,
         0,
         1,
         0,
     );
     /// 2B: the MEI type; the data are added later.
-    pub const ENCAPSULATED: FunctionSpec = FunctionSpec::new(
-        identification::ENCAPSULATED_INTERFACE_TRANSPORT,
-        OWN,
-        2,
-        0,
-        2,
-        2,
-    );
+    pub const ENCAPSULATED: FunctionSpec =
+        FunctionSpec::new(functions::ENCAPSULATED_INTERFACE_TRANSPORT, OWN, 2, 0, 2, 2);
     /// 2B/0E: MEI type, read device id code and object id. Its data begin after the code.
-    pub const READ_DEVICE_IDENTIFICATION: FunctionSpec = FunctionSpec::new(
-        identification::ENCAPSULATED_INTERFACE_TRANSPORT,
-        OWN,
-        4,
-        0,
-        3,
-        3,
-    );
+    pub const READ_DEVICE_IDENTIFICATION: FunctionSpec =
+        FunctionSpec::new(functions::ENCAPSULATED_INTERFACE_TRANSPORT, OWN, 4, 0, 3, 3);
     /// A user-defined function; its code and its length rule are added later.
     pub const CUSTOM: FunctionSpec = FunctionSpec::new(0, 0, 1, 0, 0, 1);
 }

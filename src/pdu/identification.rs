@@ -2,13 +2,11 @@
 //! 2B.
 
 use super::fields::byte;
+use super::functions;
 use super::message::{Request, Response};
 pub use super::objects::ObjectList;
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
-
-/// Encapsulated Interface Transport (clause 6.19).
-pub const ENCAPSULATED_INTERFACE_TRANSPORT: u8 = 0x2B;
 
 /// CANopen General Reference (clause 6.20).
 pub const MEI_CANOPEN: u8 = 0x0D;
@@ -46,7 +44,7 @@ pub(super) fn emit_identification(writer: &mut Writer, code: u8, object: u8) {
 
 /// Writes a request or response of any MEI type.
 pub(super) fn emit(writer: &mut Writer, mei_type: u8, data: &[u8]) {
-    writer.u8(ENCAPSULATED_INTERFACE_TRANSPORT);
+    writer.u8(functions::ENCAPSULATED_INTERFACE_TRANSPORT);
     writer.u8(mei_type);
     writer.put(data);
 }

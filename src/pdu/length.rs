@@ -3,7 +3,7 @@
 use super::custom::{find, is_free, is_user_defined, Function, Rule};
 use super::diagnostics::sub_function::RETURN_QUERY_DATA;
 use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
-use super::{bits, diagnostics, files, identification, registers, EXCEPTION};
+use super::{functions, EXCEPTION};
 use crate::error::Status;
 
 /// The length of a PDU or frame.
@@ -54,33 +54,16 @@ pub fn request(pdu: &[u8], functions: &[Function]) -> Length {
         return Length::AtLeast(1);
     };
     match code {
-        bits::READ_COILS
-        | bits::READ_DISCRETE_INPUTS
-        | bits::WRITE_SINGLE_COIL
-        | registers::READ_HOLDING_REGISTERS
-        | registers::READ_INPUT_REGISTERS
-        | registers::WRITE_SINGLE_REGISTER => Length::Exactly(5),
-        bits::WRITE_MULTIPLE_COILS | registers::WRITE_MULTIPLE_REGISTERS => {
-            counted_length(pdu, 5, 0)
-        }
-        registers::MASK_WRITE_REGISTER => Length::Exactly(7),
-        registers::READ_WRITE_MULTIPLE_REGISTERS => counted_length(pdu, 9, 0),
-        diagnostics::READ_EXCEPTION_STATUS
-        | diagnostics::GET_COMM_EVENT_COUNTER
-        | diagnostics::GET_COMM_EVENT_LOG
-        | diagnostics::REPORT_SERVER_ID => Length::Exactly(1),
-        diagnostics::DIAGNOSTICS => diagnostics(pdu),
-        files::READ_FILE_RECORD | files::WRITE_FILE_RECORD => counted_length(pdu, 1, 0),
-        files::READ_FIFO_QUEUE => Length::Exactly(3),
-        identification::ENCAPSULATED_INTERFACE_TRANSPORT => match pdu.get(1) {
+        functions::DIAGNOSTICS => diagnostics(pdu),
+        functions::ENCAPSULATED_INTERFACE_TRANSPORT => match pdu.get(1) {
             None => Length::AtLeast(2),
             Some(&MEI_READ_DEVICE_IDENTIFICATION) => Length::Exactly(4),
             Some(_) => Length::Silence,
         },
-        code => match find(functions, code) {
-            Some(function) => by_rule(pdu, function.request),
-            None => Length::Unknown,
-        },
+        code => {
+            let declared = || find(functions, code).map(|function| function.request);
+            by_table(pdu, functions::request(code).or_else(declared))
+        }
     }
 }
 
@@ -92,41 +75,30 @@ pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
         return Length::AtLeast(1);
     };
     match code {
-        bits::READ_COILS
-        | bits::READ_DISCRETE_INPUTS
-        | registers::READ_HOLDING_REGISTERS
-        | registers::READ_INPUT_REGISTERS
-        | registers::READ_WRITE_MULTIPLE_REGISTERS
-        | diagnostics::GET_COMM_EVENT_LOG
-        | diagnostics::REPORT_SERVER_ID
-        | files::READ_FILE_RECORD
-        | files::WRITE_FILE_RECORD => counted_length(pdu, 1, 0),
-        bits::WRITE_SINGLE_COIL
-        | bits::WRITE_MULTIPLE_COILS
-        | registers::WRITE_SINGLE_REGISTER
-        | registers::WRITE_MULTIPLE_REGISTERS
-        | diagnostics::GET_COMM_EVENT_COUNTER => Length::Exactly(5),
-        registers::MASK_WRITE_REGISTER => Length::Exactly(7),
-        diagnostics::READ_EXCEPTION_STATUS => Length::Exactly(2),
-        diagnostics::DIAGNOSTICS => diagnostics(pdu),
-        files::READ_FIFO_QUEUE => match pdu.get(1..3) {
+        functions::DIAGNOSTICS => diagnostics(pdu),
+        functions::READ_FIFO_QUEUE => match pdu.get(1..3) {
             Some([high, low]) => {
                 let count = u16::from_be_bytes([*high, *low]);
                 Length::Exactly(usize::from(count.saturating_add(3)))
             }
             _ => Length::AtLeast(3),
         },
-        identification::ENCAPSULATED_INTERFACE_TRANSPORT => match pdu.get(1) {
+        functions::ENCAPSULATED_INTERFACE_TRANSPORT => match pdu.get(1) {
             None => Length::AtLeast(2),
             Some(&MEI_READ_DEVICE_IDENTIFICATION) => objects(pdu),
             Some(_) => Length::Silence,
         },
         code if code & EXCEPTION != 0 => Length::Exactly(2),
-        code => match find(functions, code) {
-            Some(function) => by_rule(pdu, function.response),
-            None => Length::Unknown,
-        },
+        code => {
+            let declared = || find(functions, code).map(|function| function.response);
+            by_table(pdu, functions::response(code).or_else(declared))
+        }
     }
+}
+
+/// The length of a PDU by the rule of its function, if there is one.
+fn by_table(pdu: &[u8], rule: Option<Rule>) -> Length {
+    rule.map_or(Length::Unknown, |rule| by_rule(pdu, rule))
 }
 
 /// The length of a device identification, in which each object has its own length.

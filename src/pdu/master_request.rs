@@ -11,38 +11,32 @@ use crate::error::Status;
 /// Function code, and at most four words of address and quantity.
 const HEAD: usize = 9;
 
-/// The part of a [`FunctionSpec`] that the master needs: the function code and three flags in one
-/// byte. The compiler converts each constant, which takes less flash than at run time.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct MasterSpec(u8);
+/// The function code in the short form of a [`FunctionSpec`].
+const FUNCTION: u8 = 0x1F;
+/// The second word is a quantity.
+const HAS_QUANTITY: u8 = 0x20;
+/// The response repeats the head. Without this flag it carries data after a byte count.
+const WRITES: u8 = 0x40;
+/// The data are bits, not registers.
+const HAS_BITS: u8 = 0x80;
 
-impl MasterSpec {
-    const FUNCTION: u8 = 0x1F;
-    /// The second word is a quantity.
-    const COUNTED: u8 = 0x20;
-    /// The response repeats the head. Without this flag it carries data after a byte count.
-    const WRITES: u8 = 0x40;
-    /// The data are bits, not registers.
-    const BITS: u8 = 0x80;
-
-    /// Converts `spec`, which must be that of one of the master's functions.
+impl FunctionSpec {
+    /// The part that a [`MasterRequest`] needs, in one byte: the function code and three flags.
+    /// The compiler converts each constant, which takes less flash than at run time. It must be
+    /// one of the master's functions.
     #[inline(always)]
-    pub const fn new(spec: FunctionSpec) -> MasterSpec {
-        let mut code = spec.function();
-        if spec.has(RANGE) {
-            code |= MasterSpec::COUNTED;
+    pub const fn short(self) -> u8 {
+        let mut short = self.function();
+        if self.has(RANGE) {
+            short |= HAS_QUANTITY;
         }
-        if !spec.has(READ) {
-            code |= MasterSpec::WRITES;
+        if !self.has(READ) {
+            short |= WRITES;
         }
-        if spec.has(BITS) {
-            code |= MasterSpec::BITS;
+        if self.has(BITS) {
+            short |= HAS_BITS;
         }
-        MasterSpec(code)
-    }
-
-    const fn has(self, flag: u8) -> bool {
-        self.0 & flag != 0
+        short
     }
 }
 
@@ -95,20 +89,20 @@ impl MasterRequest {
         }
     }
 
-    /// Sets the request of the function `spec`, with an address and a quantity or value
-    /// `word`. Returns [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the standard does
+    /// Sets the request of a function, given as [`FunctionSpec::short`], with an address and a
+    /// quantity or value `word`. Returns [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the standard does
     /// not allow, [`Status::ILLEGAL_DATA_ADDRESS`] if the range goes beyond address 65535,
     /// otherwise [`Status::OK`].
-    pub fn set(&mut self, spec: MasterSpec, address: u16, word: u16) -> Status {
+    pub fn set(&mut self, function: u8, address: u16, word: u16) -> Status {
         let ([a, b], [c, d]) = (address.to_be_bytes(), word.to_be_bytes());
         let [at_0, at_1, at_2, at_3, at_4, ..] = &mut self.head;
-        *at_0 = spec.0 & MasterSpec::FUNCTION;
+        *at_0 = function & FUNCTION;
         (*at_1, *at_2, *at_3, *at_4) = (a, b, c, d);
         self.head_length = 5;
         // A greater quantity is refused below, so the lost high bits do no harm.
         let mut words = word;
         let mut bytes = (word << 1) as u8;
-        self.has_bits = spec.has(MasterSpec::BITS);
+        self.has_bits = function & HAS_BITS != 0;
         self.last_bits = 0;
         if self.has_bits {
             words = (word >> 4) + u16::from(word & 15 != 0);
@@ -118,14 +112,14 @@ impl MasterRequest {
         self.sends = 0;
         self.reads = bytes;
         let mut most = MAX_READ_REGISTERS;
-        if spec.has(MasterSpec::WRITES) {
+        if function & WRITES != 0 {
             self.reads = 0;
             most = MAX_WRITE_REGISTERS;
         }
-        if !spec.has(MasterSpec::COUNTED) {
+        if function & HAS_QUANTITY == 0 {
             return Status::OK;
         }
-        if spec.has(MasterSpec::WRITES) {
+        if function & WRITES != 0 {
             self.sends = bytes;
         }
         if words == 0 || words > most {
@@ -139,8 +133,8 @@ impl MasterRequest {
 
     /// 16 (hex): the register becomes `(register & and_mask) | (or_mask & !and_mask)`.
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
-        let spec = MasterSpec::new(FunctionSpec::MASK_WRITE_REGISTER);
-        let status = self.set(spec, address, and_mask);
+        let function = FunctionSpec::MASK_WRITE_REGISTER.short();
+        let status = self.set(function, address, and_mask);
         self.append_word(or_mask);
         status
     }
@@ -156,8 +150,8 @@ impl MasterRequest {
         write_address: u16,
         write_quantity: u16,
     ) -> Status {
-        let spec = MasterSpec::new(FunctionSpec::READ_WRITE_REGISTERS);
-        let readable = self.set(spec, read_address, read_quantity);
+        let function = FunctionSpec::READ_WRITE_REGISTERS.short();
+        let readable = self.set(function, read_address, read_quantity);
         let writable = self.append_write(write_address, write_quantity);
         match writable {
             Status::OK => readable,

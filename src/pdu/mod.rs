@@ -10,6 +10,7 @@ pub mod diagnostics;
 mod fields;
 pub mod files;
 pub mod function_spec;
+pub mod functions;
 pub mod header;
 pub mod identification;
 pub mod identification_stream;
@@ -20,14 +21,10 @@ mod message;
 mod objects;
 mod records;
 pub mod registers;
-pub mod reply;
 pub mod request;
 pub mod response;
 
-/// True for the function codes that the standard defines (clause 6).
-pub const fn is_public(function: u8) -> bool {
-    matches!(function, 0x01..=0x08 | 0x0B | 0x0C | 0x0F..=0x11 | 0x14..=0x18 | 0x2B)
-}
+pub use functions::is_public;
 
 /// The bit that is set in the function code of an exception response (clause 7).
 pub const EXCEPTION: u8 = 0x80;

@@ -1,23 +1,11 @@
 //! Holding and input registers: functions 03, 04, 06, 10, 16 and 17.
 
 use super::fields::{check_end_and_range, check_within, counted, word};
+use super::functions;
 use super::limits::{MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_REGISTERS};
 use super::message::{Request, Response};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
-
-/// Read Holding Registers (clause 6.3).
-pub const READ_HOLDING_REGISTERS: u8 = 0x03;
-/// Read Input Registers (clause 6.4).
-pub const READ_INPUT_REGISTERS: u8 = 0x04;
-/// Write Single Register (clause 6.6).
-pub const WRITE_SINGLE_REGISTER: u8 = 0x06;
-/// Write Multiple Registers (clause 6.12).
-pub const WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
-/// Mask Write Register (clause 6.16).
-pub const MASK_WRITE_REGISTER: u8 = 0x16;
-/// Read/Write Multiple Registers (clause 6.17).
-pub const READ_WRITE_MULTIPLE_REGISTERS: u8 = 0x17;
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
@@ -89,7 +77,7 @@ fn values<'a>(reader: &mut Reader<'a>, quantity: u16) -> Result<&'a [u8], Status
 }
 
 pub(super) fn emit_mask_write(writer: &mut Writer, address: u16, and_mask: u16, or_mask: u16) {
-    writer.u8(MASK_WRITE_REGISTER);
+    writer.u8(functions::MASK_WRITE_REGISTER);
     writer.u16(address);
     writer.u16(and_mask);
     writer.u16(or_mask);

@@ -2,6 +2,7 @@
 //! bytes.
 
 use super::files::{Reads, Writes};
+use super::functions;
 use super::length::{self, Length};
 use super::limits::MAX_PDU;
 pub use super::message::Request;
@@ -44,25 +45,27 @@ impl<'a> Request<'a> {
     ) -> Result<Self, Status> {
         let function = reader.u8().ok_or(Status::ILLEGAL_FUNCTION)?;
         match function {
-            bits::READ_COILS | bits::READ_DISCRETE_INPUTS => bits::parse_read(function, reader),
-            registers::READ_HOLDING_REGISTERS | registers::READ_INPUT_REGISTERS => {
+            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => {
+                bits::parse_read(function, reader)
+            }
+            functions::READ_HOLDING_REGISTERS | functions::READ_INPUT_REGISTERS => {
                 registers::parse_read(function, reader)
             }
-            bits::WRITE_SINGLE_COIL => bits::parse_write_single(reader),
-            registers::WRITE_SINGLE_REGISTER => registers::parse_write_single(reader),
-            diagnostics::READ_EXCEPTION_STATUS => Ok(Request::ReadExceptionStatus),
-            diagnostics::DIAGNOSTICS => diagnostics::parse_diagnostics(reader),
-            diagnostics::GET_COMM_EVENT_COUNTER => Ok(Request::GetCommEventCounter),
-            diagnostics::GET_COMM_EVENT_LOG => Ok(Request::GetCommEventLog),
-            bits::WRITE_MULTIPLE_COILS => bits::parse_write_multiple(reader),
-            registers::WRITE_MULTIPLE_REGISTERS => registers::parse_write_multiple(reader),
-            diagnostics::REPORT_SERVER_ID => Ok(Request::ReportServerId),
-            files::READ_FILE_RECORD => files::parse_read(reader),
-            files::WRITE_FILE_RECORD => files::parse_write(reader),
-            registers::MASK_WRITE_REGISTER => registers::parse_mask_write(reader),
-            registers::READ_WRITE_MULTIPLE_REGISTERS => registers::parse_read_write(reader),
-            files::READ_FIFO_QUEUE => files::parse_fifo(reader),
-            identification::ENCAPSULATED_INTERFACE_TRANSPORT => identification::parse(reader),
+            functions::WRITE_SINGLE_COIL => bits::parse_write_single(reader),
+            functions::WRITE_SINGLE_REGISTER => registers::parse_write_single(reader),
+            functions::READ_EXCEPTION_STATUS => Ok(Request::ReadExceptionStatus),
+            functions::DIAGNOSTICS => diagnostics::parse_diagnostics(reader),
+            functions::GET_COMM_EVENT_COUNTER => Ok(Request::GetCommEventCounter),
+            functions::GET_COMM_EVENT_LOG => Ok(Request::GetCommEventLog),
+            functions::WRITE_MULTIPLE_COILS => bits::parse_write_multiple(reader),
+            functions::WRITE_MULTIPLE_REGISTERS => registers::parse_write_multiple(reader),
+            functions::REPORT_SERVER_ID => Ok(Request::ReportServerId),
+            functions::READ_FILE_RECORD => files::parse_read(reader),
+            functions::WRITE_FILE_RECORD => files::parse_write(reader),
+            functions::MASK_WRITE_REGISTER => registers::parse_mask_write(reader),
+            functions::READ_WRITE_MULTIPLE_REGISTERS => registers::parse_read_write(reader),
+            functions::READ_FIFO_QUEUE => files::parse_fifo(reader),
+            functions::ENCAPSULATED_INTERFACE_TRANSPORT => identification::parse(reader),
             function => {
                 let declared = custom::find(functions, function);
                 length::check(pdu, function, declared.map(|it| it.request))?;
@@ -78,22 +81,22 @@ impl<'a> Request<'a> {
             Request::ReadBits { function, .. }
             | Request::ReadRegisters { function, .. }
             | Request::Custom { function, .. } => function,
-            Request::WriteSingleCoil { .. } => bits::WRITE_SINGLE_COIL,
-            Request::WriteSingleRegister { .. } => registers::WRITE_SINGLE_REGISTER,
-            Request::ReadExceptionStatus => diagnostics::READ_EXCEPTION_STATUS,
-            Request::Diagnostics { .. } => diagnostics::DIAGNOSTICS,
-            Request::GetCommEventCounter => diagnostics::GET_COMM_EVENT_COUNTER,
-            Request::GetCommEventLog => diagnostics::GET_COMM_EVENT_LOG,
-            Request::WriteMultipleCoils { .. } => bits::WRITE_MULTIPLE_COILS,
-            Request::WriteMultipleRegisters { .. } => registers::WRITE_MULTIPLE_REGISTERS,
-            Request::ReportServerId => diagnostics::REPORT_SERVER_ID,
-            Request::ReadFileRecord(_) => files::READ_FILE_RECORD,
-            Request::WriteFileRecord(_) => files::WRITE_FILE_RECORD,
-            Request::MaskWriteRegister { .. } => registers::MASK_WRITE_REGISTER,
-            Request::ReadWriteMultipleRegisters { .. } => registers::READ_WRITE_MULTIPLE_REGISTERS,
-            Request::ReadFifoQueue { .. } => files::READ_FIFO_QUEUE,
+            Request::WriteSingleCoil { .. } => functions::WRITE_SINGLE_COIL,
+            Request::WriteSingleRegister { .. } => functions::WRITE_SINGLE_REGISTER,
+            Request::ReadExceptionStatus => functions::READ_EXCEPTION_STATUS,
+            Request::Diagnostics { .. } => functions::DIAGNOSTICS,
+            Request::GetCommEventCounter => functions::GET_COMM_EVENT_COUNTER,
+            Request::GetCommEventLog => functions::GET_COMM_EVENT_LOG,
+            Request::WriteMultipleCoils { .. } => functions::WRITE_MULTIPLE_COILS,
+            Request::WriteMultipleRegisters { .. } => functions::WRITE_MULTIPLE_REGISTERS,
+            Request::ReportServerId => functions::REPORT_SERVER_ID,
+            Request::ReadFileRecord(_) => functions::READ_FILE_RECORD,
+            Request::WriteFileRecord(_) => functions::WRITE_FILE_RECORD,
+            Request::MaskWriteRegister { .. } => functions::MASK_WRITE_REGISTER,
+            Request::ReadWriteMultipleRegisters { .. } => functions::READ_WRITE_MULTIPLE_REGISTERS,
+            Request::ReadFifoQueue { .. } => functions::READ_FIFO_QUEUE,
             Request::ReadDeviceIdentification { .. } | Request::EncapsulatedInterface { .. } => {
-                identification::ENCAPSULATED_INTERFACE_TRANSPORT
+                functions::ENCAPSULATED_INTERFACE_TRANSPORT
             }
         }
     }
@@ -144,7 +147,7 @@ impl<'a> Request<'a> {
                 bits::emit_write_single(writer, address, on);
             }
             Request::WriteSingleRegister { address, value } => {
-                writer.u8(registers::WRITE_SINGLE_REGISTER);
+                writer.u8(functions::WRITE_SINGLE_REGISTER);
                 writer.u16(address);
                 writer.u16(value);
             }
@@ -186,7 +189,7 @@ impl<'a> Request<'a> {
                 write_quantity,
                 data,
             } => {
-                writer.u8(registers::READ_WRITE_MULTIPLE_REGISTERS);
+                writer.u8(functions::READ_WRITE_MULTIPLE_REGISTERS);
                 writer.u16(read_address);
                 writer.u16(read_quantity);
                 writer.u16(write_address);
@@ -194,7 +197,7 @@ impl<'a> Request<'a> {
                 writer.counted(data);
             }
             Request::ReadFifoQueue { address } => {
-                writer.u8(files::READ_FIFO_QUEUE);
+                writer.u8(functions::READ_FIFO_QUEUE);
                 writer.u16(address);
             }
             Request::ReadDeviceIdentification { code, object } => {

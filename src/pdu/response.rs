@@ -2,6 +2,7 @@
 //! bytes.
 
 use super::files::{Records, Writes};
+use super::functions;
 use super::limits::{MAX_PDU, MAX_WRITE_BITS, MAX_WRITE_REGISTERS};
 pub use super::message::Response;
 use super::{bits, custom, diagnostics, files, identification, length, registers, EXCEPTION};
@@ -45,34 +46,32 @@ impl<'a> Response<'a> {
     ) -> Result<Self, Status> {
         let function = reader.u8().ok_or(Status::MALFORMED_REPLY)?;
         match function {
-            bits::READ_COILS | bits::READ_DISCRETE_INPUTS => {
+            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => {
                 bits::parse_read_response(function, reader)
             }
-            registers::READ_HOLDING_REGISTERS
-            | registers::READ_INPUT_REGISTERS
-            | registers::READ_WRITE_MULTIPLE_REGISTERS => {
+            functions::READ_HOLDING_REGISTERS
+            | functions::READ_INPUT_REGISTERS
+            | functions::READ_WRITE_MULTIPLE_REGISTERS => {
                 registers::parse_read_response(function, reader)
             }
-            bits::WRITE_SINGLE_COIL => bits::parse_write_single_response(reader),
-            registers::WRITE_SINGLE_REGISTER => registers::parse_write_single_response(reader),
-            diagnostics::READ_EXCEPTION_STATUS => diagnostics::parse_exception_status(reader),
-            diagnostics::DIAGNOSTICS => diagnostics::parse_diagnostics_response(reader),
-            diagnostics::GET_COMM_EVENT_COUNTER => diagnostics::parse_event_counter(reader),
-            diagnostics::GET_COMM_EVENT_LOG => diagnostics::parse_event_log(reader),
-            bits::WRITE_MULTIPLE_COILS => {
+            functions::WRITE_SINGLE_COIL => bits::parse_write_single_response(reader),
+            functions::WRITE_SINGLE_REGISTER => registers::parse_write_single_response(reader),
+            functions::READ_EXCEPTION_STATUS => diagnostics::parse_exception_status(reader),
+            functions::DIAGNOSTICS => diagnostics::parse_diagnostics_response(reader),
+            functions::GET_COMM_EVENT_COUNTER => diagnostics::parse_event_counter(reader),
+            functions::GET_COMM_EVENT_LOG => diagnostics::parse_event_log(reader),
+            functions::WRITE_MULTIPLE_COILS => {
                 registers::parse_write_multiple_response(function, MAX_WRITE_BITS, reader)
             }
-            registers::WRITE_MULTIPLE_REGISTERS => {
+            functions::WRITE_MULTIPLE_REGISTERS => {
                 registers::parse_write_multiple_response(function, MAX_WRITE_REGISTERS, reader)
             }
-            diagnostics::REPORT_SERVER_ID => diagnostics::parse_server_id(reader),
-            files::READ_FILE_RECORD => files::parse_read_response(reader),
-            files::WRITE_FILE_RECORD => files::parse_write_response(reader),
-            registers::MASK_WRITE_REGISTER => registers::parse_mask_write_response(reader),
-            files::READ_FIFO_QUEUE => files::parse_fifo_response(reader),
-            identification::ENCAPSULATED_INTERFACE_TRANSPORT => {
-                identification::parse_response(reader)
-            }
+            functions::REPORT_SERVER_ID => diagnostics::parse_server_id(reader),
+            functions::READ_FILE_RECORD => files::parse_read_response(reader),
+            functions::WRITE_FILE_RECORD => files::parse_write_response(reader),
+            functions::MASK_WRITE_REGISTER => registers::parse_mask_write_response(reader),
+            functions::READ_FIFO_QUEUE => files::parse_fifo_response(reader),
+            functions::ENCAPSULATED_INTERFACE_TRANSPORT => identification::parse_response(reader),
             function if function & EXCEPTION != 0 => parse_exception(function, reader),
             function => {
                 let declared = custom::find(functions, function);
@@ -95,19 +94,19 @@ impl<'a> Response<'a> {
             | Response::WriteMultiple { function, .. }
             | Response::Exception { function, .. }
             | Response::Custom { function, .. } => function,
-            Response::WriteSingleCoil { .. } => bits::WRITE_SINGLE_COIL,
-            Response::WriteSingleRegister { .. } => registers::WRITE_SINGLE_REGISTER,
-            Response::ExceptionStatus { .. } => diagnostics::READ_EXCEPTION_STATUS,
-            Response::Diagnostics { .. } => diagnostics::DIAGNOSTICS,
-            Response::CommEventCounter { .. } => diagnostics::GET_COMM_EVENT_COUNTER,
-            Response::CommEventLog { .. } => diagnostics::GET_COMM_EVENT_LOG,
-            Response::ServerId { .. } => diagnostics::REPORT_SERVER_ID,
-            Response::ReadFileRecord(_) => files::READ_FILE_RECORD,
-            Response::WriteFileRecord(_) => files::WRITE_FILE_RECORD,
-            Response::MaskWriteRegister { .. } => registers::MASK_WRITE_REGISTER,
-            Response::FifoQueue { .. } => files::READ_FIFO_QUEUE,
+            Response::WriteSingleCoil { .. } => functions::WRITE_SINGLE_COIL,
+            Response::WriteSingleRegister { .. } => functions::WRITE_SINGLE_REGISTER,
+            Response::ExceptionStatus { .. } => functions::READ_EXCEPTION_STATUS,
+            Response::Diagnostics { .. } => functions::DIAGNOSTICS,
+            Response::CommEventCounter { .. } => functions::GET_COMM_EVENT_COUNTER,
+            Response::CommEventLog { .. } => functions::GET_COMM_EVENT_LOG,
+            Response::ServerId { .. } => functions::REPORT_SERVER_ID,
+            Response::ReadFileRecord(_) => functions::READ_FILE_RECORD,
+            Response::WriteFileRecord(_) => functions::WRITE_FILE_RECORD,
+            Response::MaskWriteRegister { .. } => functions::MASK_WRITE_REGISTER,
+            Response::FifoQueue { .. } => functions::READ_FIFO_QUEUE,
             Response::DeviceIdentification { .. } | Response::EncapsulatedInterface { .. } => {
-                identification::ENCAPSULATED_INTERFACE_TRANSPORT
+                functions::ENCAPSULATED_INTERFACE_TRANSPORT
             }
         }
     }
@@ -149,19 +148,19 @@ impl<'a> Response<'a> {
                 bits::emit_write_single(writer, address, on);
             }
             Response::WriteSingleRegister { address, value } => {
-                writer.u8(registers::WRITE_SINGLE_REGISTER);
+                writer.u8(functions::WRITE_SINGLE_REGISTER);
                 writer.u16(address);
                 writer.u16(value);
             }
             Response::ExceptionStatus { outputs } => {
-                writer.u8(diagnostics::READ_EXCEPTION_STATUS);
+                writer.u8(functions::READ_EXCEPTION_STATUS);
                 writer.u8(outputs);
             }
             Response::Diagnostics { sub_function, data } => {
                 diagnostics::emit_diagnostics(writer, sub_function, data);
             }
             Response::CommEventCounter { status, events } => {
-                writer.u8(diagnostics::GET_COMM_EVENT_COUNTER);
+                writer.u8(functions::GET_COMM_EVENT_COUNTER);
                 writer.u16(status);
                 writer.u16(events);
             }
@@ -181,7 +180,7 @@ impl<'a> Response<'a> {
                 writer.u16(quantity);
             }
             Response::ServerId { count, data } => {
-                writer.u8(diagnostics::REPORT_SERVER_ID);
+                writer.u8(functions::REPORT_SERVER_ID);
                 writer.u8(count);
                 writer.put(data);
             }

@@ -1,8 +1,9 @@
 //! Functions 08, 0B and 0C: counters of a line, listen only mode and event log.
 
-use super::{Addressing, Reply, RequestInfo};
+use super::{Addressing, Indication, Reply};
 use crate::pdu::diagnostics::sub_function as sub;
-use crate::pdu::diagnostics::{CLEAR_LOG, DIAGNOSTICS, GET_COMM_EVENT_COUNTER, GET_COMM_EVENT_LOG};
+use crate::pdu::diagnostics::CLEAR_LOG;
+use crate::pdu::functions::{DIAGNOSTICS, GET_COMM_EVENT_COUNTER, GET_COMM_EVENT_LOG};
 use crate::pdu::limits::MAX_EVENTS;
 
 /// The diagnostics of a unit's line. All fields are zero at first. Counters wrap at 65536.
@@ -101,7 +102,7 @@ impl Diagnostics {
 
     /// Counts a frame before it is served. False if the unit must not serve it: a damaged
     /// frame, a frame for another unit, and in listen only mode any request but a restart.
-    pub fn count_frame(&mut self, info: &RequestInfo, addressing: Addressing, pdu: &[u8]) -> bool {
+    pub fn count_frame(&mut self, info: &Indication, addressing: Addressing, pdu: &[u8]) -> bool {
         if info.again {
             return true;
         }

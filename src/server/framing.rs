@@ -1,6 +1,6 @@
 //! How each framing finds a request in the received bytes, and encodes a response.
 
-use super::info::SERIAL;
+use super::indication::SERIAL;
 use super::line::{EncodeAdu, Receive, Server, ServerStorage};
 use crate::error::Status;
 use crate::frame::ascii::{CharacterKind, Decoded};

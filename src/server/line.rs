@@ -4,8 +4,8 @@
 //! out without a reference to the server, and passes the reply back. Then the server sends it. A
 //! framing is two function pointers, so firmware contains only the framings that it begins with.
 
-use super::info::STREAM;
-use super::{Reply, RequestInfo, Units};
+use super::indication::STREAM;
+use super::{Indication, Reply, Units};
 use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
@@ -104,7 +104,7 @@ pub struct Server<P, B> {
     /// still come back.
     pub(super) sent: u16,
     /// The request that was found last.
-    pub request: RequestInfo,
+    pub request: Indication,
     /// Time at which the last byte arrived; see [`Server::keeps_time`].
     pub(super) last_byte: u32,
     /// The storage that the caller supplies.
@@ -129,7 +129,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             crc: Crc16::START,
             end: 0,
             sent: 0,
-            request: RequestInfo::NONE,
+            request: Indication::NONE,
             last_byte: 0,
             now: 0,
             silence: time::DEFAULT_SILENCE,

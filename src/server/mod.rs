@@ -15,7 +15,7 @@ pub mod diagnostics;
 pub mod files;
 mod framing;
 pub mod identity;
-mod info;
+mod indication;
 mod line;
 mod reply;
 pub mod respond;
@@ -23,7 +23,7 @@ pub mod storage;
 pub mod table;
 mod units;
 
-pub use info::{only_writes, Addressing, RequestInfo, ANY};
+pub use indication::{only_writes, Addressing, Indication, ANY};
 pub use line::{Server, ServerStorage};
 pub use reply::Reply;
 pub use units::{dispatch, first_reply, Dispatch, Service, Unit, Units};

@@ -1,8 +1,8 @@
 //! The responder: turns a request frame into a response frame. It keeps no state.
 
 use super::framing::{ascii_space, rtu_space, tcp_space};
-use super::info::{SERIAL, STREAM};
-use super::{Reply, RequestInfo, Units};
+use super::indication::{SERIAL, STREAM};
+use super::{Indication, Reply, Units};
 use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::limits::MAX_PDU;
@@ -24,7 +24,7 @@ pub fn respond(
     length: usize,
     units: &mut (impl Units + ?Sized),
 ) -> Result<usize, Status> {
-    let (mut info, space) = (RequestInfo::NONE, buffer.len());
+    let (mut info, space) = (Indication::NONE, buffer.len());
     let frame = buffer.get_mut(..length).unwrap_or_default();
     let adu = framing.parse(frame, delimiter);
     let (transaction, pdu) = adu.map_or((0, 0), |adu| {

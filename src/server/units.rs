@@ -1,7 +1,7 @@
 //! Units: find the unit that a request is addressed to, and let its services serve it.
 
 use super::diagnostics::Diagnostics;
-use super::{Addressing, Reply, RequestInfo};
+use super::{Addressing, Indication, Reply};
 
 /// A service: one family of functions.
 pub trait Service {
@@ -20,7 +20,7 @@ pub trait Service {
 /// The units that serve the frames of a line.
 pub trait Units {
     /// Serves a frame, whichever unit it is addressed to. Its PDU is at the front of `pdu`.
-    fn serve(&mut self, info: &RequestInfo, pdu: &mut [u8]) -> Reply;
+    fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply;
 }
 
 /// One unit: its id and its services.
@@ -118,7 +118,7 @@ impl Unit<'_> {
     }
 
     /// Serves a frame that is addressed to this unit. Counts any frame in the diagnostics.
-    fn serve(&mut self, info: &RequestInfo, addressing: Addressing, pdu: &mut [u8]) -> Reply {
+    fn serve(&mut self, info: &Indication, addressing: Addressing, pdu: &mut [u8]) -> Reply {
         let length = usize::from(info.length);
         let function = pdu.first().copied().unwrap_or(0);
         let mut served = addressing != Addressing::FOREIGN;
@@ -139,7 +139,7 @@ impl Unit<'_> {
 /// Units in a slice, and the frame that they are offered.
 struct Slice<'a, U> {
     units: U,
-    info: &'a RequestInfo,
+    info: &'a Indication,
     pdu: &'a mut [u8],
 }
 
@@ -160,7 +160,7 @@ impl<'u, 'a: 'u, U: Iterator<Item = &'u mut Unit<'a>>> Dispatch for Slice<'_, U>
 }
 
 impl Units for [Unit<'_>] {
-    fn serve(&mut self, info: &RequestInfo, pdu: &mut [u8]) -> Reply {
+    fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply {
         let all = info.addressing(pdu.first().copied().unwrap_or(0));
         let units = self.iter_mut();
         dispatch(&mut Slice { units, info, pdu }, all)

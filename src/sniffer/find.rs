@@ -7,7 +7,7 @@ use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::packet::PduKind;
 use crate::pdu::custom::Function;
-use crate::pdu::diagnostics::{DIAGNOSTICS, REPORT_SERVER_ID};
+use crate::pdu::functions::{DIAGNOSTICS, REPORT_SERVER_ID};
 use crate::pdu::length::Length;
 use crate::pdu::EXCEPTION;
 

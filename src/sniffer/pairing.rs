@@ -2,10 +2,11 @@
 
 use crate::packet::PduKind;
 use crate::pdu::custom::Function;
+use crate::pdu::functions;
 use crate::pdu::length::Length;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
-use crate::pdu::{bits, diagnostics, files, identification, registers, EXCEPTION};
+use crate::pdu::{identification, EXCEPTION};
 
 pub use crate::text::HEAD;
 
@@ -119,20 +120,20 @@ impl OpenRequest {
         }
         let head = self.asked.head();
         let repeated = match self.asked.function() {
-            bits::WRITE_SINGLE_COIL
-            | registers::WRITE_SINGLE_REGISTER
-            | bits::WRITE_MULTIPLE_COILS
-            | registers::WRITE_MULTIPLE_REGISTERS => 5,
-            registers::MASK_WRITE_REGISTER => 7,
-            files::WRITE_FILE_RECORD => HEAD,
-            diagnostics::DIAGNOSTICS => 3,
-            identification::ENCAPSULATED_INTERFACE_TRANSPORT => match head.get(1) {
+            functions::WRITE_SINGLE_COIL
+            | functions::WRITE_SINGLE_REGISTER
+            | functions::WRITE_MULTIPLE_COILS
+            | functions::WRITE_MULTIPLE_REGISTERS => 5,
+            functions::MASK_WRITE_REGISTER => 7,
+            functions::WRITE_FILE_RECORD => HEAD,
+            functions::DIAGNOSTICS => 3,
+            functions::ENCAPSULATED_INTERFACE_TRANSPORT => match head.get(1) {
                 Some(&identification::MEI_READ_DEVICE_IDENTIFICATION) => 3,
                 _ => 2,
             },
             // A reply with three bytes of coils is as long as the request. An equal PDU is the
             // request again.
-            bits::READ_COILS | bits::READ_DISCRETE_INPUTS if pdu == head => return false,
+            functions::READ_COILS | functions::READ_DISCRETE_INPUTS if pdu == head => return false,
             _ => 1,
         };
         let repeats = head.iter().zip(pdu).take(repeated).all(|(a, b)| a == b);
@@ -272,7 +273,7 @@ impl Requests {
         let slot = self.used().iter().find(|slot| {
             slot.state == State::Open
                 && slot.is_of(unit, slot.transaction, pdu)
-                && slot.asked.function() == diagnostics::DIAGNOSTICS
+                && slot.asked.function() == functions::DIAGNOSTICS
         })?;
         let is_long_enough = pdu.len() >= 3 && slot.reply != 0;
         (is_long_enough && slot.asked.head().starts_with(pdu.get(..3)?))

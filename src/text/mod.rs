@@ -12,9 +12,10 @@ use crate::packet::PduKind;
 use crate::pdu::diagnostics::sub_function as sub;
 use crate::pdu::diagnostics::CLEAR_LOG;
 use crate::pdu::files::{Reads, Record, Writes};
+use crate::pdu::functions;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
-use crate::pdu::{bits, files, registers, EXCEPTION};
+use crate::pdu::EXCEPTION;
 
 /// Number of bytes at the start of a request PDU that are needed to describe its reply.
 pub const HEAD: usize = 9;
@@ -94,7 +95,7 @@ fn adu(line: &mut TextWriter, side: PduKind, parsed: Result<Adu, Status>, length
 fn function(line: &mut TextWriter, code: u8) {
     line.hex(code);
     line.byte(b' ');
-    line.put(names::function(code));
+    line.put(functions::name(code));
 }
 
 /// Writes the first and the last of `quantity` addresses. The last may be greater than 65535,
@@ -187,7 +188,7 @@ fn raw(line: &mut TextWriter, data: &[u8]) {
 /// function is known.
 fn unknown(line: &mut TextWriter, pdu: &[u8]) -> bool {
     match pdu.split_first() {
-        Some((code, data)) if names::function(*code) == names::function(0) => {
+        Some((code, data)) if functions::name(*code) == functions::name(0) => {
             function(line, *code);
             raw(line, data);
             true
@@ -322,19 +323,21 @@ fn arguments(head: &[u8]) -> Arguments {
     let mut reader = Reader::new(head);
     match reader.u8() {
         Some(
-            bits::READ_COILS
-            | bits::READ_DISCRETE_INPUTS
-            | bits::WRITE_MULTIPLE_COILS
-            | registers::READ_HOLDING_REGISTERS
-            | registers::READ_INPUT_REGISTERS
-            | registers::WRITE_MULTIPLE_REGISTERS
-            | registers::READ_WRITE_MULTIPLE_REGISTERS,
+            functions::READ_COILS
+            | functions::READ_DISCRETE_INPUTS
+            | functions::WRITE_MULTIPLE_COILS
+            | functions::READ_HOLDING_REGISTERS
+            | functions::READ_INPUT_REGISTERS
+            | functions::WRITE_MULTIPLE_REGISTERS
+            | functions::READ_WRITE_MULTIPLE_REGISTERS,
         ) => match (reader.u16(), reader.u16()) {
             (Some(address), Some(quantity)) => Arguments::Range(address, quantity),
             _ => Arguments::Nothing,
         },
-        Some(files::READ_FIFO_QUEUE) => reader.u16().map_or(Arguments::Nothing, Arguments::Queue),
-        Some(files::READ_FILE_RECORD) => {
+        Some(functions::READ_FIFO_QUEUE) => {
+            reader.u16().map_or(Arguments::Nothing, Arguments::Queue)
+        }
+        Some(functions::READ_FILE_RECORD) => {
             // The head contains only the first sub-request. Of the records of others, only
             // the data are written.
             let _ = reader.u8();

@@ -1,34 +1,7 @@
-//! Names from the standard for function codes and other codes.
+//! Names from the standard for sub-functions, exceptions and other codes.
 
 use crate::pdu::diagnostics::sub_function as sub;
-use crate::pdu::{bits, diagnostics, files, identification, registers};
-
-/// The name of a function code.
-pub const fn function(code: u8) -> &'static str {
-    match code {
-        bits::READ_COILS => "read coils",
-        bits::READ_DISCRETE_INPUTS => "read discrete inputs",
-        registers::READ_HOLDING_REGISTERS => "read holding registers",
-        registers::READ_INPUT_REGISTERS => "read input registers",
-        bits::WRITE_SINGLE_COIL => "write single coil",
-        registers::WRITE_SINGLE_REGISTER => "write single register",
-        diagnostics::READ_EXCEPTION_STATUS => "read exception status",
-        diagnostics::DIAGNOSTICS => "diagnostics",
-        diagnostics::GET_COMM_EVENT_COUNTER => "get comm event counter",
-        diagnostics::GET_COMM_EVENT_LOG => "get comm event log",
-        bits::WRITE_MULTIPLE_COILS => "write multiple coils",
-        registers::WRITE_MULTIPLE_REGISTERS => "write multiple registers",
-        diagnostics::REPORT_SERVER_ID => "report server id",
-        files::READ_FILE_RECORD => "read file record",
-        files::WRITE_FILE_RECORD => "write file record",
-        registers::MASK_WRITE_REGISTER => "mask write register",
-        registers::READ_WRITE_MULTIPLE_REGISTERS => "read/write multiple registers",
-        files::READ_FIFO_QUEUE => "read FIFO queue",
-        identification::ENCAPSULATED_INTERFACE_TRANSPORT => "encapsulated interface transport",
-        code if crate::pdu::custom::is_user_defined(code) => "user-defined function",
-        _ => "unknown function",
-    }
-}
+use crate::pdu::identification;
 
 /// The name of a sub-function of function 08, diagnostics.
 pub const fn sub_function(code: u16) -> &'static str {

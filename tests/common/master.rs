@@ -6,7 +6,7 @@ use mbm::frame::checksum::crc16;
 use mbm::master::Master;
 use mbm::pdu::bits;
 use mbm::pdu::function_spec::FunctionSpec;
-use mbm::pdu::master_request::{MasterRequest, MasterSpec};
+use mbm::pdu::master_request::MasterRequest;
 use mbm::port::Port;
 use std::collections::VecDeque;
 
@@ -91,22 +91,18 @@ impl Call {
     pub fn query(&self) -> Result<MasterRequest, Status> {
         let [a, b, c, d] = self.words;
         MasterRequest::build(|query| match self.function {
-            0x01 => query.set(MasterSpec::new(FunctionSpec::READ_COILS), a, b),
-            0x02 => query.set(MasterSpec::new(FunctionSpec::READ_DISCRETE_INPUTS), a, b),
-            0x03 => query.set(MasterSpec::new(FunctionSpec::READ_HOLDING_REGISTERS), a, b),
-            0x04 => query.set(MasterSpec::new(FunctionSpec::READ_INPUT_REGISTERS), a, b),
+            0x01 => query.set(FunctionSpec::READ_COILS.short(), a, b),
+            0x02 => query.set(FunctionSpec::READ_DISCRETE_INPUTS.short(), a, b),
+            0x03 => query.set(FunctionSpec::READ_HOLDING_REGISTERS.short(), a, b),
+            0x04 => query.set(FunctionSpec::READ_INPUT_REGISTERS.short(), a, b),
             0x05 => query.set(
-                MasterSpec::new(FunctionSpec::WRITE_SINGLE_COIL),
+                FunctionSpec::WRITE_SINGLE_COIL.short(),
                 a,
                 if b == 0 { 0 } else { bits::ON },
             ),
-            0x06 => query.set(MasterSpec::new(FunctionSpec::WRITE_SINGLE_REGISTER), a, b),
-            0x0F => query.set(MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_COILS), a, b),
-            0x10 => query.set(
-                MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_REGISTERS),
-                a,
-                b,
-            ),
+            0x06 => query.set(FunctionSpec::WRITE_SINGLE_REGISTER.short(), a, b),
+            0x0F => query.set(FunctionSpec::WRITE_MULTIPLE_COILS.short(), a, b),
+            0x10 => query.set(FunctionSpec::WRITE_MULTIPLE_REGISTERS.short(), a, b),
             0x16 => query.mask_write_register(a, b, c),
             0x17 => query.read_write_registers(a, b, c, d),
             other => panic!("the master has no function {other:#x}"),

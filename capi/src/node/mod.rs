@@ -19,7 +19,7 @@ use super::storage::{LineStorage, NodeWords};
 use mbm::engine::Observer;
 use mbm::error::Status;
 use mbm::node::Node;
-use mbm::pdu::master_request::{MasterRequest, MasterSpec};
+use mbm::pdu::master_request::MasterRequest;
 use mbm::port::Port;
 
 /// The fields in the storage of an `mbm_node`.
@@ -273,11 +273,11 @@ pub unsafe extern "C" fn mbm_node_getExceptionCode(node: *const mbm_node) -> u8 
 ///
 /// # Safety
 /// As for [`pointers::with`].
-unsafe fn call(pointer: *mut mbm_node, address: u16, word: u16, spec: MasterSpec) -> u8 {
+unsafe fn call(pointer: *mut mbm_node, address: u16, word: u16, function: u8) -> u8 {
     // SAFETY: as the caller promises.
     unsafe {
         request(pointer, |node, line| {
-            node.request(line, address, word, spec)
+            node.request(line, address, word, function)
         })
     }
 }

@@ -3,7 +3,6 @@
 use super::{call, mbm_node, request};
 use mbm::error::Status;
 use mbm::pdu::function_spec::FunctionSpec;
-use mbm::pdu::master_request::MasterSpec;
 
 /// Function 01: reads coils into the response words, 16 in each word. The first coil is the
 /// lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
@@ -37,14 +36,7 @@ pub unsafe extern "C" fn mbm_node_readCoils(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        call(
-            node,
-            address,
-            quantity,
-            MasterSpec::new(FunctionSpec::READ_COILS),
-        )
-    }
+    unsafe { call(node, address, quantity, FunctionSpec::READ_COILS.short()) }
 }
 
 /// Function 02: reads discrete inputs into the response words, 16 in each word. The first
@@ -66,7 +58,7 @@ pub unsafe extern "C" fn mbm_node_readDiscreteInputs(
             node,
             address,
             quantity,
-            MasterSpec::new(FunctionSpec::READ_DISCRETE_INPUTS),
+            FunctionSpec::READ_DISCRETE_INPUTS.short(),
         )
     }
 }
@@ -89,7 +81,7 @@ pub unsafe extern "C" fn mbm_node_readHoldingRegisters(
             node,
             address,
             quantity,
-            MasterSpec::new(FunctionSpec::READ_HOLDING_REGISTERS),
+            FunctionSpec::READ_HOLDING_REGISTERS.short(),
         )
     }
 }
@@ -112,7 +104,7 @@ pub unsafe extern "C" fn mbm_node_readInputRegisters(
             node,
             address,
             quantity,
-            MasterSpec::new(FunctionSpec::READ_INPUT_REGISTERS),
+            FunctionSpec::READ_INPUT_REGISTERS.short(),
         )
     }
 }
@@ -176,7 +168,7 @@ pub unsafe extern "C" fn mbm_node_writeMultipleCoils(
             node,
             address,
             quantity,
-            MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_COILS),
+            FunctionSpec::WRITE_MULTIPLE_COILS.short(),
         )
     }
 }
@@ -211,7 +203,7 @@ pub unsafe extern "C" fn mbm_node_writeMultipleRegisters(
             node,
             address,
             quantity,
-            MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_REGISTERS),
+            FunctionSpec::WRITE_MULTIPLE_REGISTERS.short(),
         )
     }
 }

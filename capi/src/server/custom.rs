@@ -9,7 +9,7 @@ use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
 use mbm::server::custom::{self, Outcome};
-use mbm::server::{Reply, RequestInfo};
+use mbm::server::{Indication, Reply};
 
 /// A function of yours returns this, or-ed with the exception code (1 to 127), to answer
 /// with an exception.
@@ -56,7 +56,7 @@ unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_voi
     // SAFETY: as the caller promises; no reference to the record is kept while its
     // function runs.
     unsafe {
-        let to = (*info.cast::<RequestInfo>()).to;
+        let to = (*info.cast::<Indication>()).to;
         let connection = connection(info);
         let (pdu, length) = request(pdu, info);
         let function = pdu.first().copied().unwrap_or(0);

@@ -5,7 +5,7 @@ use super::{mbm_diagnostics, mbm_service, mbm_unit};
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::server::diagnostics::{Diagnostics, Restart};
-use mbm::server::{Addressing, Reply, RequestInfo};
+use mbm::server::{Addressing, Indication, Reply};
 
 /// The fields of a record that the core uses.
 ///
@@ -56,7 +56,7 @@ unsafe extern "C" fn monitor(
         };
         let (bytes, length) = request(pdu, info);
         let function = bytes.first().copied().unwrap_or(0);
-        let info = info.cast::<RequestInfo>();
+        let info = info.cast::<Indication>();
         let request = bytes.get(..length).unwrap_or_default();
         if !core_fields(record).count_frame(&*info, addressing, request) {
             return Reply::NO_RESPONSE.code();

@@ -4,7 +4,7 @@ use super::buffers::Core;
 use core::ffi::c_void;
 use core::mem::{offset_of, transmute, MaybeUninit};
 use mbm::pdu::files::Record;
-use mbm::server::{Reply, RequestInfo};
+use mbm::server::{Indication, Reply};
 
 /// A request that reads or writes cells of yours, as your hooks get it. A cell is a register,
 /// a coil, a discrete input or a record of a file.
@@ -185,7 +185,7 @@ pub(super) unsafe extern "C" fn call_hook(
     // SAFETY: as the caller promises; no reference to the hooks or the server is kept.
     unsafe {
         (*access).connection = connection(info);
-        (*access).unit = (*info.cast::<RequestInfo>()).to;
+        (*access).unit = (*info.cast::<Indication>()).to;
         let context = (*hooks).context;
         let before = match hook {
             Hook::BeforeRead => (*hooks).beforeRead,

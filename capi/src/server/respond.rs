@@ -10,13 +10,13 @@ use core::mem::MaybeUninit;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
 use mbm::server::respond::respond;
-use mbm::server::{Reply, RequestInfo, Units};
+use mbm::server::{Indication, Reply, Units};
 
 /// The units that C passed, how many, and the connection that the request came from.
 struct RespondUnits(*mut mbm_unit, u8, *mut c_void);
 
 impl Units for RespondUnits {
-    fn serve(&mut self, info: &RequestInfo, pdu: &mut [u8]) -> Reply {
+    fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply {
         // SAFETY: mbm_unit_respond requires `self.1` units. In place of a server, they get
         // storage in which the fields are set that services use.
         let reply = unsafe {

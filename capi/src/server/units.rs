@@ -5,7 +5,7 @@ use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
-use mbm::server::{dispatch, only_writes, Addressing, Dispatch, Reply, RequestInfo};
+use mbm::server::{dispatch, only_writes, Addressing, Dispatch, Indication, Reply};
 
 /// The most records that one unit can serve. Each is one struct that you pass to a
 /// mbm_unit_serve function.
@@ -163,7 +163,7 @@ impl Iterator for Services {
 pub(super) unsafe fn request<'a>(pdu: *mut u8, info: *const c_void) -> (&'a mut [u8], usize) {
     // SAFETY: as the caller promises.
     unsafe {
-        let info = info.cast::<RequestInfo>();
+        let info = info.cast::<Indication>();
         let (space, length) = ((*info).space.into(), (*info).length.into());
         core::hint::assert_unchecked(length <= space);
         (from_raw_parts_mut(pdu, space), length)
@@ -208,7 +208,7 @@ pub(super) unsafe fn call_services(
 #[inline(always)]
 unsafe fn refusal_field(info: *const c_void) -> *mut u8 {
     // SAFETY: as the caller promises; `info` is part of a server, which is not constant.
-    unsafe { &raw mut (*info.cast::<RequestInfo>().cast_mut()).refusal }
+    unsafe { &raw mut (*info.cast::<Indication>().cast_mut()).refusal }
 }
 
 /// Before the services of a unit are called.
@@ -309,7 +309,7 @@ pub(crate) unsafe fn have_ids(units: *const mbm_unit, count: u8) -> bool {
 pub(super) unsafe fn serve(
     units: *mut mbm_unit,
     count: u8,
-    info: *const RequestInfo,
+    info: *const Indication,
     pdu: *mut u8,
 ) -> usize {
     // SAFETY: as the caller promises.
@@ -328,7 +328,7 @@ pub(super) unsafe fn serve(
 struct UnitsForFrame {
     unit: *mut mbm_unit,
     left: u8,
-    info: *const RequestInfo,
+    info: *const Indication,
     pdu: *mut u8,
 }
 
@@ -382,7 +382,7 @@ impl Dispatch for UnitsForFrame {
 #[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn is_ignored_broadcast(info: *const c_void, function: u8) -> bool {
     // SAFETY: as the caller promises.
-    unsafe { (*info.cast::<RequestInfo>()).is_broadcast() && !only_writes(function) }
+    unsafe { (*info.cast::<Indication>()).is_broadcast() && !only_writes(function) }
 }
 
 /// As [`add`], but puts the service before all others of the unit.

@@ -3,7 +3,7 @@
 
 use super::super::custom::Rule;
 use super::super::function_spec::*;
-use super::super::{bits, diagnostics, files, identification, registers};
+use super::super::{functions, identification};
 use super::RequestHeader;
 use crate::error::Status;
 
@@ -30,36 +30,36 @@ impl RequestHeader {
         };
         let (first, second) = (word(0), word(1));
         let spec = match function {
-            bits::READ_COILS => FunctionSpec::READ_COILS,
-            bits::READ_DISCRETE_INPUTS => FunctionSpec::READ_DISCRETE_INPUTS,
-            registers::READ_HOLDING_REGISTERS => FunctionSpec::READ_HOLDING_REGISTERS,
-            registers::READ_INPUT_REGISTERS => FunctionSpec::READ_INPUT_REGISTERS,
-            bits::WRITE_SINGLE_COIL => FunctionSpec::WRITE_SINGLE_COIL,
-            registers::WRITE_SINGLE_REGISTER => FunctionSpec::WRITE_SINGLE_REGISTER,
-            diagnostics::READ_EXCEPTION_STATUS => FunctionSpec::READ_EXCEPTION_STATUS,
-            diagnostics::GET_COMM_EVENT_COUNTER => FunctionSpec::GET_COMM_EVENT_COUNTER,
-            diagnostics::GET_COMM_EVENT_LOG => FunctionSpec::GET_COMM_EVENT_LOG,
-            bits::WRITE_MULTIPLE_COILS => FunctionSpec::WRITE_MULTIPLE_COILS,
-            registers::WRITE_MULTIPLE_REGISTERS => FunctionSpec::WRITE_MULTIPLE_REGISTERS,
-            diagnostics::REPORT_SERVER_ID => FunctionSpec::REPORT_SERVER_ID,
-            files::READ_FIFO_QUEUE => FunctionSpec::READ_FIFO_QUEUE,
+            functions::READ_COILS => FunctionSpec::READ_COILS,
+            functions::READ_DISCRETE_INPUTS => FunctionSpec::READ_DISCRETE_INPUTS,
+            functions::READ_HOLDING_REGISTERS => FunctionSpec::READ_HOLDING_REGISTERS,
+            functions::READ_INPUT_REGISTERS => FunctionSpec::READ_INPUT_REGISTERS,
+            functions::WRITE_SINGLE_COIL => FunctionSpec::WRITE_SINGLE_COIL,
+            functions::WRITE_SINGLE_REGISTER => FunctionSpec::WRITE_SINGLE_REGISTER,
+            functions::READ_EXCEPTION_STATUS => FunctionSpec::READ_EXCEPTION_STATUS,
+            functions::GET_COMM_EVENT_COUNTER => FunctionSpec::GET_COMM_EVENT_COUNTER,
+            functions::GET_COMM_EVENT_LOG => FunctionSpec::GET_COMM_EVENT_LOG,
+            functions::WRITE_MULTIPLE_COILS => FunctionSpec::WRITE_MULTIPLE_COILS,
+            functions::WRITE_MULTIPLE_REGISTERS => FunctionSpec::WRITE_MULTIPLE_REGISTERS,
+            functions::REPORT_SERVER_ID => FunctionSpec::REPORT_SERVER_ID,
+            functions::READ_FIFO_QUEUE => FunctionSpec::READ_FIFO_QUEUE,
             _ => FunctionSpec::NONE,
         };
         let built = match function {
             _ if spec != FunctionSpec::NONE => self.set(spec, first, second),
-            diagnostics::DIAGNOSTICS if first > LAST_SUB_FUNCTION => {
+            functions::DIAGNOSTICS if first > LAST_SUB_FUNCTION => {
                 self.set(FunctionSpec::DIAGNOSTICS, first, 0);
                 self.spec.0 |= OWN;
                 self.follow(length.saturating_sub(2))
             }
-            diagnostics::DIAGNOSTICS => self.diagnostics(first, length.saturating_sub(2) / 2),
-            files::READ_FILE_RECORD => self.read_file_records(length.saturating_sub(1)),
-            files::WRITE_FILE_RECORD => self.write_file_records(length.saturating_sub(1)),
-            registers::MASK_WRITE_REGISTER => self.mask_write_register(first, second, word(2)),
-            registers::READ_WRITE_MULTIPLE_REGISTERS => {
+            functions::DIAGNOSTICS => self.diagnostics(first, length.saturating_sub(2) / 2),
+            functions::READ_FILE_RECORD => self.read_file_records(length.saturating_sub(1)),
+            functions::WRITE_FILE_RECORD => self.write_file_records(length.saturating_sub(1)),
+            functions::MASK_WRITE_REGISTER => self.mask_write_register(first, second, word(2)),
+            functions::READ_WRITE_MULTIPLE_REGISTERS => {
                 self.read_write_registers(first, second, word(2), word(3))
             }
-            identification::ENCAPSULATED_INTERFACE_TRANSPORT => match *body {
+            functions::ENCAPSULATED_INTERFACE_TRANSPORT => match *body {
                 [identification::MEI_READ_DEVICE_IDENTIFICATION, code, object] => {
                     self.read_device_identification(code, object)
                 }

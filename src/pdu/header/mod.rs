@@ -11,7 +11,8 @@ mod restore;
 pub use build::GROUP;
 
 use super::function_spec::*;
-use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
+use super::functions::{self, Direction};
+use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use super::length::Length;
 use super::limits::{MAX_FIFO, MAX_PDU};
 use super::{diagnostics, files, length, EXCEPTION};
@@ -67,7 +68,7 @@ impl RequestHeader {
     pub fn returns_query_data(&self) -> bool {
         const SUB_FUNCTION: [u8; 2] = diagnostics::sub_function::RETURN_QUERY_DATA.to_be_bytes();
         self.head
-            .starts_with(&[diagnostics::DIAGNOSTICS, SUB_FUNCTION[0], SUB_FUNCTION[1]])
+            .starts_with(&[functions::DIAGNOSTICS, SUB_FUNCTION[0], SUB_FUNCTION[1]])
     }
 
     /// Bytes of the caller's data that are sent.
@@ -100,12 +101,13 @@ impl RequestHeader {
     /// 11, 14 and 18, and 2B with MEI type 0E (hex).
     pub const fn only_reads(&self) -> bool {
         let [function, mei_type, ..] = self.head;
-        match function {
-            identification::ENCAPSULATED_INTERFACE_TRANSPORT => {
-                mei_type == MEI_READ_DEVICE_IDENTIFICATION
+        match functions::direction(function) {
+            Direction::Reads => true,
+            Direction::Writes => false,
+            Direction::Either => {
+                function == functions::ENCAPSULATED_INTERFACE_TRANSPORT
+                    && mei_type == MEI_READ_DEVICE_IDENTIFICATION
             }
-            0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18 => true,
-            _ => false,
         }
     }
 
@@ -234,16 +236,16 @@ impl RequestHeader {
     fn own_length(&self, pdu: &[u8], whole: usize) -> usize {
         let mut least = 2;
         let rule = match self.head {
-            [files::READ_FIFO_QUEUE, ..] => match pdu.get(1..3) {
+            [functions::READ_FIFO_QUEUE, ..] => match pdu.get(1..3) {
                 Some([0, low]) => Length::Exactly(3 + usize::from(*low)),
                 Some(_) => Length::Exactly(MAX_PDU + 1),
                 None => Length::AtLeast(3),
             },
-            [identification::ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, ..] => {
+            [functions::ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, ..] => {
                 length::objects(pdu)
             }
             // Some devices count the id alone and send more after it.
-            [diagnostics::REPORT_SERVER_ID, ..] => {
+            [functions::REPORT_SERVER_ID, ..] => {
                 least += usize::from(pdu.get(1).copied().unwrap_or(0));
                 Length::Silence
             }
@@ -275,7 +277,7 @@ impl RequestHeader {
             && self.is_repeated(pdu, repeated, &byte)
             && match *pdu {
                 _ if self.spec.has(GROUPS) => self.answers_groups(pdu, byte),
-                [files::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
+                [functions::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
                     high == 0 && u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2
                 }
                 _ => true,

@@ -2,7 +2,7 @@
 
 use super::super::files;
 use super::super::function_spec::*;
-use super::super::identification::ENCAPSULATED_INTERFACE_TRANSPORT;
+use super::super::functions::ENCAPSULATED_INTERFACE_TRANSPORT;
 use super::super::EXCEPTION;
 use super::RequestHeader;
 use crate::error::Status;

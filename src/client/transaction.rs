@@ -2,17 +2,17 @@
 
 use super::request::{data_of, ClientRequest};
 use super::storage::ClientStorage;
-use crate::engine::{ascii, Engine, RequestSpec};
+use crate::engine::{ascii, Engine, Transaction};
 use crate::error::Status;
 use crate::frame::{ascii as characters, rtu};
-use crate::pdu::diagnostics::REPORT_SERVER_ID;
+use crate::pdu::functions::REPORT_SERVER_ID;
 use crate::pdu::header::RequestHeader;
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
 use core::num::NonZeroU8;
 
 /// The engine of a client on a serial line.
-pub type ClientEngine<P, S, J> = Engine<P, S, ActiveRequest<P, S, J>>;
+pub type ClientEngine<P, S, J> = Engine<P, S, ClientTransaction<P, S, J>>;
 
 /// The functions that write and find ASCII frames. (Pointers, so that firmware without an
 /// ASCII line does not contain them.)
@@ -22,7 +22,7 @@ struct Ascii<P, S: ClientStorage, J> {
 }
 
 /// The request in flight.
-pub struct ActiveRequest<P, S: ClientStorage, J> {
+pub struct ClientTransaction<P, S: ClientStorage, J> {
     pub(super) client_request: Option<J>,
     /// `None` on an RTU line.
     ascii: Option<Ascii<P, S, J>>,
@@ -31,7 +31,7 @@ pub struct ActiveRequest<P, S: ClientStorage, J> {
     function: u8,
 }
 
-impl<P: Port, S: ClientStorage, J: ClientRequest> ActiveRequest<P, S, J> {
+impl<P: Port, S: ClientStorage, J: ClientRequest> ClientTransaction<P, S, J> {
     /// Sends requests in ASCII frames, which end with the character `delimiter`.
     pub fn set_ascii(&mut self, delimiter: u8) {
         self.delimiter = delimiter;
@@ -42,7 +42,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> ActiveRequest<P, S, J> {
     }
 }
 
-impl<P, S: ClientStorage, J: ClientRequest> ActiveRequest<P, S, J> {
+impl<P, S: ClientStorage, J: ClientRequest> ClientTransaction<P, S, J> {
     /// Stores the request to be sent next.
     pub(super) fn begin(&mut self, client_request: J) {
         self.function = client_request.state().header.function();
@@ -66,8 +66,8 @@ impl<P, S: ClientStorage, J: ClientRequest> ActiveRequest<P, S, J> {
     }
 }
 
-impl<P, S: ClientStorage, J: ClientRequest> RequestSpec<P, S> for ActiveRequest<P, S, J> {
-    const NONE: Self = ActiveRequest {
+impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransaction<P, S, J> {
+    const NONE: Self = ClientTransaction {
         client_request: None,
         ascii: None,
         delimiter: 0,

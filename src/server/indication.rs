@@ -1,12 +1,12 @@
 //! Which unit a received frame is addressed to.
 
 use super::table::MachineByte;
-use crate::pdu::{bits, files, registers};
+use crate::pdu::functions::{self, Direction};
 
 /// The address and the position of a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(C)]
-pub struct RequestInfo {
+pub struct Indication {
     /// The unit id in the frame.
     pub to: u8,
     /// A second id that addresses the server itself: 255 in a stream. On a serial line 0,
@@ -60,9 +60,9 @@ impl Addressing {
 /// The id of a unit that responds to every id.
 pub const ANY: u8 = 0;
 
-impl RequestInfo {
+impl Indication {
     /// No frame has been received yet.
-    pub const NONE: RequestInfo = RequestInfo {
+    pub const NONE: Indication = Indication {
         to: 0,
         own: STREAM,
         overrun: false,
@@ -82,7 +82,7 @@ impl RequestInfo {
         }
     }
 
-    /// As [`RequestInfo::addressing`], whatever the function code.
+    /// As [`Indication::addressing`], whatever the function code.
     #[inline(always)]
     pub const fn addressing_of_all(&self) -> Addressing {
         if self.length == 0 {
@@ -120,23 +120,14 @@ impl RequestInfo {
     }
 }
 
-/// [`RequestInfo::own`] on a serial line.
+/// [`Indication::own`] on a serial line.
 pub const SERIAL: u8 = 0;
-/// [`RequestInfo::own`] in a stream.
+/// [`Indication::own`] in a stream.
 pub const STREAM: u8 = 255;
 
 /// True for functions that only write and for user-defined functions. Other functions are
 /// not carried out if they are broadcast (serial line guide V1.02, 2.1).
 #[inline]
 pub const fn only_writes(function: u8) -> bool {
-    matches!(
-        function,
-        bits::WRITE_SINGLE_COIL
-            | bits::WRITE_MULTIPLE_COILS
-            | registers::WRITE_SINGLE_REGISTER
-            | registers::WRITE_MULTIPLE_REGISTERS
-            | registers::MASK_WRITE_REGISTER
-            | files::WRITE_FILE_RECORD
-            | 0x41..
-    )
+    function > 0x40 || matches!(functions::direction(function), Direction::Writes)
 }

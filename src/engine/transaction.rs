@@ -5,7 +5,7 @@ use crate::port::Port;
 
 /// A request: how its frame is written, and how its reply is recognised. The functions with
 /// an `engine` argument take the engine that holds the request.
-pub trait RequestSpec<P, S: Storage>: Sized {
+pub trait Transaction<P, S: Storage>: Sized {
     /// No request.
     const NONE: Self;
 

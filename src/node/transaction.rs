@@ -1,7 +1,8 @@
-//! The master's requests: one of ten functions, in RTU frames. The request determines the
+//! The transactions of a master: one of ten functions, in RTU frames. The request determines the
 //! length of its reply.
 
-use super::{Engine, RequestSpec, Words};
+use super::Line;
+use crate::engine::{Transaction, Words};
 use crate::error::Status;
 use crate::frame::rtu;
 use crate::pdu::master_request::MasterRequest;
@@ -10,7 +11,7 @@ use crate::port::Port;
 /// Bytes of a frame around its PDU: unit and CRC.
 const AROUND_PDU: u8 = rtu::OVERHEAD as u8;
 
-impl<P, S: Words> RequestSpec<P, S> for MasterRequest {
+impl<P, S: Words> Transaction<P, S> for MasterRequest {
     const NONE: Self = MasterRequest::NONE;
     const HAS_FIXED_REPLY: bool = true;
 
@@ -25,7 +26,7 @@ impl<P, S: Words> RequestSpec<P, S> for MasterRequest {
     }
 
     #[inline(always)]
-    fn response_timeout(engine: &mut Engine<P, S, Self>) -> u32 {
+    fn response_timeout(engine: &mut Line<P, S>) -> u32 {
         engine.storage.response_timeout(&engine.settings)
     }
 
@@ -40,12 +41,12 @@ impl<P, S: Words> RequestSpec<P, S> for MasterRequest {
     }
 
     #[inline(always)]
-    fn write(engine: &mut Engine<P, S, Self>) {
+    fn write(engine: &mut Line<P, S>) {
         write(engine);
     }
 
     #[inline(always)]
-    fn is_reply(engine: &mut Engine<P, S, Self>, front: u8, _length: u8) -> bool {
+    fn is_reply(engine: &mut Line<P, S>, front: u8, _length: u8) -> bool {
         if engine.request.is_read() {
             engine.storage.byte(front + 2) == engine.request.reads()
         } else {
@@ -54,7 +55,7 @@ impl<P, S: Words> RequestSpec<P, S> for MasterRequest {
     }
 
     #[cfg_attr(target_os = "none", inline(never))]
-    fn is_echo(engine: &mut Engine<P, S, Self>, front: u8) -> bool {
+    fn is_echo(engine: &mut Line<P, S>, front: u8) -> bool {
         let mut index = engine.request.head_length();
         while index > 0 {
             let byte = engine.storage.byte(front + index);
@@ -69,7 +70,7 @@ impl<P, S: Words> RequestSpec<P, S> for MasterRequest {
 
 /// Writes the frame of the request.
 #[cfg_attr(target_os = "none", inline(never))]
-fn write<P, S: Words>(engine: &mut Engine<P, S, MasterRequest>) {
+fn write<P, S: Words>(engine: &mut Line<P, S>) {
     engine.storage.set_byte(0, engine.unit);
     let mut end = 0;
     while end < engine.request.head_length() {
@@ -93,12 +94,12 @@ fn write<P, S: Words>(engine: &mut Engine<P, S, MasterRequest>) {
 
 /// Clears the bits of the last byte of data, which is at `index`, that the request does not use.
 #[inline(always)]
-fn clear_unused_bits<P, S: Words>(engine: &mut Engine<P, S, MasterRequest>, index: u8) {
+fn clear_unused_bits<P, S: Words>(engine: &mut Line<P, S>, index: u8) {
     let byte = engine.storage.byte(index) & engine.request.mask();
     engine.storage.set_byte(index, byte);
 }
 
-impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
+impl<P: Port, S: Words> Line<P, S> {
     /// [`Status::OK`] if a request may be made, otherwise the reason.
     #[inline(always)]
     pub fn ready(&self) -> Status {

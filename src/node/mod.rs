@@ -2,11 +2,13 @@
 //! library ModbusMaster. It has the device's unit, the result of its last request, and the
 //! positions in the words to send and in the received words. The line sends its requests.
 
+mod transaction;
+
 use crate::engine::{Engine, Words, BROADCAST};
 use crate::error::Status;
 use crate::pdu::bits;
 use crate::pdu::function_spec::FunctionSpec;
-use crate::pdu::master_request::{MasterRequest, MasterSpec};
+use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
 
 /// The value returned for a word that does not exist.
@@ -105,8 +107,8 @@ impl Node {
         self.status = status;
     }
 
-    /// Starts the request of the function `spec`, with an address and a quantity or value
-    /// `word`. If it returns an error, nothing is sent. The address of a write becomes the
+    /// Starts the request of a function, given as [`FunctionSpec::short`], with an address and a
+    /// quantity or value `word`. If it returns an error, nothing is sent. The address of a write becomes the
     /// write address.
     ///
     /// This and the other functions that make a request require a line that is ready: see
@@ -117,23 +119,23 @@ impl Node {
         line: &mut Line<P, S>,
         address: u16,
         word: u16,
-        spec: MasterSpec,
+        function: u8,
     ) -> Status {
-        let built = self.build(line, address, word, spec);
+        let built = self.build(line, address, word, function);
         self.start(line, built)
     }
 
-    /// Builds the request of the function `spec`. [`Node::start`] starts it.
+    /// Builds the request of a function, given as [`FunctionSpec::short`]. [`Node::start`] starts it.
     #[cfg_attr(target_os = "none", inline(never))]
     fn build<P: Port, S: Words>(
         &mut self,
         line: &mut Line<P, S>,
         address: u16,
         word: u16,
-        spec: MasterSpec,
+        function: u8,
     ) -> Status {
         let request = line.request();
-        let built = request.set(spec, address, word);
+        let built = request.set(function, address, word);
         if !request.is_read() {
             self.write_address = address;
         }
@@ -175,8 +177,8 @@ impl Node {
         on: u16,
     ) -> Status {
         let value = if on == 0 { 0 } else { bits::ON };
-        let spec = MasterSpec::new(FunctionSpec::WRITE_SINGLE_COIL);
-        self.request(line, address, value, spec)
+        let function = FunctionSpec::WRITE_SINGLE_COIL.short();
+        self.request(line, address, value, function)
     }
 
     /// 06: writes one register. The value also becomes transmit word 0.
@@ -186,8 +188,8 @@ impl Node {
         address: u16,
         value: u16,
     ) -> Status {
-        let spec = MasterSpec::new(FunctionSpec::WRITE_SINGLE_REGISTER);
-        let built = self.build(line, address, value, spec);
+        let function = FunctionSpec::WRITE_SINGLE_REGISTER.short();
+        let built = self.build(line, address, value, function);
         if built == Status::OK {
             set_word(line.storage.transmit(), 0, value);
         }
@@ -196,15 +198,15 @@ impl Node {
 
     /// 0F: writes the queued bits to the last write address.
     pub fn write_queued_coils<P: Port, S: Words>(&mut self, line: &mut Line<P, S>) -> Status {
-        let spec = MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_COILS);
-        self.request(line, self.write_address, self.transmit_bits, spec)
+        let function = FunctionSpec::WRITE_MULTIPLE_COILS.short();
+        self.request(line, self.write_address, self.transmit_bits, function)
     }
 
     /// 10: writes the queued words to the last write address. A word begun by
     /// [`Node::send_bit`] and not complete is not written.
     pub fn write_queued_registers<P: Port, S: Words>(&mut self, line: &mut Line<P, S>) -> Status {
-        let spec = MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_REGISTERS);
-        self.request(line, self.write_address, self.transmit_bits >> 4, spec)
+        let function = FunctionSpec::WRITE_MULTIPLE_REGISTERS.short();
+        self.request(line, self.write_address, self.transmit_bits >> 4, function)
     }
 
     /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
@@ -216,8 +218,8 @@ impl Node {
         and_mask: u16,
         or_mask: u16,
     ) -> Status {
-        let spec = MasterSpec::new(FunctionSpec::MASK_WRITE_REGISTER);
-        let built = self.build(line, address, and_mask, spec);
+        let function = FunctionSpec::MASK_WRITE_REGISTER.short();
+        let built = self.build(line, address, and_mask, function);
         if built == Status::OK {
             set_word(line.storage.transmit(), 0, and_mask);
             set_word(line.storage.transmit(), 1, or_mask);
@@ -234,8 +236,8 @@ impl Node {
         read: (u16, u16),
         write: (u16, u16),
     ) -> Status {
-        let spec = MasterSpec::new(FunctionSpec::READ_WRITE_REGISTERS);
-        let mut built = self.build(line, read.0, read.1, spec);
+        let function = FunctionSpec::READ_WRITE_REGISTERS.short();
+        let mut built = self.build(line, read.0, read.1, function);
         self.write_address = write.0;
         // A fault of the write is reported before one of the read.
         match line.request().append_write(write.0, write.1) {
