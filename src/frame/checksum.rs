@@ -46,8 +46,8 @@ const fn shifted(crc: u16) -> u16 {
 }
 
 /// The CRC after `bytes`, by tables: 16 bytes in one step, then 4, then 1. The bytes of one step
-/// do not depend on each other, so the processor handles them in parallel. CONTRIBUTING.md
-/// explains why this is not the table of the `crc` crate.
+/// do not depend on each other, so the processor handles them in parallel.
+/// docs/dependencies.md explains why this is not the table of the `crc` crate.
 fn by_table(crc: u16, bytes: &[u8]) -> u16 {
     let [last, third, second, first] = &TABLES;
     let [single, ..] = last;
