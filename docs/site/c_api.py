@@ -7,16 +7,16 @@ from entries import block, code, constants, declared, explained, heading, protot
 HEADER = "include/mbm.h"
 # The page with the guide to a section; a section without one is explained by its comments alone.
 GUIDES = {
-    "Version": "CHANGELOG.md", "Statuses": "docs/status-codes.md", "Port": "docs/guide-mcu.md#the-port",
+    "Version": "CHANGELOG.md", "Statuses": "docs/status-codes.md", "Port": "docs/port.md",
     "Functions and framings": "docs/packets.md", "Master": "docs/master.md", "Client": "docs/client.md",
-    "Plan": "docs/plan.md", "Link": "docs/client.md#a-link-that-opens-itself-again", "Server": "docs/server.md",
+    "Plan": "docs/plan.md", "Link": "docs/link.md", "Server": "docs/server.md",
     "Units": "docs/server.md", "Gateway": "docs/gateway.md", "Values": "docs/values.md",
     "Packets": "docs/packets.md", "Sniffer": "docs/sniffer.md", "Trace": "docs/trace.md",
-    "Ring": "docs/guide-mcu.md#a-uart-without-a-fifo",
+    "Ring": "docs/port.md#a-uart-without-a-fifo",
 }
 PORT_GUIDES = {
-    "mbm_tty": "docs/guide-linux.md", "mbm_tcp": "docs/guide-linux.md", "mbm_call": "docs/guide-linux.md",
-    "mbm_udp": "docs/guide-linux.md#over-udp", "mbm_tls": "docs/security.md", "mbm_tls_linux": "docs/security.md",
+    "mbm_tty": "docs/ports-linux.md", "mbm_tcp": "docs/ports-linux.md", "mbm_call": "docs/ports-linux.md",
+    "mbm_udp": "docs/ports-linux.md#over-udp", "mbm_tls": "docs/security.md", "mbm_tls_linux": "docs/security.md",
 }
 
 
@@ -133,7 +133,7 @@ def index(header, made):
     text += table("sections", ["section", "about", "functions"], rows)
     text += f"## Rules of every function\n\n{rules}\n## Ports for Linux\n\n"
     text += ("Sources beside the archive: compile the ones that you need with your program."
-             " [guide-linux.md](/docs/guide-linux.md) says how.\n\n")
+             " [guide-linux.md](/docs/guide-linux.md) shows how.\n\n")
     text += table("sections", ["header", "about"], [[f'<a href="@@{s.path}">{s.title}</a>', s.about] for s in of_linux])
     text += "## Every function\n\n"
     names = sorted((m.name, m.comment.first) for s in of_header for m in s.functions)

@@ -6,7 +6,7 @@ from entries import block, code, constants, declared, explained, heading, protot
 
 # The headers that a sketch includes, in the order of the navigation.
 SKETCHES = ["ModbusMaster", "ModbusClient", "ModbusServer", "ModbusTcpServer", "ModbusTcpGateway", "ModbusSniffer"]
-GUIDE = "docs/guide-arduino.md"
+GUIDE = "docs/arduino-classes.md"
 
 
 class Class:
@@ -151,7 +151,7 @@ def loose_page(compounds):
 
 def index(made, compounds):
     text = ("# C++ API\n\nClasses for sketches, header-only, C++11, without a heap. Each stands on the C functions of"
-            f" `mbm.h`. [guide-arduino.md](/{GUIDE}) has complete sketches.\n\n")
+            f" `mbm.h`. [arduino-classes.md](/{GUIDE}) has complete sketches.\n\n")
     for title, wanted in [("Classes that a sketch declares", True), ("Classes that these stand on", False)]:
         rows = [[word(each.name), f"<code>{each.header}</code>", each.compound.comment.first] for each in made
                 if each.is_for_sketches == wanted]

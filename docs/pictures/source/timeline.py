@@ -1,4 +1,4 @@
-"""The time line of a transaction on RS-485: for docs/guide-mcu.md and docs/master.md."""
+"""The time line of a transaction on RS-485: for docs/port.md and docs/master.md."""
 
 from drawing import MARGIN, WIDTH, Drawing
 
