@@ -94,7 +94,7 @@
 //! use mbm::client::{Client, ClientRequest, Serial, RequestState};
 //! use mbm::engine::Frame;
 //! use mbm::error::Status;
-//! use mbm::pdu::function_spec::FunctionSpec;
+//! use mbm::pdu::functions::FunctionSpec;
 //!
 //! struct Read {
 //!     state: RequestState,

@@ -4,7 +4,7 @@
 use crate::engine::{Settings, Words};
 use crate::error::Status;
 use crate::node::{set_word, word, Line, Node};
-use crate::pdu::function_spec::FunctionSpec;
+use crate::pdu::functions::FunctionSpec;
 use crate::port::Port;
 
 /// A line with one node, its port and its buffers.

@@ -5,7 +5,7 @@ mod wire;
 
 use mbm::client::{Backoff, Client, Policy, Serial, Tcp, Transport, UnitRecord};
 use mbm::error::Status;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use wire::{End, Lent, Task};
 
 fn read(unit: u8) -> Task {

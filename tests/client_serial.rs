@@ -11,7 +11,7 @@ use mbm::engine::{Frame, Setting};
 use mbm::error::Status;
 use mbm::frame::{ascii, rtu};
 use mbm::pdu::custom::Rule;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use wire::{End, Lent, Task};
 

@@ -7,7 +7,7 @@ mod wire;
 
 use mbm::client::{Backoff, Client, Serial, Tcp, Transport};
 use mbm::error::Status;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use wire::{End, Lent, Task};
 
 type TcpIp = Client<Tcp<End, Lent>, Task, 16>;

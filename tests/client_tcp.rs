@@ -7,7 +7,7 @@ mod stream;
 use mbm::engine::{Counter, Frame};
 use mbm::error::Status;
 use mbm::frame::tcp;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use proptest::prelude::*;
 use stream::{client, poll, read, requests, response, wire::Task};

@@ -3,7 +3,7 @@
 use crate::ours::UNIT;
 use crate::Work;
 use mbm::error::Status;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use rmodbus::client::ModbusRequest;
 use rmodbus::server::context::ModbusContext;

@@ -4,8 +4,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use mbm::error::Status;
+use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::functions::REPORT_SERVER_ID;
-use mbm::pdu::function_spec::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use mbm::pdu::identification::{IdentificationReply, INDIVIDUAL};
 use mbm::pdu::identification_stream::{Next, ObjectStream};

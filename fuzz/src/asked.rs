@@ -1,7 +1,7 @@
 //! A request of the master: as mbm builds it, as the standard describes it, and its responses.
 
 use crate::{be, naive, Input};
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::master_request::MasterRequest;
 
 /// A request and its PDU.

@@ -10,7 +10,7 @@ use mbm::client::{Client, Serial};
 use mbm::engine::Setting;
 use mbm::error::Status;
 use mbm::frame::rtu;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use std::collections::VecDeque;
 use wire::{End, Lent, Task};

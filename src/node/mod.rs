@@ -6,8 +6,8 @@ mod transaction;
 
 use crate::engine::{Engine, Words, BROADCAST};
 use crate::error::Status;
-use crate::pdu::bits;
-use crate::pdu::function_spec::FunctionSpec;
+use crate::pdu::functions;
+use crate::pdu::functions::FunctionSpec;
 use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
 
@@ -176,7 +176,7 @@ impl Node {
         address: u16,
         on: u16,
     ) -> Status {
-        let value = if on == 0 { 0 } else { bits::ON };
+        let value = if on == 0 { 0 } else { functions::COIL_ON };
         let function = FunctionSpec::WRITE_SINGLE_COIL.short();
         self.request(line, address, value, function)
     }

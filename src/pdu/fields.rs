@@ -1,7 +1,8 @@
-//! Functions that the parsers of all families share. An error is the exception that a server
-//! answers to such a request; [`super::response`] converts it to the error of a response.
+//! Functions that read and write parts of requests and responses. An error is the exception that a
+//! server answers to such a request; [`super::response`] converts it to the error of a response.
 
-use crate::bytes::Reader;
+use super::functions::{self, COIL_ON};
+use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 
 /// Reads a byte; an error if the PDU has ended.
@@ -63,4 +64,52 @@ pub(super) fn check_within(count: usize, limits: (usize, usize)) -> Result<(), S
     } else {
         Err(Status::ILLEGAL_DATA_VALUE)
     }
+}
+
+/// True if the value of a single coil is on, false if it is off.
+pub(super) fn is_on(value: u16) -> Result<bool, Status> {
+    match value {
+        COIL_ON => Ok(true),
+        0 => Ok(false),
+        _ => Err(Status::ILLEGAL_DATA_VALUE),
+    }
+}
+
+/// Bytes of the data of so many bits.
+pub(super) const fn byte_count(quantity: u16) -> u8 {
+    quantity.div_ceil(8) as u8
+}
+
+/// Writes a request or response of 05.
+pub(super) fn emit_write_single_coil(writer: &mut Writer, address: u16, on: bool) {
+    writer.u8(functions::WRITE_SINGLE_COIL);
+    writer.u16(address);
+    writer.u16(if on { COIL_ON } else { 0 });
+}
+
+/// Writes a request or response of 16 (hex).
+pub(super) fn emit_mask_write_register(
+    writer: &mut Writer,
+    address: u16,
+    and_mask: u16,
+    or_mask: u16,
+) {
+    writer.u8(functions::MASK_WRITE_REGISTER);
+    writer.u16(address);
+    writer.u16(and_mask);
+    writer.u16(or_mask);
+}
+
+/// Writes a request or response of 08.
+pub(super) fn emit_diagnostics(writer: &mut Writer, sub_function: u16, data: &[u8]) {
+    writer.u8(functions::DIAGNOSTICS);
+    writer.u16(sub_function);
+    writer.put(data);
+}
+
+/// Writes a request or response of any MEI type.
+pub(super) fn emit_encapsulated(writer: &mut Writer, mei_type: u8, data: &[u8]) {
+    writer.u8(functions::ENCAPSULATED_INTERFACE_TRANSPORT);
+    writer.u8(mei_type);
+    writer.put(data);
 }

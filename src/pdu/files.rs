@@ -1,51 +1,184 @@
-//! File records and FIFO queues: functions 14, 15 and 18.
+//! File records in the PDUs of functions 14 and 15.
 
-use super::fields::{counted, expect_end, word};
-use super::functions;
-use super::limits::MAX_FIFO;
-use super::message::{Request, Response};
-pub use super::records::{Reads, Record, Records, Writes, REFERENCE_TYPE};
-use crate::bytes::{Reader, Writer};
+use super::fields::{byte, check_within, counted, word};
+use super::limits::{FILE_DATA_BYTES, MAX_RECORD, READ_FILE_BYTES, WRITE_FILE_BYTES};
+use crate::bytes::Reader;
 use crate::error::Status;
 
-pub(super) fn parse_read<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
-    let bytes = counted(reader)?;
-    expect_end(reader)?;
-    Ok(Request::ReadFileRecord(Reads::new(bytes)?))
+/// The only reference type that the standard defines.
+pub const REFERENCE_TYPE: u8 = 6;
+
+/// The records of a file that a sub-request reads or writes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Record {
+    /// File number, from 1 on.
+    pub file: u16,
+    /// Number of the first record, 0 to 9999.
+    pub record: u16,
+    /// Number of records. A record is one register.
+    pub length: u16,
 }
 
-pub(super) fn parse_write<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
-    let bytes = counted(reader)?;
-    expect_end(reader)?;
-    Ok(Request::WriteFileRecord(Writes::new(bytes)?))
-}
+/// The sub-requests of 14.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Reads<'a>(pub(super) &'a [u8]);
 
-pub(super) fn parse_fifo<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
-    let address = word(reader)?;
-    Ok(Request::ReadFifoQueue { address })
-}
+/// The sub-requests of 15, and of its response.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Writes<'a>(pub(super) &'a [u8]);
 
-pub(super) fn parse_read_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
-    Ok(Response::ReadFileRecord(Records::new(counted(reader)?)?))
-}
+/// The sub-responses of 14.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Records<'a>(pub(super) &'a [u8]);
 
-pub(super) fn parse_write_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
-    Ok(Response::WriteFileRecord(Writes::new(counted(reader)?)?))
-}
-
-pub(super) fn parse_fifo_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
-    let (bytes, count) = (word(reader)?, word(reader)?);
-    let data = reader.rest();
-    let agree = count <= MAX_FIFO && bytes == 2 + 2 * count && data.len() == 2 * usize::from(count);
-    if !agree {
+/// Reads the head of the next sub-request. Also returns whether such records can exist; this
+/// is not an error yet, because a server checks all counts before it (figures 24 and 25).
+fn next_record(reader: &mut Reader) -> Result<(Record, bool), Status> {
+    let reference = byte(reader)?;
+    let record = Record {
+        file: word(reader)?,
+        record: word(reader)?,
+        length: word(reader)?,
+    };
+    if record.length == 0 {
         return Err(Status::ILLEGAL_DATA_VALUE);
     }
-    Ok(Response::FifoQueue { data })
+    let last = record.record.checked_add(record.length - 1);
+    let exists = reference == REFERENCE_TYPE
+        && record.file != 0
+        && last.is_some_and(|last| last <= MAX_RECORD);
+    Ok((record, exists))
 }
 
-pub(super) fn emit_fifo_response(writer: &mut Writer, data: &[u8]) {
-    writer.u8(functions::READ_FIFO_QUEUE);
-    writer.u16((data.len() as u16).wrapping_add(2));
-    writer.u16(data.len() as u16 / 2);
-    writer.put(data);
+/// An error unless the records of all sub-requests can exist.
+fn check_exist(exist: bool) -> Result<(), Status> {
+    if exist {
+        Ok(())
+    } else {
+        Err(Status::ILLEGAL_DATA_ADDRESS)
+    }
+}
+
+impl<'a> Reads<'a> {
+    /// The sub-requests in `bytes`.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_VALUE`] for wrong counts, or for more records than one response
+    /// can hold; [`Status::ILLEGAL_DATA_ADDRESS`] for a reference type, file number or record
+    /// number that the standard does not allow.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
+        check_within(bytes.len(), READ_FILE_BYTES)?;
+        let mut reader = Reader::new(bytes);
+        let mut space = FILE_DATA_BYTES.1;
+        let mut exist = true;
+        while !reader.is_empty() {
+            let (record, exists) = next_record(&mut reader)?;
+            let answer = sub_response_length(record.length);
+            space = space
+                .checked_sub(answer)
+                .ok_or(Status::ILLEGAL_DATA_VALUE)?;
+            exist &= exists;
+        }
+        check_exist(exist)?;
+        Ok(Reads(bytes))
+    }
+
+    /// The sub-requests as bytes on the wire.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.0
+    }
+
+    /// The records of each sub-request.
+    pub fn iter(&self) -> impl Iterator<Item = Record> + 'a {
+        let mut reader = Reader::new(self.0);
+        core::iter::from_fn(move || Some(next_record(&mut reader).ok()?.0))
+    }
+
+    /// Length of the response PDU in bytes.
+    pub fn response_length(&self) -> usize {
+        let answers = self.iter().map(|record| sub_response_length(record.length));
+        2 + answers.sum::<usize>()
+    }
+}
+
+/// Length in bytes of a sub-response with `records` records.
+fn sub_response_length(records: u16) -> usize {
+    usize::from(records).saturating_mul(2).saturating_add(2)
+}
+
+/// Reads the next sub-request of 15: its head, its data, and whether such records can exist.
+fn next_write<'a>(reader: &mut Reader<'a>) -> Result<(Record, &'a [u8], bool), Status> {
+    let (record, exists) = next_record(reader)?;
+    let data = reader.take(usize::from(record.length).saturating_mul(2));
+    Ok((record, data.ok_or(Status::ILLEGAL_DATA_VALUE)?, exists))
+}
+
+impl<'a> Writes<'a> {
+    /// The sub-requests in `bytes`.
+    ///
+    /// # Errors
+    /// As [`Reads::new`].
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
+        check_within(bytes.len(), WRITE_FILE_BYTES)?;
+        let mut reader = Reader::new(bytes);
+        let mut exist = true;
+        while !reader.is_empty() {
+            exist &= next_write(&mut reader)?.2;
+        }
+        check_exist(exist)?;
+        Ok(Writes(bytes))
+    }
+
+    /// The sub-requests as bytes on the wire.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.0
+    }
+
+    /// The records of each sub-request, and their data with the high byte first.
+    pub fn iter(&self) -> impl Iterator<Item = (Record, &'a [u8])> + 'a {
+        let mut reader = Reader::new(self.0);
+        core::iter::from_fn(move || {
+            let (record, data, _) = next_write(&mut reader).ok()?;
+            Some((record, data))
+        })
+    }
+}
+
+/// Reads the data of the next sub-response of 14.
+fn next_data<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Status> {
+    let group = counted(reader)?;
+    match group.split_first() {
+        Some((&REFERENCE_TYPE, data)) if !data.is_empty() && data.len().is_multiple_of(2) => {
+            Ok(data)
+        }
+        _ => Err(Status::ILLEGAL_DATA_VALUE),
+    }
+}
+
+impl<'a> Records<'a> {
+    /// The sub-responses in `bytes`.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_VALUE`] for wrong counts.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
+        // The sub-response of one record has four bytes, although the least byte count in
+        // the standard's table is seven.
+        check_within(bytes.len(), (4, FILE_DATA_BYTES.1))?;
+        let mut reader = Reader::new(bytes);
+        while !reader.is_empty() {
+            next_data(&mut reader)?;
+        }
+        Ok(Records(bytes))
+    }
+
+    /// The sub-responses as bytes on the wire.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.0
+    }
+
+    /// The data of each sub-response, with the high byte first.
+    pub fn iter(&self) -> impl Iterator<Item = &'a [u8]> + 'a {
+        let mut reader = Reader::new(self.0);
+        core::iter::from_fn(move || next_data(&mut reader).ok())
+    }
 }

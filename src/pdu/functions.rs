@@ -20,7 +20,7 @@ pub enum Direction {
 
 macro_rules! functions {
     ($($(#[$clause:meta])* $constant:ident = $code:literal, $name:literal,
-        $request:expr, $response:expr, $direction:ident;)*) => {
+        $request:expr, $response:expr, $direction:ident, $spec:ident;)*) => {
         $($(#[$clause])* pub const $constant: u8 = $code;)*
 
         /// The codes of all functions.
@@ -57,6 +57,17 @@ macro_rules! functions {
             }
         }
 
+        impl FunctionSpec {
+            /// How the request of a function is composed that has at most two words and one kind of
+            /// data; otherwise [`FunctionSpec::NONE`].
+            pub const fn of(function: u8) -> FunctionSpec {
+                match function {
+                    $($constant => FunctionSpec::$spec,)*
+                    _ => FunctionSpec::NONE,
+                }
+            }
+        }
+
         /// What a function does. [`Direction::Either`] for an unknown one.
         pub const fn direction(function: u8) -> Direction {
             match function {
@@ -71,59 +82,284 @@ macro_rules! functions {
 functions! {
     /// Read Coils (clause 6.1).
     READ_COILS = 0x01, "read coils",
-        Some(Fixed(5)), Some(Counted(1, 0)), Reads;
+        Some(Fixed(5)), Some(Counted(1, 0)), Reads,
+        READ_COILS;
     /// Read Discrete Inputs (clause 6.2).
     READ_DISCRETE_INPUTS = 0x02, "read discrete inputs",
-        Some(Fixed(5)), Some(Counted(1, 0)), Reads;
+        Some(Fixed(5)), Some(Counted(1, 0)), Reads,
+        READ_DISCRETE_INPUTS;
     /// Read Holding Registers (clause 6.3).
     READ_HOLDING_REGISTERS = 0x03, "read holding registers",
-        Some(Fixed(5)), Some(Counted(1, 0)), Reads;
+        Some(Fixed(5)), Some(Counted(1, 0)), Reads,
+        READ_HOLDING_REGISTERS;
     /// Read Input Registers (clause 6.4).
     READ_INPUT_REGISTERS = 0x04, "read input registers",
-        Some(Fixed(5)), Some(Counted(1, 0)), Reads;
+        Some(Fixed(5)), Some(Counted(1, 0)), Reads,
+        READ_INPUT_REGISTERS;
     /// Write Single Coil (clause 6.5).
     WRITE_SINGLE_COIL = 0x05, "write single coil",
-        Some(Fixed(5)), Some(Fixed(5)), Writes;
+        Some(Fixed(5)), Some(Fixed(5)), Writes,
+        WRITE_SINGLE_COIL;
     /// Write Single Register (clause 6.6).
     WRITE_SINGLE_REGISTER = 0x06, "write single register",
-        Some(Fixed(5)), Some(Fixed(5)), Writes;
+        Some(Fixed(5)), Some(Fixed(5)), Writes,
+        WRITE_SINGLE_REGISTER;
     /// Read Exception Status (clause 6.7).
     READ_EXCEPTION_STATUS = 0x07, "read exception status",
-        Some(Fixed(1)), Some(Fixed(2)), Reads;
+        Some(Fixed(1)), Some(Fixed(2)), Reads,
+        READ_EXCEPTION_STATUS;
     /// Diagnostics (clause 6.8).
     DIAGNOSTICS = 0x08, "diagnostics",
-        None, None, Either;
+        None, None, Either,
+        NONE;
     /// Get Comm Event Counter (clause 6.9).
     GET_COMM_EVENT_COUNTER = 0x0B, "get comm event counter",
-        Some(Fixed(1)), Some(Fixed(5)), Reads;
+        Some(Fixed(1)), Some(Fixed(5)), Reads,
+        GET_COMM_EVENT_COUNTER;
     /// Get Comm Event Log (clause 6.10).
     GET_COMM_EVENT_LOG = 0x0C, "get comm event log",
-        Some(Fixed(1)), Some(Counted(1, 0)), Reads;
+        Some(Fixed(1)), Some(Counted(1, 0)), Reads,
+        GET_COMM_EVENT_LOG;
     /// Write Multiple Coils (clause 6.11).
     WRITE_MULTIPLE_COILS = 0x0F, "write multiple coils",
-        Some(Counted(5, 0)), Some(Fixed(5)), Writes;
+        Some(Counted(5, 0)), Some(Fixed(5)), Writes,
+        WRITE_MULTIPLE_COILS;
     /// Write Multiple Registers (clause 6.12).
     WRITE_MULTIPLE_REGISTERS = 0x10, "write multiple registers",
-        Some(Counted(5, 0)), Some(Fixed(5)), Writes;
+        Some(Counted(5, 0)), Some(Fixed(5)), Writes,
+        WRITE_MULTIPLE_REGISTERS;
     /// Report Server ID (clause 6.13). The response may be longer than its byte count says.
     REPORT_SERVER_ID = 0x11, "report server id",
-        Some(Fixed(1)), Some(Counted(1, 0)), Reads;
+        Some(Fixed(1)), Some(Counted(1, 0)), Reads,
+        REPORT_SERVER_ID;
     /// Read File Record (clause 6.14).
     READ_FILE_RECORD = 0x14, "read file record",
-        Some(Counted(1, 0)), Some(Counted(1, 0)), Reads;
+        Some(Counted(1, 0)), Some(Counted(1, 0)), Reads,
+        NONE;
     /// Write File Record (clause 6.15).
     WRITE_FILE_RECORD = 0x15, "write file record",
-        Some(Counted(1, 0)), Some(Counted(1, 0)), Writes;
+        Some(Counted(1, 0)), Some(Counted(1, 0)), Writes,
+        NONE;
     /// Mask Write Register (clause 6.16).
     MASK_WRITE_REGISTER = 0x16, "mask write register",
-        Some(Fixed(7)), Some(Fixed(7)), Writes;
+        Some(Fixed(7)), Some(Fixed(7)), Writes,
+        NONE;
     /// Read/Write Multiple Registers (clause 6.17).
     READ_WRITE_MULTIPLE_REGISTERS = 0x17, "read/write multiple registers",
-        Some(Counted(9, 0)), Some(Counted(1, 0)), Either;
+        Some(Counted(9, 0)), Some(Counted(1, 0)), Either,
+        NONE;
     /// Read FIFO Queue (clause 6.18).
     READ_FIFO_QUEUE = 0x18, "read FIFO queue",
-        Some(Fixed(3)), None, Reads;
+        Some(Fixed(3)), None, Reads,
+        READ_FIFO_QUEUE;
     /// Encapsulated Interface Transport (clause 6.19).
     ENCAPSULATED_INTERFACE_TRANSPORT = 0x2B, "encapsulated interface transport",
-        None, None, Either;
+        None, None, Either,
+        NONE;
+}
+
+/// The value that switches a single coil on in a request of 05; 0 switches it off (clause 6.5).
+pub const COIL_ON: u16 = 0xFF00;
+
+/// How the request and the response of a function are composed: flags and small numbers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(transparent)]
+pub struct FunctionSpec(pub(super) u32);
+
+/// A byte count stands between the head and the data.
+pub(super) const COUNTED: u32 = 1 << 8;
+/// The data to send are words.
+pub(super) const SENDS_WORDS: u32 = 1 << 9;
+/// The data received are words.
+pub(super) const TAKES_WORDS: u32 = 1 << 10;
+/// The response repeats the whole request.
+pub(super) const REPEATS_DATA: u32 = 1 << 11;
+/// The request may be broadcast.
+pub(super) const BROADCAST: u32 = 1 << 12;
+/// The data of the response are groups of file records.
+pub(super) const GROUPS: u32 = 1 << 13;
+/// Units do not respond.
+pub(super) const UNANSWERED: u32 = 1 << 14;
+/// The second word is a quantity.
+pub(super) const RANGE: u32 = 1 << 15;
+/// The quantity counts bits, not registers.
+pub(super) const BITS: u32 = 1 << 16;
+
+/// Two bits say how the length of the response is known. `FIXED`: the request determines it.
+pub const FIXED: u32 = 0;
+/// The request determines it, and the second byte of the response counts the data.
+pub(super) const READ: u32 = 1 << 17;
+/// The byte at an index counts the bytes after it.
+pub const COUNTS: u32 = 2 << 17;
+/// The function has a rule of its own, or only the end of the frame ends the response.
+pub const OWN: u32 = 3 << 17;
+/// The mask of these two bits.
+pub(super) const KIND: u32 = 3 << 17;
+
+/// The lowest of three bits: the length of the head.
+pub(super) const HEAD_LENGTH: u32 = 19;
+/// The lowest of three bits: the length of the response, or the index of the byte that counts.
+pub(super) const LENGTH: u32 = 22;
+/// The lowest of three bits: the number of bytes of the request that the response repeats.
+pub(super) const REPEATED: u32 = 25;
+/// The lowest of three bits: the index of the data in the response; 0 if it has none.
+pub(super) const DATA: u32 = 28;
+
+impl FunctionSpec {
+    pub(super) const fn new(
+        function: u8,
+        flags: u32,
+        head: u32,
+        length: u32,
+        repeated: u32,
+        data: u32,
+    ) -> FunctionSpec {
+        let broadcast = match direction(function) {
+            Direction::Writes => BROADCAST,
+            _ => 0,
+        };
+        FunctionSpec(
+            function as u32
+                | flags
+                | broadcast
+                | head << HEAD_LENGTH
+                | length << LENGTH
+                | repeated << REPEATED
+                | data << DATA,
+        )
+    }
+
+    /// 01, 02.
+    pub(super) const fn bits(function: u8) -> FunctionSpec {
+        FunctionSpec::new(function, RANGE | BITS | READ, 5, 0, 0, 2)
+    }
+
+    /// 03, 04.
+    pub(super) const fn registers(function: u8) -> FunctionSpec {
+        FunctionSpec::new(function, RANGE | READ | TAKES_WORDS, 5, 0, 0, 2)
+    }
+
+    /// 01 to 04: the functions that read a table.
+    pub const fn reads_table(function: u8) -> FunctionSpec {
+        let FunctionSpec(spec) = if function <= 2 {
+            FunctionSpec::bits(0)
+        } else {
+            FunctionSpec::registers(0)
+        };
+        FunctionSpec(spec | function as u32)
+    }
+
+    /// A request of five bytes that the response repeats.
+    pub(super) const fn echoed(function: u8, flags: u32) -> FunctionSpec {
+        FunctionSpec::new(function, flags, 5, 5, 5, 0)
+    }
+
+    /// A request that is a function code alone. The table says how long its response is.
+    pub(super) const fn bare(function: u8, flags: u32, data: u32) -> FunctionSpec {
+        let (kind, length) = match response(function) {
+            Some(Rule::Fixed(length)) => (FIXED, length),
+            Some(Rule::Counted(offset, _)) => (COUNTS, offset),
+            _ => (OWN, 0),
+        };
+        FunctionSpec::new(function, flags | kind, 1, length as u32, 0, data)
+    }
+
+    pub(super) const fn has(self, flag: u32) -> bool {
+        self.0 & flag != 0
+    }
+
+    /// The function code.
+    pub(super) const fn function(self) -> u8 {
+        self.0 as u8
+    }
+
+    pub(super) const fn number(self, at: u32) -> u8 {
+        (self.0 >> at) as u8 & 7
+    }
+
+    /// How many bytes of the request the response repeats; 0 for none, and for a response that
+    /// repeats all.
+    pub const fn repeated(self) -> u8 {
+        self.number(REPEATED)
+    }
+
+    /// No request.
+    pub(super) const NONE: FunctionSpec = FunctionSpec(0);
+
+    /// 01: address and quantity.
+    pub const READ_COILS: FunctionSpec = FunctionSpec::bits(READ_COILS);
+    /// 02: address and quantity.
+    pub const READ_DISCRETE_INPUTS: FunctionSpec = FunctionSpec::bits(READ_DISCRETE_INPUTS);
+    /// 03: address and quantity.
+    pub const READ_HOLDING_REGISTERS: FunctionSpec =
+        FunctionSpec::registers(READ_HOLDING_REGISTERS);
+    /// 04: address and quantity.
+    pub const READ_INPUT_REGISTERS: FunctionSpec = FunctionSpec::registers(READ_INPUT_REGISTERS);
+    /// 05: address, and FF00 or 0.
+    pub const WRITE_SINGLE_COIL: FunctionSpec = FunctionSpec::echoed(WRITE_SINGLE_COIL, 0);
+    /// 06: address and value.
+    pub const WRITE_SINGLE_REGISTER: FunctionSpec = FunctionSpec::echoed(WRITE_SINGLE_REGISTER, 0);
+    /// 07.
+    pub const READ_EXCEPTION_STATUS: FunctionSpec = FunctionSpec::bare(READ_EXCEPTION_STATUS, 0, 1);
+    /// 0B: two words are received.
+    pub const GET_COMM_EVENT_COUNTER: FunctionSpec =
+        FunctionSpec::bare(GET_COMM_EVENT_COUNTER, TAKES_WORDS, 1);
+    /// 0C: status, event count and message count are received as words with the high byte
+    /// first, then the events.
+    pub const GET_COMM_EVENT_LOG: FunctionSpec = FunctionSpec::bare(GET_COMM_EVENT_LOG, 0, 2);
+    /// 0F: address and quantity.
+    pub const WRITE_MULTIPLE_COILS: FunctionSpec =
+        FunctionSpec::echoed(WRITE_MULTIPLE_COILS, RANGE | BITS | COUNTED);
+    /// 10: address and quantity.
+    pub const WRITE_MULTIPLE_REGISTERS: FunctionSpec =
+        FunctionSpec::echoed(WRITE_MULTIPLE_REGISTERS, RANGE | COUNTED | SENDS_WORDS);
+    /// 11. Its response may be longer than its byte count says.
+    pub const REPORT_SERVER_ID: FunctionSpec = FunctionSpec::new(REPORT_SERVER_ID, OWN, 1, 0, 0, 2);
+    /// 16: address and AND mask; the OR mask is added later.
+    pub const MASK_WRITE_REGISTER: FunctionSpec =
+        FunctionSpec::new(MASK_WRITE_REGISTER, 0, 7, 7, 7, 0);
+    /// 18: address.
+    pub const READ_FIFO_QUEUE: FunctionSpec =
+        FunctionSpec::new(READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
+
+    /// 17: address and quantity to read; the range to write is added later.
+    pub const READ_WRITE_REGISTERS: FunctionSpec = FunctionSpec(
+        FunctionSpec::registers(READ_WRITE_MULTIPLE_REGISTERS).0 | COUNTED | SENDS_WORDS,
+    );
+
+    /// 08: a sub-function; the data are added later.
+    pub const DIAGNOSTICS: FunctionSpec =
+        FunctionSpec::new(DIAGNOSTICS, FIXED | SENDS_WORDS | TAKES_WORDS, 3, 0, 3, 3);
+    /// 14: one group is added later.
+    pub const READ_FILE_RECORD: FunctionSpec =
+        FunctionSpec::new(READ_FILE_RECORD, READ | GROUPS | TAKES_WORDS, 0, 0, 0, 4);
+    /// 15: one group is added later.
+    pub const WRITE_FILE_RECORD: FunctionSpec = FunctionSpec::new(
+        WRITE_FILE_RECORD,
+        FIXED | SENDS_WORDS | REPEATS_DATA,
+        0,
+        0,
+        0,
+        0,
+    );
+    /// 14: the caller supplies the groups.
+    pub const READ_FILE_RECORDS: FunctionSpec =
+        FunctionSpec::new(READ_FILE_RECORD, COUNTS | GROUPS | COUNTED, 1, 1, 0, 2);
+    /// 15: the caller supplies the groups.
+    pub const WRITE_FILE_RECORDS: FunctionSpec = FunctionSpec::new(
+        WRITE_FILE_RECORD,
+        FIXED | COUNTED | REPEATS_DATA,
+        1,
+        0,
+        1,
+        0,
+    );
+    /// 2B: the MEI type; the data are added later.
+    pub const ENCAPSULATED: FunctionSpec =
+        FunctionSpec::new(ENCAPSULATED_INTERFACE_TRANSPORT, OWN, 2, 0, 2, 2);
+    /// 2B/0E: MEI type, read device id code and object id. Its data begin after the code.
+    pub const READ_DEVICE_IDENTIFICATION: FunctionSpec =
+        FunctionSpec::new(ENCAPSULATED_INTERFACE_TRANSPORT, OWN, 4, 0, 3, 3);
+    /// A user-defined function; its code and its length rule are added later.
+    pub const CUSTOM: FunctionSpec = FunctionSpec::new(0, 0, 1, 0, 0, 1);
 }

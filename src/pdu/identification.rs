@@ -1,11 +1,8 @@
 //! Encapsulated interface transport, and device identification, which it contains: function
 //! 2B.
 
-use super::fields::byte;
-use super::functions;
-use super::message::{Request, Response};
-pub use super::objects::ObjectList;
-use crate::bytes::{Reader, Writer};
+use super::fields::{byte, counted};
+use crate::bytes::Reader;
 use crate::error::Status;
 
 /// CANopen General Reference (clause 6.20).
@@ -23,31 +20,7 @@ pub const EXTENDED: u8 = 3;
 pub const INDIVIDUAL: u8 = 4;
 
 /// The value of the field "more follows" in a response if more objects follow; else it is 0.
-const MORE: u8 = 0xFF;
-
-pub(super) fn parse<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
-    let mei_type = byte(reader)?;
-    if mei_type != MEI_READ_DEVICE_IDENTIFICATION {
-        let data = reader.rest();
-        return Ok(Request::EncapsulatedInterface { mei_type, data });
-    }
-    let (code, object) = (byte(reader)?, byte(reader)?);
-    if !(BASIC..=INDIVIDUAL).contains(&code) {
-        return Err(Status::ILLEGAL_DATA_VALUE);
-    }
-    Ok(Request::ReadDeviceIdentification { code, object })
-}
-
-pub(super) fn emit_identification(writer: &mut Writer, code: u8, object: u8) {
-    emit(writer, MEI_READ_DEVICE_IDENTIFICATION, &[code, object]);
-}
-
-/// Writes a request or response of any MEI type.
-pub(super) fn emit(writer: &mut Writer, mei_type: u8, data: &[u8]) {
-    writer.u8(functions::ENCAPSULATED_INTERFACE_TRANSPORT);
-    writer.u8(mei_type);
-    writer.put(data);
-}
+pub(super) const MORE: u8 = 0xFF;
 
 /// What a response to Read Device Identification has after its code.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -74,25 +47,12 @@ impl<'a> IdentificationReply<'a> {
     }
 }
 
-pub(super) fn parse_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
-    let mei_type = byte(reader)?;
-    if mei_type != MEI_READ_DEVICE_IDENTIFICATION {
-        let data = reader.rest();
-        return Ok(Response::EncapsulatedInterface { mei_type, data });
-    }
-    let code = byte(reader)?;
-    let reply = read_reply(code, reader)?;
-    Ok(Response::DeviceIdentification {
-        code,
-        conformity: reply.conformity,
-        more_follows: reply.more_follows,
-        next_object: reply.next_object,
-        objects: reply.objects,
-    })
-}
-
+/// Parses what follows the code of a response to Read Device Identification.
 #[inline(always)]
-fn read_reply<'a>(code: u8, reader: &mut Reader<'a>) -> Result<IdentificationReply<'a>, Status> {
+pub(super) fn read_reply<'a>(
+    code: u8,
+    reader: &mut Reader<'a>,
+) -> Result<IdentificationReply<'a>, Status> {
     let conformity = byte(reader)?;
     let (more, next_object, count) = (byte(reader)?, byte(reader)?, byte(reader)?);
     // The conformity level is not checked, nor the next object if none follows: some devices
@@ -113,16 +73,49 @@ fn read_reply<'a>(code: u8, reader: &mut Reader<'a>) -> Result<IdentificationRep
     })
 }
 
-pub(super) fn emit_identification_response(
-    writer: &mut Writer,
-    head: [u8; 2],
-    more_follows: bool,
-    next_object: u8,
-    objects: ObjectList,
-) {
-    let [code, conformity] = head;
-    let more = if more_follows { MORE } else { 0 };
-    let head = [code, conformity, more, next_object, objects.count];
-    emit(writer, MEI_READ_DEVICE_IDENTIFICATION, &head);
-    writer.put(objects.bytes);
+/// The objects of a response, each an id and a value.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ObjectList<'a> {
+    pub(super) count: u8,
+    pub(super) bytes: &'a [u8],
+}
+
+/// Reads the id and the value of the next object.
+fn object<'a>(reader: &mut Reader<'a>) -> Result<(u8, &'a [u8]), Status> {
+    let id = byte(reader)?;
+    Ok((id, counted(reader)?))
+}
+
+impl<'a> ObjectList<'a> {
+    /// The `count` objects in `bytes`.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_VALUE`] unless `bytes` are exactly `count` objects.
+    pub fn new(count: u8, bytes: &'a [u8]) -> Result<Self, Status> {
+        let mut reader = Reader::new(bytes);
+        for _ in 0..count {
+            object(&mut reader)?;
+        }
+        if reader.is_empty() {
+            Ok(ObjectList { count, bytes })
+        } else {
+            Err(Status::ILLEGAL_DATA_VALUE)
+        }
+    }
+
+    /// Number of objects.
+    pub const fn count(&self) -> u8 {
+        self.count
+    }
+
+    /// The objects as bytes on the wire: id, length and value of each.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
+    /// Id and value of each object.
+    pub fn iter(&self) -> impl Iterator<Item = (u8, &'a [u8])> + 'a {
+        let mut reader = Reader::new(self.bytes);
+        core::iter::from_fn(move || object(&mut reader).ok())
+    }
 }

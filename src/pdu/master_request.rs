@@ -1,7 +1,7 @@
 //! A request of the master: its head, and the number of transmit words that follow it.
 
 use super::fields::check_range;
-use super::function_spec::*;
+use super::functions::{FunctionSpec, BITS, RANGE, READ};
 use super::limits::{
     MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,

@@ -1,15 +1,14 @@
 //! Protocol data units (PDUs): a function code and its data, without framing (application
 //! protocol V1.1b3, clause 6).
 //!
-//! Each family of functions has its own file. Each function code has its own small function
-//! that builds the request, so that firmware contains only the ones that it calls.
+//! [`functions`] is the table of the functions. [`request`] and [`response`] take PDUs apart and
+//! write them. [`header`] and [`master_request`] are what a client and a master keep of a request
+//! that they send.
 
-pub mod bits;
 pub mod custom;
 pub mod diagnostics;
 mod fields;
 pub mod files;
-pub mod function_spec;
 pub mod functions;
 pub mod header;
 pub mod identification;
@@ -17,10 +16,6 @@ pub mod identification_stream;
 pub mod length;
 pub mod limits;
 pub mod master_request;
-mod message;
-mod objects;
-mod records;
-pub mod registers;
 pub mod request;
 pub mod response;
 

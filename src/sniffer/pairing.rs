@@ -2,7 +2,7 @@
 
 use crate::packet::PduKind;
 use crate::pdu::custom::Function;
-use crate::pdu::functions;
+use crate::pdu::functions::{self, FunctionSpec};
 use crate::pdu::length::Length;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
@@ -119,13 +119,10 @@ impl OpenRequest {
             return pdu.len() == 2;
         }
         let head = self.asked.head();
-        let repeated = match self.asked.function() {
-            functions::WRITE_SINGLE_COIL
-            | functions::WRITE_SINGLE_REGISTER
-            | functions::WRITE_MULTIPLE_COILS
-            | functions::WRITE_MULTIPLE_REGISTERS => 5,
-            functions::MASK_WRITE_REGISTER => 7,
+        let function = self.asked.function();
+        let repeated = match function {
             functions::WRITE_FILE_RECORD => HEAD,
+            functions::MASK_WRITE_REGISTER => 7,
             functions::DIAGNOSTICS => 3,
             functions::ENCAPSULATED_INTERFACE_TRANSPORT => match head.get(1) {
                 Some(&identification::MEI_READ_DEVICE_IDENTIFICATION) => 3,
@@ -134,7 +131,7 @@ impl OpenRequest {
             // A reply with three bytes of coils is as long as the request. An equal PDU is the
             // request again.
             functions::READ_COILS | functions::READ_DISCRETE_INPUTS if pdu == head => return false,
-            _ => 1,
+            _ => usize::from(FunctionSpec::of(function).repeated()).max(1),
         };
         let repeats = head.iter().zip(pdu).take(repeated).all(|(a, b)| a == b);
         repeats && (self.reply == 0 || usize::from(self.reply) == pdu.len())

@@ -2,7 +2,7 @@
 
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 
 /// The builder of a request, the data to send, the PDU of the request, the PDU of the

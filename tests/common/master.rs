@@ -4,8 +4,8 @@ use mbm::engine::{Buffers, Words};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::master::Master;
-use mbm::pdu::bits;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions;
+use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::master_request::MasterRequest;
 use mbm::port::Port;
 use std::collections::VecDeque;
@@ -98,7 +98,7 @@ impl Call {
             0x05 => query.set(
                 FunctionSpec::WRITE_SINGLE_COIL.short(),
                 a,
-                if b == 0 { 0 } else { bits::ON },
+                if b == 0 { 0 } else { functions::COIL_ON },
             ),
             0x06 => query.set(FunctionSpec::WRITE_SINGLE_REGISTER.short(), a, b),
             0x0F => query.set(FunctionSpec::WRITE_MULTIPLE_COILS.short(), a, b),

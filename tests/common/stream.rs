@@ -6,7 +6,7 @@ pub mod wire;
 
 use mbm::client::{Client, Tcp};
 use mbm::frame::tcp;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use wire::{End, Lent, Task};
 
 pub type TcpIp = Client<Tcp<End, Lent>, Task, 16>;

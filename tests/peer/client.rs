@@ -11,7 +11,7 @@ use mbm::engine::Setting;
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::Rule;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use mbm::port::Port;
 use std::collections::VecDeque;

@@ -2,7 +2,7 @@
 
 use super::{call, mbm_node, request};
 use mbm::error::Status;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 
 /// Function 01: reads coils into the response words, 16 in each word. The first coil is the
 /// lowest bit; the last word is padded with zeros (V1.1b3, 6.1).

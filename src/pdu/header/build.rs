@@ -3,7 +3,10 @@
 use super::super::custom::Rule;
 use super::super::diagnostics::sub_function;
 use super::super::fields::check_range;
-use super::super::function_spec::*;
+use super::super::functions::{
+    FunctionSpec, BITS, BROADCAST, COUNTS, FIXED, HEAD_LENGTH, LENGTH, OWN, RANGE, READ, REPEATED,
+    REPEATS_DATA, UNANSWERED,
+};
 use super::super::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use super::super::limits::{
     FILE_DATA_BYTES, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS,

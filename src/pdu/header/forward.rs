@@ -2,7 +2,7 @@
 //! unchanged.
 
 use super::super::custom::Rule;
-use super::super::function_spec::*;
+use super::super::functions::{FunctionSpec, BITS, DATA, OWN, SENDS_WORDS, TAKES_WORDS};
 use super::super::{functions, identification};
 use super::RequestHeader;
 use crate::error::Status;
@@ -29,24 +29,7 @@ impl RequestHeader {
             None => 0,
         };
         let (first, second) = (word(0), word(1));
-        let spec = match function {
-            functions::READ_COILS => FunctionSpec::READ_COILS,
-            functions::READ_DISCRETE_INPUTS => FunctionSpec::READ_DISCRETE_INPUTS,
-            functions::READ_HOLDING_REGISTERS => FunctionSpec::READ_HOLDING_REGISTERS,
-            functions::READ_INPUT_REGISTERS => FunctionSpec::READ_INPUT_REGISTERS,
-            functions::WRITE_SINGLE_COIL => FunctionSpec::WRITE_SINGLE_COIL,
-            functions::WRITE_SINGLE_REGISTER => FunctionSpec::WRITE_SINGLE_REGISTER,
-            functions::READ_EXCEPTION_STATUS => FunctionSpec::READ_EXCEPTION_STATUS,
-            functions::GET_COMM_EVENT_COUNTER => FunctionSpec::GET_COMM_EVENT_COUNTER,
-            functions::GET_COMM_EVENT_LOG => FunctionSpec::GET_COMM_EVENT_LOG,
-            functions::WRITE_MULTIPLE_COILS => FunctionSpec::WRITE_MULTIPLE_COILS,
-            functions::WRITE_MULTIPLE_REGISTERS => FunctionSpec::WRITE_MULTIPLE_REGISTERS,
-            functions::REPORT_SERVER_ID => FunctionSpec::REPORT_SERVER_ID,
-            functions::READ_FIFO_QUEUE => FunctionSpec::READ_FIFO_QUEUE,
-            _ => FunctionSpec::NONE,
-        };
         let built = match function {
-            _ if spec != FunctionSpec::NONE => self.set(spec, first, second),
             functions::DIAGNOSTICS if first > LAST_SUB_FUNCTION => {
                 self.set(FunctionSpec::DIAGNOSTICS, first, 0);
                 self.spec.0 |= OWN;
@@ -68,7 +51,10 @@ impl RequestHeader {
                 }
                 [mei_type, ..] => self.encapsulated(mei_type, length - 1),
             },
-            _ => self.custom(function, length, Rule::Silence),
+            _ => match FunctionSpec::of(function) {
+                FunctionSpec::NONE => self.custom(function, length, Rule::Silence),
+                spec => self.set(spec, first, second),
+            },
         };
         if built != Status::OK {
             return built;

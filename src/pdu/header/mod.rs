@@ -10,8 +10,11 @@ mod restore;
 
 pub use build::GROUP;
 
-use super::function_spec::*;
 use super::functions::{self, Direction};
+use super::functions::{
+    FunctionSpec, BITS, BROADCAST, COUNTED, COUNTS, DATA, FIXED, GROUPS, KIND, READ, REPEATS_DATA,
+    SENDS_WORDS, TAKES_WORDS, UNANSWERED,
+};
 use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use super::length::Length;
 use super::limits::{MAX_FIFO, MAX_PDU};

@@ -1,8 +1,8 @@
 //! The response to a request, restored from the data that a client stored of it.
 
 use super::super::files;
-use super::super::function_spec::*;
 use super::super::functions::ENCAPSULATED_INTERFACE_TRANSPORT;
+use super::super::functions::REPEATS_DATA;
 use super::super::EXCEPTION;
 use super::RequestHeader;
 use crate::error::Status;

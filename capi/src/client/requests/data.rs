@@ -3,7 +3,7 @@
 use super::{two_words, with_more};
 use crate::client::{mbm_client, mbm_clientRequest};
 use mbm::error::Status;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 
 /// Function 01: reads coils into the bytes of `reply`, eight in each byte. The first coil is
 /// the lowest bit; the last byte is padded with zeros (V1.1b3, 6.1).

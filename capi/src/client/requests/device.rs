@@ -6,7 +6,7 @@ use crate::client::{mbm_client, mbm_clientRequest};
 use crate::functions::{mbm_rule, MBM_RULE_COUNTED, MBM_RULE_FIXED, MBM_RULE_SILENCE};
 use crate::pointers::array_or_empty;
 use mbm::error::Status;
-use mbm::pdu::function_spec::{FunctionSpec, COUNTS, FIXED, OWN};
+use mbm::pdu::functions::{FunctionSpec, COUNTS, FIXED, OWN};
 use mbm::pdu::header::{RequestHeader, GROUP};
 use mbm::pdu::limits::MAX_PDU;
 

@@ -11,7 +11,7 @@ use super::request::{mbm_clientRequest, RequestFields, RequestPtr};
 use crate::pointers;
 use mbm::client::ClientRequest as _;
 use mbm::error::Status;
-use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::functions::FunctionSpec;
 #[cfg(doc)]
 use mbm::pdu::header::RequestHeader;
 
