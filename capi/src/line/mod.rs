@@ -61,6 +61,7 @@ pub(crate) unsafe fn prepare(line: *mut mbm_line) -> Status {
     unsafe {
         match pointers::check_once(line) {
             Status::NOT_INITIALISED => {
+                pointers::zero_on_host(line);
                 mbm_line::mark(line).write(pointers::BEGUN);
                 Status::OK
             }

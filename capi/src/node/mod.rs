@@ -100,6 +100,7 @@ pub unsafe extern "C" fn mbm_node_begin(
             return Status::INVALID_ARGUMENT.code();
         }
         if pointers::check_once(node) != Status::OK {
+            pointers::zero_on_host(node);
             mbm_node::mark(node).write(pointers::BEGUN);
         }
         if (*node.cast::<Object>()).core.is_pending() {

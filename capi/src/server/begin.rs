@@ -4,7 +4,7 @@ use super::buffers::Core;
 use super::units::have_ids;
 use super::{mbm_server, mbm_unit};
 use crate::framing::MBM_MAX_TCP_FRAME;
-use crate::pointers::{check, object, read, with_hooks, CObject, IN_HOOK};
+use crate::pointers::{check, object, read, with_hooks, zero_on_host, CObject, BEGUN, IN_HOOK};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 use mbm::time;
@@ -40,6 +40,9 @@ unsafe fn begin(
         let mark = mbm_server::mark(server).read();
         if mark == IN_HOOK {
             return Status::BUSY;
+        }
+        if mark != BEGUN {
+            zero_on_host(server);
         }
         let core = object(server);
         with_hooks(server, || {
