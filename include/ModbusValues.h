@@ -33,11 +33,6 @@ public:
 
     /** The order of values for calls without an order; orderABCD at first. */
     void setWordOrder(WordOrder order) { view.order = order; }
-    /** The order in effect. */
-    WordOrder getWordOrder() const
-    {
-        return view.order == orderDefault ? orderABCD : static_cast<WordOrder>(view.order);
-    }
     /** How many words there are. */
     uint16_t size() const { return view.count; }
     /** The word `index`, which is below size(). */

@@ -78,7 +78,6 @@
 /* The archive has a double of 32 bits: what calls these must not link. */
 #define mbm_registers_getDouble mbm_registers_getDouble_wants_mdouble_32
 #define mbm_registers_setDouble mbm_registers_setDouble_wants_mdouble_32
-#define mbm_plan_getDouble mbm_plan_getDouble_wants_mdouble_32
 #define mbm_plan_getNumber mbm_plan_getNumber_wants_mdouble_32
 #endif
 
@@ -797,17 +796,17 @@ typedef struct mbm_framing {
  * interrupt. mbm_port says which functions the hooks of the port may call.
  *
  * A call that is refused changes nothing. Exceptions are the functions that make a request,
- * as mbm_node_readCoils describes, and mbm_node_send32.
+ * as mbm_node_readCoils describes.
  */
 typedef struct mbm_node {
     /**
      * Private.
      */
-    void *pointers[7];
+    void *pointers[5];
     /**
      * Private.
      */
-    uint32_t words[3];
+    uint32_t words[4];
 } mbm_node;
 
 /**
@@ -919,55 +918,6 @@ uint8_t mbm_line_setFrame(struct mbm_line *line,
  *         the port except `idle`
  */
 uint8_t mbm_line_cancel(struct mbm_line *line);
-
-/**
- * Returns the silence before a request that is in effect: what mbm_line_setGap set, or t3.5
- * of the rate that mbm_line_setBaudRate set, or 4 ms.
- *
- * @param line  the object
- * @return microseconds; 0 for an object that was never begun
- */
-uint32_t mbm_line_getGap(const struct mbm_line *line);
-
-/**
- * Returns the turnaround delay: see mbm_line_setTurnaroundDelay.
- *
- * @param line  the object
- * @return milliseconds; 0 for an object that was never begun
- */
-uint16_t mbm_line_getTurnaroundDelay(const struct mbm_line *line);
-
-/**
- * Returns the quiet time: see mbm_line_setQuietTime.
- *
- * @param line  the object
- * @return milliseconds; 0 for an object that was never begun
- */
-uint16_t mbm_line_getQuietTime(const struct mbm_line *line);
-
-/**
- * Returns how often a request is repeated: see mbm_line_setRetries.
- *
- * @param line  the object
- * @return 0 to 255; 0 for an object that was never begun
- */
-uint8_t mbm_line_getRetries(const struct mbm_line *line);
-
-/**
- * Returns whether echo discarding is on: see mbm_line_setEchoDiscard.
- *
- * @param line  the object
- * @return 1 or 0; 0 for an object that was never begun
- */
-uint8_t mbm_line_getEchoDiscard(const struct mbm_line *line);
-
-/**
- * Returns how long the driver stays on after the flush: see mbm_line_setPostFlushHold.
- *
- * @param line  the object
- * @return characters; 0 for an object that was never begun
- */
-uint8_t mbm_line_getPostFlushHold(const struct mbm_line *line);
 
 /**
  * Sets the baud rate from which the master computes the gap before a request (t3.5, serial
@@ -1338,18 +1288,6 @@ uint8_t mbm_node_readWriteQueuedRegisters(struct mbm_node *node,
                                           uint16_t readQuantity);
 
 /**
- * Reads holding registers. mbm_node_receive then returns them one after the other.
- *
- * @param node  the object
- * @param address   the first register, 0 to 65535
- * @param quantity  the number of registers, 1 to 125
- * @return the number of words that mbm_node_receive will return; 0 if the request failed
- *         (mbm_node_status returns why), if another request is under way, and in
- *         non-blocking mode
- */
-uint8_t mbm_node_requestFrom(struct mbm_node *node, uint16_t address, uint16_t quantity);
-
-/**
  * Sets the unit to which the master sends later requests.
  *
  * @param node  the object
@@ -1392,30 +1330,6 @@ uint8_t mbm_node_setBlocking(struct mbm_node *node,
                              uint8_t on);
 
 /**
- * Returns the response timeout: see mbm_node_setResponseTimeout.
- *
- * @param node  the object
- * @return milliseconds; 0 for an object that was never begun
- */
-uint32_t mbm_node_getResponseTimeout(const struct mbm_node *node);
-
-/**
- * Returns whether requests block: see mbm_node_setBlocking.
- *
- * @param node  the object
- * @return 1 for blocking, 0 for non-blocking; 0 for an object that was never begun
- */
-uint8_t mbm_node_getBlocking(const struct mbm_node *node);
-
-/**
- * Returns the order of values: see mbm_node_setWordOrder.
- *
- * @param node  the object
- * @return one of MBM_ORDER_...; MBM_ORDER_ABCD for an object that was never begun
- */
-uint8_t mbm_node_getWordOrder(const struct mbm_node *node);
-
-/**
  * Accepts replies of devices that deviate from the standard. It has these effects:
  * - The master accepts a reply with the right unit, function and CRC although it repeats
  *   another address, value or quantity, or carries more or fewer data than were requested.
@@ -1437,51 +1351,6 @@ uint8_t mbm_node_setLenient(struct mbm_node *node,
                             uint8_t on);
 
 /**
- * Returns whether deviating replies are accepted: see mbm_node_setLenient.
- *
- * @param node  the object
- * @return 1 or 0; 0 for an object that was never begun
- */
-uint8_t mbm_node_getLenient(const struct mbm_node *node);
-
-/**
- * Returns a word of the last successful read.
- *
- * @param node  the object
- * @param index   0 to 255
- * @return the word; 0xFFFF if `index` is past the end of the response buffer
- */
-uint16_t mbm_node_getResponseBuffer(const struct mbm_node *node, uint8_t index);
-
-/**
- * Zeroes the response words. The position of mbm_node_receive does not change.
- *
- * @param node  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_node_clearResponseBuffer(struct mbm_node *node);
-
-/**
- * Sets a transmit word for the functions that write. The queue of mbm_node_send does not
- * change.
- *
- * @param node  the object
- * @param index   0 to the number of transmit words - 1
- * @param value   the word
- * @return MBM_OK; MBM_ILLEGAL_DATA_ADDRESS if `index` is past the end of the buffer;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_node_setTransmitBuffer(struct mbm_node *node, uint8_t index, uint16_t value);
-
-/**
- * Zeroes the transmit words. The queue of mbm_node_send does not change its length.
- *
- * @param node  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_node_clearTransmitBuffer(struct mbm_node *node);
-
-/**
  * Queues a word after the words queued before. If the last word holds queued bits, the new
  * word goes into the next one.
  *
@@ -1492,17 +1361,6 @@ uint8_t mbm_node_clearTransmitBuffer(struct mbm_node *node);
  */
 uint8_t mbm_node_send(struct mbm_node *node,
                       uint16_t word);
-
-/**
- * Queues two words, the low one first. If only one word fits, it queues the low one alone.
- *
- * @param node  the object
- * @param value   both words
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL if a word did not fit;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_node_send32(struct mbm_node *node,
-                        uint32_t value);
 
 /**
  * Queues a bit after the bits queued before, starting at the lowest bit of a word.
@@ -1920,71 +1778,6 @@ uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
-
-/**
- * Returns the response timeout: see mbm_client_setResponseTimeout.
- *
- * @param client  the object
- * @return milliseconds; 0 for an object that was never begun
- */
-uint32_t mbm_client_getResponseTimeout(const struct mbm_client *client);
-
-/**
- * Returns the silence before a request on an RTU line that is in effect: what
- * mbm_client_setGap set, or t3.5 of the rate that mbm_client_setBaudRate set, or 4 ms.
- *
- * @param client  the object
- * @return microseconds; 0 for an object that was never begun
- */
-uint32_t mbm_client_getGap(const struct mbm_client *client);
-
-/**
- * Returns the turnaround delay: see mbm_client_setTurnaroundDelay.
- *
- * @param client  the object
- * @return milliseconds; 0 for an object that was never begun
- */
-uint16_t mbm_client_getTurnaroundDelay(const struct mbm_client *client);
-
-/**
- * Returns the quiet time: see mbm_client_setQuietTime.
- *
- * @param client  the object
- * @return milliseconds; 0 for an object that was never begun
- */
-uint16_t mbm_client_getQuietTime(const struct mbm_client *client);
-
-/**
- * Returns how often a request is repeated: see mbm_client_setRetries.
- *
- * @param client  the object
- * @return 0 to 255; 0 for an object that was never begun
- */
-uint8_t mbm_client_getRetries(const struct mbm_client *client);
-
-/**
- * Returns whether echo discarding is on: see mbm_client_setEchoDiscard.
- *
- * @param client  the object
- * @return 1 or 0; 0 for an object that was never begun
- */
-uint8_t mbm_client_getEchoDiscard(const struct mbm_client *client);
-
-/**
- * Returns how long the driver stays on after the flush: see mbm_client_setPostFlushHold.
- *
- * @param client  the object
- * @return characters; 0 for an object that was never begun
- */
-uint8_t mbm_client_getPostFlushHold(const struct mbm_client *client);
-
-/**
- * Returns how many requests may be under way at once: see mbm_client_setInFlight.
- *
- * @param client  the object
- * @return 1 to 16; 1 on a serial line and in RTU over TCP; 0 for an object that was never begun
- */
-uint8_t mbm_client_getInFlight(const struct mbm_client *client);
 
 /**
  * Begins to read the objects of a device.
@@ -2498,33 +2291,6 @@ uint8_t mbm_client_writeFileRecord(struct mbm_client *client,
                                    uint16_t quantity);
 
 /**
- * Function 14 with several groups: reads records of several files, or of several ranges.
- * `data` contains the sub-requests as on the wire, seven bytes each. `reply` receives the
- * sub-responses as on the wire (V1.1b3, 6.14).
- *
- * @param client   the object
- * @param request  the request
- * @param bytes  the number of bytes of `data`, 7 to 245, a multiple of 7
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readFileRecords(struct mbm_client *client,
-                                   struct mbm_clientRequest *request,
-                                   uint16_t bytes);
-
-/**
- * Function 15 with several groups: writes records of several files, or of several ranges.
- * `data` contains the sub-requests as on the wire (V1.1b3, 6.15).
- *
- * @param client   the object
- * @param request  the request
- * @param bytes  the number of bytes of `data`, 9 to 251
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_writeFileRecords(struct mbm_client *client,
-                                    struct mbm_clientRequest *request,
-                                    uint16_t bytes);
-
-/**
  * Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
  * 6.18).
  *
@@ -2552,22 +2318,6 @@ uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
                                             struct mbm_clientRequest *request,
                                             uint8_t code,
                                             uint8_t object);
-
-/**
- * Function 2B with any MEI type: sends the bytes of `data` after the MEI type, and reads the
- * bytes after the MEI type of the response into `reply` (V1.1b3, 6.19). On RTU, silence ends
- * the response.
- *
- * @param client   the object
- * @param request  the request
- * @param meiType  the MEI type, for example MBM_MEI_CANOPEN
- * @param bytes  the number of bytes of `data`, 0 to 251
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_encapsulatedInterfaceTransport(struct mbm_client *client,
-                                                  struct mbm_clientRequest *request,
-                                                  uint8_t meiType,
-                                                  uint16_t bytes);
 
 /**
  * Any function code: sends the bytes of `data` after the function code, and reads the bytes
@@ -3218,22 +2968,6 @@ uint8_t mbm_plan_getFloat(const struct mbm_plan *plan,
                           float *value);
 
 /**
- * A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double, without the scale of its
- * field. On AVR, where C's double has
- * 32 bits, it is mbm_plan_getFloat.
- *
- * @param plan   the object
- * @param field  the index of the field
- * @param index  which of its values, 0 for the first
- * @param value  gets the number
- * @return as mbm_plan_getFloat
- */
-uint8_t mbm_plan_getDouble(const struct mbm_plan *plan,
-                           uint16_t field,
-                           uint16_t index,
-                           double *value);
-
-/**
  * A text, which ends at its first NUL or with its field. In an order with the low byte first,
  * the first of two characters is a register's low byte.
  *
@@ -3672,15 +3406,6 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
 uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
 
 /**
- * Returns the silence that ends a frame: what mbm_server_setSilence set, or t3.5 of the rate
- * that mbm_server_setBaudRate set, or the default of the framing.
- *
- * @param server  the object
- * @return microseconds; 0 in TCP and for an object that was never begun
- */
-uint32_t mbm_server_getSilence(const struct mbm_server *server);
-
-/**
  * Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
  * 2.5.1.1). It does not change the rate of the line. Other framings do not use t3.5: see
  * mbm_server_setSilence.
@@ -3703,14 +3428,6 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
  *         MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
-
-/**
- * Returns whether the server discards its own echo: see mbm_server_setEchoDiscard.
- *
- * @param server  the object
- * @return 1 or 0; 0 for an object that was never begun
- */
-uint8_t mbm_server_getEchoDiscard(const struct mbm_server *server);
 
 /* ==== 10. Units ===================================================================== */
 
@@ -4838,14 +4555,6 @@ uint8_t mbm_gateway_setInFlight(struct mbm_gateway *gateway,
                                 uint16_t most);
 
 /**
- * Returns the number that mbm_gateway_setInFlight has set.
- *
- * @param gateway  the object
- * @return the number; 0 if the gateway was never begun
- */
-uint16_t mbm_gateway_inFlight(const struct mbm_gateway *gateway);
-
-/**
  * Sets for how long a request may wait until its line is free. After that time the gateway
  * answers it with exception 0A and does not send it. Set it to the time that the clients on
  * TCP wait, less the response timeout of the line: then no device carries out a request that
@@ -4858,14 +4567,6 @@ uint16_t mbm_gateway_inFlight(const struct mbm_gateway *gateway);
  */
 uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway,
                                  uint32_t timeMs);
-
-/**
- * Returns the time that mbm_gateway_setQueueTime has set.
- *
- * @param gateway  the object
- * @return milliseconds; 0 also if the gateway was never begun
- */
-uint32_t mbm_gateway_queueTime(const struct mbm_gateway *gateway);
 
 /**
  * Serves units of the gateway itself: those that a route to MBM_GATEWAY_LOCAL leads to. The
@@ -4957,10 +4658,9 @@ uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
  * A view of consecutive registers, with the addresses that the device gives them. The
  * view owns nothing: `data` points to memory of the program.
  *
- * mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in; so do
- * mbm_node_getResponseRegisters and mbm_node_getTransmitRegisters. You may also set
- * each field yourself. The get and set functions do not change the view. Several threads
- * may use one view at the same time as long as none of them writes the registers.
+ * mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in. You may also
+ * set each field yourself. The get and set functions do not change the view. Several
+ * threads may use one view at the same time as long as none of them writes the registers.
  */
 typedef struct mbm_registers {
     /**
@@ -5122,47 +4822,6 @@ uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint8_t on);
 
 /**
- * Sets the byte and word order of values in the views that mbm_node_getResponseRegisters
- * and mbm_node_getTransmitRegisters fill in from now on.
- *
- * @param node  the object
- * @param order   one of MBM_ORDER_...; the default is MBM_ORDER_ABCD
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also for an unknown order; MBM_NOT_INITIALISED
- */
-uint8_t mbm_node_setWordOrder(struct mbm_node *node, uint8_t order);
-
-/**
- * Fills in a view of the response words as registers, from which you can get values. The
- * view copies no words: it also shows those that a later read receives.
- *
- * The view includes all words of the buffer, also words that the last read did not
- * change. Get values only after the read has succeeded.
- *
- * @param node  the object; do not change its buffers while you use the view
- * @param first      the address in the device of word 0: the address of the read, or 0 if
- *                   you want to count from word 0
- * @param registers  the view to fill in; unchanged if the status is not MBM_OK
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_node_getResponseRegisters(const struct mbm_node *node,
-                                      uint16_t first,
-                                      struct mbm_registers *registers);
-
-/**
- * Fills in a view of the transmit words as registers, in which you can set values for the
- * functions that write. The queue of mbm_node_send does not change.
- *
- * @param node  the object; do not change its buffers while you use the view
- * @param first      the address in the device of word 0: the address of the write, or 0 if
- *                   you want to count from word 0
- * @param registers  the view to fill in; unchanged if the status is not MBM_OK
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_node_getTransmitRegisters(const struct mbm_node *node,
-                                      uint16_t first,
-                                      struct mbm_registers *registers);
-
-/**
  * Fills in a view of words that were read as registers. The order is MBM_ORDER_ABCD
  * until you set `registers->order`. Nothing is copied: the view always shows the present
  * words.
@@ -5239,23 +4898,6 @@ uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
                              uint16_t address,
                              uint8_t bit,
                              uint8_t *on);
-
-/**
- * Reads one byte of a register, 0 to 255. For a signed byte, pass a pointer to an
- * int8_t, cast to uint8_t *.
- *
- * @param registers  the registers
- * @param address    the device's address of the register
- * @param high       0 for the low byte, anything else for the high byte, which is
- *                   transmitted first
- * @param value      receives the byte
- * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
- *         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_registers_getUint8(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t high,
-                               uint8_t *value);
 
 /**
  * Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
@@ -5382,25 +5024,6 @@ uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
                                uint16_t length);
 
 /**
- * Compares registers with raw bytes, the high byte of each register first in every
- * order.
- *
- * @param registers  the registers
- * @param address    the device's address of the register whose high byte is compared
- *                   with the first byte
- * @param bytes      the bytes to compare with; NULL only if `length` is 0
- * @param length     how many bytes, two for each register; may be odd
- * @param equal      receives 1 if all bytes are equal, else 0
- * @return MBM_OK; or with `equal` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_registers_isEqual(const struct mbm_registers *registers,
-                              uint16_t address,
-                              const uint8_t *bytes,
-                              uint16_t length,
-                              uint8_t *equal);
-
-/**
  * Writes one bit of a register; the other bits do not change.
  *
  * @param registers  the registers, of a kind that may be written
@@ -5414,22 +5037,6 @@ uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
                              uint16_t address,
                              uint8_t bit,
                              uint8_t on);
-
-/**
- * Writes one byte of a register; the other byte does not change.
- *
- * @param registers  the registers, of a kind that may be written
- * @param address    the device's address of the register
- * @param high       0 for the low byte, anything else for the high byte, which is
- *                   transmitted first
- * @param value      the byte
- * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
- *         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_registers_setUint8(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t high,
-                               uint8_t value);
 
 /**
  * Writes a number into one register. The order of words has no effect; the order of
@@ -6338,14 +5945,6 @@ uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
 uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint32_t timeoutMs);
 
 /**
- * Returns the response timeout: see mbm_sniffer_setResponseTimeout.
- *
- * @param sniffer  the object
- * @return milliseconds; 0 for an object that was never begun
- */
-uint16_t mbm_sniffer_getResponseTimeout(const struct mbm_sniffer *sniffer);
-
-/**
  * Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
  * than the error of your time stamps. At first it is 50 ms in RTU and RTU over TCP,
  * which suits a USB adapter, and 1000 ms in ASCII and TCP.
@@ -6355,14 +5954,6 @@ uint16_t mbm_sniffer_getResponseTimeout(const struct mbm_sniffer *sniffer);
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint32_t timeoutMs);
-
-/**
- * Returns the frame timeout: see mbm_sniffer_setFrameTimeout.
- *
- * @param sniffer  the object
- * @return milliseconds; 0 for an object that was never begun
- */
-uint16_t mbm_sniffer_getFrameTimeout(const struct mbm_sniffer *sniffer);
 
 /**
  * Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.
@@ -6589,14 +6180,6 @@ const struct mbm_port *mbm_trace_innerPort(const struct mbm_trace *trace);
  */
 uint8_t mbm_trace_setFrameTimeout(struct mbm_trace *trace,
                                   uint32_t timeoutMs);
-
-/**
- * Returns the frame timeout: see mbm_trace_setFrameTimeout.
- *
- * @param trace  the object
- * @return milliseconds; 0 for an object that was never begun, and from within its hook
- */
-uint16_t mbm_trace_getFrameTimeout(const struct mbm_trace *trace);
 
 /**
  * Calls the hook for the bytes that wait for the rest of their frame: before the program

@@ -38,16 +38,6 @@ pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most
     }
 }
 
-/// Returns the number that mbm_gateway_setInFlight has set.
-///
-/// @param gateway  the object
-/// @return the number; 0 if the gateway was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_gateway_inFlight(gateway: *const mbm_gateway) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(gateway, 0, |core| (*core).most_requests()) }
-}
-
 /// Sets for how long a request may wait until its line is free. After that time the gateway
 /// answers it with exception 0A and does not send it. Set it to the time that the clients on
 /// TCP wait, less the response timeout of the line: then no device carries out a request that
@@ -69,16 +59,6 @@ pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, tim
             Status::OK
         })
     }
-}
-
-/// Returns the time that mbm_gateway_setQueueTime has set.
-///
-/// @param gateway  the object
-/// @return milliseconds; 0 also if the gateway was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_gateway_queueTime(gateway: *const mbm_gateway) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(gateway, 0, |core| (*core).queue_time() / 1000) }
 }
 
 /// Serves units of the gateway itself: those that a route to MBM_GATEWAY_LOCAL leads to. The

@@ -1,10 +1,8 @@
 //! `mbm_line_*`: a serial line, which any number of nodes use.
 
-mod getters;
 pub(crate) mod object;
 mod settings;
 
-pub use getters::*;
 pub use object::*;
 pub use settings::*;
 

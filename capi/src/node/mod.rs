@@ -3,13 +3,11 @@
 pub(crate) mod object;
 mod requests;
 mod settings;
-mod values;
 mod words;
 
 pub use object::*;
 pub use requests::*;
 pub use settings::*;
-pub use values::*;
 pub use words::*;
 
 use super::line::{self, mbm_line};
@@ -33,8 +31,6 @@ pub(super) struct Object {
     words: NodeWords,
     /// What the line's engine gets: a function if deviating replies are accepted.
     observer: Option<Observer<PortRef, LineStorage, MasterRequest>>,
-    /// The order of words in values: one of `MBM_ORDER_...`; 0 if it was never set.
-    order: u8,
 }
 
 const _: () = {

@@ -1,7 +1,6 @@
 //! The ten functions, and those of them that use the queue of words to send.
 
 use super::{call, mbm_node, request};
-use mbm::error::Status;
 use mbm::pdu::function_spec::FunctionSpec;
 use mbm::pdu::master_request::MasterSpec;
 
@@ -297,28 +296,5 @@ pub unsafe extern "C" fn mbm_node_readWriteQueuedRegisters(
         request(node, |node, line| {
             node.read_write_queued_registers(line, (readAddress, readQuantity))
         })
-    }
-}
-
-/// Reads holding registers. mbm_node_receive then returns them one after the other.
-///
-/// @param node  the object
-/// @param address   the first register, 0 to 65535
-/// @param quantity  the number of registers, 1 to 125
-/// @return the number of words that mbm_node_receive will return; 0 if the request failed
-///         (mbm_node_status returns why), if another request is under way, and in
-///         non-blocking mode
-#[no_mangle]
-pub unsafe extern "C" fn mbm_node_requestFrom(
-    node: *mut mbm_node,
-    address: u16,
-    quantity: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if mbm_node_readHoldingRegisters(node, address, quantity) != Status::OK.code() {
-            return 0;
-        }
-        super::mbm_node_available(node)
     }
 }

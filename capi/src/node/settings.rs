@@ -3,10 +3,9 @@
 use super::mbm_node;
 use crate::line::Core;
 use crate::pointers::{read, with};
-use crate::registers::MBM_ORDER_ABCD;
 use mbm::engine::Setting;
 use mbm::error::Status;
-use mbm::time::{timeout, to_millis};
+use mbm::time::timeout;
 
 /// Sets the unit to which the master sends later requests.
 ///
@@ -73,38 +72,6 @@ pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8
     }
 }
 
-/// Returns the response timeout: see mbm_node_setResponseTimeout.
-///
-/// @param node  the object
-/// @return milliseconds; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_node_getResponseTimeout(node: *const mbm_node) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe { read(node, 0, |node| to_millis(node.words.response_timeout.get())) }
-}
-
-/// Returns whether requests block: see mbm_node_setBlocking.
-///
-/// @param node  the object
-/// @return 1 for blocking, 0 for non-blocking; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_node_getBlocking(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { read(node, 0, |node| (!node.non_blocking).into()) }
-}
-
-/// Returns the order of values: see mbm_node_setWordOrder.
-///
-/// @param node  the object
-/// @return one of MBM_ORDER_...; MBM_ORDER_ABCD for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_node_getWordOrder(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    let order = unsafe { read(node, 0, |node| node.order) };
-    // 0 in a master whose order was never set.
-    order.max(MBM_ORDER_ABCD)
-}
-
 /// Accepts replies of devices that deviate from the standard. It has these effects:
 /// - The master accepts a reply with the right unit, function and CRC although it repeats
 ///   another address, value or quantity, or carries more or fewer data than were requested.
@@ -133,14 +100,4 @@ pub unsafe extern "C" fn mbm_node_setLenient(node: *mut mbm_node, on: u8) -> u8 
             Status::OK
         })
     }
-}
-
-/// Returns whether deviating replies are accepted: see mbm_node_setLenient.
-///
-/// @param node  the object
-/// @return 1 or 0; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_node_getLenient(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { read(node, 0, |node| node.observer.is_some().into()) }
 }

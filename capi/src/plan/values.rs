@@ -263,34 +263,6 @@ pub unsafe extern "C" fn mbm_plan_getFloat(
     unsafe { get(plan, field, index, value.cast(), |words| words.float()) }
 }
 
-/// A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double, without the scale of its
-/// field. On AVR, where C's double has
-/// 32 bits, it is mbm_plan_getFloat.
-///
-/// @param plan   the object
-/// @param field  the index of the field
-/// @param index  which of its values, 0 for the first
-/// @param value  gets the number
-/// @return as mbm_plan_getFloat
-#[no_mangle]
-pub unsafe extern "C" fn mbm_plan_getDouble(
-    plan: *const mbm_plan,
-    field: u16,
-    index: u16,
-    value: *mut f64,
-) -> u8 {
-    // SAFETY: as the header demands; a double is its bits.
-    #[cfg(not(target_arch = "avr"))]
-    unsafe {
-        get(plan, field, index, value.cast(), |words| words.double())
-    }
-    // SAFETY: as the header demands; C's double is a float here.
-    #[cfg(target_arch = "avr")]
-    unsafe {
-        mbm_plan_getFloat(plan, field, index, value.cast())
-    }
-}
-
 /// A text, which ends at its first NUL or with its field. In an order with the low byte first,
 /// the first of two characters is a register's low byte.
 ///

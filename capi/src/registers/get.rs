@@ -1,7 +1,7 @@
 //! Reads values from registers. A call that fails leaves the caller's value unchanged.
 
 use super::{code, machine_order_mask, mbm_registers, view, BorrowedRegisters, MBM_ORDER_DEFAULT};
-use crate::pointers::{self, slice, slice_mut};
+use crate::pointers::{self, slice_mut};
 use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
 use mbm::data::value::{ShortDouble, Value};
@@ -68,31 +68,6 @@ pub unsafe extern "C" fn mbm_registers_getBit(
     unsafe {
         get_value(registers, on, |registers| {
             registers.bit(address, bit).map(u8::from)
-        })
-    }
-}
-
-/// Reads one byte of a register, 0 to 255. For a signed byte, pass a pointer to an
-/// int8_t, cast to uint8_t *.
-///
-/// @param registers  the registers
-/// @param address    the device's address of the register
-/// @param high       0 for the low byte, anything else for the high byte, which is
-///                   transmitted first
-/// @param value      receives the byte
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
-///         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getUint8(
-    registers: *const mbm_registers,
-    address: u16,
-    high: u8,
-    value: *mut u8,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        get_value(registers, value, |registers| {
-            registers.u8(address, high != 0)
         })
     }
 }
@@ -278,32 +253,4 @@ pub unsafe extern "C" fn mbm_registers_getBytes(
             registers.bytes_in(registers.order, address, bytes)
         })
     })
-}
-
-/// Compares registers with raw bytes, the high byte of each register first in every
-/// order.
-///
-/// @param registers  the registers
-/// @param address    the device's address of the register whose high byte is compared
-///                   with the first byte
-/// @param bytes      the bytes to compare with; NULL only if `length` is 0
-/// @param length     how many bytes, two for each register; may be odd
-/// @param equal      receives 1 if all bytes are equal, else 0
-/// @return MBM_OK; or with `equal` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_isEqual(
-    registers: *const mbm_registers,
-    address: u16,
-    bytes: *const u8,
-    length: u16,
-    equal: *mut u8,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        get_value(registers, equal, |registers| {
-            let bytes = slice(bytes, length.into())?;
-            registers.is_equal(address, bytes).map(u8::from)
-        })
-    }
 }

@@ -40,10 +40,9 @@ pub const MBM_REGISTERS_INTO_BYTES: u8 = 4;
 /// A view of consecutive registers, with the addresses that the device gives them. The
 /// view owns nothing: `data` points to memory of the program.
 ///
-/// mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in; so do
-/// mbm_node_getResponseRegisters and mbm_node_getTransmitRegisters. You may also set
-/// each field yourself. The get and set functions do not change the view. Several threads
-/// may use one view at the same time as long as none of them writes the registers.
+/// mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in. You may also
+/// set each field yourself. The get and set functions do not change the view. Several
+/// threads may use one view at the same time as long as none of them writes the registers.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_registers {

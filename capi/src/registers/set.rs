@@ -69,30 +69,6 @@ pub unsafe extern "C" fn mbm_registers_setBit(
     }
 }
 
-/// Writes one byte of a register; the other byte does not change.
-///
-/// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of the register
-/// @param high       0 for the low byte, anything else for the high byte, which is
-///                   transmitted first
-/// @param value      the byte
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
-///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setUint8(
-    registers: *const mbm_registers,
-    address: u16,
-    high: u8,
-    value: u8,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(registers, MBM_ORDER_DEFAULT, |registers| {
-            registers.set_u8(address, high != 0, value)
-        })
-    }
-}
-
 /// Writes a number into one register. The order of words has no effect; the order of
 /// bytes has.
 ///

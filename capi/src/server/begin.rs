@@ -4,7 +4,7 @@ use super::buffers::Core;
 use super::units::have_ids;
 use super::{mbm_server, mbm_unit};
 use crate::framing::MBM_MAX_TCP_FRAME;
-use crate::pointers::{check, object, read, with_hooks, CObject, BEGUN, IN_HOOK};
+use crate::pointers::{check, object, with_hooks, CObject, BEGUN, IN_HOOK};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 use mbm::time;
@@ -206,17 +206,6 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceU
     }
 }
 
-/// Returns the silence that ends a frame: what mbm_server_setSilence set, or t3.5 of the rate
-/// that mbm_server_setBaudRate set, or the default of the framing.
-///
-/// @param server  the object
-/// @return microseconds; 0 in TCP and for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_server_getSilence(server: *const mbm_server) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe { read(server, 0, |core| (*core).silence) }
-}
-
 /// Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
 /// 2.5.1.1). It does not change the rate of the line. Other framings do not use t3.5: see
 /// mbm_server_setSilence.
@@ -258,14 +247,4 @@ pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: 
             refused => refused.code(),
         }
     }
-}
-
-/// Returns whether the server discards its own echo: see mbm_server_setEchoDiscard.
-///
-/// @param server  the object
-/// @return 1 or 0; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_server_getEchoDiscard(server: *const mbm_server) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { read(server, 0, |core| (*core).discards_echo().into()) }
 }

@@ -12,7 +12,7 @@ use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::{Function, Rule};
 use mbm::sniffer::{BusDirection, Sniffer, MIN_BUFFER};
-use mbm::time::{millis, to_millis};
+use mbm::time::millis;
 
 /// The bytes come from a line that carries both directions.
 pub const MBM_DIRECTION_BOTH: u8 = 0;
@@ -288,16 +288,6 @@ pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
     unsafe { with(sniffer, |core| core.set_timeout(timeout)) }
 }
 
-/// Returns the response timeout: see mbm_sniffer_setResponseTimeout.
-///
-/// @param sniffer  the object
-/// @return milliseconds; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_sniffer_getResponseTimeout(sniffer: *const mbm_sniffer) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(sniffer, 0, |object| to_millis(object.core.timeout()) as u16) }
-}
-
 /// Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
 /// than the error of your time stamps. At first it is 50 ms in RTU and RTU over TCP,
 /// which suits a USB adapter, and 1000 ms in ASCII and TCP.
@@ -316,20 +306,6 @@ pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
     };
     // SAFETY: as the header demands.
     unsafe { with(sniffer, |core| core.set_frame_timeout(timeout)) }
-}
-
-/// Returns the frame timeout: see mbm_sniffer_setFrameTimeout.
-///
-/// @param sniffer  the object
-/// @return milliseconds; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_sniffer_getFrameTimeout(sniffer: *const mbm_sniffer) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::read(sniffer, 0, |object| {
-            to_millis(object.core.frame_timeout()) as u16
-        })
-    }
 }
 
 /// Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.

@@ -8,8 +8,7 @@ use crate::framing::{is_delimiter, mbm_framing};
 use crate::functions::declared;
 use crate::node::mbm_node;
 use crate::pointers::{
-    array_or_empty, check, get, object, read as read_object, with, with_hooks, CObject, BEGUN,
-    IN_HOOK,
+    array_or_empty, check, get, object, with, with_hooks, CObject, BEGUN, IN_HOOK,
 };
 use crate::port::{countable, mbm_port, PortRef};
 use core::ffi::c_void;
@@ -413,16 +412,6 @@ pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeou
             Status::OK
         })
     }
-}
-
-/// Returns the frame timeout: see mbm_trace_setFrameTimeout.
-///
-/// @param trace  the object
-/// @return milliseconds; 0 for an object that was never begun, and from within its hook
-#[no_mangle]
-pub unsafe extern "C" fn mbm_trace_getFrameTimeout(trace: *const mbm_trace) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe { read_object(trace, 0, |core| ((*core).frame_timeout() / 1000) as u16) }
 }
 
 /// Calls the hook for the bytes that wait for the rest of their frame: before the program

@@ -163,57 +163,6 @@ pub unsafe extern "C" fn mbm_client_writeFileRecord(
     }
 }
 
-/// Function 14 with several groups: reads records of several files, or of several ranges.
-/// `data` contains the sub-requests as on the wire, seven bytes each. `reply` receives the
-/// sub-responses as on the wire (V1.1b3, 6.14).
-///
-/// @param client   the object
-/// @param request  the request
-/// @param bytes  the number of bytes of `data`, 7 to 245, a multiple of 7
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readFileRecords(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    bytes: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::READ_FILE_RECORDS,
-            [bytes.into(), 0, 0, 0],
-            Some(|fields, words, _| fields.state.header.read_file_records(words[0] as u16)),
-        )
-    }
-}
-
-/// Function 15 with several groups: writes records of several files, or of several ranges.
-/// `data` contains the sub-requests as on the wire (V1.1b3, 6.15).
-///
-/// @param client   the object
-/// @param request  the request
-/// @param bytes  the number of bytes of `data`, 9 to 251
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_writeFileRecords(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    bytes: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::WRITE_FILE_RECORDS,
-            [bytes.into(), 0, 0, 0],
-            Some(|fields, words, _| fields.state.header.write_file_records(words[0] as u16)),
-        )
-    }
-}
-
 /// Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
 /// 6.18).
 ///
@@ -256,34 +205,6 @@ pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
             FunctionSpec::READ_DEVICE_IDENTIFICATION,
             [first.into(), second.into(), code.into(), 0],
             Some(|_, words, _| RequestHeader::check_code(words[2] as u8)),
-        )
-    }
-}
-
-/// Function 2B with any MEI type: sends the bytes of `data` after the MEI type, and reads the
-/// bytes after the MEI type of the response into `reply` (V1.1b3, 6.19). On RTU, silence ends
-/// the response.
-///
-/// @param client   the object
-/// @param request  the request
-/// @param meiType  the MEI type, for example MBM_MEI_CANOPEN
-/// @param bytes  the number of bytes of `data`, 0 to 251
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    meiType: u8,
-    bytes: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::ENCAPSULATED,
-            [usize::from(meiType) << 8, bytes.into(), 0, 0],
-            Some(|fields, words, _| fields.state.header.follow(words[1] as u16)),
         )
     }
 }
