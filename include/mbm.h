@@ -5,9 +5,14 @@
  * Licence: MIT OR Apache-2.0. Generated from the source of mbm; do not edit.
  *
  * Rules of every function:
- * - A pointer is NULL or valid. For NULL a function returns MBM_INVALID_ARGUMENT, for an
- *   object that was never begun MBM_NOT_INITIALISED. It never crashes. Data that
- *   a function only reads may be NULL if their length is 0.
+ * - A function that succeeds returns MBM_OK, unless its comment says otherwise. Every function
+ *   returns MBM_INVALID_ARGUMENT for NULL, a number out of the range in its comment, an
+ *   incomplete port, a buffer that is too short and an object of another framing;
+ *   MBM_NOT_INITIALISED for an object that was never begun; MBM_BUSY if a hook calls it on the
+ *   object that calls the hook (see mbm_port). A comment names only the statuses besides these.
+ * - A call that is refused changes nothing, unless the comment says otherwise.
+ * - A pointer is NULL or valid. For NULL a function never crashes. Data that a function only
+ *   reads may be NULL if their length is 0.
  * - Objects are your storage. Initialise each object and each struct with MBM_INIT where you
  *   declare it. The library uses no heap and no global variables.
  * - No function is re-entrant on one object. Call no function from an interrupt unless its
@@ -93,19 +98,11 @@ struct mbm_registers;
 
 /* ==== 1. Version ==================================================================== */
 
-/**
- * Version of this header: a new major version may break programs.
- */
+/** Version of this header: a new major version may break programs. */
 #define MBM_VERSION_MAJOR 0
-
-/**
- * Version of this header: before 1.0 a new minor version may break programs.
- */
+/** Version of this header: before 1.0 a new minor version may break programs. */
 #define MBM_VERSION_MINOR 2
-
-/**
- * Version of this header: a new patch version breaks nothing.
- */
+/** Version of this header: a new patch version breaks nothing. */
 #define MBM_VERSION_PATCH 0
 
 /**
@@ -120,184 +117,86 @@ const char *mbm_version(void);
 
 /* ==== 2. Statuses =================================================================== */
 
-/**
- * The call succeeded.
- */
+/** The call succeeded. */
 #define MBM_OK 0u
-
-/**
- * Exception of the device: it does not support the function.
- */
+/** Exception of the device: it does not support the function. */
 #define MBM_ILLEGAL_FUNCTION 1u
-
-/**
- * Exception of the device: it has no such address. This library also returns it, and sends
- * nothing, for a range that passes address 65535.
- */
+/** Exception of the device: it has no such address. This library also returns it, and sends
+ *  nothing, for a range that passes address 65535. */
 #define MBM_ILLEGAL_DATA_ADDRESS 2u
-
-/**
- * Exception of the device: it refuses the quantity or value. This library also returns it,
- * and sends nothing, for a quantity that the standard forbids, and for a write of more than
- * the transmit buffer holds.
- */
+/** Exception of the device: it refuses the quantity or value. This library also returns it,
+ *  and sends nothing, for a quantity that the standard forbids, and for a write of more than
+ *  the transmit buffer holds. */
 #define MBM_ILLEGAL_DATA_VALUE 3u
-
-/**
- * Exception of the device: it failed while it executed the request.
- */
+/** Exception of the device: it failed while it executed the request. */
 #define MBM_SLAVE_DEVICE_FAILURE 4u
-
-/**
- * Exception of the device: it accepted the request and needs a long time for it.
- */
+/** Exception of the device: it accepted the request and needs a long time for it. */
 #define MBM_ACKNOWLEDGE 5u
-
-/**
- * Exception of the device: it is busy. Send the request again later.
- */
+/** Exception of the device: it is busy. Send the request again later. */
 #define MBM_SLAVE_DEVICE_BUSY 6u
-
-/**
- * Exception of the device: the memory of a file failed its consistency check.
- */
+/** Exception of the device: the memory of a file failed its consistency check. */
 #define MBM_MEMORY_PARITY_ERROR 8u
-
-/**
- * Exception of a gateway: it has no path to the device.
- */
+/** Exception of a gateway: it has no path to the device. */
 #define MBM_GATEWAY_PATH_UNAVAILABLE 10u
-
-/**
- * Exception of a gateway: it received no response from the device.
- */
+/** Exception of a gateway: it received no response from the device. */
 #define MBM_GATEWAY_TARGET_FAILED_TO_RESPOND 11u
-
-/**
- * Only frames of other units arrived within the response timeout.
- */
+/** Only frames of other units arrived within the response timeout. */
 #define MBM_INVALID_SLAVE_ID 224u
-
-/**
- * The unit sent a reply to another function, and no other reply arrived within the
- * response timeout.
- */
+/** The unit sent a reply to another function, and no other reply arrived within the
+ *  response timeout. */
 #define MBM_INVALID_FUNCTION 225u
-
-/**
- * No complete reply arrived within the response timeout.
- */
+/** No complete reply arrived within the response timeout. */
 #define MBM_RESPONSE_TIMED_OUT 226u
-
-/**
- * The CRC of the reply, or in ASCII its LRC, is wrong.
- */
+/** The CRC of the reply, or in ASCII its LRC, is wrong. */
 #define MBM_INVALID_CRC 227u
-
-/**
- * The function cannot accept an argument: NULL, a number out of range, a port without
- * read, write or micros, a buffer that is too short, or an object of another framing or
- * kind. The comment of the function says which. The call changed nothing.
- */
+/** The function cannot accept an argument: NULL, a number out of range, a port without
+ *  read, write or micros, a buffer that is too short, or an object of another framing or
+ *  kind. The comment of the function says which. The call changed nothing. */
 #define MBM_INVALID_ARGUMENT 228u
-
-/**
- * The unit sent a reply of this function with a right CRC, but the reply does not match the
- * request: a wrong byte count, a wrong echo, or an exception code of 0 or from 0x80.
- */
+/** The unit sent a reply of this function with a right CRC, but the reply does not match the
+ *  request: a wrong byte count, a wrong echo, or an exception code of 0 or from 0x80. */
 #define MBM_MALFORMED_REPLY 229u
-
-/**
- * The port's read or write reported that the link is lost.
- */
+/** The port's read or write reported that the link is lost. */
 #define MBM_LINK_LOST 230u
-
-/**
- * The object is in use: it has a request under way, or the call came from a hook that the
- * object called, or the object is a record that serves in another way. The call changed
- * nothing.
- */
+/** The object is in use: it has a request under way, or the call came from a hook that the
+ *  object called, or the object is a record that serves in another way. The call changed
+ *  nothing. */
 #define MBM_BUSY 231u
-
-/**
- * A request that reads cannot be broadcast. Nothing was sent.
- */
+/** A request that reads cannot be broadcast. Nothing was sent. */
 #define MBM_BROADCAST_NOT_ALLOWED 232u
-
-/**
- * One of these: the frame buffer cannot hold the request, and nothing was sent; the frame
- * buffer or the response buffer cannot hold the reply, and the response words are
- * unchanged; a unit cannot take another record.
- */
+/** One of these: the frame buffer cannot hold the request, and nothing was sent; the frame
+ *  buffer or the response buffer cannot hold the reply, and the response words are
+ *  unchanged; a unit cannot take another record. */
 #define MBM_BUFFER_TOO_SMALL 233u
-
-/**
- * The object was never begun, or has no buffers.
- */
+/** The object was never begun, or has no buffers. */
 #define MBM_NOT_INITIALISED 234u
-
-/**
- * The request is under way: call mbm_node_poll again.
- */
+/** The request is under way: call mbm_node_poll again. */
 #define MBM_PENDING 235u
-
-/**
- * The line was not silent, or the port accepted no bytes, for as long as the response
- * timeout.
- */
+/** The line was not silent, or the port accepted no bytes, for as long as the response
+ *  timeout. */
 #define MBM_LINE_BUSY 236u
-
-/**
- * A cancel function or a begin function gave the request up.
- */
+/** A cancel function or a begin function gave the request up. */
 #define MBM_CANCELLED 237u
-
-/**
- * The frame is not complete: more bytes must follow.
- */
+/** The frame is not complete: more bytes must follow. */
 #define MBM_INCOMPLETE_FRAME 238u
-
-/**
- * No frame of this framing starts with these bytes, or has this length.
- */
+/** No frame of this framing starts with these bytes, or has this length. */
 #define MBM_MALFORMED_FRAME 239u
-
-/**
- * The client has 16 requests already. Nothing was queued.
- */
+/** The client has 16 requests already. Nothing was queued. */
 #define MBM_QUEUE_FULL 240u
-
-/**
- * Another pending request of the client has this transaction number. Nothing was queued.
- */
+/** Another pending request of the client has this transaction number. Nothing was queued. */
 #define MBM_DUPLICATE_TRANSACTION 241u
-
-/**
- * The request has ended already, or was never queued on this client.
- */
+/** The request has ended already, or was never queued on this client. */
 #define MBM_NOT_PENDING 242u
-
-/**
- * Two fields of a plan share an address of one unit and table.
- */
+/** Two fields of a plan share an address of one unit and table. */
 #define MBM_FIELDS_OVERLAP 243u
-
-/**
- * The device says that more objects of its identification follow, but it sends none, names
- * an object that is not after those that it has sent, or then sends one before the one that
- * it named. Reading on might never end.
- */
+/** The device says that more objects of its identification follow, but it sends none, names
+ *  an object that is not after those that it has sent, or then sends one before the one that
+ *  it named. Reading on might never end. */
 #define MBM_NO_PROGRESS 244u
-
-/**
- * A value is out of the range of the type in which the program reads it.
- */
+/** A value is out of the range of the type in which the program reads it. */
 #define MBM_OUT_OF_RANGE 246u
-
-/**
- * The connection was not made in time. Of a link: within its connect timeout. Of a request on
- * Modbus TCP without a link: the port accepted no byte within the response timeout.
- */
+/** The connection was not made in time. Of a link: within its connect timeout. Of a request on
+ *  Modbus TCP without a link: the port accepted no byte within the response timeout. */
 #define MBM_CONNECT_TIMED_OUT 247u
 
 /**
@@ -323,12 +222,11 @@ const char *mbm_status_text(uint8_t status);
  * sketch calls modbusStatusText with both numbers.
  *
  * @param status         the status of the request
- * @param exceptionCode  `exception` of the mbm_clientRequest, or what
- *                       mbm_node_getExceptionCode returns: 0 if the device sent no exception
+ * @param exceptionCode  `exception` of the mbm_clientRequest, or what mbm_node_getExceptionCode
+ *                       returns: 0 if the device sent no exception
  * @return a constant string, never NULL
  */
-const char *mbm_status_textOf(uint8_t status,
-                              uint8_t exceptionCode);
+const char *mbm_status_textOf(uint8_t status, uint8_t exceptionCode);
 
 /* ==== 3. Port ======================================================================= */
 
@@ -347,46 +245,30 @@ const char *mbm_status_textOf(uint8_t status,
  * it may call every function, but one that starts a request returns MBM_BUSY.
  */
 typedef struct mbm_port {
-    /**
-     * Your pointer, passed to every hook; may be NULL.
-     */
+    /** Your pointer, passed to every hook; may be NULL. */
     void *context;
-    /**
-     * Copies up to `capacity` received bytes to `bytes`, without waiting. Returns the
-     * number of bytes, 0 if none has arrived, a negative number if the link is lost.
-     */
+    /** Copies up to `capacity` received bytes to `bytes`, without waiting. Returns the
+     *  number of bytes, 0 if none has arrived, a negative number if the link is lost. */
     int16_t (*read)(void *context, uint8_t *bytes, uint16_t capacity);
-    /**
-     * Accepts up to `length` bytes to send, without waiting until they are sent. Returns
-     * the number of bytes accepted, 0 if it can accept none now, a negative number if the
-     * link is lost.
-     */
+    /** Accepts up to `length` bytes to send, without waiting until they are sent. Returns
+     *  the number of bytes accepted, 0 if it can accept none now, a negative number if the
+     *  link is lost. */
     int16_t (*write)(void *context, const uint8_t *bytes, uint16_t length);
-    /**
-     * Returns the time in microseconds; it wraps at 2^32. A platform with a
-     * millisecond tick returns `tick * 1000`.
-     */
+    /** Returns the time in microseconds; it wraps at 2^32. A platform with a
+     *  millisecond tick returns `tick * 1000`. */
     uint32_t (*micros)(void *context);
-    /**
-     * Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
-     * also wait until the last bit was sent, and return 1. Without it, a line and a client
-     * that know the baud rate wait for a reply longer by the time of the request's characters,
-     * since bytes may remain to be sent after `write` has taken them.
-     */
+    /** Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
+     *  also wait until the last bit was sent, and return 1. Without it, a line and a client
+     *  that know the baud rate wait for a reply longer by the time of the request's characters,
+     *  since bytes may remain to be sent after `write` has taken them. */
     uint8_t (*flush)(void *context);
-    /**
-     * Optional: called before the first byte of a frame is sent (RS-485 driver on).
-     */
+    /** Optional: called before the first byte of a frame is sent (RS-485 driver on). */
     void (*preTransmission)(void *context);
-    /**
-     * Optional: called after the last bit of a frame was sent (RS-485 driver off).
-     */
+    /** Optional: called after the last bit of a frame was sent (RS-485 driver off). */
     void (*postTransmission)(void *context);
-    /**
-     * Optional: called repeatedly while a blocking function of `node` waits, but never
-     * between preTransmission and postTransmission. It may sleep until a byte arrives, at
-     * most for the time that mbm_node_pollDelay(node) returns.
-     */
+    /** Optional: called repeatedly while a blocking function of `node` waits, but never
+     *  between preTransmission and postTransmission. It may sleep until a byte arrives, at
+     *  most for the time that mbm_node_pollDelay(node) returns. */
     void (*idle)(void *context, struct mbm_node *node);
 } mbm_port;
 
@@ -394,328 +276,143 @@ typedef struct mbm_port {
  * Counters of what happened on the line since you zeroed them. Each wraps at 2^32.
  */
 typedef struct mbm_counters {
-    /**
-     * Requests sent, including retries.
-     */
+    /** Requests sent, including retries. */
     uint32_t requests;
-    /**
-     * Replies that matched a request, including exceptions.
-     */
+    /** Replies that matched a request, including exceptions. */
     uint32_t replies;
-    /**
-     * Replies that were exceptions.
-     */
+    /** Replies that were exceptions. */
     uint32_t exceptions;
-    /**
-     * Requests whose reply arrived with a wrong CRC.
-     */
+    /** Requests whose reply arrived with a wrong CRC. */
     uint32_t badCrc;
-    /**
-     * Requests without a reply within the response timeout.
-     */
+    /** Requests without a reply within the response timeout. */
     uint32_t timeouts;
-    /**
-     * Frames with a right CRC that arrived during the wait for a reply, from another unit
-     * or not matching the request.
-     */
+    /** Frames with a right CRC that arrived during the wait for a reply, from another unit
+     *  or not matching the request. */
     uint32_t foreignFrames;
-    /**
-     * Replies that were found after bytes that were not a frame.
-     */
+    /** Replies that were found after bytes that were not a frame. */
     uint32_t resynchronisations;
-    /**
-     * Bytes sent.
-     */
+    /** Bytes sent. */
     uint32_t bytesSent;
-    /**
-     * Bytes received, including those of foreign frames and noise.
-     */
+    /** Bytes received, including those of foreign frames and noise. */
     uint32_t bytesReceived;
 } mbm_counters;
 
 /* ==== 4. Functions and framings ===================================================== */
 
-/**
- * RTU: serial line, binary, with a CRC-16 (serial line guide V1.02, 2.5.1).
- */
+/** RTU: serial line, binary, with a CRC-16 (serial line guide V1.02, 2.5.1). */
 #define MBM_FRAMING_RTU 0u
-
-/**
- * ASCII: serial line, hexadecimal characters, with an LRC (serial line guide V1.02, 2.5.2).
- */
+/** ASCII: serial line, hexadecimal characters, with an LRC (serial line guide V1.02, 2.5.2). */
 #define MBM_FRAMING_ASCII 1u
-
-/**
- * TCP: the PDU follows the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
- */
+/** TCP: the PDU follows the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3). */
 #define MBM_FRAMING_TCP 2u
-
-/**
- * RTU frames in a TCP stream.
- */
+/** RTU frames in a TCP stream. */
 #define MBM_FRAMING_RTU_OVER_TCP 3u
-
-/**
- * No frame: the PDU alone, for the mbm_frame functions.
- */
+/** No frame: the PDU alone, for the mbm_frame functions. */
 #define MBM_FRAMING_NONE 4u
-
-/**
- * The maximum length of a TCP frame, in bytes.
- */
+/** The maximum length of a TCP frame, in bytes. */
 #define MBM_MAX_TCP_FRAME 260
-
-/**
- * The maximum length of an ASCII frame, in characters.
- */
+/** The maximum length of an ASCII frame, in characters. */
 #define MBM_MAX_ASCII_FRAME 513
-
-/**
- * Read Coils (V1.1b3, 6.1).
- */
+/** Read Coils (V1.1b3, 6.1). */
 #define MBM_FC_READ_COILS 1u
-
-/**
- * Read Discrete Inputs (V1.1b3, 6.2).
- */
+/** Read Discrete Inputs (V1.1b3, 6.2). */
 #define MBM_FC_READ_DISCRETE_INPUTS 2u
-
-/**
- * Read Holding Registers (V1.1b3, 6.3).
- */
+/** Read Holding Registers (V1.1b3, 6.3). */
 #define MBM_FC_READ_HOLDING_REGISTERS 3u
-
-/**
- * Read Input Registers (V1.1b3, 6.4).
- */
+/** Read Input Registers (V1.1b3, 6.4). */
 #define MBM_FC_READ_INPUT_REGISTERS 4u
-
-/**
- * Write Single Coil (V1.1b3, 6.5).
- */
+/** Write Single Coil (V1.1b3, 6.5). */
 #define MBM_FC_WRITE_SINGLE_COIL 5u
-
-/**
- * Write Single Register (V1.1b3, 6.6).
- */
+/** Write Single Register (V1.1b3, 6.6). */
 #define MBM_FC_WRITE_SINGLE_REGISTER 6u
-
-/**
- * Read Exception Status (V1.1b3, 6.7).
- */
+/** Read Exception Status (V1.1b3, 6.7). */
 #define MBM_FC_READ_EXCEPTION_STATUS 7u
-
-/**
- * Diagnostics (V1.1b3, 6.8).
- */
+/** Diagnostics (V1.1b3, 6.8). */
 #define MBM_FC_DIAGNOSTICS 8u
-
-/**
- * Get Comm Event Counter (V1.1b3, 6.9).
- */
+/** Get Comm Event Counter (V1.1b3, 6.9). */
 #define MBM_FC_GET_COMM_EVENT_COUNTER 11u
-
-/**
- * Get Comm Event Log (V1.1b3, 6.10).
- */
+/** Get Comm Event Log (V1.1b3, 6.10). */
 #define MBM_FC_GET_COMM_EVENT_LOG 12u
-
-/**
- * Write Multiple Coils (V1.1b3, 6.11).
- */
+/** Write Multiple Coils (V1.1b3, 6.11). */
 #define MBM_FC_WRITE_MULTIPLE_COILS 15u
-
-/**
- * Write Multiple Registers (V1.1b3, 6.12).
- */
+/** Write Multiple Registers (V1.1b3, 6.12). */
 #define MBM_FC_WRITE_MULTIPLE_REGISTERS 16u
-
-/**
- * Report Server ID (V1.1b3, 6.13).
- */
+/** Report Server ID (V1.1b3, 6.13). */
 #define MBM_FC_REPORT_SERVER_ID 17u
-
-/**
- * Read File Record (V1.1b3, 6.14).
- */
+/** Read File Record (V1.1b3, 6.14). */
 #define MBM_FC_READ_FILE_RECORD 20u
-
-/**
- * Write File Record (V1.1b3, 6.15).
- */
+/** Write File Record (V1.1b3, 6.15). */
 #define MBM_FC_WRITE_FILE_RECORD 21u
-
-/**
- * Mask Write Register (V1.1b3, 6.16).
- */
+/** Mask Write Register (V1.1b3, 6.16). */
 #define MBM_FC_MASK_WRITE_REGISTER 22u
-
-/**
- * Read/Write Multiple Registers (V1.1b3, 6.17).
- */
+/** Read/Write Multiple Registers (V1.1b3, 6.17). */
 #define MBM_FC_READ_WRITE_MULTIPLE_REGISTERS 23u
-
-/**
- * Read FIFO Queue (V1.1b3, 6.18).
- */
+/** Read FIFO Queue (V1.1b3, 6.18). */
 #define MBM_FC_READ_FIFO_QUEUE 24u
-
-/**
- * Encapsulated Interface Transport (V1.1b3, 6.19).
- */
+/** Encapsulated Interface Transport (V1.1b3, 6.19). */
 #define MBM_FC_ENCAPSULATED_INTERFACE 43u
-
-/**
- * Sub-function of 08: the device returns the data, of any number of words (V1.1b3, 6.8.1).
- */
+/** Sub-function of 08: the device returns the data, of any number of words (V1.1b3, 6.8.1). */
 #define MBM_DIAGNOSTICS_RETURN_QUERY_DATA 0u
-
-/**
- * Sub-function of 08: restarts the communications port. The data FF 00 also clear the
- * event log.
- */
+/** Sub-function of 08: restarts the communications port. The data FF 00 also clear the
+ *  event log. */
 #define MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS 1u
-
-/**
- * Sub-function of 08: the device returns its diagnostic register.
- */
+/** Sub-function of 08: the device returns its diagnostic register. */
 #define MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER 2u
-
-/**
- * Sub-function of 08: sets the character that ends ASCII frames after CR. The first byte
- * of the data is the character.
- */
+/** Sub-function of 08: sets the character that ends ASCII frames after CR. The first byte
+ *  of the data is the character. */
 #define MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER 3u
-
-/**
- * Sub-function of 08: the device listens only. It sends no reply.
- */
+/** Sub-function of 08: the device listens only. It sends no reply. */
 #define MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY 4u
-
-/**
- * Sub-function of 08: clears the counters and the diagnostic register.
- */
+/** Sub-function of 08: clears the counters and the diagnostic register. */
 #define MBM_DIAGNOSTICS_CLEAR_COUNTERS 10u
-
-/**
- * Sub-function of 08: the number of messages that the device detected on the bus.
- */
+/** Sub-function of 08: the number of messages that the device detected on the bus. */
 #define MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT 11u
-
-/**
- * Sub-function of 08: the number of messages with a wrong CRC.
- */
+/** Sub-function of 08: the number of messages with a wrong CRC. */
 #define MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT 12u
-
-/**
- * Sub-function of 08: the number of exceptions that the device sent.
- */
+/** Sub-function of 08: the number of exceptions that the device sent. */
 #define MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT 13u
-
-/**
- * Sub-function of 08: the number of messages addressed to this device.
- */
+/** Sub-function of 08: the number of messages addressed to this device. */
 #define MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT 14u
-
-/**
- * Sub-function of 08: the number of messages to which the device sent no reply.
- */
+/** Sub-function of 08: the number of messages to which the device sent no reply. */
 #define MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT 15u
-
-/**
- * Sub-function of 08: the number of messages to which the device replied with a NAK.
- */
+/** Sub-function of 08: the number of messages to which the device replied with a NAK. */
 #define MBM_DIAGNOSTICS_SERVER_NAK_COUNT 16u
-
-/**
- * Sub-function of 08: the number of messages to which the device replied that it is busy.
- */
+/** Sub-function of 08: the number of messages to which the device replied that it is busy. */
 #define MBM_DIAGNOSTICS_SERVER_BUSY_COUNT 17u
-
-/**
- * Sub-function of 08: the number of messages that character overruns destroyed.
- */
+/** Sub-function of 08: the number of messages that character overruns destroyed. */
 #define MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT 18u
-
-/**
- * Sub-function of 08: clears the counter of character overruns.
- */
+/** Sub-function of 08: clears the counter of character overruns. */
 #define MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER 20u
-
-/**
- * MEI type of 2B: CANopen General Reference (V1.1b3, 6.20).
- */
+/** MEI type of 2B: CANopen General Reference (V1.1b3, 6.20). */
 #define MBM_MEI_CANOPEN 13u
-
-/**
- * MEI type of 2B: Read Device Identification (V1.1b3, 6.21).
- */
+/** MEI type of 2B: Read Device Identification (V1.1b3, 6.21). */
 #define MBM_MEI_READ_DEVICE_IDENTIFICATION 14u
-
-/**
- * Read device id code: the basic objects, 00 to 02.
- */
+/** Read device id code: the basic objects, 00 to 02. */
 #define MBM_DEVICE_ID_BASIC 1u
-
-/**
- * Read device id code: the regular objects, 00 to 7F.
- */
+/** Read device id code: the regular objects, 00 to 7F. */
 #define MBM_DEVICE_ID_REGULAR 2u
-
-/**
- * Read device id code: all objects, 00 to FF.
- */
+/** Read device id code: all objects, 00 to FF. */
 #define MBM_DEVICE_ID_EXTENDED 3u
-
-/**
- * Read device id code: one object.
- */
+/** Read device id code: one object. */
 #define MBM_DEVICE_ID_INDIVIDUAL 4u
-
-/**
- * Length rule: the PDU is as long as its frame. On an RTU line silence ends the frame.
- */
+/** Length rule: the PDU is as long as its frame. On an RTU line silence ends the frame. */
 #define MBM_RULE_SILENCE 0u
-
-/**
- * Length rule: the PDU always has the same number of bytes.
- */
+/** Length rule: the PDU always has the same number of bytes. */
 #define MBM_RULE_FIXED 1u
-
-/**
- * Length rule: a byte of the PDU gives the number of bytes that follow it.
- */
+/** Length rule: a byte of the PDU gives the number of bytes that follow it. */
 #define MBM_RULE_COUNTED 2u
-
-/**
- * The maximum number of registers that one request reads (V1.1b3, 6.3 and 6.4).
- */
+/** The maximum number of registers that one request reads (V1.1b3, 6.3 and 6.4). */
 #define MBM_MAX_READ_REGISTERS 125
-
-/**
- * The maximum number of registers that one request writes (V1.1b3, 6.12).
- */
+/** The maximum number of registers that one request writes (V1.1b3, 6.12). */
 #define MBM_MAX_WRITE_REGISTERS 123
-
-/**
- * The maximum number of registers that one read/write request writes (V1.1b3, 6.17).
- */
+/** The maximum number of registers that one read/write request writes (V1.1b3, 6.17). */
 #define MBM_MAX_READ_WRITE_REGISTERS 121
-
-/**
- * The maximum number of coils or discrete inputs that one request reads (V1.1b3, 6.1 and
- * 6.2).
- */
+/** The maximum number of coils or discrete inputs that one request reads (V1.1b3, 6.1 and
+ *  6.2). */
 #define MBM_MAX_READ_BITS 2000
-
-/**
- * The maximum number of coils that one request writes (V1.1b3, 6.11).
- */
+/** The maximum number of coils that one request writes (V1.1b3, 6.11). */
 #define MBM_MAX_WRITE_BITS 1968
-
-/**
- * The maximum length of an RTU frame, in bytes (serial line guide V1.02, 2.5.1).
- */
+/** The maximum length of an RTU frame, in bytes (serial line guide V1.02, 2.5.1). */
 #define MBM_MAX_FRAME 256
 
 /**
@@ -723,18 +420,12 @@ typedef struct mbm_counters {
  * code. As MBM_INIT, it is MBM_RULE_SILENCE.
  */
 typedef struct mbm_rule {
-    /**
-     * MBM_RULE_SILENCE, MBM_RULE_FIXED or MBM_RULE_COUNTED.
-     */
+    /** MBM_RULE_SILENCE, MBM_RULE_FIXED or MBM_RULE_COUNTED. */
     uint8_t kind;
-    /**
-     * MBM_RULE_FIXED: bytes of the PDU, 1 to 253. MBM_RULE_COUNTED: the position of the
-     * counting byte, 1 to 252 bytes after the function code.
-     */
+    /** MBM_RULE_FIXED: bytes of the PDU, 1 to 253. MBM_RULE_COUNTED: the position of the
+     *  counting byte, 1 to 252 bytes after the function code. */
     uint8_t bytes;
-    /**
-     * MBM_RULE_COUNTED: the number of bytes that follow the counted bytes.
-     */
+    /** MBM_RULE_COUNTED: the number of bytes that follow the counted bytes. */
     uint8_t more;
 } mbm_rule;
 
@@ -745,17 +436,11 @@ typedef struct mbm_rule {
  * standard defines keeps its meaning, also if you declare it.
  */
 typedef struct mbm_function {
-    /**
-     * The function code, 1 to 127.
-     */
+    /** The function code, 1 to 127. */
     uint8_t code;
-    /**
-     * The length of its requests.
-     */
+    /** The length of its requests. */
     struct mbm_rule request;
-    /**
-     * The length of its responses.
-     */
+    /** The length of its responses. */
     struct mbm_rule response;
 } mbm_function;
 
@@ -764,22 +449,14 @@ typedef struct mbm_function {
  * means RTU with the functions of the standard only.
  */
 typedef struct mbm_framing {
-    /**
-     * The declarations of your own functions; may be NULL if `functionCount` is 0.
-     */
+    /** The declarations of your own functions; may be NULL if `functionCount` is 0. */
     const struct mbm_function *functions;
-    /**
-     * The number of declarations in `functions`.
-     */
+    /** The number of declarations in `functions`. */
     uint8_t functionCount;
-    /**
-     * MBM_FRAMING_RTU, _ASCII, _TCP, _RTU_OVER_TCP or _NONE.
-     */
+    /** MBM_FRAMING_RTU, _ASCII, _TCP, _RTU_OVER_TCP or _NONE. */
     uint8_t kind;
-    /**
-     * ASCII only: the last character of a frame; 0 means line feed (V1.1b3, 6.8.1,
-     * sub-function 03).
-     */
+    /** ASCII only: the last character of a frame; 0 means line feed (V1.1b3, 6.8.1,
+     *  sub-function 03). */
     uint8_t delimiter;
 } mbm_framing;
 
@@ -799,13 +476,9 @@ typedef struct mbm_framing {
  * as mbm_node_readCoils describes.
  */
 typedef struct mbm_node {
-    /**
-     * Private.
-     */
+    /** Private. */
     void *pointers[5];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[4];
 } mbm_node;
 
@@ -820,13 +493,9 @@ typedef struct mbm_node {
  * A call that is refused changes nothing.
  */
 typedef struct mbm_line {
-    /**
-     * Private.
-     */
+    /** Private. */
     void *pointers[13];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[20];
 } mbm_line;
 
@@ -842,8 +511,7 @@ typedef struct mbm_line {
  *                    as the object is used. read, write and micros must not be NULL
  * @param frame       as for mbm_line_setFrame; also NULL, if you call that function later
  * @param frameBytes  as for mbm_line_setFrame; 0 if `frame` is NULL
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or too small a frame
- *         buffer; MBM_BUSY while a request is under way
+ * @return a status; MBM_BUSY while a request is under way
  */
 uint8_t mbm_line_beginRtu(struct mbm_line *line,
                           const struct mbm_port *port,
@@ -868,7 +536,7 @@ uint8_t mbm_line_beginRtu(struct mbm_line *line,
  * @param responseWords  0 to 255; 125 hold any reply
  * @param transmit       the words that writes send; NULL only if `transmitWords` is 0
  * @param transmitWords  0 to 255; 123 hold any request
- * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY while a request of the node is under way
+ * @return a status; MBM_BUSY while a request of the node is under way
  */
 uint8_t mbm_node_begin(struct mbm_node *node,
                        struct mbm_line *line,
@@ -882,13 +550,12 @@ uint8_t mbm_node_begin(struct mbm_node *node,
  * Sets the write address and empties the queue of mbm_node_send. The transmit words do not
  * change.
  *
- * @param node  the object
+ * @param node     the object
  * @param address  the address to which the functions with Queued in their name write, 0 to
  *                 65535
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_node_beginTransmission(struct mbm_node *node,
-                                   uint16_t address);
+uint8_t mbm_node_beginTransmission(struct mbm_node *node, uint16_t address);
 
 /**
  * Sets the buffer of one frame. The line uses it only while a request is under way. So in
@@ -902,11 +569,9 @@ uint8_t mbm_node_beginTransmission(struct mbm_node *node,
  * @param line        the object; initialised with MBM_INIT before the first call
  * @param frame       the buffer. Its content is not used between requests
  * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
- * @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
+ * @return a status; MBM_BUSY while a request is under way
  */
-uint8_t mbm_line_setFrame(struct mbm_line *line,
-                          uint8_t *frame,
-                          uint16_t frameBytes);
+uint8_t mbm_line_setFrame(struct mbm_line *line, uint8_t *frame, uint16_t frameBytes);
 
 /**
  * Gives up the request under way, whichever node has made it, and switches the driver off. The
@@ -914,8 +579,7 @@ uint8_t mbm_line_setFrame(struct mbm_line *line,
  * If no request is under way, it does nothing.
  *
  * @param line  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY from within a hook of
- *         the port except `idle`
+ * @return a status
  */
 uint8_t mbm_line_cancel(struct mbm_line *line);
 
@@ -925,32 +589,30 @@ uint8_t mbm_line_cancel(struct mbm_line *line);
  * serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
  *
  * @param line  the object
- * @param baud    bits per second; 0 (the default): unknown
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param baud  bits per second; 0 (the default): unknown
+ * @return a status
  */
-uint8_t mbm_line_setBaudRate(struct mbm_line *line,
-                             uint32_t baud);
+uint8_t mbm_line_setBaudRate(struct mbm_line *line, uint32_t baud);
 
 /**
  * Sets the silence before a request, instead of t3.5. Use 0 if no device on the line needs
  * the gap, and more than t3.5 for devices that need longer before they can receive again.
  * A later call of mbm_line_setBaudRate sets it back to t3.5.
  *
- * @param line  the object
- * @param gapUs         microseconds from the last byte received or sent; a value above 2^31
- *                      (36 minutes) means 2^31
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param line   the object
+ * @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36
+ *               minutes) means 2^31
+ * @return a status
  */
-uint8_t mbm_line_setGap(struct mbm_line *line,
-                        uint32_t gapUs);
+uint8_t mbm_line_setGap(struct mbm_line *line, uint32_t gapUs);
 
 /**
  * Sets the turnaround delay: how long the master waits after a broadcast, which no device
  * answers (serial line guide V1.02, 2.4.1).
  *
- * @param line  the object
- * @param delayMs       milliseconds, 0 to 65535; the default is 100
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param line     the object
+ * @param delayMs  milliseconds, 0 to 65535; the default is 100
+ * @return a status
  */
 uint8_t mbm_line_setTurnaroundDelay(struct mbm_line *line, uint32_t delayMs);
 
@@ -978,23 +640,21 @@ uint8_t mbm_line_setTurnaroundDelay(struct mbm_line *line, uint32_t delayMs);
  * response timeout may be taken for the reply to the next request, and so may all that
  * follow.
  *
- * @param line  the object
- * @param quietMs       milliseconds, 0 to 65535; the default is 100
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param line     the object
+ * @param quietMs  milliseconds, 0 to 65535; the default is 100
+ * @return a status
  */
-uint8_t mbm_line_setQuietTime(struct mbm_line *line,
-                              uint32_t quietMs);
+uint8_t mbm_line_setQuietTime(struct mbm_line *line, uint32_t quietMs);
 
 /**
  * Sets how often the master repeats a request whose reply is missing, damaged or malformed.
  * It does not repeat a request that was answered with an exception.
  *
- * @param line  the object
+ * @param line     the object
  * @param retries  0 to 255; the default is 0
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_line_setRetries(struct mbm_line *line,
-                            uint8_t retries);
+uint8_t mbm_line_setRetries(struct mbm_line *line, uint8_t retries);
 
 /**
  * Switches echo discarding on or off. Switch it on if the receiver also receives what the
@@ -1002,8 +662,8 @@ uint8_t mbm_line_setRetries(struct mbm_line *line,
  * reply.
  *
  * @param line  the object
- * @param on      0 (the default) or 1
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param on    0 (the default) or 1
+ * @return a status
  */
 uint8_t mbm_line_setEchoDiscard(struct mbm_line *line, uint8_t on);
 
@@ -1011,10 +671,10 @@ uint8_t mbm_line_setEchoDiscard(struct mbm_line *line, uint8_t on);
  * Sets how long the driver stays on after the port's flush, for platforms whose flush
  * returns before the last bit was sent.
  *
- * @param line  the object
- * @param characters  the time in characters at the baud rate of mbm_line_setBaudRate
- *                    (without one, at 9600); the default is 0
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param line        the object
+ * @param characters  the time in characters at the baud rate of mbm_line_setBaudRate (without
+ *                    one, at 9600); the default is 0
+ * @return a status
  */
 uint8_t mbm_line_setPostFlushHold(struct mbm_line *line, uint8_t characters);
 
@@ -1022,32 +682,30 @@ uint8_t mbm_line_setPostFlushHold(struct mbm_line *line, uint8_t characters);
  * Sets your storage for counters, in which the master counts from now on. You may read and
  * zero the counters at any time, but not from an interrupt.
  *
- * @param line  the object
+ * @param line      the object
  * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_line_setCounters(struct mbm_line *line,
-                             struct mbm_counters *counters);
+uint8_t mbm_line_setCounters(struct mbm_line *line, struct mbm_counters *counters);
 
 /**
  * Reports when another user of the wire, for example another object, used it last.
  * The gap before the next request counts from that time. A time before the last use that
  * the object knows changes nothing.
  *
- * @param line  the object
- * @param timeUs        the time in microseconds on the clock of the object's port, at most
- *                      2^31 microseconds (36 minutes) ago
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param line    the object
+ * @param timeUs  the time in microseconds on the clock of the object's port, at most 2^31
+ *                microseconds (36 minutes) ago
+ * @return a status
  */
-uint8_t mbm_line_usedAt(struct mbm_line *line,
-                        uint32_t timeUs);
+uint8_t mbm_line_usedAt(struct mbm_line *line, uint32_t timeUs);
 
 /**
  * Reports that another user of the wire has just used it: as mbm_line_usedAt with the
  * present time.
  *
  * @param line  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_line_used(struct mbm_line *line);
 
@@ -1059,9 +717,7 @@ uint8_t mbm_line_used(struct mbm_line *line);
  *
  * @param node  the object
  * @return MBM_PENDING until the request has ended. Then, at every call, the status of the
- *         request. MBM_OK if there was no request yet; MBM_BUSY from within a hook of the
- *         port except `idle`, while the request is under way; MBM_INVALID_ARGUMENT or
- *         MBM_NOT_INITIALISED
+ *         request. MBM_OK if there was no request yet
  */
 uint8_t mbm_node_poll(struct mbm_node *node);
 
@@ -1081,8 +737,7 @@ uint32_t mbm_node_pollDelay(struct mbm_node *node);
  * becomes MBM_CANCELLED. If the node has no request under way, it does nothing.
  *
  * @param node  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY from within a hook of
- *         the port except `idle`, while the request is under way
+ * @return a status
  */
 uint8_t mbm_node_cancel(struct mbm_node *node);
 
@@ -1091,8 +746,7 @@ uint8_t mbm_node_cancel(struct mbm_node *node);
  *
  * @param node  the object
  * @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
- *         request; MBM_BUSY from within a hook of the port except `idle`, while the request is
- *         under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ *         request
  */
 uint8_t mbm_node_status(const struct mbm_node *node);
 
@@ -1122,25 +776,23 @@ uint8_t mbm_node_getExceptionCode(const struct mbm_node *node);
  * standard forbids or addresses beyond 65535. The status is then the exception with which a
  * device would answer.
  *
- * @param node  the object
+ * @param node      the object
  * @param address   the first coil, 0 to 65535, as on the wire
  * @param quantity  the number of coils, 1 to 2000
- * @return MBM_OK, or an exception of the device (0x01 to 0x7F), or
- *         MBM_PENDING (non-blocking mode), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
- *         MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION,
- *         MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
- *         MBM_BROADCAST_NOT_ALLOWED, MBM_BUSY, MBM_CANCELLED,
- *         MBM_NOT_INITIALISED, MBM_INVALID_ARGUMENT
+ * @return a status; MBM_PENDING in non-blocking mode; an exception of the device (0x01 to
+ *         0x7F); MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC, MBM_MALFORMED_REPLY,
+ *         MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST, MBM_LINE_BUSY,
+ *         MBM_BUFFER_TOO_SMALL, MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a
+ *         request is under way on the line; MBM_NOT_INITIALISED if the line has no port or no
+ *         frame buffer
  */
-uint8_t mbm_node_readCoils(struct mbm_node *node,
-                           uint16_t address,
-                           uint16_t quantity);
+uint8_t mbm_node_readCoils(struct mbm_node *node, uint16_t address, uint16_t quantity);
 
 /**
  * Function 02: reads discrete inputs into the response words, 16 in each word. The first
  * input is the lowest bit; the last word is padded with zeros (V1.1b3, 6.2).
  *
- * @param node  the object
+ * @param node      the object
  * @param address   the first input, 0 to 65535, as on the wire
  * @param quantity  the number of inputs, 1 to 2000
  * @return a status; see mbm_node_readCoils
@@ -1152,7 +804,7 @@ uint8_t mbm_node_readDiscreteInputs(struct mbm_node *node,
 /**
  * Function 03: reads holding registers into the response words (V1.1b3, 6.3).
  *
- * @param node  the object
+ * @param node      the object
  * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_node_readCoils
@@ -1164,7 +816,7 @@ uint8_t mbm_node_readHoldingRegisters(struct mbm_node *node,
 /**
  * Function 04: reads input registers into the response words (V1.1b3, 6.4).
  *
- * @param node  the object
+ * @param node      the object
  * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_node_readCoils
@@ -1176,7 +828,7 @@ uint8_t mbm_node_readInputRegisters(struct mbm_node *node,
 /**
  * Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
  *
- * @param node  the object
+ * @param node     the object
  * @param address  the coil, 0 to 65535; becomes the write address
  * @param state    0 is off, any other value is on
  * @return a status; see mbm_node_readCoils
@@ -1186,7 +838,7 @@ uint8_t mbm_node_writeSingleCoil(struct mbm_node *node, uint16_t address, uint8_
 /**
  * Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
  *
- * @param node  the object
+ * @param node     the object
  * @param address  the register, 0 to 65535; becomes the write address
  * @param value    its value; also becomes transmit word 0
  * @return a status; see mbm_node_readCoils
@@ -1199,7 +851,7 @@ uint8_t mbm_node_writeSingleRegister(struct mbm_node *node,
  * Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
  * the lowest bit (V1.1b3, 6.11). With unit 0 it is a broadcast.
  *
- * @param node  the object
+ * @param node      the object
  * @param address   the first coil, 0 to 65535; becomes the write address
  * @param quantity  the number of coils, 1 to 1968, and not more than the transmit words hold
  * @return a status; see mbm_node_readCoils
@@ -1221,7 +873,7 @@ uint8_t mbm_node_writeQueuedCoils(struct mbm_node *node);
  * Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
  * With unit 0 it is a broadcast.
  *
- * @param node  the object
+ * @param node      the object
  * @param address   the first register, 0 to 65535; becomes the write address
  * @param quantity  the number of registers, 1 to 123, and not more than the transmit words
  * @return a status; see mbm_node_readCoils
@@ -1244,7 +896,7 @@ uint8_t mbm_node_writeQueuedRegisters(struct mbm_node *node);
  * (register AND andMask) OR (orMask AND NOT andMask) (V1.1b3, 6.16).
  * With unit 0 it is a broadcast.
  *
- * @param node  the object
+ * @param node     the object
  * @param address  the register, 0 to 65535; becomes the write address
  * @param andMask  1 for each bit of the register to keep; also becomes transmit word 0
  * @param orMask   the new value of the bits that are not kept; also becomes transmit word 1
@@ -1259,11 +911,10 @@ uint8_t mbm_node_maskWriteRegister(struct mbm_node *node,
  * Function 17: the device writes the transmit words to registers first. Then it reads
  * registers, which arrive in the response words. Both in one request (V1.1b3, 6.17).
  *
- * @param node  the object
+ * @param node           the object
  * @param readAddress    the first register to read, 0 to 65535
  * @param readQuantity   the number of registers to read, 1 to 125
- * @param writeAddress   the first register to write, 0 to 65535; becomes the write
- *                       address
+ * @param writeAddress   the first register to write, 0 to 65535; becomes the write address
  * @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
  *                       transmit words
  * @return a status; see mbm_node_readCoils
@@ -1278,7 +929,7 @@ uint8_t mbm_node_readWriteMultipleRegisters(struct mbm_node *node,
  * Function 17: as mbm_node_readWriteMultipleRegisters, but writes the queued complete
  * words, starting at the last write address.
  *
- * @param node  the object
+ * @param node          the object
  * @param readAddress   the first register to read, 0 to 65535
  * @param readQuantity  the number of registers to read, 1 to 125
  * @return a status; see mbm_node_readCoils
@@ -1290,13 +941,12 @@ uint8_t mbm_node_readWriteQueuedRegisters(struct mbm_node *node,
 /**
  * Sets the unit to which the master sends later requests.
  *
- * @param node  the object
- * @param slave   the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248
- *                to 255, which the standard reserves
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param node   the object
+ * @param slave  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
+ *               255, which the standard reserves
+ * @return a status
  */
-uint8_t mbm_node_setSlaveID(struct mbm_node *node,
-                            uint8_t slave);
+uint8_t mbm_node_setSlaveID(struct mbm_node *node, uint8_t slave);
 
 /**
  * Returns the unit to which the master sends requests.
@@ -1310,12 +960,11 @@ uint8_t mbm_node_getSlaveID(const struct mbm_node *node);
  * Sets the response timeout: the maximum time from the last bit of the request to the last
  * byte of the reply.
  *
- * @param node  the object
- * @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param node       the object
+ * @param timeoutMs  milliseconds, 0 to 1000000 (16 minutes); the default is 2000
+ * @return a status
  */
-uint8_t mbm_node_setResponseTimeout(struct mbm_node *node,
-                                    uint32_t timeoutMs);
+uint8_t mbm_node_setResponseTimeout(struct mbm_node *node, uint32_t timeoutMs);
 
 /**
  * Switches between blocking and non-blocking mode. In blocking mode, the default, a function
@@ -1323,11 +972,10 @@ uint8_t mbm_node_setResponseTimeout(struct mbm_node *node,
  * MBM_PENDING at once, and you call mbm_node_poll until the request has ended.
  *
  * @param node  the object
- * @param on      1 blocking, 0 non-blocking; it applies from the next request on
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param on    1 blocking, 0 non-blocking; it applies from the next request on
+ * @return a status
  */
-uint8_t mbm_node_setBlocking(struct mbm_node *node,
-                             uint8_t on);
+uint8_t mbm_node_setBlocking(struct mbm_node *node, uint8_t on);
 
 /**
  * Accepts replies of devices that deviate from the standard. It has these effects:
@@ -1343,35 +991,29 @@ uint8_t mbm_node_setBlocking(struct mbm_node *node,
  * every reply.
  *
  * @param node  the object
- * @param on      0 (the default) or 1
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY while a request is
- *         under way
+ * @param on    0 (the default) or 1
+ * @return a status; MBM_BUSY while a request is under way
  */
-uint8_t mbm_node_setLenient(struct mbm_node *node,
-                            uint8_t on);
+uint8_t mbm_node_setLenient(struct mbm_node *node, uint8_t on);
 
 /**
  * Queues a word after the words queued before. If the last word holds queued bits, the new
  * word goes into the next one.
  *
  * @param node  the object
- * @param word    the word
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param word  the word
+ * @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
  */
-uint8_t mbm_node_send(struct mbm_node *node,
-                      uint16_t word);
+uint8_t mbm_node_send(struct mbm_node *node, uint16_t word);
 
 /**
  * Queues a bit after the bits queued before, starting at the lowest bit of a word.
  *
  * @param node  the object
- * @param on      0 is off, any other value is on
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param on    0 is off, any other value is on
+ * @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
  */
-uint8_t mbm_node_sendBit(struct mbm_node *node,
-                         uint8_t on);
+uint8_t mbm_node_sendBit(struct mbm_node *node, uint8_t on);
 
 /**
  * Returns how many words of the last successful read mbm_node_receive has not returned yet.
@@ -1391,36 +1033,19 @@ uint16_t mbm_node_receive(struct mbm_node *node);
 
 /* ==== 6. Client ===================================================================== */
 
-/**
- * The maximum number of requests that are pending in one client.
- */
+/** The maximum number of requests that are pending in one client. */
 #define MBM_CLIENT_DEPTH 16
-
-/**
- * `retryLimit` of mbm_clientRequest and mbm_clientUnit: no repetitions.
- */
+/** `retryLimit` of mbm_clientRequest and mbm_clientUnit: no repetitions. */
 #define MBM_NO_RETRIES 255u
-
-/**
- * mbm_client_setBackoff: the client repeats a request at once.
- */
+/** mbm_client_setBackoff: the client repeats a request at once. */
 #define MBM_BACKOFF_NONE 0u
-
-/**
- * mbm_client_setBackoff: the client waits `delayMs` before each repetition.
- */
+/** mbm_client_setBackoff: the client waits `delayMs` before each repetition. */
 #define MBM_BACKOFF_FIXED 1u
-
-/**
- * mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
- * before the second, three times that before the third, but at most `maxDelayMs`.
- */
+/** mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
+ *  before the second, three times that before the third, but at most `maxDelayMs`. */
 #define MBM_BACKOFF_LINEAR 2u
-
-/**
- * mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
- * before the second, four times that before the third, but at most `maxDelayMs`.
- */
+/** mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
+ *  before the second, four times that before the third, but at most `maxDelayMs`. */
 #define MBM_BACKOFF_EXPONENTIAL 3u
 
 /**
@@ -1438,13 +1063,9 @@ uint16_t mbm_node_receive(struct mbm_node *node);
  * begun.
  */
 typedef struct mbm_client {
-    /**
-     * Private.
-     */
+    /** Private. */
     void *pointers[50];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[28];
 } mbm_client;
 
@@ -1460,73 +1081,45 @@ typedef struct mbm_client {
  * the lowest bit.
  */
 typedef struct mbm_clientRequest {
-    /**
-     * Optional: mbm_client_poll calls it when the request has ended, but not after
-     * mbm_client_cancel or a begin function gave the request up. It may queue requests, also
-     * this one, and cancel others.
-     */
+    /** Optional: mbm_client_poll calls it when the request has ended, but not after
+     *  mbm_client_cancel or a begin function gave the request up. It may queue requests, also
+     *  this one, and cancel others. */
     void (*done)(void *context, struct mbm_clientRequest *request);
-    /**
-     * Your pointer, passed to `done`; may be NULL.
-     */
+    /** Your pointer, passed to `done`; may be NULL. */
     void *context;
-    /**
-     * The data that functions that write send.
-     */
+    /** The data that functions that write send. */
     const void *data;
-    /**
-     * Receives the data that functions that read return; NULL if you want the status only.
-     */
+    /** Receives the data that functions that read return; NULL if you want the status only. */
     void *reply;
-    /**
-     * The number of bytes that `reply` can hold.
-     */
+    /** The number of bytes that `reply` can hold. */
     uint16_t replyBytes;
-    /**
-     * A number of your choice, which the client does not change. In TCP frames no two
-     * pending requests may have the same one, except 0. It is not the transaction identifier
-     * on the wire: mbm_client_wireTransaction returns that.
-     */
+    /** A number of your choice, which the client does not change. In TCP frames no two
+     *  pending requests may have the same one, except 0. It is not the transaction identifier
+     *  on the wire: mbm_client_wireTransaction returns that. */
     uint16_t transaction;
-    /**
-     * The unit identifier of the device. On a serial line 1 to 247; 0 is broadcast; the
-     * client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255. A client
-     * refuses a greater number (MBM_INVALID_ARGUMENT).
-     */
+    /** The unit identifier of the device. On a serial line 1 to 247; 0 is broadcast; the
+     *  client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255. A client
+     *  refuses a greater number (MBM_INVALID_ARGUMENT). */
     uint16_t unit;
-    /**
-     * MBM_PENDING from the call that queues the request until it ends; then its result.
-     */
+    /** MBM_PENDING from the call that queues the request until it ends; then its result. */
     uint8_t status;
-    /**
-     * The exception code of the response as received; 0 if the response was no exception.
-     */
+    /** The exception code of the response as received; 0 if the response was no exception. */
     uint8_t exception;
-    /**
-     * The response timeout of this request in milliseconds, 1 to 1000000 (16 minutes); 0: that
-     * of the unit (mbm_clientUnit) or of the client (mbm_client_setResponseTimeout). A client
-     * refuses a greater number (MBM_INVALID_ARGUMENT).
-     */
+    /** The response timeout of this request in milliseconds, 1 to 1000000 (16 minutes); 0: that
+     *  of the unit (mbm_clientUnit) or of the client (mbm_client_setResponseTimeout). A client
+     *  refuses a greater number (MBM_INVALID_ARGUMENT). */
     uint32_t timeoutMs;
-    /**
-     * The number of bytes received into `reply`.
-     */
+    /** The number of bytes received into `reply`. */
     uint8_t length;
-    /**
-     * How often the client repeats this request at most, 1 to 254; MBM_NO_RETRIES: never; 0:
-     * as often as the unit or mbm_client_setRetries says. With 1 to 254, a client refuses the
-     * request (MBM_INVALID_ARGUMENT) if none of mbm_client_setRetries,
-     * mbm_client_setBusyRetries and mbm_client_setUnits was called on it: only they link the
-     * code for repetitions.
-     */
+    /** How often the client repeats this request at most, 1 to 254; MBM_NO_RETRIES: never; 0:
+     *  as often as the unit or mbm_client_setRetries says. With 1 to 254, a client refuses the
+     *  request (MBM_INVALID_ARGUMENT) if none of mbm_client_setRetries,
+     *  mbm_client_setBusyRetries and mbm_client_setUnits was called on it: only they link the
+     *  code for repetitions. */
     uint8_t retryLimit;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint8_t bytes[6];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[7];
 } mbm_clientRequest;
 
@@ -1540,54 +1133,36 @@ typedef struct mbm_clientRequest {
  * it points to. To give it up, pass `request` to mbm_client_cancel.
  */
 typedef struct mbm_identification {
-    /**
-     * The request for one part of the objects. Set its `unit`. Its `reply` receives one
-     * reply after the other, as mbm_client_readDeviceIdentification says: 250 bytes hold
-     * any, `replyBytes` is their number. On a TCP client you may set `transaction`.
-     * mbm_identification_read sets `done`, `context` and `data`.
+    /** The request for one part of the objects. Set its `unit`. Its `reply` receives one
+     *  reply after the other, as mbm_client_readDeviceIdentification says: 250 bytes hold
+     *  any, `replyBytes` is their number. On a TCP client you may set `transaction`.
+     *  mbm_identification_read sets `done`, `context` and `data`.
      *
-     * Its `status` is that of the identification: MBM_PENDING while objects are missing;
-     * MBM_OK when `object` was called for all; MBM_NO_PROGRESS if the device repeats itself;
-     * MBM_MALFORMED_REPLY also for a reply whose objects are not whole, and for one with
-     * another object than the one that was requested alone; otherwise as of
-     * mbm_client_readCoils. Objects that were handed out before a failure are sound.
-     */
+     *  Its `status` is that of the identification: MBM_PENDING while objects are missing;
+     *  MBM_OK when `object` was called for all; MBM_NO_PROGRESS if the device repeats itself;
+     *  MBM_MALFORMED_REPLY also for a reply whose objects are not whole, and for one with
+     *  another object than the one that was requested alone; otherwise as of
+     *  mbm_client_readCoils. Objects that were handed out before a failure are sound. */
     struct mbm_clientRequest request;
-    /**
-     * Optional: mbm_client_poll calls it for each object. `object` and its data are valid
-     * during the call. It may call what `done` of a request may call: it may queue
-     * requests, and cancel, also this one, which ends the calls.
-     */
+    /** Optional: mbm_client_poll calls it for each object. `object` and its data are valid
+     *  during the call. It may call what `done` of a request may call: it may queue
+     *  requests, and cancel, also this one, which ends the calls. */
     void (*object)(void *context, const struct mbm_object *object);
-    /**
-     * Optional: mbm_client_poll calls it when the identification has ended, as it calls
-     * `done` of a request. It may read the next identification with the same storage.
-     */
+    /** Optional: mbm_client_poll calls it when the identification has ended, as it calls
+     *  `done` of a request. It may read the next identification with the same storage. */
     void (*done)(void *context, struct mbm_identification *identification);
-    /**
-     * Your pointer, passed to both; may be NULL.
-     */
+    /** Your pointer, passed to both; may be NULL. */
     void *context;
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_client *client;
-    /**
-     * How many objects `object` was called for, or would have been.
-     */
+    /** How many objects `object` was called for, or would have been. */
     uint16_t count;
-    /**
-     * The conformity level in the last reply, by the standard 01 to 03 or 81 to 83 (hex). It
-     * is not checked: some devices send a wrong one, and reading does not depend on it.
-     */
+    /** The conformity level in the last reply, by the standard 01 to 03 or 81 to 83 (hex). It
+     *  is not checked: some devices send a wrong one, and reading does not depend on it. */
     uint8_t conformity;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint8_t handingOut;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint16_t stream[2];
 } mbm_identification;
 
@@ -1596,25 +1171,17 @@ typedef struct mbm_identification {
  * mbm_client_reconnect.
  */
 typedef struct mbm_linkHooks {
-    /**
-     * Your pointer, passed to all hooks; may be NULL.
-     */
+    /** Your pointer, passed to all hooks; may be NULL. */
     void *context;
-    /**
-     * Optional: closes the link, if it is open.
-     */
+    /** Optional: closes the link, if it is open. */
     void (*disconnect)(void *context);
-    /**
-     * Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the
-     * link is open, MBM_PENDING if the connection is still being made and the port accepts no
-     * bytes yet, or another status.
-     */
+    /** Optional for mbm_client_reconnect: opens the link without waiting. Returns MBM_OK if the
+     *  link is open, MBM_PENDING if the connection is still being made and the port accepts no
+     *  bytes yet, or another status. */
     uint8_t (*connect)(void *context);
-    /**
-     * For mbm_link_begin only; optional if `connect` never returns MBM_PENDING. Returns MBM_OK
-     * if the link is open, MBM_PENDING while the connection is still being made, or another
-     * status.
-     */
+    /** For mbm_link_begin only; optional if `connect` never returns MBM_PENDING. Returns MBM_OK
+     *  if the link is open, MBM_PENDING while the connection is still being made, or another
+     *  status. */
     uint8_t (*status)(void *context);
 } mbm_linkHooks;
 
@@ -1623,54 +1190,32 @@ typedef struct mbm_linkHooks {
  * zero the counters at any time, but not from an interrupt; each wraps at 2^32.
  */
 typedef struct mbm_clientUnit {
-    /**
-     * Requests that ended, without retries.
-     */
+    /** Requests that ended, without retries. */
     uint32_t requests;
-    /**
-     * Requests that the unit answered, also with an exception.
-     */
+    /** Requests that the unit answered, also with an exception. */
     uint32_t replies;
-    /**
-     * Requests that the unit answered with an exception.
-     */
+    /** Requests that the unit answered with an exception. */
     uint32_t exceptions;
-    /**
-     * Repetitions of requests.
-     */
+    /** Repetitions of requests. */
     uint32_t retries;
-    /**
-     * Set by you: the minimum time from the end of a request to the next request to this
-     * unit, in microseconds; a value above 2^31 (36 minutes) means 2^31.
-     */
+    /** Set by you: the minimum time from the end of a request to the next request to this
+     *  unit, in microseconds; a value above 2^31 (36 minutes) means 2^31. */
     uint32_t delayUs;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t last;
-    /**
-     * Set by you: the response timeout of this unit in milliseconds, 1 to 1000000 (16
-     * minutes); 0: that of mbm_client_setResponseTimeout. mbm_client_setUnits refuses a
-     * greater number. If you set it later, it means 1000000.
-     */
+    /** Set by you: the response timeout of this unit in milliseconds, 1 to 1000000 (16
+     *  minutes); 0: that of mbm_client_setResponseTimeout. mbm_client_setUnits refuses a
+     *  greater number. If you set it later, it means 1000000. */
     uint32_t timeoutMs;
-    /**
-     * Set by you: the unit identifier, 0 to 255. mbm_client_setUnits refuses a greater number.
-     * If you set it later, the record is of no unit.
-     */
+    /** Set by you: the unit identifier, 0 to 255. mbm_client_setUnits refuses a greater number.
+     *  If you set it later, the record is of no unit. */
     uint16_t unit;
-    /**
-     * The status of the last request that ended; MBM_OK if none has ended.
-     */
+    /** The status of the last request that ended; MBM_OK if none has ended. */
     uint8_t status;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint8_t cooling_down;
-    /**
-     * Set by you: how often the client repeats a request to this unit at most, 1 to 254;
-     * MBM_NO_RETRIES: never; 0: as often as mbm_client_setRetries says.
-     */
+    /** Set by you: how often the client repeats a request to this unit at most, 1 to 254;
+     *  MBM_NO_RETRIES: never; 0: as often as mbm_client_setRetries says. */
     uint8_t retryLimit;
 } mbm_clientUnit;
 
@@ -1686,8 +1231,7 @@ typedef struct mbm_clientUnit {
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
  * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
- * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
- *         the client is suspended
+ * @return a status; MBM_BUSY also while the client is suspended
  */
 uint8_t mbm_client_beginRtu(struct mbm_client *client,
                             const struct mbm_port *port,
@@ -1703,8 +1247,7 @@ uint8_t mbm_client_beginRtu(struct mbm_client *client,
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
  * @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
- * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
- *         the client is suspended
+ * @return a status; MBM_BUSY also while the client is suspended
  */
 uint8_t mbm_client_beginAscii(struct mbm_client *client,
                               const struct mbm_port *port,
@@ -1719,8 +1262,7 @@ uint8_t mbm_client_beginAscii(struct mbm_client *client,
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
  * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
- * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
- *         the client is suspended
+ * @return a status; MBM_BUSY also while the client is suspended
  */
 uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
                                    const struct mbm_port *port,
@@ -1734,16 +1276,13 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
  *
  * @param client         the object; initialised with MBM_INIT before the first call
  * @param port           the port, which is copied; read, write and micros must not be NULL
- * @param incoming       the buffer of received bytes, valid for as long as the client is
- *                       used
- * @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger
- *                       buffer takes more responses from one read
- * @param outgoing       the buffer of bytes to send, valid for as long as the client is
- *                       used
- * @param outgoingBytes  bytes of `outgoing`, at least 12; 260 hold any frame. A larger
- *                       buffer collects more requests for one write
- * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
- *         the client is suspended
+ * @param incoming       the buffer of received bytes, valid for as long as the client is used
+ * @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger buffer
+ *                       takes more responses from one read
+ * @param outgoing       the buffer of bytes to send, valid for as long as the client is used
+ * @param outgoingBytes  bytes of `outgoing`, at least 12; 260 hold any frame. A larger buffer
+ *                       collects more requests for one write
+ * @return a status; MBM_BUSY also while the client is suspended
  */
 uint8_t mbm_client_beginTcp(struct mbm_client *client,
                             const struct mbm_port *port,
@@ -1761,8 +1300,7 @@ uint8_t mbm_client_beginTcp(struct mbm_client *client,
  *
  * @param client     the object, begun with mbm_client_beginAscii
  * @param character  1 to 127, except CR, the colon and hexadecimal digits
- * @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
- *         for a client of another framing; MBM_NOT_INITIALISED
+ * @return a status; MBM_BUSY while a request is under way
  */
 uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
 
@@ -1773,9 +1311,9 @@ uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
  * holds 16.
  *
  * @param client  the object
- * @param most    1 to 16; the default is 16. On a serial line and in RTU over TCP only 1
- *                is accepted
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param most    1 to 16; the default is 16. On a serial line and in RTU over TCP only 1 is
+ *                accepted
+ * @return a status
  */
 uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
 
@@ -1787,16 +1325,15 @@ uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
  * @param identification  the storage, with unit, reply buffer and callbacks set
  * @param client          the client that sends the requests; it must stay valid until the
  *                        identification has ended
- * @param code            MBM_DEVICE_ID_BASIC, MBM_DEVICE_ID_REGULAR or
- *                        MBM_DEVICE_ID_EXTENDED: all objects of the category; a device that
- *                        has fewer sends those that it has. MBM_DEVICE_ID_INDIVIDUAL: one
+ * @param code            MBM_DEVICE_ID_BASIC, MBM_DEVICE_ID_REGULAR or MBM_DEVICE_ID_EXTENDED:
+ *                        all objects of the category; a device that has fewer sends those that
+ *                        it has. MBM_DEVICE_ID_INDIVIDUAL: one
  * @param object          the id of the first object, 0 for all, or of the only one. A device
  *                        that does not have the first object begins with its first one
- * @return MBM_PENDING if the first request is queued. Otherwise nothing has changed:
- *         MBM_BUSY if the identification is pending, from within its `object`, and from
- *         within a hook of the port; MBM_ILLEGAL_DATA_VALUE for another `code`;
- *         MBM_INVALID_ARGUMENT if `request.reply` or another pointer is NULL; or another
- *         status of mbm_client_readCoils
+ * @return MBM_PENDING if the first request is queued. Otherwise nothing has changed: MBM_BUSY
+ *         if the identification is pending, and from within its `object`;
+ *         MBM_ILLEGAL_DATA_VALUE for another `code`; MBM_INVALID_ARGUMENT if `request.reply` is
+ *         NULL; or another status of mbm_client_readCoils
  */
 uint8_t mbm_identification_read(struct mbm_identification *identification,
                                 struct mbm_client *client,
@@ -1809,13 +1346,12 @@ uint8_t mbm_identification_read(struct mbm_identification *identification,
  * that were not sent yet are sent over the new link.
  *
  * @param client  the object
- * @param link    your hooks, used during this call only; NULL if you have opened the link
- *                again already
+ * @param link    your hooks, used during this call only; NULL if you have opened the link again
+ *                already
  * @return what `connect` returns, or MBM_OK without `connect`; MBM_BUSY while the client is
- *         suspended; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ *         suspended
  */
-uint8_t mbm_client_reconnect(struct mbm_client *client,
-                             const struct mbm_linkHooks *link);
+uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_linkHooks *link);
 
 /**
  * Returns whether the link works, as far as the client knows.
@@ -1825,9 +1361,9 @@ uint8_t mbm_client_reconnect(struct mbm_client *client,
  * port knows whether it is: for example, call mbm_tcp_isConnected.
  *
  * @param client  the object
- * @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives
- *         or mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first
- *         request. With a link: 0 from each loss of it until it is open again
+ * @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives or
+ *         mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first request. With
+ *         a link: 0 from each loss of it until it is open again
  */
 uint8_t mbm_client_isConnected(const struct mbm_client *client);
 
@@ -1839,11 +1375,9 @@ uint8_t mbm_client_isConnected(const struct mbm_client *client);
  * @param client  the object. If `line` is not NULL, it must use RTU or RTU over TCP
  * @param line    a line, which then uses the client's port; NULL if you use the wire in another
  *                way
- * @return MBM_OK; MBM_BUSY, with both objects unchanged, if a request is under way or the
- *         client is suspended already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; MBM_BUSY if a request is under way or the client is suspended already
  */
-uint8_t mbm_client_suspend(struct mbm_client *client,
-                           struct mbm_line *line);
+uint8_t mbm_client_suspend(struct mbm_client *client, struct mbm_line *line);
 
 /**
  * Resumes the client. The line then has no port: requests of its nodes return
@@ -1851,9 +1385,8 @@ uint8_t mbm_client_suspend(struct mbm_client *client,
  *
  * @param client  the object
  * @param line    the line that was passed to mbm_client_suspend; NULL if none was
- * @return MBM_OK; MBM_BUSY while a request is under way on the line;
- *         MBM_INVALID_ARGUMENT if the client was not suspended, and for any other line;
- *         MBM_NOT_INITIALISED
+ * @return a status; MBM_BUSY while a request is under way on the line; MBM_INVALID_ARGUMENT if
+ *         the client was not suspended, and for any other line
  */
 uint8_t mbm_client_resume(struct mbm_client *client, struct mbm_line *line);
 
@@ -1865,9 +1398,8 @@ uint8_t mbm_client_resume(struct mbm_client *client, struct mbm_line *line);
  * Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
  *
  * @param client  the object
- * @return MBM_PENDING while requests are pending; MBM_OK if none is; MBM_BUSY from within
- *         `done` or a hook of the port, and while the client is suspended;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_PENDING while requests are pending; MBM_OK if none is; MBM_BUSY also from within
+ *         `done`, and while the client is suspended
  */
 uint8_t mbm_client_poll(struct mbm_client *client);
 
@@ -1878,9 +1410,9 @@ uint8_t mbm_client_poll(struct mbm_client *client);
  * when the link is to be opened again, and is at most one second while the client is idle.
  *
  * @param client  the object
- * @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF
- *         means that no request is pending. While a TCP port accepts no bytes to send it is
- *         1000: to poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
+ * @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF means
+ *         that no request is pending. While a TCP port accepts no bytes to send it is 1000: to
+ *         poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
  */
 uint32_t mbm_client_pollDelay(struct mbm_client *client);
 
@@ -1899,20 +1431,18 @@ uint8_t mbm_client_pending(const struct mbm_client *client);
  *
  * @param client   the object
  * @param request  a request that was queued on this client
- * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
- *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
- *         MBM_NOT_INITIALISED
+ * @return a status; MBM_NOT_PENDING for a request that has ended already or was never queued
+ *         here
  */
-uint8_t mbm_client_cancel(struct mbm_client *client,
-                          struct mbm_clientRequest *request);
+uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
 
 /**
  * Returns the transaction identifier on the wire: that of the TCP frame in which the client
  * sent the request last. The client chooses a new one for each frame, also for a retry.
  *
  * @param request  a request, pending or ended
- * @return the identifier; 0 in other framings, for a request that was never sent, and
- *         for NULL. 0 may also be the identifier of a frame
+ * @return the identifier; 0 in other framings, for a request that was never sent, and for NULL.
+ *         0 may also be the identifier of a frame
  */
 uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
 
@@ -1925,10 +1455,9 @@ uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
  *
  * @param client   the object
  * @param retries  0 to 255; the default is 0
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_client_setRetries(struct mbm_client *client,
-                              uint8_t retries);
+uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
 
 /**
  * Sets that the client repeats a request that a busy device refuses: one that the device
@@ -1946,10 +1475,10 @@ uint8_t mbm_client_setRetries(struct mbm_client *client,
  * client sends other requests, also to this unit.
  *
  * @param client   the object
- * @param retries  the most repetitions of one request for this reason, 0 (the default) to
- *                 255; the request then ends with the status 5 or 6
+ * @param retries  the most repetitions of one request for this reason, 0 (the default) to 255;
+ *                 the request then ends with the status 5 or 6
  * @param waitMs   the wait before each repetition in milliseconds, 0 to 65535
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_client_setBusyRetries(struct mbm_client *client,
                                   uint8_t retries,
@@ -1959,11 +1488,11 @@ uint8_t mbm_client_setBusyRetries(struct mbm_client *client,
  * Sets how long a request waits before the client repeats it. Meanwhile the client sends
  * other requests.
  *
- * @param client            the object
- * @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
- * @param delayMs           the wait before the first repetition, in milliseconds, 0 to 1000000
- * @param maxDelayMs        the longest wait, in milliseconds, 0 to 1000000
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param client      the object
+ * @param backoff     MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
+ * @param delayMs     the wait before the first repetition, in milliseconds, 0 to 1000000
+ * @param maxDelayMs  the longest wait, in milliseconds, 0 to 1000000
+ * @return a status
  */
 uint8_t mbm_client_setBackoff(struct mbm_client *client,
                               uint8_t backoff,
@@ -1977,12 +1506,11 @@ uint8_t mbm_client_setBackoff(struct mbm_client *client,
  * @param client   the object
  * @param percent  0 (the default) to 100: the largest part of the wait by which the client
  *                 shortens it
- * @param random   returns a new random number at each call, for example that of rand(). It
- *                 may have 32 bits, 15 bits, or random bits in its upper half only. A
- *                 function that it calls on the client returns MBM_BUSY. NULL only if
- *                 `percent` is 0
+ * @param random   returns a new random number at each call, for example that of rand(). It may
+ *                 have 32 bits, 15 bits, or random bits in its upper half only. A function that
+ *                 it calls on the client returns MBM_BUSY. NULL only if `percent` is 0
  * @param context  your pointer, passed to `random`; may be NULL
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_client_setJitter(struct mbm_client *client,
                              uint8_t percent,
@@ -2007,20 +1535,19 @@ uint8_t mbm_client_setJitter(struct mbm_client *client,
  * has ended.
  *
  * @param request   a request that has ended
- * @param pdu       receives the PDU of the reply, to which the packet's data point; it must
- *                  not overlap `reply` and `data` of the request
+ * @param pdu       receives the PDU of the reply, to which the packet's data point; it must not
+ *                  overlap `reply` and `data` of the request
  * @param capacity  bytes of `pdu`; MBM_MAX_PDU hold any reply
  * @param packet    receives the packet, with the unit of the request, and in TCP frames the
  *                  transaction identifier of the reply; it changes only for MBM_OK
- * @return MBM_OK, also for an exception, whose kind is MBM_PACKET_EXCEPTION; MBM_PENDING
- *         if the request has not ended; the request's status if it ended without a reply,
- *         or was not queued; MBM_BUFFER_TOO_SMALL if the reply's data did not fit into
- *         `reply`, if `reply` is NULL, or if `capacity` is too small; MBM_MALFORMED_REPLY
- *         if the data are not those of a reply of the function, although the client
- *         accepted them: it does not look into an event log or a device identification;
- *         MBM_INVALID_ARGUMENT for NULL, overlapping memory, a request that was never
- *         queued, and for a request that no device answers: a broadcast, or sub-function
- *         04 of 08
+ * @return MBM_OK, also for an exception, whose kind is MBM_PACKET_EXCEPTION; MBM_PENDING if the
+ *         request has not ended; the request's status if it ended without a reply, or was not
+ *         queued; MBM_BUFFER_TOO_SMALL if the reply's data did not fit into `reply`, if `reply`
+ *         is NULL, or if `capacity` is too small; MBM_MALFORMED_REPLY if the data are not those
+ *         of a reply of the function, although the client accepted them: it does not look into
+ *         an event log or a device identification; MBM_INVALID_ARGUMENT for overlapping memory,
+ *         a request that was never queued, and one that no device answers: a broadcast, or
+ *         sub-function 04 of 08
  */
 uint8_t mbm_client_reply(const struct mbm_clientRequest *request,
                          uint8_t *pdu,
@@ -2038,18 +1565,16 @@ uint8_t mbm_client_reply(const struct mbm_clientRequest *request,
  * MBM_LINE_BUSY, MBM_CONNECT_TIMED_OUT, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes
  * only if it is MBM_OK.
  *
- * @param client   the object
- * @param request  the request
- * @param address  the first coil, 0 to 65535, as on the wire
+ * @param client    the object
+ * @param request   the request
+ * @param address   the first coil, 0 to 65535, as on the wire
  * @param quantity  the number of coils, 1 to 2000
- * @return MBM_PENDING if the request is queued. Otherwise nothing was queued, and the
- *         request's `status` is the same: MBM_ILLEGAL_DATA_VALUE or
- *         MBM_ILLEGAL_DATA_ADDRESS for a request that no device could accept,
- *         MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL, MBM_DUPLICATE_TRANSACTION,
- *         MBM_BUFFER_TOO_SMALL if `reply` cannot hold the data, MBM_INVALID_ARGUMENT if
- *         `data` is NULL. With the request unchanged: MBM_BUSY if the request is pending
- *         already, or from within a hook of the port; MBM_INVALID_ARGUMENT if a pointer is
- *         NULL; MBM_NOT_INITIALISED
+ * @return MBM_PENDING if the request is queued. Otherwise nothing was queued, and the request's
+ *         `status` is the same: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for a
+ *         request that no device could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
+ *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` cannot hold the data,
+ *         MBM_INVALID_ARGUMENT if `data` is NULL. With the request unchanged: MBM_BUSY also if
+ *         the request is pending already
  */
 uint8_t mbm_client_readCoils(struct mbm_client *client,
                              struct mbm_clientRequest *request,
@@ -2060,9 +1585,9 @@ uint8_t mbm_client_readCoils(struct mbm_client *client,
  * Function 02: reads discrete inputs into the bytes of `reply`, as mbm_client_readCoils
  * does (V1.1b3, 6.2).
  *
- * @param client   the object
- * @param request  the request
- * @param address  the first input, 0 to 65535, as on the wire
+ * @param client    the object
+ * @param request   the request
+ * @param address   the first input, 0 to 65535, as on the wire
  * @param quantity  the number of inputs, 1 to 2000
  * @return a status; see mbm_client_readCoils
  */
@@ -2074,9 +1599,9 @@ uint8_t mbm_client_readDiscreteInputs(struct mbm_client *client,
 /**
  * Function 03: reads holding registers into the words of `reply` (V1.1b3, 6.3).
  *
- * @param client   the object
- * @param request  the request
- * @param address  the first register, 0 to 65535, as on the wire
+ * @param client    the object
+ * @param request   the request
+ * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
@@ -2088,9 +1613,9 @@ uint8_t mbm_client_readHoldingRegisters(struct mbm_client *client,
 /**
  * Function 04: reads input registers into the words of `reply` (V1.1b3, 6.4).
  *
- * @param client   the object
- * @param request  the request
- * @param address  the first register, 0 to 65535, as on the wire
+ * @param client    the object
+ * @param request   the request
+ * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
@@ -2105,7 +1630,7 @@ uint8_t mbm_client_readInputRegisters(struct mbm_client *client,
  * @param client   the object
  * @param request  the request
  * @param address  the coil, 0 to 65535, as on the wire
- * @param on  0 is off, any other value is on
+ * @param on       0 is off, any other value is on
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
@@ -2119,7 +1644,7 @@ uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
  * @param client   the object
  * @param request  the request
  * @param address  the register, 0 to 65535, as on the wire
- * @param value  its new value
+ * @param value    its new value
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
@@ -2131,9 +1656,9 @@ uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
  * Function 0F: writes coils from the bytes of `data`, eight in each byte. The first coil is
  * the lowest bit (V1.1b3, 6.11).
  *
- * @param client   the object
- * @param request  the request
- * @param address  the first coil, 0 to 65535, as on the wire
+ * @param client    the object
+ * @param request   the request
+ * @param address   the first coil, 0 to 65535, as on the wire
  * @param quantity  the number of coils, 1 to 1968
  * @return a status; see mbm_client_readCoils
  */
@@ -2145,9 +1670,9 @@ uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
 /**
  * Function 10: writes the words of `data` to holding registers (V1.1b3, 6.12).
  *
- * @param client   the object
- * @param request  the request
- * @param address  the first register, 0 to 65535, as on the wire
+ * @param client    the object
+ * @param request   the request
+ * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 123
  * @return a status; see mbm_client_readCoils
  */
@@ -2164,7 +1689,7 @@ uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
  * @param request  the request
  * @param address  the register, 0 to 65535, as on the wire
  * @param andMask  1 for each bit of the register to keep
- * @param orMask  the new value of the bits that are not kept
+ * @param orMask   the new value of the bits that are not kept
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
@@ -2177,11 +1702,11 @@ uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
  * Function 17: the device writes the words of `data` to holding registers first. Then it
  * reads holding registers, which arrive in the words of `reply` (V1.1b3, 6.17).
  *
- * @param client   the object
- * @param request  the request
- * @param readAddress  the first register to read, 0 to 65535
- * @param readQuantity  the number of registers to read, 1 to 125
- * @param writeAddress  the first register to write, 0 to 65535
+ * @param client         the object
+ * @param request        the request
+ * @param readAddress    the first register to read, 0 to 65535
+ * @param readQuantity   the number of registers to read, 1 to 125
+ * @param writeAddress   the first register to write, 0 to 65535
  * @param writeQuantity  the number of registers to write, 1 to 121
  * @return a status; see mbm_client_readCoils
  */
@@ -2207,12 +1732,12 @@ uint8_t mbm_client_readExceptionStatus(struct mbm_client *client,
  * Function 08: sends the words of `data`, and reads the same number of words into `reply`
  * (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
  *
- * @param client   the object
- * @param request  the request
- * @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others,
- *                     which the standard reserves, and expects a response of one word; for
- *                     a response of another length use mbm_client_custom
- * @param words  the number of words of `data`: 1; for sub-function 0, 1 to 125
+ * @param client       the object
+ * @param request      the request
+ * @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which
+ *                     the standard reserves, and expects a response of one word; for a response
+ *                     of another length use mbm_client_custom
+ * @param words        the number of words of `data`: 1; for sub-function 0, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_diagnostics(struct mbm_client *client,
@@ -2260,10 +1785,10 @@ uint8_t mbm_client_reportServerId(struct mbm_client *client,
  * Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
  * 6.14).
  *
- * @param client   the object
- * @param request  the request
- * @param file  the file number, 1 to 65535
- * @param record  the first record, 0 to 9999
+ * @param client    the object
+ * @param request   the request
+ * @param file      the file number, 1 to 65535
+ * @param record    the first record, 0 to 9999
  * @param quantity  the number of records, 1 to 121
  * @return a status; see mbm_client_readCoils
  */
@@ -2277,10 +1802,10 @@ uint8_t mbm_client_readFileRecord(struct mbm_client *client,
  * Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
  * 6.15).
  *
- * @param client   the object
- * @param request  the request
- * @param file  the file number, 1 to 65535
- * @param record  the first record, 0 to 9999
+ * @param client    the object
+ * @param request   the request
+ * @param file      the file number, 1 to 65535
+ * @param record    the first record, 0 to 9999
  * @param quantity  the number of records, 1 to 122
  * @return a status; see mbm_client_readCoils
  */
@@ -2310,8 +1835,8 @@ uint8_t mbm_client_readFifoQueue(struct mbm_client *client,
  *
  * @param client   the object
  * @param request  the request
- * @param code  the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
- * @param object  the id of the first object to read
+ * @param code     the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
+ * @param object   the id of the first object to read
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
@@ -2354,8 +1879,8 @@ uint8_t mbm_client_custom(struct mbm_client *client,
  * @param client    the object
  * @param request   the request; if it is queued, its `data` then points into `body`
  * @param function  the function code, 1 to 127
- * @param body      the bytes after the function code; do not change them until the request
- *                  has ended; may be NULL if `bytes` is 0
+ * @param body      the bytes after the function code; do not change them until the request has
+ *                  ended; may be NULL if `bytes` is 0
  * @param bytes     the number of bytes of `body`, 0 to 252
  * @return a status; see mbm_client_readCoils. Also those with which a server answers such a
  *         request: MBM_ILLEGAL_DATA_VALUE if the length or a count in `body` is wrong,
@@ -2373,12 +1898,11 @@ uint8_t mbm_client_forward(struct mbm_client *client,
  * the outgoing buffer, also if the port accepts it later. `timeoutMs` of a request or of a unit
  * replaces this time.
  *
- * @param client        the object
- * @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param client     the object
+ * @param timeoutMs  milliseconds, 0 to 1000000 (16 minutes); the default is 2000
+ * @return a status
  */
-uint8_t mbm_client_setResponseTimeout(struct mbm_client *client,
-                                      uint32_t timeoutMs);
+uint8_t mbm_client_setResponseTimeout(struct mbm_client *client, uint32_t timeoutMs);
 
 /**
  * Sets the baud rate from which the client computes the gap before an RTU request (t3.5,
@@ -2387,31 +1911,29 @@ uint8_t mbm_client_setResponseTimeout(struct mbm_client *client,
  *
  * @param client  the object
  * @param baud    bits per second; 0 (the default): unknown
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_client_setBaudRate(struct mbm_client *client,
-                               uint32_t baud);
+uint8_t mbm_client_setBaudRate(struct mbm_client *client, uint32_t baud);
 
 /**
  * Sets the silence before a request, instead of t3.5. A later call of
  * mbm_client_setBaudRate sets it back to t3.5. It has no effect on TCP.
  *
- * @param client        the object
- * @param gapUs         microseconds from the last byte received or sent; a value above 2^31
- *                      (36 minutes) means 2^31
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param client  the object
+ * @param gapUs   microseconds from the last byte received or sent; a value above 2^31 (36
+ *                minutes) means 2^31
+ * @return a status
  */
-uint8_t mbm_client_setGap(struct mbm_client *client,
-                          uint32_t gapUs);
+uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t gapUs);
 
 /**
  * Sets the turnaround delay: how long the client waits after a request that no device
  * answers. These requests are a broadcast (serial line guide V1.02, 2.4.1), and 08 with
  * sub-function 04.
  *
- * @param client        the object
- * @param delayMs       milliseconds, 0 to 65535; the default is 100
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param client   the object
+ * @param delayMs  milliseconds, 0 to 65535; the default is 100
+ * @return a status
  */
 uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint32_t delayMs);
 
@@ -2424,12 +1946,11 @@ uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint32_t delayM
  * repeats data of your choice. If no other request has the same data, no late reply can be
  * taken for it, and after its reply the next replies of that unit are not held either.
  *
- * @param client        the object
- * @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param client   the object
+ * @param quietMs  milliseconds, 0 to 65535; the default is 100; 0 holds no reply
+ * @return a status
  */
-uint8_t mbm_client_setQuietTime(struct mbm_client *client,
-                                uint32_t quietMs);
+uint8_t mbm_client_setQuietTime(struct mbm_client *client, uint32_t quietMs);
 
 /**
  * Switches echo discarding on or off. Switch it on if the receiver also receives what the
@@ -2438,7 +1959,7 @@ uint8_t mbm_client_setQuietTime(struct mbm_client *client,
  *
  * @param client  the object
  * @param on      0 (the default) or 1
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
 
@@ -2447,9 +1968,9 @@ uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
  * returns before the last bit was sent. It has no effect on TCP.
  *
  * @param client      the object
- * @param characters  the time in characters at the baud rate of mbm_client_setBaudRate
- *                    (without one, at 9600); the default is 0
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param characters  the time in characters at the baud rate of mbm_client_setBaudRate (without
+ *                    one, at 9600); the default is 0
+ * @return a status
  */
 uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t characters);
 
@@ -2461,10 +1982,9 @@ uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t character
  *
  * @param client    the object
  * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_client_setCounters(struct mbm_client *client,
-                               struct mbm_counters *counters);
+uint8_t mbm_client_setCounters(struct mbm_client *client, struct mbm_counters *counters);
 
 /**
  * Sets the records of units. In a record the client counts the requests to its unit. The
@@ -2475,9 +1995,8 @@ uint8_t mbm_client_setCounters(struct mbm_client *client,
  * @param units   your array of records, initialised with MBM_INIT except for the fields that
  *                you set; NULL for none
  * @param count   the number of records, 0 to 255
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a record with a `unit` above 255 or a
- *         `timeoutMs` above 1000000; MBM_NOT_INITIALISED. A call that is refused changes
- *         nothing
+ * @return a status; MBM_INVALID_ARGUMENT for a record with a `unit` above 255 or a `timeoutMs`
+ *         above 1000000
  */
 uint8_t mbm_client_setUnits(struct mbm_client *client,
                             struct mbm_clientUnit *units,
@@ -2485,85 +2004,38 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
 
 /* ==== 7. Plan ======================================================================= */
 
-/**
- * A table of the data model (V1.1b3, 4.3): coils. The number of each table is that of the
- * function that reads it.
- */
+/** A table of the data model (V1.1b3, 4.3): coils. The number of each table is that of the
+ *  function that reads it. */
 #define MBM_TABLE_COILS 1u
-
-/**
- * The discrete inputs.
- */
+/** The discrete inputs. */
 #define MBM_TABLE_DISCRETE_INPUTS 2u
-
-/**
- * The holding registers.
- */
+/** The holding registers. */
 #define MBM_TABLE_HOLDING_REGISTERS 3u
-
-/**
- * The input registers.
- */
+/** The input registers. */
 #define MBM_TABLE_INPUT_REGISTERS 4u
-
-/**
- * The type of a value: a coil or a discrete input, 0 or 1.
- */
+/** The type of a value: a coil or a discrete input, 0 or 1. */
 #define MBM_TYPE_BIT 1u
-
-/**
- * One register, 0 to 65535.
- */
+/** One register, 0 to 65535. */
 #define MBM_TYPE_UINT16 2u
-
-/**
- * One register, -32768 to 32767.
- */
+/** One register, -32768 to 32767. */
 #define MBM_TYPE_INT16 3u
-
-/**
- * Two registers.
- */
+/** Two registers. */
 #define MBM_TYPE_UINT32 4u
-
-/**
- * Two registers, two's complement.
- */
+/** Two registers, two's complement. */
 #define MBM_TYPE_INT32 5u
-
-/**
- * Four registers.
- */
+/** Four registers. */
 #define MBM_TYPE_UINT64 6u
-
-/**
- * Four registers, two's complement.
- */
+/** Four registers, two's complement. */
 #define MBM_TYPE_INT64 7u
-
-/**
- * Two registers, an IEEE 754 binary32.
- */
+/** Two registers, an IEEE 754 binary32. */
 #define MBM_TYPE_FLOAT 8u
-
-/**
- * Four registers, an IEEE 754 binary64.
- */
+/** Four registers, an IEEE 754 binary64. */
 #define MBM_TYPE_DOUBLE 9u
-
-/**
- * A text, two characters a register, which ends at its first NUL or with its field.
- */
+/** A text, two characters a register, which ends at its first NUL or with its field. */
 #define MBM_TYPE_TEXT 10u
-
-/**
- * The longest interval of a field in milliseconds: a day.
- */
+/** The longest interval of a field in milliseconds: a day. */
 #define MBM_PLAN_LONGEST_INTERVAL 86400000
-
-/**
- * The most fields of one plan.
- */
+/** The most fields of one plan. */
 #define MBM_PLAN_MAX_FIELDS 16383
 
 /**
@@ -2574,13 +2046,9 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
  * mbm_plan_end.
  */
 typedef struct mbm_plan {
-    /**
-     * Private.
-     */
+    /** Private. */
     void *pointers[3];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[4];
 } mbm_plan;
 
@@ -2589,42 +2057,24 @@ typedef struct mbm_plan {
  * unit again and again. A table of them may be constant.
  */
 typedef struct mbm_planField {
-    /**
-     * The unit, 1 to 255. mbm_plan_begin refuses a greater number.
-     */
+    /** The unit, 1 to 255. mbm_plan_begin refuses a greater number. */
     uint16_t unit;
-    /**
-     * One of MBM_TABLE_...
-     */
+    /** One of MBM_TABLE_... */
     uint8_t table;
-    /**
-     * One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, another for registers.
-     */
+    /** One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, another for registers. */
     uint8_t type;
-    /**
-     * One of MBM_ORDER_...; MBM_ORDER_DEFAULT is MBM_ORDER_ABCD.
-     */
+    /** One of MBM_ORDER_...; MBM_ORDER_DEFAULT is MBM_ORDER_ABCD. */
     uint8_t order;
-    /**
-     * The first bit or register, 0 to 65535, as on the wire.
-     */
+    /** The first bit or register, 0 to 65535, as on the wire. */
     uint16_t address;
-    /**
-     * The number of values; of a text the number of characters. 0 means 1.
-     */
+    /** The number of values; of a text the number of characters. 0 means 1. */
     uint16_t count;
-    /**
-     * The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL.
-     */
+    /** The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL. */
     uint32_t intervalMs;
-    /**
-     * mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
-     * It is 0 for a text.
-     */
+    /** mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
+     *  It is 0 for a text. */
     int32_t multiplier;
-    /**
-     * They divide by this after that; 0 means 1. Not negative; 0 for a text.
-     */
+    /** They divide by this after that; 0 means 1. Not negative; 0 for a text. */
     int32_t divisor;
 } mbm_planField;
 
@@ -2632,9 +2082,7 @@ typedef struct mbm_planField {
  * Storage of a plan, one for each field.
  */
 typedef struct mbm_planPosition {
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[2];
 } mbm_planPosition;
 
@@ -2642,9 +2090,7 @@ typedef struct mbm_planPosition {
  * Storage of a plan, one for each read.
  */
 typedef struct mbm_planRead {
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[8];
 } mbm_planRead;
 
@@ -2652,17 +2098,11 @@ typedef struct mbm_planRead {
  * How much one read of a unit may request, if not as much as the plan's other reads.
  */
 typedef struct mbm_planUnitLimits {
-    /**
-     * Bits, 1 to 2000; 0 means as `bitsPerRead` of the plan.
-     */
+    /** Bits, 1 to 2000; 0 means as `bitsPerRead` of the plan. */
     uint16_t bitsPerRead;
-    /**
-     * Registers, 1 to 125; 0 means as `registersPerRead` of the plan.
-     */
+    /** Registers, 1 to 125; 0 means as `registersPerRead` of the plan. */
     uint16_t registersPerRead;
-    /**
-     * The unit, 1 to 255. mbm_plan_begin refuses a greater number.
-     */
+    /** The unit, 1 to 255. mbm_plan_begin refuses a greater number. */
     uint16_t unit;
 } mbm_planUnitLimits;
 
@@ -2670,21 +2110,13 @@ typedef struct mbm_planUnitLimits {
  * Addresses that no read of a plan may touch.
  */
 typedef struct mbm_planExcludedRange {
-    /**
-     * The first address.
-     */
+    /** The first address. */
     uint16_t first;
-    /**
-     * The last address, not less than `first`.
-     */
+    /** The last address, not less than `first`. */
     uint16_t last;
-    /**
-     * The unit, 1 to 255; 0 for every unit. mbm_plan_begin refuses a greater number.
-     */
+    /** The unit, 1 to 255; 0 for every unit. mbm_plan_begin refuses a greater number. */
     uint16_t unit;
-    /**
-     * One of MBM_TABLE_...
-     */
+    /** One of MBM_TABLE_... */
     uint8_t table;
 } mbm_planExcludedRange;
 
@@ -2693,94 +2125,52 @@ typedef struct mbm_planExcludedRange {
  * that it points to, for as long as the plan is used.
  */
 typedef struct mbm_planSetup {
-    /**
-     * The fields, in any order.
-     */
+    /** The fields, in any order. */
     const struct mbm_planField *fields;
-    /**
-     * Storage: as many as fields.
-     */
+    /** Storage: as many as fields. */
     struct mbm_planPosition *positions;
-    /**
-     * Storage: as many as reads; there are never more reads than fields.
-     */
+    /** Storage: as many as reads; there are never more reads than fields. */
     struct mbm_planRead *reads;
-    /**
-     * Storage: the registers of all reads and the bits of all reads, 16 to a word.
-     */
+    /** Storage: the registers of all reads and the bits of all reads, 16 to a word. */
     uint16_t *data;
-    /**
-     * Storage: the requests with which the plan reads, initialised with MBM_INIT; they are the
-     * plan's alone. With one it sends one read after the other; more are for Modbus TCP, where
-     * several may be under way at once.
-     */
+    /** Storage: the requests with which the plan reads, initialised with MBM_INIT; they are the
+     *  plan's alone. With one it sends one read after the other; more are for Modbus TCP, where
+     *  several may be under way at once. */
     struct mbm_clientRequest *requests;
-    /**
-     * Units with limits of their own; NULL for none.
-     */
+    /** Units with limits of their own; NULL for none. */
     const struct mbm_planUnitLimits *units;
-    /**
-     * Addresses that no read may touch; NULL for none.
-     */
+    /** Addresses that no read may touch; NULL for none. */
     const struct mbm_planExcludedRange *excluded;
-    /**
-     * Optional: called by mbm_plan_poll for each field of a read that has ended, and for each
-     * field of a unit that the plan takes for silent. It may call every function on the plan
-     * and on the client.
-     */
+    /** Optional: called by mbm_plan_poll for each field of a read that has ended, and for each
+     *  field of a unit that the plan takes for silent. It may call every function on the plan
+     *  and on the client. */
     void (*update)(void *context, struct mbm_plan *plan, uint16_t field);
-    /**
-     * Handed to `update`. Yours, may be NULL.
-     */
+    /** Handed to `update`. Yours, may be NULL. */
     void *context;
-    /**
-     * How long the plan leaves a unit alone after a first request without an answer, in
-     * milliseconds; each further one doubles it. 0 means 1000.
-     */
+    /** How long the plan leaves a unit alone after a first request without an answer, in
+     *  milliseconds; each further one doubles it. 0 means 1000. */
     uint32_t backoffMs;
-    /**
-     * The longest such time in milliseconds; 0 means 60000.
-     */
+    /** The longest such time in milliseconds; 0 means 60000. */
     uint32_t longestBackoffMs;
-    /**
-     * How many fields, 1 to MBM_PLAN_MAX_FIELDS.
-     */
+    /** How many fields, 1 to MBM_PLAN_MAX_FIELDS. */
     uint16_t fieldCount;
-    /**
-     * How many reads there is storage for.
-     */
+    /** How many reads there is storage for. */
     uint16_t readCount;
-    /**
-     * How many words there are in `data`.
-     */
+    /** How many words there are in `data`. */
     uint16_t dataWords;
-    /**
-     * The most bits that one read requests, 1 to 2000; 0 means 2000.
-     */
+    /** The most bits that one read requests, 1 to 2000; 0 means 2000. */
     uint16_t bitsPerRead;
-    /**
-     * The most bits between two fields that one read may cover as well.
-     */
+    /** The most bits between two fields that one read may cover as well. */
     uint16_t bitGap;
-    /**
-     * The most registers that one read requests, 1 to 125; 0 means 125.
-     */
+    /** The most registers that one read requests, 1 to 125; 0 means 125. */
     uint16_t registersPerRead;
-    /**
-     * The most registers between two fields that one read may cover as well.
-     */
+    /** The most registers between two fields that one read may cover as well. */
     uint16_t registerGap;
-    /**
-     * How many requests, 1 to 16.
-     */
+    /** How many requests, 1 to 16. */
     uint8_t requestCount;
-    /**
-     * How many units with limits of their own.
-     */
+    /** How many units with limits of their own. */
     uint8_t unitCount;
-    /**
-     * How many excluded ranges.
-     */
+    /** How many excluded ranges. */
     uint8_t excludedCount;
 } mbm_planSetup;
 
@@ -2788,29 +2178,17 @@ typedef struct mbm_planSetup {
  * A read of a plan: one request that it repeats.
  */
 typedef struct mbm_planReadInfo {
-    /**
-     * The time from one read to the next, in milliseconds.
-     */
+    /** The time from one read to the next, in milliseconds. */
     uint32_t intervalMs;
-    /**
-     * The first bit or register, as on the wire.
-     */
+    /** The first bit or register, as on the wire. */
     uint16_t address;
-    /**
-     * How many bits or registers.
-     */
+    /** How many bits or registers. */
     uint16_t quantity;
-    /**
-     * The unit.
-     */
+    /** The unit. */
     uint8_t unit;
-    /**
-     * One of MBM_TABLE_...
-     */
+    /** One of MBM_TABLE_... */
     uint8_t table;
-    /**
-     * How it ended last; MBM_PENDING before it has ended once.
-     */
+    /** How it ended last; MBM_PENDING before it has ended once. */
     uint8_t status;
 } mbm_planReadInfo;
 
@@ -2832,19 +2210,15 @@ typedef struct mbm_planReadInfo {
  *                plans
  * @param setup   table, limits and storage; it stays valid and as it is until the plan ends
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
- * @return MBM_OK; MBM_BUSY from within a hook of the client's port; of a field
- *         MBM_INVALID_ARGUMENT for an unknown table, type or order, a type that the table does
- *         not have, a unit above 255, an interval out of range, a negative divisor or a scale
- *         of a text,
- *         MBM_BROADCAST_NOT_ALLOWED for unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
- *         address 65535 or into an excluded range, MBM_ILLEGAL_DATA_VALUE if it is longer than
- *         a read may be, MBM_FIELDS_OVERLAP for the later of two that share an address,
- *         MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data;
- *         MBM_INVALID_ARGUMENT also for NULL pointers, counts out of range, and a unit above
- *         255 of limits or of an excluded range;
- *         MBM_NOT_INITIALISED for a client that was never begun. After the status of a field
- *         the plan has ended, and `positions` and `reads` may be changed; after any other
- *         nothing is
+ * @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or
+ *         order, a type that the table does not have, a unit above 255, an interval out of
+ *         range, a negative divisor or a scale of a text; MBM_BROADCAST_NOT_ALLOWED for unit 0;
+ *         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range;
+ *         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be; MBM_FIELDS_OVERLAP for the
+ *         later of two that share an address; MBM_BUFFER_TOO_SMALL for the first without
+ *         storage for its read or its data. After such a status the plan has ended, and
+ *         `positions` and `reads` may be changed. MBM_INVALID_ARGUMENT also for a unit above
+ *         255 of limits or of an excluded range
  */
 uint8_t mbm_plan_begin(struct mbm_plan *plan,
                        struct mbm_client *client,
@@ -2855,8 +2229,7 @@ uint8_t mbm_plan_begin(struct mbm_plan *plan,
  * Ends a plan: gives its requests up and lets go of its storage.
  *
  * @param plan  the object
- * @return MBM_OK; MBM_BUSY from within a hook of the client's port, with nothing changed;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_plan_end(struct mbm_plan *plan);
 
@@ -2866,8 +2239,7 @@ uint8_t mbm_plan_end(struct mbm_plan *plan);
  * poll the client: call mbm_client_poll after it.
  *
  * @param plan  the object
- * @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT;
- *         MBM_NOT_INITIALISED, also for a client that was zeroed
+ * @return a status
  */
 uint8_t mbm_plan_poll(struct mbm_plan *plan);
 
@@ -2892,12 +2264,9 @@ uint32_t mbm_plan_pollDelay(struct mbm_plan *plan);
  * @param ageMs  gets the milliseconds since the value arrived, 2147483647 (24 days) at most;
  *               0xFFFFFFFF if none ever did; may be NULL
  * @return MBM_PENDING before the first read has ended, then as it ended: MBM_OK, an exception
- *         of the device, or a failure such as MBM_RESPONSE_TIMED_OUT; MBM_INVALID_ARGUMENT
- *         for a field that is not there, or MBM_NOT_INITIALISED, with `ageMs` unchanged
+ *         of the device, or a failure such as MBM_RESPONSE_TIMED_OUT
  */
-uint8_t mbm_plan_getStatus(struct mbm_plan *plan,
-                           uint16_t field,
-                           uint32_t *ageMs);
+uint8_t mbm_plan_getStatus(struct mbm_plan *plan, uint16_t field, uint32_t *ageMs);
 
 /**
  * A value as an integer: multiplied and divided as its field says, rounded to the nearest,
@@ -2907,10 +2276,9 @@ uint8_t mbm_plan_getStatus(struct mbm_plan *plan,
  * @param field  the index of the field, of a bit or an integer
  * @param index  which of its values, 0 for the first
  * @param value  gets the number
- * @return MBM_OK; MBM_OUT_OF_RANGE if it is not in the range of `value`;
- *         MBM_INVALID_ARGUMENT, also for a float or a text; MBM_NOT_INITIALISED; if no value
- *         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
- *         only
+ * @return a status; MBM_OUT_OF_RANGE if it is not in the range of `value`; MBM_INVALID_ARGUMENT
+ *         for a float or a text; if no value has arrived yet the status that mbm_plan_getStatus
+ *         returns
  */
 uint8_t mbm_plan_getInteger(const struct mbm_plan *plan,
                             uint16_t field,
@@ -2924,9 +2292,9 @@ uint8_t mbm_plan_getInteger(const struct mbm_plan *plan,
  * @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
  * @param index  which of its values, 0 for the first
  * @param value  gets the number
- * @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half
- *         of the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of
- *         64 bits
+ * @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half of
+ *         the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of 64
+ *         bits
  */
 uint8_t mbm_plan_getInt32(const struct mbm_plan *plan,
                           uint16_t field,
@@ -2942,8 +2310,7 @@ uint8_t mbm_plan_getInt32(const struct mbm_plan *plan,
  * @param field  the index of the field
  * @param index  which of its values, 0 for the first
  * @param value  gets the number; a float that is infinite or not a number stays so
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a text; MBM_NOT_INITIALISED; if no value has
- *         arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK only
+ * @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text
  */
 uint8_t mbm_plan_getNumber(const struct mbm_plan *plan,
                            uint16_t field,
@@ -2958,9 +2325,7 @@ uint8_t mbm_plan_getNumber(const struct mbm_plan *plan,
  * @param field  the index of the field
  * @param index  which of its values, 0 for the first
  * @param value  gets the number
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also for other types; MBM_NOT_INITIALISED; if no value
- *         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
- *         only
+ * @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT for other types
  */
 uint8_t mbm_plan_getFloat(const struct mbm_plan *plan,
                           uint16_t field,
@@ -2975,8 +2340,7 @@ uint8_t mbm_plan_getFloat(const struct mbm_plan *plan,
  * @param field     the index of the field, of type MBM_TYPE_TEXT
  * @param text      gets the text and a NUL
  * @param capacity  bytes of `text`; the field's count and one are always enough
- * @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL if the text does not fit. `text` changes
- *         on MBM_OK only
+ * @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL if the text does not fit
  */
 uint8_t mbm_plan_getText(const struct mbm_plan *plan,
                          uint16_t field,
@@ -3002,11 +2366,9 @@ uint8_t mbm_plan_getRegisters(const struct mbm_plan *plan,
  *
  * @param plan   the object
  * @param field  the index of the field
- * @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT for a
- *         field that is not there; MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_plan_refresh(struct mbm_plan *plan,
-                         uint16_t field);
+uint8_t mbm_plan_refresh(struct mbm_plan *plan, uint16_t field);
 
 /**
  * The reads that the plan has made of the fields: one request each.
@@ -3014,8 +2376,7 @@ uint8_t mbm_plan_refresh(struct mbm_plan *plan,
  * @param plan   the object
  * @param index  0 for the first read
  * @param read   gets the read
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also behind the last read, or MBM_NOT_INITIALISED, with
- *         `read` unchanged
+ * @return a status; MBM_INVALID_ARGUMENT behind the last read
  */
 uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
                          uint16_t index,
@@ -3023,35 +2384,18 @@ uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
 
 /* ==== 8. Link ======================================================================= */
 
-/**
- * mbm_link_state: there is no link. The client opens it when the wait is over.
- */
+/** mbm_link_state: there is no link. The client opens it when the wait is over. */
 #define MBM_LINK_IS_DOWN 1u
-
-/**
- * mbm_link_state: the connection is being made.
- */
+/** mbm_link_state: the connection is being made. */
 #define MBM_LINK_IS_CONNECTING 2u
-
-/**
- * mbm_link_state: the link is open.
- */
+/** mbm_link_state: the link is open. */
 #define MBM_LINK_IS_UP 3u
-
-/**
- * An event of a link: it is open now. The status is MBM_OK.
- */
+/** An event of a link: it is open now. The status is MBM_OK. */
 #define MBM_LINK_EVENT_CONNECTED 0u
-
-/**
- * An event of a link: it was open and is lost. The status is MBM_LINK_LOST.
- */
+/** An event of a link: it was open and is lost. The status is MBM_LINK_LOST. */
 #define MBM_LINK_EVENT_LOST 1u
-
-/**
- * An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
- * mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long.
- */
+/** An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
+ *  mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long. */
 #define MBM_LINK_EVENT_FAILED 2u
 
 /**
@@ -3062,13 +2406,9 @@ uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
  * mbm_link_end or until the client was begun again.
  */
 typedef struct mbm_link {
-    /**
-     * Private.
-     */
+    /** Private. */
     void *pointers[32];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[21];
 } mbm_link;
 
@@ -3077,21 +2417,13 @@ typedef struct mbm_link {
  * an interrupt; each wraps at 2^32.
  */
 typedef struct mbm_linkCounters {
-    /**
-     * Calls of `connect` of mbm_linkHooks.
-     */
+    /** Calls of `connect` of mbm_linkHooks. */
     uint32_t attempts;
-    /**
-     * Attempts that failed.
-     */
+    /** Attempts that failed. */
     uint32_t failed;
-    /**
-     * How often the link was opened, or found open by mbm_link_begin.
-     */
+    /** How often the link was opened, or found open by mbm_link_begin. */
     uint32_t connected;
-    /**
-     * How often an open link was lost.
-     */
+    /** How often an open link was lost. */
     uint32_t lost;
 } mbm_linkCounters;
 
@@ -3123,9 +2455,8 @@ typedef struct mbm_linkCounters {
  * @param client  the client, begun; it must not have another link
  * @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
  *                hooks must not use the client or the link: each function returns MBM_BUSY
- * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_NOT_INITIALISED if the client was not begun;
- *         MBM_BUSY from within a hook, while the client is suspended, or if it has another
- *         link
+ * @return a status; MBM_NOT_INITIALISED if the client was not begun; MBM_BUSY also while the
+ *         client is suspended, and if it has another link
  */
 uint8_t mbm_link_begin(struct mbm_link *link,
                        struct mbm_client *client,
@@ -3137,8 +2468,7 @@ uint8_t mbm_link_begin(struct mbm_link *link,
  * a frame may have been sent. The storage is free, and begins anew with mbm_link_begin.
  *
  * @param link  the object; the client's storage must still be valid
- * @return MBM_OK; MBM_BUSY from within a hook and while the client is suspended;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; MBM_BUSY also while the client is suspended
  */
 uint8_t mbm_link_end(struct mbm_link *link);
 
@@ -3148,7 +2478,7 @@ uint8_t mbm_link_end(struct mbm_link *link);
  * that are under way end with MBM_LINK_LOST; queued ones wait for this attempt.
  *
  * @param link  the object
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_link_reconnect(struct mbm_link *link);
 
@@ -3162,7 +2492,7 @@ uint8_t mbm_link_reconnect(struct mbm_link *link);
  *                    mbm_client_setBackoff
  * @param delayMs     the first wait in milliseconds, 0 to 65535; the default is 500
  * @param maxDelayMs  the longest wait in milliseconds, 0 to 65535; the default is 30000
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_link_setBackoff(struct mbm_link *link,
                             uint8_t backoff,
@@ -3175,10 +2505,10 @@ uint8_t mbm_link_setBackoff(struct mbm_link *link,
  *
  * @param link     the object
  * @param percent  0 (the default) to 100: the largest part of the wait that is taken off
- * @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only
- *                 if `percent` is 0
+ * @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only if
+ *                 `percent` is 0
  * @param context  your pointer, passed to `random`; may be NULL
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_link_setJitter(struct mbm_link *link,
                            uint8_t percent,
@@ -3192,10 +2522,9 @@ uint8_t mbm_link_setJitter(struct mbm_link *link,
  * @param link       the object
  * @param timeoutMs  milliseconds, 1 to 1000000 (16 minutes); 0: as long as `status` returns
  *                   MBM_PENDING. The default is 10000
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_link_setConnectTimeout(struct mbm_link *link,
-                                   uint32_t timeoutMs);
+uint8_t mbm_link_setConnectTimeout(struct mbm_link *link, uint32_t timeoutMs);
 
 /**
  * Sets whether requests wait for the link. By default they do not: while the link is down,
@@ -3207,10 +2536,9 @@ uint8_t mbm_link_setConnectTimeout(struct mbm_link *link,
  *
  * @param link  the object
  * @param on    0 (the default) or 1
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_link_setRequestsWait(struct mbm_link *link,
-                                 uint8_t on);
+uint8_t mbm_link_setRequestsWait(struct mbm_link *link, uint8_t on);
 
 /**
  * Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
@@ -3220,7 +2548,7 @@ uint8_t mbm_link_setRequestsWait(struct mbm_link *link,
  * @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
  *                  request may, and call every function on the link; NULL for none
  * @param context   your pointer, passed to `callback`; may be NULL
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_link_setCallback(struct mbm_link *link,
                              void (*callback)(void *context, uint8_t event, uint8_t status),
@@ -3231,7 +2559,7 @@ uint8_t mbm_link_setCallback(struct mbm_link *link,
  *
  * @param link      the object
  * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_link_setCounters(struct mbm_link *link, struct mbm_linkCounters *counters);
 
@@ -3260,13 +2588,9 @@ uint8_t mbm_link_state(const struct mbm_link *link);
  * mbm_unit_serve functions on any unit.
  */
 typedef struct mbm_server {
-    /**
-     * Private.
-     */
+    /** Private. */
     void *pointers[14];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[8];
 } mbm_server;
 
@@ -3286,12 +2610,10 @@ typedef struct mbm_server {
  * @param units   the units to serve: one unit, or an array of units
  * @param count   how many units
  * @param frame   buffer for one frame, a request or a response
- * @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame.
- *                The server ignores a longer request, and answers exception 04 in place
- *                of a longer response
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook, a buffer
- *         that is too short or a unit with an id above 255; MBM_BUSY from within a hook of
- *         this server
+ * @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame. The
+ *                server ignores a longer request, and answers exception 04 in place of a longer
+ *                response
+ * @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
  */
 uint8_t mbm_server_beginRtu(struct mbm_server *server,
                             const struct mbm_port *port,
@@ -3309,8 +2631,7 @@ uint8_t mbm_server_beginRtu(struct mbm_server *server,
  * @param units   see mbm_server_beginRtu
  * @param count   see mbm_server_beginRtu
  * @param frame   see mbm_server_beginRtu
- * @param bytes   size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every
- *                frame
+ * @param bytes   size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every frame
  * @return a status; see mbm_server_beginRtu
  */
 uint8_t mbm_server_beginAscii(struct mbm_server *server,
@@ -3325,8 +2646,8 @@ uint8_t mbm_server_beginAscii(struct mbm_server *server,
  * the server answers them in order.
  *
  * @param server  see mbm_server_beginRtu; one for each connection
- * @param port    see mbm_server_beginRtu; its hooks read and write the connection and give
- *                the time
+ * @param port    see mbm_server_beginRtu; its hooks read and write the connection and give the
+ *                time
  * @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
  * @param count   see mbm_server_beginRtu
  * @param frame   see mbm_server_beginRtu; one for each connection
@@ -3370,10 +2691,9 @@ uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
  * line has been silent for t3.5.
  *
  * @param server  the object
- * @return MBM_OK; MBM_LINK_LOST if the port reported that the connection is lost: close
- *         it; MBM_MALFORMED_FRAME if the bytes received over TCP are not Modbus: close
- *         the connection; MBM_BUSY from within a hook of this server;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; MBM_LINK_LOST if the port reported that the connection is lost: close it;
+ *         MBM_MALFORMED_FRAME if the bytes received over TCP are not Modbus: close the
+ *         connection
  */
 uint8_t mbm_server_poll(struct mbm_server *server);
 
@@ -3382,14 +2702,14 @@ uint8_t mbm_server_poll(struct mbm_server *server);
  * arrive earlier.
  *
  * @param server  the object
- * @return microseconds. 0: poll now; a call from within a hook of this server returns 0
- *         too. 0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for
- *         a server that was never begun. 1000: a function of yours has returned
- *         MBM_REPLY_PENDING, or a connection does not accept the response yet; the
- *         server receives no bytes meanwhile, so do not wait for one, but poll earlier
- *         if you know that the function or the connection is ready. Afterwards, and after
- *         a begin function, it is 0 until mbm_server_poll has read the port, so bytes that
- *         arrived meanwhile need not end a sleep
+ * @return microseconds. 0: poll now; a call from within a hook of this server returns 0 too.
+ *         0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for a server
+ *         that was never begun. 1000: a function of yours has returned MBM_REPLY_PENDING, or a
+ *         connection does not accept the response yet; the server receives no bytes meanwhile,
+ *         so do not wait for one, but poll earlier if you know that the function or the
+ *         connection is ready. Afterwards, and after a begin function, it is 0 until
+ *         mbm_server_poll has read the port, so bytes that arrived meanwhile need not end a
+ *         sleep
  */
 uint32_t mbm_server_pollDelay(const struct mbm_server *server);
 
@@ -3399,9 +2719,9 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
  * effect in TCP. The begin functions restore the default.
  *
  * @param server     the object
- * @param silenceUs  microseconds since the last received byte; a value above 2^31
- *                   (36 minutes) counts as 2^31
- * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+ * @param silenceUs  microseconds since the last received byte; a value above 2^31 (36 minutes)
+ *                   counts as 2^31
+ * @return a status
  */
 uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
 
@@ -3412,8 +2732,7 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
  *
  * @param server  the object
  * @param baud    bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
- * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
- *         MBM_NOT_INITIALISED or MBM_BUSY
+ * @return a status; MBM_INVALID_ARGUMENT for other framings
  */
 uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
 
@@ -3424,54 +2743,35 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
  *
  * @param server  the object
  * @param on      0 for off, the default; anything else for on
- * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
- *         MBM_NOT_INITIALISED or MBM_BUSY
+ * @return a status; MBM_INVALID_ARGUMENT for other framings
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
 
 /* ==== 10. Units ===================================================================== */
 
-/**
- * A function of yours returns this, or-ed with the exception code (1 to 127), to answer
- * with an exception.
- */
+/** A function of yours returns this, or-ed with the exception code (1 to 127), to answer
+ *  with an exception. */
 #define MBM_REPLY_EXCEPTION 256u
-
-/**
- * A function of yours returns this to send no response.
- */
+/** A function of yours returns this to send no response. */
 #define MBM_REPLY_NONE 512u
-
-/**
- * A function of yours returns this if it has not finished. The next poll calls it again
- * with the same request. The server receives nothing meanwhile.
- */
+/** A function of yours returns this if it has not finished. The next poll calls it again
+ *  with the same request. The server receives nothing meanwhile. */
 #define MBM_REPLY_PENDING 768u
-
-/**
- * A function of yours returns this to decline the request: the next record of the unit that
- * serves the function code answers, or exception 01 if there is none.
- */
+/** A function of yours returns this to decline the request: the next record of the unit that
+ *  serves the function code answers, or exception 01 if there is none. */
 #define MBM_REPLY_DECLINED 1024u
-
-/**
- * The most records that one unit can serve. Each is one struct that you pass to a
- * mbm_unit_serve function.
- */
+/** The most records that one unit can serve. Each is one struct that you pass to a
+ *  mbm_unit_serve function. */
 #define MBM_MAX_SERVICES 16
 
 /**
  * The head of each record that a mbm_unit_serve function takes. Private.
  */
 typedef struct mbm_service {
-    /**
-     * Serves a request if its function belongs to this record. NULL in a zeroed record,
-     * which serves nothing.
-     */
+    /** Serves a request if its function belongs to this record. NULL in a zeroed record,
+     *  which serves nothing. */
     size_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *info);
-    /**
-     * The kind of the record within its family, from 1 on; 0 in a zeroed record.
-     */
+    /** The kind of the record within its family, from 1 on; 0 in a zeroed record. */
     uint8_t kind;
 } mbm_service;
 
@@ -3481,66 +2781,36 @@ typedef struct mbm_service {
  * them at any time. The sub-functions below are those of function 08 (V1.1b3, 6.8), in hex.
  */
 typedef struct mbm_diagnostics {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * Optional: called when the client restarts the communications (sub-function 01).
-     * `clearLog` is 1 if the client cleared the event log too, else 0.
-     */
+    /** Optional: called when the client restarts the communications (sub-function 01).
+     *  `clearLog` is 1 if the client cleared the event log too, else 0. */
     void (*restart)(void *context, uint8_t clearLog);
-    /**
-     * Passed to `restart`. Any value; may be NULL.
-     */
+    /** Passed to `restart`. Any value; may be NULL. */
     void *context;
-    /**
-     * The value that sub-function 02 returns. You set it.
-     */
+    /** The value that sub-function 02 returns. You set it. */
     uint16_t diagnosticRegister;
-    /**
-     * Sub-function 0B: frames with a right CRC, for any unit.
-     */
+    /** Sub-function 0B: frames with a right CRC, for any unit. */
     uint16_t busMessages;
-    /**
-     * Sub-function 0C: damaged frames.
-     */
+    /** Sub-function 0C: damaged frames. */
     uint16_t busCommunicationErrors;
-    /**
-     * Sub-function 0D: exceptions, including those that broadcasts caused.
-     */
+    /** Sub-function 0D: exceptions, including those that broadcasts caused. */
     uint16_t exceptionErrors;
-    /**
-     * Sub-function 0E: requests for this unit, and broadcasts.
-     */
+    /** Sub-function 0E: requests for this unit, and broadcasts. */
     uint16_t serverMessages;
-    /**
-     * Sub-function 0F: requests without a response.
-     */
+    /** Sub-function 0F: requests without a response. */
     uint16_t noResponses;
-    /**
-     * Sub-function 10: exceptions with code 07.
-     */
+    /** Sub-function 10: exceptions with code 07. */
     uint16_t naks;
-    /**
-     * Sub-function 11: exceptions with code 06.
-     */
+    /** Sub-function 11: exceptions with code 06. */
     uint16_t busy;
-    /**
-     * Sub-function 12: frames that were too long for the buffer.
-     */
+    /** Sub-function 12: frames that were too long for the buffer. */
     uint16_t characterOverruns;
-    /**
-     * The event count that function 0B returns: requests that were carried out.
-     */
+    /** The event count that function 0B returns: requests that were carried out. */
     uint16_t events;
-    /**
-     * 1 in listen only mode, else 0.
-     */
+    /** 1 in listen only mode, else 0. */
     uint8_t listenOnly;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint8_t hidden[67];
 } mbm_diagnostics;
 
@@ -3561,28 +2831,20 @@ typedef struct mbm_diagnostics {
  * several have them together.
  */
 typedef struct mbm_unit {
-    /**
-     * Private: the records in the order in which the unit calls them. NULL follows the
-     * last one.
-     */
+    /** Private: the records in the order in which the unit calls them. NULL follows the
+     *  last one. */
     struct mbm_service *services[MBM_MAX_SERVICES];
-    /**
-     * Private: NULL in a unit without diagnostics.
-     */
+    /** Private: NULL in a unit without diagnostics. */
     size_t (*monitor)(struct mbm_unit *unit,
                       const void *info,
                       uint8_t addressing,
                       uint8_t *pdu);
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_diagnostics *diagnostics;
-    /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). The ids 248 to 255, which
-     * the standard reserves, are accepted. 0 answers to every id. A unit without any
-     * record does not answer. A begin function of a server refuses a greater id
-     * (MBM_INVALID_ARGUMENT). If you set one later, no request has it.
-     */
+    /** The unit id, 1 to 247 (serial line guide V1.02, 2.2). The ids 248 to 255, which
+     *  the standard reserves, are accepted. 0 answers to every id. A unit without any
+     *  record does not answer. A begin function of a server refuses a greater id
+     *  (MBM_INVALID_ARGUMENT). If you set one later, no request has it. */
     uint16_t id;
 } mbm_unit;
 
@@ -3591,36 +2853,22 @@ typedef struct mbm_unit {
  * a coil, a discrete input or a record of a file.
  */
 typedef struct mbm_access {
-    /**
-     * The new values, in the hooks of a write: registers and records with the high byte
-     * first, bits with the lowest bit of the first byte first. NULL in beforeRead. Valid
-     * until the hook returns.
-     */
+    /** The new values, in the hooks of a write: registers and records with the high byte
+     *  first, bits with the lowest bit of the first byte first. NULL in beforeRead. Valid
+     *  until the hook returns. */
     const uint8_t *data;
-    /**
-     * The line or connection that the request came from: the `context` of the port of the
-     * server that received it, or the `connection` of mbm_unit_respond.
-     */
+    /** The line or connection that the request came from: the `context` of the port of the
+     *  server that received it, or the `connection` of mbm_unit_respond. */
     void *connection;
-    /**
-     * The address of the first cell; of a file, the number of the first record.
-     */
+    /** The address of the first cell; of a file, the number of the first record. */
     uint16_t address;
-    /**
-     * How many cells, 1 to 2000.
-     */
+    /** How many cells, 1 to 2000. */
     uint16_t quantity;
-    /**
-     * The number of the file; 0 for tables and callbacks.
-     */
+    /** The number of the file; 0 for tables and callbacks. */
     uint16_t file;
-    /**
-     * The unit id in the request. 0 on a serial line is a broadcast.
-     */
+    /** The unit id in the request. 0 on a serial line is a broadcast. */
     uint8_t unit;
-    /**
-     * The function code of the request.
-     */
+    /** The function code of the request. */
     uint8_t function;
 } mbm_access;
 
@@ -3641,22 +2889,14 @@ typedef struct mbm_access {
  * hooks for it, that counts from the next request on.
  */
 typedef struct mbm_accessHooks {
-    /**
-     * Your pointer, passed to each hook; may be NULL.
-     */
+    /** Your pointer, passed to each hook; may be NULL. */
     void *context;
-    /**
-     * Called before cells are read. It may refresh them. Returns 0 to allow the read, or an
-     * exception code to refuse the whole request; a number above 127 becomes exception 04.
-     */
+    /** Called before cells are read. It may refresh them. Returns 0 to allow the read, or an
+     *  exception code to refuse the whole request; a number above 127 becomes exception 04. */
     uint8_t (*beforeRead)(void *context, const struct mbm_access *access);
-    /**
-     * Called before cells are written. Returns as beforeRead.
-     */
+    /** Called before cells are written. Returns as beforeRead. */
     uint8_t (*beforeWrite)(void *context, const struct mbm_access *access);
-    /**
-     * Called after cells were written.
-     */
+    /** Called after cells were written. */
     void (*afterWrite)(void *context, const struct mbm_access *access);
 } mbm_accessHooks;
 
@@ -3664,14 +2904,10 @@ typedef struct mbm_accessHooks {
  * The hooks of a record. Private.
  */
 typedef struct mbm_recordHooks {
-    /**
-     * The hooks.
-     */
+    /** The hooks. */
     const struct mbm_accessHooks *hooks;
-    /**
-     * Calls the hooks. NULL if there are none. A program in which no record has hooks does
-     * not contain the function.
-     */
+    /** Calls the hooks. NULL if there are none. A program in which no record has hooks does
+     *  not contain the function. */
     void (*call)(void);
 } mbm_recordHooks;
 
@@ -3681,34 +2917,22 @@ typedef struct mbm_recordHooks {
  * that you need, and pass it to mbm_unit_serveCallbacks.
  */
 typedef struct mbm_dataCallbacks {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * Passed to each function. Any value; may be NULL.
-     */
+    /** Passed to each function. Any value; may be NULL. */
     void *context;
-    /**
-     * Optional; NULL if every address exists. Otherwise returns 1 if this address
-     * exists, else 0. A request for an address that does not exist is answered with
-     * exception 02.
-     */
+    /** Optional; NULL if every address exists. Otherwise returns 1 if this address
+     *  exists, else 0. A request for an address that does not exist is answered with
+     *  exception 02. */
     uint8_t (*isValid)(void *context, uint16_t address);
-    /**
-     * Required. Returns the value of an existing cell; of a bit, 0 for off and any other
-     * value for on.
-     */
+    /** Required. Returns the value of an existing cell; of a bit, 0 for off and any other
+     *  value for on. */
     uint16_t (*get)(void *context, uint16_t address);
-    /**
-     * Sets an existing cell; a bit to 0 or 1. Coils and holding registers without it are
-     * read-only: the unit answers functions that write them with exception 01, unless a
-     * later record serves these functions.
-     */
+    /** Sets an existing cell; a bit to 0 or 1. Coils and holding registers without it are
+     *  read-only: the unit answers functions that write them with exception 01, unless a
+     *  later record serves these functions. */
     void (*set)(void *context, uint16_t address, uint16_t value);
-    /**
-     * Private: see mbm_dataCallbacks_setHooks.
-     */
+    /** Private: see mbm_dataCallbacks_setHooks. */
     struct mbm_recordHooks hooks;
 } mbm_dataCallbacks;
 
@@ -3716,27 +2940,17 @@ typedef struct mbm_dataCallbacks {
  * A request for a function of yours.
  */
 typedef struct mbm_request {
-    /**
-     * The data of the request: the bytes after the function code.
-     */
+    /** The data of the request: the bytes after the function code. */
     const uint8_t *data;
-    /**
-     * The line or connection that the request came from: the `context` of the port of the
-     * server that received it, or the `connection` of mbm_unit_respond.
-     */
+    /** The line or connection that the request came from: the `context` of the port of the
+     *  server that received it, or the `connection` of mbm_unit_respond. */
     void *connection;
-    /**
-     * Length of `data` in bytes, 0 to 252.
-     */
+    /** Length of `data` in bytes, 0 to 252. */
     uint16_t length;
-    /**
-     * The unit id in the request. 0 on a serial line is a broadcast: the server then
-     * sends no response.
-     */
+    /** The unit id in the request. 0 on a serial line is a broadcast: the server then
+     *  sends no response. */
     uint8_t unit;
-    /**
-     * The function code.
-     */
+    /** The function code. */
     uint8_t function;
 } mbm_request;
 
@@ -3751,34 +2965,24 @@ typedef struct mbm_request {
  * for the cells that they lack; a function with code 0 is not.
  */
 typedef struct mbm_custom {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * Carries out a request and writes the data of the response, without the function
-     * code, to `response`. `capacity` is the space in bytes that the frame buffer has
-     * after the request; the server sends at most 252 bytes. Returns the number of bytes
-     * written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, MBM_REPLY_PENDING or
-     * MBM_REPLY_DECLINED.
-     */
+    /** Carries out a request and writes the data of the response, without the function
+     *  code, to `response`. `capacity` is the space in bytes that the frame buffer has
+     *  after the request; the server sends at most 252 bytes. Returns the number of bytes
+     *  written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, MBM_REPLY_PENDING or
+     *  MBM_REPLY_DECLINED. */
     uint16_t (*serve)(void *context,
                       const struct mbm_request *request,
                       uint8_t *response,
                       uint16_t capacity);
-    /**
-     * Passed to `serve`. Any value; may be NULL.
-     */
+    /** Passed to `serve`. Any value; may be NULL. */
     void *context;
-    /**
-     * The function code, 1 to 127. 0 means every function that no earlier record of the
-     * unit serves. The standard reserves 65 to 72 and 100 to 110 for users (V1.1b3, 5).
-     */
+    /** The function code, 1 to 127. 0 means every function that no earlier record of the
+     *  unit serves. The standard reserves 65 to 72 and 100 to 110 for users (V1.1b3, 5). */
     uint8_t code;
-    /**
-     * The length of the request PDUs, which a server of RTU over TCP needs. If it is
-     * zeroed, a request is complete when its CRC is right.
-     */
+    /** The length of the request PDUs, which a server of RTU over TCP needs. If it is
+     *  zeroed, a request is complete when its CRC is right. */
     struct mbm_rule length;
 } mbm_custom;
 
@@ -3787,13 +2991,9 @@ typedef struct mbm_custom {
  * mbm_unit_switchFunction.
  */
 typedef struct mbm_functionMask {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint8_t off[16];
 } mbm_functionMask;
 
@@ -3801,17 +3001,11 @@ typedef struct mbm_functionMask {
  * One file: an array of records. A record is one register.
  */
 typedef struct mbm_file {
-    /**
-     * The records, starting with record 0.
-     */
+    /** The records, starting with record 0. */
     uint16_t *records;
-    /**
-     * How many records the file has, at most 10000.
-     */
+    /** How many records the file has, at most 10000. */
     uint16_t size;
-    /**
-     * The file number, 1 to 65535.
-     */
+    /** The file number, 1 to 65535. */
     uint16_t number;
 } mbm_file;
 
@@ -3820,21 +3014,13 @@ typedef struct mbm_file {
  * it to mbm_unit_serveFiles.
  */
 typedef struct mbm_files {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * The files: an array of `count` elements.
-     */
+    /** The files: an array of `count` elements. */
     const struct mbm_file *files;
-    /**
-     * How many files.
-     */
+    /** How many files. */
     uint16_t count;
-    /**
-     * Private: see mbm_files_setHooks.
-     */
+    /** Private: see mbm_files_setHooks. */
     struct mbm_recordHooks hooks;
 } mbm_files;
 
@@ -3842,18 +3028,12 @@ typedef struct mbm_files {
  * One FIFO queue of registers.
  */
 typedef struct mbm_fifo {
-    /**
-     * The registers, the oldest first.
-     */
+    /** The registers, the oldest first. */
     const uint16_t *words;
-    /**
-     * The address of the queue (the FIFO pointer address).
-     */
+    /** The address of the queue (the FIFO pointer address). */
     uint16_t address;
-    /**
-     * How many registers the queue holds now. If there are more than 31, the server
-     * answers with exception 03 (V1.1b3, 6.18).
-     */
+    /** How many registers the queue holds now. If there are more than 31, the server
+     *  answers with exception 03 (V1.1b3, 6.18). */
     uint16_t count;
 } mbm_fifo;
 
@@ -3862,18 +3042,12 @@ typedef struct mbm_fifo {
  * pass it to mbm_unit_serveFifos.
  */
 typedef struct mbm_fifos {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * The queues: an array of `count` elements. A read leaves the registers in the
-     * queue.
-     */
+    /** The queues: an array of `count` elements. A read leaves the registers in the
+     *  queue. */
     const struct mbm_fifo *fifos;
-    /**
-     * How many queues.
-     */
+    /** How many queues. */
     uint16_t count;
 } mbm_fifos;
 
@@ -3882,13 +3056,9 @@ typedef struct mbm_fifos {
  * pass it to mbm_unit_serveExceptionStatus.
  */
 typedef struct mbm_exceptionStatus {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * The outputs, one bit each. You may change them at any time.
-     */
+    /** The outputs, one bit each. You may change them at any time. */
     uint8_t outputs;
 } mbm_exceptionStatus;
 
@@ -3900,29 +3070,17 @@ typedef struct mbm_exceptionStatus {
  * exception 04.
  */
 typedef struct mbm_serverId {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * The server id; NULL only if idLength is 0.
-     */
+    /** The server id; NULL only if idLength is 0. */
     const uint8_t *id;
-    /**
-     * The data after the run indicator; NULL only if additionalLength is 0.
-     */
+    /** The data after the run indicator; NULL only if additionalLength is 0. */
     const uint8_t *additional;
-    /**
-     * Length of `id` in bytes.
-     */
+    /** Length of `id` in bytes. */
     uint8_t idLength;
-    /**
-     * Length of `additional` in bytes.
-     */
+    /** Length of `additional` in bytes. */
     uint8_t additionalLength;
-    /**
-     * The run indicator: 0 is sent as 00, any other value as FF (hex).
-     */
+    /** The run indicator: 0 is sent as 00, any other value as FF (hex). */
     uint8_t running;
 } mbm_serverId;
 
@@ -3931,20 +3089,14 @@ typedef struct mbm_serverId {
  * and pass it to mbm_unit_serveIdentification.
  */
 typedef struct mbm_serverIdentification {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * The objects, in any order. Every device has the ids 0 (vendor name), 1 (product
-     * code) and 2 (revision). Optional are 3 (vendor URL), 4 (product name), 5 (model
-     * name) and 6 (application name), and from 0x80 on your own. An object has at most
-     * 244 bytes.
-     */
+    /** The objects, in any order. Every device has the ids 0 (vendor name), 1 (product
+     *  code) and 2 (revision). Optional are 3 (vendor URL), 4 (product name), 5 (model
+     *  name) and 6 (application name), and from 0x80 on your own. An object has at most
+     *  244 bytes. */
     const struct mbm_object *objects;
-    /**
-     * How many objects.
-     */
+    /** How many objects. */
     uint16_t count;
 } mbm_serverIdentification;
 
@@ -3957,31 +3109,19 @@ typedef struct mbm_serverIdentification {
  * zero it first.
  */
 typedef struct mbm_registerTable {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * The registers: `size` words.
-     */
+    /** The registers: `size` words. */
     uint16_t *words;
-    /**
-     * Optional; NULL if every register exists. Otherwise a bitmap with one bit for each
-     * register, the lowest bit of the first byte first. A request for a register whose
-     * bit is 0 is answered with exception 02.
-     */
+    /** Optional; NULL if every register exists. Otherwise a bitmap with one bit for each
+     *  register, the lowest bit of the first byte first. A request for a register whose
+     *  bit is 0 is answered with exception 02. */
     const uint8_t *valid;
-    /**
-     * Private: see mbm_registerTable_setHooks.
-     */
+    /** Private: see mbm_registerTable_setHooks. */
     struct mbm_recordHooks hooks;
-    /**
-     * The address of the first register.
-     */
+    /** The address of the first register. */
     uint16_t base;
-    /**
-     * How many registers there are.
-     */
+    /** How many registers there are. */
     uint16_t size;
 } mbm_registerTable;
 
@@ -3991,29 +3131,17 @@ typedef struct mbm_registerTable {
  * mbm_unit_serveDiscreteInputs.
  */
 typedef struct mbm_bitTable {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_service service;
-    /**
-     * The bits: `size` bits, in (size + 7) / 8 bytes.
-     */
+    /** The bits: `size` bits, in (size + 7) / 8 bytes. */
     uint8_t *bits;
-    /**
-     * As in mbm_registerTable.
-     */
+    /** As in mbm_registerTable. */
     const uint8_t *valid;
-    /**
-     * Private: see mbm_bitTable_setHooks.
-     */
+    /** Private: see mbm_bitTable_setHooks. */
     struct mbm_recordHooks hooks;
-    /**
-     * The address of the first bit.
-     */
+    /** The address of the first bit. */
     uint16_t base;
-    /**
-     * How many bits there are.
-     */
+    /** How many bits there are. */
     uint16_t size;
 } mbm_bitTable;
 
@@ -4022,11 +3150,10 @@ typedef struct mbm_bitTable {
  *
  * @param unit   the unit
  * @param cells  must stay valid for as long as the unit is used
- * @param table  the table, named by the function that reads it: 1 coils (functions 01,
- *               05, 0F), 2 discrete inputs (02), 3 holding registers (03, 06, 10, 16,
- *               17), 4 input registers (04); functions in hex
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `get` or another table;
- *         MBM_BUSY and MBM_BUFFER_TOO_SMALL as mbm_unit_serveCoils
+ * @param table  the table, named by the function that reads it: 1 coils (functions 01, 05, 0F),
+ *               2 discrete inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
+ *               registers (04); functions in hex
+ * @return a status; see mbm_unit_serveCoils. MBM_INVALID_ARGUMENT for a NULL `get`
  */
 uint8_t mbm_unit_serveCallbacks(struct mbm_unit *unit,
                                 struct mbm_dataCallbacks *cells,
@@ -4037,7 +3164,7 @@ uint8_t mbm_unit_serveCallbacks(struct mbm_unit *unit,
  *
  * @param cells  the cells, registered already or not. Zeroing the struct removes the hooks
  * @param hooks  must stay valid for as long as the cells are served; NULL for no hooks
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `cells`
+ * @return a status
  */
 uint8_t mbm_dataCallbacks_setHooks(struct mbm_dataCallbacks *cells,
                                    const struct mbm_accessHooks *hooks);
@@ -4047,9 +3174,8 @@ uint8_t mbm_dataCallbacks_setHooks(struct mbm_dataCallbacks *cells,
  *
  * @param unit    the unit
  * @param custom  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `serve`, a code above
- *         127 or an invalid `length`; MBM_BUFFER_TOO_SMALL if the unit has
- *         MBM_MAX_SERVICES records already
+ * @return a status; see mbm_unit_serveFiles. MBM_INVALID_ARGUMENT for a NULL `serve`, a code
+ *         above 127 or an invalid `length`
  */
 uint8_t mbm_unit_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
 
@@ -4062,8 +3188,7 @@ uint8_t mbm_unit_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
  *              Units that share a mask have the same functions off
  * @param code  the function code, 1 to 127
  * @param on    0 switches the function off, anything else switches it on
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a code out of range;
- *         MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES records already
+ * @return a status; see mbm_unit_serveFiles
  */
 uint8_t mbm_unit_switchFunction(struct mbm_unit *unit,
                                 struct mbm_functionMask *mask,
@@ -4077,11 +3202,9 @@ uint8_t mbm_unit_switchFunction(struct mbm_unit *unit,
  * events, and a client can force it into listen only mode.
  *
  * @param unit         the unit
- * @param diagnostics  must stay valid for as long as the unit is used. Use one struct
- *                     for each unit: a shared one counts for all units that share it
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
- *         another mbm_diagnostics; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
- *         records already
+ * @param diagnostics  must stay valid for as long as the unit is used. Use one struct for each
+ *                     unit: a shared one counts for all units that share it
+ * @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
  */
 uint8_t mbm_unit_serveDiagnostics(struct mbm_unit *unit,
                                   struct mbm_diagnostics *diagnostics);
@@ -4093,8 +3216,7 @@ uint8_t mbm_unit_serveDiagnostics(struct mbm_unit *unit,
  *
  * @param unit   the unit
  * @param files  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
- *         unit has MBM_MAX_SERVICES records already
+ * @return a status; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES records already
  */
 uint8_t mbm_unit_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
 
@@ -4104,18 +3226,16 @@ uint8_t mbm_unit_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
  *
  * @param files  the files, registered already or not. Zeroing the struct removes the hooks
  * @param hooks  must stay valid for as long as the files are served; NULL for no hooks
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `files`
+ * @return a status
  */
-uint8_t mbm_files_setHooks(struct mbm_files *files,
-                           const struct mbm_accessHooks *hooks);
+uint8_t mbm_files_setHooks(struct mbm_files *files, const struct mbm_accessHooks *hooks);
 
 /**
  * Serves FIFO queues: function 18 (hex), Read FIFO Queue.
  *
  * @param unit   the unit
  * @param fifos  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
- *         unit has MBM_MAX_SERVICES records already
+ * @return a status; see mbm_unit_serveFiles
  */
 uint8_t mbm_unit_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
 
@@ -4124,9 +3244,7 @@ uint8_t mbm_unit_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
  *
  * @param unit    the unit
  * @param status  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
- *         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
- *         records already
+ * @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
  */
 uint8_t mbm_unit_serveExceptionStatus(struct mbm_unit *unit,
                                       struct mbm_exceptionStatus *status);
@@ -4136,9 +3254,7 @@ uint8_t mbm_unit_serveExceptionStatus(struct mbm_unit *unit,
  *
  * @param unit  the unit
  * @param id    must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
- *         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
- *         records already
+ * @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
  */
 uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
 
@@ -4150,9 +3266,7 @@ uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
  *
  * @param unit            the unit
  * @param identification  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
- *         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
- *         records already
+ * @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
  */
 uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
                                      struct mbm_serverIdentification *identification);
@@ -4165,18 +3279,17 @@ uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
  * @param count       how many units
  * @param connection  your pointer, which hooks and functions of yours get as the connection
  *                    that the request came from; may be NULL
- * @param framing     the framing. Its `functions` are not used: units know their own
- *                    functions
+ * @param framing     the framing. Its `functions` are not used: units know their own functions
  * @param frame       holds the complete request; receives the response
  * @param length      length of the request in bytes
- * @param capacity    size of `frame` in bytes. 256 hold every response in RTU, 513 in
- *                    ASCII, 260 in TCP. A longer response becomes exception 04
- * @param response    receives the length of the response in bytes; 0 without a response:
- *                    after a damaged frame, a request for another unit, a broadcast, and
- *                    with any status but MBM_OK
- * @return MBM_OK; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write
- *         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT, also
- *         for a unit with an id above 255
+ * @param capacity    size of `frame` in bytes. 256 hold every response in RTU, 513 in ASCII,
+ *                    260 in TCP. A longer response becomes exception 04
+ * @param response    receives the length of the response in bytes; 0 without a response: after
+ *                    a damaged frame, a request for another unit, a broadcast, and with any
+ *                    status but MBM_OK
+ * @return a status; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write the
+ *         request into `frame` again before the next call; MBM_INVALID_ARGUMENT for a unit with
+ *         an id above 255
  */
 uint8_t mbm_unit_respond(struct mbm_unit *units,
                          uint8_t count,
@@ -4192,7 +3305,7 @@ uint8_t mbm_unit_respond(struct mbm_unit *units,
  *
  * @param table  the table, registered already or not. Zeroing the struct removes the hooks
  * @param hooks  must stay valid for as long as the table is served; NULL for no hooks
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `table`
+ * @return a status
  */
 uint8_t mbm_registerTable_setHooks(struct mbm_registerTable *table,
                                    const struct mbm_accessHooks *hooks);
@@ -4202,7 +3315,7 @@ uint8_t mbm_registerTable_setHooks(struct mbm_registerTable *table,
  *
  * @param table  the table, registered already or not. Zeroing the struct removes the hooks
  * @param hooks  must stay valid for as long as the table is served; NULL for no hooks
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `table`
+ * @return a status
  */
 uint8_t mbm_bitTable_setHooks(struct mbm_bitTable *table,
                               const struct mbm_accessHooks *hooks);
@@ -4212,9 +3325,8 @@ uint8_t mbm_bitTable_setHooks(struct mbm_bitTable *table,
  *
  * @param unit   the unit
  * @param table  must stay valid for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that is
- *         served as another kind; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
- *         records already
+ * @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another
+ *         kind
  */
 uint8_t mbm_unit_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table);
 
@@ -4255,20 +3367,15 @@ uint8_t mbm_unit_serveInputRegisters(struct mbm_unit *unit,
  * zeroed the table.
  *
  * @param table  holding registers that mbm_unit_serveHoldingRegisters accepted
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and for any other table
+ * @return a status; MBM_INVALID_ARGUMENT for any other table
  */
 uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table);
 
 /* ==== 11. Gateway =================================================================== */
 
-/**
- * The `line` of a route for broadcasts: to all lines, one after the other.
- */
+/** The `line` of a route for broadcasts: to all lines, one after the other. */
 #define MBM_GATEWAY_ALL_LINES 255u
-
-/**
- * The `line` of a route to the gateway's own units: see mbm_gateway_serveUnits.
- */
+/** The `line` of a route to the gateway's own units: see mbm_gateway_serveUnits. */
 #define MBM_GATEWAY_LOCAL 254u
 
 /**
@@ -4285,13 +3392,9 @@ uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table)
  * of a request of your own that mbm_gateway_poll ends.
  */
 typedef struct mbm_gateway {
-    /**
-     * Private.
-     */
+    /** Private. */
     void *pointers[13];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[2];
 } mbm_gateway;
 
@@ -4307,23 +3410,15 @@ typedef struct mbm_gateway {
  * - {0, 0, MBM_GATEWAY_ALL_LINES, 0}: unit 0 is a broadcast on each line
  */
 typedef struct mbm_gatewayRoute {
-    /**
-     * The first unit id on TCP, 0 to 255. mbm_gateway_begin refuses a greater number.
-     */
+    /** The first unit id on TCP, 0 to 255. mbm_gateway_begin refuses a greater number. */
     uint16_t first;
-    /**
-     * The last unit id on TCP, up to 255.
-     */
+    /** The last unit id on TCP, up to 255. */
     uint16_t last;
-    /**
-     * The index of the line, MBM_GATEWAY_ALL_LINES or MBM_GATEWAY_LOCAL.
-     */
+    /** The index of the line, MBM_GATEWAY_ALL_LINES or MBM_GATEWAY_LOCAL. */
     uint8_t line;
-    /**
-     * The id on the line of the unit that is `first` on TCP; the units after it follow, up to
-     * 255. 0: the ids on the line are those on TCP. A request whose unit id on the line is 0
-     * is a broadcast.
-     */
+    /** The id on the line of the unit that is `first` on TCP; the units after it follow, up to
+     *  255. 0: the ids on the line are those on TCP. A request whose unit id on the line is 0
+     *  is a broadcast. */
     uint16_t unit;
 } mbm_gatewayRoute;
 
@@ -4331,33 +3426,23 @@ typedef struct mbm_gatewayRoute {
  * A line of a gateway. Initialise it with MBM_INIT, then set the fields that you need.
  */
 typedef struct mbm_gatewayLine {
-    /**
-     * The client of the line, in any framing. Begin it before the gateway, with a frame
-     * buffer that holds every frame. Its settings hold: response timeout, retries, quiet
-     * time. You may send requests of your own with it. Do not replace it by another client
-     * while the gateway has open connections.
-     */
+    /** The client of the line, in any framing. Begin it before the gateway, with a frame
+     *  buffer that holds every frame. Its settings hold: response timeout, retries, quiet
+     *  time. You may send requests of your own with it. Do not replace it by another client
+     *  while the gateway has open connections. */
     struct mbm_client *client;
-    /**
-     * Your pointer, passed to `isReady`; may be NULL.
-     */
+    /** Your pointer, passed to `isReady`; may be NULL. */
     void *context;
-    /**
-     * Optional: called before each request to the line. Returns 1 if the line can take it, 0
-     * if the gateway shall answer with exception 0A, for example because a terminal is not
-     * open. It may call every function on the client except mbm_client_poll, and no function
-     * on the gateway (MBM_BUSY).
-     */
+    /** Optional: called before each request to the line. Returns 1 if the line can take it, 0
+     *  if the gateway shall answer with exception 0A, for example because a terminal is not
+     *  open. It may call every function on the client except mbm_client_poll, and no function
+     *  on the gateway (MBM_BUSY). */
     uint8_t (*isReady)(void *context);
-    /**
-     * The most requests that the gateway queues in the client at a time, 1 to 16; 0 means 1.
-     * With 1, the clients on TCP take turns with every request. A line that is a TCP
-     * connection can have more under way.
-     */
+    /** The most requests that the gateway queues in the client at a time, 1 to 16; 0 means 1.
+     *  With 1, the clients on TCP take turns with every request. A line that is a TCP
+     *  connection can have more under way. */
     uint8_t inFlight;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint8_t last;
 } mbm_gatewayLine;
 
@@ -4365,13 +3450,9 @@ typedef struct mbm_gatewayLine {
  * A place for a TCP connection.
  */
 typedef struct mbm_gatewayConnection {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_port port;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[3];
 } mbm_gatewayConnection;
 
@@ -4380,17 +3461,11 @@ typedef struct mbm_gatewayConnection {
  * machine.
  */
 typedef struct mbm_gatewayRequest {
-    /**
-     * Private.
-     */
+    /** Private. */
     struct mbm_clientRequest request;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[5];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint8_t frame[MBM_MAX_TCP_FRAME];
 } mbm_gatewayRequest;
 
@@ -4398,38 +3473,22 @@ typedef struct mbm_gatewayRequest {
  * What a gateway consists of. The gateway copies this struct, but not what it points to.
  */
 typedef struct mbm_gatewayConfig {
-    /**
-     * The map of units. It may be in flash.
-     */
+    /** The map of units. It may be in flash. */
     const struct mbm_gatewayRoute *routes;
-    /**
-     * The lines; may be NULL if `lineCount` is 0.
-     */
+    /** The lines; may be NULL if `lineCount` is 0. */
     struct mbm_gatewayLine *lines;
-    /**
-     * The places for connections. The index in this array is the connection's number.
-     */
+    /** The places for connections. The index in this array is the connection's number. */
     struct mbm_gatewayConnection *connections;
-    /**
-     * The places for requests. Each connection always has one. Connections that send several
-     * requests without waiting for the replies share the others.
-     */
+    /** The places for requests. Each connection always has one. Connections that send several
+     *  requests without waiting for the replies share the others. */
     struct mbm_gatewayRequest *requests;
-    /**
-     * The number of `requests`, at least `connectionCount` and below 65535.
-     */
+    /** The number of `requests`, at least `connectionCount` and below 65535. */
     uint16_t requestCount;
-    /**
-     * The number of `routes`, at least 1.
-     */
+    /** The number of `routes`, at least 1. */
     uint8_t routeCount;
-    /**
-     * The number of `lines`, 0 to 253.
-     */
+    /** The number of `lines`, 0 to 253. */
     uint8_t lineCount;
-    /**
-     * The number of `connections`, at least 1.
-     */
+    /** The number of `connections`, at least 1. */
     uint8_t connectionCount;
 } mbm_gatewayConfig;
 
@@ -4441,14 +3500,13 @@ typedef struct mbm_gatewayConfig {
  * to their defaults. A call that is refused changes nothing.
  *
  * @param gateway  the object; initialised with MBM_INIT before the first call
- * @param config   what the gateway consists of. What it points to must stay valid, and must
- *                 be used by one gateway only, for as long as the gateway is used; lines,
+ * @param config   what the gateway consists of. What it points to must stay valid, and must be
+ *                 used by one gateway only, for as long as the gateway is used; lines,
  *                 connections and requests are initialised with MBM_INIT
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a count out of range, fewer
- *         requests than connections, a route to a line that does not exist or to a unit id
- *         above 255, and a line without client; MBM_NOT_INITIALISED if the client of a line
- *         was not begun; MBM_BUSY from within a hook of the gateway, and of a client of its
- *         lines
+ * @return a status; MBM_INVALID_ARGUMENT for fewer requests than connections, a route to a line
+ *         that does not exist or to a unit id above 255, and a line without client;
+ *         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within
+ *         a hook of a client of its lines
  */
 uint8_t mbm_gateway_begin(struct mbm_gateway *gateway,
                           const struct mbm_gatewayConfig *config);
@@ -4459,10 +3517,9 @@ uint8_t mbm_gateway_begin(struct mbm_gateway *gateway,
  *
  * @param gateway     the object
  * @param connection  the number of a free place, below `connectionCount`
- * @param port        the connection; is copied. Its hooks read, write and micros are
- *                    required. The clocks of all connections count the same time
- * @return MBM_OK; MBM_BUSY if the place has an open connection, and from within a hook of the
- *         gateway; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param port        the connection; is copied. Its hooks read, write and micros are required.
+ *                    The clocks of all connections count the same time
+ * @return a status; MBM_BUSY if the place has an open connection
  */
 uint8_t mbm_gateway_open(struct mbm_gateway *gateway,
                          uint8_t connection,
@@ -4474,11 +3531,9 @@ uint8_t mbm_gateway_open(struct mbm_gateway *gateway,
  *
  * @param gateway     the object
  * @param connection  the number of the place; nothing happens if it is free already
- * @return MBM_OK; MBM_BUSY from within a hook of the gateway, and from within a hook of a
- *         port of its lines; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; MBM_BUSY also from within a hook of a port of its lines
  */
-uint8_t mbm_gateway_close(struct mbm_gateway *gateway,
-                          uint8_t connection);
+uint8_t mbm_gateway_close(struct mbm_gateway *gateway, uint8_t connection);
 
 /**
  * Returns how a connection is. Call it after mbm_gateway_poll for each connection: if the
@@ -4488,10 +3543,9 @@ uint8_t mbm_gateway_close(struct mbm_gateway *gateway,
  * @param connection  the number of the place
  * @return MBM_OK while the connection is open; MBM_LINK_LOST if its port reported that the
  *         connection is lost; MBM_MALFORMED_FRAME if it sent bytes that are not Modbus TCP;
- *         MBM_NOT_INITIALISED for a free place; MBM_INVALID_ARGUMENT for a number out of range
+ *         MBM_NOT_INITIALISED for a free place
  */
-uint8_t mbm_gateway_status(const struct mbm_gateway *gateway,
-                           uint8_t connection);
+uint8_t mbm_gateway_status(const struct mbm_gateway *gateway, uint8_t connection);
 
 /**
  * Returns how many requests of a connection are under way: complete, but not answered yet.
@@ -4501,8 +3555,7 @@ uint8_t mbm_gateway_status(const struct mbm_gateway *gateway,
  * @param connection  the number of the place
  * @return the number of requests; 0 for a free place and for a number out of range
  */
-uint16_t mbm_gateway_pending(const struct mbm_gateway *gateway,
-                             uint8_t connection);
+uint16_t mbm_gateway_pending(const struct mbm_gateway *gateway, uint8_t connection);
 
 /**
  * Returns whether the next mbm_gateway_poll reads bytes from a connection. If not, the
@@ -4513,8 +3566,7 @@ uint16_t mbm_gateway_pending(const struct mbm_gateway *gateway,
  * @param connection  the number of the place
  * @return 1 or 0
  */
-uint8_t mbm_gateway_isReading(const struct mbm_gateway *gateway,
-                              uint8_t connection);
+uint8_t mbm_gateway_isReading(const struct mbm_gateway *gateway, uint8_t connection);
 
 /**
  * Polls the clients of all lines, receives requests, passes them on, and sends responses.
@@ -4523,8 +3575,7 @@ uint8_t mbm_gateway_isReading(const struct mbm_gateway *gateway,
  * Call it often. You need not poll the clients of the lines; you may.
  *
  * @param gateway  the object
- * @return MBM_OK; MBM_BUSY from within a hook of the gateway, and from within a hook of a port
- *         of its lines; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; MBM_BUSY also from within a hook of a port of its lines
  */
 uint8_t mbm_gateway_poll(struct mbm_gateway *gateway);
 
@@ -4549,10 +3600,9 @@ uint32_t mbm_gateway_pollDelay(struct mbm_gateway *gateway);
  * @param gateway  the object
  * @param most     1 to 65535; the default is 65535. Fewer if there are not enough places for
  *                 requests
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_gateway_setInFlight(struct mbm_gateway *gateway,
-                                uint16_t most);
+uint8_t mbm_gateway_setInFlight(struct mbm_gateway *gateway, uint16_t most);
 
 /**
  * Sets for how long a request may wait until its line is free. After that time the gateway
@@ -4563,10 +3613,9 @@ uint8_t mbm_gateway_setInFlight(struct mbm_gateway *gateway,
  * @param gateway  the object
  * @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait
  *                 for any time
- * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
-uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway,
-                                 uint32_t timeMs);
+uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway, uint32_t timeMs);
 
 /**
  * Serves units of the gateway itself: those that a route to MBM_GATEWAY_LOCAL leads to. The
@@ -4577,11 +3626,10 @@ uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway,
  * mbm_gateway_poll. Other requests go on meanwhile, also those for the same unit.
  *
  * @param gateway  the object
- * @param units    one unit, or an array of units; must stay valid for as long as the gateway
- *                 is used. Servers may serve the same units. NULL only if `count` is 0
+ * @param units    one unit, or an array of units; must stay valid for as long as the gateway is
+ *                 used. Servers may serve the same units. NULL only if `count` is 0
  * @param count    how many units
- * @return MBM_OK; MBM_BUSY; MBM_INVALID_ARGUMENT, also for a unit with an id above 255;
- *         MBM_NOT_INITIALISED
+ * @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
  */
 uint8_t mbm_gateway_serveUnits(struct mbm_gateway *gateway,
                                struct mbm_unit *units,
@@ -4596,8 +3644,7 @@ uint8_t mbm_gateway_serveUnits(struct mbm_gateway *gateway,
  * @param functions  the declarations; they must stay valid for as long as the gateway is used.
  *                   NULL only if `count` is 0
  * @param count      how many declarations
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a declaration that is not valid; MBM_BUSY or
- *         MBM_NOT_INITIALISED
+ * @return a status; MBM_INVALID_ARGUMENT for a declaration that is not valid
  */
 uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
                                  const struct mbm_function *functions,
@@ -4605,53 +3652,27 @@ uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
 
 /* ==== 12. Values ==================================================================== */
 
-/**
- * Passed to a function: use the order of the mbm_registers. As that order itself:
- * MBM_ORDER_ABCD.
- */
+/** Passed to a function: use the order of the mbm_registers. As that order itself:
+ *  MBM_ORDER_ABCD. */
 #define MBM_ORDER_DEFAULT 0u
-
-/**
- * High word first, high byte first, as most devices do. A is the most significant byte.
- * Example: 2923517522, which is 0xAE415652, is transmitted as AE41 5652 (hex).
- */
+/** High word first, high byte first, as most devices do. A is the most significant byte.
+ *  Example: 2923517522, which is 0xAE415652, is transmitted as AE41 5652 (hex). */
 #define MBM_ORDER_ABCD 1u
-
-/**
- * Low word first, high byte first. The example is transmitted as 5652 AE41.
- */
+/** Low word first, high byte first. The example is transmitted as 5652 AE41. */
 #define MBM_ORDER_CDAB 2u
-
-/**
- * High word first, low byte first. The example is transmitted as 41AE 5256.
- */
+/** High word first, low byte first. The example is transmitted as 41AE 5256. */
 #define MBM_ORDER_BADC 3u
-
-/**
- * Low word first, low byte first. The example is transmitted as 5256 41AE.
- */
+/** Low word first, low byte first. The example is transmitted as 5256 41AE. */
 #define MBM_ORDER_DCBA 4u
-
-/**
- * mbm_registers.kind: words that may only be read, for example the response words of
- * mbm_node.
- */
+/** mbm_registers.kind: words that may only be read, for example the response words of
+ *  mbm_node. */
 #define MBM_REGISTERS_OF_WORDS 1u
-
-/**
- * mbm_registers.kind: bytes that may only be read, the high byte of each register first.
- */
+/** mbm_registers.kind: bytes that may only be read, the high byte of each register first. */
 #define MBM_REGISTERS_OF_BYTES 2u
-
-/**
- * mbm_registers.kind: words that may be read and written.
- */
+/** mbm_registers.kind: words that may be read and written. */
 #define MBM_REGISTERS_INTO_WORDS 3u
-
-/**
- * mbm_registers.kind: bytes that may be read and written, the high byte of each register
- * first.
- */
+/** mbm_registers.kind: bytes that may be read and written, the high byte of each register
+ *  first. */
 #define MBM_REGISTERS_INTO_BYTES 4u
 
 /**
@@ -4661,28 +3682,19 @@ uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
  * mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in. You may also
  * set each field yourself. The get and set functions do not change the view. Several
  * threads may use one view at the same time as long as none of them writes the registers.
+ * They return MBM_ILLEGAL_DATA_ADDRESS if a register that they need is not in the view.
  */
 typedef struct mbm_registers {
-    /**
-     * The words or bytes; `kind` says which. If it is NULL, every function returns
-     * MBM_NOT_INITIALISED.
-     */
+    /** The words or bytes; `kind` says which. If it is NULL, every function returns
+     *  MBM_NOT_INITIALISED. */
     const void *data;
-    /**
-     * The device's address of the first register.
-     */
+    /** The device's address of the first register. */
     uint16_t first;
-    /**
-     * How many registers; `first + count` is at most 65536.
-     */
+    /** How many registers; `first + count` is at most 65536. */
     uint16_t count;
-    /**
-     * One of MBM_REGISTERS_...
-     */
+    /** One of MBM_REGISTERS_... */
     uint8_t kind;
-    /**
-     * One of MBM_ORDER_...: the order for calls with MBM_ORDER_DEFAULT.
-     */
+    /** One of MBM_ORDER_...: the order for calls with MBM_ORDER_DEFAULT. */
     uint8_t order;
 } mbm_registers;
 
@@ -4695,8 +3707,7 @@ typedef struct mbm_registers {
  * @param quantity  the number of coils, 0 to 65535
  * @param bytes     receives the bits, 8 in each byte
  * @param length    the number of bytes that `bytes` can hold
- * @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
- *         MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
  */
 uint8_t mbm_bits_pack(const uint8_t *coils,
                       uint16_t quantity,
@@ -4710,8 +3721,7 @@ uint8_t mbm_bits_pack(const uint8_t *coils,
  * @param length    the number of bytes
  * @param coils     receives one byte for each coil, 0 or 1
  * @param quantity  the number of coils, 0 to 65535
- * @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `bytes` has
- *         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if `bytes` has fewer bits than `quantity`
  */
 uint8_t mbm_bits_unpack(const uint8_t *bytes,
                         uint16_t length,
@@ -4726,9 +3736,8 @@ uint8_t mbm_bits_unpack(const uint8_t *bytes,
  * @param quantity  the number of coils that were read; `bytes` holds that many bits
  * @param address   the address of the coil
  * @param on        receives 0 or 1
- * @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
- *         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
- *         for a NULL pointer
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
+ *         passes address 65535
  */
 uint8_t mbm_bits_isSet(const uint8_t *bytes,
                        uint16_t first,
@@ -4744,9 +3753,8 @@ uint8_t mbm_bits_isSet(const uint8_t *bytes,
  * @param quantity  the number of coils of the write; `bytes` holds that many bits
  * @param address   the address of the coil
  * @param on        0 is off, any other value is on
- * @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
- *         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
- *         NULL pointer
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
+ *         passes address 65535
  */
 uint8_t mbm_bits_set(uint8_t *bytes,
                      uint16_t first,
@@ -4762,8 +3770,7 @@ uint8_t mbm_bits_set(uint8_t *bytes,
  * @param quantity  the number of coils, 0 to 65535
  * @param words     receives the bits, 16 in each word
  * @param length    the number of words that `words` can hold
- * @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
- *         MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
  */
 uint8_t mbm_bits_packWords(const uint8_t *coils,
                            uint16_t quantity,
@@ -4777,8 +3784,7 @@ uint8_t mbm_bits_packWords(const uint8_t *coils,
  * @param length    the number of words
  * @param coils     receives one byte for each coil, 0 or 1
  * @param quantity  the number of coils, 0 to 65535
- * @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `words` has
- *         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if `words` has fewer bits than `quantity`
  */
 uint8_t mbm_bits_unpackWords(const uint16_t *words,
                              uint16_t length,
@@ -4793,9 +3799,8 @@ uint8_t mbm_bits_unpackWords(const uint16_t *words,
  * @param quantity  the number of coils that were read; `words` holds that many bits
  * @param address   the address of the coil
  * @param on        receives 0 or 1
- * @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
- *         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
- *         for a NULL pointer
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
+ *         passes address 65535
  */
 uint8_t mbm_bits_isSetInWords(const uint16_t *words,
                               uint16_t first,
@@ -4811,9 +3816,8 @@ uint8_t mbm_bits_isSetInWords(const uint16_t *words,
  * @param quantity  the number of coils of the write; `words` holds that many bits
  * @param address   the address of the coil
  * @param on        0 is off, any other value is on
- * @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
- *         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
- *         NULL pointer
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
+ *         passes address 65535
  */
 uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint16_t first,
@@ -4827,12 +3831,11 @@ uint8_t mbm_bits_setInWords(uint16_t *words,
  * words.
  *
  * @param registers  the view to fill in; without data after an error
- * @param words      the words, for example the response words of mbm_node; must stay
- *                   valid while the view is used. NULL only if `count` is 0
+ * @param words      the words, for example the response words of mbm_node; must stay valid
+ *                   while the view is used. NULL only if `count` is 0
  * @param count      how many words
  * @param first      the device's address of the first register, 0 to 65535
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
- *         MBM_INVALID_ARGUMENT for NULL
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535
  */
 uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
                               const uint16_t *words,
@@ -4843,12 +3846,11 @@ uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
  * As mbm_registers_ofWords, for the data bytes of a reply or a request.
  *
  * @param registers  the view to fill in; without data after an error
- * @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must
- *                   stay valid while the view is used
+ * @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must stay
+ *                   valid while the view is used
  * @param length     how many bytes, an even number
  * @param first      the device's address of the first register, 0 to 65535
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
- *         MBM_INVALID_ARGUMENT for NULL or an odd length
+ * @return a status; see mbm_registers_ofWords. MBM_INVALID_ARGUMENT for an odd length
  */
 uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
                               const uint8_t *bytes,
@@ -4891,8 +3893,7 @@ uint8_t mbm_registers_intoBytes(struct mbm_registers *registers,
  * @param address    the device's address of the register
  * @param bit        0, the least significant, to 15
  * @param on         receives 0 or 1
- * @return MBM_OK; or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register does
- *         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
                              uint16_t address,
@@ -4907,8 +3908,7 @@ uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
  * @param address    the device's address of the register
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      receives the number
- * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
- *         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_getUint16(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -4923,8 +3923,7 @@ uint8_t mbm_registers_getUint16(const struct mbm_registers *registers,
  * @param address    the device's address of the first of its registers
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      receives the number
- * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_getUint32(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -4939,8 +3938,7 @@ uint8_t mbm_registers_getUint32(const struct mbm_registers *registers,
  * @param address    the device's address of the first of its registers
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      receives the number
- * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_getUint64(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -4955,8 +3953,7 @@ uint8_t mbm_registers_getUint64(const struct mbm_registers *registers,
  * @param address    the device's address of the first of its registers
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      receives the number
- * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_getFloat(const struct mbm_registers *registers,
                                uint16_t address,
@@ -4971,8 +3968,7 @@ uint8_t mbm_registers_getFloat(const struct mbm_registers *registers,
  * @param address    the device's address of the first of its registers
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      receives the number
- * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_getDouble(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -4988,14 +3984,12 @@ uint8_t mbm_registers_getDouble(const struct mbm_registers *registers,
  *
  * @param registers  the registers
  * @param address    the device's address of the first register of the field
- * @param length     length of the field in bytes, two for each register; an odd length
- *                   ends with the first character of a register
+ * @param length     length of the field in bytes, two for each register; an odd length ends
+ *                   with the first character of a register
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param text       receives the text and a NUL
  * @param capacity   size of `text` in bytes; `length + 1` are always enough
- * @return MBM_OK; or with `text` unchanged MBM_ILLEGAL_DATA_ADDRESS if part of the field
- *         does not exist, MBM_BUFFER_TOO_SMALL, MBM_INVALID_ARGUMENT or
- *         MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if `text` is
  */
 uint8_t mbm_registers_getString(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -5014,8 +4008,7 @@ uint8_t mbm_registers_getString(const struct mbm_registers *registers,
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param bytes      receives the bytes; must not overlap the registers
  * @param length     how many bytes, two for each register; may be odd
- * @return MBM_OK; or with `bytes` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
                                uint16_t address,
@@ -5030,8 +4023,7 @@ uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
  * @param address    the device's address of the register
  * @param bit        0, the least significant, to 15
  * @param on         0 for off, anything else for on
- * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
- *         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
                              uint16_t address,
@@ -5046,8 +4038,7 @@ uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
  * @param address    the device's address of the register
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      the number
- * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
- *         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_setUint16(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -5061,8 +4052,7 @@ uint8_t mbm_registers_setUint16(const struct mbm_registers *registers,
  * @param address    the device's address of the first of its registers
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      the number
- * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the two
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_setUint32(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -5076,8 +4066,7 @@ uint8_t mbm_registers_setUint32(const struct mbm_registers *registers,
  * @param address    the device's address of the first of its registers
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      points to the number
- * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the four
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_setUint64(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -5091,8 +4080,7 @@ uint8_t mbm_registers_setUint64(const struct mbm_registers *registers,
  * @param address    the device's address of the first of its registers
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      points to the number
- * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the two
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_setFloat(const struct mbm_registers *registers,
                                uint16_t address,
@@ -5107,8 +4095,7 @@ uint8_t mbm_registers_setFloat(const struct mbm_registers *registers,
  * @param address    the device's address of the first of its registers
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      points to the number
- * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the four
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_setDouble(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -5121,13 +4108,12 @@ uint8_t mbm_registers_setDouble(const struct mbm_registers *registers,
  *
  * @param registers  the registers, of a kind that may be written
  * @param address    the device's address of the first register of the field
- * @param length     length of the field in bytes, two for each register; if it is odd,
- *                   the byte after the field becomes 0 too
+ * @param length     length of the field in bytes, two for each register; if it is odd, the byte
+ *                   after the field becomes 0 too
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param text       the text; ends with a NUL, which need not fit into the field
- * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if part of the field
- *         does not exist, MBM_BUFFER_TOO_SMALL if the text is longer than the field,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if the text is longer than the
+ *         field
  */
 uint8_t mbm_registers_setString(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -5144,10 +4130,9 @@ uint8_t mbm_registers_setString(const struct mbm_registers *registers,
  * @param address    the device's address of the first register
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param bytes      the bytes; must not overlap the registers
- * @param length     how many bytes, two for each register; if it is odd, the other byte
- *                   of the last register does not change
- * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the
- *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param length     how many bytes, two for each register; if it is odd, the other byte of the
+ *                   last register does not change
+ * @return a status; see mbm_registers
  */
 uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
                                uint16_t address,
@@ -5157,63 +4142,34 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
 
 /* ==== 13. Packets =================================================================== */
 
-/**
- * A request: a client sends it.
- */
+/** A request: a client sends it. */
 #define MBM_PACKET_REQUEST 0u
-
-/**
- * A response: a server sends it if the request succeeds.
- */
+/** A response: a server sends it if the request succeeds. */
 #define MBM_PACKET_RESPONSE 1u
-
-/**
- * An exception: a server sends it if the request fails (V1.1b3, clause 7).
- */
+/** An exception: a server sends it if the request fails (V1.1b3, clause 7). */
 #define MBM_PACKET_EXCEPTION 2u
-
-/**
- * The longest PDU, function code and data, in bytes (V1.1b3, 4.1).
- */
+/** The longest PDU, function code and data, in bytes (V1.1b3, 4.1). */
 #define MBM_MAX_PDU 253
-
-/**
- * The length is exactly `bytes`.
- */
+/** The length is exactly `bytes`. */
 #define MBM_LENGTH_EXACT 0u
-
-/**
- * The length is at least `bytes`. Call the function again once you have that many bytes.
- */
+/** The length is at least `bytes`. Call the function again once you have that many bytes. */
 #define MBM_LENGTH_AT_LEAST 1u
-
-/**
- * Silence on the line ends the frame; in ASCII the end character does. `bytes` is 0.
- */
+/** Silence on the line ends the frame; in ASCII the end character does. `bytes` is 0. */
 #define MBM_LENGTH_SILENCE 2u
-
-/**
- * The length is not known, because the function is not declared: see mbm_function. In
- * RTU over TCP also for a function whose frames silence ends, because a stream has no
- * silence. `bytes` is 0.
- */
+/** The length is not known, because the function is not declared: see mbm_function. In
+ *  RTU over TCP also for a function whose frames silence ends, because a stream has no
+ *  silence. `bytes` is 0. */
 #define MBM_LENGTH_UNKNOWN 3u
 
 /**
  * An object of a device identification.
  */
 typedef struct mbm_object {
-    /**
-     * The value, usually text, without a NUL.
-     */
+    /** The value, usually text, without a NUL. */
     const uint8_t *data;
-    /**
-     * Length of the value in bytes.
-     */
+    /** Length of the value in bytes. */
     uint8_t length;
-    /**
-     * The object id: 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
-     */
+    /** The object id: 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21). */
     uint8_t id;
 } mbm_object;
 
@@ -5251,122 +4207,68 @@ typedef struct mbm_object {
  * mbm_packet_nextObject; to write them, mbm_packet_addRecord and mbm_packet_addObject.
  */
 typedef struct mbm_packet {
-    /**
-     * The data, without the byte count before them. Parsing sets a pointer into the
-     * parsed bytes. To build a packet, point it to bytes of yours. May be NULL if
-     * dataLength is 0.
-     */
+    /** The data, without the byte count before them. Parsing sets a pointer into the
+     *  parsed bytes. To build a packet, point it to bytes of yours. May be NULL if
+     *  dataLength is 0. */
     const uint8_t *data;
-    /**
-     * Length of `data` in bytes.
-     */
+    /** Length of `data` in bytes. */
     uint16_t dataLength;
-    /**
-     * The transaction identifier of a TCP frame; 0 in other framings.
-     */
+    /** The transaction identifier of a TCP frame; 0 in other framings. */
     uint16_t transaction;
-    /**
-     * The first coil, input or register, counted from 0; for function 17 the first that
-     * is read.
-     */
+    /** The first coil, input or register, counted from 0; for function 17 the first that
+     *  is read. */
     uint16_t address;
-    /**
-     * How many coils, inputs or registers; for function 17 how many are read.
-     */
+    /** How many coils, inputs or registers; for function 17 how many are read. */
     uint16_t quantity;
-    /**
-     * 17: the first register that is written.
-     */
+    /** 17: the first register that is written. */
     uint16_t writeAddress;
-    /**
-     * 17: how many registers are written.
-     */
+    /** 17: how many registers are written. */
     uint16_t writeQuantity;
-    /**
-     * 05: 0 is off, any other value is on; parsing sets 1 for on. 06: the value of the
-     * register.
-     */
+    /** 05: 0 is off, any other value is on; parsing sets 1 for on. 06: the value of the
+     *  register. */
     uint16_t value;
-    /**
-     * 16: the bits that keep their value.
-     */
+    /** 16: the bits that keep their value. */
     uint16_t andMask;
-    /**
-     * 16: the new values of the other bits.
-     */
+    /** 16: the new values of the other bits. */
     uint16_t orMask;
-    /**
-     * 08: the sub-function, one of MBM_DIAGNOSTICS_...
-     */
+    /** 08: the sub-function, one of MBM_DIAGNOSTICS_... */
     uint16_t subFunction;
-    /**
-     * 0B, 0C: FFFF (hex) while the device carries out a command, else 0.
-     */
+    /** 0B, 0C: FFFF (hex) while the device carries out a command, else 0. */
     uint16_t commStatus;
-    /**
-     * 0B, 0C: the count of successful messages.
-     */
+    /** 0B, 0C: the count of successful messages. */
     uint16_t eventCount;
-    /**
-     * 0C: the count of messages.
-     */
+    /** 0C: the count of messages. */
     uint16_t messageCount;
-    /**
-     * The unit id that the request addresses, or that replies, 0 to 255. Only frames have it.
-     * mbm_frame_build, mbm_frame_exception and mbm_frame_replyLength refuse a greater number
-     * (MBM_INVALID_ARGUMENT).
-     */
+    /** The unit id that the request addresses, or that replies, 0 to 255. Only frames have it.
+     *  mbm_frame_build, mbm_frame_exception and mbm_frame_replyLength refuse a greater number
+     *  (MBM_INVALID_ARGUMENT). */
     uint16_t unit;
-    /**
-     * MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
-     */
+    /** MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION. */
     uint8_t kind;
-    /**
-     * The function code, 1 to 127; of an exception the one of the request.
-     */
+    /** The function code, 1 to 127; of an exception the one of the request. */
     uint8_t function;
-    /**
-     * Exception: the code, 1 to 127. The numbers are those of MBM_ILLEGAL_FUNCTION and
-     * the statuses after it.
-     */
+    /** Exception: the code, 1 to 127. The numbers are those of MBM_ILLEGAL_FUNCTION and
+     *  the statuses after it. */
     uint8_t exceptionCode;
-    /**
-     * 07: the eight outputs, one bit each.
-     */
+    /** 07: the eight outputs, one bit each. */
     uint8_t exceptionStatus;
-    /**
-     * 11: the byte count, at most dataLength. Some devices count only the id and send
-     * more bytes after it.
-     */
+    /** 11: the byte count, at most dataLength. Some devices count only the id and send
+     *  more bytes after it. */
     uint8_t byteCount;
-    /**
-     * 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another MEI type.
-     */
+    /** 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another MEI type. */
     uint8_t meiType;
-    /**
-     * 2B/0E: one of MBM_DEVICE_ID_...
-     */
+    /** 2B/0E: one of MBM_DEVICE_ID_... */
     uint8_t readDeviceIdCode;
-    /**
-     * 2B/0E: the first object to read, or the only one.
-     */
+    /** 2B/0E: the first object to read, or the only one. */
     uint8_t objectId;
-    /**
-     * 2B/0E: the conformity level, by the standard 01 to 03 or 81 to 83 (hex); not
-     * checked.
-     */
+    /** 2B/0E: the conformity level, by the standard 01 to 03 or 81 to 83 (hex); not
+     *  checked. */
     uint8_t conformity;
-    /**
-     * 2B/0E: 1 if the client has to send another request for the rest, else 0.
-     */
+    /** 2B/0E: 1 if the client has to send another request for the rest, else 0. */
     uint8_t moreFollows;
-    /**
-     * 2B/0E: the object to request next. By the standard 0 if none follows; not checked.
-     */
+    /** 2B/0E: the object to request next. By the standard 0 if none follows; not checked. */
     uint8_t nextObjectId;
-    /**
-     * 2B/0E: how many objects `data` contains.
-     */
+    /** 2B/0E: how many objects `data` contains. */
     uint8_t objectCount;
 } mbm_packet;
 
@@ -5374,13 +4276,9 @@ typedef struct mbm_packet {
  * The length of a PDU or frame, as far as it is known.
  */
 typedef struct mbm_length {
-    /**
-     * The length in bytes from the first byte on; `kind` says how to read it.
-     */
+    /** The length in bytes from the first byte on; `kind` says how to read it. */
     uint16_t bytes;
-    /**
-     * MBM_LENGTH_EXACT, MBM_LENGTH_AT_LEAST, MBM_LENGTH_SILENCE or MBM_LENGTH_UNKNOWN.
-     */
+    /** MBM_LENGTH_EXACT, MBM_LENGTH_AT_LEAST, MBM_LENGTH_SILENCE or MBM_LENGTH_UNKNOWN. */
     uint8_t kind;
 } mbm_length;
 
@@ -5388,24 +4286,16 @@ typedef struct mbm_length {
  * Registers of a file: one group of function 14 or 15 (hex), in a request or a response.
  */
 typedef struct mbm_record {
-    /**
-     * The registers, the high byte of each first; 2 * length bytes. A request of
-     * function 14 reads registers and has no data: NULL after parsing, ignored for
-     * building.
-     */
+    /** The registers, the high byte of each first; 2 * length bytes. A request of
+     *  function 14 reads registers and has no data: NULL after parsing, ignored for
+     *  building. */
     const uint8_t *data;
-    /**
-     * The file number, 1 to 65535; 0 in a response of function 14, which does not
-     * contain it.
-     */
+    /** The file number, 1 to 65535; 0 in a response of function 14, which does not
+     *  contain it. */
     uint16_t file;
-    /**
-     * The first record, 0 to 9999; 0 in a response of function 14.
-     */
+    /** The first record, 0 to 9999; 0 in a response of function 14. */
     uint16_t record;
-    /**
-     * How many registers.
-     */
+    /** How many registers. */
     uint16_t length;
 } mbm_record;
 
@@ -5418,11 +4308,11 @@ typedef struct mbm_record {
  * @param framing   the framing of the frame
  * @param packet    the packet, with its unit, and for TCP its transaction
  * @param frame     receives the frame; it must not overlap the packet's data
- * @param capacity  bytes of `frame`; MBM_MAX_FRAME suffice for RTU, MBM_MAX_TCP_FRAME for
- *                  TCP, MBM_MAX_PDU for MBM_FRAMING_NONE, MBM_MAX_ASCII_FRAME for all
+ * @param capacity  bytes of `frame`; MBM_MAX_FRAME suffice for RTU, MBM_MAX_TCP_FRAME for TCP,
+ *                  MBM_MAX_PDU for MBM_FRAMING_NONE, MBM_MAX_ASCII_FRAME for all
  * @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also for a unit above 255;
- *         otherwise the status that mbm_frame_parse would return for such a frame
+ * @return a status; MBM_BUFFER_TOO_SMALL; otherwise the status that mbm_frame_parse would
+ *         return for such a frame
  */
 uint8_t mbm_frame_build(const struct mbm_framing *framing,
                         const struct mbm_packet *packet,
@@ -5439,21 +4329,20 @@ uint8_t mbm_frame_build(const struct mbm_framing *framing,
  * Any thread or interrupt may call it.
  *
  * @param framing      the framing of the frame
- * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
- *                     and exceptions
- * @param frame        the frame, from its first byte to its last. An ASCII frame is
- *                     decoded in place, which overwrites it; other frames do not change
+ * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
+ * @param frame        the frame, from its first byte to its last. An ASCII frame is decoded in
+ *                     place, which overwrites it; other frames do not change
  * @param frameLength  the number of bytes of `frame`
  * @param packet       receives the packet. If the frame is valid but its PDU is not, it
- *                     receives only kind, unit, transaction and function. If the frame is
- *                     not valid, it receives only the kind. For MBM_INVALID_ARGUMENT it
- *                     does not change
- * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. If the frame is not valid:
- *         MBM_INCOMPLETE_FRAME, MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a
- *         wrong LRC. If its request is not valid, the exception that answers it:
- *         MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE.
- *         If its response is not valid: MBM_MALFORMED_REPLY, or MBM_INVALID_FUNCTION for a
- *         function code that the standard does not define and `framing` does not declare
+ *                     receives only kind, unit, transaction and function. If the frame is not
+ *                     valid, it receives only the kind. For MBM_INVALID_ARGUMENT it does not
+ *                     change
+ * @return MBM_OK, also for an exception. If the frame is not valid: MBM_INCOMPLETE_FRAME,
+ *         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC. If its request is not
+ *         valid, the exception that answers it: MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS
+ *         or MBM_ILLEGAL_DATA_VALUE. If its response is not valid: MBM_MALFORMED_REPLY, or
+ *         MBM_INVALID_FUNCTION for a function code that the standard does not define and
+ *         `framing` does not declare
  */
 uint8_t mbm_frame_parse(const struct mbm_framing *framing,
                         uint8_t kind,
@@ -5474,10 +4363,9 @@ uint8_t mbm_frame_parse(const struct mbm_framing *framing,
  * @param frame     receives the frame; it may be the buffer of the request's frame
  * @param capacity  bytes of `frame`; 11 always suffice
  * @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED for unit 0 on a serial line, which no device
- *         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no
- *         exception can contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
- *         for a `code` out of range and for MBM_FRAMING_NONE
+ * @return a status; MBM_BROADCAST_NOT_ALLOWED for unit 0 on a serial line, which no device
+ *         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no exception
+ *         can contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT also for MBM_FRAMING_NONE
  */
 uint8_t mbm_frame_exception(const struct mbm_framing *framing,
                             const struct mbm_packet *request,
@@ -5499,14 +4387,12 @@ uint8_t mbm_frame_exception(const struct mbm_framing *framing,
  * Any thread or interrupt may call it. On a Cortex-M it takes 500 bytes of stack.
  *
  * @param framing   the framing of the frame
- * @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and
- *                  exceptions
+ * @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
  * @param bytes     the frame's first bytes; more may follow
  * @param have      the number of bytes; may be 0
- * @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is
- *                  not MBM_OK
- * @return MBM_OK; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame
- *         may be as long as they say; MBM_INVALID_ARGUMENT
+ * @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
+ * @return a status; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame may
+ *         be as long as they say
  */
 uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
                                  uint8_t kind,
@@ -5526,8 +4412,8 @@ uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
  * @param expected  receives the length. It is MBM_LENGTH_EXACT and 0 for a request that no
  *                  device answers: a broadcast, or 08 with sub-function 04. It is
  *                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also if the packet is not a request; otherwise the
- *         status for which mbm_frame_build refuses the request
+ * @return a status; MBM_INVALID_ARGUMENT if the packet is not a request; otherwise the status
+ *         for which mbm_frame_build refuses the request
  */
 uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
                               const struct mbm_packet *request,
@@ -5543,13 +4429,11 @@ uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
  *
  * @param bytes         the first bytes
  * @param have          the number of bytes
- * @param allowUnknown  0: the function code must be one that the standard defines or
- *                      leaves to users; any other value: every function code but 0 will do
- * @param expected      receives the length of the frame in bytes; 0 if the status is not
- *                      MBM_OK
- * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes are needed to decide;
- *         MBM_MALFORMED_FRAME if the bytes are not a Modbus TCP frame;
- *         MBM_INVALID_ARGUMENT
+ * @param allowUnknown  0: the function code must be one that the standard defines or leaves to
+ *                      users; any other value: every function code but 0 will do
+ * @param expected      receives the length of the frame in bytes; 0 if the status is not MBM_OK
+ * @return a status; MBM_INCOMPLETE_FRAME if more bytes are needed to decide;
+ *         MBM_MALFORMED_FRAME if the bytes are not a Modbus TCP frame
  */
 uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
                                uint16_t have,
@@ -5587,10 +4471,9 @@ uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
  *
  * @param packet  a request or response of function 14 or 15, parsed or to be built
  * @param cursor  the position in the data; a variable of yours, 0 for the first record
- * @param record  receives the record; its data pointer points into the data of the
- *                packet
- * @return 1 if there is a record. 0, with `cursor` and `record` unchanged, if there are
- *         no more records, and for NULL
+ * @param record  receives the record; its data pointer points into the data of the packet
+ * @return 1 if there is a record. 0, with `cursor` and `record` unchanged, if there are no more
+ *         records, and for NULL
  */
 uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
                               uint16_t *cursor,
@@ -5604,10 +4487,9 @@ uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
  *
  * @param packet  a response of function 2B/0E (hex), parsed or to be built
  * @param cursor  the position in the data; a variable of yours, 0 for the first object
- * @param object  receives the object; its data pointer points into the data of the
- *                packet
- * @return 1 if there is an object. 0, with `cursor` and `object` unchanged, if there are
- *         no more objects, and for NULL
+ * @param object  receives the object; its data pointer points into the data of the packet
+ * @return 1 if there is an object. 0, with `cursor` and `object` unchanged, if there are no
+ *         more objects, and for NULL
  */
 uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
                               uint16_t *cursor,
@@ -5618,14 +4500,13 @@ uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
  * build. Set the kind and the function of the packet first, and dataLength to 0.
  *
  * @param packet    gets the record; unchanged if the call fails
- * @param storage   receives the data of the packet; use the same storage for all its
- *                  records
+ * @param storage   receives the data of the packet; use the same storage for all its records
  * @param capacity  size of `storage` in bytes; 251 are always enough
  * @param record    the record; its data must not overlap `storage`
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if the function is not 14
- *         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for an invalid
- *         record; MBM_INVALID_ARGUMENT for a NULL pointer, an exception packet, record
- *         data that overlap `storage`, or packet data that are not in `storage`
+ * @return a status; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if the function is not 14 or 15;
+ *         MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for an invalid record;
+ *         MBM_INVALID_ARGUMENT for an exception packet, record data that overlap `storage`, or
+ *         packet data that are not in `storage`
  */
 uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
                              uint8_t *storage,
@@ -5638,15 +4519,13 @@ uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
  * and objectCount to 0.
  *
  * @param packet    gets the object; unchanged if the call fails
- * @param storage   receives the data of the packet; use the same storage for all its
- *                  objects
+ * @param storage   receives the data of the packet; use the same storage for all its objects
  * @param capacity  size of `storage` in bytes; 246 are always enough
  * @param object    the object; its data must not overlap `storage`
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL: if `storage` has 246 bytes, the object belongs
- *         into the next response, so set moreFollows and nextObjectId;
- *         MBM_ILLEGAL_FUNCTION if the packet is no such response; MBM_INVALID_ARGUMENT
- *         for a NULL pointer, object data that overlap `storage`, or packet data that
- *         are not in `storage`
+ * @return a status; MBM_BUFFER_TOO_SMALL: if `storage` has 246 bytes, the object belongs into
+ *         the next response, so set moreFollows and nextObjectId; MBM_ILLEGAL_FUNCTION if the
+ *         packet is no such response; MBM_INVALID_ARGUMENT for object data that overlap
+ *         `storage`, or packet data that are not in `storage`
  */
 uint8_t mbm_packet_addObject(struct mbm_packet *packet,
                              uint8_t *storage,
@@ -5661,14 +4540,13 @@ uint8_t mbm_packet_addObject(struct mbm_packet *packet,
  * Any thread or interrupt may call it. On a Cortex-M it takes 1000 bytes of stack.
  *
  * @param framing      the framing of the frame
- * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
- *                     and exceptions
+ * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
  * @param frame        the frame, from its first byte to its last
  * @param frameLength  the number of bytes of `frame`
  * @param text         receives the line. A zero byte always ends it
  * @param size         bytes of `text`; 200 suffice for most frames, 2295 for all
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
- *         MBM_INVALID_ARGUMENT, also for MBM_FRAMING_NONE
+ * @return a status; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
+ *         MBM_INVALID_ARGUMENT for MBM_FRAMING_NONE
  */
 uint8_t mbm_frame_text(const struct mbm_framing *framing,
                        uint8_t kind,
@@ -5679,66 +4557,31 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
 
 /* ==== 14. Sniffer =================================================================== */
 
-/**
- * The bytes come from a line that carries both directions.
- */
+/** The bytes come from a line that carries both directions. */
 #define MBM_DIRECTION_BOTH 0u
-
-/**
- * The bytes come from a line or stream on which only the client sends.
- */
+/** The bytes come from a line or stream on which only the client sends. */
 #define MBM_DIRECTION_CLIENT 1u
-
-/**
- * The bytes come from a line or stream on which only servers send.
- */
+/** The bytes come from a line or stream on which only servers send. */
 #define MBM_DIRECTION_SERVER 2u
-
-/**
- * The smallest buffer of a sniffer, in bytes.
- */
+/** The smallest buffer of a sniffer, in bytes. */
 #define MBM_MIN_SNIFFER_BUFFER 32
-
-/**
- * The most functions of your declaration that a sniffer accepts.
- */
+/** The most functions of your declaration that a sniffer accepts. */
 #define MBM_MAX_SNIFFER_FUNCTIONS 19
-
-/**
- * A request.
- */
+/** A request. */
 #define MBM_EVENT_REQUEST 0u
-
-/**
- * The reply to a request.
- */
+/** The reply to a request. */
 #define MBM_EVENT_REPLY 1u
-
-/**
- * An exception that answers a request.
- */
+/** An exception that answers a request. */
 #define MBM_EVENT_EXCEPTION 2u
-
-/**
- * A reply or exception without a matching request: it is late, or its request was not
- * received, or it does not match the request.
- */
+/** A reply or exception without a matching request: it is late, or its request was not
+ *  received, or it does not match the request. */
 #define MBM_EVENT_UNPAIRED 3u
-
-/**
- * A request without a reply: none came before the timeout, or on a serial line before
- * the next request.
- */
+/** A request without a reply: none came before the timeout, or on a serial line before
+ *  the next request. */
 #define MBM_EVENT_TIMEOUT 4u
-
-/**
- * Bytes that look like a frame, but the CRC or LRC is wrong, or bytes are missing.
- */
+/** Bytes that look like a frame, but the CRC or LRC is wrong, or bytes are missing. */
 #define MBM_EVENT_BAD_CRC 5u
-
-/**
- * Bytes that are no frame.
- */
+/** Bytes that are no frame. */
 #define MBM_EVENT_NOISE 6u
 
 /**
@@ -5750,13 +4593,9 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
  * interrupt; pass bytes from an interrupt through an mbm_ring.
  */
 typedef struct mbm_sniffer {
-    /**
-     * Private.
-     */
+    /** Private. */
     void *pointers[1];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[171];
 } mbm_sniffer;
 
@@ -5767,81 +4606,49 @@ typedef struct mbm_sniffer {
  * with that sniffer.
  */
 typedef struct mbm_event {
-    /**
-     * The bytes of the frame; of MBM_EVENT_NOISE all its bytes. An ASCII frame is
-     * decoded: unit id, PDU, LRC.
-     */
+    /** The bytes of the frame; of MBM_EVENT_NOISE all its bytes. An ASCII frame is
+     *  decoded: unit id, PDU, LRC. */
     const uint8_t *frame;
-    /**
-     * The PDU within the frame; NULL without a PDU.
-     */
+    /** The PDU within the frame; NULL without a PDU. */
     const uint8_t *pdu;
-    /**
-     * The fields of the PDU, as mbm_frame_parse sets them. If the PDU is malformed, and
-     * for MBM_EVENT_TIMEOUT, MBM_EVENT_BAD_CRC and MBM_EVENT_NOISE, only kind, unit,
-     * transaction and function are set.
-     */
+    /** The fields of the PDU, as mbm_frame_parse sets them. If the PDU is malformed, and
+     *  for MBM_EVENT_TIMEOUT, MBM_EVENT_BAD_CRC and MBM_EVENT_NOISE, only kind, unit,
+     *  transaction and function are set. */
     struct mbm_packet packet;
-    /**
-     * When the last byte arrived, in microseconds; for MBM_EVENT_TIMEOUT when the
-     * timeout ended.
-     */
+    /** When the last byte arrived, in microseconds; for MBM_EVENT_TIMEOUT when the
+     *  timeout ended. */
     uint32_t timeUs;
-    /**
-     * Time from the last byte of the request to the last byte of its reply, or to the
-     * timeout, in microseconds; 0 for other events.
-     */
+    /** Time from the last byte of the request to the last byte of its reply, or to the
+     *  timeout, in microseconds; 0 for other events. */
     uint32_t responseTimeUs;
-    /**
-     * Length of `frame` in bytes.
-     */
+    /** Length of `frame` in bytes. */
     uint16_t frameLength;
-    /**
-     * Length of `pdu` in bytes.
-     */
+    /** Length of `pdu` in bytes. */
     uint16_t pduLength;
-    /**
-     * How many bytes of the line or stream this event covers, at most 65535.
-     */
+    /** How many bytes of the line or stream this event covers, at most 65535. */
     uint16_t length;
-    /**
-     * The first coil, input or register of the request; for function 17 (hex) the first
-     * that is read. Also set for a reply, which does not contain it.
-     */
+    /** The first coil, input or register of the request; for function 17 (hex) the first
+     *  that is read. Also set for a reply, which does not contain it. */
     uint16_t address;
-    /**
-     * The quantity of the request; for function 17 (hex) the quantity that is read.
-     */
+    /** The quantity of the request; for function 17 (hex) the quantity that is read. */
     uint16_t quantity;
-    /**
-     * One of MBM_EVENT_...
-     */
+    /** One of MBM_EVENT_... */
     uint8_t kind;
-    /**
-     * MBM_OK; of a request that a server must refuse, the exception for it; of an
-     * exception its code; MBM_MALFORMED_REPLY if a reply does not match its request;
-     * MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL for noise that may
-     * be a frame longer than the buffer.
-     */
+    /** MBM_OK; of a request that a server must refuse, the exception for it; of an
+     *  exception its code; MBM_MALFORMED_REPLY if a reply does not match its request;
+     *  MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL for noise that may
+     *  be a frame longer than the buffer. */
     uint8_t status;
-    /**
-     * The unit that the request addresses, or that replies; for MBM_EVENT_BAD_CRC the
-     * byte at that position.
-     */
+    /** The unit that the request addresses, or that replies; for MBM_EVENT_BAD_CRC the
+     *  byte at that position. */
     uint8_t unit;
-    /**
-     * The function code, of an exception the one of the request; for MBM_EVENT_BAD_CRC
-     * the byte at that position.
-     */
+    /** The function code, of an exception the one of the request; for MBM_EVENT_BAD_CRC
+     *  the byte at that position. */
     uint8_t function;
-    /**
-     * The first bytes of the request's PDU: for replies, exceptions and timeouts, and
-     * for MBM_EVENT_UNPAIRED if the reply is late and its request is still known.
-     */
+    /** The first bytes of the request's PDU: for replies, exceptions and timeouts, and
+     *  for MBM_EVENT_UNPAIRED if the reply is late and its request is still known. */
     uint8_t requestHead[9];
-    /**
-     * How many bytes of requestHead are set; 0 if the request is not known.
-     */
+    /** How many bytes of requestHead are set; 0 if the request is not known. */
     uint8_t requestHeadLength;
 } mbm_event;
 
@@ -5852,13 +4659,12 @@ typedef struct mbm_event {
  * unanswered requests without an event, and its settings return to their defaults.
  *
  * @param sniffer  the object; initialised with MBM_INIT before the first call
- * @param buffer   holds received bytes until the sniffer has reported them; must stay
- *                 valid for as long as the sniffer is used
- * @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER.
- *                 MBM_MAX_FRAME holds every frame; with separate directions use twice as
- *                 much. A longer frame becomes an event of kind MBM_EVENT_NOISE
- * @return MBM_OK; or with nothing changed MBM_BUFFER_TOO_SMALL for a size that is too
- *         small, MBM_INVALID_ARGUMENT for a NULL pointer
+ * @param buffer   holds received bytes until the sniffer has reported them; must stay valid for
+ *                 as long as the sniffer is used
+ * @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER. MBM_MAX_FRAME
+ *                 holds every frame; with separate directions use twice as much. A longer frame
+ *                 becomes an event of kind MBM_EVENT_NOISE
+ * @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small
  */
 uint8_t mbm_sniffer_beginRtu(struct mbm_sniffer *sniffer, uint8_t *buffer, uint16_t size);
 
@@ -5904,7 +4710,7 @@ uint8_t mbm_sniffer_beginRtuOverTcp(struct mbm_sniffer *sniffer,
  * @param sniffer    the object
  * @param functions  an array that is copied; may be NULL if `count` is 0
  * @param count      how many functions, at most MBM_MAX_SNIFFER_FUNCTIONS
- * @return MBM_OK; MBM_NOT_INITIALISED; MBM_INVALID_ARGUMENT with nothing changed
+ * @return a status
  */
 uint8_t mbm_sniffer_setFunctions(struct mbm_sniffer *sniffer,
                                  const struct mbm_function *functions,
@@ -5916,7 +4722,7 @@ uint8_t mbm_sniffer_setFunctions(struct mbm_sniffer *sniffer,
  *
  * @param sniffer    the object
  * @param character  1 to 127, except CR, the colon and hexadecimal digits
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_sniffer_setDelimiter(struct mbm_sniffer *sniffer, uint8_t character);
 
@@ -5927,7 +4733,7 @@ uint8_t mbm_sniffer_setDelimiter(struct mbm_sniffer *sniffer, uint8_t character)
  *
  * @param sniffer  the object
  * @param baud     bits per second; 0, the default, if the rate is unknown
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
 
@@ -5940,7 +4746,7 @@ uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
  *
  * @param sniffer    the object
  * @param timeoutMs  1 to 65535 ms
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint32_t timeoutMs);
 
@@ -5951,7 +4757,7 @@ uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint32_t tim
  *
  * @param sniffer    the object
  * @param timeoutMs  1 to 65535 ms
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return a status
  */
 uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint32_t timeoutMs);
 
@@ -5961,15 +4767,15 @@ uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint32_t timeou
  * is lost.
  *
  * @param sniffer    the object
- * @param direction  MBM_DIRECTION_BOTH; MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER if
- *                   you receive the directions separately. Do not mix MBM_DIRECTION_BOTH
- *                   with the other two: on a change the sniffer discards the bytes that
- *                   it has not reported yet
+ * @param direction  MBM_DIRECTION_BOTH; MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER if you
+ *                   receive the directions separately. Do not mix MBM_DIRECTION_BOTH with the
+ *                   other two: on a change the sniffer discards the bytes that it has not
+ *                   reported yet
  * @param bytes      the received bytes; NULL only if `length` is 0
  * @param length     how many bytes
  * @param nowUs      arrival time of the last of the bytes, in microseconds; may wrap
- * @return how many bytes the sniffer accepted; 0 also for a sniffer that was never
- *         begun, or for an invalid argument
+ * @return how many bytes the sniffer accepted; 0 also for a sniffer that was never begun, or
+ *         for an invalid argument
  */
 uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
                           uint8_t direction,
@@ -5986,10 +4792,10 @@ uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
  *
  * @param sniffer  the object
  * @param nowUs    the time now, in microseconds; may wrap
- * @param event    receives the event; the data that it points to are valid until the
- *                 next call with this sniffer
- * @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for
- *         NULL, and for a sniffer that was never begun
+ * @param event    receives the event; the data that it points to are valid until the next call
+ *                 with this sniffer
+ * @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for NULL,
+ *         and for a sniffer that was never begun
  */
 uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
                          uint32_t nowUs,
@@ -6005,25 +4811,17 @@ uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
  * @param event  an event that mbm_sniffer_next returned
  * @param text   receives the line; always ends with a NUL
  * @param size   size of `text` in bytes; 200 are enough for most events, 2400 for all
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL if the line was cut; MBM_INVALID_ARGUMENT
+ * @return a status; MBM_BUFFER_TOO_SMALL if the line was cut
  */
 uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
 
 /* ==== 15. Trace ===================================================================== */
 
-/**
- * The smallest buffer of a trace, in bytes.
- */
+/** The smallest buffer of a trace, in bytes. */
 #define MBM_MIN_TRACE_BUFFER 32
-
-/**
- * The bytes were received.
- */
+/** The bytes were received. */
 #define MBM_TRACE_RECEIVED 0u
-
-/**
- * The bytes were sent.
- */
+/** The bytes were sent. */
 #define MBM_TRACE_SENT 1u
 
 /**
@@ -6037,13 +4835,9 @@ uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size)
  * uses its port.
  */
 typedef struct mbm_trace {
-    /**
-     * Private.
-     */
+    /** Private. */
     void *pointers[26];
-    /**
-     * Private.
-     */
+    /** Private. */
     uint32_t words[9];
 } mbm_trace;
 
@@ -6051,37 +4845,25 @@ typedef struct mbm_trace {
  * One frame on a line or connection, or bytes that are no frame.
  */
 typedef struct mbm_traceRecord {
-    /**
-     * The bytes as they are on the line. Of a sniffer's event in ASCII they are decoded, from
-     * the unit to the LRC.
-     */
+    /** The bytes as they are on the line. Of a sniffer's event in ASCII they are decoded, from
+     *  the unit to the LRC. */
     const uint8_t *bytes;
-    /**
-     * When the first byte was sent or read, in microseconds by the clock of the port. The
-     * time of a frame that followed other bytes without a pause is estimated. Of a sniffer's
-     * event: when the last byte arrived.
-     */
+    /** When the first byte was sent or read, in microseconds by the clock of the port. The
+     *  time of a frame that followed other bytes without a pause is estimated. Of a sniffer's
+     *  event: when the last byte arrived. */
     uint32_t timeUs;
-    /**
-     * The number of bytes.
-     */
+    /** The number of bytes. */
     uint16_t length;
-    /**
-     * MBM_TRACE_RECEIVED or MBM_TRACE_SENT.
-     */
+    /** MBM_TRACE_RECEIVED or MBM_TRACE_SENT. */
     uint8_t direction;
-    /**
-     * MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions. On a serial
-     * line a received frame may be the echo of a request, or may be meant for others; if a
-     * frame can be both, it is the kind that the other side of this link sends.
-     */
+    /** MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions. On a serial
+     *  line a received frame may be the echo of a request, or may be meant for others; if a
+     *  frame can be both, it is the kind that the other side of this link sends. */
     uint8_t kind;
-    /**
-     * MBM_OK of a whole frame; MBM_INVALID_CRC if its CRC or LRC is wrong;
-     * MBM_INCOMPLETE_FRAME of the beginning of a frame whose rest did not come;
-     * MBM_MALFORMED_FRAME of bytes that begin no frame; MBM_BUFFER_TOO_SMALL of a piece of
-     * a frame that is longer than half of the trace's buffer.
-     */
+    /** MBM_OK of a whole frame; MBM_INVALID_CRC if its CRC or LRC is wrong;
+     *  MBM_INCOMPLETE_FRAME of the beginning of a frame whose rest did not come;
+     *  MBM_MALFORMED_FRAME of bytes that begin no frame; MBM_BUFFER_TOO_SMALL of a piece of
+     *  a frame that is longer than half of the trace's buffer. */
     uint8_t status;
 } mbm_traceRecord;
 
@@ -6101,23 +4883,21 @@ typedef struct mbm_traceRecord {
  * drops the bytes that it has not handed out, and its frame timeout is the default.
  *
  * @param trace    the object; initialised with MBM_INIT before the first call
- * @param port     is copied; its hooks read, write and micros are required. Its optional
- *                 hooks are passed on. It must not be the port of this trace, nor
- *                 that of a trace that passes everything on to this one
+ * @param port     is copied; its hooks read, write and micros are required. Its optional hooks
+ *                 are passed on. It must not be the port of this trace, nor that of a trace
+ *                 that passes everything on to this one
  * @param framing  the framing of the object that will use the port, and the declarations of
  *                 your own functions, which must stay valid and unchanged. Without a
  *                 declaration, the end of a received RTU frame is not known from its bytes
- * @param buffer   holds incomplete frames: one half of it those that are sent, the other
- *                 those that are received. It must stay valid for as long as the trace is
- *                 used
+ * @param buffer   holds incomplete frames: one half of it those that are sent, the other those
+ *                 that are received. It must stay valid for as long as the trace is used
  * @param size     size of `buffer` in bytes, at least MBM_MIN_TRACE_BUFFER. Two times
- *                 MBM_MAX_FRAME, MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every
- *                 frame; a longer one is handed out in pieces
+ *                 MBM_MAX_FRAME, MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every frame; a
+ *                 longer one is handed out in pieces
  * @param hook     is called for each frame
  * @param context  your pointer, passed to `hook`: for example the link or its name
- * @return MBM_OK; or with nothing changed MBM_BUFFER_TOO_SMALL for a size that is too
- *         small, MBM_INVALID_ARGUMENT for a NULL pointer, an incomplete port or a framing
- *         that is not valid, MBM_BUSY from within the hook
+ * @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for
+ *         a framing that is not valid
  */
 uint8_t mbm_trace_beginClient(struct mbm_trace *trace,
                               const struct mbm_port *port,
@@ -6154,8 +4934,8 @@ uint8_t mbm_trace_beginServer(struct mbm_trace *trace,
  * function of a node, client or server.
  *
  * @param trace  the object
- * @return the port, which is valid for as long as the trace is used. NULL for a trace that
- *         was never begun, and from within its hook: the begin functions refuse it
+ * @return the port, which is valid for as long as the trace is used. NULL for a trace that was
+ *         never begun, and from within its hook: the begin functions refuse it
  */
 const struct mbm_port *mbm_trace_port(struct mbm_trace *trace);
 
@@ -6176,10 +4956,9 @@ const struct mbm_port *mbm_trace_innerPort(const struct mbm_trace *trace);
  *
  * @param trace      the object
  * @param timeoutMs  1 to 65535 ms
- * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+ * @return a status
  */
-uint8_t mbm_trace_setFrameTimeout(struct mbm_trace *trace,
-                                  uint32_t timeoutMs);
+uint8_t mbm_trace_setFrameTimeout(struct mbm_trace *trace, uint32_t timeoutMs);
 
 /**
  * Calls the hook for the bytes that wait for the rest of their frame: before the program
@@ -6188,7 +4967,7 @@ uint8_t mbm_trace_setFrameTimeout(struct mbm_trace *trace,
  * On a Cortex-M it takes 850 bytes of stack, as every traced frame does.
  *
  * @param trace  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+ * @return a status
  */
 uint8_t mbm_trace_flush(struct mbm_trace *trace);
 
@@ -6199,11 +4978,9 @@ uint8_t mbm_trace_flush(struct mbm_trace *trace);
  *
  * @param event   an event that mbm_sniffer_next returned
  * @param record  receives the record; its bytes are valid as long as those of the event
- * @return MBM_OK; MBM_INVALID_ARGUMENT, with `record` unchanged, for NULL and for
- *         MBM_EVENT_TIMEOUT, which has no bytes
+ * @return a status; MBM_INVALID_ARGUMENT for MBM_EVENT_TIMEOUT, which has no bytes
  */
-uint8_t mbm_trace_ofEvent(const struct mbm_event *event,
-                          struct mbm_traceRecord *record);
+uint8_t mbm_trace_ofEvent(const struct mbm_event *event, struct mbm_traceRecord *record);
 
 /* ==== 16. Ring ====================================================================== */
 
@@ -6217,17 +4994,11 @@ uint8_t mbm_trace_ofEvent(const struct mbm_event *event,
  * disable interrupts.
  */
 typedef struct mbm_ring {
-    /**
-     * Private.
-     */
+    /** Private. */
     uint8_t *bytes;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint16_t size;
-    /**
-     * Private.
-     */
+    /** Private. */
     uint16_t positions[3];
 } mbm_ring;
 
@@ -6237,9 +5008,8 @@ typedef struct mbm_ring {
  *
  * @param ring   the object
  * @param bytes  your storage; it must stay valid for as long as the ring is used
- * @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte
- *               less
- * @return MBM_OK or MBM_INVALID_ARGUMENT
+ * @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte less
+ * @return a status
  */
 uint8_t mbm_ring_begin(struct mbm_ring *ring, uint8_t *bytes, uint16_t size);
 

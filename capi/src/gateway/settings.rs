@@ -23,7 +23,7 @@ use mbm::time::timeout;
 /// @param gateway  the object
 /// @param most     1 to 65535; the default is 65535. Fewer if there are not enough places for
 ///                 requests
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most: u16) -> u8 {
     // SAFETY: as the header demands.
@@ -46,7 +46,7 @@ pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most
 /// @param gateway  the object
 /// @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait
 ///                 for any time
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, timeMs: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -69,11 +69,10 @@ pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, tim
 /// mbm_gateway_poll. Other requests go on meanwhile, also those for the same unit.
 ///
 /// @param gateway  the object
-/// @param units    one unit, or an array of units; must stay valid for as long as the gateway
-///                 is used. Servers may serve the same units. NULL only if `count` is 0
+/// @param units    one unit, or an array of units; must stay valid for as long as the gateway is
+///                 used. Servers may serve the same units. NULL only if `count` is 0
 /// @param count    how many units
-/// @return MBM_OK; MBM_BUSY; MBM_INVALID_ARGUMENT, also for a unit with an id above 255;
-///         MBM_NOT_INITIALISED
+/// @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_serveUnits(
     gateway: *mut mbm_gateway,
@@ -133,8 +132,7 @@ unsafe fn serve(
 /// @param functions  the declarations; they must stay valid for as long as the gateway is used.
 ///                   NULL only if `count` is 0
 /// @param count      how many declarations
-/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a declaration that is not valid; MBM_BUSY or
-///         MBM_NOT_INITIALISED
+/// @return a status; MBM_INVALID_ARGUMENT for a declaration that is not valid
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setFunctions(
     gateway: *mut mbm_gateway,

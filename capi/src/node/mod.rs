@@ -75,7 +75,7 @@ unsafe impl CObject for mbm_node {
 /// @param responseWords  0 to 255; 125 hold any reply
 /// @param transmit       the words that writes send; NULL only if `transmitWords` is 0
 /// @param transmitWords  0 to 255; 123 hold any request
-/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY while a request of the node is under way
+/// @return a status; MBM_BUSY while a request of the node is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_begin(
     node: *mut mbm_node,
@@ -147,9 +147,7 @@ unsafe fn has_line(object: *mut Object) -> bool {
 ///
 /// @param node  the object
 /// @return MBM_PENDING until the request has ended. Then, at every call, the status of the
-///         request. MBM_OK if there was no request yet; MBM_BUSY from within a hook of the
-///         port except `idle`, while the request is under way; MBM_INVALID_ARGUMENT or
-///         MBM_NOT_INITIALISED
+///         request. MBM_OK if there was no request yet
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_poll(node: *mut mbm_node) -> u8 {
     // SAFETY: as the header demands.
@@ -221,8 +219,7 @@ pub unsafe extern "C" fn mbm_node_pollDelay(node: *mut mbm_node) -> u32 {
 /// becomes MBM_CANCELLED. If the node has no request under way, it does nothing.
 ///
 /// @param node  the object
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY from within a hook of
-///         the port except `idle`, while the request is under way
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
     // SAFETY: as the header demands. No reference to the node lives while hooks run.
@@ -246,8 +243,7 @@ pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
 ///
 /// @param node  the object
 /// @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
-///         request; MBM_BUSY from within a hook of the port except `idle`, while the request is
-///         under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+///         request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_status(node: *const mbm_node) -> u8 {
     // SAFETY: as the header demands; every object is writable storage.

@@ -9,10 +9,10 @@ use mbm::time::timeout;
 
 /// Sets the unit to which the master sends later requests.
 ///
-/// @param node  the object
-/// @param slave   the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248
-///                to 255, which the standard reserves
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param node   the object
+/// @param slave  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
+///               255, which the standard reserves
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, slave: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -37,9 +37,9 @@ pub unsafe extern "C" fn mbm_node_getSlaveID(node: *const mbm_node) -> u8 {
 /// Sets the response timeout: the maximum time from the last bit of the request to the last
 /// byte of the reply.
 ///
-/// @param node  the object
-/// @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param node       the object
+/// @param timeoutMs  milliseconds, 0 to 1000000 (16 minutes); the default is 2000
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeoutMs: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -59,8 +59,8 @@ pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeou
 /// MBM_PENDING at once, and you call mbm_node_poll until the request has ended.
 ///
 /// @param node  the object
-/// @param on      1 blocking, 0 non-blocking; it applies from the next request on
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param on    1 blocking, 0 non-blocking; it applies from the next request on
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -85,9 +85,8 @@ pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8
 /// every reply.
 ///
 /// @param node  the object
-/// @param on      0 (the default) or 1
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY while a request is
-///         under way
+/// @param on    0 (the default) or 1
+/// @return a status; MBM_BUSY while a request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setLenient(node: *mut mbm_node, on: u8) -> u8 {
     // SAFETY: as the header demands.

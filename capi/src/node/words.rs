@@ -8,10 +8,10 @@ use mbm::node::NO_WORD;
 /// Sets the write address and empties the queue of mbm_node_send. The transmit words do not
 /// change.
 ///
-/// @param node  the object
+/// @param node     the object
 /// @param address  the address to which the functions with Queued in their name write, 0 to
 ///                 65535
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_beginTransmission(node: *mut mbm_node, address: u16) -> u8 {
     // SAFETY: as the header demands.
@@ -36,9 +36,8 @@ fn queued(fits: bool) -> Status {
 /// word goes into the next one.
 ///
 /// @param node  the object
-/// @param word    the word
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param word  the word
+/// @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_send(node: *mut mbm_node, word: u16) -> u8 {
     // SAFETY: as the header demands.
@@ -52,9 +51,8 @@ pub unsafe extern "C" fn mbm_node_send(node: *mut mbm_node, word: u16) -> u8 {
 /// Queues a bit after the bits queued before, starting at the lowest bit of a word.
 ///
 /// @param node  the object
-/// @param on      0 is off, any other value is on
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param on    0 is off, any other value is on
+/// @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_sendBit(node: *mut mbm_node, on: u8) -> u8 {
     // SAFETY: as the header demands.

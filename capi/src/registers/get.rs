@@ -55,8 +55,7 @@ unsafe fn get(
 /// @param address    the device's address of the register
 /// @param bit        0, the least significant, to 15
 /// @param on         receives 0 or 1
-/// @return MBM_OK; or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register does
-///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getBit(
     registers: *const mbm_registers,
@@ -79,8 +78,7 @@ pub unsafe extern "C" fn mbm_registers_getBit(
 /// @param address    the device's address of the register
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
-///         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint16(
     registers: *const mbm_registers,
@@ -99,8 +97,7 @@ pub unsafe extern "C" fn mbm_registers_getUint16(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint32(
     registers: *const mbm_registers,
@@ -119,8 +116,7 @@ pub unsafe extern "C" fn mbm_registers_getUint32(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint64(
     registers: *const mbm_registers,
@@ -139,8 +135,7 @@ pub unsafe extern "C" fn mbm_registers_getUint64(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getFloat(
     registers: *const mbm_registers,
@@ -159,8 +154,7 @@ pub unsafe extern "C" fn mbm_registers_getFloat(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getDouble(
     registers: *const mbm_registers,
@@ -195,14 +189,12 @@ pub unsafe extern "C" fn mbm_registers_getDouble(
 ///
 /// @param registers  the registers
 /// @param address    the device's address of the first register of the field
-/// @param length     length of the field in bytes, two for each register; an odd length
-///                   ends with the first character of a register
+/// @param length     length of the field in bytes, two for each register; an odd length ends
+///                   with the first character of a register
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param text       receives the text and a NUL
 /// @param capacity   size of `text` in bytes; `length + 1` are always enough
-/// @return MBM_OK; or with `text` unchanged MBM_ILLEGAL_DATA_ADDRESS if part of the field
-///         does not exist, MBM_BUFFER_TOO_SMALL, MBM_INVALID_ARGUMENT or
-///         MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if `text` is
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getString(
     registers: *const mbm_registers,
@@ -236,8 +228,7 @@ pub unsafe extern "C" fn mbm_registers_getString(
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param bytes      receives the bytes; must not overlap the registers
 /// @param length     how many bytes, two for each register; may be odd
-/// @return MBM_OK; or with `bytes` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getBytes(
     registers: *const mbm_registers,
