@@ -44,7 +44,7 @@
 #include "ModbusTransmission.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusStatusText.h"
-#include "mbm.h"
+#include "mbm/client.h"
 
 /** @cond the macros are explained at the head of the file */
 #if !defined(MODBUSCLIENT_FRAME_BYTES)

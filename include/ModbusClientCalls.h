@@ -14,7 +14,7 @@
 
 #include "ModbusMasterOptions.h"
 #include "ModbusRequest.h"
-#include "mbm.h"
+#include "mbm/client.h"
 
 /**
  * Queues requests to units, up to 16 at once. ModbusSerialClient and ModbusTcpClient add

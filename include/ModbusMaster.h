@@ -30,7 +30,7 @@
 #include "ModbusMasterPorts.h"
 #include "ModbusMasterValues.h"
 #include "ModbusStatusText.h"
-#include "mbm.h"
+#include "mbm/master.h"
 
 /**
  * A Modbus RTU master: one line, one request at a time.
@@ -474,8 +474,8 @@ private:
     // Both, the low one first; only the low one if only one fits.
     uint8_t sendWords(uint32_t words)
     {
-        const uint8_t status = sendWord(words & 0xFFFFu);
-        return status == MBM_OK ? sendWord(static_cast<uint16_t>(words >> 16)) : status;
+        const uint8_t low = sendWord(words & 0xFFFFu);
+        return low == MBM_OK ? sendWord(static_cast<uint16_t>(words >> 16)) : low;
     }
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)

@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 #include "ModbusNumbers.h"
-#include "mbm.h"
+#include "mbm/values.h"
 
 /**
  * The words of a ModbusMaster as values. `index` counts words from 0, as with

@@ -36,7 +36,7 @@
 #include "ModbusMasterBoards.h"
 #include "ModbusServerTables.h"
 #include "ModbusStatusText.h"
-#include "mbm.h"
+#include "mbm/server.h"
 
 /** @cond the macro is explained at the head of the file */
 #if !defined(MODBUSSERVER_FRAME_BYTES)

@@ -34,7 +34,7 @@
 #include "ModbusCallback.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusSnifferText.h"
-#include "mbm.h"
+#include "mbm/sniffer.h"
 
 /** @cond the macro is explained at the head of the file */
 #if !defined(MODBUSSNIFFER_BUFFER_BYTES)

@@ -13,7 +13,7 @@
 #include <stdint.h>
 
 #include "ModbusNumbers.h"
-#include "mbm.h"
+#include "mbm/values.h"
 
 /**
  * An array of words, and the values in it. `index` counts words from 0: a float at
