@@ -34,7 +34,7 @@ TRACE = $(patsubst %,$(BUILD)/$(1)/linux/%.o,trace_options pcap_file)
 # formatted by hand.
 C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'firmware-tests/*.[ch]' \
     'packaging/*.[ch]')
-HEADERS := $(wildcard include/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
+HEADERS := $(wildcard include/*.h include/mbm/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
 
 .PHONY: help
 help: ## List the targets
@@ -77,7 +77,7 @@ size: ## Measure the flash and RAM that the library adds, and compare with docs/
 CAPI := capi
 HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && scripts/header "$$tool"
 .PHONY: header
-header: ## Generate include/mbm.h from the source
+header: ## Generate include/mbm.h and its parts from the source
 	@$(HEADER)
 
 .PHONY: check

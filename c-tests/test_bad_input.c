@@ -22,7 +22,6 @@ static void all_requests_answer(mbm_node *m, uint8_t status)
     IS(status, mbm_node_maskWriteRegister(m, 0, 1, 2));
     IS(status, mbm_node_readWriteMultipleRegisters(m, 0, 1, 0, 1));
     IS(status, mbm_node_readWriteQueuedRegisters(m, 0, 1));
-    assert_int_equal(mbm_node_requestFrom(m, 0, 1), 0);
 }
 
 /* Calls all others except begin, setFrame and statusText. */
@@ -49,17 +48,12 @@ static void all_others_answer(mbm_line *l, mbm_node *m, uint8_t status)
     IS(status, mbm_line_used(l));
     IS(status, mbm_line_usedAt(l, 0));
     IS(status, mbm_line_cancel(l));
-    IS(status, mbm_node_clearResponseBuffer(m));
-    IS(status, mbm_node_setTransmitBuffer(m, 0, 1));
-    IS(status, mbm_node_clearTransmitBuffer(m));
     IS(status, mbm_node_beginTransmission(m, 1));
     IS(status, mbm_node_send(m, 1));
     IS(status, mbm_node_send(m, 1));
-    IS(status, mbm_node_send32(m, 1));
     IS(status, mbm_node_sendBit(m, 1));
     assert_int_equal(mbm_node_getExceptionCode(m), 0);
     assert_int_equal(mbm_node_getSlaveID(m), 0);
-    assert_int_equal(mbm_node_getResponseBuffer(m, 0), 0xFFFF);
     assert_int_equal(mbm_node_available(m), 0);
     assert_int_equal(mbm_node_receive(m), 0xFFFF);
 }
@@ -125,27 +119,9 @@ static void a_line_without_a_frame_buffer_sends_no_request(void **state)
     OK(mbm_node_begin(&m, &l, 17, NULL, 0, NULL, 0));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
     sim_assert_order(s, "PWFOIR", "");
-    assert_int_equal(mbm_node_getResponseBuffer(&m, 0), 0xFFFF);
-    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_setTransmitBuffer(&m, 0, 1));
     IS(MBM_BUFFER_TOO_SMALL, mbm_node_send(&m, 1));
-    IS(MBM_BUFFER_TOO_SMALL, mbm_node_send32(&m, 1));
     IS(MBM_BUFFER_TOO_SMALL, mbm_node_sendBit(&m, 1));
-    OK(mbm_node_clearResponseBuffer(&m));
-    OK(mbm_node_clearTransmitBuffer(&m));
     IS(MBM_NOT_INITIALISED, mbm_node_poll(&m));
-}
-
-/* requestFrom returns a number of words and no status, so the program needs mbm_node_status. */
-static void status_says_why_request_from_returned_0(void **state)
-{
-    mbm_line l = MBM_INIT;
-    mbm_node m = MBM_INIT;
-    SIM;
-
-    OK(mbm_line_beginRtu(&l, &s->port, NULL, 0));
-    OK(mbm_node_begin(&m, &l, 17, NULL, 0, NULL, 0));
-    assert_int_equal(mbm_node_requestFrom(&m, 0, 1), 0);
-    IS(MBM_NOT_INITIALISED, mbm_node_status(&m));
 }
 
 static void a_line_without_a_port_sends_no_request(void **state)
@@ -210,8 +186,6 @@ static void forbidden_quantities_return_3_and_nothing_is_sent(void **state)
         IS(3, mbm_node_writeMultipleRegisters(n, 0, registers[i]));
         IS(3, mbm_node_readWriteMultipleRegisters(n, 0, registers[i], 0, 1));
         IS(3, mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, registers[i]));
-        assert_int_equal(mbm_node_requestFrom(n, 0, registers[i]), 0);
-        IS(3, mbm_node_status(n));
     }
     IS(3, mbm_node_writeMultipleRegisters(n, 0, 124));
     IS(3, mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, 122));
@@ -232,27 +206,9 @@ static void ranges_beyond_65535_return_2_and_nothing_is_sent(void **state)
     IS(2, mbm_node_writeMultipleRegisters(n, 65414, 123));
     IS(2, mbm_node_readWriteMultipleRegisters(n, 65535, 2, 0, 1));
     IS(2, mbm_node_readWriteMultipleRegisters(n, 0, 1, 65535, 2));
-    assert_int_equal(mbm_node_requestFrom(n, 65535, 2), 0);
-    IS(2, mbm_node_status(n));
     /* The quantity is checked before the address, as a device does. */
     IS(3, mbm_node_readHoldingRegisters(n, 65535, 126));
     assert_int_equal(s->sent, 0);
-}
-
-static void request_from_returns_0_if_it_is_refused_after_a_read(void **state)
-{
-    NODE;
-
-    sim_answer(s, 1, 500, "11 03 02 00 07 +");
-    assert_int_equal(mbm_node_requestFrom(n, 0, 1), 1);
-    assert_int_equal(mbm_node_requestFrom(n, 0, 0), 0);
-    IS(3, mbm_node_status(n));
-    assert_int_equal(mbm_node_requestFrom(n, 65535, 2), 0);
-    IS(2, mbm_node_status(n));
-    OK(mbm_node_setBlocking(n, 0));
-    IS(MBM_PENDING, mbm_node_writeSingleRegister(n, 0, 1));
-    assert_int_equal(mbm_node_requestFrom(n, 0, 1), 0);
-    IS(MBM_PENDING, mbm_node_status(n));
 }
 
 static void the_last_address_can_be_read_and_written(void **state)
@@ -414,7 +370,6 @@ static void a_reply_longer_than_the_response_words_changes_none(void **state)
     b = give_buffers(s, 0, 0, 256);
     sim_answer(s, 1, 500, "11 03 02 11 11 +");
     IS(MBM_BUFFER_TOO_SMALL, mbm_node_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0xFFFF);
     free_buffers(s, b);
 }
 
@@ -468,12 +423,10 @@ int main(void)
         SIM_TEST(a_zeroed_object_is_not_initialised_and_stays_zero),
         SIM_TEST(every_status_has_a_text),
         SIM_TEST(a_line_without_a_frame_buffer_sends_no_request),
-        SIM_TEST(status_says_why_request_from_returned_0),
         SIM_TEST(a_line_without_a_port_sends_no_request),
         SIM_TEST(a_port_without_its_three_hooks_is_refused),
         SIM_TEST(forbidden_quantities_return_3_and_nothing_is_sent),
         SIM_TEST(ranges_beyond_65535_return_2_and_nothing_is_sent),
-        SIM_TEST(request_from_returns_0_if_it_is_refused_after_a_read),
         SIM_TEST(the_last_address_can_be_read_and_written),
         SIM_TEST(a_frame_buffer_below_8_bytes_is_refused),
         SIM_TEST(a_request_is_sent_whole_or_not_at_all),

@@ -10,7 +10,7 @@ static void write_may_accept_a_byte_at_a_time(void **state)
 
     s->write_piece = 1;
     for (i = 0; i < 123; i++)
-        mbm_node_setTransmitBuffer(n, (uint8_t)i, (uint16_t)(i * 0x0101));
+        s->transmit[i] = (uint16_t)(i * 0x0101);
     sim_answer(s, 1, 500, "11 10 00 00 00 7B +");
     OK(mbm_node_writeMultipleRegisters(n, 0, 123));
     assert_int_equal(s->frames[0].length, 255);

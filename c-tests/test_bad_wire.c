@@ -22,7 +22,7 @@ static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
     if (*status != MBM_OK)
         return 'F';
     for (i = 0; i < FAULT_REGISTERS; i++)
-        if (mbm_node_getResponseBuffer(&n->node, (uint8_t)i) != fault_value(100 * number + i))
+        if (n->response[i] != fault_value(100 * number + i))
             return 'W';
     return '.';
 }

@@ -169,9 +169,6 @@ static void a_request_that_needs_more_words_than_it_has_is_refused(void **)
     assert_int_equal(client.readWriteMultipleRegisters(request, 0, 1, 0, 3), small);
     assert_int_equal(client.diagnostics(request, 0, 3), small);
     assert_int_equal(client.writeFileRecord(request, 4, 1, 3), small);
-    assert_int_equal(client.readFileRecords(request, 7), small);
-    assert_int_equal(client.writeFileRecords(request, 9), small);
-    assert_int_equal(client.encapsulatedInterfaceTransport(request, 13, 5), small);
     const mbm_rule rule = {MBM_RULE_FIXED, 2, 0};
     assert_int_equal(client.custom(request, 0x41, 5, rule), small);
     assert_int_equal(request.status(), small);
@@ -317,6 +314,38 @@ static void a_driver_callback_can_call_nothing(void **)
     assert_int_equal(another.status(), MBM_OK);
 }
 
+static void the_settings_of_the_line_reach_the_client(void **)
+{
+    static uint32_t released;
+    ModbusSerialClient client;
+    ModbusRequestOf<1> request(17);
+    client.begin(Serial, 9600);
+    assert_int_equal(client.setGap(30000), MBM_OK);
+    assert_int_equal(client.setQuietTime(200), MBM_OK);
+    assert_int_equal(client.setPostFlushHold(2), MBM_OK);
+    client.setResponseTimeout(50);
+    client.postTransmission([] { released = board().now; });
+    expect_exchange(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
+                    {17, 3, 2, 0, 5});
+    assert_in_range(released - Serial.sentAt, 2 * 1146, 2 * 1146 + 200);
+    uint32_t before = board().now;
+    client.readHoldingRegisters(request, 0, 1);
+    run_until_idle(client);
+    assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT);
+    assert_in_range(Serial.sentAt - before, 20000, 50000); // the gap, from the reply on
+    before = board().now;
+    client.readHoldingRegisters(request, 0, 1);
+    run_until_idle(client);
+    assert_in_range(Serial.sentAt - before, 200000, 220000); // the quiet time
+    Serial.sent.clear();
+    assert_int_equal(client.begin(Serial, 9600), MBM_OK);
+    assert_int_equal(client.setEchoDiscard(true), MBM_OK);
+    client.setResponseTimeout(50);
+    expect_exchange(client, client.writeSingleRegister(request, 1, 2), {17, 6, 0, 1, 0, 2},
+                    {17, 6, 0, 1, 0, 2});
+    assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT); // that was the echo
+}
+
 static void begin_resets_the_settings_of_a_client(void **)
 {
     ModbusSerialClient client;
@@ -450,6 +479,7 @@ int main()
         TEST(wait_returns_how_a_request_ended),
         TEST(the_driver_is_on_while_a_request_leaves),
         TEST(a_driver_callback_can_call_nothing),
+        TEST(the_settings_of_the_line_reach_the_client),
         TEST(begin_resets_the_settings_of_a_client),
         TEST(ascii_frames_go_both_ways),
         TEST(a_broadcast_ends_without_a_response),

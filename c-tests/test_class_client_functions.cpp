@@ -109,18 +109,14 @@ static void files_are_read_and_written(void **)
                     {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D},
                     {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D});
     assert_int_equal(request.status(), MBM_OK);
-    const uint8_t groups[] = {6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1};
-    for (uint16_t i = 0; i < static_cast<uint16_t>(sizeof groups); i++)
-        assert_int_equal(request.setByte(i, groups[i]), MBM_OK);
-    expect_exchange(client, client.readFileRecords(request, sizeof groups),
+    static const uint8_t groups[] = {14, 6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1};
+    expect_exchange(client, client.forward(request, 20, groups, sizeof groups),
                     {17, 20, 14, 6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1},
                     {17, 20, 8, 3, 6, 0x0D, 0xFE, 3, 6, 0x33, 0xCD});
-    assert_int_equal(request.getByte(2), 0x0D);
-    assert_int_equal(request.getByte(7), 0xCD);
-    const uint8_t record[] = {6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD};
-    for (uint16_t i = 0; i < static_cast<uint16_t>(sizeof record); i++)
-        request.setByte(i, record[i]);
-    expect_exchange(client, client.writeFileRecords(request, sizeof record),
+    assert_int_equal(request.getByte(3), 0x0D);
+    assert_int_equal(request.getByte(8), 0xCD);
+    static const uint8_t record[] = {9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD};
+    expect_exchange(client, client.forward(request, 21, record, sizeof record),
                     {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD},
                     {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD});
     assert_int_equal(request.status(), MBM_OK);
@@ -137,11 +133,11 @@ static void a_device_identifies_itself(void **)
     assert_int_equal(request.getByte(3), 1);
     assert_int_equal(request.getByte(5), 3);
     assert_int_equal(request.getByte(6), 'm');
-    request.setByte(0, 0x60);
-    expect_exchange(client, client.encapsulatedInterfaceTransport(request, MBM_MEI_CANOPEN, 1),
+    static const uint8_t canopen[] = {MBM_MEI_CANOPEN, 0x60};
+    expect_exchange(client, client.forward(request, 43, canopen, sizeof canopen),
                     {17, 43, 13, 0x60}, {17, 43, 13, 0x60, 1, 2});
     assert_int_equal(request.status(), MBM_OK);
-    assert_int_equal(request.length(), 3);
+    assert_int_equal(request.length(), 4);
 }
 
 static void user_defined_and_forwarded_functions_are_sent(void **)

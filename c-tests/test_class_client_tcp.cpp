@@ -49,6 +49,8 @@ static void reads_what_libmodbus_holds(void **)
     ModbusRequestOf<125> request(255);
     assert_int_equal(client->connect(device), MBM_OK);
     assert_true(client->isConnected());
+    assert_int_equal(client->setInFlight(17), MBM_INVALID_ARGUMENT);
+    assert_int_equal(client->setInFlight(1), MBM_OK);
     assert_int_equal(client->wait((client->readHoldingRegisters(request, 3, 125), request)),
                      MBM_OK);
     for (uint16_t i = 0; i < 125; i++)

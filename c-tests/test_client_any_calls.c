@@ -177,7 +177,7 @@ static uint8_t queue_one(mbm_clientRequest *r)
     case 8: return mbm_client_getCommEventLog(&client, r);
     case 9: return mbm_client_readFifoQueue(&client, r, any(65536));
     case 10: return mbm_client_readDeviceIdentification(&client, r, byte(6), byte(256));
-    case 11: return mbm_client_encapsulatedInterfaceTransport(&client, r, byte(20), byte(200));
+    case 11: return mbm_client_readExceptionStatus(&client, r);
     case 12: return mbm_client_maskWriteRegister(&client, r, 1, 2, 3);
     case 13:
         return mbm_client_readWriteMultipleRegisters(&client, r, any(100), any(127), any(100),

@@ -95,9 +95,9 @@ static void reads_and_writes(void)
 static void files_and_queues(void)
 {
     static const uint16_t values[] = {0x1234, 0x5678};
-    static const uint8_t groups[] = {6, 0, 4, 0, 7, 0, 2, 6, 0, 4, 0, 1, 0, 1};
-    static const uint8_t records[] = {5, 6, 0x12, 0x34, 0x56, 0x78, 3, 6, 0xBE, 0xEF};
-    static const uint8_t written[] = {6, 0, 4, 0, 1, 0, 1, 0xBE, 0xEF};
+    static const uint8_t groups[] = {14, 6, 0, 4, 0, 7, 0, 2, 6, 0, 4, 0, 1, 0, 1};
+    static const uint8_t records[] = {10, 5, 6, 0x12, 0x34, 0x56, 0x78, 3, 6, 0xBE, 0xEF};
+    static const uint8_t written[] = {9, 6, 0, 4, 0, 1, 0, 1, 0xBE, 0xEF};
     mbm_client *c = &a.client;
     uint8_t bytes[250];
     uint16_t words[125];
@@ -109,10 +109,10 @@ static void files_and_queues(void)
     assert_reply(&r, s.records, 40);
     ends(MBM_OK, &r, mbm_client_readFifoQueue(c, &r, 0x04DE));
     assert_reply(&r, s.queue, 4);
-    r = asker_request(SERVED_UNIT, bytes, sizeof bytes, written);
-    ends(MBM_OK, &r, mbm_client_writeFileRecords(c, &r, sizeof written));
-    r.data = groups;
-    ends(MBM_OK, &r, mbm_client_readFileRecords(c, &r, sizeof groups));
+    r = asker_request(SERVED_UNIT, bytes, sizeof bytes, NULL);
+    /* Several groups at once, as on the wire. */
+    ends(MBM_OK, &r, mbm_client_forward(c, &r, 0x15, written, sizeof written));
+    ends(MBM_OK, &r, mbm_client_forward(c, &r, 0x14, groups, sizeof groups));
     assert_reply(&r, records, sizeof records);
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readFileRecord(c, &r, 4, 19, 2));
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readFifoQueue(c, &r, 0x04DF));
@@ -137,9 +137,8 @@ static void identities_and_diagnostics(void)
     ends(MBM_OK, &r, mbm_client_readDeviceIdentification(c, &r, 1, 0));
     assert_reply(&r, "\x83\x00\x00\x03\x00\x05Maker\x01\x05Thing\x02\x04V1.0", 24);
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readDeviceIdentification(c, &r, 4, 0x44));
-    r.data = "\x04\x80";
-    ends(MBM_OK, &r, mbm_client_encapsulatedInterfaceTransport(c, &r, 0x0E, 2));
-    assert_reply(&r, "\x04\x83\x00\x00\x01\x80\x03own", 10);
+    ends(MBM_OK, &r, mbm_client_forward(c, &r, 0x2B, (const uint8_t *)"\x0E\x04\x80", 3));
+    assert_reply(&r, "\x0E\x04\x83\x00\x00\x01\x80\x03own", 11);
     r.data = own;
     ends(MBM_OK, &r, mbm_client_custom(c, &r, SERVED_ECHO, 8, &eight));
     assert_reply(&r, own, 8);

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define WORD(index) mbm_node_getResponseBuffer(&s->node, index)
+#define WORD(index) s->response[index]
 
 static uint8_t read_words(sim *s, uint16_t quantity, const char *reply)
 {
@@ -18,7 +18,7 @@ static uint8_t read_words(sim *s, uint16_t quantity, const char *reply)
 static void recovers_at_once(sim *s)
 {
     OK(read_words(s, 1, "11 03 02 00 2A +"));
-    assert_int_equal(mbm_node_getResponseBuffer(&s->node, 0), 42);
+    assert_int_equal(s->response[0], 42);
 }
 
 static void found_after(sim *s, const char *noise)
@@ -27,8 +27,8 @@ static void found_after(sim *s, const char *noise)
 
     snprintf(reply, sizeof reply, "%s / 11 03 04 12 34 56 78 +", noise);
     OK(read_words(s, 2, reply));
-    assert_int_equal(mbm_node_getResponseBuffer(&s->node, 0), 0x1234);
-    assert_int_equal(mbm_node_getResponseBuffer(&s->node, 1), 0x5678);
+    assert_int_equal(s->response[0], 0x1234);
+    assert_int_equal(s->response[1], 0x5678);
     recovers_at_once(s);
 }
 
@@ -362,8 +362,8 @@ static void a_damaged_echo_does_not_hide_the_reply(void **state)
     NODE;
 
     OK(mbm_line_setEchoDiscard(&s->line, 1));
-    mbm_node_setTransmitBuffer(n, 0, 0x1111);
-    mbm_node_setTransmitBuffer(n, 1, 0x2222);
+    s->transmit[0] = 0x1111;
+    s->transmit[1] = 0x2222;
     sim_answer(s, 1, 0, "11 10 00 01 00 02 04 11 11 22 23 AB 23");
     sim_answer(s, 1, 3000, "11 10 00 01 00 02 +");
     OK(mbm_node_writeMultipleRegisters(n, 1, 2));

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#define WORD(index) mbm_node_getResponseBuffer(n, index)
+#define WORD(index) s->response[index]
 #define LAST(text) sim_assert_sent(s, s->sent - 1, text)
 
 static void reads_coils_and_inputs_as_the_specification_shows(void **state)
@@ -73,12 +73,12 @@ static void writes_many_cells_as_the_specification_shows(void **state)
 {
     NODE;
 
-    OK(mbm_node_setTransmitBuffer(n, 0, 0x01CD));
+    s->transmit[0] = 0x01CD;
     sim_answer(s, 1, 500, "11 0F 00 13 00 0A +");
     OK(mbm_node_writeMultipleCoils(n, 19, 10));
     LAST("11 0F 00 13 00 0A 02 CD 01 +");
-    OK(mbm_node_setTransmitBuffer(n, 0, 0x000A));
-    OK(mbm_node_setTransmitBuffer(n, 1, 0x0102));
+    s->transmit[0] = 0x000A;
+    s->transmit[1] = 0x0102;
     sim_answer(s, 1, 500, "11 10 00 01 00 02 +");
     OK(mbm_node_writeMultipleRegisters(n, 1, 2));
     LAST("11 10 00 01 00 02 04 00 0A 01 02 +");
@@ -99,7 +99,7 @@ static void reads_and_writes_at_once_as_the_specification_shows(void **state)
     NODE;
 
     for (i = 0; i < 3; i++)
-        OK(mbm_node_setTransmitBuffer(n, i, 0x00FF));
+        s->transmit[i] = 0x00FF;
     sim_answer(s, 1, 500, "11 17 0C 00 FE 0A CD 00 01 00 03 00 0D 00 FF +");
     OK(mbm_node_readWriteMultipleRegisters(n, 3, 6, 14, 3));
     LAST("11 17 00 03 00 06 00 0E 00 03 06 00 FF 00 FF 00 FF +");
@@ -137,13 +137,13 @@ static void frames_are_the_same_as_in_the_documentation_of_another_library(void 
     sim_answer(s, 1, 100, "11 06 00 6B 01 01 3A D6");
     OK(mbm_node_writeSingleRegister(n, 107, 0x0101));
     LAST("11 06 00 6B 01 01 3A D6");
-    mbm_node_setTransmitBuffer(n, 0, 0x0005);
+    s->transmit[0] = 0x0005;
     sim_answer(s, 1, 100, "11 0F 04 10 00 03 17 AF");
     OK(mbm_node_writeMultipleCoils(n, 0x410, 3));
     LAST("11 0F 04 10 00 03 01 05 8E 1F");
-    mbm_node_setTransmitBuffer(n, 0, 0x00C8);
-    mbm_node_setTransmitBuffer(n, 1, 0x0082);
-    mbm_node_setTransmitBuffer(n, 2, 0x8701);
+    s->transmit[0] = 0x00C8;
+    s->transmit[1] = 0x0082;
+    s->transmit[2] = 0x8701;
     sim_answer(s, 1, 100, "11 10 04 10 00 03 82 6D");
     OK(mbm_node_writeMultipleRegisters(n, 0x410, 3));
     LAST("11 10 04 10 00 03 06 00 C8 00 82 87 01 2F 7D");
@@ -185,7 +185,7 @@ static void coil_pad_bits_are_sent_as_zero(void **state)
 {
     NODE;
 
-    mbm_node_setTransmitBuffer(n, 0, 0xFFFF);
+    s->transmit[0] = 0xFFFF;
     sim_answer(s, 1, 100, "11 0F 00 00 00 03 +");
     OK(mbm_node_writeMultipleCoils(n, 0, 3));
     LAST("11 0F 00 00 00 03 01 07 +");
@@ -194,43 +194,32 @@ static void coil_pad_bits_are_sent_as_zero(void **state)
     LAST("11 0F 00 00 00 09 02 FF 01 +");
 }
 
-static void get_response_buffer_returns_ffff_past_the_end(void **state)
-{
-    NODE;
-
-    OK(mbm_node_clearResponseBuffer(n));
-    assert_int_equal(WORD(124), 0);
-    assert_int_equal(WORD(125), 0xFFFF);
-    assert_int_equal(WORD(255), 0xFFFF);
-}
-
-static void set_transmit_buffer_returns_2_past_the_end_and_leaves_the_queue(void **state)
+static void a_transmit_word_that_the_program_sets_leaves_the_queue(void **state)
 {
     NODE;
 
     mbm_node_beginTransmission(n, 7);
-    OK(mbm_node_setTransmitBuffer(n, 122, 1));
-    assert_int_equal(mbm_node_setTransmitBuffer(n, 123, 1), MBM_ILLEGAL_DATA_ADDRESS);
-    OK(mbm_node_setTransmitBuffer(n, 0, 0xAAAA));
+    s->transmit[122] = 1;
+    s->transmit[0] = 0xAAAA;
     OK(mbm_node_send(n, 0xBBBB));
     sim_answer(s, 1, 100, "11 10 00 07 00 01 +");
     OK(mbm_node_writeQueuedRegisters(n));
     LAST("11 10 00 07 00 01 02 BB BB +");
 }
 
-static void clearing_buffers_leaves_the_indices_alone(void **state)
+static void words_that_the_program_changes_leave_the_indices_alone(void **state)
 {
     NODE;
 
     sim_answer(s, 1, 100, "11 03 04 00 01 00 02 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 2));
     assert_int_equal(mbm_node_receive(n), 1);
-    OK(mbm_node_clearResponseBuffer(n));
+    memset(s->response, 0, sizeof s->response);
     assert_int_equal(mbm_node_available(n), 1);
     assert_int_equal(mbm_node_receive(n), 0);
     mbm_node_beginTransmission(n, 3);
     mbm_node_send(n, 0x1111);
-    OK(mbm_node_clearTransmitBuffer(n));
+    memset(s->transmit, 0, sizeof s->transmit);
     mbm_node_send(n, 0x2222);
     sim_answer(s, 1, 100, "11 10 00 03 00 02 +");
     OK(mbm_node_writeQueuedRegisters(n));
@@ -254,17 +243,16 @@ static void begin_transmission_empties_the_queue_and_keeps_the_words(void **stat
     LAST("11 10 00 09 00 02 04 33 33 22 22 +");
 }
 
-static void send_queues_words_bytes_and_double_words_low_first(void **state)
+static void send_queues_words(void **state)
 {
     NODE;
 
     mbm_node_beginTransmission(n, 0x100);
     OK(mbm_node_send(n, 0x1234));
     OK(mbm_node_send(n, 0xAB));
-    OK(mbm_node_send32(n, 0xDEADBEEF));
-    sim_answer(s, 1, 100, "11 10 01 00 00 04 +");
+    sim_answer(s, 1, 100, "11 10 01 00 00 02 +");
     OK(mbm_node_writeQueuedRegisters(n));
-    LAST("11 10 01 00 00 04 08 12 34 00 AB BE EF DE AD +");
+    LAST("11 10 01 00 00 02 04 12 34 00 AB +");
 }
 
 static void send_bit_queues_bits_lowest_first(void **state)
@@ -314,13 +302,10 @@ static void words_beyond_the_transmit_buffer_are_not_queued(void **state)
     NODE;
 
     mbm_node_beginTransmission(n, 0);
-    for (i = 0; i < 122; i++)
+    for (i = 0; i < 123; i++)
         OK(mbm_node_send(n, 1));
-    /* The low word fits into the buffer, the high word does not. */
-    assert_int_equal(mbm_node_send32(n, 0x00020003), MBM_BUFFER_TOO_SMALL);
-    assert_int_equal(s->transmit[122], 3);
-    assert_int_equal(mbm_node_send(n, 1), MBM_BUFFER_TOO_SMALL);
-    assert_int_equal(mbm_node_send(n, 1), MBM_BUFFER_TOO_SMALL);
+    assert_int_equal(mbm_node_send(n, 3), MBM_BUFFER_TOO_SMALL);
+    assert_int_equal(s->transmit[122], 1);
     assert_int_equal(mbm_node_sendBit(n, 1), MBM_BUFFER_TOO_SMALL);
     sim_answer(s, 1, 100, "11 10 00 00 00 7B +");
     OK(mbm_node_writeQueuedRegisters(n));
@@ -398,20 +383,19 @@ static void single_writes_overwrite_the_first_transmit_words(void **state)
     assert_int_equal(s->transmit[2], 0xEEEE);
 }
 
-static void request_from_makes_exactly_its_words_available_to_receive(void **state)
+static void a_read_makes_exactly_its_words_available_to_receive(void **state)
 {
     NODE;
 
     sim_answer(s, 1, 100, "11 03 02 AB CD +");
-    assert_int_equal(mbm_node_requestFrom(n, 6, 1), 1);
+    OK(mbm_node_readHoldingRegisters(n, 6, 1));
     LAST("11 03 00 06 00 01 +");
     assert_int_equal(mbm_node_available(n), 1);
     assert_int_equal(mbm_node_receive(n), 0xABCD);
     assert_int_equal(mbm_node_available(n), 0);
     assert_int_equal(mbm_node_receive(n), 0xFFFF);
     sim_answer(s, 1, 100, "11 83 02 +");
-    assert_int_equal(mbm_node_requestFrom(n, 6, 1), 0);
-    assert_int_equal(mbm_node_status(n), MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_readHoldingRegisters(n, 6, 1));
     assert_int_equal(mbm_node_available(n), 0);
 }
 
@@ -419,7 +403,7 @@ static void begin_is_cheap_and_switches_slaves(void **state)
 {
     NODE;
 
-    mbm_node_setTransmitBuffer(n, 3, 0x4711);
+    s->transmit[3] = 0x4711;
     mbm_node_setResponseTimeout(n, 50);
     sim_begin(s, 2);
     sim_answer(s, 1, 100, "02 03 02 00 07 +");
@@ -460,11 +444,10 @@ int main(void)
         SIM_TEST(units_248_to_255_are_accepted),
         SIM_TEST(the_last_odd_byte_of_coils_is_padded_with_zero),
         SIM_TEST(coil_pad_bits_are_sent_as_zero),
-        SIM_TEST(get_response_buffer_returns_ffff_past_the_end),
-        SIM_TEST(set_transmit_buffer_returns_2_past_the_end_and_leaves_the_queue),
-        SIM_TEST(clearing_buffers_leaves_the_indices_alone),
+        SIM_TEST(a_transmit_word_that_the_program_sets_leaves_the_queue),
+        SIM_TEST(words_that_the_program_changes_leave_the_indices_alone),
         SIM_TEST(begin_transmission_empties_the_queue_and_keeps_the_words),
-        SIM_TEST(send_queues_words_bytes_and_double_words_low_first),
+        SIM_TEST(send_queues_words),
         SIM_TEST(send_bit_queues_bits_lowest_first),
         SIM_TEST(a_word_after_bits_starts_a_new_word),
         SIM_TEST(queued_registers_are_complete_words_only),
@@ -473,7 +456,7 @@ int main(void)
         SIM_TEST(a_failed_transaction_empties_the_queue_and_rewinds_receive),
         SIM_TEST(the_write_address_is_shared_by_all_writing_functions),
         SIM_TEST(single_writes_overwrite_the_first_transmit_words),
-        SIM_TEST(request_from_makes_exactly_its_words_available_to_receive),
+        SIM_TEST(a_read_makes_exactly_its_words_available_to_receive),
         SIM_TEST(begin_is_cheap_and_switches_slaves),
         SIM_TEST(set_slave_id_counts_from_the_next_request_on),
     };

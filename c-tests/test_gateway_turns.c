@@ -78,10 +78,8 @@ static void requests_with_the_same_transaction_id_are_all_answered(void **state)
 static void a_connection_has_as_many_requests_as_the_setting_allows(void **state)
 {
     (void)state;
-    assert_int_equal(mbm_gateway_inFlight(&b.gateway), 65535);
     IS(MBM_INVALID_ARGUMENT, mbm_gateway_setInFlight(&b.gateway, 0));
     OK(mbm_gateway_setInFlight(&b.gateway, 2));
-    assert_int_equal(mbm_gateway_inFlight(&b.gateway), 2);
     ASK(0, 1, 2, READ);
     ASK(0, 2, 3, READ);
     ASK(0, 3, 4, READ);
@@ -191,9 +189,7 @@ static void a_client_that_floods_leaves_a_place_for_each_other(void **state)
 static void a_request_that_waits_too_long_for_its_line_gets_0a(void **state)
 {
     (void)state;
-    assert_int_equal(mbm_gateway_queueTime(&b.gateway), 0);
     OK(mbm_gateway_setQueueTime(&b.gateway, 150));
-    assert_int_equal(mbm_gateway_queueTime(&b.gateway), 150);
     ASK(0, 1, 2, READ);
     ASK(0, 2, 3, READ);
     ASK(0, 3, 4, READ);

@@ -38,7 +38,7 @@ static void requests_in_an_idle_hook_return_busy_and_change_nothing(void **state
 {
     NODE;
 
-    mbm_node_setTransmitBuffer(n, 0, 0x1111);
+    s->transmit[0] = 0x1111;
     mbm_node_beginTransmission(n, 0x55);
     s->on_idle = call_back;
     sim_reads(s, 500);
@@ -48,20 +48,6 @@ static void requests_in_an_idle_hook_return_busy_and_change_nothing(void **state
     mbm_node_send(n, 0x2222);
     sim_answer(s, 1, 500, "11 10 00 55 00 01 +");
     OK(mbm_node_writeQueuedRegisters(n));
-}
-
-static void request_from_idle(sim *s)
-{
-    mbm_node_requestFrom(&s->node, 0, 1);
-}
-
-static void request_from_in_an_idle_hook_changes_nothing(void **state)
-{
-    SIM;
-
-    s->on_idle = request_from_idle;
-    sim_reads(s, 500);
-    assert_int_equal(s->sent, 1);
 }
 
 static void poll_from_idle(sim *s)
@@ -144,7 +130,7 @@ static void a_non_blocking_request_is_ended_by_poll(void **state)
     assert_int_equal(mbm_node_receive(n), 42);
     assert_int_equal(s->idles, 0);
     sim_answer(s, 1, 500, "11 83 04 +");
-    assert_int_equal(mbm_node_requestFrom(n, 0, 1), 0);
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(n, 0, 1));
     IS(4, sim_poll(s));
     IS(4, mbm_node_poll(n));
     OK(mbm_node_setBlocking(n, 1));
@@ -285,7 +271,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         SIM_TEST(requests_in_an_idle_hook_return_busy_and_change_nothing),
-        SIM_TEST(request_from_in_an_idle_hook_changes_nothing),
         SIM_TEST(an_idle_hook_that_polls_does_no_harm),
         SIM_TEST(an_idle_hook_may_cancel_before_a_byte_is_sent),
         SIM_TEST(an_idle_hook_may_cancel_while_the_reply_is_waited_for),

@@ -74,8 +74,7 @@ static void assert_reads(sim *s, uint16_t address, uint16_t quantity)
 
     OK(mbm_node_readHoldingRegisters(&s->node, address, quantity));
     for (i = 0; i < quantity; i++)
-        assert_int_equal(mbm_node_getResponseBuffer(&s->node, (uint8_t)i),
-                         fault_value(address + i));
+        assert_int_equal(s->response[i], fault_value(address + i));
 }
 
 static uint8_t read_at(sim *s, uint16_t address)
@@ -135,7 +134,7 @@ static void several_late_replies_in_a_row_are_all_skipped(void **state)
     device.takes[0] = 1700000; /* after two more requests */
     for (i = 0; i < 3; i++)
         assert_int_equal(read_at(s, i), i < 2 ? MBM_RESPONSE_TIMED_OUT : MBM_OK);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), fault_value(2));
+    assert_int_equal(s->response[0], fault_value(2));
     for (; i < 50; i++)
         assert_reads(s, i, 1);
 }
@@ -189,7 +188,7 @@ static void a_held_reply_is_no_answer_if_the_next_one_is_damaged(void **state)
     device.damaged = 2;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_at(s, 1), MBM_INVALID_CRC);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0);
+    assert_int_equal(s->response[0], 0);
     assert_reads(s, 2, 1);
     assert_reads(s, 3, 1);
 }
@@ -201,7 +200,7 @@ static void a_held_reply_is_no_answer_if_the_next_one_is_cut_off(void **state)
     device.cut = 2;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_at(s, 1), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0);
+    assert_int_equal(s->response[0], 0);
     assert_reads(s, 2, 1);
     assert_reads(s, 3, 1);
 }

@@ -58,18 +58,18 @@ static void a_read_takes_the_registers_that_come(void **state)
     sim_answer(s, 1, 500, "11 03 06 00 01 00 02 00 03 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     assert_int_equal(mbm_node_available(n), 3);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 1);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 2), 3);
+    assert_int_equal(s->response[0], 1);
+    assert_int_equal(s->response[2], 3);
     sim_answer(s, 1, 500, "11 04 02 00 09 +");
     OK(mbm_node_readInputRegisters(n, 0, 4));
     assert_int_equal(mbm_node_available(n), 1);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 9);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 2), 3); /* as it was */
+    assert_int_equal(s->response[0], 9);
+    assert_int_equal(s->response[2], 3); /* as it was */
     sim_answer(s, 1, 500, "11 01 03 FF 01 02 +");
     OK(mbm_node_readCoils(n, 0, 3));
     assert_int_equal(mbm_node_available(n), 2);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x01FF);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 1), 0x0002);
+    assert_int_equal(s->response[0], 0x01FF);
+    assert_int_equal(s->response[1], 0x0002);
     sim_answer(s, 1, 500, "11 03 05 00 01 00 02 07 +"); /* half a register too many */
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     assert_int_equal(mbm_node_available(n), 2);
@@ -87,8 +87,8 @@ static void the_bytes_may_come_one_at_a_time_or_all_at_once(void **state)
         sim_answer(s, 1, 500, "11 03 06 00 01 11 03 11 83 +"); /* data like the head of a reply */
         OK(mbm_node_readHoldingRegisters(n, 0, 1));
         assert_int_equal(mbm_node_available(n), 3);
-        assert_int_equal(mbm_node_getResponseBuffer(n, 1), 0x1103);
-        assert_int_equal(mbm_node_getResponseBuffer(n, 2), 0x1183);
+        assert_int_equal(s->response[1], 0x1103);
+        assert_int_equal(s->response[2], 0x1183);
     }
     s->character = 0; /* all at once, with the next frame */
     s->read_piece = 0;
@@ -104,11 +104,11 @@ static void a_right_reply_is_better_before_and_after_it(void **state)
     sim_answer(s, 1, 500, "11 03 04 00 01 00 02 + / 11 03 02 00 2A +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     assert_int_equal(mbm_node_available(n), 1);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x2A);
+    assert_int_equal(s->response[0], 0x2A);
     assert_true(s->now - s->frames[0].end < 100000);
     sim_answer(s, 1, 500, "11 03 02 00 2B + / 11 03 04 00 01 00 02 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x2B);
+    assert_int_equal(s->response[0], 0x2B);
     sim_answer(s, 1, 500, "11 06 00 01 00 08 + / 11 06 00 01 00 07 +");
     OK(mbm_node_writeSingleRegister(n, 1, 7));
     assert_true(s->now - s->frames[2].end < 100000);
@@ -122,7 +122,7 @@ static void half_a_reply_in_front_hides_no_right_one(void **state)
 
     sim_answer(s, 1, 500, "11 03 20 00 01 / 11 03 02 00 2A +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x2A);
+    assert_int_equal(s->response[0], 0x2A);
     assert_int_equal(mbm_node_available(n), 1);
 }
 
@@ -154,7 +154,7 @@ static void what_is_no_reply_to_the_request_is_not_accepted(void **state)
         else
             assert_int_equal(status, rows[i].status);
         assert_int_equal(mbm_node_available(n), 0);
-        assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0);
+        assert_int_equal(s->response[0], 0);
     }
     sim_answer(s, 1, 500, "11 10 00 01 00 01 02 00 00 +"); /* an echo */
     assert_int_not_equal(mbm_node_writeMultipleRegisters(n, 1, 1), MBM_OK);
@@ -235,7 +235,7 @@ static void a_small_frame_buffer_is_not_left(void **state)
         OK(mbm_line_setFrame(&s->line, frame, size));
         status = mbm_node_readHoldingRegisters(n, 0, 125);
         if (status == MBM_OK) {
-            assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0);
+            assert_int_equal(s->response[0], 0);
             assert_in_range(mbm_node_available(n), 1, (size - 3) / 2);
         } else {
             assert_int_equal(status, MBM_BUFFER_TOO_SMALL);
@@ -254,7 +254,7 @@ static void a_read_from_unit_0_is_sent_and_its_reply_accepted(void **state)
     sim_answer(s, 1, 150000, "00 03 02 00 2A +"); /* later than the turnaround delay */
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     sim_assert_sent(s, 0, "00 03 00 00 00 01 +");
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 0x2A);
+    assert_int_equal(s->response[0], 0x2A);
     assert_true(s->now - s->frames[0].end < 170000);
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
     assert_in_range(s->now - s->frames[1].end, TIMEOUT, TIMEOUT + 500);
@@ -291,7 +291,7 @@ static void a_late_reply_that_deviates_is_not_better_than_the_next(void **state)
     sim_answer(s, 1, 500, "11 03 02 00 01 + / 11 03 04 00 02 00 03 +");
     OK(mbm_node_readHoldingRegisters(n, 2, 2));
     assert_int_equal(mbm_node_available(n), 2);
-    assert_int_equal(mbm_node_getResponseBuffer(n, 0), 2);
+    assert_int_equal(s->response[0], 2);
 }
 
 int main(void)

@@ -57,7 +57,6 @@ static void each_node_keeps_its_result(void **state)
     assert_int_equal(mbm_node_available(n), 1);
     assert_int_equal(mbm_node_receive(n), 42);
     assert_int_equal(mbm_node_available(&o.node), 0);
-    assert_int_equal(mbm_node_getResponseTimeout(n), 2000);
 }
 
 static void a_request_is_refused_while_another_node_has_one_under_way(void **state)

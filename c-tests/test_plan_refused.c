@@ -150,7 +150,6 @@ static void what_was_never_begun_is_refused(void **state)
         IS(status, mbm_plan_getStatus(object, 0, &age));
         IS(status, mbm_plan_getInteger(object, 0, 0, &integer));
         IS(status, mbm_plan_getFloat(object, 0, 0, &single));
-        IS(status, mbm_plan_getDouble(object, 0, 0, &wide));
         IS(status, mbm_plan_getText(object, 0, text, sizeof text));
         IS(status, mbm_plan_getRegisters(object, 0, &view));
         IS(status, mbm_plan_getRead(object, 0, &read));

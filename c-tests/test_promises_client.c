@@ -202,7 +202,6 @@ static void a_queue_holds_sixteen_requests(void **state)
 static void functions_with_bodies_check_them(void **state)
 {
     static const uint8_t bytes[256];
-    static const uint8_t groups[256] = {6, 0, 1, 0, 0, 0, 1, 9, 9};
     static const mbm_rule silence = {.kind = MBM_RULE_SILENCE};
     uint8_t code;
     uint8_t pdu[MBM_MAX_PDU];
@@ -229,9 +228,6 @@ static void functions_with_bodies_check_them(void **state)
     WITHIN(0, mbm_client_diagnostics(&c, &r, 0, 126));
     WITHIN(1, mbm_client_diagnostics(&c, &r, 10, 1));
     WITHIN(0, mbm_client_diagnostics(&c, &r, 10, 2));
-    WITHIN(1, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 0));
-    WITHIN(1, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 251));
-    WITHIN(0, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 252));
     for (code = 0; code < 6; code++)
         WITHIN(code >= MBM_DEVICE_ID_BASIC && code <= MBM_DEVICE_ID_INDIVIDUAL,
                mbm_client_readDeviceIdentification(&c, &r, code, 255));
@@ -245,15 +241,6 @@ static void functions_with_bodies_check_them(void **state)
     WITHIN(0, mbm_client_writeFileRecord(&c, &r, 1, 0, 123));
     WITHIN(0, mbm_client_writeFileRecord(&c, &r, 1, 0, 0));
     WITHIN(0, mbm_client_writeFileRecord(&c, &r, 0, 0, 1));
-    r.data = groups;
-    WITHIN(1, mbm_client_readFileRecords(&c, &r, 7));
-    WITHIN(0, mbm_client_readFileRecords(&c, &r, 0));
-    WITHIN(0, mbm_client_readFileRecords(&c, &r, 8));
-    WITHIN(0, mbm_client_readFileRecords(&c, &r, 252));
-    WITHIN(1, mbm_client_writeFileRecords(&c, &r, 9));
-    WITHIN(0, mbm_client_writeFileRecords(&c, &r, 8));
-    WITHIN(0, mbm_client_writeFileRecords(&c, &r, 252));
-    r.data = data;
     ANSWERS(MBM_ILLEGAL_FUNCTION, mbm_client_forward(&c, &r, 0, bytes, 1));
     ANSWERS(MBM_ILLEGAL_FUNCTION, mbm_client_forward(&c, &r, 128, bytes, 1));
     ANSWERS(MBM_INVALID_ARGUMENT, mbm_client_forward(&c, &r, 0x41, NULL, 1));
@@ -335,29 +322,93 @@ static uint32_t random_number(void *context)
     return 4;
 }
 
-static void settings_have_the_defaults_and_ranges_of_the_header(void **state)
+/* The silence that is left before a request, if a byte arrives just now. */
+static uint32_t gap(void)
+{
+    uint32_t delay;
+
+    wire.step = 0;
+    hooked_port_arrive(&wire, "x", 1);
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&c, &r, 0, 1));
+    IS(MBM_PENDING, mbm_client_poll(&c));
+    delay = mbm_client_pollDelay(&c);
+    assert_int_equal(wire.length, 0);
+    OK(mbm_client_cancel(&c, &r));
+    return delay;
+}
+
+static void the_gap_is_that_of_the_header(void **state)
+{
+    (void)state;
+    assert_int_equal(gap(), 4000);
+    OK(mbm_client_setBaudRate(&c, 19200));
+    assert_int_equal(gap(), 2006);
+    OK(mbm_client_setBaudRate(&c, 9600));
+    assert_int_equal(gap(), 4011);
+    OK(mbm_client_setBaudRate(&c, 115200));
+    assert_int_equal(gap(), 1750);
+    OK(mbm_client_setBaudRate(&c, 0));
+    assert_int_equal(gap(), 4000);
+    OK(mbm_client_setGap(&c, 5));
+    assert_int_equal(gap(), 5);
+    OK(mbm_client_beginRtu(&c, &port, frame, sizeof frame));
+    assert_int_equal(gap(), 4000);
+}
+
+/* How many times a request is sent that nothing answers, and how long all of it takes. */
+static unsigned frames(uint32_t *us)
+{
+    uint32_t begin = wire.now;
+
+    wire.step = 0;
+    wire.called[HOOK_WRITE] = 0;
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&c, &r, 0, 1));
+    while (mbm_client_poll(&c) == MBM_PENDING)
+        wire.now += mbm_client_pollDelay(&c) + 1;
+    IS(MBM_RESPONSE_TIMED_OUT, r.status);
+    *us = wire.now - begin;
+    return wire.called[HOOK_WRITE];
+}
+
+static void a_begin_restores_the_defaults_of_the_header(void **state)
+{
+    unsigned again;
+    uint32_t us;
+
+    (void)state;
+    for (again = 0; again < 2; again++) {
+        assert_int_equal(frames(&us), 1); /* no retries */
+        assert_in_range(us, 2000000, 2004100);
+        assert_int_equal(frames(&us), 1);
+        assert_in_range(us, 2100000, 2104100); /* after the quiet time */
+        OK(mbm_client_setQuietTime(&c, 0));
+        r.unit = 0;
+        us = wire.now;
+        IS(MBM_PENDING, mbm_client_writeSingleRegister(&c, &r, 0, 1));
+        while (mbm_client_poll(&c) == MBM_PENDING)
+            wire.now += mbm_client_pollDelay(&c) + 1;
+        OK(r.status);
+        assert_in_range(wire.now - us, 100000, 104100); /* gap and turnaround delay */
+        r.unit = 17;
+        OK(mbm_client_setResponseTimeout(&c, 1));
+        OK(mbm_client_setRetries(&c, 255));
+        assert_int_equal(frames(&us), 256);
+        OK(mbm_client_beginRtu(&c, &port, frame, sizeof frame));
+    }
+}
+
+static void settings_have_the_ranges_of_the_header(void **state)
 {
     static mbm_clientUnit units[2];
     unsigned i;
 
     (void)state;
-    assert_int_equal(mbm_client_getResponseTimeout(&c), 2000);
-    assert_int_equal(mbm_client_getTurnaroundDelay(&c), 100);
-    assert_int_equal(mbm_client_getQuietTime(&c), 100);
-    assert_int_equal(mbm_client_getGap(&c), 4000);
-    assert_int_equal(mbm_client_getRetries(&c), 0);
-    assert_int_equal(mbm_client_getEchoDiscard(&c), 0);
-    assert_int_equal(mbm_client_getPostFlushHold(&c), 0);
-    assert_int_equal(mbm_client_getInFlight(&c), 1);
     OK(mbm_client_setResponseTimeout(&c, 1000000));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setResponseTimeout(&c, 1000001));
-    assert_int_equal(mbm_client_getResponseTimeout(&c), 1000000);
     OK(mbm_client_setTurnaroundDelay(&c, 65535));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setTurnaroundDelay(&c, 65536));
-    assert_int_equal(mbm_client_getTurnaroundDelay(&c), 65535);
     OK(mbm_client_setQuietTime(&c, 65535));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setQuietTime(&c, 65536));
-    assert_int_equal(mbm_client_getQuietTime(&c), 65535);
     OK(mbm_client_setBusyRetries(&c, 255, 65535));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setBusyRetries(&c, 1, 65536));
     OK(mbm_client_setBackoff(&c, MBM_BACKOFF_EXPONENTIAL, 1000000, 1000000));
@@ -369,15 +420,10 @@ static void settings_have_the_defaults_and_ranges_of_the_header(void **state)
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setJitter(&c, 101, random_number, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setJitter(&c, 1, NULL, NULL));
     OK(mbm_client_setGap(&c, 0xFFFFFFFF));
-    assert_int_equal(mbm_client_getGap(&c), 0x80000000);
     OK(mbm_client_setBaudRate(&c, 19200));
-    assert_int_equal(mbm_client_getGap(&c), 2006);
     OK(mbm_client_setRetries(&c, 255));
-    assert_int_equal(mbm_client_getRetries(&c), 255);
     OK(mbm_client_setEchoDiscard(&c, 1));
-    assert_int_equal(mbm_client_getEchoDiscard(&c), 1);
     OK(mbm_client_setPostFlushHold(&c, 255));
-    assert_int_equal(mbm_client_getPostFlushHold(&c), 255);
     OK(mbm_client_setUnits(&c, units, 2));
     OK(mbm_client_setUnits(&c, NULL, 2));
     OK(mbm_client_setUnits(&c, NULL, 0));
@@ -390,9 +436,6 @@ static void settings_have_the_defaults_and_ranges_of_the_header(void **state)
     }
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setDelimiter(&c, '\n'));
     OK(mbm_client_beginTcp(&c, &port, frame, 260, outgoing, sizeof outgoing));
-    assert_int_equal(mbm_client_getInFlight(&c), 16);
-    assert_int_equal(mbm_client_getResponseTimeout(&c), 2000);
-    assert_int_equal(mbm_client_getRetries(&c), 0);
     OK(mbm_client_setInFlight(&c, 16));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setInFlight(&c, 17));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setInFlight(&c, 0));
@@ -437,22 +480,11 @@ static void a_client_that_was_never_begun_has_no_settings(void **state)
         IS(status, mbm_client_suspend(n, NULL));
         IS(status, mbm_client_resume(n, NULL));
         IS(status, mbm_client_diagnostics(n, &r, 0, 1));
-        IS(status, mbm_client_encapsulatedInterfaceTransport(n, &r, 13, 0));
         IS(status, mbm_client_readDeviceIdentification(n, &r, 1, 0));
         IS(status, mbm_client_readFileRecord(n, &r, 1, 0, 1));
-        IS(status, mbm_client_readFileRecords(n, &r, 7));
-        IS(status, mbm_client_writeFileRecords(n, &r, 9));
         IS(status, mbm_client_custom(n, &r, 65, 1, &silence));
         IS(status, mbm_client_forward(n, &r, 65, reply, 1));
         IS(status, mbm_client_writeFileRecord(n, &r, 1, 0, 1));
-        assert_int_equal(mbm_client_getResponseTimeout(n), 0);
-        assert_int_equal(mbm_client_getTurnaroundDelay(n), 0);
-        assert_int_equal(mbm_client_getQuietTime(n), 0);
-        assert_int_equal(mbm_client_getGap(n), 0);
-        assert_int_equal(mbm_client_getRetries(n), 0);
-        assert_int_equal(mbm_client_getEchoDiscard(n), 0);
-        assert_int_equal(mbm_client_getPostFlushHold(n), 0);
-        assert_int_equal(mbm_client_getInFlight(n), 0);
         assert_int_equal(mbm_client_pending(n), 0);
         assert_int_equal(mbm_client_pollDelay(n), 0xFFFFFFFF);
     }
@@ -532,7 +564,9 @@ int main(void)
         TEST(a_queue_holds_sixteen_requests),
         TEST(functions_with_bodies_check_them),
         TEST(a_begin_is_refused_without_a_change),
-        TEST(settings_have_the_defaults_and_ranges_of_the_header),
+        TEST(the_gap_is_that_of_the_header),
+        TEST(a_begin_restores_the_defaults_of_the_header),
+        TEST(settings_have_the_ranges_of_the_header),
         TEST(a_client_that_was_never_begun_has_no_settings),
         TEST(a_link_has_the_limits_of_the_header),
     };

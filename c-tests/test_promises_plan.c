@@ -82,8 +82,6 @@ static void each_type_has_its_getters(void **state)
                  mbm_plan_getNumber(&d.plan, field, index, &value.number));
             GETS(OK_IF(is && types[i].is_float),
                  mbm_plan_getFloat(&d.plan, field, index, &value.single));
-            GETS(OK_IF(is && types[i].is_float),
-                 mbm_plan_getDouble(&d.plan, field, index, &value.number));
         }
         GETS(OK_IF(types[i].is_text), mbm_plan_getText(&d.plan, field, value.text, 5));
         GETS(OK_IF(types[i].is_registers), mbm_plan_getRegisters(&d.plan, field, &value.view));
@@ -91,7 +89,6 @@ static void each_type_has_its_getters(void **state)
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getInt32(&d.plan, field, 0, NULL));
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getNumber(&d.plan, field, 0, NULL));
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getFloat(&d.plan, field, 0, NULL));
-        IS(MBM_INVALID_ARGUMENT, mbm_plan_getDouble(&d.plan, field, 0, NULL));
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getText(&d.plan, field, NULL, 5));
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getRegisters(&d.plan, field, NULL));
     }
@@ -107,7 +104,6 @@ static void every_call_returns(uint8_t status, mbm_plan *plan, uint16_t field)
     GETS(status, mbm_plan_getInt32(plan, field, 0, &value.int32));
     GETS(status, mbm_plan_getNumber(plan, field, 0, &value.number));
     GETS(status, mbm_plan_getFloat(plan, field, 0, &value.single));
-    GETS(status, mbm_plan_getDouble(plan, field, 0, &value.number));
     GETS(status, mbm_plan_getText(plan, field, value.text, sizeof value.text));
     GETS(status, mbm_plan_getRegisters(plan, field, &value.view));
     REFUSED(status, age, mbm_plan_getStatus(plan, field, &age));

@@ -80,6 +80,15 @@ static void a_begin_is_refused_without_a_change(void **state)
     }
 }
 
+/* The silence that ends a frame of which one byte arrives just now. */
+static uint32_t silence(void)
+{
+    hooked_port_arrive(&wire, ":", 1);
+    OK(mbm_server_poll(&server));
+    OK(mbm_server_poll(&server));
+    return mbm_server_pollDelay(&server);
+}
+
 static void a_begin_restores_the_defaults_of_its_framing(void **state)
 {
     unsigned i, first;
@@ -92,8 +101,8 @@ static void a_begin_restores_the_defaults_of_its_framing(void **state)
             if (begins[first].is_rtu)
                 OK(mbm_server_setEchoDiscard(&server, 1));
             OK(begins[i].begin(&server, &port, &unit, 1, frame, 300));
-            assert_int_equal(mbm_server_getSilence(&server), begins[i].silence);
-            assert_int_equal(mbm_server_getEchoDiscard(&server), 0);
+            /* In TCP no silence ends a frame. */
+            assert_int_equal(silence(), begins[i].silence ? begins[i].silence : UINT32_MAX);
         }
     }
 }
@@ -106,15 +115,11 @@ static void a_server_that_was_never_begun_does_nothing(void **state)
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setBaudRate(&server, 9600));
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setEchoDiscard(&server, 1));
     assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFF);
-    assert_int_equal(mbm_server_getSilence(&server), 0);
-    assert_int_equal(mbm_server_getEchoDiscard(&server), 0);
     IS(MBM_INVALID_ARGUMENT, mbm_server_poll(NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setSilence(NULL, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(NULL, 9600));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setEchoDiscard(NULL, 1));
     assert_int_equal(mbm_server_pollDelay(NULL), 0xFFFFFFFF);
-    assert_int_equal(mbm_server_getSilence(NULL), 0);
-    assert_int_equal(mbm_server_getEchoDiscard(NULL), 0);
 }
 
 static void settings_of_rtu_are_refused_in_other_framings(void **state)
@@ -126,23 +131,21 @@ static void settings_of_rtu_are_refused_in_other_framings(void **state)
         OK(begins[i].begin(&server, &port, &unit, 1, frame, 300));
         if (begins[i].is_rtu) {
             OK(mbm_server_setBaudRate(&server, 9600));
-            assert_int_equal(mbm_server_getSilence(&server), 4011); /* 3.5 * 11 / 9600 s */
+            assert_int_equal(silence(), 4011); /* 3.5 * 11 / 9600 s */
             OK(mbm_server_setBaudRate(&server, 115200));
-            assert_int_equal(mbm_server_getSilence(&server), 1750);
+            assert_int_equal(silence(), 1750);
             OK(mbm_server_setBaudRate(&server, 0));
-            assert_int_equal(mbm_server_getSilence(&server), 4000);
+            assert_int_equal(silence(), 4000);
             OK(mbm_server_setEchoDiscard(&server, 200));
-            assert_int_equal(mbm_server_getEchoDiscard(&server), 1);
             OK(mbm_server_setEchoDiscard(&server, 0));
-            assert_int_equal(mbm_server_getEchoDiscard(&server), 0);
         } else {
             REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_setBaudRate(&server, 9600));
             REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_setEchoDiscard(&server, 1));
         }
         OK(mbm_server_setSilence(&server, 0xFFFFFFFF));
-        assert_int_equal(mbm_server_getSilence(&server), 0x80000000);
+        if (begins[i].is_rtu)
+            assert_int_equal(silence(), 0x80000000);
         OK(mbm_server_setSilence(&server, 0));
-        assert_int_equal(mbm_server_getSilence(&server), 0);
     }
 }
 

@@ -30,12 +30,51 @@ static int setup(void **state)
 
 typedef uint8_t (*begins_sniffer)(mbm_sniffer *sniffer, uint8_t *bytes, uint16_t size);
 
+/* The begin functions, with the frame timeout by default in milliseconds. */
 static const struct {
     begins_sniffer begin;
-} sniffers[] = {{mbm_sniffer_beginRtu},
-                {mbm_sniffer_beginAscii},
-                {mbm_sniffer_beginTcp},
-                {mbm_sniffer_beginRtuOverTcp}};
+    uint8_t kind;
+    uint32_t frameTimeout;
+} sniffers[] = {{mbm_sniffer_beginRtu, MBM_FRAMING_RTU, 50},
+                {mbm_sniffer_beginAscii, MBM_FRAMING_ASCII, 1000},
+                {mbm_sniffer_beginTcp, MBM_FRAMING_TCP, 1000},
+                {mbm_sniffer_beginRtuOverTcp, MBM_FRAMING_RTU_OVER_TCP, 50}};
+
+static uint32_t now; /* of the sniffer */
+
+/* Feeds the first bytes of a request, of which there are at most `most`, and returns the
+ * milliseconds until the first event of one of two kinds. */
+static uint32_t event_after(uint8_t framing, uint16_t most, uint8_t kind, uint8_t other)
+{
+    const mbm_framing as = {.kind = framing};
+    mbm_packet packet = {.unit = 17, .function = MBM_FC_READ_COILS, .quantity = 1};
+    uint8_t bytes[32];
+    uint16_t length;
+    uint32_t ms;
+    mbm_event event;
+
+    OK(mbm_frame_build(&as, &packet, bytes, sizeof bytes, &length));
+    if (length > most)
+        length = most;
+    now += 100000000;
+    assert_int_equal(mbm_sniffer_feed(&s, MBM_DIRECTION_BOTH, bytes, length, now), length);
+    for (ms = 0; ms < 70000; ms++, now += 1000)
+        while (mbm_sniffer_next(&s, now, &event))
+            if (event.kind == kind || event.kind == other)
+                return ms;
+    fail();
+    return 0;
+}
+
+static uint32_t response_timeout(uint8_t framing)
+{
+    return event_after(framing, UINT16_MAX, MBM_EVENT_TIMEOUT, MBM_EVENT_TIMEOUT);
+}
+
+static uint32_t frame_timeout(uint8_t framing)
+{
+    return event_after(framing, 4, MBM_EVENT_BAD_CRC, MBM_EVENT_NOISE);
+}
 
 static void a_sniffer_begins_in_every_framing_or_changes_nothing(void **state)
 {
@@ -47,12 +86,16 @@ static void a_sniffer_begins_in_every_framing_or_changes_nothing(void **state)
         IS(MBM_INVALID_ARGUMENT, sniffers[i].begin(NULL, buffer, 300));
         REFUSED(MBM_INVALID_ARGUMENT, s, sniffers[i].begin(&s, NULL, 300));
         REFUSED(MBM_BUFFER_TOO_SMALL, s, sniffers[i].begin(&s, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
-        assert_int_equal(mbm_sniffer_getResponseTimeout(&s), 1000);
-        OK(mbm_sniffer_setResponseTimeout(&s, 5));
-        OK(mbm_sniffer_setFrameTimeout(&s, 65535));
         OK(sniffers[i].begin(&s, buffer, 300));
-        assert_int_equal(mbm_sniffer_getResponseTimeout(&s), 1000);
-        assert_int_not_equal(mbm_sniffer_getFrameTimeout(&s), 65535);
+        assert_int_equal(response_timeout(sniffers[i].kind), 1000);
+        assert_int_equal(frame_timeout(sniffers[i].kind), sniffers[i].frameTimeout);
+        OK(mbm_sniffer_setResponseTimeout(&s, 5));
+        OK(mbm_sniffer_setFrameTimeout(&s, 200));
+        assert_int_equal(response_timeout(sniffers[i].kind), 5);
+        assert_int_equal(frame_timeout(sniffers[i].kind), 200);
+        OK(sniffers[i].begin(&s, buffer, 300));
+        assert_int_equal(response_timeout(sniffers[i].kind), 1000);
+        assert_int_equal(frame_timeout(sniffers[i].kind), sniffers[i].frameTimeout);
     }
 }
 
@@ -72,9 +115,9 @@ static void times_and_declarations_of_a_sniffer_have_limits(void **state)
     REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setFrameTimeout(&s, 0));
     REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setFrameTimeout(&s, 65536));
     OK(mbm_sniffer_setResponseTimeout(&s, 65535));
-    assert_int_equal(mbm_sniffer_getResponseTimeout(&s), 65535);
+    assert_int_equal(response_timeout(MBM_FRAMING_RTU), 65535);
     OK(mbm_sniffer_setFrameTimeout(&s, 65535));
-    assert_int_equal(mbm_sniffer_getFrameTimeout(&s), 65535);
+    assert_int_equal(frame_timeout(MBM_FRAMING_RTU), 65535);
     OK(mbm_sniffer_setBaudRate(&s, 9600));
     OK(mbm_sniffer_setBaudRate(&s, 0));
     OK(mbm_sniffer_setFunctions(&s, NULL, 0));
@@ -108,8 +151,6 @@ static void a_sniffer_that_was_never_begun_reports_nothing(void **state)
         IS(status, mbm_sniffer_setBaudRate(both[i], 1));
         IS(status, mbm_sniffer_setFunctions(both[i], NULL, 0));
         IS(status, mbm_sniffer_setDelimiter(both[i], '\n'));
-        assert_int_equal(mbm_sniffer_getResponseTimeout(both[i]), 0);
-        assert_int_equal(mbm_sniffer_getFrameTimeout(both[i]), 0);
         assert_int_equal(mbm_sniffer_feed(both[i], 0, buffer, 4, 0), 0);
         memset(&event, 0x77, sizeof event);
         REFUSED(0, event, mbm_sniffer_next(both[i], 0, &event));
@@ -122,10 +163,28 @@ static void a_sniffer_that_was_never_begun_reports_nothing(void **state)
 
 /* --- trace --- */
 
+static unsigned records;
+
 static void hook(void *context, const mbm_traceRecord *record)
 {
     (void)context;
     (void)record;
+    records++;
+}
+
+/* The milliseconds until the trace hands out the beginning of a frame. */
+static uint32_t trace_timeout(void)
+{
+    const mbm_port *traced = mbm_trace_port(&t);
+    uint8_t bytes[8];
+    uint32_t ms;
+
+    hooked_port_arrive(&wire, "\0\1\0\0", 4);
+    assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 4);
+    records = 0;
+    for (ms = 0; records == 0; ms++, wire.now += 1000)
+        assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 0);
+    return ms - 1;
 }
 
 typedef uint8_t (*begins_trace)(mbm_trace *trace, const mbm_port *on, const mbm_framing *framing,
@@ -160,14 +219,14 @@ static void a_trace_begins_or_changes_nothing(void **state)
         REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &lacking, &rtu, buffer, 600, hook, NULL));
         assert_non_null(mbm_trace_port(&t));
         assert_ptr_equal(mbm_trace_innerPort(&t)->context, &wire);
-        assert_int_equal(mbm_trace_getFrameTimeout(&t), 50);
+        assert_int_equal(trace_timeout(), 50);
         OK(mbm_trace_setFrameTimeout(&t, 65535));
-        assert_int_equal(mbm_trace_getFrameTimeout(&t), 65535);
+        assert_int_equal(trace_timeout(), 65535);
         REFUSED(MBM_INVALID_ARGUMENT, t, mbm_trace_setFrameTimeout(&t, 0));
         REFUSED(MBM_INVALID_ARGUMENT, t, mbm_trace_setFrameTimeout(&t, 65536));
         OK(mbm_trace_flush(&t));
         OK(begin(&t, &port, FRAMING(MBM_FRAMING_TCP), buffer, 600, hook, NULL));
-        assert_int_equal(mbm_trace_getFrameTimeout(&t), 1000);
+        assert_int_equal(trace_timeout(), 1000);
     }
 }
 
@@ -185,7 +244,6 @@ static void a_trace_that_was_never_begun_has_no_port(void **state)
         assert_null(mbm_trace_port(both[i]));
         assert_null(mbm_trace_innerPort(both[i]));
         IS(status, mbm_trace_setFrameTimeout(both[i], 1));
-        assert_int_equal(mbm_trace_getFrameTimeout(both[i]), 0);
         IS(status, mbm_trace_flush(both[i]));
     }
     memset(&record, 0x77, sizeof record);

@@ -54,7 +54,6 @@ typedef struct accessor {
     }
 
 GETS(getBit, (v, address, 15, value.bytes), (v, FIRST, 15, NULL))
-GETS(getUint8, (v, address, 1, value.bytes), (v, FIRST, 0, NULL))
 GETS(getUint16, (v, address, order, &value.uint16), (v, FIRST, 0, NULL))
 GETS(getUint32, (v, address, order, &value.uint32), (v, FIRST, 0, NULL))
 GETS(getUint64, (v, address, order, &value.uint64), (v, FIRST, 0, NULL))
@@ -62,9 +61,7 @@ GETS(getFloat, (v, address, order, &value.single), (v, FIRST, 0, NULL))
 GETS(getDouble, (v, address, order, &value.wide), (v, FIRST, 0, NULL))
 GETS(getString, (v, address, 5, order, value.text, 6), (v, FIRST, 5, 0, NULL, 6))
 GETS(getBytes, (v, address, order, value.bytes, 5), (v, FIRST, 0, NULL, 5))
-GETS(isEqual, (v, address, value.bytes + 1, 5, value.bytes), (v, FIRST, NULL, 5, value.bytes))
 GETS(setBit, (v, address, 15, 1), (NULL, FIRST, 15, v != NULL))
-GETS(setUint8, (v, address, 1, 9), (NULL, FIRST, 0, v != NULL))
 GETS(setUint16, (v, address, order, 9), (NULL, FIRST, 0, v != NULL))
 GETS(setUint32, (v, address, order, 9), (NULL, FIRST, 0, v != NULL))
 GETS(setUint64, (v, address, order, &value.uint64), (v, FIRST, 0, NULL))
@@ -79,10 +76,9 @@ GETS(setBytes, (v, address, order, value.bytes, 5), (v, FIRST, 0, NULL, 5))
     }
 
 static const accessor accessors[] = {
-    ROW(getBit, 1, 0, 0),    ROW(getUint8, 1, 0, 0),  ROW(getUint16, 1, 1, 0),
-    ROW(getUint32, 2, 1, 0), ROW(getUint64, 4, 1, 0), ROW(getFloat, 2, 1, 0),
-    ROW(getDouble, 4, 1, 0), ROW(getString, 3, 1, 0), ROW(getBytes, 3, 1, 0),
-    ROW(isEqual, 3, 0, 0),   ROW(setBit, 1, 0, 1),    ROW(setUint8, 1, 0, 1),
+    ROW(getBit, 1, 0, 0),    ROW(getUint16, 1, 1, 0), ROW(getUint32, 2, 1, 0),
+    ROW(getUint64, 4, 1, 0), ROW(getFloat, 2, 1, 0),  ROW(getDouble, 4, 1, 0),
+    ROW(getString, 3, 1, 0), ROW(getBytes, 3, 1, 0),  ROW(setBit, 1, 0, 1),
     ROW(setUint16, 1, 1, 1), ROW(setUint32, 2, 1, 1), ROW(setUint64, 4, 1, 1),
     ROW(setFloat, 2, 1, 1),  ROW(setDouble, 4, 1, 1), ROW(setString, 3, 1, 1),
     ROW(setBytes, 3, 1, 1)};
@@ -131,8 +127,6 @@ static void null_and_views_without_data_are_refused(void **state)
         r.data = NULL;
         NOTHING(MBM_NOT_INITIALISED, a->call(&r, FIRST, 0));
     }
-    setup(state);
-    NOTHING(MBM_INVALID_ARGUMENT, mbm_registers_isEqual(&r, FIRST, value.bytes, 5, NULL));
 }
 
 static void only_the_orders_and_kinds_of_the_header_are_accepted(void **state)
@@ -188,12 +182,12 @@ static void a_register_has_sixteen_bits_and_two_bytes(void **state)
                     mbm_registers_getBit(&r, FIRST + 1, (uint8_t)bit, value.bytes));
         }
     }
-    OK(mbm_registers_setUint8(&r, FIRST, 0, 0x11));
-    OK(mbm_registers_setUint8(&r, FIRST, 77, 0x22));
+    OK(mbm_registers_setBytes(&r, FIRST, MBM_ORDER_BADC, (const uint8_t *)"\x11", 1));
+    OK(mbm_registers_setBytes(&r, FIRST, MBM_ORDER_ABCD, (const uint8_t *)"\x22", 1));
     assert_int_equal(words[0], 0x2211);
-    OK(mbm_registers_getUint8(&r, FIRST, 0, &on));
+    OK(mbm_registers_getBytes(&r, FIRST, MBM_ORDER_BADC, &on, 1));
     assert_int_equal(on, 0x11);
-    OK(mbm_registers_getUint8(&r, FIRST, 255, &on));
+    OK(mbm_registers_getBytes(&r, FIRST, MBM_ORDER_ABCD, &on, 1));
     assert_int_equal(on, 0x22);
 }
 
@@ -219,32 +213,19 @@ static void a_text_ends_at_its_nul_or_with_its_field(void **state)
 static void an_odd_number_of_bytes_leaves_the_other_byte(void **state)
 {
     static const uint8_t three[] = {1, 2, 3};
-    uint8_t equal = 7;
 
     (void)state;
     words[1] = 0xAAAA;
     OK(mbm_registers_setBytes(&r, FIRST, 0, three, 3));
     assert_int_equal(words[0], 0x0102);
     assert_int_equal(words[1], 0x03AA);
-    OK(mbm_registers_isEqual(&r, FIRST, three, 3, &equal));
-    assert_int_equal(equal, 1);
-    r.order = MBM_ORDER_DCBA;
-    OK(mbm_registers_isEqual(&r, FIRST, three, 3, &equal));
-    assert_int_equal(equal, 1);
-    words[1] = 0x04AA;
-    OK(mbm_registers_isEqual(&r, FIRST, three, 3, &equal));
-    assert_int_equal(equal, 0);
 }
 
 /* --- views --- */
 
 static void data_of_no_length_may_be_null(void **state)
 {
-    uint8_t equal = 7;
-
     (void)state;
-    OK(mbm_registers_isEqual(&r, FIRST, NULL, 0, &equal));
-    assert_int_equal(equal, 1);
     OK(mbm_registers_getBytes(&r, FIRST, 0, NULL, 0));
     OK(mbm_registers_setBytes(&r, FIRST, 0, NULL, 0));
 #define EMPTY(view)                                                                                \
@@ -252,7 +233,6 @@ static void data_of_no_length_may_be_null(void **state)
         memset(&r, 0, sizeof r);                                                                   \
         OK(view);                                                                                  \
         NOTHING(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getUint16(&r, 5, 0, &value.uint16));       \
-        OK(mbm_registers_isEqual(&r, 5, NULL, 0, &equal));                                         \
     } while (0)
     EMPTY(mbm_registers_ofWords(&r, NULL, 0, 5));
     EMPTY(mbm_registers_ofBytes(&r, NULL, 0, 5));

@@ -193,7 +193,7 @@ static uint8_t make_request(sim *s, run *r)
     uint8_t i, words = (uint8_t)(1 + draw(r, 123));
 
     for (i = 0; i < words; i++)
-        mbm_node_setTransmitBuffer(n, i, (uint16_t)draw(r, 65536));
+        s->transmit[i] = (uint16_t)draw(r, 65536);
     mbm_node_setSlaveID(n, (uint8_t)(MODEL_FIRST_UNIT + draw(r, MODEL_UNITS)));
     s->echo = draw(r, 12) == 0;
     mbm_line_setEchoDiscard(&s->line, s->echo);

@@ -65,7 +65,6 @@ static void every_function_of_the_line_is_busy(void)
     IS(MBM_BUSY, mbm_node_maskWriteRegister(m, 0, 1, 2));
     IS(MBM_BUSY, mbm_node_readWriteMultipleRegisters(m, 0, 1, 0, 1));
     IS(MBM_BUSY, mbm_node_readWriteQueuedRegisters(m, 0, 1));
-    assert_int_equal(mbm_node_requestFrom(m, 0, 1), 0);
 }
 
 /* Of a node whose request is under way. */
@@ -83,18 +82,12 @@ static void its_request_is_busy(void)
 static void its_words_and_settings_are_free(void)
 {
     mbm_node *m = &master;
-    mbm_registers view;
 
     assert_int_equal(mbm_node_getSlaveID(m), 17);
     OK(mbm_node_setSlaveID(m, 17));
     OK(mbm_node_setResponseTimeout(m, 2000));
-    OK(mbm_node_setWordOrder(m, MBM_ORDER_ABCD));
-    OK(mbm_node_setTransmitBuffer(m, 1, 0x55));
     OK(mbm_node_beginTransmission(m, 1));
     OK(mbm_node_send(m, 0x77));
-    OK(mbm_node_clearTransmitBuffer(m));
-    OK(mbm_node_getResponseRegisters(m, 0, &view));
-    OK(mbm_node_getTransmitRegisters(m, 0, &view));
     assert_int_equal(mbm_node_getExceptionCode(m), 0);
     assert_int_equal(mbm_node_available(m), 0);
     assert_int_equal(mbm_node_receive(m), 0xFFFF);

@@ -90,7 +90,6 @@ static void every_request_of_the_client_answers(uint8_t status, mbm_clientReques
     ASKED(mbm_client_writeFileRecord(&client, r, 1, 0, 1));
     ASKED(mbm_client_readFifoQueue(&client, r, 0));
     ASKED(mbm_client_readDeviceIdentification(&client, r, 1, 0));
-    ASKED(mbm_client_encapsulatedInterfaceTransport(&client, r, 14, 1));
     ASKED(mbm_client_custom(&client, r, 65, 1, &rule));
 }
 

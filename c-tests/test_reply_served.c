@@ -67,7 +67,7 @@ static void reads(uint8_t queued)
 
 static void check_fields(void)
 {
-    static const uint8_t parts[] = {6, 0, 4, 0, 7, 0, 2, 6, 0, 4, 0, 1, 0, 1};
+    static const uint8_t parts[] = {14, 6, 0, 4, 0, 7, 0, 2, 6, 0, 4, 0, 1, 0, 1};
     static const uint8_t twelve[2] = {0x12, 0x34};
     static const uint16_t word[] = {0x1234};
     mbm_record record;
@@ -100,8 +100,7 @@ static void check_fields(void)
     s.records[7] = 0x1234;
     s.records[8] = 0x5678;
     s.records[1] = 0xBEEF;
-    request.data = parts;
-    reads(mbm_client_readFileRecords(&client, &request, sizeof parts));
+    reads(mbm_client_forward(&client, &request, 0x14, parts, sizeof parts));
     assert_true(mbm_packet_nextRecord(&packet, &cursor, &record));
     assert_int_equal(record.length, 2);
     assert_memory_equal(record.data, "\x12\x34\x56\x78", 4);

@@ -174,7 +174,7 @@ static uint8_t node_reads(world *w, mbm_node *m, uint8_t unit, uint16_t address,
         sleep_until_a_byte(w, mbm_node_pollDelay(m));
         status = mbm_node_poll(m);
     }
-    *value = mbm_node_getResponseBuffer(m, 0);
+    *value = mbm_node_receive(m);
     return status;
 }
 

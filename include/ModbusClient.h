@@ -44,7 +44,7 @@
 #include "ModbusTransmission.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusStatusText.h"
-#include "mbm.h"
+#include "mbm/client.h"
 
 /** @cond the macros are explained at the head of the file */
 #if !defined(MODBUSCLIENT_FRAME_BYTES)
@@ -96,27 +96,17 @@ public:
     uint8_t setBaudRate(uint32_t baud) { return mbm_client_setBaudRate(&client, baud); }
     /** Microseconds of silence before a request, instead of t3.5. */
     uint8_t setGap(uint32_t us) { return mbm_client_setGap(&client, us); }
-    /** The silence in effect: of setGap, or t3.5 of setBaudRate. */
-    uint32_t getGap() const { return mbm_client_getGap(&client); }
     /** Milliseconds from a broadcast to the next request; 100 at first. */
     uint8_t setTurnaroundDelay(uint32_t ms) { return mbm_client_setTurnaroundDelay(&client, ms); }
-    /** What setTurnaroundDelay has set. */
-    uint16_t getTurnaroundDelay() const { return mbm_client_getTurnaroundDelay(&client); }
     /** Milliseconds after a failed request before the next one is sent; 100 at first. */
     uint8_t setQuietTime(uint32_t ms) { return mbm_client_setQuietTime(&client, ms); }
-    /** What setQuietTime has set. */
-    uint16_t getQuietTime() const { return mbm_client_getQuietTime(&client); }
     /** Discards the local echo, if the receiver receives what the driver sends; off at first. */
     uint8_t setEchoDiscard(bool on) { return mbm_client_setEchoDiscard(&client, on); }
-    /** What setEchoDiscard has set. */
-    bool getEchoDiscard() const { return mbm_client_getEchoDiscard(&client) != 0; }
     /** Character times that the driver stays on after flush, for cores whose flush returns early; 0 at first. */
     uint8_t setPostFlushHold(uint8_t characters)
     {
         return mbm_client_setPostFlushHold(&client, characters);
     }
-    /** What setPostFlushHold has set. */
-    uint8_t getPostFlushHold() const { return mbm_client_getPostFlushHold(&client); }
     /** The character that ends ASCII frames after CR, 1 to 127; LF at first. */
     uint8_t setDelimiter(uint8_t character) { return mbm_client_setDelimiter(&client, character); }
 
@@ -244,8 +234,6 @@ public:
 
     /** How many requests are under way at once, 1 to 16, for devices that take fewer; 16 at first. */
     uint8_t setInFlight(uint8_t most) { return mbm_client_setInFlight(&client, most); }
-    /** What setInFlight has set; 16 at first. */
-    uint8_t getInFlight() const { return mbm_client_getInFlight(&client); }
 
 private:
     static_assert(MODBUSCLIENT_TCP_BYTES >= 17 && MODBUSCLIENT_TCP_BYTES <= 32767,

@@ -14,7 +14,7 @@
 
 #include "ModbusMasterOptions.h"
 #include "ModbusRequest.h"
-#include "mbm.h"
+#include "mbm/client.h"
 
 /**
  * Queues requests to units, up to 16 at once. ModbusSerialClient and ModbusTcpClient add
@@ -181,20 +181,6 @@ public:
                    ? mbm_client_writeFileRecord(&client, withWords(request), file, record, quantity)
                    : refuse(request);
     }
-    /** Function 14 of several groups, as bytes on the wire: 7 to 245, a multiple of 7. */
-    uint8_t readFileRecords(ModbusRequest &request, uint16_t bytes)
-    {
-        return holds(request, 2, bytes)
-                   ? mbm_client_readFileRecords(&client, withWords(request), bytes)
-                   : refuse(request);
-    }
-    /** Function 15 of several groups, as bytes on the wire: 9 to 251. */
-    uint8_t writeFileRecords(ModbusRequest &request, uint16_t bytes)
-    {
-        return holds(request, 2, bytes)
-                   ? mbm_client_writeFileRecords(&client, withWords(request), bytes)
-                   : refuse(request);
-    }
     /** Function 18: reads up to 31 registers of a queue; length() / 2 says how many. */
     uint8_t readFifoQueue(ModbusRequest &request, uint16_t address)
     {
@@ -208,14 +194,6 @@ public:
     uint8_t readDeviceIdentification(ModbusRequest &request, uint8_t code, uint8_t object = 0)
     {
         return mbm_client_readDeviceIdentification(&client, withWords(request), code, object);
-    }
-    /** Function 2B of any MEI type: sends 0 to 251 bytes and reads bytes. */
-    uint8_t encapsulatedInterfaceTransport(ModbusRequest &request, uint8_t meiType,
-                                           uint16_t bytes)
-    {
-        return holds(request, 2, bytes) ? mbm_client_encapsulatedInterfaceTransport(
-                                           &client, withWords(request), meiType, bytes)
-                                     : refuse(request);
     }
     /** A function of yours, 1 to 127: sends 0 to 252 bytes; `response` says how long a reply is. */
     uint8_t custom(ModbusRequest &request, uint8_t function, uint16_t bytes,
@@ -238,12 +216,8 @@ public:
 
     /** Milliseconds that a reply may take, 0 to 1000000; 2000 at first. */
     uint8_t setResponseTimeout(uint32_t ms) { return mbm_client_setResponseTimeout(&client, ms); }
-    /** What setResponseTimeout has set. */
-    uint32_t getResponseTimeout() const { return mbm_client_getResponseTimeout(&client); }
     /** How often a request is repeated if its reply is missing, damaged or malformed, 0 to 255; 0 at first. */
     uint8_t setRetries(uint8_t retries) { return mbm_client_setRetries(&client, retries); }
-    /** What setRetries has set. */
-    uint8_t getRetries() const { return mbm_client_getRetries(&client); }
     /**
      * How often a request is repeated, after `waitMs` milliseconds each time, that the device
      * refuses because it is busy (exception 06), or that only reads and that the device

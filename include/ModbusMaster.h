@@ -30,7 +30,7 @@
 #include "ModbusMasterPorts.h"
 #include "ModbusMasterValues.h"
 #include "ModbusStatusText.h"
-#include "mbm.h"
+#include "mbm/master.h"
 
 /**
  * A Modbus RTU master: one line, one request at a time.
@@ -284,8 +284,6 @@ public:
     /** Milliseconds from the end of a request to the end of its reply, 0 to 1000000; 2000 at
         first. A longer time changes nothing. */
     void setResponseTimeout(uint32_t ms) { mbm_node_setResponseTimeout(&state.node, ms); }
-    /** What setResponseTimeout has set. */
-    uint32_t getResponseTimeout() const { return mbm_node_getResponseTimeout(&state.node); }
     /** The unit of later requests: 1 to 247; 248 to 255 are sent as they are, 0 broadcasts. */
     void setSlaveID(uint8_t slave) { mbm_node_setSlaveID(&state.node, slave); }
     /** The unit of later requests. */
@@ -296,24 +294,14 @@ public:
     void setBaudRate(uint32_t baud) { mbm_line_setBaudRate(line(), baud); }
     /** Microseconds of silence before a request, instead of t3.5. */
     void setGap(uint32_t us) { mbm_line_setGap(line(), us); }
-    /** The silence in effect: of setGap, or t3.5 of setBaudRate. */
-    uint32_t getGap() const { return mbm_line_getGap(line()); }
     /** Milliseconds from a broadcast to the next request; 100 at first. */
     void setTurnaroundDelay(uint32_t ms) { mbm_line_setTurnaroundDelay(line(), ms); }
-    /** What setTurnaroundDelay has set. */
-    uint16_t getTurnaroundDelay() const { return mbm_line_getTurnaroundDelay(line()); }
     /** Milliseconds after a failed request before the next one is sent; 100 at first. */
     void setQuietTime(uint32_t ms) { mbm_line_setQuietTime(line(), ms); }
-    /** What setQuietTime has set. */
-    uint16_t getQuietTime() const { return mbm_line_getQuietTime(line()); }
     /** How often a request is repeated if its reply is missing, damaged or malformed; 0 at first. */
     void setRetries(uint8_t retries) { mbm_line_setRetries(line(), retries); }
-    /** What setRetries has set. */
-    uint8_t getRetries() const { return mbm_line_getRetries(line()); }
     /** Discards the local echo, if the receiver receives what the driver sends; off at first. */
     void setEchoDiscard(bool on) { mbm_line_setEchoDiscard(line(), on); }
-    /** What setEchoDiscard has set. */
-    bool getEchoDiscard() const { return mbm_line_getEchoDiscard(line()) != 0; }
     /**
      * Accepts replies that deviate from the standard if no correct one arrives in time:
      * another echoed address or value, another number of registers. A read of more words
@@ -326,15 +314,11 @@ public:
             Line::keep();
         mbm_node_setLenient(&state.node, on);
     }
-    /** What setLenient has set. */
-    bool getLenient() const { return mbm_node_getLenient(&state.node) != 0; }
     /** Character times that the driver stays on after flush, for cores whose flush returns early; 0 at first. */
     void setPostFlushHold(uint8_t characters)
     {
         mbm_line_setPostFlushHold(line(), characters);
     }
-    /** What setPostFlushHold has set. */
-    uint8_t getPostFlushHold() const { return mbm_line_getPostFlushHold(line()); }
     /** false: the functions return ku8MBPending at once, and poll completes the request. */
     void setBlocking(bool on)
     {
@@ -343,8 +327,6 @@ public:
             Line::keep();
         mbm_node_setBlocking(&state.node, on);
     }
-    /** What setBlocking has set; true at first. */
-    bool getBlocking() const { return mbm_node_getBlocking(&state.node) != 0; }
     /** Counts into `counters`; set them to 0 before. nullptr stops counting. Copies share them. */
     void setCounters(mbm_counters *counters) { mbm_line_setCounters(line(), counters); }
     // NOLINTEND(readability-convert-member-functions-to-static)
@@ -388,6 +370,7 @@ private:
         ModbusTransmissionHook onPre;
         ModbusTransmissionHook onPost;
         uint8_t port;
+        uint8_t order; // of values: see setWordOrder
         mbm_node node;
         uint16_t response[responseWords];
         uint16_t transmit[transmitWords];
@@ -454,7 +437,6 @@ private:
     }
 #else
     mbm_line *line() { return &state.own.wire.line; }
-    const mbm_line *line() const { return &state.own.wire.line; }
     static Wire &wireOf(void *context) { return *static_cast<Wire *>(context); }
 
     void beginLine()
@@ -489,7 +471,12 @@ private:
 #endif
 
     uint8_t sendWord(uint16_t word) { return mbm_node_send(&state.node, word); }
-    uint8_t sendWords(uint32_t words) { return mbm_node_send32(&state.node, words); }
+    // Both, the low one first; only the low one if only one fits.
+    uint8_t sendWords(uint32_t words)
+    {
+        const uint8_t low = sendWord(words & 0xFFFFu);
+        return low == MBM_OK ? sendWord(static_cast<uint16_t>(words >> 16)) : low;
+    }
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {

@@ -10,7 +10,7 @@
 
 #include <stdint.h>
 
-#include "mbm.h"
+#include "mbm/base.h"
 
 /**
  * The constants of ModbusMaster; use them as ModbusMaster::ku8MBSuccess. It is

@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 #include "ModbusMasterOptions.h"
-#include "mbm.h"
+#include "mbm/master.h"
 
 /** @cond private to ModbusMaster */
 // What the hooks of the port need. `User` is the object whose request is under way.

@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 #include "ModbusNumbers.h"
-#include "mbm.h"
+#include "mbm/values.h"
 
 /**
  * The words of a ModbusMaster as values. `index` counts words from 0, as with
@@ -31,12 +31,7 @@ class ModbusMasterValues : public ModbusWordOrder,
                            public ModbusNumbers<ModbusMasterValues<Master>> {
 public:
     /** The order of values for calls without an order; orderABCD at first. */
-    void setWordOrder(WordOrder order) { mbm_node_setWordOrder(&core(), order); }
-    /** The order in effect. */
-    WordOrder getWordOrder() const
-    {
-        return static_cast<WordOrder>(mbm_node_getWordOrder(&core()));
-    }
+    void setWordOrder(WordOrder order) { static_cast<Master *>(this)->state.order = order; }
 
     /** An integer in the response: a word, 0 to 65535; only the bytes of its order matter. */
     bool getResponseUInt16(uint8_t index, uint16_t &value, WordOrder order = orderDefault) const
@@ -251,18 +246,21 @@ private:
     using Numbers::set;
     using Numbers::valueOf;
 
-    const mbm_node &core() const { return static_cast<const Master *>(this)->state.node; }
-    mbm_node &core() { return static_cast<Master *>(this)->state.node; }
-
     uint8_t toRead(mbm_registers &space, const mbm_registers *&words) const
     {
+        const Master &master = *static_cast<const Master *>(this);
+        space = {master.state.response, 0, Master::responseWords, MBM_REGISTERS_OF_WORDS,
+                 master.state.order};
         words = &space;
-        return mbm_node_getResponseRegisters(&core(), 0, &space);
+        return MBM_OK;
     }
     uint8_t toWrite(mbm_registers &space, const mbm_registers *&words)
     {
+        Master &master = *static_cast<Master *>(this);
+        space = {master.state.transmit, 0, Master::transmitWords, MBM_REGISTERS_INTO_WORDS,
+                 master.state.order};
         words = &space;
-        return mbm_node_getTransmitRegisters(&core(), 0, &space);
+        return MBM_OK;
     }
 };
 

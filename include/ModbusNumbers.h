@@ -11,7 +11,7 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "mbm.h"
+#include "mbm/values.h"
 
 /** The orders of the words of a value. */
 class ModbusWordOrder {

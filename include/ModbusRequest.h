@@ -13,7 +13,7 @@
 
 #include "ModbusCallback.h"
 #include "ModbusValues.h"
-#include "mbm.h"
+#include "mbm/client.h"
 
 /**
  * A request to one unit. A write sends its words, and a read fills them. The members of

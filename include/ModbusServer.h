@@ -36,7 +36,7 @@
 #include "ModbusMasterBoards.h"
 #include "ModbusServerTables.h"
 #include "ModbusStatusText.h"
-#include "mbm.h"
+#include "mbm/server.h"
 
 /** @cond the macro is explained at the head of the file */
 #if !defined(MODBUSSERVER_FRAME_BYTES)
@@ -247,13 +247,9 @@ public:
         if (mbm_server_setSilence(&state.server, us / 2) != MBM_BUSY)
             state.silence = us;
     }
-    /** The silence in effect: of setSilence, or t3.5 of setBaudRate or begin. 0 after beginAscii. */
-    uint32_t getSilence() const { return state.silence; }
 
     /** Discards the local echo, if the receiver receives what the driver sends (RTU only; call it after begin). */
     void setEchoDiscard(bool on) { mbm_server_setEchoDiscard(&state.server, on); }
-    /** What setEchoDiscard has set. */
-    bool getEchoDiscard() const { return mbm_server_getEchoDiscard(&state.server) != 0; }
 
 private:
     static_assert(MODBUSSERVER_FRAME_BYTES >= 32 && MODBUSSERVER_FRAME_BYTES <= 256,

@@ -11,7 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "mbm.h"
+#include "mbm/server.h"
 
 /**
  * Functions of yours that are called around the requests to a table: pass the object to

@@ -34,7 +34,7 @@
 #include "ModbusCallback.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusSnifferText.h"
-#include "mbm.h"
+#include "mbm/sniffer.h"
 
 /** @cond the macro is explained at the head of the file */
 #if !defined(MODBUSSNIFFER_BUFFER_BYTES)
@@ -97,12 +97,8 @@ public:
     {
         return mbm_sniffer_setResponseTimeout(&sniffer, ms);
     }
-    /** What setResponseTimeout has set. */
-    uint16_t getResponseTimeout() const { return mbm_sniffer_getResponseTimeout(&sniffer); }
     /** Milliseconds that the rest of a frame may take, 1 to 65535; 50 in RTU, 1000 in ASCII at first. */
     uint8_t setFrameTimeout(uint32_t ms) { return mbm_sniffer_setFrameTimeout(&sniffer, ms); }
-    /** What setFrameTimeout has set. */
-    uint16_t getFrameTimeout() const { return mbm_sniffer_getFrameTimeout(&sniffer); }
 
     /**
      * Reads the bytes that have arrived, prints new events and calls the callback for each.

@@ -11,7 +11,7 @@
 #include <Arduino.h>
 #include <stdint.h>
 
-#include "mbm.h"
+#include "mbm/sniffer.h"
 
 /** The name of a function of the standard; an empty text for others. */
 inline const __FlashStringHelper *modbusFunctionText(uint8_t function)

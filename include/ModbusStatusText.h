@@ -11,7 +11,7 @@
 #include <Arduino.h>
 #include <stdint.h>
 
-#include "mbm.h"
+#include "mbm/base.h"
 
 /**
  * The texts of mbm_status_text, for Serial.println. mbm_status_text takes a kilobyte of RAM

@@ -14,7 +14,7 @@
 #include <stdint.h>
 
 #include "ModbusTransmission.h"
-#include "mbm.h"
+#include "mbm/base.h"
 
 /** @cond the macros are explained in ModbusTcpServer.h */
 #if !defined(MODBUSSERVER_CONNECTIONS)

@@ -31,7 +31,7 @@
 
 #include "ModbusClient.h"
 #include "ModbusTcpConnections.h"
-#include "mbm.h"
+#include "mbm/gateway.h"
 
 /** What a gateway keeps of one connection beside its mbm_gateway: nothing. */
 struct ModbusTcpPassed {};

@@ -37,7 +37,7 @@
 
 #include "ModbusServer.h"
 #include "ModbusTcpConnections.h"
-#include "mbm.h"
+#include "mbm/server.h"
 
 /** The server of one connection. Used by ModbusTcpServer. */
 struct ModbusTcpServed {

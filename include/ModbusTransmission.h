@@ -10,7 +10,7 @@
 
 #include <stdint.h>
 
-#include "mbm.h"
+#include "mbm/base.h"
 
 /** @cond for the classes that have callbacks */
 /** A function of the sketch, with or without an argument; none if it is zeroed. */

@@ -13,7 +13,7 @@
 #include <stdint.h>
 
 #include "ModbusNumbers.h"
-#include "mbm.h"
+#include "mbm/values.h"
 
 /**
  * An array of words, and the values in it. `index` counts words from 0: a float at
@@ -33,11 +33,6 @@ public:
 
     /** The order of values for calls without an order; orderABCD at first. */
     void setWordOrder(WordOrder order) { view.order = order; }
-    /** The order in effect. */
-    WordOrder getWordOrder() const
-    {
-        return view.order == orderDefault ? orderABCD : static_cast<WordOrder>(view.order);
-    }
     /** How many words there are. */
     uint16_t size() const { return view.count; }
     /** The word `index`, which is below size(). */

@@ -99,7 +99,7 @@ $(foreach board,$(UPSTREAM_BOARDS),$(eval $(call upstream,$(board))))
 
 # The code for avrxmega3 in a program for another chip, because no simulator has an avrxmega3.
 BARE := $(AVR_OUT)/avrxmega3/Bare.elf
-$(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S include/mbm.h
+$(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S $(wildcard include/mbm/*.h)
 	@mkdir -p $(@D)
 	@avr-gcc -mmcu=atmega1284p -U__AVR_ARCH__ -D__AVR_ARCH__=103 -c $(BUILD)/assembler/mbm_avrxmega3.S -o $(@D)/mbm.o
 	@avr-gcc -mmcu=atmega1284p -std=c11 -Os $(WARNINGS) -Iinclude -Wl,--gc-sections $< $(@D)/mbm.o -o $@

@@ -13,6 +13,7 @@ from project import ROOT  # noqa: E402
 HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterHelpers.h",
            "ModbusMasterOptions.h", "ModbusMasterPorts.h", "ModbusMasterLine.h", "util/crc16.h", "util/word.h",
            "ModbusMasterValues.h", "ModbusServer.h", "ModbusServerTables.h", "ModbusStatusText.h", "mbm.h",
+           *(f"mbm/{part.name}" for part in sorted((ROOT / "include/mbm").glob("*.h"))),
            "ModbusClient.h", "ModbusClientCalls.h", "ModbusRequest.h", "ModbusValues.h", "ModbusNumbers.h",
            "ModbusCallback.h", "ModbusTransmission.h",
            "ModbusTcpServer.h", "ModbusTcpConnections.h", "ModbusTcpGateway.h", "ModbusSniffer.h",

@@ -20,7 +20,7 @@ def by_hand_pattern(version):
 
 
 def of_header(text):
-    """The version that the macros of mbm.h make."""
+    """The version that the macros of mbm/base.h make."""
     return ".".join(
         re.search(rf"^#define MBM_VERSION_{part} (\d+)$", text, re.M)[1]
         for part in ("MAJOR", "MINOR", "PATCH")
@@ -52,8 +52,8 @@ MANIFESTS = {
     "idf_component.yml": first(r"^version: *[\"']?([^\"'\n]*)"),
     "mbm.pc": first(r"^Version: *(.*)$"),
     "mbmConfigVersion.cmake": first(r"PACKAGE_VERSION \"([^\"]*)\""),
-    "include/mbm.h": of_header,
-    "src/mbm.h": of_header,
+    "include/mbm/base.h": of_header,
+    "src/mbm/base.h": of_header,
     "Cargo.toml": of_cargo,
     "./control": first(rf"^Version: *{NUMBER}"),
     ".pdsc": first(r"<release [^>]*version=\"([^\"]*)\""),

@@ -8,12 +8,12 @@ int main(void)
     begin();
     for (;;) {
         i++;
-        (void)CALL(mbm_node_setTransmitBuffer(&node, 0, (uint16_t)i));
-        (void)CALL(mbm_node_setTransmitBuffer(&node, 1, (uint16_t)(i >> 16)));
+        transmit[0] = (uint16_t)i;
+        transmit[1] = (uint16_t)(i >> 16);
         uart = CALL(mbm_node_writeMultipleRegisters(&node, 0, 2));
         if (CALL(mbm_node_readHoldingRegisters(&node, 2, 6)) == MBM_OK) {
             for (uint8_t j = 0; j < 6; j++)
-                uart = (uint8_t)CALL(mbm_node_getResponseBuffer(&node, j));
+                uart = (uint8_t)response[j];
         }
         USED(i);
     }

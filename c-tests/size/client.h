@@ -55,7 +55,6 @@ static inline void every_function(void)
     uart = CALL(mbm_client_readWriteMultipleRegisters(&client, &request, 2, 10, 20, 10));
     uart = CALL(mbm_client_readFifoQueue(&client, &request, 2));
     uart = CALL(mbm_client_readDeviceIdentification(&client, &request, 1, 0));
-    uart = CALL(mbm_client_encapsulatedInterfaceTransport(&client, &request, 0x0D, 2));
     uart = CALL(mbm_client_custom(&client, &request, 0x41, 2, &rule));
     uart = CALL(mbm_client_poll(&client));
 }

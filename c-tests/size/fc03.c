@@ -6,6 +6,6 @@ int main(void)
     begin();
     for (;;) {
         if (CALL(mbm_node_readHoldingRegisters(&node, 2, 10)) == MBM_OK)
-            uart = (uint8_t)CALL(mbm_node_getResponseBuffer(&node, 0));
+            uart = (uint8_t)response[0];
     }
 }

@@ -88,8 +88,8 @@ static inline void begin(void)
         uart = CALL(mbm_node_writeMultipleRegisters(&node, 2, 10));                                \
         uart = CALL(mbm_node_maskWriteRegister(&node, 2, 0xFF00, 0x0012));                         \
         uart = CALL(mbm_node_readWriteMultipleRegisters(&node, 2, 10, 20, 10));                    \
-        (void)CALL(mbm_node_setTransmitBuffer(&node, 0, 1));                                       \
-        uart = (uint8_t)CALL(mbm_node_getResponseBuffer(&node, 0));                                \
+        transmit[0] = 1;                                                                           \
+        uart = (uint8_t)response[0];                                                               \
     } while (0)
 
 #endif

@@ -27,6 +27,6 @@ int main(void)
     (void)CALL(mbm_line_beginRtu(&line, mbm_trace_port(&trace), frame, sizeof frame));
     for (;;) {
         uart = CALL(mbm_node_readHoldingRegisters(&node, 2, 10));
-        uart = (uint8_t)CALL(mbm_node_getResponseBuffer(&node, 0));
+        uart = (uint8_t)response[0];
     }
 }

@@ -20,7 +20,7 @@ void node_begin(node *n, int fd, uint8_t slave)
 
 int node_bit(const node *n, unsigned index)
 {
-    return mbm_node_getResponseBuffer(&n->node, (uint8_t)(index / 16)) >> index % 16 & 1;
+    return n->response[index / 16] >> index % 16 & 1;
 }
 
 void node_set_bit(node *n, unsigned index, int on)

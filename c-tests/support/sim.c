@@ -324,5 +324,5 @@ void sim_reads(sim *s, uint32_t delay)
 {
     sim_answer(s, 1, delay, "11 03 02 00 2A +");
     OK(sim_read_one(s));
-    assert_int_equal(mbm_node_getResponseBuffer(&s->node, 0), 42);
+    assert_int_equal(s->response[0], 42);
 }

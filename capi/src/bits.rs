@@ -79,8 +79,7 @@ unsafe fn set<T: Packed>(units: *mut T, first: u16, quantity: u16, address: u16,
 /// @param quantity  the number of coils, 0 to 65535
 /// @param bytes     receives the bits, 8 in each byte
 /// @param length    the number of bytes that `bytes` can hold
-/// @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
-///         MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_pack(
     coils: *const u8,
@@ -98,8 +97,7 @@ pub unsafe extern "C" fn mbm_bits_pack(
 /// @param length    the number of bytes
 /// @param coils     receives one byte for each coil, 0 or 1
 /// @param quantity  the number of coils, 0 to 65535
-/// @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `bytes` has
-///         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if `bytes` has fewer bits than `quantity`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_unpack(
     bytes: *const u8,
@@ -118,9 +116,8 @@ pub unsafe extern "C" fn mbm_bits_unpack(
 /// @param quantity  the number of coils that were read; `bytes` holds that many bits
 /// @param address   the address of the coil
 /// @param on        receives 0 or 1
-/// @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
-///         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
-///         for a NULL pointer
+/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
+///         passes address 65535
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_isSet(
     bytes: *const u8,
@@ -140,9 +137,8 @@ pub unsafe extern "C" fn mbm_bits_isSet(
 /// @param quantity  the number of coils of the write; `bytes` holds that many bits
 /// @param address   the address of the coil
 /// @param on        0 is off, any other value is on
-/// @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
-///         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
-///         NULL pointer
+/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
+///         passes address 65535
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_set(
     bytes: *mut u8,
@@ -162,8 +158,7 @@ pub unsafe extern "C" fn mbm_bits_set(
 /// @param quantity  the number of coils, 0 to 65535
 /// @param words     receives the bits, 16 in each word
 /// @param length    the number of words that `words` can hold
-/// @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
-///         MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_packWords(
     coils: *const u8,
@@ -181,8 +176,7 @@ pub unsafe extern "C" fn mbm_bits_packWords(
 /// @param length    the number of words
 /// @param coils     receives one byte for each coil, 0 or 1
 /// @param quantity  the number of coils, 0 to 65535
-/// @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `words` has
-///         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if `words` has fewer bits than `quantity`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_unpackWords(
     words: *const u16,
@@ -201,9 +195,8 @@ pub unsafe extern "C" fn mbm_bits_unpackWords(
 /// @param quantity  the number of coils that were read; `words` holds that many bits
 /// @param address   the address of the coil
 /// @param on        receives 0 or 1
-/// @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
-///         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
-///         for a NULL pointer
+/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
+///         passes address 65535
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_isSetInWords(
     words: *const u16,
@@ -223,9 +216,8 @@ pub unsafe extern "C" fn mbm_bits_isSetInWords(
 /// @param quantity  the number of coils of the write; `words` holds that many bits
 /// @param address   the address of the coil
 /// @param on        0 is off, any other value is on
-/// @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
-///         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
-///         NULL pointer
+/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
+///         passes address 65535
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_setInWords(
     words: *mut u16,

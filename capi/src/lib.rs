@@ -9,7 +9,7 @@
 //! - No function is re-entrant on one object. A program may use any number of objects
 //!   side by side.
 //!
-//! cbindgen copies the comments into `include/mbm.h`, so they are written for C programmers.
+//! cbindgen copies the comments into `include/mbm/*.h`, so they are written for C programmers.
 
 #![no_std]
 #![warn(missing_docs, clippy::indexing_slicing, clippy::unwrap_used)]

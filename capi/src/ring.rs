@@ -56,9 +56,8 @@ unsafe fn ring<'a>(ring: *const mbm_ring) -> Option<Ring<'a>> {
 ///
 /// @param ring   the object
 /// @param bytes  your storage; it must stay valid for as long as the ring is used
-/// @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte
-///               less
-/// @return MBM_OK or MBM_INVALID_ARGUMENT
+/// @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte less
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_begin(ring: *mut mbm_ring, bytes: *mut u8, size: u16) -> u8 {
     if ring.is_null() || bytes.is_null() || size < 2 || usize::from(size) > MAX_STORAGE {

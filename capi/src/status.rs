@@ -162,8 +162,8 @@ pub extern "C" fn mbm_status_text(status: u8) -> *const c_char {
 /// sketch calls modbusStatusText with both numbers.
 ///
 /// @param status         the status of the request
-/// @param exceptionCode  `exception` of the mbm_clientRequest, or what
-///                       mbm_node_getExceptionCode returns: 0 if the device sent no exception
+/// @param exceptionCode  `exception` of the mbm_clientRequest, or what mbm_node_getExceptionCode
+///                       returns: 0 if the device sent no exception
 /// @return a constant string, never NULL
 #[no_mangle]
 pub extern "C" fn mbm_status_textOf(status: u8, exceptionCode: u8) -> *const c_char {

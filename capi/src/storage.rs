@@ -2,7 +2,6 @@
 
 use core::slice::from_raw_parts_mut;
 use mbm::engine::{Setting, Settings, Storage, Words, COUNTERS};
-use mbm::node::NO_WORD;
 use mbm::time::millis;
 
 /// Counters of what happened on the line since you zeroed them. Each wraps at 2^32.
@@ -37,9 +36,9 @@ const _: () = assert!(size_of::<mbm_counters>() == COUNTERS * size_of::<u32>());
 pub(super) struct NodeWords {
     pub(super) response_words: u8,
     pub(super) transmit_words: u8,
+    pub(super) response_timeout: Setting<{ millis(2000) }>,
     pub(super) response: *mut u16,
     pub(super) transmit: *mut u16,
-    pub(super) response_timeout: Setting<{ millis(2000) }>,
 }
 
 impl NodeWords {
@@ -47,15 +46,6 @@ impl NodeWords {
     pub(super) fn response(&mut self) -> &mut [u16] {
         // SAFETY: as the header of mbm_node_begin demands.
         unsafe { words(self.response, self.response_words) }
-    }
-
-    /// The word at `index` that a read has filled; [`NO_WORD`] past the end.
-    pub(super) fn response_word(&self, index: u8) -> u16 {
-        if index >= self.response_words {
-            return NO_WORD;
-        }
-        // SAFETY: below `response_words`, as the header of mbm_node_begin demands.
-        unsafe { *self.response.add(index.into()) }
     }
 
     /// The words that writes send.

@@ -37,14 +37,13 @@ pub(super) fn outcome(written: Result<TextWriter, Status>) -> u8 {
 /// Any thread or interrupt may call it. On a Cortex-M it takes 1000 bytes of stack.
 ///
 /// @param framing      the framing of the frame
-/// @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
-///                     and exceptions
+/// @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
 /// @param frame        the frame, from its first byte to its last
 /// @param frameLength  the number of bytes of `frame`
 /// @param text         receives the line. A zero byte always ends it
 /// @param size         bytes of `text`; 200 suffice for most frames, 2295 for all
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
-///         MBM_INVALID_ARGUMENT, also for MBM_FRAMING_NONE
+/// @return a status; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
+///         MBM_INVALID_ARGUMENT for MBM_FRAMING_NONE
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_text(
     framing: *const mbm_framing,

@@ -1,4 +1,4 @@
-"""The pages of the C API: one for each section of mbm.h, and one for each port for Linux."""
+"""The pages of the C API: one for each section of the parts of mbm.h, and one for each port for Linux."""
 
 import re
 
@@ -8,6 +8,7 @@ HEADER = "include/mbm.h"
 # The page with the guide to a section; a section without one is explained by its comments alone.
 GUIDES = {
     "Version": "CHANGELOG.md", "Statuses": "docs/status-codes.md", "Port": "docs/port.md",
+    "Limits": "docs/packets.md",
     "Functions and framings": "docs/packets.md", "Master": "docs/master.md", "Client": "docs/client.md",
     "Plan": "docs/plan.md", "Link": "docs/link.md", "Server": "docs/server.md",
     "Units": "docs/server.md", "Gateway": "docs/gateway.md", "Values": "docs/values.md",
@@ -23,8 +24,9 @@ PORT_GUIDES = {
 class Section:
     """A part of the API that has a page."""
 
-    def __init__(self, title, about, path, guide, members, compounds, intro=""):
+    def __init__(self, title, about, path, guide, members, compounds, intro="", include=""):
         self.title, self.about, self.path, self.guide, self.intro = title, about, path, guide, intro
+        self.include = include
         known = [m for m in members if not m.is_private]
         self.functions = [m for m in known if m.kind == "function"]
         self.constants = [m for m in known if m.kind == "define" and not m.name.endswith("_H")]
@@ -44,23 +46,29 @@ def slug(title):
     return re.sub(r"\W+", "-", title.lower())
 
 
-def sections(header, compounds):
-    """The sections of mbm.h. A comment in the header begins each; what stands before the first is its own."""
-    lines = header.splitlines()
-    starts = [(number, m[1]) for number, line in enumerate(lines, 1)
-              if (m := re.match(r"/\* ==== \d+\. (.*?) =+ \*/", line))]
-    about = dict(re.findall(r"^ \*\s+\d+ (.+?)  +(\S.*)$", header, re.M))
-    file = next(c for c in compounds if c.kind == "file" and c.file.endswith("/mbm.h"))
+def sections(root, header, compounds):
+    """The sections of the parts that mbm.h includes."""
+    return [section for part in re.findall(r'^#include "(mbm/\w+\.h)"', header, re.M)
+            for section in of_part(part, (root / "include" / part).read_text(), compounds)]
+
+
+def of_part(part, text, compounds):
+    """The sections of a part. A comment begins each; what stands before the first is its own."""
+    lines = text.splitlines()
+    starts = [(number, m[1], m[2]) for number, line in enumerate(lines, 1)
+              if (m := re.match(r"/\* ==== (.*?): (.*?) =+ \*/", line))]
+    file = next(c for c in compounds if c.kind == "file" and c.file.endswith(f"include/{part}"))
     structs = [c for c in compounds if c.kind == "struct" and c.file == file.file]
     made = []
-    for place, (start, title) in enumerate(starts):
+    for place, (start, title, about) in enumerate(starts):
         end = starts[place + 1][0] if place + 1 < len(starts) else len(lines) + 1
         # The macros at the head of the file belong to the first section.
         start = 0 if place == 0 else start
         def inside(item):
             return start < item.line < end
-        made.append(Section(title, about[title], f"api/c/{slug(title)}.md", GUIDES.get(title),
-                            [m for m in file.members if inside(m)], [c for c in structs if inside(c)]))
+        made.append(Section(title, about, f"api/c/{slug(title)}.md", GUIDES.get(title),
+                            [m for m in file.members if inside(m)], [c for c in structs if inside(c)],
+                            include=part))
     return made
 
 
@@ -90,6 +98,7 @@ def page(section, titles):
     text = f"# {section.title}\n\n{section.about[0].upper() + section.about[1:].rstrip('.')}."
     if section.guide:
         text += f" Guide: [{titles[section.guide.partition('#')[0]]}](/{section.guide})."
+    text += f" It is in `{section.include}`." if section.include else ""
     text += "\n\n" + block(section.intro)
     if section.functions:
         text += summary(section.functions)
@@ -128,8 +137,8 @@ def index(header, made):
     of_header = [s for s in made if not s.title.endswith(".h")]
     of_linux = [s for s in made if s.title.endswith(".h")]
     rows = [[f'<a href="@@{s.path}">{s.title}</a>', s.about, len(s.functions)] for s in of_header]
-    text = ("# C API\n\nYou include one header, `mbm.h`, and link one archive. The archive carries these functions;"
-            " your linker drops the ones that you do not call.\n\n")
+    text = ("# C API\n\nYou include one header, `mbm.h`, or those of its parts that you need, and link one archive. The"
+            " archive carries these functions; your linker drops the ones that you do not call.\n\n")
     text += table("sections", ["section", "about", "functions"], rows)
     text += f"## Rules of every function\n\n{rules}\n## Ports for Linux\n\n"
     text += ("Sources beside the archive: compile the ones that you need with your program."

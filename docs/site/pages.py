@@ -14,7 +14,7 @@ LANGUAGES = {".c": "c", ".h": "c", ".ino": "cpp", ".cpp": "cpp", ".rs": "rust", 
              ".toml": "toml", ".yml": "yaml", ".yaml": "yaml", ".json": "json", ".txt": "text", ".cmake": "cmake",
              ".mk": "make", ".ld": "text", ".S": "gas"}
 # Headers that have pages of the API.
-HEADERS = {"include/mbm.h": "api/c/index.md"}
+HEADERS = {"include/mbm.h": "api/c/index.md", "include/mbm": "api/c/index.md"}
 LONGEST_SOURCE = 200_000
 
 

@@ -45,13 +45,14 @@ static void write(void)
 
     (void)mbm_node_beginTransmission(&node, 101);
     (void)mbm_node_send(&node, 0x1122);
-    (void)mbm_node_send32(&node, 0x33445566);
+    (void)mbm_node_send(&node, 0x5566);
+    (void)mbm_node_send(&node, 0x3344);
     note(WRITE_REGISTERS, "write registers", mbm_node_writeQueuedRegisters(&node), MBM_OK);
 
     note(WRITE_COIL, "write a coil", mbm_node_writeSingleCoil(&node, 40, 1), MBM_OK);
 
-    (void)mbm_node_setTransmitBuffer(&node, 0, 0xA5C3);
-    (void)mbm_node_setTransmitBuffer(&node, 1, 0x0005);
+    transmit[0] = 0xA5C3;
+    transmit[1] = 0x0005;
     note(WRITE_COILS, "write 19 coils", mbm_node_writeMultipleCoils(&node, 50, 19), MBM_OK);
 }
 
@@ -71,8 +72,8 @@ static void write_and_read(void)
     note(MASK_WRITE, "mask a register", mbm_node_maskWriteRegister(&node, 102, 0x00FF, 0x3400),
          MBM_OK);
 
-    (void)mbm_node_setTransmitBuffer(&node, 0, 0xCAFE);
-    (void)mbm_node_setTransmitBuffer(&node, 1, 0xF00D);
+    transmit[0] = 0xCAFE;
+    transmit[1] = 0xF00D;
     note(READ_WRITE, "write 2 registers and read 6",
          mbm_node_readWriteMultipleRegisters(&node, 100, 6, 104, 2), MBM_OK);
 
@@ -117,7 +118,7 @@ static uint8_t send_report(void)
     report[REPORT_FOREIGN_FRAMES] = (uint16_t)counters.foreignFrames;
     report[REPORT_RESYNCHRONISATIONS] = (uint16_t)counters.resynchronisations;
     for (i = 0; i < REPORT_SIZE; i++) {
-        (void)mbm_node_setTransmitBuffer(&node, i, report[i]);
+        transmit[i] = report[i];
     }
     return mbm_node_writeMultipleRegisters(&node, REPORT_ADDRESS, REPORT_SIZE);
 }

@@ -51,13 +51,13 @@ int main(int argc, char **argv)
     mbm_node_begin(&node, &line, (uint8_t)slave, response, READ_WORDS, transmit, WRITE_WORDS);
 
     /* Two words to registers 0 and 1, then six words from register 2 on. */
-    mbm_node_setTransmitBuffer(&node, 0, 0x1234);
-    mbm_node_setTransmitBuffer(&node, 1, 0xABCD);
+    transmit[0] = 0x1234;
+    transmit[1] = 0xABCD;
     if (failed("write", mbm_node_writeMultipleRegisters(&node, 0, WRITE_WORDS)) ||
         failed("read", mbm_node_readHoldingRegisters(&node, 2, READ_WORDS)))
         return 1;
     for (i = 0; i < READ_WORDS; i++)
-        printf("register %d: 0x%04X\n", 2 + i, mbm_node_getResponseBuffer(&node, i));
+        printf("register %d: 0x%04X\n", 2 + i, response[i]);
 
     mbm_tty_close(&tty);
     return 0;

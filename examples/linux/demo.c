@@ -97,7 +97,7 @@ static void show(uint8_t status, uint8_t expected_status)
     print_frame(MBM_PACKET_RESPONSE, &received);
     printf("  result   %s", mbm_status_text(status));
     for (i = 0; i < words; i++)
-        printf("%s0x%04X", i == 0 ? ": " : " ", mbm_node_getResponseBuffer(&node, i));
+        printf("%s0x%04X", i == 0 ? ": " : " ", response[i]);
     printf("\n");
     expect(status == expected_status, mbm_status_text(expected_status));
 }
@@ -122,7 +122,7 @@ static int read_bits(const uint8_t *there, unsigned count)
     unsigned i;
 
     for (i = 0; i < count; i++) {
-        if ((mbm_node_getResponseBuffer(&node, (uint8_t)(i / 16)) >> i % 16 & 1) != there[i])
+        if ((response[i / 16] >> i % 16 & 1) != there[i])
             return 0;
     }
     return 1;
@@ -155,10 +155,10 @@ static void basic_sketch(void)
     const uint16_t *registers = device.mapping->tab_registers;
 
     counter++;
-    printf("counter 0x%08X: mbm_node_setTransmitBuffer(&node, 0, low), ..(&node, 1, high)\n",
+    printf("counter 0x%08X: transmit[0] = its low word, transmit[1] = its high word\n",
            (unsigned)counter);
-    mbm_node_setTransmitBuffer(&node, 0, (uint16_t)counter);
-    mbm_node_setTransmitBuffer(&node, 1, (uint16_t)(counter >> 16));
+    transmit[0] = (uint16_t)counter;
+    transmit[1] = (uint16_t)(counter >> 16);
     REQUEST(mbm_node_writeMultipleRegisters(&node, 0, 2), MBM_OK);
     expect(registers[0] == 1 && registers[1] == 1, "the counter in registers 0 and 1");
     REQUEST(mbm_node_readHoldingRegisters(&node, 2, 6), MBM_OK);
@@ -175,7 +175,7 @@ static void other_registers(void)
     expect(read_words(device.mapping->tab_input_registers + 8, 1), "input register 8");
     REQUEST(mbm_node_maskWriteRegister(&node, 40, 0xFF00, 0x0012), MBM_OK);
     expect(registers[40] == 0xBE12, "0xBE12 in register 40");
-    mbm_node_setTransmitBuffer(&node, 0, 0x0A0B);
+    transmit[0] = 0x0A0B;
     REQUEST(mbm_node_readWriteMultipleRegisters(&node, 40, 2, 41, 1), MBM_OK);
     expect(registers[41] == 0x0A0B && read_words(registers + 40, 2), "registers 40 and 41");
 }
@@ -186,7 +186,7 @@ static void bits(void)
 
     REQUEST(mbm_node_writeSingleCoil(&node, 20, 1), MBM_OK);
     expect(coils[20] == 1, "coil 20 on");
-    mbm_node_setTransmitBuffer(&node, 0, 0x0155);
+    transmit[0] = 0x0155;
     REQUEST(mbm_node_writeMultipleCoils(&node, 21, 9), MBM_OK);
     expect(coils[21] == 1 && coils[22] == 0 && coils[28] == 0 && coils[29] == 1, "coils 21 to 29");
     REQUEST(mbm_node_readCoils(&node, 20, 10), MBM_OK);

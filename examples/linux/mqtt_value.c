@@ -48,7 +48,7 @@ static int print_number(const mbm_plan *plan, const mqtt_field *field, const mbm
     uint8_t status;
 
     if (planned->type == MBM_TYPE_FLOAT || planned->type == MBM_TYPE_DOUBLE) {
-        status = mbm_plan_getDouble(plan, at, index, &real);
+        status = mbm_plan_getNumber(plan, at, index, &real);
         if (status != MBM_OK)
             return 0;
         if (field->is_scaled)

@@ -61,19 +61,9 @@ impl<S: GatewayStorage> Gateway<S> {
         self.most = most;
     }
 
-    /// See [`Gateway::set_most_requests`].
-    pub fn most_requests(&self) -> u16 {
-        self.most
-    }
-
     /// Sets how long a request may wait for its line, in microseconds; 0 for ever.
     pub fn set_queue_time(&mut self, microseconds: u32) {
         self.queue_time = time::clamped(microseconds);
-    }
-
-    /// See [`Gateway::set_queue_time`].
-    pub fn queue_time(&self) -> u32 {
-        self.queue_time
     }
 
     /// Serves the connection that the storage has at this place from now on.

@@ -133,16 +133,6 @@ impl Sniffer {
         self.timing.frame_timeout = frame_timeout;
     }
 
-    /// The time that a reply may take, in microseconds.
-    pub const fn timeout(&self) -> u32 {
-        self.timeout
-    }
-
-    /// How long the sniffer waits for the rest of a frame, in microseconds.
-    pub const fn frame_timeout(&self) -> u32 {
-        self.timing.frame_timeout
-    }
-
     /// Sets the end character of ASCII frames.
     pub const fn set_end(&mut self, end: u8) {
         self.idle_for = 0;

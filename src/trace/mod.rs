@@ -78,11 +78,6 @@ impl<P, B, O> Trace<P, B, O> {
         self.frame_timeout = frame_timeout;
     }
 
-    /// How long the trace waits for the rest of a frame, in microseconds.
-    pub const fn frame_timeout(&self) -> u32 {
-        self.frame_timeout
-    }
-
     fn rules(&self, direction: Direction) -> Rules {
         let received = match self.sends {
             PduKind::Request => PduKind::Response,

@@ -96,8 +96,7 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
 /// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
-/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
-///         the client is suspended
+/// @return a status; MBM_BUSY also while the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginRtu(
     client: *mut mbm_client,
@@ -117,8 +116,7 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
 /// @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
-/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
-///         the client is suspended
+/// @return a status; MBM_BUSY also while the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginAscii(
     client: *mut mbm_client,
@@ -138,8 +136,7 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
 ///
 /// @param client     the object, begun with mbm_client_beginAscii
 /// @param character  1 to 127, except CR, the colon and hexadecimal digits
-/// @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
-///         for a client of another framing; MBM_NOT_INITIALISED
+/// @return a status; MBM_BUSY while a request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, character: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -165,8 +162,7 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
 /// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
-/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
-///         the client is suspended
+/// @return a status; MBM_BUSY also while the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
     client: *mut mbm_client,
@@ -184,16 +180,13 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
 ///
 /// @param client         the object; initialised with MBM_INIT before the first call
 /// @param port           the port, which is copied; read, write and micros must not be NULL
-/// @param incoming       the buffer of received bytes, valid for as long as the client is
-///                       used
-/// @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger
-///                       buffer takes more responses from one read
-/// @param outgoing       the buffer of bytes to send, valid for as long as the client is
-///                       used
-/// @param outgoingBytes  bytes of `outgoing`, at least 12; 260 hold any frame. A larger
-///                       buffer collects more requests for one write
-/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
-///         the client is suspended
+/// @param incoming       the buffer of received bytes, valid for as long as the client is used
+/// @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger buffer
+///                       takes more responses from one read
+/// @param outgoing       the buffer of bytes to send, valid for as long as the client is used
+/// @param outgoingBytes  bytes of `outgoing`, at least 12; 260 hold any frame. A larger buffer
+///                       collects more requests for one write
+/// @return a status; MBM_BUSY also while the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginTcp(
     client: *mut mbm_client,
@@ -224,9 +217,9 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
 /// holds 16.
 ///
 /// @param client  the object
-/// @param most    1 to 16; the default is 16. On a serial line and in RTU over TCP only 1
-///                is accepted
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param most    1 to 16; the default is 16. On a serial line and in RTU over TCP only 1 is
+///                accepted
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
     // SAFETY: as the header demands.

@@ -72,16 +72,15 @@ const OBJECTS: usize = 4;
 /// @param identification  the storage, with unit, reply buffer and callbacks set
 /// @param client          the client that sends the requests; it must stay valid until the
 ///                        identification has ended
-/// @param code            MBM_DEVICE_ID_BASIC, MBM_DEVICE_ID_REGULAR or
-///                        MBM_DEVICE_ID_EXTENDED: all objects of the category; a device that
-///                        has fewer sends those that it has. MBM_DEVICE_ID_INDIVIDUAL: one
+/// @param code            MBM_DEVICE_ID_BASIC, MBM_DEVICE_ID_REGULAR or MBM_DEVICE_ID_EXTENDED:
+///                        all objects of the category; a device that has fewer sends those that
+///                        it has. MBM_DEVICE_ID_INDIVIDUAL: one
 /// @param object          the id of the first object, 0 for all, or of the only one. A device
 ///                        that does not have the first object begins with its first one
-/// @return MBM_PENDING if the first request is queued. Otherwise nothing has changed:
-///         MBM_BUSY if the identification is pending, from within its `object`, and from
-///         within a hook of the port; MBM_ILLEGAL_DATA_VALUE for another `code`;
-///         MBM_INVALID_ARGUMENT if `request.reply` or another pointer is NULL; or another
-///         status of mbm_client_readCoils
+/// @return MBM_PENDING if the first request is queued. Otherwise nothing has changed: MBM_BUSY
+///         if the identification is pending, and from within its `object`;
+///         MBM_ILLEGAL_DATA_VALUE for another `code`; MBM_INVALID_ARGUMENT if `request.reply` is
+///         NULL; or another status of mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_identification_read(
     identification: *mut mbm_identification,

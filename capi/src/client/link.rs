@@ -32,10 +32,10 @@ pub struct mbm_linkHooks {
 /// that were not sent yet are sent over the new link.
 ///
 /// @param client  the object
-/// @param link    your hooks, used during this call only; NULL if you have opened the link
-///                again already
+/// @param link    your hooks, used during this call only; NULL if you have opened the link again
+///                already
 /// @return what `connect` returns, or MBM_OK without `connect`; MBM_BUSY while the client is
-///         suspended; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+///         suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_reconnect(
     client: *mut mbm_client,
@@ -78,9 +78,9 @@ pub unsafe extern "C" fn mbm_client_reconnect(
 /// port knows whether it is: for example, call mbm_tcp_isConnected.
 ///
 /// @param client  the object
-/// @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives
-///         or mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first
-///         request. With a link: 0 from each loss of it until it is open again
+/// @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives or
+///         mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first request. With
+///         a link: 0 from each loss of it until it is open again
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
@@ -94,8 +94,7 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
 /// @param client  the object. If `line` is not NULL, it must use RTU or RTU over TCP
 /// @param line    a line, which then uses the client's port; NULL if you use the wire in another
 ///                way
-/// @return MBM_OK; MBM_BUSY, with both objects unchanged, if a request is under way or the
-///         client is suspended already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; MBM_BUSY if a request is under way or the client is suspended already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_suspend(client: *mut mbm_client, line: *mut mbm_line) -> u8 {
     // SAFETY: as the header demands.
@@ -135,9 +134,8 @@ pub unsafe extern "C" fn mbm_client_suspend(client: *mut mbm_client, line: *mut 
 ///
 /// @param client  the object
 /// @param line    the line that was passed to mbm_client_suspend; NULL if none was
-/// @return MBM_OK; MBM_BUSY while a request is under way on the line;
-///         MBM_INVALID_ARGUMENT if the client was not suspended, and for any other line;
-///         MBM_NOT_INITIALISED
+/// @return a status; MBM_BUSY while a request is under way on the line; MBM_INVALID_ARGUMENT if
+///         the client was not suspended, and for any other line
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, line: *mut mbm_line) -> u8 {
     // SAFETY: as the header demands.

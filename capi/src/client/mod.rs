@@ -1,7 +1,6 @@
 //! `mbm_client_*`: the client, whose functions never wait.
 
 mod begin;
-mod getters;
 mod identification;
 mod kind;
 mod link;
@@ -16,7 +15,6 @@ mod storage;
 mod units;
 
 pub use begin::*;
-pub use getters::*;
 pub use identification::*;
 pub use link::*;
 pub use object::mbm_client;

@@ -34,9 +34,8 @@ pub(crate) unsafe fn clock(client: *mut mbm_client) -> u32 {
 /// Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
 ///
 /// @param client  the object
-/// @return MBM_PENDING while requests are pending; MBM_OK if none is; MBM_BUSY from within
-///         `done` or a hook of the port, and while the client is suspended;
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_PENDING while requests are pending; MBM_OK if none is; MBM_BUSY also from within
+///         `done`, and while the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
     // SAFETY: as the header demands.
@@ -91,9 +90,9 @@ unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
 /// when the link is to be opened again, and is at most one second while the client is idle.
 ///
 /// @param client  the object
-/// @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF
-///         means that no request is pending. While a TCP port accepts no bytes to send it is
-///         1000: to poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
+/// @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF means
+///         that no request is pending. While a TCP port accepts no bytes to send it is 1000: to
+///         poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
     // SAFETY: as the header demands.
@@ -131,9 +130,8 @@ pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
 ///
 /// @param client   the object
 /// @param request  a request that was queued on this client
-/// @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
-///         ended already or was never queued here; MBM_INVALID_ARGUMENT or
-///         MBM_NOT_INITIALISED
+/// @return a status; MBM_NOT_PENDING for a request that has ended already or was never queued
+///         here
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_cancel(
     client: *mut mbm_client,
@@ -161,8 +159,8 @@ pub unsafe extern "C" fn mbm_client_cancel(
 /// sent the request last. The client chooses a new one for each frame, also for a retry.
 ///
 /// @param request  a request, pending or ended
-/// @return the identifier; 0 in other framings, for a request that was never sent, and
-///         for NULL. 0 may also be the identifier of a frame
+/// @return the identifier; 0 in other framings, for a request that was never sent, and for NULL.
+///         0 may also be the identifier of a frame
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_wireTransaction(request: *const mbm_clientRequest) -> u16 {
     // SAFETY: as the header demands: NULL, or a request that is zeroed or was used.

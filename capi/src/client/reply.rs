@@ -64,20 +64,19 @@ fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Status> 
 /// has ended.
 ///
 /// @param request   a request that has ended
-/// @param pdu       receives the PDU of the reply, to which the packet's data point; it must
-///                  not overlap `reply` and `data` of the request
+/// @param pdu       receives the PDU of the reply, to which the packet's data point; it must not
+///                  overlap `reply` and `data` of the request
 /// @param capacity  bytes of `pdu`; MBM_MAX_PDU hold any reply
 /// @param packet    receives the packet, with the unit of the request, and in TCP frames the
 ///                  transaction identifier of the reply; it changes only for MBM_OK
-/// @return MBM_OK, also for an exception, whose kind is MBM_PACKET_EXCEPTION; MBM_PENDING
-///         if the request has not ended; the request's status if it ended without a reply,
-///         or was not queued; MBM_BUFFER_TOO_SMALL if the reply's data did not fit into
-///         `reply`, if `reply` is NULL, or if `capacity` is too small; MBM_MALFORMED_REPLY
-///         if the data are not those of a reply of the function, although the client
-///         accepted them: it does not look into an event log or a device identification;
-///         MBM_INVALID_ARGUMENT for NULL, overlapping memory, a request that was never
-///         queued, and for a request that no device answers: a broadcast, or sub-function
-///         04 of 08
+/// @return MBM_OK, also for an exception, whose kind is MBM_PACKET_EXCEPTION; MBM_PENDING if the
+///         request has not ended; the request's status if it ended without a reply, or was not
+///         queued; MBM_BUFFER_TOO_SMALL if the reply's data did not fit into `reply`, if `reply`
+///         is NULL, or if `capacity` is too small; MBM_MALFORMED_REPLY if the data are not those
+///         of a reply of the function, although the client accepted them: it does not look into
+///         an event log or a device identification; MBM_INVALID_ARGUMENT for overlapping memory,
+///         a request that was never queued, and one that no device answers: a broadcast, or
+///         sub-function 04 of 08
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_reply(
     request: *const mbm_clientRequest,

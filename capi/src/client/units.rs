@@ -60,9 +60,8 @@ const _: () = {
 /// @param units   your array of records, initialised with MBM_INIT except for the fields that
 ///                you set; NULL for none
 /// @param count   the number of records, 0 to 255
-/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a record with a `unit` above 255 or a
-///         `timeoutMs` above 1000000; MBM_NOT_INITIALISED. A call that is refused changes
-///         nothing
+/// @return a status; MBM_INVALID_ARGUMENT for a record with a `unit` above 255 or a `timeoutMs`
+///         above 1000000
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setUnits(
     client: *mut mbm_client,

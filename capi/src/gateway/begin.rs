@@ -12,14 +12,13 @@ use mbm::error::Status;
 /// to their defaults. A call that is refused changes nothing.
 ///
 /// @param gateway  the object; initialised with MBM_INIT before the first call
-/// @param config   what the gateway consists of. What it points to must stay valid, and must
-///                 be used by one gateway only, for as long as the gateway is used; lines,
+/// @param config   what the gateway consists of. What it points to must stay valid, and must be
+///                 used by one gateway only, for as long as the gateway is used; lines,
 ///                 connections and requests are initialised with MBM_INIT
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a count out of range, fewer
-///         requests than connections, a route to a line that does not exist or to a unit id
-///         above 255, and a line without client; MBM_NOT_INITIALISED if the client of a line
-///         was not begun; MBM_BUSY from within a hook of the gateway, and of a client of its
-///         lines
+/// @return a status; MBM_INVALID_ARGUMENT for fewer requests than connections, a route to a line
+///         that does not exist or to a unit id above 255, and a line without client;
+///         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within
+///         a hook of a client of its lines
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_begin(
     gateway: *mut mbm_gateway,

@@ -51,10 +51,9 @@ unsafe fn read_place<T>(
 ///
 /// @param gateway     the object
 /// @param connection  the number of a free place, below `connectionCount`
-/// @param port        the connection; is copied. Its hooks read, write and micros are
-///                    required. The clocks of all connections count the same time
-/// @return MBM_OK; MBM_BUSY if the place has an open connection, and from within a hook of the
-///         gateway; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param port        the connection; is copied. Its hooks read, write and micros are required.
+///                    The clocks of all connections count the same time
+/// @return a status; MBM_BUSY if the place has an open connection
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_open(
     gateway: *mut mbm_gateway,
@@ -87,8 +86,7 @@ pub unsafe extern "C" fn mbm_gateway_open(
 ///
 /// @param gateway     the object
 /// @param connection  the number of the place; nothing happens if it is free already
-/// @return MBM_OK; MBM_BUSY from within a hook of the gateway, and from within a hook of a
-///         port of its lines; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; MBM_BUSY also from within a hook of a port of its lines
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_close(gateway: *mut mbm_gateway, connection: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -110,7 +108,7 @@ pub unsafe extern "C" fn mbm_gateway_close(gateway: *mut mbm_gateway, connection
 /// @param connection  the number of the place
 /// @return MBM_OK while the connection is open; MBM_LINK_LOST if its port reported that the
 ///         connection is lost; MBM_MALFORMED_FRAME if it sent bytes that are not Modbus TCP;
-///         MBM_NOT_INITIALISED for a free place; MBM_INVALID_ARGUMENT for a number out of range
+///         MBM_NOT_INITIALISED for a free place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_status(gateway: *const mbm_gateway, connection: u8) -> u8 {
     // SAFETY: as the header demands.

@@ -10,8 +10,7 @@ use mbm::error::Status;
 /// Call it often. You need not poll the clients of the lines; you may.
 ///
 /// @param gateway  the object
-/// @return MBM_OK; MBM_BUSY from within a hook of the gateway, and from within a hook of a port
-///         of its lines; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; MBM_BUSY also from within a hook of a port of its lines
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_poll(gateway: *mut mbm_gateway) -> u8 {
     // SAFETY: as the header demands. No reference includes the mark.

@@ -23,7 +23,7 @@ use mbm::time::timeout;
 /// @param gateway  the object
 /// @param most     1 to 65535; the default is 65535. Fewer if there are not enough places for
 ///                 requests
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most: u16) -> u8 {
     // SAFETY: as the header demands.
@@ -38,16 +38,6 @@ pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most
     }
 }
 
-/// Returns the number that mbm_gateway_setInFlight has set.
-///
-/// @param gateway  the object
-/// @return the number; 0 if the gateway was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_gateway_inFlight(gateway: *const mbm_gateway) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(gateway, 0, |core| (*core).most_requests()) }
-}
-
 /// Sets for how long a request may wait until its line is free. After that time the gateway
 /// answers it with exception 0A and does not send it. Set it to the time that the clients on
 /// TCP wait, less the response timeout of the line: then no device carries out a request that
@@ -56,7 +46,7 @@ pub unsafe extern "C" fn mbm_gateway_inFlight(gateway: *const mbm_gateway) -> u1
 /// @param gateway  the object
 /// @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait
 ///                 for any time
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, timeMs: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -71,16 +61,6 @@ pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, tim
     }
 }
 
-/// Returns the time that mbm_gateway_setQueueTime has set.
-///
-/// @param gateway  the object
-/// @return milliseconds; 0 also if the gateway was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_gateway_queueTime(gateway: *const mbm_gateway) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(gateway, 0, |core| (*core).queue_time() / 1000) }
-}
-
 /// Serves units of the gateway itself: those that a route to MBM_GATEWAY_LOCAL leads to. The
 /// unit ids that such a route maps to are those of the units; 0 and 255 address the first
 /// unit. A request for an id that no unit has gets no response.
@@ -89,11 +69,10 @@ pub unsafe extern "C" fn mbm_gateway_queueTime(gateway: *const mbm_gateway) -> u
 /// mbm_gateway_poll. Other requests go on meanwhile, also those for the same unit.
 ///
 /// @param gateway  the object
-/// @param units    one unit, or an array of units; must stay valid for as long as the gateway
-///                 is used. Servers may serve the same units. NULL only if `count` is 0
+/// @param units    one unit, or an array of units; must stay valid for as long as the gateway is
+///                 used. Servers may serve the same units. NULL only if `count` is 0
 /// @param count    how many units
-/// @return MBM_OK; MBM_BUSY; MBM_INVALID_ARGUMENT, also for a unit with an id above 255;
-///         MBM_NOT_INITIALISED
+/// @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_serveUnits(
     gateway: *mut mbm_gateway,
@@ -153,8 +132,7 @@ unsafe fn serve(
 /// @param functions  the declarations; they must stay valid for as long as the gateway is used.
 ///                   NULL only if `count` is 0
 /// @param count      how many declarations
-/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a declaration that is not valid; MBM_BUSY or
-///         MBM_NOT_INITIALISED
+/// @return a status; MBM_INVALID_ARGUMENT for a declaration that is not valid
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setFunctions(
     gateway: *mut mbm_gateway,

@@ -1,10 +1,8 @@
 //! `mbm_line_*`: a serial line, which any number of nodes use.
 
-mod getters;
 pub(crate) mod object;
 mod settings;
 
-pub use getters::*;
 pub use object::*;
 pub use settings::*;
 
@@ -103,8 +101,7 @@ pub(crate) unsafe fn core_of(line: *mut mbm_line) -> *mut Core {
 ///                    as the object is used. read, write and micros must not be NULL
 /// @param frame       as for mbm_line_setFrame; also NULL, if you call that function later
 /// @param frameBytes  as for mbm_line_setFrame; 0 if `frame` is NULL
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or too small a frame
-///         buffer; MBM_BUSY while a request is under way
+/// @return a status; MBM_BUSY while a request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_beginRtu(
     line: *mut mbm_line,
@@ -147,7 +144,7 @@ fn is_frame_refused(frame: *mut u8, bytes: u16) -> bool {
 /// @param line        the object; initialised with MBM_INIT before the first call
 /// @param frame       the buffer. Its content is not used between requests
 /// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
-/// @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
+/// @return a status; MBM_BUSY while a request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setFrame(
     line: *mut mbm_line,
@@ -172,8 +169,7 @@ pub unsafe extern "C" fn mbm_line_setFrame(
 /// If no request is under way, it does nothing.
 ///
 /// @param line  the object
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY from within a hook of
-///         the port except `idle`
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_cancel(line: *mut mbm_line) -> u8 {
     // SAFETY: as the header demands.

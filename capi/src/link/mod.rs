@@ -65,9 +65,8 @@ const _: () = {
 /// @param client  the client, begun; it must not have another link
 /// @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
 ///                hooks must not use the client or the link: each function returns MBM_BUSY
-/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_NOT_INITIALISED if the client was not begun;
-///         MBM_BUSY from within a hook, while the client is suspended, or if it has another
-///         link
+/// @return a status; MBM_NOT_INITIALISED if the client was not begun; MBM_BUSY also while the
+///         client is suspended, and if it has another link
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_begin(
     link: *mut mbm_link,
@@ -183,8 +182,7 @@ unsafe fn end(link: *mut Object) -> Status {
 /// a frame may have been sent. The storage is free, and begins anew with mbm_link_begin.
 ///
 /// @param link  the object; the client's storage must still be valid
-/// @return MBM_OK; MBM_BUSY from within a hook and while the client is suspended;
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; MBM_BUSY also while the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_end(link: *mut mbm_link) -> u8 {
     // SAFETY: as the header demands.
@@ -204,7 +202,7 @@ pub unsafe extern "C" fn mbm_link_end(link: *mut mbm_link) -> u8 {
 /// that are under way end with MBM_LINK_LOST; queued ones wait for this attempt.
 ///
 /// @param link  the object
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
     // SAFETY: as the header demands.
@@ -225,7 +223,7 @@ pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
 ///                    mbm_client_setBackoff
 /// @param delayMs     the first wait in milliseconds, 0 to 65535; the default is 500
 /// @param maxDelayMs  the longest wait in milliseconds, 0 to 65535; the default is 30000
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setBackoff(
     link: *mut mbm_link,
@@ -253,10 +251,10 @@ pub unsafe extern "C" fn mbm_link_setBackoff(
 ///
 /// @param link     the object
 /// @param percent  0 (the default) to 100: the largest part of the wait that is taken off
-/// @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only
-///                 if `percent` is 0
+/// @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only if
+///                 `percent` is 0
 /// @param context  your pointer, passed to `random`; may be NULL
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setJitter(
     link: *mut mbm_link,
@@ -283,7 +281,7 @@ pub unsafe extern "C" fn mbm_link_setJitter(
 /// @param link       the object
 /// @param timeoutMs  milliseconds, 1 to 1000000 (16 minutes); 0: as long as `status` returns
 ///                   MBM_PENDING. The default is 10000
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeoutMs: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -307,7 +305,7 @@ pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeout
 ///
 /// @param link  the object
 /// @param on    0 (the default) or 1
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setRequestsWait(link: *mut mbm_link, on: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -326,7 +324,7 @@ pub unsafe extern "C" fn mbm_link_setRequestsWait(link: *mut mbm_link, on: u8) -
 /// @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
 ///                  request may, and call every function on the link; NULL for none
 /// @param context   your pointer, passed to `callback`; may be NULL
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setCallback(
     link: *mut mbm_link,
@@ -347,7 +345,7 @@ pub unsafe extern "C" fn mbm_link_setCallback(
 ///
 /// @param link      the object
 /// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
-/// @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setCounters(
     link: *mut mbm_link,

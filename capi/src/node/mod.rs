@@ -3,13 +3,11 @@
 pub(crate) mod object;
 mod requests;
 mod settings;
-mod values;
 mod words;
 
 pub use object::*;
 pub use requests::*;
 pub use settings::*;
-pub use values::*;
 pub use words::*;
 
 use super::line::{self, mbm_line};
@@ -32,8 +30,6 @@ pub(super) struct Object {
     words: NodeWords,
     /// What the line's engine gets: a function if deviating replies are accepted.
     observer: Option<Observer<PortRef, LineStorage, MasterRequest>>,
-    /// The order of words in values: one of `MBM_ORDER_...`; 0 if it was never set.
-    order: u8,
 }
 
 const _: () = {
@@ -78,7 +74,7 @@ unsafe impl CObject for mbm_node {
 /// @param responseWords  0 to 255; 125 hold any reply
 /// @param transmit       the words that writes send; NULL only if `transmitWords` is 0
 /// @param transmitWords  0 to 255; 123 hold any request
-/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY while a request of the node is under way
+/// @return a status; MBM_BUSY while a request of the node is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_begin(
     node: *mut mbm_node,
@@ -147,9 +143,7 @@ unsafe fn has_line(object: *mut Object) -> bool {
 ///
 /// @param node  the object
 /// @return MBM_PENDING until the request has ended. Then, at every call, the status of the
-///         request. MBM_OK if there was no request yet; MBM_BUSY from within a hook of the
-///         port except `idle`, while the request is under way; MBM_INVALID_ARGUMENT or
-///         MBM_NOT_INITIALISED
+///         request. MBM_OK if there was no request yet
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_poll(node: *mut mbm_node) -> u8 {
     // SAFETY: as the header demands.
@@ -220,8 +214,7 @@ pub unsafe extern "C" fn mbm_node_pollDelay(node: *mut mbm_node) -> u32 {
 /// becomes MBM_CANCELLED. If the node has no request under way, it does nothing.
 ///
 /// @param node  the object
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY from within a hook of
-///         the port except `idle`, while the request is under way
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
     // SAFETY: as the header demands. No reference to the node lives while hooks run.
@@ -245,8 +238,7 @@ pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
 ///
 /// @param node  the object
 /// @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
-///         request; MBM_BUSY from within a hook of the port except `idle`, while the request is
-///         under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+///         request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_status(node: *const mbm_node) -> u8 {
     // SAFETY: as the header demands; every object is writable storage.

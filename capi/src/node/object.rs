@@ -12,11 +12,11 @@ use core::ffi::c_void;
 /// interrupt. mbm_port says which functions the hooks of the port may call.
 ///
 /// A call that is refused changes nothing. Exceptions are the functions that make a request,
-/// as mbm_node_readCoils describes, and mbm_node_send32.
+/// as mbm_node_readCoils describes.
 #[repr(C)]
 pub struct mbm_node {
     /// Private.
-    pointers: [*mut c_void; 7],
+    pointers: [*mut c_void; 5],
     /// Private.
-    words: [u32; 3],
+    words: [u32; 4],
 }

@@ -3,17 +3,16 @@
 use super::mbm_node;
 use crate::line::Core;
 use crate::pointers::{read, with};
-use crate::registers::MBM_ORDER_ABCD;
 use mbm::engine::Setting;
 use mbm::error::Status;
-use mbm::time::{timeout, to_millis};
+use mbm::time::timeout;
 
 /// Sets the unit to which the master sends later requests.
 ///
-/// @param node  the object
-/// @param slave   the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248
-///                to 255, which the standard reserves
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param node   the object
+/// @param slave  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
+///               255, which the standard reserves
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, slave: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -38,9 +37,9 @@ pub unsafe extern "C" fn mbm_node_getSlaveID(node: *const mbm_node) -> u8 {
 /// Sets the response timeout: the maximum time from the last bit of the request to the last
 /// byte of the reply.
 ///
-/// @param node  the object
-/// @param timeoutMs     milliseconds, 0 to 1000000 (16 minutes); the default is 2000
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param node       the object
+/// @param timeoutMs  milliseconds, 0 to 1000000 (16 minutes); the default is 2000
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeoutMs: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -60,8 +59,8 @@ pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeou
 /// MBM_PENDING at once, and you call mbm_node_poll until the request has ended.
 ///
 /// @param node  the object
-/// @param on      1 blocking, 0 non-blocking; it applies from the next request on
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param on    1 blocking, 0 non-blocking; it applies from the next request on
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -71,38 +70,6 @@ pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8
             Status::OK
         })
     }
-}
-
-/// Returns the response timeout: see mbm_node_setResponseTimeout.
-///
-/// @param node  the object
-/// @return milliseconds; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_node_getResponseTimeout(node: *const mbm_node) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe { read(node, 0, |node| to_millis(node.words.response_timeout.get())) }
-}
-
-/// Returns whether requests block: see mbm_node_setBlocking.
-///
-/// @param node  the object
-/// @return 1 for blocking, 0 for non-blocking; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_node_getBlocking(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { read(node, 0, |node| (!node.non_blocking).into()) }
-}
-
-/// Returns the order of values: see mbm_node_setWordOrder.
-///
-/// @param node  the object
-/// @return one of MBM_ORDER_...; MBM_ORDER_ABCD for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_node_getWordOrder(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    let order = unsafe { read(node, 0, |node| node.order) };
-    // 0 in a master whose order was never set.
-    order.max(MBM_ORDER_ABCD)
 }
 
 /// Accepts replies of devices that deviate from the standard. It has these effects:
@@ -118,9 +85,8 @@ pub unsafe extern "C" fn mbm_node_getWordOrder(node: *const mbm_node) -> u8 {
 /// every reply.
 ///
 /// @param node  the object
-/// @param on      0 (the default) or 1
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY while a request is
-///         under way
+/// @param on    0 (the default) or 1
+/// @return a status; MBM_BUSY while a request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setLenient(node: *mut mbm_node, on: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -133,14 +99,4 @@ pub unsafe extern "C" fn mbm_node_setLenient(node: *mut mbm_node, on: u8) -> u8 
             Status::OK
         })
     }
-}
-
-/// Returns whether deviating replies are accepted: see mbm_node_setLenient.
-///
-/// @param node  the object
-/// @return 1 or 0; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_node_getLenient(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { read(node, 0, |node| node.observer.is_some().into()) }
 }

@@ -69,10 +69,9 @@ unsafe fn next<T>(
 ///
 /// @param packet  a request or response of function 14 or 15, parsed or to be built
 /// @param cursor  the position in the data; a variable of yours, 0 for the first record
-/// @param record  receives the record; its data pointer points into the data of the
-///                packet
-/// @return 1 if there is a record. 0, with `cursor` and `record` unchanged, if there are
-///         no more records, and for NULL
+/// @param record  receives the record; its data pointer points into the data of the packet
+/// @return 1 if there is a record. 0, with `cursor` and `record` unchanged, if there are no more
+///         records, and for NULL
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_nextRecord(
     packet: *const mbm_packet,
@@ -105,10 +104,9 @@ pub unsafe extern "C" fn mbm_packet_nextRecord(
 ///
 /// @param packet  a response of function 2B/0E (hex), parsed or to be built
 /// @param cursor  the position in the data; a variable of yours, 0 for the first object
-/// @param object  receives the object; its data pointer points into the data of the
-///                packet
-/// @return 1 if there is an object. 0, with `cursor` and `object` unchanged, if there are
-///         no more objects, and for NULL
+/// @param object  receives the object; its data pointer points into the data of the packet
+/// @return 1 if there is an object. 0, with `cursor` and `object` unchanged, if there are no
+///         more objects, and for NULL
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_nextObject(
     packet: *const mbm_packet,
@@ -175,14 +173,13 @@ unsafe fn add(
 /// build. Set the kind and the function of the packet first, and dataLength to 0.
 ///
 /// @param packet    gets the record; unchanged if the call fails
-/// @param storage   receives the data of the packet; use the same storage for all its
-///                  records
+/// @param storage   receives the data of the packet; use the same storage for all its records
 /// @param capacity  size of `storage` in bytes; 251 are always enough
 /// @param record    the record; its data must not overlap `storage`
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if the function is not 14
-///         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for an invalid
-///         record; MBM_INVALID_ARGUMENT for a NULL pointer, an exception packet, record
-///         data that overlap `storage`, or packet data that are not in `storage`
+/// @return a status; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if the function is not 14 or 15;
+///         MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for an invalid record;
+///         MBM_INVALID_ARGUMENT for an exception packet, record data that overlap `storage`, or
+///         packet data that are not in `storage`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_addRecord(
     packet: *mut mbm_packet,
@@ -221,15 +218,13 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
 /// and objectCount to 0.
 ///
 /// @param packet    gets the object; unchanged if the call fails
-/// @param storage   receives the data of the packet; use the same storage for all its
-///                  objects
+/// @param storage   receives the data of the packet; use the same storage for all its objects
 /// @param capacity  size of `storage` in bytes; 246 are always enough
 /// @param object    the object; its data must not overlap `storage`
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL: if `storage` has 246 bytes, the object belongs
-///         into the next response, so set moreFollows and nextObjectId;
-///         MBM_ILLEGAL_FUNCTION if the packet is no such response; MBM_INVALID_ARGUMENT
-///         for a NULL pointer, object data that overlap `storage`, or packet data that
-///         are not in `storage`
+/// @return a status; MBM_BUFFER_TOO_SMALL: if `storage` has 246 bytes, the object belongs into
+///         the next response, so set moreFollows and nextObjectId; MBM_ILLEGAL_FUNCTION if the
+///         packet is no such response; MBM_INVALID_ARGUMENT for object data that overlap
+///         `storage`, or packet data that are not in `storage`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_addObject(
     packet: *mut mbm_packet,

@@ -26,19 +26,15 @@ use mbm::plan::{group, schedule};
 ///                plans
 /// @param setup   table, limits and storage; it stays valid and as it is until the plan ends
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
-/// @return MBM_OK; MBM_BUSY from within a hook of the client's port; of a field
-///         MBM_INVALID_ARGUMENT for an unknown table, type or order, a type that the table does
-///         not have, a unit above 255, an interval out of range, a negative divisor or a scale
-///         of a text,
-///         MBM_BROADCAST_NOT_ALLOWED for unit 0, MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
-///         address 65535 or into an excluded range, MBM_ILLEGAL_DATA_VALUE if it is longer than
-///         a read may be, MBM_FIELDS_OVERLAP for the later of two that share an address,
-///         MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data;
-///         MBM_INVALID_ARGUMENT also for NULL pointers, counts out of range, and a unit above
-///         255 of limits or of an excluded range;
-///         MBM_NOT_INITIALISED for a client that was never begun. After the status of a field
-///         the plan has ended, and `positions` and `reads` may be changed; after any other
-///         nothing is
+/// @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or
+///         order, a type that the table does not have, a unit above 255, an interval out of
+///         range, a negative divisor or a scale of a text; MBM_BROADCAST_NOT_ALLOWED for unit 0;
+///         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range;
+///         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be; MBM_FIELDS_OVERLAP for the
+///         later of two that share an address; MBM_BUFFER_TOO_SMALL for the first without
+///         storage for its read or its data. After such a status the plan has ended, and
+///         `positions` and `reads` may be changed. MBM_INVALID_ARGUMENT also for a unit above
+///         255 of limits or of an excluded range
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_begin(
     plan: *mut mbm_plan,
@@ -107,8 +103,7 @@ unsafe fn begin(
 /// Ends a plan: gives its requests up and lets go of its storage.
 ///
 /// @param plan  the object
-/// @return MBM_OK; MBM_BUSY from within a hook of the client's port, with nothing changed;
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_end(plan: *mut mbm_plan) -> u8 {
     // SAFETY: as the header demands.

@@ -17,8 +17,7 @@ const LONGEST_DELAY: u32 = 30 * 60 * 1000;
 /// poll the client: call mbm_client_poll after it.
 ///
 /// @param plan  the object
-/// @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT;
-///         MBM_NOT_INITIALISED, also for a client that was zeroed
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_poll(plan: *mut mbm_plan) -> u8 {
     // SAFETY: as the header demands.

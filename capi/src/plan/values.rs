@@ -140,8 +140,7 @@ unsafe fn get<T>(
 /// @param ageMs  gets the milliseconds since the value arrived, 2147483647 (24 days) at most;
 ///               0xFFFFFFFF if none ever did; may be NULL
 /// @return MBM_PENDING before the first read has ended, then as it ended: MBM_OK, an exception
-///         of the device, or a failure such as MBM_RESPONSE_TIMED_OUT; MBM_INVALID_ARGUMENT
-///         for a field that is not there, or MBM_NOT_INITIALISED, with `ageMs` unchanged
+///         of the device, or a failure such as MBM_RESPONSE_TIMED_OUT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getStatus(
     plan: *mut mbm_plan,
@@ -176,10 +175,9 @@ pub unsafe extern "C" fn mbm_plan_getStatus(
 /// @param field  the index of the field, of a bit or an integer
 /// @param index  which of its values, 0 for the first
 /// @param value  gets the number
-/// @return MBM_OK; MBM_OUT_OF_RANGE if it is not in the range of `value`;
-///         MBM_INVALID_ARGUMENT, also for a float or a text; MBM_NOT_INITIALISED; if no value
-///         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
-///         only
+/// @return a status; MBM_OUT_OF_RANGE if it is not in the range of `value`; MBM_INVALID_ARGUMENT
+///         for a float or a text; if no value has arrived yet the status that mbm_plan_getStatus
+///         returns
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getInteger(
     plan: *const mbm_plan,
@@ -197,9 +195,9 @@ pub unsafe extern "C" fn mbm_plan_getInteger(
 /// @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
 /// @param index  which of its values, 0 for the first
 /// @param value  gets the number
-/// @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half
-///         of the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of
-///         64 bits
+/// @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half of
+///         the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of 64
+///         bits
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getInt32(
     plan: *const mbm_plan,
@@ -219,8 +217,7 @@ pub unsafe extern "C" fn mbm_plan_getInt32(
 /// @param field  the index of the field
 /// @param index  which of its values, 0 for the first
 /// @param value  gets the number; a float that is infinite or not a number stays so
-/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a text; MBM_NOT_INITIALISED; if no value has
-///         arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK only
+/// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getNumber(
     plan: *const mbm_plan,
@@ -249,9 +246,7 @@ pub unsafe extern "C" fn mbm_plan_getNumber(
 /// @param field  the index of the field
 /// @param index  which of its values, 0 for the first
 /// @param value  gets the number
-/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for other types; MBM_NOT_INITIALISED; if no value
-///         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
-///         only
+/// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT for other types
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getFloat(
     plan: *const mbm_plan,
@@ -263,34 +258,6 @@ pub unsafe extern "C" fn mbm_plan_getFloat(
     unsafe { get(plan, field, index, value.cast(), |words| words.float()) }
 }
 
-/// A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double, without the scale of its
-/// field. On AVR, where C's double has
-/// 32 bits, it is mbm_plan_getFloat.
-///
-/// @param plan   the object
-/// @param field  the index of the field
-/// @param index  which of its values, 0 for the first
-/// @param value  gets the number
-/// @return as mbm_plan_getFloat
-#[no_mangle]
-pub unsafe extern "C" fn mbm_plan_getDouble(
-    plan: *const mbm_plan,
-    field: u16,
-    index: u16,
-    value: *mut f64,
-) -> u8 {
-    // SAFETY: as the header demands; a double is its bits.
-    #[cfg(not(target_arch = "avr"))]
-    unsafe {
-        get(plan, field, index, value.cast(), |words| words.double())
-    }
-    // SAFETY: as the header demands; C's double is a float here.
-    #[cfg(target_arch = "avr")]
-    unsafe {
-        mbm_plan_getFloat(plan, field, index, value.cast())
-    }
-}
-
 /// A text, which ends at its first NUL or with its field. In an order with the low byte first,
 /// the first of two characters is a register's low byte.
 ///
@@ -298,8 +265,7 @@ pub unsafe extern "C" fn mbm_plan_getDouble(
 /// @param field     the index of the field, of type MBM_TYPE_TEXT
 /// @param text      gets the text and a NUL
 /// @param capacity  bytes of `text`; the field's count and one are always enough
-/// @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL if the text does not fit. `text` changes
-///         on MBM_OK only
+/// @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL if the text does not fit
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getText(
     plan: *const mbm_plan,
@@ -366,8 +332,7 @@ pub unsafe extern "C" fn mbm_plan_getRegisters(
 ///
 /// @param plan   the object
 /// @param field  the index of the field
-/// @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT for a
-///         field that is not there; MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8 {
     // SAFETY: as the header demands.
@@ -391,8 +356,7 @@ pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8
 /// @param plan   the object
 /// @param index  0 for the first read
 /// @param read   gets the read
-/// @return MBM_OK; MBM_INVALID_ARGUMENT, also behind the last read, or MBM_NOT_INITIALISED, with
-///         `read` unchanged
+/// @return a status; MBM_INVALID_ARGUMENT behind the last read
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getRead(
     plan: *const mbm_plan,

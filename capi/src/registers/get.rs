@@ -1,7 +1,7 @@
 //! Reads values from registers. A call that fails leaves the caller's value unchanged.
 
 use super::{code, machine_order_mask, mbm_registers, view, BorrowedRegisters, MBM_ORDER_DEFAULT};
-use crate::pointers::{self, slice, slice_mut};
+use crate::pointers::{self, slice_mut};
 use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
 use mbm::data::value::{ShortDouble, Value};
@@ -55,8 +55,7 @@ unsafe fn get(
 /// @param address    the device's address of the register
 /// @param bit        0, the least significant, to 15
 /// @param on         receives 0 or 1
-/// @return MBM_OK; or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register does
-///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getBit(
     registers: *const mbm_registers,
@@ -72,31 +71,6 @@ pub unsafe extern "C" fn mbm_registers_getBit(
     }
 }
 
-/// Reads one byte of a register, 0 to 255. For a signed byte, pass a pointer to an
-/// int8_t, cast to uint8_t *.
-///
-/// @param registers  the registers
-/// @param address    the device's address of the register
-/// @param high       0 for the low byte, anything else for the high byte, which is
-///                   transmitted first
-/// @param value      receives the byte
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
-///         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getUint8(
-    registers: *const mbm_registers,
-    address: u16,
-    high: u8,
-    value: *mut u8,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        get_value(registers, value, |registers| {
-            registers.u8(address, high != 0)
-        })
-    }
-}
-
 /// Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
 /// int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.
 ///
@@ -104,8 +78,7 @@ pub unsafe extern "C" fn mbm_registers_getUint8(
 /// @param address    the device's address of the register
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
-///         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint16(
     registers: *const mbm_registers,
@@ -124,8 +97,7 @@ pub unsafe extern "C" fn mbm_registers_getUint16(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint32(
     registers: *const mbm_registers,
@@ -144,8 +116,7 @@ pub unsafe extern "C" fn mbm_registers_getUint32(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint64(
     registers: *const mbm_registers,
@@ -164,8 +135,7 @@ pub unsafe extern "C" fn mbm_registers_getUint64(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getFloat(
     registers: *const mbm_registers,
@@ -184,8 +154,7 @@ pub unsafe extern "C" fn mbm_registers_getFloat(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      receives the number
-/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getDouble(
     registers: *const mbm_registers,
@@ -220,14 +189,12 @@ pub unsafe extern "C" fn mbm_registers_getDouble(
 ///
 /// @param registers  the registers
 /// @param address    the device's address of the first register of the field
-/// @param length     length of the field in bytes, two for each register; an odd length
-///                   ends with the first character of a register
+/// @param length     length of the field in bytes, two for each register; an odd length ends
+///                   with the first character of a register
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param text       receives the text and a NUL
 /// @param capacity   size of `text` in bytes; `length + 1` are always enough
-/// @return MBM_OK; or with `text` unchanged MBM_ILLEGAL_DATA_ADDRESS if part of the field
-///         does not exist, MBM_BUFFER_TOO_SMALL, MBM_INVALID_ARGUMENT or
-///         MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if `text` is
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getString(
     registers: *const mbm_registers,
@@ -261,8 +228,7 @@ pub unsafe extern "C" fn mbm_registers_getString(
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param bytes      receives the bytes; must not overlap the registers
 /// @param length     how many bytes, two for each register; may be odd
-/// @return MBM_OK; or with `bytes` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getBytes(
     registers: *const mbm_registers,
@@ -278,32 +244,4 @@ pub unsafe extern "C" fn mbm_registers_getBytes(
             registers.bytes_in(registers.order, address, bytes)
         })
     })
-}
-
-/// Compares registers with raw bytes, the high byte of each register first in every
-/// order.
-///
-/// @param registers  the registers
-/// @param address    the device's address of the register whose high byte is compared
-///                   with the first byte
-/// @param bytes      the bytes to compare with; NULL only if `length` is 0
-/// @param length     how many bytes, two for each register; may be odd
-/// @param equal      receives 1 if all bytes are equal, else 0
-/// @return MBM_OK; or with `equal` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_isEqual(
-    registers: *const mbm_registers,
-    address: u16,
-    bytes: *const u8,
-    length: u16,
-    equal: *mut u8,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        get_value(registers, equal, |registers| {
-            let bytes = slice(bytes, length.into())?;
-            registers.is_equal(address, bytes).map(u8::from)
-        })
-    }
 }

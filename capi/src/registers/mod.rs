@@ -40,10 +40,10 @@ pub const MBM_REGISTERS_INTO_BYTES: u8 = 4;
 /// A view of consecutive registers, with the addresses that the device gives them. The
 /// view owns nothing: `data` points to memory of the program.
 ///
-/// mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in; so do
-/// mbm_node_getResponseRegisters and mbm_node_getTransmitRegisters. You may also set
-/// each field yourself. The get and set functions do not change the view. Several threads
-/// may use one view at the same time as long as none of them writes the registers.
+/// mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in. You may also
+/// set each field yourself. The get and set functions do not change the view. Several
+/// threads may use one view at the same time as long as none of them writes the registers.
+/// They return MBM_ILLEGAL_DATA_ADDRESS if a register that they need is not in the view.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_registers {
@@ -202,12 +202,11 @@ unsafe fn fill(
 /// words.
 ///
 /// @param registers  the view to fill in; without data after an error
-/// @param words      the words, for example the response words of mbm_node; must stay
-///                   valid while the view is used. NULL only if `count` is 0
+/// @param words      the words, for example the response words of mbm_node; must stay valid
+///                   while the view is used. NULL only if `count` is 0
 /// @param count      how many words
 /// @param first      the device's address of the first register, 0 to 65535
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
-///         MBM_INVALID_ARGUMENT for NULL
+/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_ofWords(
     registers: *mut mbm_registers,
@@ -230,12 +229,11 @@ pub unsafe extern "C" fn mbm_registers_ofWords(
 /// As mbm_registers_ofWords, for the data bytes of a reply or a request.
 ///
 /// @param registers  the view to fill in; without data after an error
-/// @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must
-///                   stay valid while the view is used
+/// @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must stay
+///                   valid while the view is used
 /// @param length     how many bytes, an even number
 /// @param first      the device's address of the first register, 0 to 65535
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
-///         MBM_INVALID_ARGUMENT for NULL or an odd length
+/// @return a status; see mbm_registers_ofWords. MBM_INVALID_ARGUMENT for an odd length
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_ofBytes(
     registers: *mut mbm_registers,

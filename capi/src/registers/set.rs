@@ -52,8 +52,7 @@ unsafe fn set(
 /// @param address    the device's address of the register
 /// @param bit        0, the least significant, to 15
 /// @param on         0 for off, anything else for on
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
-///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setBit(
     registers: *const mbm_registers,
@@ -69,30 +68,6 @@ pub unsafe extern "C" fn mbm_registers_setBit(
     }
 }
 
-/// Writes one byte of a register; the other byte does not change.
-///
-/// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of the register
-/// @param high       0 for the low byte, anything else for the high byte, which is
-///                   transmitted first
-/// @param value      the byte
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
-///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setUint8(
-    registers: *const mbm_registers,
-    address: u16,
-    high: u8,
-    value: u8,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(registers, MBM_ORDER_DEFAULT, |registers| {
-            registers.set_u8(address, high != 0, value)
-        })
-    }
-}
-
 /// Writes a number into one register. The order of words has no effect; the order of
 /// bytes has.
 ///
@@ -100,8 +75,7 @@ pub unsafe extern "C" fn mbm_registers_setUint8(
 /// @param address    the device's address of the register
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      the number
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
-///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setUint16(
     registers: *const mbm_registers,
@@ -119,8 +93,7 @@ pub unsafe extern "C" fn mbm_registers_setUint16(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      the number
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the two
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setUint32(
     registers: *const mbm_registers,
@@ -138,8 +111,7 @@ pub unsafe extern "C" fn mbm_registers_setUint32(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      points to the number
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the four
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setUint64(
     registers: *const mbm_registers,
@@ -157,8 +129,7 @@ pub unsafe extern "C" fn mbm_registers_setUint64(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      points to the number
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the two
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setFloat(
     registers: *const mbm_registers,
@@ -177,8 +148,7 @@ pub unsafe extern "C" fn mbm_registers_setFloat(
 /// @param address    the device's address of the first of its registers
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      points to the number
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the four
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setDouble(
     registers: *const mbm_registers,
@@ -210,13 +180,12 @@ pub unsafe extern "C" fn mbm_registers_setDouble(
 ///
 /// @param registers  the registers, of a kind that may be written
 /// @param address    the device's address of the first register of the field
-/// @param length     length of the field in bytes, two for each register; if it is odd,
-///                   the byte after the field becomes 0 too
+/// @param length     length of the field in bytes, two for each register; if it is odd, the byte
+///                   after the field becomes 0 too
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param text       the text; ends with a NUL, which need not fit into the field
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if part of the field
-///         does not exist, MBM_BUFFER_TOO_SMALL if the text is longer than the field,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if the text is longer than the
+///         field
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setString(
     registers: *const mbm_registers,
@@ -242,10 +211,9 @@ pub unsafe extern "C" fn mbm_registers_setString(
 /// @param address    the device's address of the first register
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param bytes      the bytes; must not overlap the registers
-/// @param length     how many bytes, two for each register; if it is odd, the other byte
-///                   of the last register does not change
-/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the
-///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param length     how many bytes, two for each register; if it is odd, the other byte of the
+///                   last register does not change
+/// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setBytes(
     registers: *const mbm_registers,

@@ -4,7 +4,7 @@ use super::buffers::Core;
 use super::units::have_ids;
 use super::{mbm_server, mbm_unit};
 use crate::framing::MBM_MAX_TCP_FRAME;
-use crate::pointers::{check, object, read, with_hooks, zero_on_host, CObject, BEGUN, IN_HOOK};
+use crate::pointers::{check, object, with_hooks, zero_on_host, CObject, BEGUN, IN_HOOK};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 use mbm::time;
@@ -78,12 +78,10 @@ unsafe fn begin(
 /// @param units   the units to serve: one unit, or an array of units
 /// @param count   how many units
 /// @param frame   buffer for one frame, a request or a response
-/// @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame.
-///                The server ignores a longer request, and answers exception 04 in place
-///                of a longer response
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook, a buffer
-///         that is too short or a unit with an id above 255; MBM_BUSY from within a hook of
-///         this server
+/// @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame. The
+///                server ignores a longer request, and answers exception 04 in place of a longer
+///                response
+/// @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginRtu(
     server: *mut mbm_server,
@@ -105,8 +103,7 @@ pub unsafe extern "C" fn mbm_server_beginRtu(
 /// @param units   see mbm_server_beginRtu
 /// @param count   see mbm_server_beginRtu
 /// @param frame   see mbm_server_beginRtu
-/// @param bytes   size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every
-///                frame
+/// @param bytes   size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every frame
 /// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginAscii(
@@ -128,8 +125,8 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
 /// the server answers them in order.
 ///
 /// @param server  see mbm_server_beginRtu; one for each connection
-/// @param port    see mbm_server_beginRtu; its hooks read and write the connection and give
-///                the time
+/// @param port    see mbm_server_beginRtu; its hooks read and write the connection and give the
+///                time
 /// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
 /// @param count   see mbm_server_beginRtu
 /// @param frame   see mbm_server_beginRtu; one for each connection
@@ -192,9 +189,9 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
 /// effect in TCP. The begin functions restore the default.
 ///
 /// @param server     the object
-/// @param silenceUs  microseconds since the last received byte; a value above 2^31
-///                   (36 minutes) counts as 2^31
-/// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+/// @param silenceUs  microseconds since the last received byte; a value above 2^31 (36 minutes)
+///                   counts as 2^31
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceUs: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -207,25 +204,13 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceU
     }
 }
 
-/// Returns the silence that ends a frame: what mbm_server_setSilence set, or t3.5 of the rate
-/// that mbm_server_setBaudRate set, or the default of the framing.
-///
-/// @param server  the object
-/// @return microseconds; 0 in TCP and for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_server_getSilence(server: *const mbm_server) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe { read(server, 0, |core| (*core).silence) }
-}
-
 /// Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
 /// 2.5.1.1). It does not change the rate of the line. Other framings do not use t3.5: see
 /// mbm_server_setSilence.
 ///
 /// @param server  the object
 /// @param baud    bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
-/// @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
-///         MBM_NOT_INITIALISED or MBM_BUSY
+/// @return a status; MBM_INVALID_ARGUMENT for other framings
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -247,8 +232,7 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
 ///
 /// @param server  the object
 /// @param on      0 for off, the default; anything else for on
-/// @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
-///         MBM_NOT_INITIALISED or MBM_BUSY
+/// @return a status; MBM_INVALID_ARGUMENT for other framings
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -259,14 +243,4 @@ pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: 
             refused => refused.code(),
         }
     }
-}
-
-/// Returns whether the server discards its own echo: see mbm_server_setEchoDiscard.
-///
-/// @param server  the object
-/// @return 1 or 0; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_server_getEchoDiscard(server: *const mbm_server) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { read(server, 0, |core| (*core).discards_echo().into()) }
 }

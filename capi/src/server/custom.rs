@@ -130,9 +130,8 @@ pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Op
 ///
 /// @param unit    the unit
 /// @param custom  must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `serve`, a code above
-///         127 or an invalid `length`; MBM_BUFFER_TOO_SMALL if the unit has
-///         MBM_MAX_SERVICES records already
+/// @return a status; see mbm_unit_serveFiles. MBM_INVALID_ARGUMENT for a NULL `serve`, a code
+///         above 127 or an invalid `length`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCustom(unit: *mut mbm_unit, custom: *mut mbm_custom) -> u8 {
     // SAFETY: as the header demands.
@@ -186,8 +185,7 @@ unsafe fn mask_byte(mask: *mut mbm_functionMask, code: u8) -> *mut u8 {
 ///              Units that share a mask have the same functions off
 /// @param code  the function code, 1 to 127
 /// @param on    0 switches the function off, anything else switches it on
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a code out of range;
-///         MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES records already
+/// @return a status; see mbm_unit_serveFiles
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_switchFunction(
     unit: *mut mbm_unit,

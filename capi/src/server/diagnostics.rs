@@ -75,11 +75,9 @@ unsafe extern "C" fn monitor(
 /// events, and a client can force it into listen only mode.
 ///
 /// @param unit         the unit
-/// @param diagnostics  must stay valid for as long as the unit is used. Use one struct
-///                     for each unit: a shared one counts for all units that share it
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
-///         another mbm_diagnostics; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
-///         records already
+/// @param diagnostics  must stay valid for as long as the unit is used. Use one struct for each
+///                     unit: a shared one counts for all units that share it
+/// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveDiagnostics(
     unit: *mut mbm_unit,

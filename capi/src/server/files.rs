@@ -212,8 +212,7 @@ unsafe extern "C" fn serve_fifos(
 ///
 /// @param unit   the unit
 /// @param files  must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
-///         unit has MBM_MAX_SERVICES records already
+/// @return a status; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveFiles(unit: *mut mbm_unit, files: *mut mbm_files) -> u8 {
     // SAFETY: as the header demands.
@@ -225,7 +224,7 @@ pub unsafe extern "C" fn mbm_unit_serveFiles(unit: *mut mbm_unit, files: *mut mb
 ///
 /// @param files  the files, registered already or not. Zeroing the struct removes the hooks
 /// @param hooks  must stay valid for as long as the files are served; NULL for no hooks
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `files`
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_files_setHooks(
     files: *mut mbm_files,
@@ -245,8 +244,7 @@ pub unsafe extern "C" fn mbm_files_setHooks(
 ///
 /// @param unit   the unit
 /// @param fifos  must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
-///         unit has MBM_MAX_SERVICES records already
+/// @return a status; see mbm_unit_serveFiles
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveFifos(unit: *mut mbm_unit, fifos: *mut mbm_fifos) -> u8 {
     // SAFETY: as the header demands.

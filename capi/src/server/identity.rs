@@ -135,9 +135,7 @@ unsafe extern "C" fn serve_identification(
 ///
 /// @param unit    the unit
 /// @param status  must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
-///         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
-///         records already
+/// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
     unit: *mut mbm_unit,
@@ -151,9 +149,7 @@ pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
 ///
 /// @param unit  the unit
 /// @param id    must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
-///         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
-///         records already
+/// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mbm_serverId) -> u8 {
     // SAFETY: as the header demands.
@@ -167,9 +163,7 @@ pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mb
 ///
 /// @param unit            the unit
 /// @param identification  must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit serves
-///         another such record; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
-///         records already
+/// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveIdentification(
     unit: *mut mbm_unit,

@@ -38,18 +38,17 @@ impl Units for RespondUnits {
 /// @param count       how many units
 /// @param connection  your pointer, which hooks and functions of yours get as the connection
 ///                    that the request came from; may be NULL
-/// @param framing     the framing. Its `functions` are not used: units know their own
-///                    functions
+/// @param framing     the framing. Its `functions` are not used: units know their own functions
 /// @param frame       holds the complete request; receives the response
 /// @param length      length of the request in bytes
-/// @param capacity    size of `frame` in bytes. 256 hold every response in RTU, 513 in
-///                    ASCII, 260 in TCP. A longer response becomes exception 04
-/// @param response    receives the length of the response in bytes; 0 without a response:
-///                    after a damaged frame, a request for another unit, a broadcast, and
-///                    with any status but MBM_OK
-/// @return MBM_OK; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write
-///         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT, also
-///         for a unit with an id above 255
+/// @param capacity    size of `frame` in bytes. 256 hold every response in RTU, 513 in ASCII,
+///                    260 in TCP. A longer response becomes exception 04
+/// @param response    receives the length of the response in bytes; 0 without a response: after
+///                    a damaged frame, a request for another unit, a broadcast, and with any
+///                    status but MBM_OK
+/// @return a status; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write the
+///         request into `frame` again before the next call; MBM_INVALID_ARGUMENT for a unit with
+///         an id above 255
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_respond(
     units: *mut mbm_unit,

@@ -263,9 +263,8 @@ unsafe extern "C" fn add_table(
 ///
 /// @param unit   the unit
 /// @param table  must stay valid for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that is
-///         served as another kind; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
-///         records already
+/// @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another
+///         kind
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCoils(unit: *mut mbm_unit, table: *mut mbm_bitTable) -> u8 {
     // SAFETY: as the header demands.
@@ -321,7 +320,7 @@ pub unsafe extern "C" fn mbm_unit_serveInputRegisters(
 /// zeroed the table.
 ///
 /// @param table  holding registers that mbm_unit_serveHoldingRegisters accepted
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and for any other table
+/// @return a status; MBM_INVALID_ARGUMENT for any other table
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registerTable_serveMaskAndReadWrite(
     table: *mut mbm_registerTable,

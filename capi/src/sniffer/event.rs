@@ -183,7 +183,7 @@ impl mbm_event {
 /// @param event  an event that mbm_sniffer_next returned
 /// @param text   receives the line; always ends with a NUL
 /// @param size   size of `text` in bytes; 200 are enough for most events, 2400 for all
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL if the line was cut; MBM_INVALID_ARGUMENT
+/// @return a status; MBM_BUFFER_TOO_SMALL if the line was cut
 #[no_mangle]
 pub unsafe extern "C" fn mbm_event_text(
     event: *const mbm_event,

@@ -12,7 +12,7 @@ use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::{Function, Rule};
 use mbm::sniffer::{BusDirection, Sniffer, MIN_BUFFER};
-use mbm::time::{millis, to_millis};
+use mbm::time::millis;
 
 /// The bytes come from a line that carries both directions.
 pub const MBM_DIRECTION_BOTH: u8 = 0;
@@ -144,13 +144,12 @@ unsafe fn begin(sniffer: *mut mbm_sniffer, buffer: *mut u8, size: u16, framing: 
 /// unanswered requests without an event, and its settings return to their defaults.
 ///
 /// @param sniffer  the object; initialised with MBM_INIT before the first call
-/// @param buffer   holds received bytes until the sniffer has reported them; must stay
-///                 valid for as long as the sniffer is used
-/// @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER.
-///                 MBM_MAX_FRAME holds every frame; with separate directions use twice as
-///                 much. A longer frame becomes an event of kind MBM_EVENT_NOISE
-/// @return MBM_OK; or with nothing changed MBM_BUFFER_TOO_SMALL for a size that is too
-///         small, MBM_INVALID_ARGUMENT for a NULL pointer
+/// @param buffer   holds received bytes until the sniffer has reported them; must stay valid for
+///                 as long as the sniffer is used
+/// @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER. MBM_MAX_FRAME
+///                 holds every frame; with separate directions use twice as much. A longer frame
+///                 becomes an event of kind MBM_EVENT_NOISE
+/// @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_beginRtu(
     sniffer: *mut mbm_sniffer,
@@ -216,7 +215,7 @@ pub unsafe extern "C" fn mbm_sniffer_beginRtuOverTcp(
 /// @param sniffer    the object
 /// @param functions  an array that is copied; may be NULL if `count` is 0
 /// @param count      how many functions, at most MBM_MAX_SNIFFER_FUNCTIONS
-/// @return MBM_OK; MBM_NOT_INITIALISED; MBM_INVALID_ARGUMENT with nothing changed
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setFunctions(
     sniffer: *mut mbm_sniffer,
@@ -243,7 +242,7 @@ pub unsafe extern "C" fn mbm_sniffer_setFunctions(
 ///
 /// @param sniffer    the object
 /// @param character  1 to 127, except CR, the colon and hexadecimal digits
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setDelimiter(sniffer: *mut mbm_sniffer, character: u8) -> u8 {
     if !is_delimiter(character) {
@@ -259,7 +258,7 @@ pub unsafe extern "C" fn mbm_sniffer_setDelimiter(sniffer: *mut mbm_sniffer, cha
 ///
 /// @param sniffer  the object
 /// @param baud     bits per second; 0, the default, if the rate is unknown
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setBaudRate(sniffer: *mut mbm_sniffer, baud: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -274,7 +273,7 @@ pub unsafe extern "C" fn mbm_sniffer_setBaudRate(sniffer: *mut mbm_sniffer, baud
 ///
 /// @param sniffer    the object
 /// @param timeoutMs  1 to 65535 ms
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
     sniffer: *mut mbm_sniffer,
@@ -288,23 +287,13 @@ pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
     unsafe { with(sniffer, |core| core.set_timeout(timeout)) }
 }
 
-/// Returns the response timeout: see mbm_sniffer_setResponseTimeout.
-///
-/// @param sniffer  the object
-/// @return milliseconds; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_sniffer_getResponseTimeout(sniffer: *const mbm_sniffer) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(sniffer, 0, |object| to_millis(object.core.timeout()) as u16) }
-}
-
 /// Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
 /// than the error of your time stamps. At first it is 50 ms in RTU and RTU over TCP,
 /// which suits a USB adapter, and 1000 ms in ASCII and TCP.
 ///
 /// @param sniffer    the object
 /// @param timeoutMs  1 to 65535 ms
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
     sniffer: *mut mbm_sniffer,
@@ -318,34 +307,20 @@ pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
     unsafe { with(sniffer, |core| core.set_frame_timeout(timeout)) }
 }
 
-/// Returns the frame timeout: see mbm_sniffer_setFrameTimeout.
-///
-/// @param sniffer  the object
-/// @return milliseconds; 0 for an object that was never begun
-#[no_mangle]
-pub unsafe extern "C" fn mbm_sniffer_getFrameTimeout(sniffer: *const mbm_sniffer) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::read(sniffer, 0, |object| {
-            to_millis(object.core.frame_timeout()) as u16
-        })
-    }
-}
-
 /// Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.
 /// If the sniffer did not accept all bytes, feed the rest now with the same time; no byte
 /// is lost.
 ///
 /// @param sniffer    the object
-/// @param direction  MBM_DIRECTION_BOTH; MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER if
-///                   you receive the directions separately. Do not mix MBM_DIRECTION_BOTH
-///                   with the other two: on a change the sniffer discards the bytes that
-///                   it has not reported yet
+/// @param direction  MBM_DIRECTION_BOTH; MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER if you
+///                   receive the directions separately. Do not mix MBM_DIRECTION_BOTH with the
+///                   other two: on a change the sniffer discards the bytes that it has not
+///                   reported yet
 /// @param bytes      the received bytes; NULL only if `length` is 0
 /// @param length     how many bytes
 /// @param nowUs      arrival time of the last of the bytes, in microseconds; may wrap
-/// @return how many bytes the sniffer accepted; 0 also for a sniffer that was never
-///         begun, or for an invalid argument
+/// @return how many bytes the sniffer accepted; 0 also for a sniffer that was never begun, or
+///         for an invalid argument
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_feed(
     sniffer: *mut mbm_sniffer,
@@ -381,10 +356,10 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
 ///
 /// @param sniffer  the object
 /// @param nowUs    the time now, in microseconds; may wrap
-/// @param event    receives the event; the data that it points to are valid until the
-///                 next call with this sniffer
-/// @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for
-///         NULL, and for a sniffer that was never begun
+/// @param event    receives the event; the data that it points to are valid until the next call
+///                 with this sniffer
+/// @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for NULL,
+///         and for a sniffer that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_next(
     sniffer: *mut mbm_sniffer,

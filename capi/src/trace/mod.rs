@@ -8,8 +8,7 @@ use crate::framing::{is_delimiter, mbm_framing};
 use crate::functions::declared;
 use crate::node::mbm_node;
 use crate::pointers::{
-    array_or_empty, check, get, object, read as read_object, with, with_hooks, CObject, BEGUN,
-    IN_HOOK,
+    array_or_empty, check, get, object, with, with_hooks, CObject, BEGUN, IN_HOOK,
 };
 use crate::port::{countable, mbm_port, PortRef};
 use core::ffi::c_void;
@@ -302,23 +301,21 @@ fn code(result: Result<(), Status>) -> u8 {
 /// drops the bytes that it has not handed out, and its frame timeout is the default.
 ///
 /// @param trace    the object; initialised with MBM_INIT before the first call
-/// @param port     is copied; its hooks read, write and micros are required. Its optional
-///                 hooks are passed on. It must not be the port of this trace, nor
-///                 that of a trace that passes everything on to this one
+/// @param port     is copied; its hooks read, write and micros are required. Its optional hooks
+///                 are passed on. It must not be the port of this trace, nor that of a trace
+///                 that passes everything on to this one
 /// @param framing  the framing of the object that will use the port, and the declarations of
 ///                 your own functions, which must stay valid and unchanged. Without a
 ///                 declaration, the end of a received RTU frame is not known from its bytes
-/// @param buffer   holds incomplete frames: one half of it those that are sent, the other
-///                 those that are received. It must stay valid for as long as the trace is
-///                 used
+/// @param buffer   holds incomplete frames: one half of it those that are sent, the other those
+///                 that are received. It must stay valid for as long as the trace is used
 /// @param size     size of `buffer` in bytes, at least MBM_MIN_TRACE_BUFFER. Two times
-///                 MBM_MAX_FRAME, MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every
-///                 frame; a longer one is handed out in pieces
+///                 MBM_MAX_FRAME, MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every frame; a
+///                 longer one is handed out in pieces
 /// @param hook     is called for each frame
 /// @param context  your pointer, passed to `hook`: for example the link or its name
-/// @return MBM_OK; or with nothing changed MBM_BUFFER_TOO_SMALL for a size that is too
-///         small, MBM_INVALID_ARGUMENT for a NULL pointer, an incomplete port or a framing
-///         that is not valid, MBM_BUSY from within the hook
+/// @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for
+///         a framing that is not valid
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_beginClient(
     trace: *mut mbm_trace,
@@ -363,8 +360,8 @@ pub unsafe extern "C" fn mbm_trace_beginServer(
 /// function of a node, client or server.
 ///
 /// @param trace  the object
-/// @return the port, which is valid for as long as the trace is used. NULL for a trace that
-///         was never begun, and from within its hook: the begin functions refuse it
+/// @return the port, which is valid for as long as the trace is used. NULL for a trace that was
+///         never begun, and from within its hook: the begin functions refuse it
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_port(trace: *mut mbm_trace) -> *const mbm_port {
     // SAFETY: as the header demands.
@@ -399,7 +396,7 @@ pub unsafe extern "C" fn mbm_trace_innerPort(trace: *const mbm_trace) -> *const 
 ///
 /// @param trace      the object
 /// @param timeoutMs  1 to 65535 ms
-/// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeoutMs: u32) -> u8 {
     let timeout = match u16::try_from(timeoutMs) {
@@ -415,23 +412,13 @@ pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeou
     }
 }
 
-/// Returns the frame timeout: see mbm_trace_setFrameTimeout.
-///
-/// @param trace  the object
-/// @return milliseconds; 0 for an object that was never begun, and from within its hook
-#[no_mangle]
-pub unsafe extern "C" fn mbm_trace_getFrameTimeout(trace: *const mbm_trace) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe { read_object(trace, 0, |core| ((*core).frame_timeout() / 1000) as u16) }
-}
-
 /// Calls the hook for the bytes that wait for the rest of their frame: before the program
 /// ends, or before a link is closed.
 ///
 /// On a Cortex-M it takes 850 bytes of stack, as every traced frame does.
 ///
 /// @param trace  the object
-/// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_flush(trace: *mut mbm_trace) -> u8 {
     // SAFETY: as the header demands.

@@ -90,8 +90,7 @@ impl Observer for CObserver {
 ///
 /// @param event   an event that mbm_sniffer_next returned
 /// @param record  receives the record; its bytes are valid as long as those of the event
-/// @return MBM_OK; MBM_INVALID_ARGUMENT, with `record` unchanged, for NULL and for
-///         MBM_EVENT_TIMEOUT, which has no bytes
+/// @return a status; MBM_INVALID_ARGUMENT for MBM_EVENT_TIMEOUT, which has no bytes
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_ofEvent(
     event: *const mbm_event,

@@ -89,7 +89,6 @@ unsafe fn use_line(context: *mut c_void) {
         assert_eq!(mbm_line_cancel(line), BUSY);
         assert_eq!(mbm_line_used(line), BUSY);
         assert_eq!(mbm_line_beginRtu(line, &port, null_mut(), 0), BUSY);
-        assert_eq!(mbm_line_getRetries(line), 0);
         assert_eq!(mbm_node_poll(node), BUSY);
         assert_eq!(mbm_node_status(node), BUSY);
         assert_eq!(mbm_node_cancel(node), BUSY);
@@ -100,11 +99,8 @@ unsafe fn use_line(context: *mut c_void) {
         // The words and the settings of the node are not the line's.
         assert_eq!(mbm_node_setSlaveID(node, 17), MBM_OK);
         assert_eq!(mbm_node_setResponseTimeout(node, 20), MBM_OK);
-        assert_eq!(mbm_node_setTransmitBuffer(node, 1, 7), MBM_OK);
-        assert_eq!(mbm_node_clearTransmitBuffer(node), MBM_OK);
         assert_eq!(mbm_node_send(node, 5), MBM_OK);
         assert_eq!(mbm_node_beginTransmission(node, 3), MBM_OK);
-        mbm_node_getResponseBuffer(node, 0);
         mbm_node_receive(node);
         // Nor is another node the line's, but its requests are refused.
         let words = {

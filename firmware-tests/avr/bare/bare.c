@@ -117,6 +117,6 @@ int main(void)
         is_wanted = 0;
         words[1] = mbm_node_readHoldingRegisters(&device, FIRST, COUNT);
         for (i = 0; i < COUNT; i++)
-            words[2 + i] = mbm_node_getResponseBuffer(&device, i);
+            words[2 + i] = replies[i];
     }
 }

@@ -59,7 +59,7 @@ fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
 /// Queues a request of any function.
 pub fn request(w: &World, client: *mut mbm_client) {
     let request = w.requests.pick(w);
-    let choice = w.byte() % 29;
+    let choice = w.byte() % 26;
     let (a, b, c, d, byte) = (w.word(), w.word(), w.word(), w.word(), w.byte());
     // The length of `data` for this function, as the header says.
     let words = |count: u16| 2 * usize::from(count);
@@ -177,9 +177,7 @@ pub fn request(w: &World, client: *mut mbm_client) {
             client,
             mbm_client_writeFileRecord(client, request, a, b, c)
         ),
-        22 => call!(w, client, mbm_client_readFileRecords(client, request, a)),
-        23 => call!(w, client, mbm_client_writeFileRecords(client, request, a)),
-        24 => {
+        22 => {
             let (code, object) = (byte % 8, d as u8);
             call!(
                 w,
@@ -187,14 +185,7 @@ pub fn request(w: &World, client: *mut mbm_client) {
                 mbm_client_readDeviceIdentification(client, request, code, object)
             )
         }
-        25 => {
-            call!(
-                w,
-                client,
-                mbm_client_encapsulatedInterfaceTransport(client, request, byte, b)
-            )
-        }
-        26 => call!(w, client, mbm_client_custom(client, request, byte, b, rule)),
+        23 => call!(w, client, mbm_client_custom(client, request, byte, b, rule)),
         _ => call!(
             w,
             client,

@@ -106,19 +106,6 @@ fn set(w: &World, client: *mut mbm_client) {
         ),
         _ => call!(w, client, mbm_client_setUnits(client, none, byte)),
     });
-    get(w, client);
-}
-
-/// Reads the settings.
-fn get(w: &World, client: *mut mbm_client) {
-    call!(w, client, mbm_client_getResponseTimeout(client));
-    assert!(call!(w, client, mbm_client_getGap(client)) <= 1 << 31);
-    call!(w, client, mbm_client_getTurnaroundDelay(client));
-    call!(w, client, mbm_client_getQuietTime(client));
-    call!(w, client, mbm_client_getRetries(client));
-    assert!(call!(w, client, mbm_client_getEchoDiscard(client)) <= 1);
-    call!(w, client, mbm_client_getPostFlushHold(client));
-    assert!(call!(w, client, mbm_client_getInFlight(client)) <= MBM_CLIENT_DEPTH);
 }
 
 fn poll(w: &World, client: *mut mbm_client) {

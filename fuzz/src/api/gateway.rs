@@ -173,13 +173,9 @@ fn connection(w: &World, gateway: *mut mbm_gateway) {
         }
         4 => drop(call!(w, gateway, mbm_gateway_status(gateway, number))),
         5 => drop(call!(w, gateway, mbm_gateway_pending(gateway, number))),
-        6 => {
+        _ => {
             let reads = call!(w, gateway, mbm_gateway_isReading(gateway, number));
             assert!(reads <= 1);
-        }
-        _ => {
-            call!(w, gateway, mbm_gateway_inFlight(gateway));
-            call!(w, gateway, mbm_gateway_queueTime(gateway));
         }
     }
 }

@@ -62,24 +62,6 @@ fn set(w: &World, line: *mut mbm_line) {
         6 => call!(w, line, mbm_line_setPostFlushHold(line, byte)),
         _ => call!(w, line, mbm_line_setCounters(line, counters)),
     });
-    get(w, line);
-}
-
-/// Reads the settings. In a hook of the line they are those of a line that was never begun.
-fn get(w: &World, line: *mut mbm_line) {
-    let gap = call!(w, line, mbm_line_getGap(line));
-    assert!(gap <= 1 << 31);
-    let echo = call!(w, line, mbm_line_getEchoDiscard(line));
-    assert!(echo <= 1);
-    let others = [
-        call!(w, line, mbm_line_getTurnaroundDelay(line)),
-        call!(w, line, mbm_line_getQuietTime(line)),
-        call!(w, line, mbm_line_getRetries(line)).into(),
-        call!(w, line, mbm_line_getPostFlushHold(line)).into(),
-    ];
-    if w.is_locked(line.cast()) {
-        assert_eq!((gap, echo, others), (0, 0, [0; 4]));
-    }
 }
 
 /// Reports that the wire was used.

@@ -55,25 +55,14 @@ fn begin(w: &World, node: *mut mbm_node) {
 /// Settings. They may be set in hooks of the line, too.
 fn set(w: &World, node: *mut mbm_node) {
     let (byte, word, long) = (w.byte(), w.word(), w.long());
-    let choice = w.byte() % 5;
+    let choice = w.byte() % 4;
     let time = if byte < 0xF0 { word.into() } else { long };
     unchanged_if_refused(w, &[span(node)], "mbm_node_set", || match choice {
         0 => call!(w, node, mbm_node_setSlaveID(node, byte)),
         1 => call!(w, node, mbm_node_setResponseTimeout(node, time)),
         2 => call!(w, node, mbm_node_setBlocking(node, byte & 1)),
-        3 => call!(w, node, mbm_node_setLenient(node, byte & 1)),
-        _ => call!(w, node, mbm_node_setWordOrder(node, byte % 8)),
+        _ => call!(w, node, mbm_node_setLenient(node, byte & 1)),
     });
-    get(w, node);
-}
-
-/// Reads the settings.
-fn get(w: &World, node: *mut mbm_node) {
-    assert!(call!(w, node, mbm_node_getResponseTimeout(node)) <= 1_000_000);
-    assert!(call!(w, node, mbm_node_getBlocking(node)) <= 1);
-    assert!(call!(w, node, mbm_node_getLenient(node)) <= 1);
-    let order = call!(w, node, mbm_node_getWordOrder(node));
-    assert!((MBM_ORDER_ABCD..=MBM_ORDER_DCBA).contains(&order));
     call!(w, node, mbm_node_getSlaveID(node));
 }
 
@@ -94,12 +83,7 @@ fn request(w: &World, node: *mut mbm_node) {
         begin(w, node);
     }
     let (a, b, c, d) = (w.word(), w.word(), w.word(), w.word());
-    let choice = w.byte() % 14;
-    if choice == 13 {
-        let words = call!(w, node, mbm_node_requestFrom(node, a, b));
-        assert!(words <= 125, "{words} words to receive");
-        return;
-    }
+    let choice = w.byte() % 13;
     let spans = [span(node), span(w.line_of(node))];
     let before = spans.map(bytes);
     let inner = w.inner_calls.get();
@@ -192,42 +176,28 @@ fn poll(w: &World, node: *mut mbm_node) {
 }
 
 fn words(w: &World, node: *mut mbm_node) {
-    let (byte, word, long) = (w.byte(), w.word(), w.long());
-    match w.byte() % 14 {
-        0 => drop(call!(w, node, mbm_node_getResponseBuffer(node, byte))),
-        1 => drop(call!(w, node, mbm_node_clearResponseBuffer(node))),
-        2 => drop(call!(w, node, mbm_node_setTransmitBuffer(node, byte, word))),
-        3 => drop(call!(w, node, mbm_node_clearTransmitBuffer(node))),
-        4 => drop(call!(w, node, mbm_node_beginTransmission(node, word))),
-        5 => {
+    let (byte, word) = (w.byte(), w.word());
+    match w.byte() % 7 {
+        0 => drop(call!(w, node, mbm_node_beginTransmission(node, word))),
+        1 => {
             for _ in 0..byte % 130 {
                 call!(w, node, mbm_node_send(node, word));
             }
         }
-        6 => drop(call!(w, node, mbm_node_send(node, u16::from(byte)))),
-        7 => drop(call!(w, node, mbm_node_send32(node, long))),
-        8 => {
+        2 => drop(call!(w, node, mbm_node_send(node, u16::from(byte)))),
+        3 => {
             for _ in 0..byte {
                 call!(w, node, mbm_node_sendBit(node, byte & 1));
             }
         }
-        9 => {
+        4 => {
             let count = call!(w, node, mbm_node_available(node));
             assert!(count <= 125, "{count} words to receive");
         }
-        10 => {
+        5 => {
             for _ in 0..byte % 8 {
                 call!(w, node, mbm_node_receive(node));
             }
-        }
-        choice @ (11 | 12) => {
-            let view = w.views.pick(w);
-            let spans = [span(view)];
-            let status = unchanged_if_refused(w, &spans, "a view of words", || match choice {
-                11 => call!(w, node, mbm_node_getResponseRegisters(node, word, view)),
-                _ => call!(w, node, mbm_node_getTransmitRegisters(node, word, view)),
-            });
-            is_status("a view of words", status);
         }
         _ => drop(call!(w, node, mbm_node_getExceptionCode(node))),
     }

@@ -153,8 +153,7 @@ fn look(w: &World, plan: *mut mbm_plan) {
         1 => get!(mbm_plan_getInteger(field, index)),
         2 => get!(mbm_plan_getInt32(field, index)),
         3 => get!(mbm_plan_getNumber(field, index)),
-        4 if index & 1 == 0 => get!(mbm_plan_getFloat(field, index)),
-        4 => get!(mbm_plan_getDouble(field, index)),
+        4 => get!(mbm_plan_getFloat(field, index)),
         5 => get!(mbm_plan_getRegisters(field)),
         6 => get!(mbm_plan_getRead(index)),
         _ => {

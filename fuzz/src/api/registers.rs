@@ -76,9 +76,8 @@ fn read(w: &World, view: *const mbm_registers) {
         };
     }
     let length = w.word();
-    match w.byte() % 15 {
+    match w.byte() % 14 {
         0 => get!(mbm_registers_getBit, byte % 20),
-        1 => get!(mbm_registers_getUint8, byte & 1),
         3 => get!(mbm_registers_getUint16, order),
         5 => get!(mbm_registers_getUint32, order),
         7 => get!(mbm_registers_getUint64, order),
@@ -111,19 +110,11 @@ fn read(w: &World, view: *const mbm_registers) {
                     view,
                     mbm_registers_getBytes(view, at, MBM_ORDER_ABCD, bytes, length)
                 ),
-                13 => {
+                _ => {
                     call!(
                         w,
                         view,
                         mbm_registers_getBytes(view, at, order, bytes, length)
-                    )
-                }
-                _ => {
-                    let equal = w.unset::<u8>();
-                    call!(
-                        w,
-                        view,
-                        mbm_registers_isEqual(view, at, bytes, length, equal)
                     )
                 }
             });
@@ -169,9 +160,7 @@ fn write(w: &World, view: *const mbm_registers) {
     let choice = w.byte() % 14;
     refused_changes_nothing(w, &[memory_of(view)], "a setter", || match choice {
         0 => call!(w, view, mbm_registers_setBit(view, at, byte % 20, byte & 1)),
-        1 => call!(w, view, mbm_registers_setUint8(view, at, byte & 1, byte)),
-        2 => call!(w, view, mbm_registers_setUint8(view, at, byte & 1, byte)),
-        3 => call!(w, view, mbm_registers_setUint16(view, at, order, word)),
+        1..=3 => call!(w, view, mbm_registers_setUint16(view, at, order, word)),
         4 => call!(w, view, mbm_registers_setUint16(view, at, order, word)),
         5 => call!(w, view, mbm_registers_setUint32(view, at, order, long)),
         6 => call!(w, view, mbm_registers_setUint32(view, at, order, long)),

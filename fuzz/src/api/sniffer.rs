@@ -62,8 +62,6 @@ fn set(w: &World, sniffer: *mut mbm_sniffer) {
             mbm_sniffer_setFrameTimeout(sniffer, u32::from(word))
         ),
     });
-    call!(w, sniffer, mbm_sniffer_getResponseTimeout(sniffer));
-    call!(w, sniffer, mbm_sniffer_getFrameTimeout(sniffer));
 }
 
 fn next(w: &World, sniffer: *mut mbm_sniffer) {

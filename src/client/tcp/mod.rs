@@ -75,11 +75,6 @@ impl<P, S> Tcp<P, S> {
         self.max_in_flight = most.max(1);
     }
 
-    /// How many requests may be in flight; 255 if [`Tcp::limit`] was not called.
-    pub fn most(&self) -> u8 {
-        self.max_in_flight
-    }
-
     fn clear(&mut self) {
         self.start = 0;
         self.end = 0;

@@ -28,12 +28,12 @@ pub unsafe extern "C" fn mbm_client_readExceptionStatus(
 /// Function 08: sends the words of `data`, and reads the same number of words into `reply`
 /// (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
 ///
-/// @param client   the object
-/// @param request  the request
-/// @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others,
-///                     which the standard reserves, and expects a response of one word; for
-///                     a response of another length use mbm_client_custom
-/// @param words  the number of words of `data`: 1; for sub-function 0, 1 to 125
+/// @param client       the object
+/// @param request      the request
+/// @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which
+///                     the standard reserves, and expects a response of one word; for a response
+///                     of another length use mbm_client_custom
+/// @param words        the number of words of `data`: 1; for sub-function 0, 1 to 125
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_diagnostics(
@@ -108,10 +108,10 @@ pub unsafe extern "C" fn mbm_client_reportServerId(
 /// Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
 /// 6.14).
 ///
-/// @param client   the object
-/// @param request  the request
-/// @param file  the file number, 1 to 65535
-/// @param record  the first record, 0 to 9999
+/// @param client    the object
+/// @param request   the request
+/// @param file      the file number, 1 to 65535
+/// @param record    the first record, 0 to 9999
 /// @param quantity  the number of records, 1 to 121
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
@@ -137,10 +137,10 @@ pub unsafe extern "C" fn mbm_client_readFileRecord(
 /// Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
 /// 6.15).
 ///
-/// @param client   the object
-/// @param request  the request
-/// @param file  the file number, 1 to 65535
-/// @param record  the first record, 0 to 9999
+/// @param client    the object
+/// @param request   the request
+/// @param file      the file number, 1 to 65535
+/// @param record    the first record, 0 to 9999
 /// @param quantity  the number of records, 1 to 122
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
@@ -159,57 +159,6 @@ pub unsafe extern "C" fn mbm_client_writeFileRecord(
             FunctionSpec::WRITE_FILE_RECORD,
             [GROUP, file.into(), record.into(), quantity.into()],
             Some(add_group),
-        )
-    }
-}
-
-/// Function 14 with several groups: reads records of several files, or of several ranges.
-/// `data` contains the sub-requests as on the wire, seven bytes each. `reply` receives the
-/// sub-responses as on the wire (V1.1b3, 6.14).
-///
-/// @param client   the object
-/// @param request  the request
-/// @param bytes  the number of bytes of `data`, 7 to 245, a multiple of 7
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readFileRecords(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    bytes: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::READ_FILE_RECORDS,
-            [bytes.into(), 0, 0, 0],
-            Some(|fields, words, _| fields.state.header.read_file_records(words[0] as u16)),
-        )
-    }
-}
-
-/// Function 15 with several groups: writes records of several files, or of several ranges.
-/// `data` contains the sub-requests as on the wire (V1.1b3, 6.15).
-///
-/// @param client   the object
-/// @param request  the request
-/// @param bytes  the number of bytes of `data`, 9 to 251
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_writeFileRecords(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    bytes: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::WRITE_FILE_RECORDS,
-            [bytes.into(), 0, 0, 0],
-            Some(|fields, words, _| fields.state.header.write_file_records(words[0] as u16)),
         )
     }
 }
@@ -237,8 +186,8 @@ pub unsafe extern "C" fn mbm_client_readFifoQueue(
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param code  the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
-/// @param object  the id of the first object to read
+/// @param code     the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
+/// @param object   the id of the first object to read
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
@@ -256,34 +205,6 @@ pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
             FunctionSpec::READ_DEVICE_IDENTIFICATION,
             [first.into(), second.into(), code.into(), 0],
             Some(|_, words, _| RequestHeader::check_code(words[2] as u8)),
-        )
-    }
-}
-
-/// Function 2B with any MEI type: sends the bytes of `data` after the MEI type, and reads the
-/// bytes after the MEI type of the response into `reply` (V1.1b3, 6.19). On RTU, silence ends
-/// the response.
-///
-/// @param client   the object
-/// @param request  the request
-/// @param meiType  the MEI type, for example MBM_MEI_CANOPEN
-/// @param bytes  the number of bytes of `data`, 0 to 251
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    meiType: u8,
-    bytes: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::ENCAPSULATED,
-            [usize::from(meiType) << 8, bytes.into(), 0, 0],
-            Some(|fields, words, _| fields.state.header.follow(words[1] as u16)),
         )
     }
 }
@@ -357,8 +278,8 @@ pub unsafe extern "C" fn mbm_client_custom(
 /// @param client    the object
 /// @param request   the request; if it is queued, its `data` then points into `body`
 /// @param function  the function code, 1 to 127
-/// @param body      the bytes after the function code; do not change them until the request
-///                  has ended; may be NULL if `bytes` is 0
+/// @param body      the bytes after the function code; do not change them until the request has
+///                  ended; may be NULL if `bytes` is 0
 /// @param bytes     the number of bytes of `body`, 0 to 252
 /// @return a status; see mbm_client_readCoils. Also those with which a server answers such a
 ///         request: MBM_ILLEGAL_DATA_VALUE if the length or a count in `body` is wrong,

@@ -98,7 +98,7 @@ int main(void)
         print("register ");
         print_number((uint16_t)(FIRST + i));
         print(": ");
-        print_number(mbm_node_getResponseBuffer(&meter, i));
+        print_number(response[i]);
         print("\n");
     }
     return 0;

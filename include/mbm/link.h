@@ -1,0 +1,212 @@
+/**
+ * @file mbm/link.h
+ * @brief A link: keeps the connection of a client open.
+ *
+ * Licence: MIT OR Apache-2.0. Generated from the source of mbm; do not edit. A part of
+ * mbm.h, at whose head are the rules of every function.
+ */
+
+#ifndef MBM_LINK_H
+#define MBM_LINK_H
+
+#include "client.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ==== Link: keeps a client's link open ============================================== */
+
+/** mbm_link_state: there is no link. The client opens it when the wait is over. */
+#define MBM_LINK_IS_DOWN 1u
+/** mbm_link_state: the connection is being made. */
+#define MBM_LINK_IS_CONNECTING 2u
+/** mbm_link_state: the link is open. */
+#define MBM_LINK_IS_UP 3u
+/** An event of a link: it is open now. The status is MBM_OK. */
+#define MBM_LINK_EVENT_CONNECTED 0u
+/** An event of a link: it was open and is lost. The status is MBM_LINK_LOST. */
+#define MBM_LINK_EVENT_LOST 1u
+/** An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
+ *  mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long. */
+#define MBM_LINK_EVENT_FAILED 2u
+
+/**
+ * A link that opens itself again when it was lost. It belongs to one client:
+ * mbm_client_poll polls both.
+ *
+ * You own the storage. Initialise it with MBM_INIT. It must stay where it is until
+ * mbm_link_end or until the client was begun again.
+ */
+typedef struct mbm_link {
+    /** Private. */
+    void *pointers[32];
+    /** Private. */
+    uint32_t words[21];
+} mbm_link;
+
+/**
+ * What has happened to a link. You may read and zero the counters at any time, but not from
+ * an interrupt; each wraps at 2^32.
+ */
+typedef struct mbm_linkCounters {
+    /** Calls of `connect` of mbm_linkHooks. */
+    uint32_t attempts;
+    /** Attempts that failed. */
+    uint32_t failed;
+    /** How often the link was opened, or found open by mbm_link_begin. */
+    uint32_t connected;
+    /** How often an open link was lost. */
+    uint32_t lost;
+} mbm_linkCounters;
+
+/**
+ * Gives a client a link, which mbm_client_poll keeps open from then on:
+ * - It notices the loss of the link also while the client has no request. For that, an idle
+ *   client reads the port in each poll and drops what it reads: late replies, noise, frames
+ *   of others. If something else reads the line, call mbm_client_suspend first.
+ * - It opens the link again, after a wait that grows with each attempt that fails.
+ * - When the link is lost, requests under way end with MBM_LINK_LOST, because the device may
+ *   have carried them out. The others end too, or wait: see mbm_link_setRequestsWait.
+ * - Requests that are under way when the link begins go on if `status` finds the link open, and
+ *   end with MBM_LINK_LOST if not. No byte of an ended request is sent over a new link.
+ *
+ * mbm_client_pollDelay returns when the next poll is due, for an idle client at most one
+ * second. A wait for bytes that also ends when the link is lost, as mbm_tcp_wait and
+ * mbm_tty_wait, finds the loss at once.
+ *
+ * In the first poll the link calls `status` to find out whether the link is open already, and
+ * `connect` if not. After a loss or a failed attempt it calls `disconnect`, once.
+ *
+ * Client and link must stay where they are, and must not be copied. A program does not also
+ * call mbm_client_reconnect.
+ *
+ * All settings of the link return to their defaults. The call may be repeated at any time,
+ * also with another client. A begin function of the client ends the link.
+ *
+ * @param link    the object; initialised with MBM_INIT before the first call
+ * @param client  the client, begun; it must not have another link
+ * @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
+ *                hooks must not use the client or the link: each function returns MBM_BUSY
+ * @return a status; MBM_NOT_INITIALISED if the client was not begun; MBM_BUSY also while the
+ *         client is suspended, and if it has another link
+ */
+uint8_t mbm_link_begin(struct mbm_link *link,
+                       struct mbm_client *client,
+                       const struct mbm_linkHooks *hooks);
+
+/**
+ * Ends a link. The client and its requests stay; the link itself stays open or closed as it
+ * is. If its callback has just reported a loss, open it anew before the client sends again: half
+ * a frame may have been sent. The storage is free, and begins anew with mbm_link_begin.
+ *
+ * @param link  the object; the client's storage must still be valid
+ * @return a status; MBM_BUSY also while the client is suspended
+ */
+uint8_t mbm_link_end(struct mbm_link *link);
+
+/**
+ * Closes the link and opens it again, at the next poll of the client and without a wait. Call
+ * it when you know better than the link: the network is back, the address has changed. Requests
+ * that are under way end with MBM_LINK_LOST; queued ones wait for this attempt.
+ *
+ * @param link  the object
+ * @return a status
+ */
+uint8_t mbm_link_reconnect(struct mbm_link *link);
+
+/**
+ * Sets the wait before an attempt to open the link. The first attempt after a loss waits for
+ * `delayMs`; each attempt that fails lets the wait grow. It starts anew when the link was open
+ * for as long as the last wait.
+ *
+ * @param link        the object
+ * @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
+ *                    mbm_client_setBackoff
+ * @param delayMs     the first wait in milliseconds, 0 to 65535; the default is 500
+ * @param maxDelayMs  the longest wait in milliseconds, 0 to 65535; the default is 30000
+ * @return a status
+ */
+uint8_t mbm_link_setBackoff(struct mbm_link *link,
+                            uint8_t backoff,
+                            uint32_t delayMs,
+                            uint32_t maxDelayMs);
+
+/**
+ * Shortens each wait before an attempt by a random part, so that many clients that lost their
+ * server together do not connect at the same time.
+ *
+ * @param link     the object
+ * @param percent  0 (the default) to 100: the largest part of the wait that is taken off
+ * @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only if
+ *                 `percent` is 0
+ * @param context  your pointer, passed to `random`; may be NULL
+ * @return a status
+ */
+uint8_t mbm_link_setJitter(struct mbm_link *link,
+                           uint8_t percent,
+                           uint32_t (*random)(void *context),
+                           void *context);
+
+/**
+ * Sets how long a connection may take to be made. Then the attempt has failed, with
+ * MBM_CONNECT_TIMED_OUT.
+ *
+ * @param link       the object
+ * @param timeoutMs  milliseconds, 1 to 1000000 (16 minutes); 0: as long as `status` returns
+ *                   MBM_PENDING. The default is 10000
+ * @return a status
+ */
+uint8_t mbm_link_setConnectTimeout(struct mbm_link *link, uint32_t timeoutMs);
+
+/**
+ * Sets whether requests wait for the link. By default they do not: while the link is down,
+ * every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took longer
+ * than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
+ * request again at once then polls without a pause: let it wait.) If requests wait, they stay
+ * in the queue until the link is open again or until you cancel them; their response timeout
+ * begins when they are sent. While a connection is being made, requests always wait.
+ *
+ * @param link  the object
+ * @param on    0 (the default) or 1
+ * @return a status
+ */
+uint8_t mbm_link_setRequestsWait(struct mbm_link *link, uint8_t on);
+
+/**
+ * Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
+ * attempt has failed.
+ *
+ * @param link      the object
+ * @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
+ *                  request may, and call every function on the link; NULL for none
+ * @param context   your pointer, passed to `callback`; may be NULL
+ * @return a status
+ */
+uint8_t mbm_link_setCallback(struct mbm_link *link,
+                             void (*callback)(void *context, uint8_t event, uint8_t status),
+                             void *context);
+
+/**
+ * Sets your storage for counters, in which the link counts from now on.
+ *
+ * @param link      the object
+ * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
+ * @return a status
+ */
+uint8_t mbm_link_setCounters(struct mbm_link *link, struct mbm_linkCounters *counters);
+
+/**
+ * Returns what a link is doing.
+ *
+ * @param link  the object
+ * @return MBM_LINK_IS_DOWN, MBM_LINK_IS_CONNECTING or MBM_LINK_IS_UP; 0 before the first poll,
+ *         and for an object that was never begun
+ */
+uint8_t mbm_link_state(const struct mbm_link *link);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif
+
+#endif  /* MBM_LINK_H */

@@ -1,0 +1,408 @@
+/**
+ * @file mbm/plan.h
+ * @brief A plan: the values that a client reads again and again.
+ *
+ * Licence: MIT OR Apache-2.0. Generated from the source of mbm; do not edit. A part of
+ * mbm.h, at whose head are the rules of every function.
+ */
+
+#ifndef MBM_PLAN_H
+#define MBM_PLAN_H
+
+#include "client.h"
+#include "values.h"
+
+#if defined(__AVR__) && __SIZEOF_DOUBLE__ != 4
+/* The archive has a double of 32 bits: what calls these must not link. */
+#define mbm_plan_getNumber mbm_plan_getNumber_wants_mdouble_32
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ==== Plan: a table of values that a client reads again and again =================== */
+
+/** A table of the data model (V1.1b3, 4.3): coils. The number of each table is that of the
+ *  function that reads it. */
+#define MBM_TABLE_COILS 1u
+/** The discrete inputs. */
+#define MBM_TABLE_DISCRETE_INPUTS 2u
+/** The holding registers. */
+#define MBM_TABLE_HOLDING_REGISTERS 3u
+/** The input registers. */
+#define MBM_TABLE_INPUT_REGISTERS 4u
+/** The type of a value: a coil or a discrete input, 0 or 1. */
+#define MBM_TYPE_BIT 1u
+/** One register, 0 to 65535. */
+#define MBM_TYPE_UINT16 2u
+/** One register, -32768 to 32767. */
+#define MBM_TYPE_INT16 3u
+/** Two registers. */
+#define MBM_TYPE_UINT32 4u
+/** Two registers, two's complement. */
+#define MBM_TYPE_INT32 5u
+/** Four registers. */
+#define MBM_TYPE_UINT64 6u
+/** Four registers, two's complement. */
+#define MBM_TYPE_INT64 7u
+/** Two registers, an IEEE 754 binary32. */
+#define MBM_TYPE_FLOAT 8u
+/** Four registers, an IEEE 754 binary64. */
+#define MBM_TYPE_DOUBLE 9u
+/** A text, two characters a register, which ends at its first NUL or with its field. */
+#define MBM_TYPE_TEXT 10u
+/** The longest interval of a field in milliseconds: a day. */
+#define MBM_PLAN_LONGEST_INTERVAL 86400000
+/** The most fields of one plan. */
+#define MBM_PLAN_MAX_FIELDS 16383
+
+/**
+ * A plan: a table of fields that a client reads from units again and again.
+ *
+ * You own the storage. Initialise it with MBM_INIT. Call mbm_plan_begin first. Use it from
+ * the thread that uses its client, and never from an interrupt. It stays where it is until
+ * mbm_plan_end.
+ */
+typedef struct mbm_plan {
+    /** Private. */
+    void *pointers[3];
+    /** Private. */
+    uint32_t words[4];
+} mbm_plan;
+
+/**
+ * A field of a plan: a value, or several of one type in a row, that a program wants from a
+ * unit again and again. A table of them may be constant.
+ */
+typedef struct mbm_planField {
+    /** The unit, 1 to 255. mbm_plan_begin refuses a greater number. */
+    uint16_t unit;
+    /** One of MBM_TABLE_... */
+    uint8_t table;
+    /** One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, another for registers. */
+    uint8_t type;
+    /** One of MBM_ORDER_...; MBM_ORDER_DEFAULT is MBM_ORDER_ABCD. */
+    uint8_t order;
+    /** The first bit or register, 0 to 65535, as on the wire. */
+    uint16_t address;
+    /** The number of values; of a text the number of characters. 0 means 1. */
+    uint16_t count;
+    /** The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL. */
+    uint32_t intervalMs;
+    /** mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
+     *  It is 0 for a text. */
+    int32_t multiplier;
+    /** They divide by this after that; 0 means 1. Not negative; 0 for a text. */
+    int32_t divisor;
+} mbm_planField;
+
+/**
+ * Storage of a plan, one for each field.
+ */
+typedef struct mbm_planPosition {
+    /** Private. */
+    uint32_t words[2];
+} mbm_planPosition;
+
+/**
+ * Storage of a plan, one for each read.
+ */
+typedef struct mbm_planRead {
+    /** Private. */
+    uint32_t words[8];
+} mbm_planRead;
+
+/**
+ * How much one read of a unit may request, if not as much as the plan's other reads.
+ */
+typedef struct mbm_planUnitLimits {
+    /** Bits, 1 to 2000; 0 means as `bitsPerRead` of the plan. */
+    uint16_t bitsPerRead;
+    /** Registers, 1 to 125; 0 means as `registersPerRead` of the plan. */
+    uint16_t registersPerRead;
+    /** The unit, 1 to 255. mbm_plan_begin refuses a greater number. */
+    uint16_t unit;
+} mbm_planUnitLimits;
+
+/**
+ * Addresses that no read of a plan may touch.
+ */
+typedef struct mbm_planExcludedRange {
+    /** The first address. */
+    uint16_t first;
+    /** The last address, not less than `first`. */
+    uint16_t last;
+    /** The unit, 1 to 255; 0 for every unit. mbm_plan_begin refuses a greater number. */
+    uint16_t unit;
+    /** One of MBM_TABLE_... */
+    uint8_t table;
+} mbm_planExcludedRange;
+
+/**
+ * What a plan is made of. It may be constant. It stays valid and as it is, with everything
+ * that it points to, for as long as the plan is used.
+ */
+typedef struct mbm_planSetup {
+    /** The fields, in any order. */
+    const struct mbm_planField *fields;
+    /** Storage: as many as fields. */
+    struct mbm_planPosition *positions;
+    /** Storage: as many as reads; there are never more reads than fields. */
+    struct mbm_planRead *reads;
+    /** Storage: the registers of all reads and the bits of all reads, 16 to a word. */
+    uint16_t *data;
+    /** Storage: the requests with which the plan reads, initialised with MBM_INIT; they are the
+     *  plan's alone. With one it sends one read after the other; more are for Modbus TCP, where
+     *  several may be under way at once. */
+    struct mbm_clientRequest *requests;
+    /** Units with limits of their own; NULL for none. */
+    const struct mbm_planUnitLimits *units;
+    /** Addresses that no read may touch; NULL for none. */
+    const struct mbm_planExcludedRange *excluded;
+    /** Optional: called by mbm_plan_poll for each field of a read that has ended, and for each
+     *  field of a unit that the plan takes for silent. It may call every function on the plan
+     *  and on the client. */
+    void (*update)(void *context, struct mbm_plan *plan, uint16_t field);
+    /** Handed to `update`. Yours, may be NULL. */
+    void *context;
+    /** How long the plan leaves a unit alone after a first request without an answer, in
+     *  milliseconds; each further one doubles it. 0 means 1000. */
+    uint32_t backoffMs;
+    /** The longest such time in milliseconds; 0 means 60000. */
+    uint32_t longestBackoffMs;
+    /** How many fields, 1 to MBM_PLAN_MAX_FIELDS. */
+    uint16_t fieldCount;
+    /** How many reads there is storage for. */
+    uint16_t readCount;
+    /** How many words there are in `data`. */
+    uint16_t dataWords;
+    /** The most bits that one read requests, 1 to 2000; 0 means 2000. */
+    uint16_t bitsPerRead;
+    /** The most bits between two fields that one read may cover as well. */
+    uint16_t bitGap;
+    /** The most registers that one read requests, 1 to 125; 0 means 125. */
+    uint16_t registersPerRead;
+    /** The most registers between two fields that one read may cover as well. */
+    uint16_t registerGap;
+    /** How many requests, 1 to 16. */
+    uint8_t requestCount;
+    /** How many units with limits of their own. */
+    uint8_t unitCount;
+    /** How many excluded ranges. */
+    uint8_t excludedCount;
+} mbm_planSetup;
+
+/**
+ * A read of a plan: one request that it repeats.
+ */
+typedef struct mbm_planReadInfo {
+    /** The time from one read to the next, in milliseconds. */
+    uint32_t intervalMs;
+    /** The first bit or register, as on the wire. */
+    uint16_t address;
+    /** How many bits or registers. */
+    uint16_t quantity;
+    /** The unit. */
+    uint8_t unit;
+    /** One of MBM_TABLE_... */
+    uint8_t table;
+    /** How it ended last; MBM_PENDING before it has ended once. */
+    uint8_t status;
+} mbm_planReadInfo;
+
+/**
+ * Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
+ *
+ * Fields with the same unit, table and interval are read together. Of all ways to cover them
+ * within the limits, the plan takes one with the fewest reads, and of these one with the fewest
+ * bits or registers. All reads are due at once; the rounds after the first are spread, so that
+ * reads of one interval follow each other at equal distances.
+ *
+ * You may call it again at any time, also from `update`, but not from a hook of the client's
+ * port. The plan then first ends, as by mbm_plan_end, unless the call is refused for NULL, a
+ * count out of range, a unit above 255 of limits or of an excluded range, or a client that was
+ * never begun.
+ *
+ * @param plan    the object; initialised with MBM_INIT before the first call
+ * @param client  the client that sends the reads, begun; the program may use it too, and other
+ *                plans
+ * @param setup   table, limits and storage; it stays valid and as it is until the plan ends
+ * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
+ * @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or
+ *         order, a type that the table does not have, a unit above 255, an interval out of
+ *         range, a negative divisor or a scale of a text; MBM_BROADCAST_NOT_ALLOWED for unit 0;
+ *         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range;
+ *         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be; MBM_FIELDS_OVERLAP for the
+ *         later of two that share an address; MBM_BUFFER_TOO_SMALL for the first without
+ *         storage for its read or its data. After such a status the plan has ended, and
+ *         `positions` and `reads` may be changed. MBM_INVALID_ARGUMENT also for a unit above
+ *         255 of limits or of an excluded range
+ */
+uint8_t mbm_plan_begin(struct mbm_plan *plan,
+                       struct mbm_client *client,
+                       const struct mbm_planSetup *setup,
+                       uint16_t *field);
+
+/**
+ * Ends a plan: gives its requests up and lets go of its storage.
+ *
+ * @param plan  the object
+ * @return a status
+ */
+uint8_t mbm_plan_end(struct mbm_plan *plan);
+
+/**
+ * Takes the replies that have arrived, calls `update` for the fields of each read that has
+ * ended, and queues the reads that are due, as far as there are requests for them. It does not
+ * poll the client: call mbm_client_poll after it.
+ *
+ * @param plan  the object
+ * @return a status
+ */
+uint8_t mbm_plan_poll(struct mbm_plan *plan);
+
+/**
+ * How long mbm_plan_poll has nothing to do, so that a program may sleep until then or until
+ * mbm_client_pollDelay is over, whichever comes first.
+ *
+ * @param plan  the object
+ * @return microseconds; 0 means poll now, and is returned within a hook of the client's port;
+ *         0xFFFFFFFF if there is nothing to do before a request of the client has ended, and
+ *         for an object that was never begun
+ */
+uint32_t mbm_plan_pollDelay(struct mbm_plan *plan);
+
+/**
+ * How the last read of a field ended, and how old its value is. The functions that get a value
+ * return the last one that was read, also after a read has failed: this says whether it is
+ * still worth something.
+ *
+ * @param plan   the object
+ * @param field  the index of the field
+ * @param ageMs  gets the milliseconds since the value arrived, 2147483647 (24 days) at most;
+ *               0xFFFFFFFF if none ever did; may be NULL
+ * @return MBM_PENDING before the first read has ended, then as it ended: MBM_OK, an exception
+ *         of the device, or a failure such as MBM_RESPONSE_TIMED_OUT
+ */
+uint8_t mbm_plan_getStatus(struct mbm_plan *plan, uint16_t field, uint32_t *ageMs);
+
+/**
+ * A value as an integer: multiplied and divided as its field says, rounded to the nearest,
+ * halves away from 0.
+ *
+ * @param plan   the object
+ * @param field  the index of the field, of a bit or an integer
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number
+ * @return a status; MBM_OUT_OF_RANGE if it is not in the range of `value`; MBM_INVALID_ARGUMENT
+ *         for a float or a text; if no value has arrived yet the status that mbm_plan_getStatus
+ *         returns
+ */
+uint8_t mbm_plan_getInteger(const struct mbm_plan *plan,
+                            uint16_t field,
+                            uint16_t index,
+                            int64_t *value);
+
+/**
+ * As mbm_plan_getInteger, but with 32 bits throughout: less code on a microcontroller.
+ *
+ * @param plan   the object
+ * @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number
+ * @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half of
+ *         the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of 64
+ *         bits
+ */
+uint8_t mbm_plan_getInt32(const struct mbm_plan *plan,
+                          uint16_t field,
+                          uint16_t index,
+                          int32_t *value);
+
+/**
+ * A bit, an integer or a float as a double: multiplied and divided as its field says, and
+ * rounded once, to the nearest. On AVR, where C's double has 32 bits, it is rounded to these after
+ * that.
+ *
+ * @param plan   the object
+ * @param field  the index of the field
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number; a float that is infinite or not a number stays so
+ * @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text
+ */
+uint8_t mbm_plan_getNumber(const struct mbm_plan *plan,
+                           uint16_t field,
+                           uint16_t index,
+                           double *value);
+
+/**
+ * A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
+ * to the nearest; without the scale of its field.
+ *
+ * @param plan   the object
+ * @param field  the index of the field
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number
+ * @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT for other types
+ */
+uint8_t mbm_plan_getFloat(const struct mbm_plan *plan,
+                          uint16_t field,
+                          uint16_t index,
+                          float *value);
+
+/**
+ * A text, which ends at its first NUL or with its field. In an order with the low byte first,
+ * the first of two characters is a register's low byte.
+ *
+ * @param plan      the object
+ * @param field     the index of the field, of type MBM_TYPE_TEXT
+ * @param text      gets the text and a NUL
+ * @param capacity  bytes of `text`; the field's count and one are always enough
+ * @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL if the text does not fit
+ */
+uint8_t mbm_plan_getText(const struct mbm_plan *plan,
+                         uint16_t field,
+                         char *text,
+                         uint16_t capacity);
+
+/**
+ * The registers of a field as they were read, for mbm_registers_get... functions, in the order
+ * of the field. It copies nothing: the next reply changes what it sees.
+ *
+ * @param plan       the object
+ * @param field      the index of the field, of registers
+ * @param registers  the view to fill in
+ * @return as mbm_plan_getInteger
+ */
+uint8_t mbm_plan_getRegisters(const struct mbm_plan *plan,
+                              uint16_t field,
+                              struct mbm_registers *registers);
+
+/**
+ * Makes the read of a field due at once, for a value that is wanted now. A unit that does not
+ * answer is left alone all the same.
+ *
+ * @param plan   the object
+ * @param field  the index of the field
+ * @return a status
+ */
+uint8_t mbm_plan_refresh(struct mbm_plan *plan, uint16_t field);
+
+/**
+ * The reads that the plan has made of the fields: one request each.
+ *
+ * @param plan   the object
+ * @param index  0 for the first read
+ * @param read   gets the read
+ * @return a status; MBM_INVALID_ARGUMENT behind the last read
+ */
+uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
+                         uint16_t index,
+                         struct mbm_planReadInfo *read);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif
+
+#endif  /* MBM_PLAN_H */

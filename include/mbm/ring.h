@@ -1,0 +1,106 @@
+/**
+ * @file mbm/ring.h
+ * @brief The ring: bytes from an interrupt to the main loop.
+ *
+ * Licence: MIT OR Apache-2.0. Generated from the source of mbm; do not edit. A part of
+ * mbm.h, at whose head are the rules of every function.
+ */
+
+#ifndef MBM_RING_H
+#define MBM_RING_H
+
+#include "base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ==== Ring: bytes from an interrupt to the main loop ================================ */
+
+/**
+ * A receive ring between an interrupt handler and the main loop.
+ *
+ * The writer, which is an interrupt handler, a DMA callback or a thread, puts bytes in
+ * with mbm_ring_put or mbm_ring_write. The reader, which is the main loop in the `read`
+ * hook of a port, takes them out with mbm_ring_read. Each may interrupt the other at any
+ * point. A ring has only one writer and only one reader at a time. The functions never
+ * disable interrupts.
+ */
+typedef struct mbm_ring {
+    /** Private. */
+    uint8_t *bytes;
+    /** Private. */
+    uint16_t size;
+    /** Private. */
+    uint16_t positions[3];
+} mbm_ring;
+
+/**
+ * Begins an empty ring over your storage. Neither writer nor reader may use the ring
+ * meanwhile.
+ *
+ * @param ring   the object
+ * @param bytes  your storage; it must stay valid for as long as the ring is used
+ * @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte less
+ * @return a status
+ */
+uint8_t mbm_ring_begin(struct mbm_ring *ring, uint8_t *bytes, uint16_t size);
+
+/**
+ * Puts one byte in. The writer calls it, also from an interrupt.
+ *
+ * @param ring  the object
+ * @param byte  the received byte
+ * @return 1; 0 if the ring was full: mbm_ring_lost counts the byte
+ */
+uint8_t mbm_ring_put(struct mbm_ring *ring, uint8_t byte);
+
+/**
+ * Puts bytes in, in order. The writer calls it, also from an interrupt.
+ *
+ * @param ring    the object
+ * @param bytes   the received bytes; NULL only if `length` is 0
+ * @param length  the number of bytes
+ * @return the number of bytes that the ring took; mbm_ring_lost counts the others
+ */
+uint16_t mbm_ring_write(struct mbm_ring *ring, const uint8_t *bytes, uint16_t length);
+
+/**
+ * Takes bytes out, in order, without waiting. The reader calls it.
+ *
+ * @param ring      the object
+ * @param bytes     receives the bytes; NULL only if `capacity` is 0
+ * @param capacity  the number of bytes that `bytes` can hold
+ * @return the number of bytes taken out; 0 if the ring was empty
+ */
+uint16_t mbm_ring_read(struct mbm_ring *ring, uint8_t *bytes, uint16_t capacity);
+
+/**
+ * Returns how many bytes mbm_ring_read can take out now. The reader calls it.
+ *
+ * @param ring  the object
+ * @return the number of bytes; 0 also if the ring was never begun
+ */
+uint16_t mbm_ring_available(const struct mbm_ring *ring);
+
+/**
+ * Discards all bytes in the ring. The reader calls it.
+ *
+ * @param ring  the object
+ */
+void mbm_ring_clear(struct mbm_ring *ring);
+
+/**
+ * Returns how many bytes were lost because the ring was full, since mbm_ring_begin.
+ * Writer and reader may call it.
+ *
+ * @param ring  the object
+ * @return the number of bytes; it wraps at 65536, on an AVR at 256
+ */
+uint16_t mbm_ring_lost(const struct mbm_ring *ring);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif
+
+#endif  /* MBM_RING_H */

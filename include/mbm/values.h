@@ -1,0 +1,518 @@
+/**
+ * @file mbm/values.h
+ * @brief Values: registers and bits as numbers and texts.
+ *
+ * Licence: MIT OR Apache-2.0. Generated from the source of mbm; do not edit. A part of
+ * mbm.h, at whose head are the rules of every function.
+ */
+
+#ifndef MBM_VALUES_H
+#define MBM_VALUES_H
+
+#include "base.h"
+
+#if defined(__AVR__) && __SIZEOF_DOUBLE__ != 4
+/* The archive has a double of 32 bits: what calls these must not link. */
+#define mbm_registers_getDouble mbm_registers_getDouble_wants_mdouble_32
+#define mbm_registers_setDouble mbm_registers_setDouble_wants_mdouble_32
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ==== Values: registers and bits as numbers, in words or bytes ====================== */
+
+/** Passed to a function: use the order of the mbm_registers. As that order itself:
+ *  MBM_ORDER_ABCD. */
+#define MBM_ORDER_DEFAULT 0u
+/** High word first, high byte first, as most devices do. A is the most significant byte.
+ *  Example: 2923517522, which is 0xAE415652, is transmitted as AE41 5652 (hex). */
+#define MBM_ORDER_ABCD 1u
+/** Low word first, high byte first. The example is transmitted as 5652 AE41. */
+#define MBM_ORDER_CDAB 2u
+/** High word first, low byte first. The example is transmitted as 41AE 5256. */
+#define MBM_ORDER_BADC 3u
+/** Low word first, low byte first. The example is transmitted as 5256 41AE. */
+#define MBM_ORDER_DCBA 4u
+/** mbm_registers.kind: words that may only be read, for example the response words of
+ *  mbm_node. */
+#define MBM_REGISTERS_OF_WORDS 1u
+/** mbm_registers.kind: bytes that may only be read, the high byte of each register first. */
+#define MBM_REGISTERS_OF_BYTES 2u
+/** mbm_registers.kind: words that may be read and written. */
+#define MBM_REGISTERS_INTO_WORDS 3u
+/** mbm_registers.kind: bytes that may be read and written, the high byte of each register
+ *  first. */
+#define MBM_REGISTERS_INTO_BYTES 4u
+
+/**
+ * A view of consecutive registers, with the addresses that the device gives them. The
+ * view owns nothing: `data` points to memory of the program.
+ *
+ * mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in. You may also
+ * set each field yourself. The get and set functions do not change the view. Several
+ * threads may use one view at the same time as long as none of them writes the registers.
+ * They return MBM_ILLEGAL_DATA_ADDRESS if a register that they need is not in the view.
+ */
+typedef struct mbm_registers {
+    /** The words or bytes; `kind` says which. If it is NULL, every function returns
+     *  MBM_NOT_INITIALISED. */
+    const void *data;
+    /** The device's address of the first register. */
+    uint16_t first;
+    /** How many registers; `first + count` is at most 65536. */
+    uint16_t count;
+    /** One of MBM_REGISTERS_... */
+    uint8_t kind;
+    /** One of MBM_ORDER_...: the order for calls with MBM_ORDER_DEFAULT. */
+    uint8_t order;
+} mbm_registers;
+
+/**
+ * Packs coils into bytes for a write. The first coil goes into the lowest bit of the
+ * first byte (V1.1b3, 6.11). Unused bits of the last byte become 0; the bytes after it do
+ * not change.
+ *
+ * @param coils     one byte for each coil: 0 is off, any other value is on
+ * @param quantity  the number of coils, 0 to 65535
+ * @param bytes     receives the bits, 8 in each byte
+ * @param length    the number of bytes that `bytes` can hold
+ * @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
+ */
+uint8_t mbm_bits_pack(const uint8_t *coils,
+                      uint16_t quantity,
+                      uint8_t *bytes,
+                      uint16_t length);
+
+/**
+ * Unpacks the coils or discrete inputs that a read returned in bytes (V1.1b3, 6.1).
+ *
+ * @param bytes     the bits, 8 in each byte; the first coil is the lowest bit
+ * @param length    the number of bytes
+ * @param coils     receives one byte for each coil, 0 or 1
+ * @param quantity  the number of coils, 0 to 65535
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if `bytes` has fewer bits than `quantity`
+ */
+uint8_t mbm_bits_unpack(const uint8_t *bytes,
+                        uint16_t length,
+                        uint8_t *coils,
+                        uint16_t quantity);
+
+/**
+ * Gets the state of one coil or discrete input of a read, by its address in the device.
+ *
+ * @param bytes     the bits of the read, 8 in each byte; the first coil is the lowest bit
+ * @param first     the address of the first coil of the read
+ * @param quantity  the number of coils that were read; `bytes` holds that many bits
+ * @param address   the address of the coil
+ * @param on        receives 0 or 1
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
+ *         passes address 65535
+ */
+uint8_t mbm_bits_isSet(const uint8_t *bytes,
+                       uint16_t first,
+                       uint16_t quantity,
+                       uint16_t address,
+                       uint8_t *on);
+
+/**
+ * Sets one coil of a write, by its address in the device. The other coils do not change.
+ *
+ * @param bytes     the bits of the write, 8 in each byte; the first coil is the lowest bit
+ * @param first     the address of the first coil of the write
+ * @param quantity  the number of coils of the write; `bytes` holds that many bits
+ * @param address   the address of the coil
+ * @param on        0 is off, any other value is on
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
+ *         passes address 65535
+ */
+uint8_t mbm_bits_set(uint8_t *bytes,
+                     uint16_t first,
+                     uint16_t quantity,
+                     uint16_t address,
+                     uint8_t on);
+
+/**
+ * As mbm_bits_pack, but into words, 16 bits in each word; for example the transmit words
+ * of a node.
+ *
+ * @param coils     one byte for each coil: 0 is off, any other value is on
+ * @param quantity  the number of coils, 0 to 65535
+ * @param words     receives the bits, 16 in each word
+ * @param length    the number of words that `words` can hold
+ * @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
+ */
+uint8_t mbm_bits_packWords(const uint8_t *coils,
+                           uint16_t quantity,
+                           uint16_t *words,
+                           uint16_t length);
+
+/**
+ * As mbm_bits_unpack, but from words, for example the response words of a node.
+ *
+ * @param words     the bits, 16 in each word; the first coil is the lowest bit
+ * @param length    the number of words
+ * @param coils     receives one byte for each coil, 0 or 1
+ * @param quantity  the number of coils, 0 to 65535
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if `words` has fewer bits than `quantity`
+ */
+uint8_t mbm_bits_unpackWords(const uint16_t *words,
+                             uint16_t length,
+                             uint8_t *coils,
+                             uint16_t quantity);
+
+/**
+ * As mbm_bits_isSet, but in words, for example the response words of a node.
+ *
+ * @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
+ * @param first     the address of the first coil of the read
+ * @param quantity  the number of coils that were read; `words` holds that many bits
+ * @param address   the address of the coil
+ * @param on        receives 0 or 1
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
+ *         passes address 65535
+ */
+uint8_t mbm_bits_isSetInWords(const uint16_t *words,
+                              uint16_t first,
+                              uint16_t quantity,
+                              uint16_t address,
+                              uint8_t *on);
+
+/**
+ * As mbm_bits_set, but in words, for example the transmit words of a node.
+ *
+ * @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
+ * @param first     the address of the first coil of the write
+ * @param quantity  the number of coils of the write; `words` holds that many bits
+ * @param address   the address of the coil
+ * @param on        0 is off, any other value is on
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
+ *         passes address 65535
+ */
+uint8_t mbm_bits_setInWords(uint16_t *words,
+                            uint16_t first,
+                            uint16_t quantity,
+                            uint16_t address,
+                            uint8_t on);
+
+/**
+ * Fills in a view of words that were read as registers. The order is MBM_ORDER_ABCD
+ * until you set `registers->order`. Nothing is copied: the view always shows the present
+ * words.
+ *
+ * @param registers  the view to fill in; without data after an error
+ * @param words      the words, for example the response words of mbm_node; must stay valid
+ *                   while the view is used. NULL only if `count` is 0
+ * @param count      how many words
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535
+ */
+uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
+                              const uint16_t *words,
+                              uint16_t count,
+                              uint16_t first);
+
+/**
+ * As mbm_registers_ofWords, for the data bytes of a reply or a request.
+ *
+ * @param registers  the view to fill in; without data after an error
+ * @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must stay
+ *                   valid while the view is used
+ * @param length     how many bytes, an even number
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return a status; see mbm_registers_ofWords. MBM_INVALID_ARGUMENT for an odd length
+ */
+uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
+                              const uint8_t *bytes,
+                              uint16_t length,
+                              uint16_t first);
+
+/**
+ * As mbm_registers_ofWords, for words that you also write, for example the transmit
+ * words of mbm_node.
+ *
+ * @param registers  the view to fill in; without data after an error
+ * @param words      the words to write; must stay valid while the view is used
+ * @param count      how many words
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return a status; see mbm_registers_ofWords
+ */
+uint8_t mbm_registers_intoWords(struct mbm_registers *registers,
+                                uint16_t *words,
+                                uint16_t count,
+                                uint16_t first);
+
+/**
+ * As mbm_registers_ofBytes, for bytes that you also write.
+ *
+ * @param registers  the view to fill in; without data after an error
+ * @param bytes      the bytes to write; must stay valid while the view is used
+ * @param length     how many bytes, an even number
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return a status; see mbm_registers_ofBytes
+ */
+uint8_t mbm_registers_intoBytes(struct mbm_registers *registers,
+                                uint8_t *bytes,
+                                uint16_t length,
+                                uint16_t first);
+
+/**
+ * Reads one bit of a register.
+ *
+ * @param registers  the registers
+ * @param address    the device's address of the register
+ * @param bit        0, the least significant, to 15
+ * @param on         receives 0 or 1
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
+                             uint16_t address,
+                             uint8_t bit,
+                             uint8_t *on);
+
+/**
+ * Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
+ * int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.
+ *
+ * @param registers  the registers
+ * @param address    the device's address of the register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_getUint16(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint16_t *value);
+
+/**
+ * Reads a number of two registers, 0 to 4294967295. For a signed number (two's
+ * complement), pass a pointer to an int32_t, cast to uint32_t *.
+ *
+ * @param registers  the registers
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_getUint32(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint32_t *value);
+
+/**
+ * Reads a number of four registers. For a signed number, pass a pointer to an int64_t,
+ * cast to uint64_t *.
+ *
+ * @param registers  the registers
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_getUint64(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint64_t *value);
+
+/**
+ * Reads a float of two registers, an IEEE 754 binary32. Its bits are copied, also those
+ * of a NaN.
+ *
+ * @param registers  the registers
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_getFloat(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               float *value);
+
+/**
+ * Reads a double of four registers, an IEEE 754 binary64. Its bits are copied. On AVR,
+ * where a double of C has 32 bits (-mdouble=32), the number is rounded to the nearest.
+ *
+ * @param registers  the registers
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_getDouble(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                double *value);
+
+/**
+ * Reads a text. It ends at its first NUL or at the end of its field.
+ *
+ * The registers of a text follow each other in every order. In an order with the low
+ * byte first, the first of two characters is the low byte of a register. Characters are
+ * copied without a check, also if they are not ASCII.
+ *
+ * @param registers  the registers
+ * @param address    the device's address of the first register of the field
+ * @param length     length of the field in bytes, two for each register; an odd length ends
+ *                   with the first character of a register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param text       receives the text and a NUL
+ * @param capacity   size of `text` in bytes; `length + 1` are always enough
+ * @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if `text` is
+ */
+uint8_t mbm_registers_getString(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint16_t length,
+                                uint8_t order,
+                                char *text,
+                                uint16_t capacity);
+
+/**
+ * Reads raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register
+ * is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a
+ * device that swaps the bytes of its registers.
+ *
+ * @param registers  the registers
+ * @param address    the device's address of the first register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param bytes      receives the bytes; must not overlap the registers
+ * @param length     how many bytes, two for each register; may be odd
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               uint8_t *bytes,
+                               uint16_t length);
+
+/**
+ * Writes one bit of a register; the other bits do not change.
+ *
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the register
+ * @param bit        0, the least significant, to 15
+ * @param on         0 for off, anything else for on
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
+                             uint16_t address,
+                             uint8_t bit,
+                             uint8_t on);
+
+/**
+ * Writes a number into one register. The order of words has no effect; the order of
+ * bytes has.
+ *
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_setUint16(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint16_t value);
+
+/**
+ * Writes a number into two registers.
+ *
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_setUint32(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint32_t value);
+
+/**
+ * Writes a number into four registers.
+ *
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      points to the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_setUint64(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                const uint64_t *value);
+
+/**
+ * Writes a float into two registers, as an IEEE 754 binary32. Its bits are copied.
+ *
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      points to the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_setFloat(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               const float *value);
+
+/**
+ * Writes a double into four registers, as an IEEE 754 binary64. On AVR, where a double
+ * of C has 32 bits (-mdouble=32), it is converted without loss.
+ *
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      points to the number
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_setDouble(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                const double *value);
+
+/**
+ * Writes a text into a field and fills the rest of the field with NULs, in the layout
+ * that mbm_registers_getString reads.
+ *
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first register of the field
+ * @param length     length of the field in bytes, two for each register; if it is odd, the byte
+ *                   after the field becomes 0 too
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param text       the text; ends with a NUL, which need not fit into the field
+ * @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if the text is longer than the
+ *         field
+ */
+uint8_t mbm_registers_setString(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint16_t length,
+                                uint8_t order,
+                                const char *text);
+
+/**
+ * Writes raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each
+ * register is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low
+ * byte, for a device that swaps the bytes of its registers.
+ *
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param bytes      the bytes; must not overlap the registers
+ * @param length     how many bytes, two for each register; if it is odd, the other byte of the
+ *                   last register does not change
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               const uint8_t *bytes,
+                               uint16_t length);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif
+
+#endif  /* MBM_VALUES_H */
