@@ -87,8 +87,7 @@ pub unsafe extern "C" fn mbm_bits_pack(
     bytes: *mut u8,
     length: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { pack(coils, quantity, bytes, length) }
+    pack(coils, quantity, bytes, length)
 }
 
 /// Unpacks the coils or discrete inputs that a read returned in bytes (V1.1b3, 6.1).
@@ -105,8 +104,7 @@ pub unsafe extern "C" fn mbm_bits_unpack(
     coils: *mut u8,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { unpack(bytes, length, coils, quantity) }
+    unpack(bytes, length, coils, quantity)
 }
 
 /// Gets the state of one coil or discrete input of a read, by its address in the device.
@@ -126,8 +124,7 @@ pub unsafe extern "C" fn mbm_bits_isSet(
     address: u16,
     on: *mut u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { is_set(bytes, first, quantity, address, on) }
+    is_set(bytes, first, quantity, address, on)
 }
 
 /// Sets one coil of a write, by its address in the device. The other coils do not change.
@@ -147,8 +144,7 @@ pub unsafe extern "C" fn mbm_bits_set(
     address: u16,
     on: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { set(bytes, first, quantity, address, on) }
+    set(bytes, first, quantity, address, on)
 }
 
 /// As mbm_bits_pack, but into words, 16 bits in each word; for example the transmit words
@@ -166,8 +162,7 @@ pub unsafe extern "C" fn mbm_bits_packWords(
     words: *mut u16,
     length: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { pack(coils, quantity, words, length) }
+    pack(coils, quantity, words, length)
 }
 
 /// As mbm_bits_unpack, but from words, for example the response words of a node.
@@ -184,8 +179,7 @@ pub unsafe extern "C" fn mbm_bits_unpackWords(
     coils: *mut u8,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { unpack(words, length, coils, quantity) }
+    unpack(words, length, coils, quantity)
 }
 
 /// As mbm_bits_isSet, but in words, for example the response words of a node.
@@ -205,8 +199,7 @@ pub unsafe extern "C" fn mbm_bits_isSetInWords(
     address: u16,
     on: *mut u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { is_set(words, first, quantity, address, on) }
+    is_set(words, first, quantity, address, on)
 }
 
 /// As mbm_bits_set, but in words, for example the transmit words of a node.
@@ -226,6 +219,5 @@ pub unsafe extern "C" fn mbm_bits_setInWords(
     address: u16,
     on: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { set(words, first, quantity, address, on) }
+    set(words, first, quantity, address, on)
 }

@@ -161,8 +161,7 @@ pub unsafe extern "C" fn mbm_frame_parse(
         }
         Err(refused) => refused,
     };
-    // SAFETY: as the header demands.
-    unsafe { put(packet, found) };
+    put(packet, found);
     status.code()
 }
 
@@ -190,21 +189,18 @@ pub unsafe extern "C" fn mbm_frame_exception(
     capacity: u16,
     length: *mut u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let build = || {
-            let request = get(request).filter(|packet| packet.kind == MBM_PACKET_REQUEST);
-            let request = request.ok_or(Status::INVALID_ARGUMENT)?;
-            let format = format(framing, |_| None)?;
-            let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
-            let buffer = buffer.ok_or(Status::INVALID_ARGUMENT)?;
-            let code = Status::from_code(code);
-            let framing = format.framing.ok_or(Status::INVALID_ARGUMENT)?;
-            let exception = Exception::new(framing, request.head()?, code)?;
-            exception.emit(framing, format.end, buffer)
-        };
-        put_length(length, build())
-    }
+    let build = || {
+        let request = get(request).filter(|packet| packet.kind == MBM_PACKET_REQUEST);
+        let request = request.ok_or(Status::INVALID_ARGUMENT)?;
+        let format = format(framing, |_| None)?;
+        let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
+        let buffer = buffer.ok_or(Status::INVALID_ARGUMENT)?;
+        let code = Status::from_code(code);
+        let framing = format.framing.ok_or(Status::INVALID_ARGUMENT)?;
+        let exception = Exception::new(framing, request.head()?, code)?;
+        exception.emit(framing, format.end, buffer)
+    };
+    put_length(length, build())
 }
 
 /// Computes the length of a frame from its first bytes.
@@ -233,20 +229,17 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
     have: u16,
     expected: *mut mbm_length,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let measure = || {
-            let pdu_kind = side(kind)?;
-            let bytes = array_or_empty(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
-            let format = format(framing, |framing| function(framing, bytes))?;
-            let own = format.own.as_slice();
-            match format.framing {
-                Some(framing) => length::expected(framing, pdu_kind, bytes, format.end, own),
-                None => pdu_length(pdu_kind, bytes, own),
-            }
-        };
-        put_expected(expected, measure())
-    }
+    let measure = || {
+        let pdu_kind = side(kind)?;
+        let bytes = array_or_empty(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
+        let format = format(framing, |framing| function(framing, bytes))?;
+        let own = format.own.as_slice();
+        match format.framing {
+            Some(framing) => length::expected(framing, pdu_kind, bytes, format.end, own),
+            None => pdu_length(pdu_kind, bytes, own),
+        }
+    };
+    put_expected(expected, measure())
 }
 
 /// The length of a PDU, from its first bytes.
@@ -278,20 +271,17 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
     request: *const mbm_packet,
     expected: *mut mbm_length,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let measure = || {
-            let packet = get(request).ok_or(Status::INVALID_ARGUMENT)?;
-            let format = format(framing, |_| Some(packet.function))?;
-            let own = format.own.as_slice();
-            let unit = packet.head()?.unit;
-            reply_length(&packet, own, |request| match format.framing {
-                Some(framing) => length::of_reply(framing, unit, request, own),
-                None => request.response_length(own),
-            })
-        };
-        put_expected(expected, measure())
-    }
+    let measure = || {
+        let packet = get(request).ok_or(Status::INVALID_ARGUMENT)?;
+        let format = format(framing, |_| Some(packet.function))?;
+        let own = format.own.as_slice();
+        let unit = packet.head()?.unit;
+        reply_length(&packet, own, |request| match format.framing {
+            Some(framing) => length::of_reply(framing, unit, request, own),
+            None => request.response_length(own),
+        })
+    };
+    put_expected(expected, measure())
 }
 
 /// Decides whether bytes look like the start of a Modbus TCP frame, a request or a
@@ -315,15 +305,12 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
     allowUnknown: u8,
     expected: *mut u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let bytes = array_or_empty(bytes, have.into()).filter(|_| !expected.is_null());
-        let length = match bytes {
-            Some(bytes) => length::looks_like_tcp(bytes, allowUnknown != 0, &[]),
-            None => Err(Status::INVALID_ARGUMENT),
-        };
-        put_length(expected, length)
-    }
+    let bytes = array_or_empty(bytes, have.into()).filter(|_| !expected.is_null());
+    let length = match bytes {
+        Some(bytes) => length::looks_like_tcp(bytes, allowUnknown != 0, &[]),
+        None => Err(Status::INVALID_ARGUMENT),
+    };
+    put_length(expected, length)
 }
 
 /// Computes the CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). A frame carries
@@ -336,8 +323,7 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
 /// @return the CRC; 0xFFFF if `bytes` is NULL or `length` is 0
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_crc16(bytes: *const u8, length: u16) -> u16 {
-    // SAFETY: as the header demands.
-    let bytes = unsafe { array(bytes, length.into()) };
+    let bytes = array(bytes, length.into());
     let crc = bytes.map_or(Crc16::START, crc16);
     u16::from_le_bytes(crc.to_bytes())
 }
@@ -351,6 +337,5 @@ pub unsafe extern "C" fn mbm_frame_crc16(bytes: *const u8, length: u16) -> u16 {
 /// @return the LRC; 0 if `bytes` is NULL or `length` is 0
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_lrc(bytes: *const u8, length: u16) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { array(bytes, length.into()) }.map_or(0, lrc)
+    array(bytes, length.into()).map_or(0, lrc)
 }

@@ -12,9 +12,16 @@
 //! cbindgen copies the comments into `include/mbm/*.h`, so they are written for C programmers.
 
 #![no_std]
-#![warn(missing_docs, clippy::indexing_slicing, clippy::unwrap_used)]
+#![warn(
+    missing_docs,
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    clippy::undocumented_unsafe_blocks
+)]
 #![allow(non_camel_case_types, non_snake_case)]
-// The safety rules are the same for every function: see the rules above.
+// The safety rules are the same for every exported function: see the rules above. Its body relies on
+// what its comment demands of the C program; a block with a SAFETY line stands where more is to be
+// shown, and in every other function.
 #![allow(clippy::missing_safety_doc)]
 
 mod bits;

@@ -81,8 +81,7 @@ pub unsafe extern "C" fn mbm_ring_begin(ring: *mut mbm_ring, bytes: *mut u8, siz
 /// @return 1; 0 if the ring was full: mbm_ring_lost counts the byte
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_put(ring: *mut mbm_ring, byte: u8) -> u8 {
-    // SAFETY: as the header demands.
-    match unsafe { self::ring(ring) } {
+    match self::ring(ring) {
         Some(ring) => ring.put(byte).into(),
         None => 0,
     }
@@ -99,9 +98,8 @@ pub unsafe extern "C" fn mbm_ring_write(ring: *mut mbm_ring, bytes: *const u8, l
     if bytes.is_null() {
         return 0;
     }
-    // SAFETY: as the header demands.
-    match unsafe { self::ring(ring) } {
-        Some(ring) => ring.write(unsafe { from_raw_parts(bytes, length.into()) }),
+    match self::ring(ring) {
+        Some(ring) => ring.write(from_raw_parts(bytes, length.into())),
         None => 0,
     }
 }
@@ -117,9 +115,8 @@ pub unsafe extern "C" fn mbm_ring_read(ring: *mut mbm_ring, bytes: *mut u8, capa
     if bytes.is_null() {
         return 0;
     }
-    // SAFETY: as the header demands.
-    match unsafe { self::ring(ring) } {
-        Some(ring) => ring.read(unsafe { from_raw_parts_mut(bytes, capacity.into()) }),
+    match self::ring(ring) {
+        Some(ring) => ring.read(from_raw_parts_mut(bytes, capacity.into())),
         None => 0,
     }
 }
@@ -130,8 +127,7 @@ pub unsafe extern "C" fn mbm_ring_read(ring: *mut mbm_ring, bytes: *mut u8, capa
 /// @return the number of bytes; 0 also if the ring was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_available(ring: *const mbm_ring) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe { self::ring(ring) }.map_or(0, |ring| ring.available())
+    self::ring(ring).map_or(0, |ring| ring.available())
 }
 
 /// Discards all bytes in the ring. The reader calls it.
@@ -139,8 +135,7 @@ pub unsafe extern "C" fn mbm_ring_available(ring: *const mbm_ring) -> u16 {
 /// @param ring  the object
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_clear(ring: *mut mbm_ring) {
-    // SAFETY: as the header demands.
-    if let Some(ring) = unsafe { self::ring(ring) } {
+    if let Some(ring) = self::ring(ring) {
         ring.clear();
     }
 }
@@ -152,6 +147,5 @@ pub unsafe extern "C" fn mbm_ring_clear(ring: *mut mbm_ring) {
 /// @return the number of bytes; it wraps at 65536, on an AVR at 256
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_lost(ring: *const mbm_ring) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe { self::ring(ring) }.map_or(0, |ring| ring.lost())
+    self::ring(ring).map_or(0, |ring| ring.lost())
 }

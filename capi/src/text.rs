@@ -53,17 +53,14 @@ pub unsafe extern "C" fn mbm_frame_text(
     text: *mut c_char,
     size: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let write = || {
-            let mut line = line(text, size)?;
-            let description = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
-            let (framing, end) = (description.of_frames()?, description.end());
-            let frame = array_or_empty(frame, frameLength.into());
-            let frame = frame.ok_or(Status::INVALID_ARGUMENT)?;
-            text::frame(&mut line, framing, side(kind)?, frame, end);
-            Ok(line)
-        };
-        outcome(write())
-    }
+    let write = || {
+        let mut line = line(text, size)?;
+        let description = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
+        let (framing, end) = (description.of_frames()?, description.end());
+        let frame = array_or_empty(frame, frameLength.into());
+        let frame = frame.ok_or(Status::INVALID_ARGUMENT)?;
+        text::frame(&mut line, framing, side(kind)?, frame, end);
+        Ok(line)
+    };
+    outcome(write())
 }

@@ -104,8 +104,7 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { begin(client, port, frame, frameBytes, &kind::RTU) }
+    begin(client, port, frame, frameBytes, &kind::RTU)
 }
 
 /// Begins a client of a serial line with ASCII frames (serial line guide V1.02, 2.5.2). It
@@ -124,8 +123,7 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { begin(client, port, frame, frameBytes, &kind::ASCII) }
+    begin(client, port, frame, frameBytes, &kind::ASCII)
 }
 
 /// Sets the character that ends ASCII frames after CR, instead of LF, in both
@@ -139,20 +137,17 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
 /// @return a status; MBM_BUSY while a request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, character: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(client, |object| {
-            if (*(*object).kind).framing != MBM_FRAMING_ASCII || !is_delimiter(character) {
-                return Status::INVALID_ARGUMENT;
-            }
-            if !queue(object).is_idle() {
-                return Status::BUSY;
-            }
-            let engine = &mut transport::<SerialTransport>(object).engine;
-            engine.request().set_ascii(character);
-            Status::OK
-        })
-    }
+    pointers::with(client, |object| {
+        if (*(*object).kind).framing != MBM_FRAMING_ASCII || !is_delimiter(character) {
+            return Status::INVALID_ARGUMENT;
+        }
+        if !queue(object).is_idle() {
+            return Status::BUSY;
+        }
+        let engine = &mut transport::<SerialTransport>(object).engine;
+        engine.request().set_ascii(character);
+        Status::OK
+    })
 }
 
 /// Begins a client that sends RTU frames through a TCP stream, for converters that pass
@@ -170,8 +165,7 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { begin(client, port, frame, frameBytes, &kind::RTU_OVER_TCP) }
+    begin(client, port, frame, frameBytes, &kind::RTU_OVER_TCP)
 }
 
 /// Begins a client of a TCP stream with frames that have the MBAP header (messaging on
@@ -222,15 +216,12 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(client, |object| match ((*(*object).kind).framing, most) {
-            (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
-                transport::<TcpTransport>(object).limit(most);
-                Status::OK
-            }
-            (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,
-            _ => Status::INVALID_ARGUMENT,
-        })
-    }
+    pointers::with(client, |object| match ((*(*object).kind).framing, most) {
+        (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
+            transport::<TcpTransport>(object).limit(most);
+            Status::OK
+        }
+        (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,
+        _ => Status::INVALID_ARGUMENT,
+    })
 }

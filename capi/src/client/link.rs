@@ -83,8 +83,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
 ///         a link: 0 from each loss of it until it is open again
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(client, 0, |object| queue(object).connected.into()) }
+    pointers::read(client, 0, |object| queue(object).connected.into())
 }
 
 /// Suspends the client, so that a line can use its port. The client's requests wait until
@@ -97,36 +96,33 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
 /// @return a status; MBM_BUSY if a request is under way or the client is suspended already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_suspend(client: *mut mbm_client, line: *mut mbm_line) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = pointers::with(client, |object| {
-            if !line.is_null() {
-                if (*(*object).kind).framing != MBM_FRAMING_RTU {
-                    // A line uses RTU frames only.
-                    return Status::INVALID_ARGUMENT;
-                }
-                match pointers::check(line) {
-                    Status::OK if pointers::object(line).is_pending() => return Status::BUSY,
-                    Status::OK | Status::NOT_INITIALISED => {}
-                    refused => return refused,
-                }
+    let status = pointers::with(client, |object| {
+        if !line.is_null() {
+            if (*(*object).kind).framing != MBM_FRAMING_RTU {
+                // A line uses RTU frames only.
+                return Status::INVALID_ARGUMENT;
             }
-            if !on_transport!(object, transport => transport.suspend(&mut (*object).queue)) {
-                return Status::BUSY;
+            match pointers::check(line) {
+                Status::OK if pointers::object(line).is_pending() => return Status::BUSY,
+                Status::OK | Status::NOT_INITIALISED => {}
+                refused => return refused,
             }
-            (*object).borrower = line;
-            if !line.is_null() {
-                line::prepare(line);
-                let port = (*(*object).kind).port(object);
-                pointers::object(line).port.set(port);
-            }
-            Status::OK
-        });
-        if status == Status::OK.code() && !line.is_null() {
-            pointers::with_hooks(client, || line::with_hooks(line, line::Core::line_used));
         }
-        status
+        if !on_transport!(object, transport => transport.suspend(&mut (*object).queue)) {
+            return Status::BUSY;
+        }
+        (*object).borrower = line;
+        if !line.is_null() {
+            line::prepare(line);
+            let port = (*(*object).kind).port(object);
+            pointers::object(line).port.set(port);
+        }
+        Status::OK
+    });
+    if status == Status::OK.code() && !line.is_null() {
+        pointers::with_hooks(client, || line::with_hooks(line, line::Core::line_used));
     }
+    status
 }
 
 /// Resumes the client. The line then has no port: requests of its nodes return
@@ -138,26 +134,23 @@ pub unsafe extern "C" fn mbm_client_suspend(client: *mut mbm_client, line: *mut 
 ///         the client was not suspended, and for any other line
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, line: *mut mbm_line) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(client, |object| {
-            if !queue(object).suspended || (*object).borrower != line {
-                return Status::INVALID_ARGUMENT;
-            }
-            match pointers::check(line) {
-                Status::OK => {
-                    let core = pointers::object(line);
-                    if core.is_pending() {
-                        return Status::BUSY;
-                    }
-                    core.port.clear_if((*(*object).kind).port(object));
+    pointers::with(client, |object| {
+        if !queue(object).suspended || (*object).borrower != line {
+            return Status::INVALID_ARGUMENT;
+        }
+        match pointers::check(line) {
+            Status::OK => {
+                let core = pointers::object(line);
+                if core.is_pending() {
+                    return Status::BUSY;
                 }
-                Status::BUSY => return Status::BUSY,
-                // There is no line, or it was zeroed.
-                _ => {}
+                core.port.clear_if((*(*object).kind).port(object));
             }
-            queue(object).suspended = false;
-            Status::OK
-        })
-    }
+            Status::BUSY => return Status::BUSY,
+            // There is no line, or it was zeroed.
+            _ => {}
+        }
+        queue(object).suspended = false;
+        Status::OK
+    })
 }

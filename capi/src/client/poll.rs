@@ -38,15 +38,12 @@ pub(crate) unsafe fn clock(client: *mut mbm_client) -> u32 {
 ///         `done`, and while the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(client, |object| {
-            if (*object).polling || (*object).queue.suspended {
-                return Status::BUSY;
-            }
-            advance_all(client, (*(*object).kind).advance)
-        })
-    }
+    pointers::with(client, |object| {
+        if (*object).polling || (*object).queue.suspended {
+            return Status::BUSY;
+        }
+        advance_all(client, (*(*object).kind).advance)
+    })
 }
 
 /// Advances the requests, and calls `done` of those that ended. `advance` is
@@ -95,22 +92,19 @@ unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
 ///         poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe {
-        match pointers::check(client) {
-            Status::OK => pointers::with_hooks(client, || {
-                let object = pointers::object(client);
-                let now = now(object);
-                let delay =
-                    on_transport!(object, transport => transport.poll_delay(&(*object).queue, now));
-                if !(*object).linked {
-                    return delay;
-                }
-                ((*(*object).kind.cast::<LinkedKind>()).delay)(object, now, delay)
-            }),
-            Status::BUSY => 0,
-            _ => u32::MAX,
-        }
+    match pointers::check(client) {
+        Status::OK => pointers::with_hooks(client, || {
+            let object = pointers::object(client);
+            let now = now(object);
+            let delay =
+                on_transport!(object, transport => transport.poll_delay(&(*object).queue, now));
+            if !(*object).linked {
+                return delay;
+            }
+            ((*(*object).kind.cast::<LinkedKind>()).delay)(object, now, delay)
+        }),
+        Status::BUSY => 0,
+        _ => u32::MAX,
     }
 }
 
@@ -120,8 +114,7 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
 /// @return 0 to 16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(client, 0, |object| queue(object).pending() as u8) }
+    pointers::read(client, 0, |object| queue(object).pending() as u8)
 }
 
 /// Cancels a request. Its status becomes MBM_CANCELLED, `done` is not called, and you may use
@@ -137,22 +130,19 @@ pub unsafe extern "C" fn mbm_client_cancel(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(client, |object| match RequestPtr::new(request) {
-            None => Status::INVALID_ARGUMENT,
-            Some(request) => match queue(object).cancel_one(|queued| *queued == request) {
-                Some(request) => {
-                    if request.state().is_sent() {
-                        let release = (*(*object).kind).release;
-                        pointers::with_hooks(client, || release(object, Some(&request)));
-                    }
-                    Status::OK
+    pointers::with(client, |object| match RequestPtr::new(request) {
+        None => Status::INVALID_ARGUMENT,
+        Some(request) => match queue(object).cancel_one(|queued| *queued == request) {
+            Some(request) => {
+                if request.state().is_sent() {
+                    let release = (*(*object).kind).release;
+                    pointers::with_hooks(client, || release(object, Some(&request)));
                 }
-                None => Status::NOT_PENDING,
-            },
-        })
-    }
+                Status::OK
+            }
+            None => Status::NOT_PENDING,
+        },
+    })
 }
 
 /// Returns the transaction identifier on the wire: that of the TCP frame in which the client

@@ -43,14 +43,11 @@ const _: () = {
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            parts.queue.policy.retries = retries;
-            allow_retries(parts);
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        parts.queue.policy.retries = retries;
+        allow_retries(parts);
+        Status::OK
+    })
 }
 
 /// Lets the client repeat requests whose limit of retries is not 0.
@@ -98,22 +95,19 @@ pub unsafe extern "C" fn mbm_client_setBusyRetries(
     retries: u8,
     waitMs: u32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            let Ok(wait) = u16::try_from(waitMs) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            parts.queue.policy.busy_retries = retries;
-            parts.queue.policy.busy_wait_ms = wait;
-            parts.storage.again = Some(|storage, policy, state, status| {
-                again_when_busy(policy, state, status)
-                    .or_else(|| again_after_failure(storage, policy, state, status))
-            });
-            parts.queue.may_retry = true;
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        let Ok(wait) = u16::try_from(waitMs) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        parts.queue.policy.busy_retries = retries;
+        parts.queue.policy.busy_wait_ms = wait;
+        parts.storage.again = Some(|storage, policy, state, status| {
+            again_when_busy(policy, state, status)
+                .or_else(|| again_after_failure(storage, policy, state, status))
+        });
+        parts.queue.may_retry = true;
+        Status::OK
+    })
 }
 
 /// Sets how long a request waits before the client repeats it. Meanwhile the client sends
@@ -131,19 +125,16 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
     delayMs: u32,
     maxDelayMs: u32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            let Some(backoff) = Backoff::from_code(backoff) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            let (Some(wait), Some(most)) = (timeout(delayMs), timeout(maxDelayMs)) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            parts.queue.policy.set_backoff(backoff, wait, most);
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        let Some(backoff) = Backoff::from_code(backoff) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        let (Some(wait), Some(most)) = (timeout(delayMs), timeout(maxDelayMs)) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        parts.queue.policy.set_backoff(backoff, wait, most);
+        Status::OK
+    })
 }
 
 /// Shortens each wait before a repetition by a random part, so that several clients do not
@@ -164,15 +155,12 @@ pub unsafe extern "C" fn mbm_client_setJitter(
     random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
     context: *mut c_void,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            if !parts.queue.policy.set_jitter(percent, random.is_some()) {
-                return Status::INVALID_ARGUMENT;
-            }
-            parts.storage.random = random;
-            parts.storage.random_context = context;
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        if !parts.queue.policy.set_jitter(percent, random.is_some()) {
+            return Status::INVALID_ARGUMENT;
+        }
+        parts.storage.random = random;
+        parts.storage.random_context = context;
+        Status::OK
+    })
 }

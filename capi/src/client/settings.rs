@@ -70,16 +70,13 @@ pub unsafe extern "C" fn mbm_client_setResponseTimeout(
     client: *mut mbm_client,
     timeoutMs: u32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            let Some(timeout) = timeout(timeoutMs) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            parts.settings.response_timeout = Setting::new(timeout);
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        let Some(timeout) = timeout(timeoutMs) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        parts.settings.response_timeout = Setting::new(timeout);
+        Status::OK
+    })
 }
 
 /// Sets the baud rate from which the client computes the gap before an RTU request (t3.5,
@@ -91,13 +88,10 @@ pub unsafe extern "C" fn mbm_client_setResponseTimeout(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            parts.settings.set_baud_rate(baud);
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        parts.settings.set_baud_rate(baud);
+        Status::OK
+    })
 }
 
 /// Sets the silence before a request, instead of t3.5. A later call of
@@ -109,13 +103,10 @@ pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, gapUs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            parts.settings.set_gap(gapUs);
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        parts.settings.set_gap(gapUs);
+        Status::OK
+    })
 }
 
 /// Sets the turnaround delay: how long the client waits after a request that no device
@@ -130,16 +121,13 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
     client: *mut mbm_client,
     delayMs: u32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            let Ok(delay) = u16::try_from(delayMs) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            parts.settings.turnaround_delay = Setting::new(millis(delay));
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        let Ok(delay) = u16::try_from(delayMs) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        parts.settings.turnaround_delay = Setting::new(millis(delay));
+        Status::OK
+    })
 }
 
 /// Sets the quiet time of a serial line. It prevents that the client accepts a late reply as
@@ -155,16 +143,13 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietMs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            let Ok(quiet) = u16::try_from(quietMs) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            parts.settings.quiet_time = Setting::new(millis(quiet));
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        let Ok(quiet) = u16::try_from(quietMs) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        parts.settings.quiet_time = Setting::new(millis(quiet));
+        Status::OK
+    })
 }
 
 /// Switches echo discarding on or off. Switch it on if the receiver also receives what the
@@ -176,8 +161,7 @@ pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietM
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setEchoDiscard(client: *mut mbm_client, on: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { set_extra(client, |settings| settings.echo_discard = on != 0) }
+    set_extra(client, |settings| settings.echo_discard = on != 0)
 }
 
 /// Sets how long the driver stays on after the port's flush, for platforms whose flush
@@ -192,8 +176,7 @@ pub unsafe extern "C" fn mbm_client_setPostFlushHold(
     client: *mut mbm_client,
     characters: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { set_extra(client, |settings| settings.post_flush_hold = characters) }
+    set_extra(client, |settings| settings.post_flush_hold = characters)
 }
 
 /// Sets your storage for counters, in which the client counts from now on. You may read and
@@ -209,15 +192,12 @@ pub unsafe extern "C" fn mbm_client_setCounters(
     client: *mut mbm_client,
     counters: *mut mbm_counters,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(client, |object| {
-            let kind = &*(*object).kind;
-            kind.storage(object).counters = counters;
-            if kind.framing != MBM_FRAMING_TCP {
-                transport::<SerialTransport>(object).engine.set_counting();
-            }
-            Status::OK
-        })
-    }
+    pointers::with(client, |object| {
+        let kind = &*(*object).kind;
+        kind.storage(object).counters = counters;
+        if kind.framing != MBM_FRAMING_TCP {
+            transport::<SerialTransport>(object).engine.set_counting();
+        }
+        Status::OK
+    })
 }

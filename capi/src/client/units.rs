@@ -68,21 +68,18 @@ pub unsafe extern "C" fn mbm_client_setUnits(
     units: *mut mbm_clientUnit,
     count: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        set(client, |parts| {
-            let records: &[UnitRecord] = array(units.cast(), count.into()).unwrap_or_default();
-            if !records.iter().all(UnitRecord::is_in_range) {
-                return Status::INVALID_ARGUMENT;
-            }
-            parts.storage.units = units.cast();
-            parts.storage.unit_count = count;
-            parts.storage.unit_records = (!units.is_null()).then_some(&UNIT_RECORDS);
-            parts.storage.unit_timeout_ms = 0;
-            allow_retries(parts);
-            Status::OK
-        })
-    }
+    set(client, |parts| {
+        let records: &[UnitRecord] = array(units.cast(), count.into()).unwrap_or_default();
+        if !records.iter().all(UnitRecord::is_in_range) {
+            return Status::INVALID_ARGUMENT;
+        }
+        parts.storage.units = units.cast();
+        parts.storage.unit_count = count;
+        parts.storage.unit_records = (!units.is_null()).then_some(&UNIT_RECORDS);
+        parts.storage.unit_timeout_ms = 0;
+        allow_retries(parts);
+        Status::OK
+    })
 }
 
 const UNIT_RECORDS: UnitRecords = UnitRecords {

@@ -60,25 +60,22 @@ pub unsafe extern "C" fn mbm_gateway_open(
     connection: u8,
     port: *const mbm_port,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_place(gateway, connection, |core| {
-            let Some(port) = port.as_ref().filter(|port| port.is_complete()) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            if (*core).status(connection) == Status::OK {
-                return Status::BUSY;
-            }
-            let place = (*core)
-                .storage
-                .config
-                .connections
-                .wrapping_add(connection.into());
-            (*mbm_gatewayConnection::port(place)).copy(port);
-            (*core).open(connection);
-            Status::OK
-        })
-    }
+    with_place(gateway, connection, |core| {
+        let Some(port) = port.as_ref().filter(|port| port.is_complete()) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        if (*core).status(connection) == Status::OK {
+            return Status::BUSY;
+        }
+        let place = (*core)
+            .storage
+            .config
+            .connections
+            .wrapping_add(connection.into());
+        (*mbm_gatewayConnection::port(place)).copy(port);
+        (*core).open(connection);
+        Status::OK
+    })
 }
 
 /// Gives up a connection and its requests. A request that a line has is cancelled: the device
@@ -89,16 +86,13 @@ pub unsafe extern "C" fn mbm_gateway_open(
 /// @return a status; MBM_BUSY also from within a hook of a port of its lines
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_close(gateway: *mut mbm_gateway, connection: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_place(gateway, connection, |core| {
-            if (*core).storage.config.check_clients() == Status::BUSY {
-                return Status::BUSY;
-            }
-            pointers::with_hooks(gateway, || (*core).close(connection));
-            Status::OK
-        })
-    }
+    with_place(gateway, connection, |core| {
+        if (*core).storage.config.check_clients() == Status::BUSY {
+            return Status::BUSY;
+        }
+        pointers::with_hooks(gateway, || (*core).close(connection));
+        Status::OK
+    })
 }
 
 /// Returns how a connection is. Call it after mbm_gateway_poll for each connection: if the
@@ -111,16 +105,13 @@ pub unsafe extern "C" fn mbm_gateway_close(gateway: *mut mbm_gateway, connection
 ///         MBM_NOT_INITIALISED for a free place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_status(gateway: *const mbm_gateway, connection: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        match pointers::check(gateway) {
-            Status::OK => read_place(gateway, connection, Status::INVALID_ARGUMENT, |core| {
-                core.status(connection)
-            }),
-            refused => refused,
-        }
-        .code()
+    match pointers::check(gateway) {
+        Status::OK => read_place(gateway, connection, Status::INVALID_ARGUMENT, |core| {
+            core.status(connection)
+        }),
+        refused => refused,
     }
+    .code()
 }
 
 /// Returns how many requests of a connection are under way: complete, but not answered yet.
@@ -131,8 +122,7 @@ pub unsafe extern "C" fn mbm_gateway_status(gateway: *const mbm_gateway, connect
 /// @return the number of requests; 0 for a free place and for a number out of range
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_pending(gateway: *const mbm_gateway, connection: u8) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe { read_place(gateway, connection, 0, |core| core.pending(connection)) }
+    read_place(gateway, connection, 0, |core| core.pending(connection))
 }
 
 /// Returns whether the next mbm_gateway_poll reads bytes from a connection. If not, the
@@ -144,10 +134,7 @@ pub unsafe extern "C" fn mbm_gateway_pending(gateway: *const mbm_gateway, connec
 /// @return 1 or 0
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_isReading(gateway: *const mbm_gateway, connection: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        read_place(gateway, connection, 0, |core| {
-            core.is_reading(connection).into()
-        })
-    }
+    read_place(gateway, connection, 0, |core| {
+        core.is_reading(connection).into()
+    })
 }

@@ -26,16 +26,13 @@ use mbm::time::timeout;
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most: u16) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(gateway, |core| {
-            if most == 0 {
-                return Status::INVALID_ARGUMENT;
-            }
-            (*core).set_most_requests(most);
-            Status::OK
-        })
-    }
+    pointers::with(gateway, |core| {
+        if most == 0 {
+            return Status::INVALID_ARGUMENT;
+        }
+        (*core).set_most_requests(most);
+        Status::OK
+    })
 }
 
 /// Sets for how long a request may wait until its line is free. After that time the gateway
@@ -49,16 +46,13 @@ pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, timeMs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(gateway, |core| {
-            let Some(time) = timeout(timeMs) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            (*core).set_queue_time(time);
-            Status::OK
-        })
-    }
+    pointers::with(gateway, |core| {
+        let Some(time) = timeout(timeMs) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        (*core).set_queue_time(time);
+        Status::OK
+    })
 }
 
 /// Serves units of the gateway itself: those that a route to MBM_GATEWAY_LOCAL leads to. The
@@ -79,19 +73,16 @@ pub unsafe extern "C" fn mbm_gateway_serveUnits(
     units: *mut mbm_unit,
     count: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(gateway, |core| {
-            if count > 0 && (units.is_null() || !have_ids(units, count)) {
-                return Status::INVALID_ARGUMENT;
-            }
-            let parts = &mut (*core).storage;
-            parts.units = units;
-            parts.unit_count = count;
-            parts.serve = if count > 0 { Some(serve) } else { None };
-            Status::OK
-        })
-    }
+    pointers::with(gateway, |core| {
+        if count > 0 && (units.is_null() || !have_ids(units, count)) {
+            return Status::INVALID_ARGUMENT;
+        }
+        let parts = &mut (*core).storage;
+        parts.units = units;
+        parts.unit_count = count;
+        parts.serve = if count > 0 { Some(serve) } else { None };
+        Status::OK
+    })
 }
 
 /// As [`Serve`](super::storage::Serve).
@@ -139,26 +130,23 @@ pub unsafe extern "C" fn mbm_gateway_setFunctions(
     functions: *const mbm_function,
     count: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(gateway, |core: *mut Core| {
-            let is_valid = pointers::slice(functions, count.into())
-                .and_then(|functions| declared(functions, None))
-                .is_ok();
-            if !is_valid {
-                return Status::INVALID_ARGUMENT;
-            }
-            let parts = &mut (*core).storage;
-            parts.functions = functions;
-            parts.function_count = count;
-            parts.forward_declared = if count > 0 {
-                Some(forward_declared)
-            } else {
-                None
-            };
-            Status::OK
-        })
-    }
+    pointers::with(gateway, |core: *mut Core| {
+        let is_valid = pointers::slice(functions, count.into())
+            .and_then(|functions| declared(functions, None))
+            .is_ok();
+        if !is_valid {
+            return Status::INVALID_ARGUMENT;
+        }
+        let parts = &mut (*core).storage;
+        parts.functions = functions;
+        parts.function_count = count;
+        parts.forward_declared = if count > 0 {
+            Some(forward_declared)
+        } else {
+            None
+        };
+        Status::OK
+    })
 }
 
 /// As [`ForwardDeclared`](super::storage::ForwardDeclared).

@@ -109,22 +109,19 @@ pub unsafe extern "C" fn mbm_line_beginRtu(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let is_refused = port.is_null()
-            || !(*port).is_complete()
-            || frameBytes > 0 && is_frame_refused(frame, frameBytes);
-        if is_refused {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        let status = prepare(line);
-        if status == Status::OK {
-            let core = pointers::object(line);
-            core.port.set(port);
-            core.storage.set_frame(frame, frameBytes);
-        }
-        status.code()
+    let is_refused = port.is_null()
+        || !(*port).is_complete()
+        || frameBytes > 0 && is_frame_refused(frame, frameBytes);
+    if is_refused {
+        return Status::INVALID_ARGUMENT.code();
     }
+    let status = prepare(line);
+    if status == Status::OK {
+        let core = pointers::object(line);
+        core.port.set(port);
+        core.storage.set_frame(frame, frameBytes);
+    }
+    status.code()
 }
 
 /// True for a frame buffer that cannot hold an exception or a request of two words.
@@ -172,15 +169,12 @@ pub unsafe extern "C" fn mbm_line_setFrame(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_cancel(line: *mut mbm_line) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = pointers::check(line);
-        if status == Status::OK && pointers::object(line).is_pending() {
-            with_hooks(line, |core| {
-                core.cancel();
-                core.storage.words = null_mut();
-            });
-        }
-        status.code()
+    let status = pointers::check(line);
+    if status == Status::OK && pointers::object(line).is_pending() {
+        with_hooks(line, |core| {
+            core.cancel();
+            core.storage.words = null_mut();
+        });
     }
+    status.code()
 }

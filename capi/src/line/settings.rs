@@ -17,13 +17,10 @@ use mbm::time::millis;
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setBaudRate(line: *mut mbm_line, baud: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(line, |line| {
-            line.settings.set_baud_rate(baud);
-            Status::OK
-        })
-    }
+    with(line, |line| {
+        line.settings.set_baud_rate(baud);
+        Status::OK
+    })
 }
 
 /// Sets the silence before a request, instead of t3.5. Use 0 if no device on the line needs
@@ -36,13 +33,10 @@ pub unsafe extern "C" fn mbm_line_setBaudRate(line: *mut mbm_line, baud: u32) ->
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setGap(line: *mut mbm_line, gapUs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(line, |line| {
-            line.settings.set_gap(gapUs);
-            Status::OK
-        })
-    }
+    with(line, |line| {
+        line.settings.set_gap(gapUs);
+        Status::OK
+    })
 }
 
 /// Sets the turnaround delay: how long the master waits after a broadcast, which no device
@@ -53,16 +47,13 @@ pub unsafe extern "C" fn mbm_line_setGap(line: *mut mbm_line, gapUs: u32) -> u8 
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setTurnaroundDelay(line: *mut mbm_line, delayMs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(line, |line| {
-            let Ok(delay) = u16::try_from(delayMs) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            line.settings.turnaround_delay = Setting::new(millis(delay));
-            Status::OK
-        })
-    }
+    with(line, |line| {
+        let Ok(delay) = u16::try_from(delayMs) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        line.settings.turnaround_delay = Setting::new(millis(delay));
+        Status::OK
+    })
 }
 
 /// Sets the quiet time. It prevents that the master accepts a late reply as the reply to a
@@ -93,16 +84,13 @@ pub unsafe extern "C" fn mbm_line_setTurnaroundDelay(line: *mut mbm_line, delayM
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setQuietTime(line: *mut mbm_line, quietMs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(line, |line| {
-            let Ok(quiet) = u16::try_from(quietMs) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            line.settings.quiet_time = Setting::new(millis(quiet));
-            Status::OK
-        })
-    }
+    with(line, |line| {
+        let Ok(quiet) = u16::try_from(quietMs) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        line.settings.quiet_time = Setting::new(millis(quiet));
+        Status::OK
+    })
 }
 
 /// Sets how often the master repeats a request whose reply is missing, damaged or malformed.
@@ -113,14 +101,11 @@ pub unsafe extern "C" fn mbm_line_setQuietTime(line: *mut mbm_line, quietMs: u32
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setRetries(line: *mut mbm_line, retries: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(line, |line| {
-            line.settings.retries = retries;
-            line.use_extras();
-            Status::OK
-        })
-    }
+    with(line, |line| {
+        line.settings.retries = retries;
+        line.use_extras();
+        Status::OK
+    })
 }
 
 /// Switches echo discarding on or off. Switch it on if the receiver also receives what the
@@ -132,14 +117,11 @@ pub unsafe extern "C" fn mbm_line_setRetries(line: *mut mbm_line, retries: u8) -
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setEchoDiscard(line: *mut mbm_line, on: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(line, |line| {
-            line.settings.echo_discard = on != 0;
-            line.use_extras();
-            Status::OK
-        })
-    }
+    with(line, |line| {
+        line.settings.echo_discard = on != 0;
+        line.use_extras();
+        Status::OK
+    })
 }
 
 /// Sets how long the driver stays on after the port's flush, for platforms whose flush
@@ -151,14 +133,11 @@ pub unsafe extern "C" fn mbm_line_setEchoDiscard(line: *mut mbm_line, on: u8) ->
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setPostFlushHold(line: *mut mbm_line, characters: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(line, |line| {
-            line.settings.post_flush_hold = characters;
-            line.use_extras();
-            Status::OK
-        })
-    }
+    with(line, |line| {
+        line.settings.post_flush_hold = characters;
+        line.use_extras();
+        Status::OK
+    })
 }
 
 /// Sets your storage for counters, in which the master counts from now on. You may read and
@@ -172,14 +151,11 @@ pub unsafe extern "C" fn mbm_line_setCounters(
     line: *mut mbm_line,
     counters: *mut mbm_counters,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(line, |line| {
-            line.storage.counters = counters;
-            line.set_counting();
-            Status::OK
-        })
-    }
+    with(line, |line| {
+        line.storage.counters = counters;
+        line.set_counting();
+        Status::OK
+    })
 }
 
 /// Reports when another user of the wire, for example another object, used it last.
@@ -192,13 +168,10 @@ pub unsafe extern "C" fn mbm_line_setCounters(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_usedAt(line: *mut mbm_line, timeUs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(line, |line| {
-            line.line_used_at(timeUs);
-            Status::OK
-        })
-    }
+    with(line, |line| {
+        line.line_used_at(timeUs);
+        Status::OK
+    })
 }
 
 /// Reports that another user of the wire has just used it: as mbm_line_usedAt with the
@@ -208,16 +181,13 @@ pub unsafe extern "C" fn mbm_line_usedAt(line: *mut mbm_line, timeUs: u32) -> u8
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_used(line: *mut mbm_line) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = check(line);
-        if status == Status::OK {
-            with_hooks(line, |core| {
-                if core.port.is_ready() {
-                    core.line_used();
-                }
-            });
-        }
-        status.code()
+    let status = check(line);
+    if status == Status::OK {
+        with_hooks(line, |core| {
+            if core.port.is_ready() {
+                core.line_used();
+            }
+        });
     }
+    status.code()
 }

@@ -185,16 +185,13 @@ unsafe fn end(link: *mut Object) -> Status {
 /// @return a status; MBM_BUSY also while the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_end(link: *mut mbm_link) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(link, |object| {
-            let status = end(object);
-            if status == Status::OK {
-                mbm_link::mark(link).write(0);
-            }
-            status
-        })
-    }
+    pointers::with(link, |object| {
+        let status = end(object);
+        if status == Status::OK {
+            mbm_link::mark(link).write(0);
+        }
+        status
+    })
 }
 
 /// Closes the link and opens it again, at the next poll of the client and without a wait. Call
@@ -205,13 +202,10 @@ pub unsafe extern "C" fn mbm_link_end(link: *mut mbm_link) -> u8 {
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(link, |object| {
-            (*object).core.restart();
-            Status::OK
-        })
-    }
+    pointers::with(link, |object| {
+        (*object).core.restart();
+        Status::OK
+    })
 }
 
 /// Sets the wait before an attempt to open the link. The first attempt after a loss waits for
@@ -231,19 +225,16 @@ pub unsafe extern "C" fn mbm_link_setBackoff(
     delayMs: u32,
     maxDelayMs: u32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(link, |object| {
-            let Some(backoff) = Backoff::from_code(backoff) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            let (Some(wait), Some(most)) = (timeout(delayMs), timeout(maxDelayMs)) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            (*object).core.policy.set_backoff(backoff, wait, most);
-            Status::OK
-        })
-    }
+    pointers::with(link, |object| {
+        let Some(backoff) = Backoff::from_code(backoff) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        let (Some(wait), Some(most)) = (timeout(delayMs), timeout(maxDelayMs)) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        (*object).core.policy.set_backoff(backoff, wait, most);
+        Status::OK
+    })
 }
 
 /// Shortens each wait before an attempt by a random part, so that many clients that lost their
@@ -262,17 +253,14 @@ pub unsafe extern "C" fn mbm_link_setJitter(
     random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
     context: *mut c_void,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(link, |object| {
-            if !(*object).core.policy.set_jitter(percent, random.is_some()) {
-                return Status::INVALID_ARGUMENT;
-            }
-            (*object).random = random;
-            (*object).random_context = context;
-            Status::OK
-        })
-    }
+    pointers::with(link, |object| {
+        if !(*object).core.policy.set_jitter(percent, random.is_some()) {
+            return Status::INVALID_ARGUMENT;
+        }
+        (*object).random = random;
+        (*object).random_context = context;
+        Status::OK
+    })
 }
 
 /// Sets how long a connection may take to be made. Then the attempt has failed, with
@@ -284,16 +272,13 @@ pub unsafe extern "C" fn mbm_link_setJitter(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeoutMs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(link, |object| {
-            let Some(timeout) = timeout(timeoutMs) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            (*object).core.connect_timeout = timeout;
-            Status::OK
-        })
-    }
+    pointers::with(link, |object| {
+        let Some(timeout) = timeout(timeoutMs) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        (*object).core.connect_timeout = timeout;
+        Status::OK
+    })
 }
 
 /// Sets whether requests wait for the link. By default they do not: while the link is down,
@@ -308,13 +293,10 @@ pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeout
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setRequestsWait(link: *mut mbm_link, on: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(link, |object| {
-            (*object).core.keeps_requests = on != 0;
-            Status::OK
-        })
-    }
+    pointers::with(link, |object| {
+        (*object).core.keeps_requests = on != 0;
+        Status::OK
+    })
 }
 
 /// Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
@@ -331,14 +313,11 @@ pub unsafe extern "C" fn mbm_link_setCallback(
     callback: Option<unsafe extern "C" fn(context: *mut c_void, event: u8, status: u8)>,
     context: *mut c_void,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(link, |object| {
-            (*object).callback = callback;
-            (*object).callback_context = context;
-            Status::OK
-        })
-    }
+    pointers::with(link, |object| {
+        (*object).callback = callback;
+        (*object).callback_context = context;
+        Status::OK
+    })
 }
 
 /// Sets your storage for counters, in which the link counts from now on.
@@ -351,13 +330,10 @@ pub unsafe extern "C" fn mbm_link_setCounters(
     link: *mut mbm_link,
     counters: *mut mbm_linkCounters,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(link, |object| {
-            (*object).counters = counters;
-            Status::OK
-        })
-    }
+    pointers::with(link, |object| {
+        (*object).counters = counters;
+        Status::OK
+    })
 }
 
 /// Returns what a link is doing.
@@ -367,6 +343,5 @@ pub unsafe extern "C" fn mbm_link_setCounters(
 ///         and for an object that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_state(link: *const mbm_link) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(link, 0, |object| (*object).core.state() as u8) }
+    pointers::read(link, 0, |object| (*object).core.state() as u8)
 }

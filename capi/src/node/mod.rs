@@ -146,8 +146,7 @@ unsafe fn has_line(object: *mut Object) -> bool {
 ///         request. MBM_OK if there was no request yet
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_poll(node: *mut mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { poll(node) }
+    poll(node)
 }
 
 /// As [`mbm_node_poll`].
@@ -194,19 +193,16 @@ unsafe extern "C" fn poll(node: *mut mbm_node) -> u8 {
 ///         0xFFFFFFFF means that the node has no request under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_pollDelay(node: *mut mbm_node) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let object = node.cast::<Object>();
-        if pointers::check(node) != Status::OK || !(*object).core.is_pending() {
-            return u32::MAX;
-        }
-        match check_line(object) {
-            Status::OK if has_line(object) => line::with_hooks((*object).line, |line| {
-                let now = line.port.micros();
-                line.poll_delay(now)
-            }),
-            _ => 0,
-        }
+    let object = node.cast::<Object>();
+    if pointers::check(node) != Status::OK || !(*object).core.is_pending() {
+        return u32::MAX;
+    }
+    match check_line(object) {
+        Status::OK if has_line(object) => line::with_hooks((*object).line, |line| {
+            let now = line.port.micros();
+            line.poll_delay(now)
+        }),
+        _ => 0,
     }
 }
 
@@ -257,8 +253,7 @@ pub unsafe extern "C" fn mbm_node_status(node: *const mbm_node) -> u8 {
 /// @return the code; 0 if the last request ended without an exception
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_getExceptionCode(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::read(node, 0, |node| node.core.exception_code()) }
+    pointers::read(node, 0, |node| node.core.exception_code())
 }
 
 /// Starts a request that has an address and a word and, in blocking mode, polls until it has

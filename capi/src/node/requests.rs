@@ -34,8 +34,7 @@ pub unsafe extern "C" fn mbm_node_readCoils(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { call(node, address, quantity, FunctionSpec::READ_COILS.short()) }
+    call(node, address, quantity, FunctionSpec::READ_COILS.short())
 }
 
 /// Function 02: reads discrete inputs into the response words, 16 in each word. The first
@@ -51,15 +50,12 @@ pub unsafe extern "C" fn mbm_node_readDiscreteInputs(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        call(
-            node,
-            address,
-            quantity,
-            FunctionSpec::READ_DISCRETE_INPUTS.short(),
-        )
-    }
+    call(
+        node,
+        address,
+        quantity,
+        FunctionSpec::READ_DISCRETE_INPUTS.short(),
+    )
 }
 
 /// Function 03: reads holding registers into the response words (V1.1b3, 6.3).
@@ -74,15 +70,12 @@ pub unsafe extern "C" fn mbm_node_readHoldingRegisters(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        call(
-            node,
-            address,
-            quantity,
-            FunctionSpec::READ_HOLDING_REGISTERS.short(),
-        )
-    }
+    call(
+        node,
+        address,
+        quantity,
+        FunctionSpec::READ_HOLDING_REGISTERS.short(),
+    )
 }
 
 /// Function 04: reads input registers into the response words (V1.1b3, 6.4).
@@ -97,15 +90,12 @@ pub unsafe extern "C" fn mbm_node_readInputRegisters(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        call(
-            node,
-            address,
-            quantity,
-            FunctionSpec::READ_INPUT_REGISTERS.short(),
-        )
-    }
+    call(
+        node,
+        address,
+        quantity,
+        FunctionSpec::READ_INPUT_REGISTERS.short(),
+    )
 }
 
 /// Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
@@ -120,12 +110,9 @@ pub unsafe extern "C" fn mbm_node_writeSingleCoil(
     address: u16,
     state: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        request(node, |node, line| {
-            node.write_single_coil(line, address, state.into())
-        })
-    }
+    request(node, |node, line| {
+        node.write_single_coil(line, address, state.into())
+    })
 }
 
 /// Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
@@ -140,12 +127,9 @@ pub unsafe extern "C" fn mbm_node_writeSingleRegister(
     address: u16,
     value: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        request(node, |node, line| {
-            node.write_single_register(line, address, value)
-        })
-    }
+    request(node, |node, line| {
+        node.write_single_register(line, address, value)
+    })
 }
 
 /// Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
@@ -161,15 +145,12 @@ pub unsafe extern "C" fn mbm_node_writeMultipleCoils(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        call(
-            node,
-            address,
-            quantity,
-            FunctionSpec::WRITE_MULTIPLE_COILS.short(),
-        )
-    }
+    call(
+        node,
+        address,
+        quantity,
+        FunctionSpec::WRITE_MULTIPLE_COILS.short(),
+    )
 }
 
 /// Function 0F: writes the queued bits to coils, starting at the last write address. Call
@@ -179,8 +160,7 @@ pub unsafe extern "C" fn mbm_node_writeMultipleCoils(
 /// @return a status; see mbm_node_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_writeQueuedCoils(node: *mut mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { request(node, |node, line| node.write_queued_coils(line)) }
+    request(node, |node, line| node.write_queued_coils(line))
 }
 
 /// Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
@@ -196,15 +176,12 @@ pub unsafe extern "C" fn mbm_node_writeMultipleRegisters(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        call(
-            node,
-            address,
-            quantity,
-            FunctionSpec::WRITE_MULTIPLE_REGISTERS.short(),
-        )
-    }
+    call(
+        node,
+        address,
+        quantity,
+        FunctionSpec::WRITE_MULTIPLE_REGISTERS.short(),
+    )
 }
 
 /// Function 10: writes the queued complete words to registers, starting at the last write
@@ -214,8 +191,7 @@ pub unsafe extern "C" fn mbm_node_writeMultipleRegisters(
 /// @return a status; see mbm_node_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_writeQueuedRegisters(node: *mut mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { request(node, |node, line| node.write_queued_registers(line)) }
+    request(node, |node, line| node.write_queued_registers(line))
 }
 
 /// Function 16: the device sets a register to
@@ -234,12 +210,9 @@ pub unsafe extern "C" fn mbm_node_maskWriteRegister(
     andMask: u16,
     orMask: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        request(node, |node, line| {
-            node.mask_write_register(line, address, andMask, orMask)
-        })
-    }
+    request(node, |node, line| {
+        node.mask_write_register(line, address, andMask, orMask)
+    })
 }
 
 /// Function 17: the device writes the transmit words to registers first. Then it reads
@@ -260,13 +233,10 @@ pub unsafe extern "C" fn mbm_node_readWriteMultipleRegisters(
     writeAddress: u16,
     writeQuantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        request(node, |node, line| {
-            let (read, write) = ((readAddress, readQuantity), (writeAddress, writeQuantity));
-            node.read_write_multiple_registers(line, read, write)
-        })
-    }
+    request(node, |node, line| {
+        let (read, write) = ((readAddress, readQuantity), (writeAddress, writeQuantity));
+        node.read_write_multiple_registers(line, read, write)
+    })
 }
 
 /// Function 17: as mbm_node_readWriteMultipleRegisters, but writes the queued complete
@@ -282,10 +252,7 @@ pub unsafe extern "C" fn mbm_node_readWriteQueuedRegisters(
     readAddress: u16,
     readQuantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        request(node, |node, line| {
-            node.read_write_queued_registers(line, (readAddress, readQuantity))
-        })
-    }
+    request(node, |node, line| {
+        node.read_write_queued_registers(line, (readAddress, readQuantity))
+    })
 }

@@ -15,13 +15,10 @@ use mbm::time::timeout;
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, slave: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(node, |node| {
-            node.core.set_unit(slave);
-            Status::OK
-        })
-    }
+    with(node, |node| {
+        node.core.set_unit(slave);
+        Status::OK
+    })
 }
 
 /// Returns the unit to which the master sends requests.
@@ -30,8 +27,7 @@ pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, slave: u8) -> 
 /// @return the unit identifier, 1 by default; 0 for an object that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_getSlaveID(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { read(node, 0, |node| node.core.unit()) }
+    read(node, 0, |node| node.core.unit())
 }
 
 /// Sets the response timeout: the maximum time from the last bit of the request to the last
@@ -42,16 +38,13 @@ pub unsafe extern "C" fn mbm_node_getSlaveID(node: *const mbm_node) -> u8 {
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeoutMs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(node, |node| {
-            let Some(timeout) = timeout(timeoutMs) else {
-                return Status::INVALID_ARGUMENT;
-            };
-            node.words.response_timeout = Setting::new(timeout);
-            Status::OK
-        })
-    }
+    with(node, |node| {
+        let Some(timeout) = timeout(timeoutMs) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        node.words.response_timeout = Setting::new(timeout);
+        Status::OK
+    })
 }
 
 /// Switches between blocking and non-blocking mode. In blocking mode, the default, a function
@@ -63,13 +56,10 @@ pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeou
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(node, |node| {
-            node.non_blocking = on == 0;
-            Status::OK
-        })
-    }
+    with(node, |node| {
+        node.non_blocking = on == 0;
+        Status::OK
+    })
 }
 
 /// Accepts replies of devices that deviate from the standard. It has these effects:
@@ -89,14 +79,11 @@ pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8
 /// @return a status; MBM_BUSY while a request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setLenient(node: *mut mbm_node, on: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(node, |node| {
-            if node.core.is_pending() {
-                return Status::BUSY;
-            }
-            node.observer = Core::lenient(on != 0);
-            Status::OK
-        })
-    }
+    with(node, |node| {
+        if node.core.is_pending() {
+            return Status::BUSY;
+        }
+        node.observer = Core::lenient(on != 0);
+        Status::OK
+    })
 }

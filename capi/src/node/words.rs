@@ -14,13 +14,10 @@ use mbm::node::NO_WORD;
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_beginTransmission(node: *mut mbm_node, address: u16) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(node, |node| {
-            node.core.begin_transmission(address);
-            Status::OK
-        })
-    }
+    with(node, |node| {
+        node.core.begin_transmission(address);
+        Status::OK
+    })
 }
 
 /// The status of a word or bit that was queued if it `fits`.
@@ -40,12 +37,9 @@ fn queued(fits: bool) -> Status {
 /// @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_send(node: *mut mbm_node, word: u16) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(node, |node| {
-            queued(node.core.send(node.words.transmit(), word))
-        })
-    }
+    with(node, |node| {
+        queued(node.core.send(node.words.transmit(), word))
+    })
 }
 
 /// Queues a bit after the bits queued before, starting at the lowest bit of a word.
@@ -55,12 +49,9 @@ pub unsafe extern "C" fn mbm_node_send(node: *mut mbm_node, word: u16) -> u8 {
 /// @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_sendBit(node: *mut mbm_node, on: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(node, |node| {
-            queued(node.core.send_bit(node.words.transmit(), on != 0))
-        })
-    }
+    with(node, |node| {
+        queued(node.core.send_bit(node.words.transmit(), on != 0))
+    })
 }
 
 /// Returns how many words of the last successful read mbm_node_receive has not returned yet.
@@ -69,8 +60,7 @@ pub unsafe extern "C" fn mbm_node_sendBit(node: *mut mbm_node, on: u8) -> u8 {
 /// @return 0 to 125
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_available(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { read(node, 0, |node| node.core.available()) }
+    read(node, 0, |node| node.core.available())
 }
 
 /// Returns the next word of the last successful read.
@@ -79,10 +69,7 @@ pub unsafe extern "C" fn mbm_node_available(node: *const mbm_node) -> u8 {
 /// @return the word; 0xFFFF if no word is left
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_receive(node: *mut mbm_node) -> u16 {
-    // SAFETY: as the header demands.
-    unsafe {
-        read(node, NO_WORD, |node| {
-            node.core.receive(node.words.response())
-        })
-    }
+    read(node, NO_WORD, |node| {
+        node.core.receive(node.words.response())
+    })
 }

@@ -93,8 +93,7 @@ pub unsafe extern "C" fn mbm_packet_nextRecord(
         };
         Some((record, length))
     };
-    // SAFETY: as the header demands.
-    unsafe { next(packet, cursor, record, first) }
+    next(packet, cursor, record, first)
 }
 
 /// Reads the objects of a device identification one by one, as mbm_packet_nextRecord
@@ -125,8 +124,7 @@ pub unsafe extern "C" fn mbm_packet_nextObject(
         };
         Some((object, bytes))
     };
-    // SAFETY: as the header demands.
-    unsafe { next(packet, cursor, object, first) }
+    next(packet, cursor, object, first)
 }
 
 impl mbm_packet {
@@ -187,30 +185,26 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
     capacity: u16,
     record: *const mbm_record,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let Some((added, current)) = get(record).zip(get(packet)) else {
-            return Status::INVALID_ARGUMENT.code();
+    let Some((added, current)) = get(record).zip(get(packet)) else {
+        return Status::INVALID_ARGUMENT.code();
+    };
+    // A request of function 14 names the registers and has no data.
+    let reads = current.kind == MBM_PACKET_REQUEST && current.function == MBM_FC_READ_FILE_RECORD;
+    let bytes = match added.length.checked_mul(2) {
+        _ if reads => 0,
+        Some(bytes) => bytes,
+        None => return Status::ILLEGAL_DATA_VALUE.code(),
+    };
+    let write = |packet: &mut mbm_packet, data: &[u8], space: &mut [u8]| {
+        let head = Record {
+            file: added.file,
+            record: added.record,
+            length: added.length,
         };
-        // A request of function 14 names the registers and has no data.
-        let reads =
-            current.kind == MBM_PACKET_REQUEST && current.function == MBM_FC_READ_FILE_RECORD;
-        let bytes = match added.length.checked_mul(2) {
-            _ if reads => 0,
-            Some(bytes) => bytes,
-            None => return Status::ILLEGAL_DATA_VALUE.code(),
-        };
-        let write = |packet: &mut mbm_packet, data: &[u8], space: &mut [u8]| {
-            let head = Record {
-                file: added.file,
-                record: added.record,
-                length: added.length,
-            };
-            groups::put_record(side(packet.kind)?, packet.function, head, data, space)
-        };
-        let done = add(packet, storage, capacity, (added.data, bytes), write);
-        done.err().unwrap_or(Status::OK).code()
-    }
+        groups::put_record(side(packet.kind)?, packet.function, head, data, space)
+    };
+    let done = add(packet, storage, capacity, (added.data, bytes), write);
+    done.err().unwrap_or(Status::OK).code()
 }
 
 /// Adds an object to the data of a response of function 2B/0E (hex) that you are going to
@@ -232,21 +226,18 @@ pub unsafe extern "C" fn mbm_packet_addObject(
     capacity: u16,
     object: *const mbm_object,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let Some(added) = get(object) else {
-            return Status::INVALID_ARGUMENT.code();
-        };
-        let write = |packet: &mut mbm_packet, value: &[u8], space: &mut [u8]| {
-            if !packet.has_objects() {
-                return Err(Status::ILLEGAL_FUNCTION);
-            }
-            let count = packet.objectCount.checked_add(1);
-            packet.objectCount = count.ok_or(Status::BUFFER_TOO_SMALL)?;
-            groups::put_object(added.id, value, space)
-        };
-        let value = (added.data, added.length.into());
-        let done = add(packet, storage, capacity, value, write);
-        done.err().unwrap_or(Status::OK).code()
-    }
+    let Some(added) = get(object) else {
+        return Status::INVALID_ARGUMENT.code();
+    };
+    let write = |packet: &mut mbm_packet, value: &[u8], space: &mut [u8]| {
+        if !packet.has_objects() {
+            return Err(Status::ILLEGAL_FUNCTION);
+        }
+        let count = packet.objectCount.checked_add(1);
+        packet.objectCount = count.ok_or(Status::BUFFER_TOO_SMALL)?;
+        groups::put_object(added.id, value, space)
+    };
+    let value = (added.data, added.length.into());
+    let done = add(packet, storage, capacity, value, write);
+    done.err().unwrap_or(Status::OK).code()
 }

@@ -106,19 +106,16 @@ unsafe fn begin(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_end(plan: *mut mbm_plan) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(plan, |object| {
-            let client = (*object).client;
-            if pointers::check(client) == Status::BUSY {
-                return Status::BUSY;
-            }
-            let setup = (*object).setup();
-            for slot in 0..setup.requestCount {
-                mbm_client_cancel(client, setup.requests.add(slot.into()));
-            }
-            (*object).mark = 0;
-            Status::OK
-        })
-    }
+    pointers::with(plan, |object| {
+        let client = (*object).client;
+        if pointers::check(client) == Status::BUSY {
+            return Status::BUSY;
+        }
+        let setup = (*object).setup();
+        for slot in 0..setup.requestCount {
+            mbm_client_cancel(client, setup.requests.add(slot.into()));
+        }
+        (*object).mark = 0;
+        Status::OK
+    })
 }

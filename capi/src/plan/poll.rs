@@ -20,34 +20,31 @@ const LONGEST_DELAY: u32 = 30 * 60 * 1000;
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_poll(plan: *mut mbm_plan) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(plan, |object| {
-            match pointers::check((*object).client) {
-                Status::OK => {}
-                refused => return refused,
+    pointers::with(plan, |object| {
+        match pointers::check((*object).client) {
+            Status::OK => {}
+            refused => return refused,
+        }
+        let now = time(object);
+        let setup = (*object).setup();
+        let reads = (*object).reads();
+        for slot in 0..setup.requestCount {
+            let request = setup.requests.add(slot.into());
+            let status = Status::from_code((*request).status);
+            if status == Status::PENDING {
+                continue;
             }
-            let now = time(object);
-            let setup = (*object).setup();
-            let reads = (*object).reads();
-            for slot in 0..setup.requestCount {
-                let request = setup.requests.add(slot.into());
-                let status = Status::from_code((*request).status);
-                if status == Status::PENDING {
-                    continue;
-                }
-                if let Some(read) = read_of(request) {
-                    schedule::end(reads, read, status, now, &setup.backoff());
-                    (*request).context = null_mut();
-                }
-                if let Ok(read) = schedule::next(reads, now) {
-                    queue(object, request, read);
-                }
+            if let Some(read) = read_of(request) {
+                schedule::end(reads, read, status, now, &setup.backoff());
+                (*request).context = null_mut();
             }
-            update(plan);
-            Status::OK
-        })
-    }
+            if let Ok(read) = schedule::next(reads, now) {
+                queue(object, request, read);
+            }
+        }
+        update(plan);
+        Status::OK
+    })
 }
 
 /// The read of a request. `None` for a request that the plan does not use.
@@ -125,38 +122,35 @@ unsafe fn update(plan: *mut mbm_plan) {
 ///         for an object that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_pollDelay(plan: *mut mbm_plan) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if pointers::check(plan) != Status::OK {
-            return u32::MAX;
+    if pointers::check(plan) != Status::OK {
+        return u32::MAX;
+    }
+    let object = pointers::object(plan);
+    let client = (*object).client;
+    match pointers::check(client) {
+        Status::OK => {}
+        Status::BUSY => return 0,
+        _ => return u32::MAX,
+    }
+    let now = time(object);
+    let setup = (*object).setup();
+    let mut is_free = mbm_client_pending(client) < MBM_CLIENT_DEPTH;
+    let mut has_request = false;
+    for slot in 0..setup.requestCount {
+        let request = setup.requests.add(slot.into());
+        if (*request).status == Status::PENDING.code() {
+            continue;
         }
-        let object = pointers::object(plan);
-        let client = (*object).client;
-        match pointers::check(client) {
-            Status::OK => {}
-            Status::BUSY => return 0,
-            _ => return u32::MAX,
+        if read_of(request).is_some() {
+            return 0;
         }
-        let now = time(object);
-        let setup = (*object).setup();
-        let mut is_free = mbm_client_pending(client) < MBM_CLIENT_DEPTH;
-        let mut has_request = false;
-        for slot in 0..setup.requestCount {
-            let request = setup.requests.add(slot.into());
-            if (*request).status == Status::PENDING.code() {
-                continue;
-            }
-            if read_of(request).is_some() {
-                return 0;
-            }
-            has_request = true;
-        }
-        is_free &= has_request;
-        match schedule::next((*object).reads(), now) {
-            Err(u32::MAX) => u32::MAX,
-            Err(delay) => delay.min(LONGEST_DELAY) * 1000,
-            Ok(_) if is_free => 0,
-            Ok(_) => u32::MAX,
-        }
+        has_request = true;
+    }
+    is_free &= has_request;
+    match schedule::next((*object).reads(), now) {
+        Err(u32::MAX) => u32::MAX,
+        Err(delay) => delay.min(LONGEST_DELAY) * 1000,
+        Ok(_) if is_free => 0,
+        Ok(_) => u32::MAX,
     }
 }

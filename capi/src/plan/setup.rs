@@ -174,14 +174,22 @@ impl mbm_planSetup {
         }
     }
 
-    // SAFETY, of all below: `self` was handed to mbm_plan_begin, whose comment demands arrays
-    // of these lengths, and `is_complete`. The types of C and of the core have the same layout.
-
+    /// The fields.
+    ///
+    /// # Safety
+    /// The program passed this setup to mbm_plan_begin, whose comment demands arrays of these
+    /// lengths, and it is complete.
     pub(super) unsafe fn fields<'a>(&self) -> &'a [Field] {
+        // SAFETY: as the caller promises. The types of C and of the core have the same layout.
         unsafe { from_raw_parts(self.fields.cast(), self.fieldCount.into()) }
     }
 
+    /// The positions of the fields.
+    ///
+    /// # Safety
+    /// As for [`mbm_planSetup::fields`].
     pub(super) unsafe fn positions<'a>(&self) -> &'a [Position] {
+        // SAFETY: as the caller promises. The types of C and of the core have the same layout.
         unsafe { from_raw_parts(self.positions.cast(), self.fieldCount.into()) }
     }
 }

@@ -147,25 +147,22 @@ pub unsafe extern "C" fn mbm_plan_getStatus(
     field: u16,
     ageMs: *mut u32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let mut found = MaybeUninit::uninit();
-        match find(plan, field, &mut found) {
-            Status::OK => {}
-            refused => return refused.code(),
-        }
-        let Found { object, read, .. } = found.assume_init();
-        let now = time(object);
-        pointers::put(
-            ageMs,
-            if read.has_data() {
-                read.age(now)
-            } else {
-                u32::MAX
-            },
-        );
-        read.status().code()
+    let mut found = MaybeUninit::uninit();
+    match find(plan, field, &mut found) {
+        Status::OK => {}
+        refused => return refused.code(),
     }
+    let Found { object, read, .. } = found.assume_init();
+    let now = time(object);
+    pointers::put(
+        ageMs,
+        if read.has_data() {
+            read.age(now)
+        } else {
+            u32::MAX
+        },
+    );
+    read.status().code()
 }
 
 /// A value as an integer: multiplied and divided as its field says, rounded to the nearest,
@@ -185,8 +182,7 @@ pub unsafe extern "C" fn mbm_plan_getInteger(
     index: u16,
     value: *mut i64,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { get(plan, field, index, value, |words| words.integer()) }
+    get(plan, field, index, value, |words| words.integer())
 }
 
 /// As mbm_plan_getInteger, but with 32 bits throughout: less code on a microcontroller.
@@ -205,8 +201,7 @@ pub unsafe extern "C" fn mbm_plan_getInt32(
     index: u16,
     value: *mut i32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { get(plan, field, index, value, |words| words.int32()) }
+    get(plan, field, index, value, |words| words.int32())
 }
 
 /// A bit, an integer or a float as a double: multiplied and divided as its field says, and
@@ -274,8 +269,7 @@ pub unsafe extern "C" fn mbm_plan_getText(
     capacity: u16,
 ) -> u8 {
     let copy = |words: &Words| {
-        // SAFETY: as the header demands.
-        let text = unsafe { slice_mut::<u8>(text.cast(), capacity.into())? };
+        let text = slice_mut::<u8>(text.cast(), capacity.into())?;
         let (end, place) = text.split_last_mut().ok_or(Status::BUFFER_TOO_SMALL)?;
         let count = words.text(place)?;
         *place.get_mut(count).unwrap_or(end) = 0;
@@ -310,21 +304,18 @@ pub unsafe extern "C" fn mbm_plan_getRegisters(
     field: u16,
     registers: *mut mbm_registers,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        get(plan, field, 0, registers, |words| {
-            if words.field.is_in_bits() {
-                return Err(Status::INVALID_ARGUMENT);
-            }
-            Ok(mbm_registers {
-                data: words.words.as_ptr().cast(),
-                first: words.field.address,
-                count: words.field.length() as u16,
-                kind: MBM_REGISTERS_OF_WORDS,
-                order: words.field.order,
-            })
+    get(plan, field, 0, registers, |words| {
+        if words.field.is_in_bits() {
+            return Err(Status::INVALID_ARGUMENT);
+        }
+        Ok(mbm_registers {
+            data: words.words.as_ptr().cast(),
+            first: words.field.address,
+            count: words.field.length() as u16,
+            kind: MBM_REGISTERS_OF_WORDS,
+            order: words.field.order,
         })
-    }
+    })
 }
 
 /// Makes the read of a field due at once, for a value that is wanted now. A unit that does not
@@ -335,20 +326,17 @@ pub unsafe extern "C" fn mbm_plan_getRegisters(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let mut found = MaybeUninit::uninit();
-        match find(plan, field, &mut found) {
-            Status::OK => {}
-            refused => return refused.code(),
-        }
-        let Found { object, read, .. } = found.assume_init();
-        if pointers::check((*object).client) == Status::BUSY {
-            return Status::BUSY.code();
-        }
-        schedule::hasten(read, time(object));
-        Status::OK.code()
+    let mut found = MaybeUninit::uninit();
+    match find(plan, field, &mut found) {
+        Status::OK => {}
+        refused => return refused.code(),
     }
+    let Found { object, read, .. } = found.assume_init();
+    if pointers::check((*object).client) == Status::BUSY {
+        return Status::BUSY.code();
+    }
+    schedule::hasten(read, time(object));
+    Status::OK.code()
 }
 
 /// The reads that the plan has made of the fields: one request each.
@@ -381,7 +369,6 @@ pub unsafe extern "C" fn mbm_plan_getRead(
             status: own.status().code(),
         })
     };
-    // SAFETY: as the header demands.
-    let found = unsafe { pointers::put_result(read, find) };
+    let found = pointers::put_result(read, find);
     found.err().unwrap_or(Status::OK).code()
 }

@@ -63,12 +63,9 @@ pub unsafe extern "C" fn mbm_registers_getBit(
     bit: u8,
     on: *mut u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        get_value(registers, on, |registers| {
-            registers.bit(address, bit).map(u8::from)
-        })
-    }
+    get_value(registers, on, |registers| {
+        registers.bit(address, bit).map(u8::from)
+    })
 }
 
 /// Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
@@ -86,8 +83,7 @@ pub unsafe extern "C" fn mbm_registers_getUint16(
     order: u8,
     value: *mut u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { get(registers, address, order, value.cast(), 2) }
+    get(registers, address, order, value.cast(), 2)
 }
 
 /// Reads a number of two registers, 0 to 4294967295. For a signed number (two's
@@ -105,8 +101,7 @@ pub unsafe extern "C" fn mbm_registers_getUint32(
     order: u8,
     value: *mut u32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { get(registers, address, order, value.cast(), 4) }
+    get(registers, address, order, value.cast(), 4)
 }
 
 /// Reads a number of four registers. For a signed number, pass a pointer to an int64_t,
@@ -124,8 +119,7 @@ pub unsafe extern "C" fn mbm_registers_getUint64(
     order: u8,
     value: *mut u64,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { get(registers, address, order, value.cast(), 8) }
+    get(registers, address, order, value.cast(), 8)
 }
 
 /// Reads a float of two registers, an IEEE 754 binary32. Its bits are copied, also those
@@ -143,8 +137,7 @@ pub unsafe extern "C" fn mbm_registers_getFloat(
     order: u8,
     value: *mut f32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { get(registers, address, order, value.cast(), 4) }
+    get(registers, address, order, value.cast(), 4)
 }
 
 /// Reads a double of four registers, an IEEE 754 binary64. Its bits are copied. On AVR,

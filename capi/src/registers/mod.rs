@@ -214,16 +214,13 @@ pub unsafe extern "C" fn mbm_registers_ofWords(
     count: u16,
     first: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        fill(
-            registers,
-            words.cast(),
-            MBM_REGISTERS_OF_WORDS,
-            count,
-            first,
-        )
-    }
+    fill(
+        registers,
+        words.cast(),
+        MBM_REGISTERS_OF_WORDS,
+        count,
+        first,
+    )
 }
 
 /// As mbm_registers_ofWords, for the data bytes of a reply or a request.
@@ -241,16 +238,13 @@ pub unsafe extern "C" fn mbm_registers_ofBytes(
     length: u16,
     first: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        fill(
-            registers,
-            bytes.cast(),
-            MBM_REGISTERS_OF_BYTES,
-            length,
-            first,
-        )
-    }
+    fill(
+        registers,
+        bytes.cast(),
+        MBM_REGISTERS_OF_BYTES,
+        length,
+        first,
+    )
 }
 
 /// As mbm_registers_ofWords, for words that you also write, for example the transmit
@@ -268,16 +262,13 @@ pub unsafe extern "C" fn mbm_registers_intoWords(
     count: u16,
     first: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        fill(
-            registers,
-            words.cast(),
-            MBM_REGISTERS_INTO_WORDS,
-            count,
-            first,
-        )
-    }
+    fill(
+        registers,
+        words.cast(),
+        MBM_REGISTERS_INTO_WORDS,
+        count,
+        first,
+    )
 }
 
 /// As mbm_registers_ofBytes, for bytes that you also write.
@@ -294,14 +285,11 @@ pub unsafe extern "C" fn mbm_registers_intoBytes(
     length: u16,
     first: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        fill(
-            registers,
-            bytes.cast(),
-            MBM_REGISTERS_INTO_BYTES,
-            length,
-            first,
-        )
-    }
+    fill(
+        registers,
+        bytes.cast(),
+        MBM_REGISTERS_INTO_BYTES,
+        length,
+        first,
+    )
 }

@@ -60,12 +60,9 @@ pub unsafe extern "C" fn mbm_registers_setBit(
     bit: u8,
     on: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(registers, MBM_ORDER_DEFAULT, |registers| {
-            registers.set_bit(address, bit, on != 0)
-        })
-    }
+    with(registers, MBM_ORDER_DEFAULT, |registers| {
+        registers.set_bit(address, bit, on != 0)
+    })
 }
 
 /// Writes a number into one register. The order of words has no effect; the order of
@@ -119,8 +116,7 @@ pub unsafe extern "C" fn mbm_registers_setUint64(
     order: u8,
     value: *const u64,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { set(registers, address, order, value.cast(), 8) }
+    set(registers, address, order, value.cast(), 8)
 }
 
 /// Writes a float into two registers, as an IEEE 754 binary32. Its bits are copied.
@@ -137,8 +133,7 @@ pub unsafe extern "C" fn mbm_registers_setFloat(
     order: u8,
     value: *const f32,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { set(registers, address, order, value.cast(), 4) }
+    set(registers, address, order, value.cast(), 4)
 }
 
 /// Writes a double into four registers, as an IEEE 754 binary64. On AVR, where a double
@@ -222,10 +217,7 @@ pub unsafe extern "C" fn mbm_registers_setBytes(
     bytes: *const u8,
     length: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(registers, order, |registers| {
-            registers.set_bytes_in(registers.order, address, slice(bytes, length.into())?)
-        })
-    }
+    with(registers, order, |registers| {
+        registers.set_bytes_in(registers.order, address, slice(bytes, length.into())?)
+    })
 }

@@ -91,8 +91,7 @@ pub unsafe extern "C" fn mbm_server_beginRtu(
     frame: *mut u8,
     bytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { begin(server, port, units, count, frame, bytes, Core::begin_rtu) }.code()
+    begin(server, port, units, count, frame, bytes, Core::begin_rtu).code()
 }
 
 /// Begins a server for ASCII on a serial line (serial line guide V1.02, 2.5.2). The
@@ -117,8 +116,7 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
     if bytes < 2 * MIN_FRAME {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: as the header demands.
-    unsafe { begin(server, port, units, count, frame, bytes, Core::begin_ascii) }.code()
+    begin(server, port, units, count, frame, bytes, Core::begin_ascii).code()
 }
 
 /// Begins a server on an accepted TCP connection. If several requests are in the stream,
@@ -144,8 +142,7 @@ pub unsafe extern "C" fn mbm_server_beginTcp(
     if bytes < MBM_MAX_TCP_FRAME {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: as the header demands.
-    unsafe { begin(server, port, units, count, frame, bytes, Core::begin_tcp) }.code()
+    begin(server, port, units, count, frame, bytes, Core::begin_tcp).code()
 }
 
 /// Begins a server for a stream of RTU frames without timing: a TCP connection that
@@ -213,16 +210,13 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceU
 /// @return a status; MBM_INVALID_ARGUMENT for other framings
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        match check(server) {
-            Status::OK if (*object(server)).is_rtu_line() => {
-                (*object(server)).set_silence(time::silence(baud));
-                Status::OK.code()
-            }
-            Status::OK => Status::INVALID_ARGUMENT.code(),
-            refused => refused.code(),
+    match check(server) {
+        Status::OK if (*object(server)).is_rtu_line() => {
+            (*object(server)).set_silence(time::silence(baud));
+            Status::OK.code()
         }
+        Status::OK => Status::INVALID_ARGUMENT.code(),
+        refused => refused.code(),
     }
 }
 
@@ -235,12 +229,9 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
 /// @return a status; MBM_INVALID_ARGUMENT for other framings
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        match check(server) {
-            Status::OK if (*object(server)).set_echo_discard(on != 0) => Status::OK.code(),
-            Status::OK => Status::INVALID_ARGUMENT.code(),
-            refused => refused.code(),
-        }
+    match check(server) {
+        Status::OK if (*object(server)).set_echo_discard(on != 0) => Status::OK.code(),
+        Status::OK => Status::INVALID_ARGUMENT.code(),
+        refused => refused.code(),
     }
 }

@@ -165,13 +165,10 @@ pub unsafe extern "C" fn mbm_unit_serveCallbacks(
     cells: *mut mbm_dataCallbacks,
     table: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if cells.is_null() || (*cells).get.is_none() || !(1..=4).contains(&table) {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        add_as(unit, cells.cast(), table, serve).code()
+    if cells.is_null() || (*cells).get.is_none() || !(1..=4).contains(&table) {
+        return Status::INVALID_ARGUMENT.code();
     }
+    add_as(unit, cells.cast(), table, serve).code()
 }
 
 /// Sets the functions that are called around a read or a write of cells, or removes them.

@@ -134,17 +134,14 @@ pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Op
 ///         above 127 or an invalid `length`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCustom(unit: *mut mbm_unit, custom: *mut mbm_custom) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if custom.is_null()
-            || (*custom).serve.is_none()
-            || (*custom).code > 127
-            || functions::rule((*custom).length).is_none()
-        {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        add_as(unit, custom.cast(), CUSTOM, serve).code()
+    if custom.is_null()
+        || (*custom).serve.is_none()
+        || (*custom).code > 127
+        || functions::rule((*custom).length).is_none()
+    {
+        return Status::INVALID_ARGUMENT.code();
     }
+    add_as(unit, custom.cast(), CUSTOM, serve).code()
 }
 
 /// Answers a disabled function with exception 01, and leaves any other to the services
@@ -193,19 +190,16 @@ pub unsafe extern "C" fn mbm_unit_switchFunction(
     code: u8,
     on: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if mask.is_null() || code == 0 || code > 127 {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        let status = add_first(unit, mask.cast(), refuse_disabled);
-        if status == Status::OK.code() {
-            let (byte, bit) = (mask_byte(mask, code), 1 << (code % 8));
-            *byte |= bit;
-            if on != 0 {
-                *byte ^= bit;
-            }
-        }
-        status
+    if mask.is_null() || code == 0 || code > 127 {
+        return Status::INVALID_ARGUMENT.code();
     }
+    let status = add_first(unit, mask.cast(), refuse_disabled);
+    if status == Status::OK.code() {
+        let (byte, bit) = (mask_byte(mask, code), 1 << (code % 8));
+        *byte |= bit;
+        if on != 0 {
+            *byte ^= bit;
+        }
+    }
+    status
 }

@@ -83,19 +83,16 @@ pub unsafe extern "C" fn mbm_unit_serveDiagnostics(
     unit: *mut mbm_unit,
     diagnostics: *mut mbm_diagnostics,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if !unit.is_null() {
-            let has = (*unit).diagnostics;
-            if !has.is_null() && has != diagnostics {
-                return Status::BUSY.code();
-            }
+    if !unit.is_null() {
+        let has = (*unit).diagnostics;
+        if !has.is_null() && has != diagnostics {
+            return Status::BUSY.code();
         }
-        let status = add(unit, diagnostics.cast(), serve);
-        if status == Status::OK.code() {
-            (*unit).diagnostics = diagnostics;
-            (*unit).monitor = Some(monitor);
-        }
-        status
     }
+    let status = add(unit, diagnostics.cast(), serve);
+    if status == Status::OK.code() {
+        (*unit).diagnostics = diagnostics;
+        (*unit).monitor = Some(monitor);
+    }
+    status
 }

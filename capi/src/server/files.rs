@@ -215,8 +215,7 @@ unsafe extern "C" fn serve_fifos(
 /// @return a status; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveFiles(unit: *mut mbm_unit, files: *mut mbm_files) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { add(unit, files.cast(), serve_files) }
+    add(unit, files.cast(), serve_files)
 }
 
 /// Sets the functions that are called around a read or a write of records, or removes them.
@@ -247,6 +246,5 @@ pub unsafe extern "C" fn mbm_files_setHooks(
 /// @return a status; see mbm_unit_serveFiles
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveFifos(unit: *mut mbm_unit, fifos: *mut mbm_fifos) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { add(unit, fifos.cast(), serve_fifos) }
+    add(unit, fifos.cast(), serve_fifos)
 }

@@ -141,8 +141,7 @@ pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
     unit: *mut mbm_unit,
     status: *mut mbm_exceptionStatus,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { add_only(unit, status.cast(), serve_exception_status) }
+    add_only(unit, status.cast(), serve_exception_status)
 }
 
 /// Serves function 11 (hex), Report Server ID.
@@ -152,8 +151,7 @@ pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
 /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mbm_serverId) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { add_only(unit, id.cast(), serve_server_id) }
+    add_only(unit, id.cast(), serve_server_id)
 }
 
 /// Serves function 2B/0E (hex), Read Device Identification: streams of objects, and
@@ -169,6 +167,5 @@ pub unsafe extern "C" fn mbm_unit_serveIdentification(
     unit: *mut mbm_unit,
     identification: *mut mbm_serverIdentification,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { add_only(unit, identification.cast(), serve_identification) }
+    add_only(unit, identification.cast(), serve_identification)
 }

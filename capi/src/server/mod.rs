@@ -147,19 +147,16 @@ unsafe impl CObject for mbm_server {
 ///         connection
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = check_once(server);
-        if status != Status::OK {
-            return status.code();
-        }
-        let mark = mbm_server::mark(server);
-        mark.write(IN_HOOK);
-        let status = poll(object(server), mark);
-        // If a hook zeroed the object, its mark stays zero.
-        mark.write(mark.read() & BEGUN);
-        status.code()
+    let status = check_once(server);
+    if status != Status::OK {
+        return status.code();
     }
+    let mark = mbm_server::mark(server);
+    mark.write(IN_HOOK);
+    let status = poll(object(server), mark);
+    // If a hook zeroed the object, its mark stays zero.
+    mark.write(mark.read() & BEGUN);
+    status.code()
 }
 
 /// Receives bytes, and serves and answers the requests among them.

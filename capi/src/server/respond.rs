@@ -64,8 +64,7 @@ pub unsafe extern "C" fn mbm_unit_respond(
         // SAFETY: not NULL, so it points to a length.
         unsafe { response.write(0) }
     }
-    // SAFETY: as the header demands.
-    let (framing, delimiter) = match unsafe { get(framing) } {
+    let (framing, delimiter) = match get(framing) {
         Some(fields) => (fields.of_frames(), fields.end()),
         None => return Status::INVALID_ARGUMENT.code(),
     };

@@ -267,8 +267,7 @@ unsafe extern "C" fn add_table(
 ///         kind
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCoils(unit: *mut mbm_unit, table: *mut mbm_bitTable) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { add_table(unit, table.cast(), TableKind::COILS) }
+    add_table(unit, table.cast(), TableKind::COILS)
 }
 
 /// Serves discrete inputs: function 02.
@@ -281,8 +280,7 @@ pub unsafe extern "C" fn mbm_unit_serveDiscreteInputs(
     unit: *mut mbm_unit,
     table: *mut mbm_bitTable,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { add_table(unit, table.cast(), TableKind::DISCRETE_INPUTS) }
+    add_table(unit, table.cast(), TableKind::DISCRETE_INPUTS)
 }
 
 /// Serves holding registers: functions 03, 06 and 10 (hex). For functions 16 and 17 too,
@@ -296,8 +294,7 @@ pub unsafe extern "C" fn mbm_unit_serveHoldingRegisters(
     unit: *mut mbm_unit,
     table: *mut mbm_registerTable,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { add_table(unit, table, TableKind::HOLDING_REGISTERS) }
+    add_table(unit, table, TableKind::HOLDING_REGISTERS)
 }
 
 /// Serves input registers: function 04.
@@ -310,8 +307,7 @@ pub unsafe extern "C" fn mbm_unit_serveInputRegisters(
     unit: *mut mbm_unit,
     table: *mut mbm_registerTable,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { add_table(unit, table, TableKind::INPUT_REGISTERS) }
+    add_table(unit, table, TableKind::INPUT_REGISTERS)
 }
 
 /// Adds functions 16 and 17 (hex), Mask Write Register and Read/Write Multiple Registers,

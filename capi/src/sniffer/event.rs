@@ -190,14 +190,11 @@ pub unsafe extern "C" fn mbm_event_text(
     text: *mut c_char,
     size: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let write = || {
-            let mut line = line(text, size)?;
-            let event = get(event).ok_or(Status::INVALID_ARGUMENT)?;
-            event.core_event()?.text(&mut line);
-            Ok(line)
-        };
-        outcome(write())
-    }
+    let write = || {
+        let mut line = line(text, size)?;
+        let event = get(event).ok_or(Status::INVALID_ARGUMENT)?;
+        event.core_event()?.text(&mut line);
+        Ok(line)
+    };
+    outcome(write())
 }

@@ -156,8 +156,7 @@ pub unsafe extern "C" fn mbm_sniffer_beginRtu(
     buffer: *mut u8,
     size: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { begin(sniffer, buffer, size, Framing::Rtu) }
+    begin(sniffer, buffer, size, Framing::Rtu)
 }
 
 /// Begins a sniffer for ASCII frames on a serial line.
@@ -172,8 +171,7 @@ pub unsafe extern "C" fn mbm_sniffer_beginAscii(
     buffer: *mut u8,
     size: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { begin(sniffer, buffer, size, Framing::Ascii) }
+    begin(sniffer, buffer, size, Framing::Ascii)
 }
 
 /// Begins a sniffer for a TCP stream of frames with the MBAP header.
@@ -188,8 +186,7 @@ pub unsafe extern "C" fn mbm_sniffer_beginTcp(
     buffer: *mut u8,
     size: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { begin(sniffer, buffer, size, Framing::Tcp) }
+    begin(sniffer, buffer, size, Framing::Tcp)
 }
 
 /// Begins a sniffer for a TCP stream of RTU frames.
@@ -204,8 +201,7 @@ pub unsafe extern "C" fn mbm_sniffer_beginRtuOverTcp(
     buffer: *mut u8,
     size: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { begin(sniffer, buffer, size, Framing::RtuOverTcp) }
+    begin(sniffer, buffer, size, Framing::RtuOverTcp)
 }
 
 /// Declares functions that the standard does not define, in place of those declared
@@ -222,19 +218,16 @@ pub unsafe extern "C" fn mbm_sniffer_setFunctions(
     functions: *const mbm_function,
     count: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(sniffer, |object| {
-            match array_or_empty(functions, count.into()).map(convert) {
-                Some(Ok(functions)) => {
-                    object.functions = functions;
-                    object.count = count;
-                    Status::OK
-                }
-                _ => Status::INVALID_ARGUMENT,
+    pointers::with(sniffer, |object| {
+        match array_or_empty(functions, count.into()).map(convert) {
+            Some(Ok(functions)) => {
+                object.functions = functions;
+                object.count = count;
+                Status::OK
             }
-        })
-    }
+            _ => Status::INVALID_ARGUMENT,
+        }
+    })
 }
 
 /// Sets the character that ends an ASCII frame after CR, LF at first; as
@@ -248,8 +241,7 @@ pub unsafe extern "C" fn mbm_sniffer_setDelimiter(sniffer: *mut mbm_sniffer, cha
     if !is_delimiter(character) {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: as the header demands.
-    unsafe { with(sniffer, |core| core.set_end(character)) }
+    with(sniffer, |core| core.set_end(character))
 }
 
 /// Sets the baud rate of a serial line. From it the sniffer computes the silence between
@@ -261,8 +253,7 @@ pub unsafe extern "C" fn mbm_sniffer_setDelimiter(sniffer: *mut mbm_sniffer, cha
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setBaudRate(sniffer: *mut mbm_sniffer, baud: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { with(sniffer, |core| core.set_baud_rate(baud)) }
+    with(sniffer, |core| core.set_baud_rate(baud))
 }
 
 /// Sets how long the sniffer waits for the reply to a request before it reports
@@ -283,8 +274,7 @@ pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
         Ok(timeout) if timeout > 0 => millis(timeout),
         _ => return Status::INVALID_ARGUMENT.code(),
     };
-    // SAFETY: as the header demands.
-    unsafe { with(sniffer, |core| core.set_timeout(timeout)) }
+    with(sniffer, |core| core.set_timeout(timeout))
 }
 
 /// Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
@@ -303,8 +293,7 @@ pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
         Ok(timeout) if timeout > 0 => millis(timeout),
         _ => return Status::INVALID_ARGUMENT.code(),
     };
-    // SAFETY: as the header demands.
-    unsafe { with(sniffer, |core| core.set_frame_timeout(timeout)) }
+    with(sniffer, |core| core.set_frame_timeout(timeout))
 }
 
 /// Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.

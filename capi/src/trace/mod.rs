@@ -215,52 +215,49 @@ unsafe fn begin(
     hook: TraceHook,
     context: *mut c_void,
 ) -> Result<(), Status> {
-    // SAFETY: as the header demands.
-    unsafe {
-        let (described, kind) = described(framing)?;
-        let port = get(port).filter(mbm_port::is_complete);
-        let port = port.ok_or(Status::INVALID_ARGUMENT)?;
-        // A trace that passes its own bytes on to itself would never end.
-        let is_own = port.context == trace.cast();
-        if trace.is_null() || buffer.is_null() || hook.is_none() || is_own {
-            return Err(Status::INVALID_ARGUMENT);
-        }
-        if size < MBM_MIN_TRACE_BUFFER {
-            return Err(Status::BUFFER_TOO_SMALL);
-        }
-        if mbm_trace::mark(trace).read() == IN_HOOK {
-            return Err(Status::BUSY);
-        }
-        let observer = CObserver {
-            hook,
-            context,
-            functions: described.functions,
-            function_count: described.functionCount,
-        };
-        let buffer = CBuffer {
-            bytes: buffer,
-            size,
-        };
-        let object = trace.cast::<Object>();
-        let passed_on = PortRef::new(&raw const (*object).inner);
-        object.write(Object {
-            mark: BEGUN,
-            outer: mbm_port {
-                context: trace.cast(),
-                read: Some(read),
-                write: Some(write),
-                micros: Some(micros),
-                flush: port.flush.map(|_| flush as _),
-                preTransmission: port.preTransmission.map(|_| pre_transmission as _),
-                // It ends a sent frame.
-                postTransmission: Some(post_transmission),
-                idle: port.idle.map(|_| idle as _),
-            },
-            inner: port,
-            core: Trace::new(passed_on, kind, sends, described.end(), buffer, observer),
-        });
-        Ok(())
+    let (described, kind) = described(framing)?;
+    let port = get(port).filter(mbm_port::is_complete);
+    let port = port.ok_or(Status::INVALID_ARGUMENT)?;
+    // A trace that passes its own bytes on to itself would never end.
+    let is_own = port.context == trace.cast();
+    if trace.is_null() || buffer.is_null() || hook.is_none() || is_own {
+        return Err(Status::INVALID_ARGUMENT);
     }
+    if size < MBM_MIN_TRACE_BUFFER {
+        return Err(Status::BUFFER_TOO_SMALL);
+    }
+    if mbm_trace::mark(trace).read() == IN_HOOK {
+        return Err(Status::BUSY);
+    }
+    let observer = CObserver {
+        hook,
+        context,
+        functions: described.functions,
+        function_count: described.functionCount,
+    };
+    let buffer = CBuffer {
+        bytes: buffer,
+        size,
+    };
+    let object = trace.cast::<Object>();
+    let passed_on = PortRef::new(&raw const (*object).inner);
+    object.write(Object {
+        mark: BEGUN,
+        outer: mbm_port {
+            context: trace.cast(),
+            read: Some(read),
+            write: Some(write),
+            micros: Some(micros),
+            flush: port.flush.map(|_| flush as _),
+            preTransmission: port.preTransmission.map(|_| pre_transmission as _),
+            // It ends a sent frame.
+            postTransmission: Some(post_transmission),
+            idle: port.idle.map(|_| idle as _),
+        },
+        inner: port,
+        core: Trace::new(passed_on, kind, sends, described.end(), buffer, observer),
+    });
+    Ok(())
 }
 
 /// A copy of the description of frames, if it is valid.
@@ -327,8 +324,9 @@ pub unsafe extern "C" fn mbm_trace_beginClient(
     context: *mut c_void,
 ) -> u8 {
     let sends = PduKind::Request;
-    // SAFETY: as the header demands.
-    code(unsafe { begin(trace, sends, port, framing, buffer, size, hook, context) })
+    code(begin(
+        trace, sends, port, framing, buffer, size, hook, context,
+    ))
 }
 
 /// Begins the trace of a server. Then begin that server with mbm_trace_port.
@@ -352,8 +350,9 @@ pub unsafe extern "C" fn mbm_trace_beginServer(
     context: *mut c_void,
 ) -> u8 {
     let sends = PduKind::Response;
-    // SAFETY: as the header demands.
-    code(unsafe { begin(trace, sends, port, framing, buffer, size, hook, context) })
+    code(begin(
+        trace, sends, port, framing, buffer, size, hook, context,
+    ))
 }
 
 /// Returns the port that passes everything on to the port of the trace. Pass it to the begin
@@ -364,12 +363,9 @@ pub unsafe extern "C" fn mbm_trace_beginServer(
 ///         never begun, and from within its hook: the begin functions refuse it
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_port(trace: *mut mbm_trace) -> *const mbm_port {
-    // SAFETY: as the header demands.
-    unsafe {
-        match check(trace) {
-            Status::OK => &raw const (*trace.cast::<Object>()).outer,
-            _ => null(),
-        }
+    match check(trace) {
+        Status::OK => &raw const (*trace.cast::<Object>()).outer,
+        _ => null(),
     }
 }
 
@@ -382,12 +378,9 @@ pub unsafe extern "C" fn mbm_trace_port(trace: *mut mbm_trace) -> *const mbm_por
 ///         was never begun, and from within its hook
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_innerPort(trace: *const mbm_trace) -> *const mbm_port {
-    // SAFETY: as the header demands.
-    unsafe {
-        match check(trace) {
-            Status::OK => &raw const (*trace.cast::<Object>()).inner,
-            _ => null(),
-        }
+    match check(trace) {
+        Status::OK => &raw const (*trace.cast::<Object>()).inner,
+        _ => null(),
     }
 }
 
@@ -421,6 +414,5 @@ pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeou
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_flush(trace: *mut mbm_trace) -> u8 {
-    // SAFETY: as the header demands.
-    code(unsafe { with_core(trace, Core::hand_out_rest) })
+    code(with_core(trace, Core::hand_out_rest))
 }

@@ -96,8 +96,7 @@ pub unsafe extern "C" fn mbm_trace_ofEvent(
     event: *const mbm_event,
     record: *mut mbm_traceRecord,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    let event = unsafe { get(event) }.filter(|event| event.kind != MBM_EVENT_TIMEOUT);
+    let event = get(event).filter(|event| event.kind != MBM_EVENT_TIMEOUT);
     let (Some(event), false) = (event, record.is_null()) else {
         return Status::INVALID_ARGUMENT.code();
     };

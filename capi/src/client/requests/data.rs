@@ -32,8 +32,7 @@ pub unsafe extern "C" fn mbm_client_readCoils(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { two_words(client, request, address, quantity, FunctionSpec::READ_COILS) }
+    two_words(client, request, address, quantity, FunctionSpec::READ_COILS)
 }
 
 /// Function 02: reads discrete inputs into the bytes of `reply`, as mbm_client_readCoils
@@ -51,16 +50,13 @@ pub unsafe extern "C" fn mbm_client_readDiscreteInputs(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        two_words(
-            client,
-            request,
-            address,
-            quantity,
-            FunctionSpec::READ_DISCRETE_INPUTS,
-        )
-    }
+    two_words(
+        client,
+        request,
+        address,
+        quantity,
+        FunctionSpec::READ_DISCRETE_INPUTS,
+    )
 }
 
 /// Function 03: reads holding registers into the words of `reply` (V1.1b3, 6.3).
@@ -77,16 +73,13 @@ pub unsafe extern "C" fn mbm_client_readHoldingRegisters(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        two_words(
-            client,
-            request,
-            address,
-            quantity,
-            FunctionSpec::READ_HOLDING_REGISTERS,
-        )
-    }
+    two_words(
+        client,
+        request,
+        address,
+        quantity,
+        FunctionSpec::READ_HOLDING_REGISTERS,
+    )
 }
 
 /// Function 04: reads input registers into the words of `reply` (V1.1b3, 6.4).
@@ -103,16 +96,13 @@ pub unsafe extern "C" fn mbm_client_readInputRegisters(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        two_words(
-            client,
-            request,
-            address,
-            quantity,
-            FunctionSpec::READ_INPUT_REGISTERS,
-        )
-    }
+    two_words(
+        client,
+        request,
+        address,
+        quantity,
+        FunctionSpec::READ_INPUT_REGISTERS,
+    )
 }
 
 /// Function 05: switches one coil on or off (V1.1b3, 6.5).
@@ -129,16 +119,13 @@ pub unsafe extern "C" fn mbm_client_writeSingleCoil(
     address: u16,
     on: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        two_words(
-            client,
-            request,
-            address,
-            if on == 0 { 0 } else { 0xFF00 },
-            FunctionSpec::WRITE_SINGLE_COIL,
-        )
-    }
+    two_words(
+        client,
+        request,
+        address,
+        if on == 0 { 0 } else { 0xFF00 },
+        FunctionSpec::WRITE_SINGLE_COIL,
+    )
 }
 
 /// Function 06: writes one holding register (V1.1b3, 6.6).
@@ -155,16 +142,13 @@ pub unsafe extern "C" fn mbm_client_writeSingleRegister(
     address: u16,
     value: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        two_words(
-            client,
-            request,
-            address,
-            value,
-            FunctionSpec::WRITE_SINGLE_REGISTER,
-        )
-    }
+    two_words(
+        client,
+        request,
+        address,
+        value,
+        FunctionSpec::WRITE_SINGLE_REGISTER,
+    )
 }
 
 /// Function 0F: writes coils from the bytes of `data`, eight in each byte. The first coil is
@@ -182,16 +166,13 @@ pub unsafe extern "C" fn mbm_client_writeMultipleCoils(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        two_words(
-            client,
-            request,
-            address,
-            quantity,
-            FunctionSpec::WRITE_MULTIPLE_COILS,
-        )
-    }
+    two_words(
+        client,
+        request,
+        address,
+        quantity,
+        FunctionSpec::WRITE_MULTIPLE_COILS,
+    )
 }
 
 /// Function 10: writes the words of `data` to holding registers (V1.1b3, 6.12).
@@ -208,16 +189,13 @@ pub unsafe extern "C" fn mbm_client_writeMultipleRegisters(
     address: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        two_words(
-            client,
-            request,
-            address,
-            quantity,
-            FunctionSpec::WRITE_MULTIPLE_REGISTERS,
-        )
-    }
+    two_words(
+        client,
+        request,
+        address,
+        quantity,
+        FunctionSpec::WRITE_MULTIPLE_REGISTERS,
+    )
 }
 
 /// Function 16: sets a holding register to (register & andMask) | (orMask & ~andMask)
@@ -237,16 +215,13 @@ pub unsafe extern "C" fn mbm_client_maskWriteRegister(
     andMask: u16,
     orMask: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::MASK_WRITE_REGISTER,
-            [address.into(), andMask.into(), orMask.into(), 0],
-            None,
-        )
-    }
+    with_more(
+        client,
+        request,
+        FunctionSpec::MASK_WRITE_REGISTER,
+        [address.into(), andMask.into(), orMask.into(), 0],
+        None,
+    )
 }
 
 /// Function 17: the device writes the words of `data` to holding registers first. Then it
@@ -268,25 +243,22 @@ pub unsafe extern "C" fn mbm_client_readWriteMultipleRegisters(
     writeAddress: u16,
     writeQuantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::READ_WRITE_REGISTERS,
-            [
-                readAddress.into(),
-                readQuantity.into(),
-                writeAddress.into(),
-                writeQuantity.into(),
-            ],
-            Some(|fields, words, readable| {
-                let header = &mut fields.state.header;
-                match header.add_write(words[2] as u16, words[3] as u16) {
-                    Status::OK => readable,
-                    refused => refused,
-                }
-            }),
-        )
-    }
+    with_more(
+        client,
+        request,
+        FunctionSpec::READ_WRITE_REGISTERS,
+        [
+            readAddress.into(),
+            readQuantity.into(),
+            writeAddress.into(),
+            writeQuantity.into(),
+        ],
+        Some(|fields, words, readable| {
+            let header = &mut fields.state.header;
+            match header.add_write(words[2] as u16, words[3] as u16) {
+                Status::OK => readable,
+                refused => refused,
+            }
+        }),
+    )
 }

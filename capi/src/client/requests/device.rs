@@ -21,8 +21,7 @@ pub unsafe extern "C" fn mbm_client_readExceptionStatus(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { code_only(client, request, FunctionSpec::READ_EXCEPTION_STATUS) }
+    code_only(client, request, FunctionSpec::READ_EXCEPTION_STATUS)
 }
 
 /// Function 08: sends the words of `data`, and reads the same number of words into `reply`
@@ -42,19 +41,16 @@ pub unsafe extern "C" fn mbm_client_diagnostics(
     subFunction: u16,
     words: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::DIAGNOSTICS,
-            [subFunction.into(), words.into(), 0, 0],
-            Some(|fields, words, _| {
-                let header = &mut fields.state.header;
-                header.add_words(words[0] as u16, words[1] as u16)
-            }),
-        )
-    }
+    with_more(
+        client,
+        request,
+        FunctionSpec::DIAGNOSTICS,
+        [subFunction.into(), words.into(), 0, 0],
+        Some(|fields, words, _| {
+            let header = &mut fields.state.header;
+            header.add_words(words[0] as u16, words[1] as u16)
+        }),
+    )
 }
 
 /// Function 0B: reads the status word and the event count into two words of `reply` (V1.1b3,
@@ -68,8 +64,7 @@ pub unsafe extern "C" fn mbm_client_getCommEventCounter(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { code_only(client, request, FunctionSpec::GET_COMM_EVENT_COUNTER) }
+    code_only(client, request, FunctionSpec::GET_COMM_EVENT_COUNTER)
 }
 
 /// Function 0C: reads status, event count and message count, and then up to 64 events, into
@@ -84,8 +79,7 @@ pub unsafe extern "C" fn mbm_client_getCommEventLog(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { code_only(client, request, FunctionSpec::GET_COMM_EVENT_LOG) }
+    code_only(client, request, FunctionSpec::GET_COMM_EVENT_LOG)
 }
 
 /// Function 11: reads the server id, whose format is specific to the device (V1.1b3, 6.13).
@@ -101,8 +95,7 @@ pub unsafe extern "C" fn mbm_client_reportServerId(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { code_only(client, request, FunctionSpec::REPORT_SERVER_ID) }
+    code_only(client, request, FunctionSpec::REPORT_SERVER_ID)
 }
 
 /// Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
@@ -122,16 +115,13 @@ pub unsafe extern "C" fn mbm_client_readFileRecord(
     record: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::READ_FILE_RECORD,
-            [GROUP, file.into(), record.into(), quantity.into()],
-            Some(add_group),
-        )
-    }
+    with_more(
+        client,
+        request,
+        FunctionSpec::READ_FILE_RECORD,
+        [GROUP, file.into(), record.into(), quantity.into()],
+        Some(add_group),
+    )
 }
 
 /// Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
@@ -151,16 +141,13 @@ pub unsafe extern "C" fn mbm_client_writeFileRecord(
     record: u16,
     quantity: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with_more(
-            client,
-            request,
-            FunctionSpec::WRITE_FILE_RECORD,
-            [GROUP, file.into(), record.into(), quantity.into()],
-            Some(add_group),
-        )
-    }
+    with_more(
+        client,
+        request,
+        FunctionSpec::WRITE_FILE_RECORD,
+        [GROUP, file.into(), record.into(), quantity.into()],
+        Some(add_group),
+    )
 }
 
 /// Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
@@ -176,8 +163,7 @@ pub unsafe extern "C" fn mbm_client_readFifoQueue(
     request: *mut mbm_clientRequest,
     address: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { two_words(client, request, address, 0, FunctionSpec::READ_FIFO_QUEUE) }
+    two_words(client, request, address, 0, FunctionSpec::READ_FIFO_QUEUE)
 }
 
 /// Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` receives,
@@ -196,17 +182,14 @@ pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
     code: u8,
     object: u8,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let [first, second] = RequestHeader::identification(code, object);
-        with_more(
-            client,
-            request,
-            FunctionSpec::READ_DEVICE_IDENTIFICATION,
-            [first.into(), second.into(), code.into(), 0],
-            Some(|_, words, _| RequestHeader::check_code(words[2] as u8)),
-        )
-    }
+    let [first, second] = RequestHeader::identification(code, object);
+    with_more(
+        client,
+        request,
+        FunctionSpec::READ_DEVICE_IDENTIFICATION,
+        [first.into(), second.into(), code.into(), 0],
+        Some(|_, words, _| RequestHeader::check_code(words[2] as u8)),
+    )
 }
 
 /// Any function code: sends the bytes of `data` after the function code, and reads the bytes
@@ -226,39 +209,36 @@ pub unsafe extern "C" fn mbm_client_custom(
     bytes: u16,
     response: *const mbm_rule,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let words = [
-            function.into(),
-            bytes.into(),
-            response.expose_provenance(),
-            0,
-        ];
-        with_more(
-            client,
-            request,
-            FunctionSpec::CUSTOM,
-            words,
-            Some(|fields, words, _| {
-                let response: *const mbm_rule = core::ptr::with_exposed_provenance(words[2]);
-                let Some(response) = response.as_ref() else {
-                    return Status::INVALID_ARGUMENT;
-                };
-                let (kind, most) = match response.kind {
-                    MBM_RULE_SILENCE => (OWN, u8::MAX),
-                    MBM_RULE_FIXED => (FIXED, MAX_PDU as u8),
-                    MBM_RULE_COUNTED => (COUNTS, MAX_PDU as u8 - 1),
-                    _ => return Status::INVALID_ARGUMENT,
-                };
-                if kind != OWN && !(1..=most).contains(&response.bytes) {
-                    return Status::INVALID_ARGUMENT;
-                }
-                let numbers = [response.bytes, response.more];
-                let header = &mut fields.state.header;
-                header.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
-            }),
-        )
-    }
+    let words = [
+        function.into(),
+        bytes.into(),
+        response.expose_provenance(),
+        0,
+    ];
+    with_more(
+        client,
+        request,
+        FunctionSpec::CUSTOM,
+        words,
+        Some(|fields, words, _| {
+            let response: *const mbm_rule = core::ptr::with_exposed_provenance(words[2]);
+            let Some(response) = response.as_ref() else {
+                return Status::INVALID_ARGUMENT;
+            };
+            let (kind, most) = match response.kind {
+                MBM_RULE_SILENCE => (OWN, u8::MAX),
+                MBM_RULE_FIXED => (FIXED, MAX_PDU as u8),
+                MBM_RULE_COUNTED => (COUNTS, MAX_PDU as u8 - 1),
+                _ => return Status::INVALID_ARGUMENT,
+            };
+            if kind != OWN && !(1..=most).contains(&response.bytes) {
+                return Status::INVALID_ARGUMENT;
+            }
+            let numbers = [response.bytes, response.more];
+            let header = &mut fields.state.header;
+            header.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
+        }),
+    )
 }
 
 /// Forwards a request that arrived from another client: sends `function` and the bytes of
