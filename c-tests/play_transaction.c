@@ -1,5 +1,5 @@
 /* Plays one transaction of the master on a line with a clock of its own, and prints what happens
- * and when, in microseconds. scripts/check-pictures compares that with the pictures.
+ * and when, in microseconds. scripts/check/pictures compares that with the pictures.
  *
  *     play_transaction BAUD HOLD DELAY BYTES
  *

@@ -1,11 +1,11 @@
-"""scripts/check-dependencies holds docs/dependencies.md to what there is."""
+"""scripts/check/dependencies holds docs/dependencies.md to what there is."""
 import pathlib
 import tempfile
 import unittest
 
 from scripts_under_test import load
 
-module = load("scripts/check-dependencies")
+module = load("scripts/check/dependencies")
 
 PAGE = """# Dependencies
 
