@@ -97,12 +97,10 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@scripts/check/abi --check
 	@clang-format --dry-run --Werror $(C_SOURCES)
 	@scripts/check/header
-	@scripts/check/docs
+	@$(MAKE) --no-print-directory check-comments
 	@scripts/check/functions
 	@scripts/check/packages
 	@scripts/build/pictures --check
-	@scripts/build/charts --check
-	@scripts/check/pictures
 	@scripts/check/dependencies
 	@$(MAKE) --no-print-directory spell
 	@$(MAKE) --no-print-directory check-pages
@@ -299,7 +297,7 @@ bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs
 	@scripts/bench/client $(BENCH_CLIENT)
 	@scripts/bench/sniffer $(BENCH_SNIFFER)
 	@CARGO="$(CARGO)" scripts/bench/frames
-	@scripts/build/charts
+	@scripts/build/pictures
 
 # Programs with TLS or UDP, which pymodbus talks with too.
 SECURE := $(BUILD)/plain/linux/secure

@@ -20,11 +20,24 @@ print-commands:
 	@for file in $(wildcard firmware-tests/qemu/*.c); do echo "gcc $(QEMU_FLAGS) -c $$file -o $$file.o"; done
 	@for file in $(SKETCHES_OF_MBM); do echo "g++ -x c++ $(CXXFLAGS) $(WARNINGS) -Iinclude -Ic-tests/shim -include Arduino.h -c $$file -o $$file.o"; done
 
+# A program of awk, which leaves out an option that clang does not know.
+define AS_DATABASE
+function quoted(text) { gsub(/[\\"]/, "\\\\&", text); return "\"" text "\"" }
+/^([a-z0-9-]+-)?(gcc|g\+\+) .* -c [^ ]+ -o [^ ]+$$/ && $$(NF - 2) !~ /\.S$$/ && !seen[$$(NF - 2)]++ {
+    gsub(/ -fno-tree-loop-distribute-patterns/, "")
+    printf "%s{\"directory\": %s, \"file\": %s, \"command\": %s}", \
+        count++ ? ",\n" : "[\n", quoted("$(CURDIR)"), quoted($$(NF - 2)), quoted($$0)
+}
+END { if (!count) exit 1; print "\n]" }
+endef
+compile-commands: export AS_DATABASE := $(AS_DATABASE)
 .PHONY: compile-commands
 compile-commands: ## Write compile_commands.json, for editors and clang-tidy
 	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev libmbedtls-dev openssl valgrind libmosquitto-dev libcjson-dev \
 		libsimavr-dev libelf-dev
-	@$(MAKE) --no-print-directory print-commands | scripts/check/compile-commands
+	@$(MAKE) --no-print-directory print-commands | awk "$$AS_DATABASE" >compile_commands.json.new
+	@mv compile_commands.json.new compile_commands.json
+	@echo "compile-commands: $$(grep -c '"file"' compile_commands.json) files in compile_commands.json"
 
 .PHONY: tidy
 tidy: compile-commands ## Run clang-tidy over C, C++ and sketches, with the checks in .clang-tidy
@@ -32,6 +45,16 @@ tidy: compile-commands ## Run clang-tidy over C, C++ and sketches, with the chec
 	@sed -n 's/.*"file": "\([^"]*\)".*/\1/p' compile_commands.json | \
 		xargs -P "$$(nproc)" -n 1 clang-tidy --quiet 2>/dev/null || { echo "tidy: clang-tidy has findings (above)" >&2; exit 1; }
 	@echo "tidy: clang-tidy finds nothing in $$(grep -c '"file"' compile_commands.json) files and their headers"
+
+# In mbm.h, to which the other headers refer, parameters and returned values need comments too.
+.PHONY: check-comments
+check-comments:
+	@mkdir -p $(BUILD)/docs
+	@for input in "include/mbm.h YES" "include NO"; do set -- $$input; { cat docs/site/Doxyfile; \
+		echo "INPUT = $$1"; echo "WARN_NO_PARAMDOC = $$2"; echo "OUTPUT_DIRECTORY = $(BUILD)/docs"; \
+		echo "WARN_IF_UNDOCUMENTED = YES"; echo "WARN_AS_ERROR = FAIL_ON_WARNINGS"; \
+		} | doxygen - || exit 1; done
+	@echo "docs: every public name is documented"
 
 .PHONY: misra
 misra: ## Run cppcheck, for C with its addon for MISRA C; docs/misra.md lists the accepted findings
@@ -83,10 +106,9 @@ check-workflows: ## Check .github: workflows, issue forms, dependabot; each gate
 
 # --- the pages: their programs, their pictures, and the documentation site
 .PHONY: pictures
-pictures: ## Draw the pictures and charts of the pages, docs/pictures
+pictures: ## Draw the pictures and charts of the pages, docs/pictures, and write the figures of docs/index.md
 	@scripts/need python3
 	@scripts/build/pictures
-	@scripts/build/charts
 
 # The programs that the commands in the pages run.
 PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(KEEP_LINK) $(UDP) $(SNIFF) $(CLIENTS) $(SERVE)
