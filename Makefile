@@ -47,11 +47,11 @@ archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm
 # Phony, because Cargo decides what is out of date.
 .PHONY: $(ARCHIVE) $(FIRMWARE_ARCHIVE) $(SANITIZED_ARCHIVE)
 $(ARCHIVE):
-	@CARGO="$(CARGO)" scripts/build/archive-host $@
+	@CARGO="$(CARGO)" scripts/build/archive --host $@
 $(FIRMWARE_ARCHIVE):
-	@CARGO="$(CARGO)" scripts/build/archive-host $@ --cfg mbm_firmware
+	@CARGO="$(CARGO)" scripts/build/archive --host $@ --cfg mbm_firmware
 $(SANITIZED_ARCHIVE):
-	@CARGO="$(CARGO)" scripts/build/archive-host $@ $(RUST_SANITIZERS)
+	@CARGO="$(CARGO)" scripts/build/archive --host $@ $(RUST_SANITIZERS)
 
 MCUS := $(shell scripts/build/archive --list)
 .PHONY: archives
@@ -93,7 +93,6 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@$(CARGO) run --quiet -p mbm-tools --bin circles
 	@$(HEADER) --check
 	@scripts/release/version
-	@CARGO="$(CARGO)" scripts/check/rust-version
 	@scripts/check/abi --check
 	@clang-format --dry-run --Werror $(C_SOURCES)
 	@scripts/check/header
@@ -101,10 +100,10 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@scripts/check/functions
 	@scripts/check/packages
 	@scripts/build/pictures --check
-	@scripts/check/dependencies
+	@CARGO="$(CARGO)" scripts/check/dependencies
 	@$(MAKE) --no-print-directory spell
 	@$(MAKE) --no-print-directory check-pages
-	@scripts/check/symbols $(ARCHIVE)
+	@scripts/check/archive --host $(ARCHIVE)
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
@@ -268,7 +267,7 @@ SERVE := $(BUILD)/plain/serve
 $(SERVE): $(patsubst %,$(BUILD)/plain/%.o,serve support/served support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lpthread -o $@
 
-# The programs of the variant `plain` again, which scripts/check/run-test runs in valgrind.
+# The programs of the variant `plain` again, which scripts/check/run-c-tests runs in valgrind.
 $(TESTS:%=$(BUILD)/valgrind/%): $(BUILD)/valgrind/%: $(BUILD)/plain/%
 	@mkdir -p $(@D)
 	@ln -sfn ../plain/$* $@
@@ -311,7 +310,7 @@ $(UDP): $(patsubst %,$(BUILD)/plain/linux/%.o,udp mbm_udp) $(ARCHIVE)
 secure: ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
 	@scripts/need python3 python3-venv gcc libc6-dev libmbedtls-dev openssl
 	@$(MAKE) --no-print-directory venv certificates $(SECURE)
-	@$(BUILD)/venv/bin/python scripts/check/secure $(SECURE) $(BUILD)/certificates
+	@$(BUILD)/venv/bin/python scripts/check/examples secure $(BUILD)/plain $(BUILD)/certificates
 
 .PHONY: measure-secure
 measure-secure: ## Measure what handshakes cost other clients of that server, and who gets in under attack
@@ -323,7 +322,7 @@ measure-secure: ## Measure what handshakes cost other clients of that server, an
 udp: ## Build and check the example over UDP, build/plain/linux/udp
 	@scripts/need python3 python3-venv gcc libc6-dev
 	@$(MAKE) --no-print-directory venv $(UDP)
-	@$(BUILD)/venv/bin/python scripts/check/udp $(UDP)
+	@$(BUILD)/venv/bin/python scripts/check/examples udp $(BUILD)/plain
 
 DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
@@ -349,7 +348,7 @@ keep-link: ## Build and run the example of a client whose link opens itself agai
 sniff: ## Build and check the example that watches a bus, build/plain/linux/sniff
 	@scripts/need gcc libc6-dev
 	@$(MAKE) --no-print-directory $(SNIFF)
-	@scripts/check/sniff $(SNIFF)
+	@scripts/check/examples sniff $(BUILD)/plain
 
 CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan identify calls)
 $(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_call mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
@@ -363,7 +362,6 @@ clients: ## Build and check the client examples poll_table, scan, logger, identi
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) keep-link
 	@$(BUILD)/venv/bin/python scripts/check/clients $(BUILD)/plain
-	@$(BUILD)/venv/bin/python scripts/check/clients-lost $(BUILD)/plain
 
 .PHONY: trace
 trace: ## Compare what the examples print with --trace with what tshark reads in their --pcap files
@@ -389,7 +387,7 @@ demo: ## Show every function against a libmodbus server, frame by frame, and a p
 plan: ## A plan of ten fields at work against a libmodbus server
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/plan $(PEERS)
-	@scripts/check/plan $(BUILD)/plain
+	@scripts/check/examples plan $(BUILD)/plain
 
 MQTT := $(BUILD)/plain/linux/mqtt_bridge
 $(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fields mqtt_payload mqtt_value line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
@@ -420,7 +418,7 @@ AARCH64_LIBRARIES := $(AARCH64_ROOT)/usr/lib/$(AARCH64)
 # Phony, because Cargo decides what is out of date.
 $(AARCH64_ARCHIVE):
 	@scripts/need binutils-aarch64-linux-gnu
-	+@CARGO="$(CARGO)" MBM_MACHINE=$(AARCH64) scripts/build/archive-host $@
+	+@CARGO="$(CARGO)" MBM_MACHINE=$(AARCH64) scripts/build/archive --host $@
 archive-aarch64: $(AARCH64_ARCHIVE) ## Build the archive for 64-bit Arm Linux, build/machines/aarch64-linux-gnu/libmbm.a
 	@echo "archive-aarch64: $(AARCH64_ARCHIVE)"
 

@@ -76,8 +76,8 @@ deny: ## Check licences and origin of all crates with cargo-deny, with MBM_ADVIS
 	@$(if $(filter yes,$(MBM_ADVISORIES)),,echo "deny: known vulnerabilities were not looked up: MBM_ADVISORIES=yes does it, with a network")
 
 .PHONY: check-dependencies
-check-dependencies: ## Check that docs/dependencies.md has a reason for every dependency
-	@scripts/check/dependencies
+check-dependencies: ## Check that docs/dependencies.md has a reason for every dependency, and that none needs a newer Rust
+	@CARGO="$(CARGO)" scripts/check/dependencies
 
 .PHONY: semver
 semver: ## Compare the Rust interface with that of the last release, by cargo-semver-checks

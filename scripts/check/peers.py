@@ -34,6 +34,16 @@ def pymodbus(framing, *place):
     return start(sys.executable, "-B", script, "--framing", framing, *place)
 
 
+def crc(frame):
+    """The CRC of an RTU frame."""
+    value = 0xFFFF
+    for byte in frame:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ (0xA001 if value & 1 else 0)
+    return value.to_bytes(2, "little")
+
+
 class Wire(threading.Thread):
     """Two terminals that are connected. Keeps the bytes that each end sends."""
 
