@@ -125,7 +125,8 @@ check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and ch
 .PHONY: docs
 docs: ## Make the documentation site, build/site, and check its links, entries and search
 	@scripts/need python3 python3-venv doxygen tidy git
-	@CARGO="$(CARGO)" scripts/build/docs
+	@CARGO="$(CARGO)" docs/site/build
+	@scripts/check/site
 
 .PHONY: docs-serve
 docs-serve: docs ## Make the site and serve it at http://127.0.0.1:8000/
@@ -135,5 +136,5 @@ docs-serve: docs ## Make the site and serve it at http://127.0.0.1:8000/
 check-docs-site: docs ## Open the site in Chromium: width of a phone, requests, search; pictures in build/screenshots
 	@scripts/need chromium
 	@scripts/venv $(BUILD)/venv-browser docs/site/browser-requirements.txt
-	@$(BUILD)/venv-browser/bin/python -B scripts/check/site-in-browser
-	@$(BUILD)/venv-browser/bin/python -B scripts/check/screenshots
+	@$(BUILD)/venv-browser/bin/python -B scripts/check/site --browser
+	@$(BUILD)/venv-browser/bin/python -B scripts/check/site --screenshots
