@@ -190,7 +190,8 @@ model: ## Try every order of events around a request, then every stream of bytes
 fault-table: need-test ## Generate docs/reports/fault-table.md from the test's results
 	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire $(BUILD)/plain/test_slow_devices
 	@scripts/check/run-c-tests $(BUILD)/plain/test_bad_wire $(BUILD)/plain/test_slow_devices
-	@scripts/bench/fault-table
+	@for table in bad_wire slow_devices; do scripts/fill docs/reports/fault-table.md $$table <$(BUILD)/plain/test_$$table.rows || exit 1; done
+	@scripts/build/pictures
 
 # Certificates for tests and examples, build/certificates.
 .PHONY: certificates
@@ -291,11 +292,11 @@ $(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)
 bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs/reports/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER)
-	@scripts/bench/master $(BENCH)
-	@scripts/bench/server $(BENCH_SERVER)
-	@scripts/bench/client $(BENCH_CLIENT)
-	@scripts/bench/sniffer $(BENCH_SNIFFER)
-	@CARGO="$(CARGO)" scripts/bench/frames
+	@scripts/bench/speed master $(BENCH)
+	@scripts/bench/speed server $(BENCH_SERVER)
+	@scripts/bench/speed client $(BENCH_CLIENT)
+	@scripts/bench/speed sniffer $(BENCH_SNIFFER)
+	@CARGO="$(CARGO)" scripts/bench/speed frames
 	@scripts/build/pictures
 
 # Programs with TLS or UDP, which pymodbus talks with too.

@@ -1,4 +1,4 @@
-# The files of the library for C, and its templates. scripts/build/install and packaging/sdk/pack
+# The files of the library for C, its templates, and tarballs. scripts/build/install and packaging/*/pack
 # source this file in the top folder.
 
 # The ports for Linux, and the port inside TLS, which needs a library and so has its own folder.
@@ -24,4 +24,17 @@ fill() {
         -e "s|@VERSION@|$version|g" -e "s|@MAJOR@|$major|g" -e "s|@MINOR@|$minor|g" \
         -e "s|@POINTER@|$pointer|g" "$1" >"$2"
     chmod 644 "$2"
+}
+
+# pack_tar FOLDER OUTPUT: packs a folder as a tarball whose bytes depend only on the names, contents and
+# executable bits of its files. OUTPUT ends with .tar.gz; FOLDER is the tarball's top folder. All files
+# get the time SOURCE_DATE_EPOCH; the default is 1980-01-02, because some file systems have no time
+# before 1980.
+pack_tar() {
+    # A pipe would hide a failure of tar.
+    LC_ALL=C tar --create --directory "$(dirname "$1")" --format=ustar --sort=name --owner=0 --group=0 --numeric-owner \
+        --mtime="@${SOURCE_DATE_EPOCH:-315619200}" --mode=u=rwX,go=rX --file "$2.tar" "$(basename "$1")"
+    gzip -n -9 <"$2.tar" >"$2.new"
+    rm "$2.tar"
+    mv "$2.new" "$2"
 }

@@ -1,5 +1,5 @@
-"""A package: files with their names, written as an archive whose bytes depend on nothing else.
-packaging/*/pack import this file:
+"""A package: files with their names, written as an archive whose bytes depend on nothing else; and the
+files that the Arduino library and the PlatformIO package share. packaging/*/pack import this file:
 
     sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts/build"))
 """
@@ -14,8 +14,7 @@ import tarfile
 import zipfile
 
 sys.dont_write_bytecode = True
-from boards import SETS  # noqa: E402
-from project import ROOT, fact, licence, version  # noqa: E402
+from project import ROOT, SETS, fact, licence, version  # noqa: E402
 
 # The time of all files in archives, 1980-01-02. Some file systems have no time before 1980.
 TIME = 315619200
@@ -64,7 +63,7 @@ class Package:
 
     def copy_assembler(self, folder: str, kinds: tuple) -> list:
         """Takes the library as assembler source, for these dialects of SETS, the names of
-        scripts/build/boards.py, and a file that refuses any other core: each assembler file would
+        scripts/build/project.py, and a file that refuses any other core: each assembler file would
         compile to nothing there. Returns the names of the files in the package."""
         sets = {which: row for which, row in SETS.items() if row.kind in kinds}
         names = [f"{folder}/mbm_{which}.S" for which in sets]
@@ -127,3 +126,68 @@ typedef int mbm_core_has_code;
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(content)
         print(f"{self.kind}: {target}, {len(content)} bytes")
+
+
+# --- the Arduino library and the PlatformIO package: the headers, the assembler source and the sketches
+
+HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterHelpers.h",
+           "ModbusMasterOptions.h", "ModbusMasterPorts.h", "ModbusMasterLine.h", "util/crc16.h", "util/word.h",
+           "ModbusMasterValues.h", "ModbusServer.h", "ModbusServerTables.h", "ModbusStatusText.h", "mbm.h",
+           "ModbusClient.h", "ModbusClientCalls.h", "ModbusRequest.h", "ModbusValues.h", "ModbusNumbers.h",
+           "ModbusCallback.h", "ModbusTransmission.h",
+           "ModbusTcpServer.h", "ModbusTcpConnections.h", "ModbusTcpGateway.h", "ModbusSniffer.h",
+           "ModbusSnifferText.h"]
+
+
+def write(path: pathlib.Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def boards_header() -> str:
+    conditions = " || \\\n      ".join(f"({which.guard})" for which in SETS.values())
+    names = "; ".join(which.what for which in SETS.values())
+    return f"""\
+/**
+ * @file ModbusMasterBoards.h
+ * @brief Stops the build on boards for which this library has no code.
+ *
+ * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h and ModbusServer.h.
+ * Written by scripts/build/package.py; the conditions are those of the files mbm_*.S.
+ */
+
+#if !({conditions})
+#error "mbm does not serve this board. Supported: {names}."
+#endif
+"""
+
+
+def board_names() -> str:
+    return "\n".join(f"- {which.what}" for which in SETS.values())
+
+
+def write_sources(folder: pathlib.Path, assembler: pathlib.Path) -> None:
+    """Writes the headers, and the assembler source from the folder `assembler`."""
+    missing = [which for which in SETS if not (assembler / f"mbm_{which}.S").is_file()]
+    if missing:
+        sys.exit(f"package: {assembler} has no source for {', '.join(missing)}: run `make assembler`")
+    for header in HEADERS:
+        write(folder / header, (ROOT / "include" / header).read_text(encoding="utf-8"))
+    write(folder / "ModbusMasterBoards.h", boards_header())
+    for which in SETS:
+        write(folder / f"mbm_{which}.S", (assembler / f"mbm_{which}.S").read_text(encoding="utf-8"))
+
+
+def linux_ports() -> list:
+    """The ports for Linux, which scripts/build/library.sh lists."""
+    listed = subprocess.run(["sh", "-c", ". scripts/build/library.sh; echo $LINUX_PORTS"], cwd=ROOT, check=True, text=True,
+                            stdout=subprocess.PIPE)
+    return listed.stdout.split()
+
+
+def write_sketches(folder: pathlib.Path) -> int:
+    """Writes the sketches of examples/arduino, and returns how many there are."""
+    sketches = sorted((ROOT / "examples/arduino").glob("*/*.ino"))
+    for sketch in sketches:
+        write(folder / sketch.parent.name / sketch.name, sketch.read_text(encoding="utf-8"))
+    return len(sketches)
