@@ -429,7 +429,7 @@ $(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_R
 test-aarch64: ## Run the tests in C as programs for AArch64 under QEMU: TESTS, TEST as for test-c
 	@scripts/need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user perl mbpoll openssl \
 		pkg-config libmodbus-dev
-	@scripts/build/foreign-packages arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 \
+	@scripts/need --unpack arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 \
 		libmbedtls-dev libmbedtls14 libmbedx509-1 libmbedcrypto7
 	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests BUILDS=aarch64
 

@@ -23,7 +23,7 @@ check-dist: ## Use each package of dist/ in an empty folder as its user would; K
 .PHONY: check-reproducible
 check-reproducible: ## Write all packages again from a clone in another folder, and compare them with dist/
 	@scripts/need git
-	@CARGO="$(CARGO)" scripts/release/reproducible
+	@CARGO="$(CARGO)" scripts/release/dist --again
 
 # What a release builds and checks. RELEASE_TARGETS= leaves it out, for a rehearsal in seconds.
 RELEASE_TARGETS ?= check test dist check-dist

@@ -85,7 +85,7 @@ semver: ## Compare the Rust interface with that of the last release, by cargo-se
 
 .PHONY: check-semver
 check-semver: ## Check that `make semver` finds a change: try it on changed copies of the sources
-	@CARGO="$(CARGO)" scripts/release/check-semver
+	@CARGO="$(CARGO)" scripts/release/semver --test
 
 .PHONY: test-scripts
 test-scripts: ## Run the tests of the scripts
