@@ -50,10 +50,12 @@ tidy: compile-commands ## Run clang-tidy over C, C++ and sketches, with the chec
 .PHONY: check-comments
 check-comments:
 	@mkdir -p $(BUILD)/docs
-	@for input in "include/mbm.h YES" "include NO"; do set -- $$input; { cat docs/site/Doxyfile; \
-		echo "INPUT = $$1"; echo "WARN_NO_PARAMDOC = $$2"; echo "OUTPUT_DIRECTORY = $(BUILD)/docs"; \
-		echo "WARN_IF_UNDOCUMENTED = YES"; echo "WARN_AS_ERROR = FAIL_ON_WARNINGS"; \
-		} | doxygen - || exit 1; done
+	@for full in YES NO; do \
+		if [ $$full = YES ]; then input=include/mbm.h; else input=include; fi; \
+		{ cat docs/site/Doxyfile; printf '%s\n' "INPUT = $$input" "WARN_NO_PARAMDOC = $$full" \
+			"OUTPUT_DIRECTORY = $(BUILD)/docs" "WARN_IF_UNDOCUMENTED = YES" "WARN_AS_ERROR = FAIL_ON_WARNINGS"; } | \
+			doxygen - || exit 1; \
+	done
 	@echo "docs: every public name is documented"
 
 .PHONY: misra
