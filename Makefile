@@ -47,35 +47,35 @@ archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm
 # Phony, because Cargo decides what is out of date.
 .PHONY: $(ARCHIVE) $(FIRMWARE_ARCHIVE) $(SANITIZED_ARCHIVE)
 $(ARCHIVE):
-	@CARGO="$(CARGO)" scripts/archive-host $@
+	@CARGO="$(CARGO)" scripts/build/archive --host $@
 $(FIRMWARE_ARCHIVE):
-	@CARGO="$(CARGO)" scripts/archive-host $@ --cfg mbm_firmware
+	@CARGO="$(CARGO)" scripts/build/archive --host $@ --cfg mbm_firmware
 $(SANITIZED_ARCHIVE):
-	@CARGO="$(CARGO)" scripts/archive-host $@ $(RUST_SANITIZERS)
+	@CARGO="$(CARGO)" scripts/build/archive --host $@ $(RUST_SANITIZERS)
 
-MCUS := $(shell scripts/archive --list)
+MCUS := $(shell scripts/build/archive --list)
 .PHONY: archives
 archives: ## Build the archives for microcontrollers, build/archives and build/minimal
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
-	@scripts/check-archive
-	@scripts/stack >build/stack.txt && tail -n 1 build/stack.txt
+	@scripts/check/archive
+	@scripts/check/stack >build/stack.txt && tail -n 1 build/stack.txt
 
 .PHONY: install
 install: $(ARCHIVE) ## Install library, header, ports, pkg-config and CMake files below PREFIX
-	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/install
+	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/build/install
 
 .PHONY: check-install
 check-install: $(ARCHIVE) ## Install, and build and run the README's program from there
 	@scripts/need gcc libc6-dev make cmake pkg-config libmbedtls-dev
-	@scripts/check-install
+	@scripts/check/install
 
 .PHONY: size
 size: ## Measure the flash and RAM that the library adds, and compare with docs/reports/size.md
-	@scripts/size
+	@scripts/bench/size
 
 # The crate with the C functions.
 CAPI := capi
-HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && scripts/header "$$tool"
+HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && scripts/build/header "$$tool"
 .PHONY: header
 header: ## Generate include/mbm.h and its parts from the source
 	@$(HEADER)
@@ -92,21 +92,18 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin circles
 	@$(HEADER) --check
-	@scripts/check-version
-	@CARGO="$(CARGO)" scripts/check-rust-version
-	@scripts/abi --check
+	@scripts/release/version
+	@scripts/check/abi --check
 	@clang-format --dry-run --Werror $(C_SOURCES)
-	@scripts/check-header
-	@scripts/check-docs
-	@scripts/check-functions
-	@scripts/check-packages
-	@scripts/pictures --check
-	@scripts/charts --check
-	@scripts/check-pictures
-	@scripts/check-dependencies
+	@scripts/check/header
+	@$(MAKE) --no-print-directory check-comments
+	@scripts/check/functions
+	@scripts/check/packages
+	@scripts/build/pictures --check
+	@CARGO="$(CARGO)" scripts/check/dependencies
 	@$(MAKE) --no-print-directory spell
 	@$(MAKE) --no-print-directory check-pages
-	@scripts/check-symbols $(ARCHIVE)
+	@scripts/check/archive --host $(ARCHIVE)
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
@@ -120,7 +117,7 @@ format: ## Format Rust, C and C++ as `make check` requires
 .PHONY: abi
 abi: ## Generate packaging/mbm.abi, with which `make check` compares the C interface
 	@scripts/need gcc libc6-dev abigail-tools
-	@scripts/abi
+	@scripts/check/abi
 
 # --- tests. Compiling and tests that wait run side by side.
 
@@ -133,7 +130,7 @@ PROGRAMS = $(foreach build,$(filter valgrind,$(BUILDS)) $(filter-out valgrind,$(
 .PHONY: test
 test: need-test ## Run every test: Rust, C and C++, also with sanitizers and in valgrind
 	@rm -rf $(BUILD)/tests
-	@$(MAKE) --no-print-directory --keep-going -j$(JOBS) build-rust test-rust test-rust-firmware run-c-tests; scripts/test-totals
+	@$(MAKE) --no-print-directory --keep-going -j$(JOBS) build-rust test-rust test-rust-firmware run-c-tests; scripts/check/test-totals
 
 .PHONY: test-c
 test-c: need-test ## Run only C and C++: TESTS="test_ring test_bits" BUILDS="plain valgrind" TEST=one_test
@@ -141,25 +138,26 @@ test-c: need-test ## Run only C and C++: TESTS="test_ring test_bits" BUILDS="pla
 
 .PHONY: build-rust test-rust test-rust-firmware run-c-tests
 build-rust: need-test
-	+@CARGO="$(CARGO)" scripts/test-rust --build
+	+@CARGO="$(CARGO)" scripts/check/test-rust --build
 test-rust: build-rust $(BUILD)/plain/serve venv ## Run only Rust; `cargo test NAME` runs tests with that name
-	+@CARGO="$(CARGO)" scripts/test-rust rust
+	+@CARGO="$(CARGO)" scripts/check/test-rust rust
 test-rust-firmware: build-rust $(BUILD)/plain/serve venv ## Run only Rust, with the code that only firmware runs
-	+@CARGO="$(CARGO)" scripts/test-rust rust-firmware
-# scripts/test-totals compares the results of test_bad_wire with the committed fault table.
+	+@CARGO="$(CARGO)" scripts/check/test-rust rust-firmware
+# scripts/check/test-totals compares the results of test_bad_wire with the committed fault table.
 run-c-tests: $(PROGRAMS)
 	@mkdir -p $(BUILD)/tests
-	@MBM_TEST="$(TEST)" scripts/run-c-tests $(PROGRAMS) >$(BUILD)/tests/c.txt; code=$$?; cat $(BUILD)/tests/c.txt; \
+	@MBM_TEST="$(TEST)" scripts/check/run-c-tests $(PROGRAMS) >$(BUILD)/tests/c.txt; code=$$?; cat $(BUILD)/tests/c.txt; \
 	tail -n 1 $(BUILD)/tests/c.txt >$(BUILD)/tests/c.total; exit $$code
 
 .PHONY: coverage
 coverage: need-test ## Measure the lines that the tests run, Rust and C; writes docs/reports/coverage.md
 	@scripts/need llvm-22
 	@$(MAKE) --no-print-directory venv $(BUILD)/plain/serve
-	@CARGO="$(CARGO)" JOBS="$(JOBS)" scripts/coverage
+	@CARGO="$(CARGO)" JOBS="$(JOBS)" scripts/bench/coverage
+	@scripts/build/pictures
 .PHONY: coverage-tests
 coverage-tests: $(TESTS:%=$(BUILD)/coverage/%)
-	@scripts/run-c-tests $^
+	@scripts/check/run-c-tests $^
 
 .PHONY: venv
 venv: ## Create the Python environment for tests/peer, build/venv
@@ -173,13 +171,13 @@ miri: ## Check the hooks against Rust's aliasing rules, with Miri of the nightly
 .PHONY: fuzz
 fuzz: ## Fuzz every decoder and the C API, FUZZ_SECONDS in total (60)
 	@scripts/need g++ libc6-dev libmodbus-dev
-	@CARGO="$(CARGO)" scripts/fuzz
+	@CARGO="$(CARGO)" scripts/check/fuzz
 
 CALLS ?= 10000000
 .PHONY: fuzz-api
 fuzz-api: ## Fuzz the C API with sequences of calls, CALLS in total (10000000)
 	@scripts/need g++ libc6-dev libmodbus-dev
-	@CARGO="$(CARGO)" MBM_API_CALLS=$(CALLS) scripts/fuzz c_api
+	@CARGO="$(CARGO)" MBM_API_CALLS=$(CALLS) scripts/check/fuzz c_api
 
 MODEL_SECONDS ?= 300
 MODEL := --quiet --release --manifest-path model/Cargo.toml --target-dir $(BUILD)/model
@@ -192,18 +190,23 @@ model: ## Try every order of events around a request, then every stream of bytes
 .PHONY: fault-table
 fault-table: need-test ## Generate docs/reports/fault-table.md from the test's results
 	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire $(BUILD)/plain/test_slow_devices
-	@scripts/run-c-tests $(BUILD)/plain/test_bad_wire $(BUILD)/plain/test_slow_devices
-	@scripts/fault-table
+	@scripts/check/run-c-tests $(BUILD)/plain/test_bad_wire $(BUILD)/plain/test_slow_devices
+	@for table in bad_wire slow_devices; do scripts/fill docs/reports/fault-table.md $$table <$(BUILD)/plain/test_$$table.rows || exit 1; done
+	@scripts/build/pictures
 
 # Certificates for tests and examples, build/certificates.
 .PHONY: certificates
 certificates:
 	@scripts/need openssl
-	@scripts/certificates $(BUILD)/certificates
+	@scripts/build/certificates $(BUILD)/certificates
 
 .PHONY: corruption
 corruption: ## Compute which damage CRC-16 lets through; writes docs/reliability.md; REPLIES (40000000)
-	@CARGO="$(CARGO)" REPLIES="$(REPLIES)" scripts/corruption
+	@mkdir -p $(BUILD)
+	@MBM_DAMAGED_REPLIES=$(or $(REPLIES),40000000) $(CARGO) test --quiet --release --test crc_limit -- \
+		--nocapture --test-threads 1 >$(BUILD)/corruption.log 2>&1 || { cat $(BUILD)/corruption.log >&2; exit 1; }
+	@{ sed -n 's/.*row |/|/p' $(BUILD)/corruption.log; echo; sed -n 's/.*said //p' $(BUILD)/corruption.log; } | \
+		scripts/fill docs/reliability.md corruption
 
 # The C libraries of those compilers for firmware that are installed. Debian packs each library apart from
 # its compiler.
@@ -242,7 +245,7 @@ $(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage $(BUILD)/
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS),$(SANITIZED_ARCHIVE)))
-# scripts/coverage builds the archive with counters first. It is not trimmed, so its unwind tables
+# scripts/bench/coverage builds the archive with counters first. It is not trimmed, so its unwind tables
 # refer to rust_eh_personality, which is defined as 0 because nothing calls it.
 COUNTERS := --coverage -Wl$(comma)-u$(comma)__llvm_profile_runtime -Wl$(comma)--defsym$(comma)rust_eh_personality=0
 $(eval $(call variant,coverage,gcc,g++,$(COUNTERS),$(BUILD)/coverage/libmbm.a))
@@ -270,7 +273,7 @@ SERVE := $(BUILD)/plain/serve
 $(SERVE): $(patsubst %,$(BUILD)/plain/%.o,serve support/served support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lpthread -o $@
 
-# The programs of the variant `plain` again, which scripts/run-test runs in valgrind.
+# The programs of the variant `plain` again, which scripts/check/run-c-tests runs in valgrind.
 $(TESTS:%=$(BUILD)/valgrind/%): $(BUILD)/valgrind/%: $(BUILD)/plain/%
 	@mkdir -p $(@D)
 	@ln -sfn ../plain/$* $@
@@ -294,12 +297,12 @@ $(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)
 bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs/reports/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER)
-	@scripts/bench $(BENCH)
-	@scripts/bench-server $(BENCH_SERVER)
-	@scripts/bench-client $(BENCH_CLIENT)
-	@scripts/bench-sniffer $(BENCH_SNIFFER)
-	@CARGO="$(CARGO)" scripts/bench-frames
-	@scripts/charts
+	@scripts/bench/speed master $(BENCH)
+	@scripts/bench/speed server $(BENCH_SERVER)
+	@scripts/bench/speed client $(BENCH_CLIENT)
+	@scripts/bench/speed sniffer $(BENCH_SNIFFER)
+	@CARGO="$(CARGO)" scripts/bench/speed frames
+	@scripts/build/pictures
 
 # Programs with TLS or UDP, which pymodbus talks with too.
 SECURE := $(BUILD)/plain/linux/secure
@@ -313,19 +316,19 @@ $(UDP): $(patsubst %,$(BUILD)/plain/linux/%.o,udp mbm_udp) $(ARCHIVE)
 secure: ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
 	@scripts/need python3 python3-venv gcc libc6-dev libmbedtls-dev openssl
 	@$(MAKE) --no-print-directory venv certificates $(SECURE)
-	@$(BUILD)/venv/bin/python scripts/check-secure $(SECURE) $(BUILD)/certificates
+	@$(BUILD)/venv/bin/python scripts/check/examples secure $(BUILD)/plain $(BUILD)/certificates
 
 .PHONY: measure-secure
 measure-secure: ## Measure what handshakes cost other clients of that server, and who gets in under attack
 	@scripts/need python3 gcc libc6-dev libmbedtls-dev openssl
 	@$(MAKE) --no-print-directory certificates $(SECURE)
-	@python3 scripts/measure-secure $(SECURE) $(BUILD)/certificates
+	@python3 scripts/bench/secure $(SECURE) $(BUILD)/certificates
 
 .PHONY: udp
 udp: ## Build and check the example over UDP, build/plain/linux/udp
 	@scripts/need python3 python3-venv gcc libc6-dev
 	@$(MAKE) --no-print-directory venv $(UDP)
-	@$(BUILD)/venv/bin/python scripts/check-udp $(UDP)
+	@$(BUILD)/venv/bin/python scripts/check/examples udp $(BUILD)/plain
 
 DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
@@ -351,7 +354,7 @@ keep-link: ## Build and run the example of a client whose link opens itself agai
 sniff: ## Build and check the example that watches a bus, build/plain/linux/sniff
 	@scripts/need gcc libc6-dev
 	@$(MAKE) --no-print-directory $(SNIFF)
-	@scripts/check-sniff $(SNIFF)
+	@scripts/check/examples sniff $(BUILD)/plain
 
 CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan identify calls)
 $(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_call mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
@@ -364,21 +367,20 @@ $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support
 clients: ## Build and check the client examples poll_table, scan, logger, identify and calls in build/plain/linux
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) keep-link
-	@$(BUILD)/venv/bin/python scripts/check-clients $(BUILD)/plain
-	@$(BUILD)/venv/bin/python scripts/check-clients-lost $(BUILD)/plain
+	@$(BUILD)/venv/bin/python scripts/check/clients $(BUILD)/plain
 
 .PHONY: trace
 trace: ## Compare what the examples print with --trace with what tshark reads in their --pcap files
 	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) $(DEMO) $(SNIFF) \
 		$(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway)
-	@$(BUILD)/venv/bin/python scripts/check-trace $(BUILD)/plain
+	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
 
 .PHONY: gateway
 gateway: ## Show the gateway at work between pymodbus clients and devices of libmodbus and pymodbus
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv $(BUILD)/plain/linux/gateway $(PEERS)
-	@$(BUILD)/venv/bin/python scripts/check-gateway $(BUILD)/plain
+	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain
 
 .PHONY: demo
 demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work
@@ -391,7 +393,7 @@ demo: ## Show every function against a libmodbus server, frame by frame, and a p
 plan: ## A plan of ten fields at work against a libmodbus server
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/plan $(PEERS)
-	@scripts/demo-plan $(BUILD)/plain
+	@scripts/check/examples plan $(BUILD)/plain
 
 MQTT := $(BUILD)/plain/linux/mqtt_bridge
 $(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fields mqtt_payload mqtt_value line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
@@ -401,7 +403,7 @@ $(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fiel
 mqtt: ## Show and check the bridge to MQTT on a libmodbus server and a mosquitto broker
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3 libmosquitto-dev libcjson-dev mosquitto mosquitto-clients openssl
 	@$(MAKE) --no-print-directory $(MQTT) $(PEERS)
-	@scripts/check-mqtt $(BUILD)/plain
+	@scripts/check/mqtt $(BUILD)/plain
 
 .PHONY: guarded
 guarded: ## Show a server that refreshes registers at each read and refuses one of two clients
@@ -409,14 +411,39 @@ guarded: ## Show a server that refreshes registers at each read and refuses one 
 	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/guarded_server
 	@$(BUILD)/plain/linux/guarded_server
 
-include scripts/checks.mk
-include scripts/pages.mk
-include scripts/aarch64.mk
-include scripts/release.mk
+# The tests in C as programs for AArch64, run by QEMU's user mode. The machine stays as it is: the
+# libraries for AArch64 are unpacked below build.
+
+AARCH64 := aarch64-linux-gnu
+AARCH64_FOLDER := $(BUILD)/machines/$(AARCH64)
+AARCH64_ARCHIVE := $(AARCH64_FOLDER)/libmbm.a
+AARCH64_ROOT := $(AARCH64_FOLDER)/root
+AARCH64_LIBRARIES := $(AARCH64_ROOT)/usr/lib/$(AARCH64)
+
+.PHONY: archive-aarch64 test-aarch64 $(AARCH64_ARCHIVE)
+# Phony, because Cargo decides what is out of date.
+$(AARCH64_ARCHIVE):
+	@scripts/need binutils-aarch64-linux-gnu
+	+@CARGO="$(CARGO)" MBM_MACHINE=$(AARCH64) scripts/build/archive --host $@
+archive-aarch64: $(AARCH64_ARCHIVE) ## Build the archive for 64-bit Arm Linux, build/machines/aarch64-linux-gnu/libmbm.a
+	@echo "archive-aarch64: $(AARCH64_ARCHIVE)"
+
+$(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_ROOT)/usr/include \
+    -L$(AARCH64_LIBRARIES) -Wl$(comma)-rpath$(comma)$(CURDIR)/$(AARCH64_LIBRARIES),$(AARCH64_ARCHIVE)))
+
+test-aarch64: ## Run the tests in C as programs for AArch64 under QEMU: TESTS, TEST as for test-c
+	@scripts/need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user perl mbpoll openssl \
+		pkg-config libmodbus-dev
+	@scripts/need --unpack arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 \
+		libmbedtls-dev libmbedtls14 libmbedx509-1 libmbedcrypto7
+	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests BUILDS=aarch64
+
+# Checks, and the pages.
+include scripts/check/check.mk
 # Everything for Arduino and the AVR simulator.
-include scripts/arduino.mk
+include firmware-tests/avr/avr.mk
 include firmware-tests/qemu/qemu.mk
-# The packages in dist/.
+# The packages in dist/, and releases.
 include packaging/packaging.mk
 
 .PHONY: firmware-test

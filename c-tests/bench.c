@@ -98,16 +98,16 @@ static int serve(const char *path)
 }
 
 /* Starts this program again as the server at the far end of the pty. */
-static pid_t start_server(const char *program, const pty *pair)
+static pid_t start_server(const char *program, const pty *terminal)
 {
     pid_t child = fork();
 
     if (child < 0)
         fail("fork");
     if (child == 0) {
-        close(pair->ours);
-        close(pair->theirs);
-        execl(program, program, "serve", pair->path, (char *)NULL);
+        close(terminal->ours);
+        close(terminal->theirs);
+        execl(program, program, "serve", terminal->path, (char *)NULL);
         _exit(127);
     }
     return child;
@@ -187,14 +187,14 @@ static void compare_on_one_cpu(pid_t server_process)
 
 int main(int argc, char **argv)
 {
-    pty pair;
+    pty terminal;
     pid_t child;
 
     if (argc == 3 && strcmp(argv[1], "serve") == 0)
         return serve(argv[2]);
-    pty_open(&pair);
-    child = start_server(argv[0], &pair);
-    begin_clients(pair.ours);
+    pty_open(&terminal);
+    child = start_server(argv[0], &terminal);
+    begin_clients(terminal.ours);
     if (argc == 1) {
         compare_on_one_cpu(child);
     } else if (argc == 3 && strcmp(argv[1], "mbm") == 0) {
@@ -207,6 +207,6 @@ int main(int argc, char **argv)
     modbus_free(peer);
     kill(child, SIGKILL);
     waitpid(child, NULL, 0);
-    pty_close(&pair);
+    pty_close(&terminal);
     return 0;
 }

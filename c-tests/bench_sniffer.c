@@ -1,5 +1,5 @@
 /* Runs a sniffer on the bytes of a line, fed byte by byte and frame by frame, for
- * callgrind, which scripts/bench-sniffer starts. Each case checks the number of events, so
+ * callgrind, which scripts/bench/speed starts. Each case checks the number of events, so
  * that a sniffer that finds less is not taken for a faster one. */
 #include "crc.h"
 #include "mbm.h"

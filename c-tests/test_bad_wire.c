@@ -63,6 +63,10 @@ static void no_row_of_the_fault_table_gets_worse(void **state)
     unsigned i;
 
     (void)state;
+    if (table)
+        fprintf(
+            table,
+            "| fault | no retry | one retry | status of the first call without a retry |\n|---|---|---|---|\n");
     for (i = 0; i < fault_count; i++) {
         const fault *f = &faults[i];
         uint8_t status = outcome(f, 0, plain);

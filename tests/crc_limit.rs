@@ -231,11 +231,25 @@ fn count_accepted(times: u64) -> u64 {
     accepted
 }
 
+/// The number with a blank between thousands.
+fn grouped(number: u64) -> String {
+    if number < 1000 {
+        return number.to_string();
+    }
+    format!("{} {:03}", grouped(number / 1000), number % 1000)
+}
+
+/// Prints what docs/reliability.md says below the table.
 #[test]
 fn the_master_accepts_the_damaged_replies_that_a_bare_check_accepts() {
     let times = std::env::var("MBM_DAMAGED_REPLIES").map_or(50_000, |n| n.parse().unwrap());
     let accepted = count_accepted(times);
-    println!("accepted {accepted} of {times}");
+    println!(
+        "said Of {} damaged replies of ten registers, a bare check accepts {}, and the master",
+        grouped(times),
+        grouped(accepted)
+    );
+    println!("said accepts the same ones: none more, none fewer, with the same registers.");
     // A weaker check would let more pass.
     assert!(accepted <= times / 32_768 + 8, "{accepted}");
 }
@@ -243,6 +257,8 @@ fn the_master_accepts_the_damaged_replies_that_a_bare_check_accepts() {
 /// Prints the rows of the table in docs/reliability.md.
 #[test]
 fn the_table_of_undetected_damage() {
+    println!("row | registers | bytes | 4 flipped bits | 6 flipped bits | 8 flipped bits |");
+    println!("row |---|---|---|---|---|");
     for registers in [1, 2, 4, 10, 30, 125] {
         let bits = reply(registers).len() * 8;
         let dual = dual_weights(bits - HEAD * 8);

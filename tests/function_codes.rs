@@ -1,6 +1,6 @@
 //! Every function code of the standard is in every place where mbm looks at function codes. Each
 //! message names the file in which the code is missing. `CONTRIBUTING.md` has the order of the
-//! steps; `scripts/check-functions` checks the places that are not Rust code of the core.
+//! steps; `scripts/check/functions` checks the places that are not Rust code of the core.
 
 #[path = "common/exchanges.rs"]
 mod exchanges;

@@ -129,7 +129,7 @@ class Member:
 
     @property
     def is_private(self):
-        """scripts/check-docs holds every public name to a comment."""
+        """`make check-comments` holds every public name to a comment."""
         return not self.is_public or not self.comment.brief or self.comment.brief.lower().startswith("<p>private")
 
 

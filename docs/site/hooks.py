@@ -7,12 +7,12 @@ import re
 
 
 def slug(text, separator):
-    """The anchor of a heading, as a forge and scripts/check-pages make it."""
+    """The anchor of a heading, as a forge and scripts/check/pages make it."""
     return re.sub(r"[^\w\- ]", "", text.strip().lower()).replace(" ", separator)
 
 
 def expanded(entry, folders):
-    """The navigation with the pages that scripts/site has made in the place of their folders."""
+    """The navigation with the pages that docs/site/build has made in the place of their folders."""
     if isinstance(entry, list):
         return [each for part in entry for each in
                 (folders[part] if isinstance(part, str) and part in folders else [expanded(part, folders)])]

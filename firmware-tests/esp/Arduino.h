@@ -1,4 +1,4 @@
-/* What sketches for an ESP use of its Arduino core, as declarations: scripts/check-sketches
+/* What sketches for an ESP use of its Arduino core, as declarations: scripts/check/sketches
  * compiles sketches against it where their own core is not to be had. Nothing links it. */
 #ifndef ESP_ARDUINO_H
 #define ESP_ARDUINO_H

@@ -22,7 +22,7 @@ firmware-test-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, R
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm qemu-system-misc \
 		gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-xtensa-lx106 clang-22 llvm-22
 	@set -e; for machine in $(MACHINES); do \
-		scripts/archive $$($(MAKE) -s --no-print-directory -f $(BAREMETAL) mcu MACHINE=$$machine); \
+		scripts/build/archive $$($(MAKE) -s --no-print-directory -f $(BAREMETAL) mcu MACHINE=$$machine); \
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine; \
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine PROGRAM=serve; \
 	done
@@ -36,6 +36,6 @@ firmware-test-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, R
 	for machine in $(MACHINES); do build $$machine main; build $$machine serve; done; \
 	for variant in $(VARIANTS); do build $$variant main; done
 	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
-	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/run-c-tests $(QEMU_TESTS)
-	@MBM_FIRMWARE=$(FROM_SOURCE) MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/run-c-tests $(QEMU_TESTS)
+	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
+	@MBM_FIRMWARE=$(FROM_SOURCE) MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
 	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire; from archives, and from assembler source"

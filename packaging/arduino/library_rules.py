@@ -1,6 +1,6 @@
 """The rules of arduino-lint for a library and its examples, with their numbers there
 (https://arduino.github.io/arduino-lint/latest/rules/library/). Debian has no package of that
-program. check-arduino imports this file.
+program. check imports this file.
 
 Each rule is a function that takes a Library and yields a text for each fault. The warnings of
 arduino-lint are errors here.
@@ -13,7 +13,7 @@ import re
 # Rules that are not checked, and the reason.
 NOT_HELD = {
     "LP013": "for Arduino's own libraries",
-    "LP017": "needs the index of the Library Manager; check-arduino has a list of names that are taken",
+    "LP017": "needs the index of the Library Manager; check has a list of names that are taken",
     "LP018": "for libraries that are in that index",
     "LP022": "for libraries that are in that index",
     "LP042": "needs the network",

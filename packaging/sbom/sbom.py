@@ -132,7 +132,7 @@ def tools_of(text):
 
 
 def tools():
-    scripts = [path for path in pathlib.Path("scripts").iterdir() if path.is_file()]
+    scripts = [path for path in pathlib.Path("scripts").rglob("*") if path.is_file() and "tests" not in path.parts]
     found = {tool for path in [*files("Makefile", "*.mk"), *scripts] for tool in tools_of(path.read_text())}
     for name, version in sorted(found):
         yield component("cargo", name, version, licence=None, purpose=TOOLS)

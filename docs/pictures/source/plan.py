@@ -1,5 +1,5 @@
 """How a plan groups its fields into requests: for docs/plan.md. The fields are those of
-examples/linux/plan.c; scripts/check-pictures compares the requests with what `make plan` shows."""
+examples/linux/plan.c; `make plan` shows the requests."""
 
 from drawing import LINE, MARGIN, WIDTH, Drawing
 

@@ -1,5 +1,4 @@
-"""How the reply is found in noise: for docs/reliability.md. scripts/check-pictures gives the bytes of
-this picture to a master, by c-tests/play_transaction.c."""
+"""How the reply is found in noise: for docs/reliability.md."""
 
 from drawing import MARGIN, WIDTH, Drawing
 

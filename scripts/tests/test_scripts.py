@@ -1,0 +1,254 @@
+"""Tests of scripts that write or judge texts: scripts/check/dependencies, packaging/debian/changelog, and
+packaging/sbom. `make test-scripts` has the library for the SBOM."""
+import copy
+import importlib.machinery
+import importlib.util
+import pathlib
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).parents[2]
+
+
+def load(path):
+    """Loads a script, which may have no ending, as a module."""
+    sys.dont_write_bytecode = True
+    loader = importlib.machinery.SourceFileLoader(pathlib.Path(path).name.replace("-", "_"), str(ROOT / path))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
+
+
+# --- scripts/check/dependencies holds docs/dependencies.md to what there is
+
+dependencies = load("scripts/check/dependencies")
+
+PAGE = """# Dependencies
+
+## In the library
+
+| crate | reason | brings |
+|---|---|---|
+| `vec` | holds things | `hash` |
+
+## Python packages
+
+| package | reason |
+|---|---|
+| `peer` | a peer |
+"""
+LISTS = {"peers/requirements.txt": {"peer", "helper"}}
+REACH = {"vec": {"hash"}, "hash": set(), "new": set()}
+
+
+def complaints_about(**present):
+    kinds = {"crate in the library": {"vec", "hash"}, "Python package": {"peer"}}
+    kinds.update({kind.replace("_", " "): names for kind, names in present.items()})
+    return list(dependencies.complaints(dependencies.page(PAGE), kinds, REACH, LISTS))
+
+
+class CheckDependencies(unittest.TestCase):
+    def test_a_page_with_a_reason_for_everything_is_accepted(self):
+        self.assertEqual(complaints_about(), [])
+
+    def test_a_dependency_without_a_reason_is_refused(self):
+        self.assertEqual(
+            complaints_about(Python_package={"peer", "other"}),
+            ["docs/dependencies.md has no reason for the Python package `other`"],
+        )
+
+    def test_a_new_crate_is_named_with_the_crate_that_brings_it(self):
+        REACH["vec"].add("new")
+        self.addCleanup(REACH["vec"].discard, "new")
+        self.assertEqual(
+            complaints_about(crate_in_the_library={"vec", "hash", "new"}),
+            ["docs/dependencies.md has no reason for the crate in the library `new`, which `vec` brings"],
+        )
+
+    def test_a_kind_that_the_page_does_not_have_is_refused(self):
+        self.assertEqual(
+            complaints_about(npm_package={"linter"}), ["docs/dependencies.md has no reason for the npm package `linter`"]
+        )
+
+    def test_a_name_that_is_not_needed_any_more_is_refused(self):
+        self.assertEqual(
+            complaints_about(Python_package=set()),
+            ["docs/dependencies.md names the Python package `peer`, which is not there any more"],
+        )
+
+    def test_a_crate_under_one_that_does_not_bring_it_is_refused(self):
+        page = dependencies.page(PAGE.replace("`hash`", "`hash` `new`"))
+        present = {"crate in the library": {"vec", "hash", "new"}, "Python package": {"peer"}}
+        self.assertEqual(
+            list(dependencies.complaints(page, present, REACH, LISTS)),
+            ["docs/dependencies.md says that `vec` brings `new`, but it does not"],
+        )
+
+    def test_a_list_stands_for_everything_in_it(self):
+        text = PAGE.replace("| package | reason |\n|---|---|", "| package | reason | brings |\n|---|---|---|")
+        page = dependencies.page(text.replace("a peer |", "a peer | `peers/requirements.txt` |"))
+        present = {"Python package": {"peer", "helper"}}
+        self.assertEqual(list(dependencies.complaints(page, present, REACH, LISTS)), [])
+
+    def test_a_list_that_is_not_there_is_refused(self):
+        text = PAGE.replace("| package | reason |\n|---|---|", "| package | reason | brings |\n|---|---|---|")
+        page = dependencies.page(text.replace("a peer |", "a peer | `old/requirements.txt` |"))
+        self.assertEqual(
+            list(dependencies.complaints(page, {"Python package": {"peer"}}, REACH, LISTS)),
+            ["docs/dependencies.md names the Python package `old/requirements.txt`, which is not there any more"],
+        )
+
+    def test_an_empty_reason_is_refused(self):
+        with self.assertRaisesRegex(SystemExit, "no reason for `peer`"):
+            dependencies.page(PAGE.replace("a peer", ""))
+
+    def test_programs_of_this_repository_are_no_dependencies(self):
+        with tempfile.TemporaryDirectory() as folder:
+            lock = pathlib.Path(folder) / "Cargo.lock"
+            lock.write_text(
+                '[[package]]\nname = "ours"\nversion = "1.0.0"\ndependencies = ["vec"]\n'
+                '[[package]]\nname = "vec"\nversion = "1.0.0"\nsource = "registry"\ndependencies = ["hash 2.0.0"]\n'
+                '[[package]]\nname = "hash"\nversion = "2.0.0"\nsource = "registry"\n'
+            )
+            self.assertEqual(dependencies.locked([lock]), {"vec": {"hash"}, "hash": set()})
+
+
+# --- the changelog of the Debian package, which is made from CHANGELOG.md
+
+debian = load("packaging/debian/changelog")
+
+UNRELEASED = "# Changelog\n\n## [Unreleased]\n\n### Added\n\n- A thing.\n"
+TWO_RELEASES = UNRELEASED + "\n## [70.3.0] - 2027-02-28\n\n- More.\n\n## [70.2.0] - 2026-12-01\n\n- First.\n"
+
+
+def changelog(text, version, seconds=0):
+    return debian.changelog(text.splitlines(keepends=True), version, "A Name <a@b.example>", seconds)
+
+
+class DebianChangelog(unittest.TestCase):
+    def test_a_version_that_is_not_released_yet_has_the_time_it_is_packed_for(self):
+        self.assertEqual(
+            changelog(UNRELEASED, "70.2.0", 315619200),
+            "mbm (70.2.0-1) unstable; urgency=medium\n\n"
+            "  * Version 70.2.0. The file changelog.gz lists the changes.\n\n"
+            " -- A Name <a@b.example>  Wed, 02 Jan 1980 00:00:00 +0000\n",
+        )
+
+    def test_a_released_version_has_the_day_of_its_heading_whatever_the_time(self):
+        for seconds in (0, 1800000000):
+            first = changelog(TWO_RELEASES, "70.3.0", seconds).split("\n\n")[2]
+            self.assertEqual(first.split("\n")[0], " -- A Name <a@b.example>  Sun, 28 Feb 2027 12:00:00 +0000")
+
+    def test_older_versions_follow_the_packed_one(self):
+        text = changelog(TWO_RELEASES, "70.4.0")
+        heads = [line.split()[1] for line in text.splitlines() if line.startswith("mbm")]
+        self.assertEqual(heads, ["(70.4.0-1)", "(70.3.0-1)", "(70.2.0-1)"])
+
+    def test_a_version_newer_than_the_packed_one_is_left_out(self):
+        text = changelog(TWO_RELEASES, "70.2.0")
+        self.assertEqual([line for line in text.splitlines() if line.startswith("mbm")], ["mbm (70.2.0-1) unstable; urgency=medium"])
+
+
+# --- the SBOM
+
+sbom = load("packaging/sbom/sbom.py")
+check = load("packaging/sbom/check.py")
+
+LOCK = {
+    "mbm-c": {"name": "mbm-c", "version": "1.0.0", "dependencies": ["mbm", "cc"]},
+    "mbm": {"name": "mbm", "version": "1.0.0", "dependencies": ["vec"]},
+    "vec": {"name": "vec", "version": "0.9.0", "checksum": "aa"},
+    "cc": {"name": "cc", "version": "1.2.0", "checksum": "bb"},
+}
+
+
+def part(name, version, *, scope="required", kind="cargo", hashes=()):
+    return {
+        "name": name,
+        "version": version,
+        "purl": f"pkg:{kind}/{name}@{version}",
+        "scope": scope,
+        "licenses": [{"expression": "MIT"}],
+        "hashes": [{"content": content} for content in hashes],
+        "properties": [{"name": "mbm:for", "value": "tests"}] if scope == "excluded" else [],
+    }
+
+
+RIGHT = {
+    "components": [
+        part("mbm", "1.0.0"),
+        part("mbm-c", "1.0.0"),
+        part("mbm-archive", "1.0.0"),
+        part("rust-core", "1.95.0", kind="generic"),
+        part("vec", "0.9.0", hashes=["aa"]),
+        part("cc", "1.2.0", scope="excluded", hashes=["bb"]),
+    ]
+}
+
+
+def complaints(change=None):
+    data = copy.deepcopy(RIGHT)
+    if change:
+        change({component["name"]: component for component in data["components"]}, data["components"])
+    return list(check.complaints(data, LOCK))
+
+
+class Check(unittest.TestCase):
+    def test_an_sbom_that_agrees_with_the_crate_is_accepted(self):
+        self.assertEqual(complaints(), [])
+
+    def test_a_crate_that_is_missing_is_refused(self):
+        self.assertEqual(
+            complaints(lambda names, every: every.remove(names["cc"])),
+            ["cc 1.2.0 is missing, to which the crate is locked"],
+        )
+
+    def test_a_crate_of_another_hash_is_refused(self):
+        self.assertEqual(
+            complaints(lambda names, every: names["vec"].update(hashes=[{"content": "cc"}])),
+            ["vec has another hash than in the crate"],
+        )
+
+    def test_a_crate_of_the_library_that_is_said_to_be_for_tests_is_refused(self):
+        found = complaints(lambda names, every: names["vec"].update(scope="excluded"))
+        self.assertIn("and contains ['mbm', 'mbm-archive', 'mbm-c', 'rust-core', 'vec']", found[0])
+
+    def test_a_crate_for_tests_that_is_said_to_be_in_the_library_is_refused(self):
+        found = complaints(lambda names, every: names["cc"].update(scope="required"))
+        self.assertIn("said to contain ['cc', ", found[0])
+
+    def test_a_part_of_the_library_without_a_licence_is_refused(self):
+        self.assertEqual(
+            complaints(lambda names, every: names["vec"].pop("licenses")), ["vec is in the library and has no licence"]
+        )
+
+    def test_text_that_is_no_cyclonedx_is_refused(self):
+        self.assertIsNone(check.schema_error('{"bomFormat": "CycloneDX", "specVersion": "1.6"}'))
+        self.assertIsNotNone(check.schema_error('{"bomFormat": "CycloneDX", "specVersion": "1.6", "components": 1}'))
+
+
+class Tools(unittest.TestCase):
+    def test_the_version_of_a_tool_may_be_a_variable_of_make(self):
+        text = "BINDER := 1.2.3\nA = scripts/cargo-tool binder $(BINDER)\nB = scripts/cargo-tool judge 4.5.6 --locked\n"
+        self.assertEqual(list(sbom.tools_of(text)), [("binder", "1.2.3"), ("judge", "4.5.6")])
+
+
+class Shipped(unittest.TestCase):
+    def test_only_what_is_compiled_into_the_archive_is_in_the_library(self):
+        def dep(name, kind):
+            return {"pkg": name, "dep_kinds": [{"kind": kind}]}
+
+        nodes = [
+            {"id": "archive", "deps": [dep("core", None)]},
+            {"id": "core", "deps": [dep("vec", None), dep("tester", "dev"), dep("compiler", "build")]},
+            {"id": "vec", "deps": []},
+            {"id": "tester", "deps": [dep("random", None)]},
+            {"id": "compiler", "deps": []},
+            {"id": "random", "deps": []},
+        ]
+        self.assertEqual(sbom.shipped({"nodes": nodes}, "archive"), {"archive", "core", "vec"})
+
+
+if __name__ == "__main__":
+    unittest.main()
