@@ -4,12 +4,10 @@ CARGO ?= cargo
 comma := ,
 BUILD := build
 ARCHIVE := target/release/libmbm.a
-# The same archive, with the code that only firmware runs.
-FIRMWARE_ARCHIVE := $(BUILD)/firmware/libmbm.a
 # The same archive, for tests with the address sanitizer: instrumented, with debug assertions and
-# overflow checks. Optimised less, so that a report names the functions of the source.
+# overflow checks, and with ports that are read byte by byte, as in firmware. Optimised less, so that a report names the functions of the source.
 SANITIZED_ARCHIVE := $(BUILD)/sanitized/libmbm.a
-RUST_SANITIZERS := -Zsanitizer=address -Cdebug-assertions -Coverflow-checks -Copt-level=1 -Cdebuginfo=line-tables-only
+RUST_SANITIZERS := --cfg mbm_reads_single_bytes -Zsanitizer=address -Cdebug-assertions -Coverflow-checks -Copt-level=1 -Cdebuginfo=line-tables-only
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
 INCLUDES := -Iinclude -Iexamples/linux -Ic-tests/support -Ic-tests/shim
@@ -45,11 +43,9 @@ archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm
 	@echo "archive: $(ARCHIVE)"
 
 # Phony, because Cargo decides what is out of date.
-.PHONY: $(ARCHIVE) $(FIRMWARE_ARCHIVE) $(SANITIZED_ARCHIVE)
+.PHONY: $(ARCHIVE) $(SANITIZED_ARCHIVE)
 $(ARCHIVE):
 	@CARGO="$(CARGO)" scripts/build/archive --host $@
-$(FIRMWARE_ARCHIVE):
-	@CARGO="$(CARGO)" scripts/build/archive --host $@ --cfg mbm_firmware
 $(SANITIZED_ARCHIVE):
 	@CARGO="$(CARGO)" scripts/build/archive --host $@ $(RUST_SANITIZERS)
 
@@ -104,7 +100,6 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@$(MAKE) --no-print-directory spell
 	@$(MAKE) --no-print-directory check-pages
 	@scripts/check/archive --host $(ARCHIVE)
-	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
 .PHONY: format
@@ -123,26 +118,24 @@ abi: ## Generate packaging/mbm.abi, with which `make check` compares the C inter
 
 # One job more than processors, because the tests in Rust often wait for peers.
 JOBS ?= $(shell echo $$(($$(nproc) + 1)))
-BUILDS := plain sanitized firmware valgrind
+BUILDS := plain sanitized valgrind
 # The programs in valgrind come first, because they take the longest.
 PROGRAMS = $(foreach build,$(filter valgrind,$(BUILDS)) $(filter-out valgrind,$(BUILDS)),$(TESTS:%=$(BUILD)/$(build)/%))
 
 .PHONY: test
 test: need-test ## Run every test: Rust, C and C++, also with sanitizers and in valgrind
 	@rm -rf $(BUILD)/tests
-	@$(MAKE) --no-print-directory --keep-going -j$(JOBS) build-rust test-rust test-rust-firmware run-c-tests; scripts/check/test-totals
+	@$(MAKE) --no-print-directory --keep-going -j$(JOBS) build-rust test-rust run-c-tests; scripts/check/test-totals
 
 .PHONY: test-c
 test-c: need-test ## Run only C and C++: TESTS="test_ring test_bits" BUILDS="plain valgrind" TEST=one_test
 	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests
 
-.PHONY: build-rust test-rust test-rust-firmware run-c-tests
+.PHONY: build-rust test-rust run-c-tests
 build-rust: need-test
 	+@CARGO="$(CARGO)" scripts/check/test-rust --build
 test-rust: build-rust $(BUILD)/plain/serve venv ## Run only Rust; `cargo test NAME` runs tests with that name
-	+@CARGO="$(CARGO)" scripts/check/test-rust rust
-test-rust-firmware: build-rust $(BUILD)/plain/serve venv ## Run only Rust, with the code that only firmware runs
-	+@CARGO="$(CARGO)" scripts/check/test-rust rust-firmware
+	+@CARGO="$(CARGO)" scripts/check/test-rust
 # scripts/check/test-totals compares the results of test_bad_wire with the committed fault table.
 run-c-tests: $(PROGRAMS)
 	@mkdir -p $(BUILD)/tests
@@ -253,20 +246,6 @@ $(eval $(call variant,coverage,gcc,g++,$(COUNTERS),$(BUILD)/coverage/libmbm.a))
 # It includes sketches.
 $(BUILD)/plain/test_class_examples.o $(BUILD)/sanitized/test_class_examples.o $(BUILD)/coverage/test_class_examples.o: \
     $(wildcard examples/arduino/Tcp*/*.ino)
-
-# The programs of the variant `plain`, linked with the code that firmware runs.
-FIRMWARE_TESTS := $(TESTS:%=$(BUILD)/firmware/%)
-$(FIRMWARE_TESTS): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(SUPPORT))) $(FIRMWARE_ARCHIVE)
-	@g++ $(filter %.o,$^) $(FIRMWARE_ARCHIVE) $(LIBS) -o $@
-$(TLS_TESTS:%=$(BUILD)/firmware/%): $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(TLS))) | certificates
-$(TLS_TESTS:%=$(BUILD)/firmware/%): LIBS += $(TLS_LIBS)
-$(BUILD)/firmware/test_mqtt_payload: $(BUILD)/plain/linux/mqtt_payload.o
-$(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tcp_listener.o $(BUILD)/plain/linux/mbm_tty.o $(call TRACE,plain) $(FIRMWARE_ARCHIVE)
-	@mkdir -p $(@D)
-	@gcc $(filter %.o,$^) $(FIRMWARE_ARCHIVE) -Wl,--gc-sections -o $@
-$(BUILD)/firmware/linux/gateway: $(BUILD)/plain/linux/gateway_line.o
-$(TESTED_EXAMPLES:%=$(BUILD)/firmware/test_%): $(BUILD)/firmware/test_%: | $(BUILD)/firmware/linux/%
-$(BUILD)/firmware/test_gateway_replies $(BUILD)/firmware/test_gateway_shortage $(BUILD)/firmware/test_gateway_tcp: | $(BUILD)/firmware/linux/gateway
 
 # mbm's server, for the tests with pymodbus's client.
 SERVE := $(BUILD)/plain/serve

@@ -6,7 +6,7 @@ pub trait Port {
     /// bytes on a Cortex-M0+ and 140 on an AVR. If false, they read what has arrived in one call,
     /// and compare a whole reply before they search it, which saves a host system calls and two
     /// instructions of three.
-    const READS_SINGLE_BYTES: bool = cfg!(target_os = "none");
+    const READS_SINGLE_BYTES: bool = cfg!(any(target_os = "none", mbm_reads_single_bytes));
 
     /// True if the port can be used. Otherwise no other function is called.
     fn is_ready(&self) -> bool {

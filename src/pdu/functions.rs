@@ -59,7 +59,7 @@ macro_rules! functions {
 
         impl FunctionSpec {
             /// How the request of a function is composed that has at most two words and one kind of
-            /// data; otherwise [`FunctionSpec::NONE`].
+            /// data; otherwise the empty one.
             pub const fn of(function: u8) -> FunctionSpec {
                 match function {
                     $($constant => FunctionSpec::$spec,)*
