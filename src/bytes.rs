@@ -4,7 +4,6 @@ use crate::error::Status;
 use core::cell::Cell;
 
 /// Moves the bytes from the index `from` to the end to the front of `bytes`.
-#[cfg_attr(target_os = "none", inline(never))]
 pub fn move_to_front(bytes: &mut [u8], from: usize) {
     let cells = Cell::from_mut(bytes).as_slice_of_cells();
     move_items(cells, cells.get(from..).unwrap_or_default());

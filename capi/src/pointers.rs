@@ -141,7 +141,6 @@ pub(crate) unsafe fn check<O: CObject>(object: *const O) -> Status {
 ///
 /// # Safety
 /// As for [`check`].
-#[inline(always)]
 pub(crate) unsafe fn check_once<O: CObject>(object: *const O) -> Status {
     if object.is_null() {
         return Status::INVALID_ARGUMENT;
@@ -154,7 +153,6 @@ pub(crate) unsafe fn check_once<O: CObject>(object: *const O) -> Status {
 ///
 /// # Safety
 /// `object` points to storage of an object, zeroed or begun.
-#[inline(always)]
 pub(crate) unsafe fn check_mark<O: CObject>(object: *const O) -> Status {
     // SAFETY: as the caller promises.
     match unsafe { O::mark(object).read() } {
@@ -180,7 +178,6 @@ pub(crate) unsafe fn object<'a, O: CObject>(object: *const O) -> O::Access<'a> {
 /// # Safety
 /// [`check`] returned [`Status::OK`] for the object, or the object is being begun. No
 /// reference to it lives.
-#[inline(always)]
 pub(crate) unsafe fn with_hooks<O: CObject, T>(object: *const O, action: impl FnOnce() -> T) -> T {
     // SAFETY: as the caller promises; every object is writable storage.
     unsafe {
@@ -197,7 +194,6 @@ pub(crate) unsafe fn with_hooks<O: CObject, T>(object: *const O, action: impl Fn
 ///
 /// # Safety
 /// `object` points to storage of an object, which nothing else uses.
-#[inline(always)]
 pub(crate) unsafe fn zero<O: CObject>(object: *mut O) {
     const { assert!(size_of::<O>().is_multiple_of(size_of::<usize>())) }
     // SAFETY: as the caller promises; the storage is a number of words.

@@ -79,7 +79,6 @@ impl mbm_port {
 ///
 /// # Safety
 /// `port` points to a complete port.
-#[inline(always)]
 pub(super) unsafe fn now(port: *const mbm_port) -> u32 {
     // SAFETY: as the caller promises.
     unsafe {
@@ -176,7 +175,6 @@ impl PortRef {
     ///
     /// # Safety
     /// The port is complete, and does not change for as long as this refers to it.
-    #[inline(always)]
     pub(super) unsafe fn set(&mut self, port: *const mbm_port) {
         self.port = port;
     }
@@ -193,7 +191,6 @@ impl PortRef {
     /// # Safety
     /// `this` refers to a port. No reference to the object that holds `this` lives, because
     /// the hook may use that object.
-    #[inline(always)]
     pub(super) unsafe fn idle(this: *const PortRef, node: *mut mbm_node) {
         // SAFETY: as the caller promises.
         unsafe {

@@ -69,7 +69,6 @@ pub(super) struct LineStorage {
 
 impl LineStorage {
     /// Sets the frame buffer.
-    #[inline(always)]
     pub(super) fn set_frame(&mut self, frame: *mut u8, bytes: u16) {
         self.frame = frame;
         // No frame of a node is longer than 255 bytes.
@@ -106,32 +105,27 @@ macro_rules! frame_storage {
             self.frame_bytes
         }
 
-        #[inline(always)]
         fn byte(&self, index: $count) -> u8 {
             // SAFETY: below `frame_bytes`, see above.
             unsafe { *self.frame.add(index.into()) }
         }
 
-        #[inline(always)]
         fn set_byte(&mut self, index: $count, byte: u8) {
             // SAFETY: below `frame_bytes`, see above.
             unsafe { *self.frame.add(index.into()) = byte }
         }
 
-        #[inline(always)]
         fn slice(&self, index: $count, count: $count) -> &[u8] {
             // SAFETY: up to `frame_bytes`, see above.
             unsafe { core::slice::from_raw_parts(self.frame.add(index.into()), count.into()) }
         }
 
-        #[inline(always)]
         fn bytes(&mut self, index: $count, count: $count) -> &mut [u8] {
             // SAFETY: up to `frame_bytes`, see above.
             unsafe { core::slice::from_raw_parts_mut(self.frame.add(index.into()), count.into()) }
         }
 
         // Not inlined on a microcontroller, to save flash.
-        #[cfg_attr(target_os = "none", inline(never))]
         fn count(&mut self, counter: mbm::engine::Counter, more: u32) {
             if self.counters.is_null() {
                 return;
@@ -152,7 +146,6 @@ impl Storage for LineStorage {
     frame_storage!(u8);
 
     // Volatile: otherwise LLVM would call memmove of libc, which costs flash.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn move_down(&mut self, from: u8, count: u8) {
         // SAFETY: both ranges lie within `frame_bytes`, see above.
         unsafe {
@@ -170,7 +163,6 @@ impl Storage for LineStorage {
 // SAFETY, below: a request is under way, so `words` points to those of its node. The engine keeps
 // every index below the number of words, too.
 impl Words for LineStorage {
-    #[inline(always)]
     fn response_timeout(&self, _settings: &Settings) -> u32 {
         // SAFETY: see above.
         unsafe { (*self.words).response_timeout.get() }
@@ -186,7 +178,6 @@ impl Words for LineStorage {
         unsafe { (*self.words).transmit_words }
     }
 
-    #[inline(always)]
     fn load_words(&mut self, to: u8, count: u8, high_first: bool) {
         // SAFETY: within `transmit_words` and `frame_bytes`, see above.
         unsafe {
@@ -210,7 +201,6 @@ impl Words for LineStorage {
         unsafe { (*self.words).response_words }
     }
 
-    #[inline(always)]
     fn store_words(&mut self, from: u8, count: u8, high_first: bool) {
         // SAFETY: within `frame_bytes` and `response_words`, see above.
         unsafe {

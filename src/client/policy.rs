@@ -80,7 +80,6 @@ impl Policy {
     /// Sets the largest part of a wait that is subtracted at random, in percent. False, with
     /// nothing changed, for more than 100, or if there is no random number and `percent` is not
     /// 0.
-    #[inline(always)]
     pub fn set_jitter(&mut self, percent: u8, has_random: bool) -> bool {
         let allowed = percent <= 100 && (has_random || percent == 0);
         if allowed {
@@ -91,7 +90,6 @@ impl Policy {
 
     /// The wait before retry number `retry`, counted from 1. `random` returns a random
     /// number, which decides how much jitter is subtracted.
-    #[inline]
     pub fn wait(&self, retry: u8, random: impl FnOnce() -> u32) -> u32 {
         match self.grow {
             Some(grow) => grow(self, retry, random()),

@@ -176,7 +176,6 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     }
 
     /// Removes the request at the index `at` from the queue.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn remove(&mut self, at: usize) -> Option<J> {
         let mut moved = self.queue.pop()?;
         for place in self.queue.get_mut(at..)?.iter_mut().rev() {
@@ -186,7 +185,6 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     }
 
     /// Inserts a request at the front of the queue, which has space for it.
-    #[cfg_attr(target_os = "none", inline(always))]
     pub(super) fn put_first(&mut self, mut request: J) {
         for place in self.queue.iter_mut() {
             core::mem::swap(place, &mut request);
@@ -307,7 +305,6 @@ fn is_lost(request: &impl ClientRequest) -> bool {
 
 /// Ends a request with `status`, or prepares its retry. Returns true if it has ended,
 /// false if it waits for a retry.
-#[cfg_attr(target_os = "none", inline(never))]
 fn end_or_retry(
     policy: &Policy,
     request: &mut impl ClientRequest,

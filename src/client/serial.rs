@@ -65,7 +65,6 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// Reads and discards bytes that arrive while all requests only wait. If they stayed in
     /// the port, a program that sleeps until bytes arrive would wake up at once.
     #[cold]
-    #[inline(never)]
     fn drop_late_bytes<const N: usize>(&mut self, queue: &mut RequestQueue<J, N>, now: u32) {
         if self.engine.drop_received(now) < 0 {
             queue.disconnect();

@@ -67,7 +67,6 @@ impl<F: AsRef<[u8]> + AsMut<[u8]>> ClientStorage for Frame<F> {}
 
 impl RequestState {
     /// Microseconds until the request is due.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn remaining_wait(&self, now: u32, storage: &mut impl ClientStorage) -> u32 {
         let wait = match self.wait {
             0 => 0,
@@ -81,7 +80,6 @@ impl RequestState {
     }
 
     /// The response timeout in microseconds, if it is `line` on this line.
-    #[inline(always)]
     pub(super) fn response_timeout(&self, storage: &mut impl ClientStorage, line: u32) -> u32 {
         let timeout = match self.timeout_ms {
             0 => storage.unit_timeout_ms(self.unit()),

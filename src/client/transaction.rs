@@ -91,7 +91,6 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         self.header().returns_query_data()
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
     fn response_timeout(engine: &mut ClientEngine<P, S, J>) -> u32 {
         let line = engine.settings.response_timeout.get();
         match &engine.request.client_request {
@@ -109,7 +108,6 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         frame <= space
     }
 
-    #[inline(always)]
     fn write(engine: &mut ClientEngine<P, S, J>) {
         write(engine);
     }
@@ -123,7 +121,6 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         }
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
     fn is_reply(engine: &mut ClientEngine<P, S, J>, front: u16, length: u16) -> bool {
         let whole = length - rtu::OVERHEAD as u16;
         let pdu = engine.storage.slice(front + rtu::PDU as u16, whole);
@@ -142,7 +139,6 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         header.matches_echo(engine.storage.slice(front + rtu::PDU as u16, length))
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
     fn ending_reply(engine: &mut ClientEngine<P, S, J>, is_silent: bool) -> u16
     where
         P: Port,
@@ -159,7 +155,6 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         0
     }
 
-    #[inline(always)]
     fn search(engine: &mut ClientEngine<P, S, J>, first: u16, received: u16) -> bool
     where
         P: Port,
@@ -197,7 +192,6 @@ impl<P, S: ClientStorage, J: ClientRequest> ClientEngine<P, S, J> {
 }
 
 /// Writes the frame of the request.
-#[inline(always)]
 fn write<P, S: ClientStorage, J: ClientRequest>(engine: &mut ClientEngine<P, S, J>) {
     let length = u16::from(engine.request.header().request_length());
     engine.storage.set_byte(0, engine.unit);

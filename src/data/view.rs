@@ -135,7 +135,6 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn load(&self, address: u16, mask: usize, bytes: &mut [u8]) -> Result<(), Status> {
         let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter_mut().enumerate() {
@@ -266,7 +265,6 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn store(&mut self, address: u16, mask: usize, bytes: &[u8]) -> Result<(), Status> {
         let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter().enumerate() {

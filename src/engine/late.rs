@@ -22,7 +22,6 @@ use crate::port::Port;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// The byte of `late_units` that has the bit of the pending request's unit, and that bit.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn late_unit(&mut self) -> (&mut u8, u8) {
         // The index is in range, so the compiler leaves the check out.
         #[allow(clippy::indexing_slicing)]
@@ -37,7 +36,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Notes that the reply to the pending request may come late.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn expect_late_reply(&mut self) {
         // A damaged reply has come, so none is late.
         let is_damaged = self.phase == Phase::Reply && self.seen == Outcome::BAD_CRC;
@@ -65,7 +63,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// How long the line must be silent before a held reply is accepted.
-    #[inline(always)]
     pub(super) fn hold(&mut self) -> u32 {
         let quiet_time = self.settings.quiet_time.get();
         if self.has_slow_unit {
@@ -76,20 +73,17 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// True if the next reply is held, or one was held.
-    #[inline(always)]
     pub(super) fn is_on_probation(&self) -> bool {
         self.probation != Probation::No
     }
 
     /// True if a reply is or was held.
-    #[inline(always)]
     pub(super) fn is_held(&self) -> bool {
         self.probation == Probation::Held
     }
 
     /// Holds the response in `seen`, which is on probation. It replaces a response that was held
     /// before.
-    #[inline(always)]
     pub(super) fn hold_response(&mut self) {
         if self.is_held() {
             self.note_foreign_frame();
@@ -101,7 +95,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// True if the held response is not the answer: the bytes after it may have been the answer,
     /// or the line is not silent. A single byte may be noise.
-    #[inline(always)]
     pub(super) fn is_held_in_vain(&self) -> bool {
         self.is_held() && (self.run_length > 1u8.into() || !self.has_expired())
     }

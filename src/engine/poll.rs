@@ -57,7 +57,6 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Stores the time `now`, and starts the time of a phase that has just begun.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn look_at_clock(&mut self, now: u32) {
         self.now = now;
         if self.phase_begins {
@@ -185,7 +184,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Searches the bytes that have arrived, and ends the wait for silence or for the reply once
     /// it is over.
-    #[inline(always)]
     fn listen(&mut self) -> Status {
         // All received bytes are searched, also if the port returns them one by one. If they never
         // end, the poll ends after as many as an AVR searches in 30 ms at most.
@@ -272,14 +270,12 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// True if the wait and the response timeout after it have passed since the time `since`.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn is_overdue(&mut self, since: u32) -> bool {
         let limit = self.wait.wrapping_add(Q::response_timeout(self));
         has_elapsed(limit, self.now, since)
     }
 
     /// Lets silence end the wait for the reply, if it is known what the request ends with then.
-    #[inline(always)]
     fn wait_for_silence(&mut self) {
         if self.is_held() {
             self.wait = self.hold();
@@ -292,7 +288,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// True if bytes have arrived that may be a reply of unknown length, which silence ends.
-    #[inline(always)]
     fn may_end_in_silence(&self) -> bool {
         !Q::HAS_FIXED_REPLY && self.awaits_end
     }
@@ -318,7 +313,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Ends the request with what was seen.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn settle(&mut self) -> Status {
         if let Some(observe) = self.observer {
             observe(self, Event::End);
@@ -335,14 +329,12 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// True if the engine has extras, and they replace what follows at this moment.
-    #[inline(always)]
     pub(super) fn has_extra(&mut self, moment: Moment) -> bool {
         self.extras.is_some_and(|extras| extras(self, moment))
     }
 
     /// Cancels the request and switches the driver off. If the request was sent completely,
     /// its reply may still come.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn cancel(&mut self) {
         self.tally(Status::CANCELLED);
         self.end_on_line();
@@ -351,7 +343,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Ends a request without a right reply on the line: switches the driver off, and notes that
     /// the reply may come late.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn end_on_line(&mut self) {
         if self.phase <= Phase::Gap {
             return;

@@ -33,7 +33,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Searches the `received` bytes that the port has written to the frame buffer from `first`
     /// on. True if the request ends. The bytes after the reply are dropped then.
-    #[inline(always)]
     pub(crate) fn search(&mut self, first: S::Count, received: S::Count) -> bool {
         if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
             self.awaits_end = true;
@@ -61,7 +60,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// True if the received bytes are exactly the reply, and end the request. Hosts receive most
     /// replies in this way, and save 2000 instructions for ten registers.
-    #[inline(always)]
     fn is_reply_alone(&mut self, received: S::Count) -> bool {
         let frame = self.storage.slice(S::Count::ZERO, received);
         let start = [self.unit, self.request.function()];
@@ -114,7 +112,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Makes the exception at the end of the buffer the outcome. False if its code is invalid.
-    #[inline(always)]
     fn accept_exception(&mut self, is_whole: bool) -> bool {
         let code = self.storage.byte(self.end - 3u8.into());
         if !self.is_held() {
@@ -134,7 +131,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Length of the reply's frame that ends with the last byte, with a right CRC; 0 if there is
     /// none.
-    #[inline(always)]
     fn ending_reply(&mut self) -> S::Count {
         if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
             return Q::ending_reply(self, false);
@@ -151,7 +147,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Notes that the reply to a read begins with the last three bytes, if the frame buffer
     /// cannot hold that reply.
     #[cold]
-    #[inline(always)]
     fn note_too_long(&mut self) {
         if self.end < 3u8.into() {
             return;
@@ -167,7 +162,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// The byte count with which the reply to a read begins.
-    #[inline(always)]
     fn data_length(&self) -> u8 {
         let length: u16 = self.length.into();
         length.wrapping_sub(AROUND_DATA.into()) as u8
@@ -175,7 +169,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Moves the frame of `length` bytes at the end of the buffer to its front, and makes it the
     /// reply. False, with nothing changed, if it does not answer the request.
-    #[inline(always)]
     pub(super) fn accept(&mut self, length: S::Count) -> bool {
         let front = self.end - length;
         if !Q::is_reply(self, front, length) {
@@ -194,7 +187,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// True if the last `length` bytes are a frame of our unit with that function code and a
     /// right CRC. Notes a wrong CRC.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(crate) fn ends_with(&mut self, length: S::Count, function: u8) -> bool {
         let have = self.end - self.content;
         if length > have {
@@ -221,7 +213,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// True if the CRC of the `length` bytes at `front` is right. For the reply, it follows from
     /// the CRC of all bytes since the last frame and from that of the bytes before `front`, which
     /// are few. So bytes that begin like the reply again and again cost little.
-    #[inline(always)]
     fn is_right(&mut self, front: S::Count, length: S::Count) -> bool {
         let known = self.known();
         if !Self::DERIVES_CRC || length != self.length || front < known {
@@ -235,7 +226,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// The index in the buffer up to which `before` is the CRC since the last frame.
-    #[inline(always)]
     fn known(&self) -> S::Count {
         self.end - self.run_length.min(self.end)
     }

@@ -15,37 +15,30 @@ impl<P, S: Words> Transaction<P, S> for MasterRequest {
     const NONE: Self = MasterRequest::NONE;
     const HAS_FIXED_REPLY: bool = true;
 
-    #[inline(always)]
     fn function(&self) -> u8 {
         MasterRequest::function(self)
     }
 
-    #[inline(always)]
     fn may_be_broadcast(&self) -> bool {
         !self.is_read()
     }
 
-    #[inline(always)]
     fn response_timeout(engine: &mut Line<P, S>) -> u32 {
         engine.storage.response_timeout(&engine.settings)
     }
 
-    #[inline(always)]
     fn fits(&self, space: u8) -> bool {
         self.length() <= space.wrapping_sub(AROUND_PDU)
     }
 
-    #[inline(always)]
     fn reply_length(&self) -> u8 {
         self.response_length() + AROUND_PDU
     }
 
-    #[inline(always)]
     fn write(engine: &mut Line<P, S>) {
         write(engine);
     }
 
-    #[inline(always)]
     fn is_reply(engine: &mut Line<P, S>, front: u8, _length: u8) -> bool {
         if engine.request.is_read() {
             engine.storage.byte(front + 2) == engine.request.reads()
@@ -54,7 +47,6 @@ impl<P, S: Words> Transaction<P, S> for MasterRequest {
         }
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
     fn is_echo(engine: &mut Line<P, S>, front: u8) -> bool {
         let mut index = engine.request.head_length();
         while index > 0 {
@@ -69,7 +61,6 @@ impl<P, S: Words> Transaction<P, S> for MasterRequest {
 }
 
 /// Writes the frame of the request.
-#[cfg_attr(target_os = "none", inline(never))]
 fn write<P, S: Words>(engine: &mut Line<P, S>) {
     engine.storage.set_byte(0, engine.unit);
     let mut end = 0;
@@ -93,7 +84,6 @@ fn write<P, S: Words>(engine: &mut Line<P, S>) {
 }
 
 /// Clears the bits of the last byte of data, which is at `index`, that the request does not use.
-#[inline(always)]
 fn clear_unused_bits<P, S: Words>(engine: &mut Line<P, S>, index: u8) {
     let byte = engine.storage.byte(index) & engine.request.mask();
     engine.storage.set_byte(index, byte);
@@ -101,7 +91,6 @@ fn clear_unused_bits<P, S: Words>(engine: &mut Line<P, S>, index: u8) {
 
 impl<P: Port, S: Words> Line<P, S> {
     /// [`Status::OK`] if a request may be made, otherwise the reason.
-    #[inline(always)]
     pub fn ready(&self) -> Status {
         if self.is_pending() {
             return Status::BUSY;
@@ -114,8 +103,6 @@ impl<P: Port, S: Words> Line<P, S> {
 
     /// Copies the data of the reply into the response words. False, with nothing copied, if
     /// there are too few words.
-    #[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
-    #[cfg_attr(not(all(target_os = "none", not(target_arch = "avr"))), inline(always))]
     pub fn store_words(&mut self) -> bool {
         let count = self.request.reads();
         if self.response_words() > self.storage.response_words() {

@@ -15,7 +15,6 @@ use mbm::error::Status;
 ///
 /// # Safety
 /// As the header demands of the begin functions.
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe fn begin(
     pointer: *mut mbm_client,
     port: *const mbm_port,
@@ -59,7 +58,6 @@ unsafe fn begin(
 ///
 /// # Safety
 /// As for [`pointers::check`].
-#[inline(always)]
 unsafe fn give_up(client: *mut mbm_client) -> Status {
     // SAFETY: as the caller promises. While `release` calls hooks, the mark refuses their calls
     // on the object, and no reference into it lives. Zero is a valid value of every field

@@ -23,7 +23,6 @@ pub(super) struct Parts<'a> {
 ///
 /// # Safety
 /// As for [`pointers::with`].
-#[cfg_attr(target_os = "none", inline(always))]
 pub(super) unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> u8 {
     // SAFETY: as the caller promises.
     unsafe {

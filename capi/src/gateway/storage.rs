@@ -52,12 +52,10 @@ pub struct Parts {
 //
 // (Not inlined on an AVR: each place would multiply, which takes 640 bytes in all.)
 impl Parts {
-    #[cfg_attr(target_arch = "avr", inline(never))]
     fn request_at(&self, request: u16) -> *mut mbm_gatewayRequest {
         self.config.requests.wrapping_add(request.into())
     }
 
-    #[cfg_attr(target_arch = "avr", inline(never))]
     fn connection_at(&self, connection: u8) -> *mut mbm_gatewayConnection {
         self.config.connections.wrapping_add(connection.into())
     }

@@ -52,7 +52,6 @@ unsafe impl CObject for mbm_line {
 ///
 /// # Safety
 /// As for [`pointers::with`].
-#[cfg_attr(target_os = "none", inline(never))]
 pub(crate) unsafe fn prepare(line: *mut mbm_line) -> Status {
     // SAFETY: as the caller promises; storage that was not begun is zeroed, and zero is a
     // valid value of every field.
@@ -73,7 +72,6 @@ pub(crate) unsafe fn prepare(line: *mut mbm_line) -> Status {
 ///
 /// # Safety
 /// As for [`pointers::with_hooks`].
-#[inline(always)]
 pub(crate) unsafe fn with_hooks<T>(line: *mut mbm_line, action: impl FnOnce(&mut Core) -> T) -> T {
     // SAFETY: begun, so every field is valid; exclusive, because the mark keeps every other
     // function from making a reference.
@@ -84,7 +82,6 @@ pub(crate) unsafe fn with_hooks<T>(line: *mut mbm_line, action: impl FnOnce(&mut
 ///
 /// # Safety
 /// `line` points to storage of a line, zeroed or begun.
-#[inline(always)]
 pub(crate) unsafe fn core_of(line: *mut mbm_line) -> *mut Core {
     // SAFETY: as the caller promises.
     unsafe { &raw mut (*line.cast::<Object>()).core }
@@ -125,7 +122,6 @@ pub unsafe extern "C" fn mbm_line_beginRtu(
 }
 
 /// True for a frame buffer that cannot hold an exception or a request of two words.
-#[inline(always)]
 fn is_frame_refused(frame: *mut u8, bytes: u16) -> bool {
     frame.is_null() || bytes < 8
 }

@@ -88,7 +88,6 @@ pub unsafe extern "C" fn mbm_link_begin(
 ///
 /// # Safety
 /// As for [`mbm_link_begin`]; `link` is not NULL.
-#[inline(always)]
 unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHooks) -> Status {
     // SAFETY: as the caller promises.
     unsafe {
@@ -130,7 +129,6 @@ unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHo
 }
 
 /// The functions and numbers of `client`, which gets a link and whose transport is `transport`.
-#[inline(always)]
 fn linked(transport: &TransportKind, client: *mut mbm_client) -> LinkedKind {
     LinkedKind {
         kind: TransportKind {

@@ -54,7 +54,6 @@ unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) 
 ///
 /// # Safety
 /// As above.
-#[inline(always)]
 unsafe fn moved(context: *mut c_void, action: impl FnOnce(&mbm_port) -> i16) -> i16 {
     let link = context.cast::<Object>();
     // SAFETY: see above. The core of the link is not used while the hook runs.

@@ -120,7 +120,6 @@ pub unsafe extern "C" fn mbm_node_begin(
 ///
 /// # Safety
 /// The node was begun, so it has a line.
-#[inline(always)]
 unsafe fn check_line(object: *mut Object) -> Status {
     // SAFETY: as the caller promises.
     unsafe { pointers::check_mark((*object).line) }
@@ -130,7 +129,6 @@ unsafe fn check_line(object: *mut Object) -> Status {
 ///
 /// # Safety
 /// [`check_line`] returned [`Status::OK`] for the node.
-#[inline(always)]
 unsafe fn has_line(object: *mut Object) -> bool {
     // SAFETY: as the caller promises, so the line was begun and has no reference.
     unsafe { pointers::object((*object).line).storage.words == &raw mut (*object).words }
@@ -294,7 +292,6 @@ unsafe fn request(
 ///
 /// # Safety
 /// As for [`pointers::with`].
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe fn take_line(node: *mut mbm_node) -> Status {
     // SAFETY: as the caller promises.
     unsafe {
@@ -323,7 +320,6 @@ unsafe fn take_line(node: *mut mbm_node) -> Status {
 ///
 /// # Safety
 /// As for [`pointers::with`]; `status` is the one that the last call on that node returned.
-#[inline(never)]
 unsafe fn finish(pointer: *mut mbm_node, mut status: u8) -> u8 {
     if status != Status::PENDING.code() {
         return status;

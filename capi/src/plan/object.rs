@@ -69,7 +69,6 @@ impl Object {
 ///
 /// # Safety
 /// `object` is begun, and no reference into it or its client lives.
-#[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn time(object: *mut Object) -> u32 {
     // SAFETY: as the caller promises.
     unsafe {

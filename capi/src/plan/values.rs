@@ -41,7 +41,6 @@ struct Found<'a> {
 ///
 /// # Safety
 /// `plan` is NULL or storage of a plan.
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe fn find(plan: *const mbm_plan, field: u16, found: &mut MaybeUninit<Found>) -> Status {
     // SAFETY: as the caller promises. Every field has a position and a read.
     unsafe {
@@ -70,7 +69,6 @@ unsafe fn find(plan: *const mbm_plan, field: u16, found: &mut MaybeUninit<Found>
 ///
 /// # Safety
 /// As for [`find`]; nothing changes the data while `words` lives.
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe fn find_words(
     plan: *const mbm_plan,
     field: u16,
@@ -111,7 +109,6 @@ unsafe fn find_words(
 ///
 /// # Safety
 /// As the header demands; `place` is NULL or points to a `T`.
-#[inline(always)]
 unsafe fn get<T>(
     plan: *const mbm_plan,
     field: u16,

@@ -29,7 +29,6 @@ unsafe fn get_value<T>(
 ///
 /// # Safety
 /// As for [`view`]; `number` is NULL or points to `size` bytes.
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe fn get(
     registers: *const mbm_registers,
     address: u16,

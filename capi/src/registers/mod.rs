@@ -112,7 +112,6 @@ impl RegisterBytesMut for BorrowedRegisters {
 /// # Safety
 /// `registers` is NULL or points to an `mbm_registers`. Its `data` is NULL or points to what
 /// the other fields say, which nothing else uses while the result lives.
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe fn view(
     registers: *const mbm_registers,
     call_order: u8,

@@ -17,7 +17,6 @@ const MIN_FRAME: u16 = 16;
 ///
 /// # Safety
 /// Each argument is as the header requires.
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe fn begin(
     server: *mut mbm_server,
     port: *const mbm_port,

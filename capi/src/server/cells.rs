@@ -37,7 +37,6 @@ impl Place {
     ///
     /// # Safety
     /// The cell exists.
-    #[inline(always)]
     pub(super) unsafe fn of_cells(cells: *mut u8, kind: TableKind, index: usize) -> Place {
         // SAFETY: as the caller promises.
         unsafe {
@@ -52,14 +51,12 @@ impl Place {
     }
 
     /// The position of the first cell in the data of a PDU.
-    #[inline(always)]
     pub(super) fn of_data(byte: *mut u8, kind: TableKind) -> Place {
         let mask = kind.is_bits().into();
         Place { byte, mask }
     }
 
     /// Moves to the next bit.
-    #[inline(always)]
     #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
     fn step(&mut self) {
         let next = self.mask >> 7;
@@ -72,7 +69,6 @@ impl Place {
 ///
 /// # Safety
 /// Both positions have `left` cells, which nothing else uses meanwhile.
-#[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
     // SAFETY: as the caller promises.
     unsafe {

@@ -104,7 +104,6 @@ impl HookCaller {
     /// # Safety
     /// [`mbm_recordHooks::new`] made the hooks, or they are zeroed. They stay valid. `info` is
     /// as for [`connection`].
-    #[inline(always)]
     pub(super) unsafe fn new(hooks: mbm_recordHooks, info: *const c_void, function: u8) -> Self {
         let mut access = MaybeUninit::<mbm_access>::uninit();
         let fields = access.as_mut_ptr();
@@ -122,7 +121,6 @@ impl HookCaller {
 
     /// Calls a hook, if there are hooks. Returns 0, or the exception code with which the hook
     /// refuses the request. `data` is NULL for a read.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn call(&mut self, hook: Hook, address: u16, quantity: u16, data: *const u8) -> u8 {
         let Some(call) = self.hooks.call else {
             return 0;

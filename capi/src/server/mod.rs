@@ -96,7 +96,6 @@ impl ServerStorage for ServerBuffers {
         unsafe { from_raw_parts_mut(self.frame.add(start), end - start) }
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
     fn keep(&mut self, start: usize, end: usize) {
         // SAFETY: as for `part`.
         unsafe {
@@ -164,7 +163,6 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
 /// # Safety
 /// `core` belongs to an object that was begun. The mark of the object is `IN_HOOK`, so
 /// no function of this file uses the object meanwhile.
-#[inline(always)]
 unsafe fn poll(core: *mut Core, mark: *const u8) -> Status {
     // SAFETY: as the caller promises. Units and the clock are code of the program; no
     // reference to the core lives while they run.

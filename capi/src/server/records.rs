@@ -84,7 +84,6 @@ pub(super) const CUSTOM: u8 = 0x80;
 ///
 /// # Safety
 /// `service` is the head of a record of any kind.
-#[inline(always)]
 pub(super) unsafe fn is_custom(service: *const mbm_service) -> bool {
     // SAFETY: as the caller promises.
     unsafe { (*service).kind == CUSTOM }

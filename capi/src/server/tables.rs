@@ -72,7 +72,6 @@ pub(super) type AccessWithHooks = unsafe fn(
 ///
 /// # Safety
 /// `table` is a table.
-#[inline(always)]
 unsafe fn access_with_hooks(table: *const mbm_registerTable) -> Option<AccessWithHooks> {
     // SAFETY: as the caller promises; `call` of a table is NULL or such a function.
     unsafe { transmute((*table).hooks.call) }
@@ -88,8 +87,6 @@ const _: () = {
 // SAFETY, of all functions here: the header requires that the struct stays valid, at the
 // same address, with arrays of `size` cells. Each access is within these arrays.
 impl TableAccess for Table {
-    #[cfg_attr(target_arch = "avr", inline(never))]
-    #[cfg_attr(not(target_arch = "avr"), inline(always))]
     fn access(
         &mut self,
         operation: TableOperation,
@@ -138,7 +135,6 @@ impl TableAccess for Table {
 ///
 /// # Safety
 /// `table` is a table; `valid` is NULL or has `size` bits.
-#[inline(always)]
 unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usize) -> bool {
     // SAFETY: as the caller promises.
     unsafe {
@@ -156,7 +152,6 @@ unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usiz
 struct TableSnapshot(mbm_registerTable, *const c_void);
 
 impl TableAccess for TableSnapshot {
-    #[cfg_attr(target_os = "none", inline(never))]
     fn access(
         &mut self,
         operation: TableOperation,
@@ -249,7 +244,6 @@ unsafe extern "C" fn serve_holding_registers(
 ///
 /// # Safety
 /// As for [`add_as`].
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe extern "C" fn add_table(
     unit: *mut mbm_unit,
     table: *mut mbm_registerTable,

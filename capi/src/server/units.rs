@@ -56,7 +56,6 @@ pub struct mbm_unit {
 /// # Safety
 /// Each pointer is NULL or valid. `service` is the head of a record that is zero or that
 /// `serve` serves.
-#[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn add_as(
     unit: *mut mbm_unit,
     service: *mut mbm_service,
@@ -127,7 +126,6 @@ pub(super) struct Services {
 impl Services {
     /// # Safety
     /// `unit` is a unit, and stays one while the iterator is used.
-    #[inline(always)]
     pub(super) unsafe fn new(unit: *const mbm_unit) -> Services {
         // SAFETY: as the caller promises.
         unsafe {
@@ -141,7 +139,6 @@ impl Services {
 impl Iterator for Services {
     type Item = *mut mbm_service;
 
-    #[inline(always)]
     fn next(&mut self) -> Option<*mut mbm_service> {
         if self.place == self.end {
             return None;
@@ -205,7 +202,6 @@ pub(super) unsafe fn call_services(
 ///
 /// # Safety
 /// As for [`Serve`].
-#[inline(always)]
 unsafe fn refusal_field(info: *const c_void) -> *mut u8 {
     // SAFETY: as the caller promises; `info` is part of a server, which is not constant.
     unsafe { &raw mut (*info.cast::<Indication>().cast_mut()).refusal }
@@ -215,7 +211,6 @@ unsafe fn refusal_field(info: *const c_void) -> *mut u8 {
 ///
 /// # Safety
 /// As for [`Serve`].
-#[inline(always)]
 unsafe fn begin_refusal(info: *const c_void) {
     // SAFETY: as the caller promises.
     unsafe { refusal_field(info).write(Reply::ILLEGAL_FUNCTION.exception_code()) }
@@ -225,7 +220,6 @@ unsafe fn begin_refusal(info: *const c_void) {
 ///
 /// # Safety
 /// As for [`Serve`].
-#[inline(always)]
 unsafe fn is_answer(reply: usize, info: *const c_void) -> bool {
     if reply == Reply::NOT_HANDLED.code() {
         return false;
@@ -242,7 +236,6 @@ unsafe fn is_answer(reply: usize, info: *const c_void) -> bool {
 ///
 /// # Safety
 /// As for [`Serve`].
-#[inline(always)]
 unsafe fn refusal(info: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     Reply::exception(unsafe { refusal_field(info).read() }).code()
@@ -266,7 +259,6 @@ const _: () = {
 ///
 /// # Safety
 /// As for [`Serve`].
-#[inline(always)]
 unsafe fn call_service(service: *mut mbm_service, info: *const c_void, pdu: *mut u8) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
@@ -281,7 +273,6 @@ unsafe fn call_service(service: *mut mbm_service, info: *const c_void, pdu: *mut
 ///
 /// # Safety
 /// `unit` is a unit.
-#[inline(always)]
 unsafe fn serves(unit: *const mbm_unit) -> bool {
     // SAFETY: as the caller promises.
     unsafe {
@@ -294,7 +285,6 @@ unsafe fn serves(unit: *const mbm_unit) -> bool {
 ///
 /// # Safety
 /// `units` points to `count` units.
-#[cfg_attr(target_os = "none", inline(never))]
 pub(crate) unsafe fn have_ids(units: *const mbm_unit, count: u8) -> bool {
     // SAFETY: as the caller promises.
     (0..count).all(|index| unsafe { (*units.add(index.into())).id <= u8::MAX.into() })
@@ -305,7 +295,6 @@ pub(crate) unsafe fn have_ids(units: *const mbm_unit, count: u8) -> bool {
 /// # Safety
 /// `units` points to `count` units; `pdu` has the length and the space that `info` gives.
 #[cfg_attr(target_arch = "avr", inline(always))]
-#[cfg_attr(not(target_arch = "avr"), inline(never))]
 pub(super) unsafe fn serve(
     units: *mut mbm_unit,
     count: u8,
@@ -379,7 +368,6 @@ impl Dispatch for UnitsForFrame {
 ///
 /// # Safety
 /// As for [`Serve`].
-#[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn is_ignored_broadcast(info: *const c_void, function: u8) -> bool {
     // SAFETY: as the caller promises.
     unsafe { (*info.cast::<Indication>()).is_broadcast() && !only_writes(function) }

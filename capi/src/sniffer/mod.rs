@@ -371,7 +371,7 @@ pub unsafe extern "C" fn mbm_sniffer_next(
 
 /// [`mbm_sniffer_next`] for the case that the sniffer has to examine data. A function of
 /// its own, so that a call without an event does not save the registers that this one
-/// needs.
+/// needs. (In line, the frame of mbm_sniffer_next is too large for LLVM on an ESP32.)
 ///
 /// # Safety
 /// The object was begun with a buffer that is still valid. `event` points to an event.

@@ -113,7 +113,6 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
 
     /// Ends the requests whose time is over, and sends queued requests. Returns a request
     /// that has ended.
-    #[inline]
     fn send<J: ClientRequest, const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
@@ -263,7 +262,6 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     }
 
     /// Microseconds for which a request waits when it was sent.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn time_of(&mut self, state: &RequestState) -> u32 {
         if state.header.is_answered() {
             state.response_timeout(&mut self.storage, self.settings.response_timeout.get())

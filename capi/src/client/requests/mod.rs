@@ -38,7 +38,6 @@ type More = unsafe fn(&mut RequestFields, &[usize; 4], Status) -> Status;
 ///
 /// # Safety
 /// As the header demands.
-#[inline(always)]
 unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) -> Status {
     // SAFETY: as the caller promises.
     unsafe {
@@ -65,7 +64,6 @@ unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) ->
 /// # Safety
 /// As the header demands; [`prepare`] returned [`Status::OK`] for the request, or
 /// [`is_free`] returned true.
-#[inline(always)]
 unsafe fn submit(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -104,7 +102,6 @@ unsafe fn submit(
 ///
 /// # Safety
 /// As the header demands.
-#[cfg_attr(target_os = "none", inline(never))]
 #[allow(improper_ctypes_definitions)] // C does not call it.
 unsafe extern "C" fn queue_request(
     client: *mut mbm_client,
@@ -126,7 +123,6 @@ unsafe extern "C" fn queue_request(
 ///
 /// # Safety
 /// As the header demands.
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe extern "C" fn two_words(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -159,7 +155,6 @@ pub(crate) unsafe fn read_table(
 ///
 /// # Safety
 /// As the header demands.
-#[cfg_attr(target_os = "none", inline(never))]
 unsafe extern "C" fn code_only(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
