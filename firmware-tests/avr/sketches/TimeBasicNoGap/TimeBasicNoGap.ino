@@ -8,7 +8,7 @@ volatile uint16_t data[6];
 void setup() {
   Serial.begin(19200);
   node.begin(2, Serial);
-#if defined(MBM_H)
+#if defined(MBM_VERSION)
   node.setGap(0);
 #endif
 }

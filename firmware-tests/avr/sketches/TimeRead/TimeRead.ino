@@ -9,7 +9,7 @@ void setup() {
   DDRB |= 1;
   Serial.begin(115200);
   node.begin(1, Serial);
-#if defined(MBM_H)
+#if defined(MBM_VERSION)
   node.setBaudRate(115200);
   node.setGap(0);
 #endif
