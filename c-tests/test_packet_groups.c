@@ -129,7 +129,7 @@ static void a_device_identification_is_made_of_objects(void **state)
         {(const uint8_t *)"mbm", 3, 0}, {NULL, 0, 1}, {(const uint8_t *)"V2.11", 5, 2}};
     uint8_t storage[14], pdu[21], wanted[21];
     mbm_packet packet = {.kind = MBM_PACKET_RESPONSE,
-                         .function = MBM_FC_ENCAPSULATED_INTERFACE,
+                         .function = MBM_FC_ENCAPSULATED_INTERFACE_TRANSPORT,
                          .meiType = MBM_MEI_READ_DEVICE_IDENTIFICATION,
                          .readDeviceIdCode = MBM_DEVICE_ID_BASIC,
                          .conformity = 1};

@@ -542,7 +542,7 @@ static void objects_are_added_within_their_limits(void **state)
     static const uint8_t value[] = "value";
     uint8_t storage[246];
     mbm_packet packet = {.kind = MBM_PACKET_RESPONSE,
-                         .function = MBM_FC_ENCAPSULATED_INTERFACE,
+                         .function = MBM_FC_ENCAPSULATED_INTERFACE_TRANSPORT,
                          .meiType = MBM_MEI_READ_DEVICE_IDENTIFICATION};
     mbm_object object = {.data = value, .length = 5, .id = 0x80};
 

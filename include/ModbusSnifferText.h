@@ -35,7 +35,7 @@ inline const __FlashStringHelper *modbusFunctionText(uint8_t function)
     case MBM_FC_MASK_WRITE_REGISTER: return F(" mask write register");
     case MBM_FC_READ_WRITE_MULTIPLE_REGISTERS: return F(" read/write multiple registers");
     case MBM_FC_READ_FIFO_QUEUE: return F(" read FIFO queue");
-    case MBM_FC_ENCAPSULATED_INTERFACE: return F(" encapsulated interface transport");
+    case MBM_FC_ENCAPSULATED_INTERFACE_TRANSPORT: return F(" encapsulated interface transport");
     default: return F("");
     }
 }

@@ -1,49 +1,10 @@
-//! Function codes, and the functions that a user declares.
+//! Sub-functions and other codes of functions, and the functions that a user declares. The function
+//! codes of the header are made of the table in `src/pdu/functions.rs`.
 
 use mbm::error::Status;
 use mbm::pdu::custom::{Function, Rule};
-use mbm::pdu::functions;
 use mbm::pdu::limits::MAX_PDU;
 use mbm::pdu::{diagnostics, identification};
-
-/// Read Coils (V1.1b3, 6.1).
-pub const MBM_FC_READ_COILS: u8 = 0x01;
-/// Read Discrete Inputs (V1.1b3, 6.2).
-pub const MBM_FC_READ_DISCRETE_INPUTS: u8 = 0x02;
-/// Read Holding Registers (V1.1b3, 6.3).
-pub const MBM_FC_READ_HOLDING_REGISTERS: u8 = 0x03;
-/// Read Input Registers (V1.1b3, 6.4).
-pub const MBM_FC_READ_INPUT_REGISTERS: u8 = 0x04;
-/// Write Single Coil (V1.1b3, 6.5).
-pub const MBM_FC_WRITE_SINGLE_COIL: u8 = 0x05;
-/// Write Single Register (V1.1b3, 6.6).
-pub const MBM_FC_WRITE_SINGLE_REGISTER: u8 = 0x06;
-/// Read Exception Status (V1.1b3, 6.7).
-pub const MBM_FC_READ_EXCEPTION_STATUS: u8 = 0x07;
-/// Diagnostics (V1.1b3, 6.8).
-pub const MBM_FC_DIAGNOSTICS: u8 = 0x08;
-/// Get Comm Event Counter (V1.1b3, 6.9).
-pub const MBM_FC_GET_COMM_EVENT_COUNTER: u8 = 0x0B;
-/// Get Comm Event Log (V1.1b3, 6.10).
-pub const MBM_FC_GET_COMM_EVENT_LOG: u8 = 0x0C;
-/// Write Multiple Coils (V1.1b3, 6.11).
-pub const MBM_FC_WRITE_MULTIPLE_COILS: u8 = 0x0F;
-/// Write Multiple Registers (V1.1b3, 6.12).
-pub const MBM_FC_WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
-/// Report Server ID (V1.1b3, 6.13).
-pub const MBM_FC_REPORT_SERVER_ID: u8 = 0x11;
-/// Read File Record (V1.1b3, 6.14).
-pub const MBM_FC_READ_FILE_RECORD: u8 = 0x14;
-/// Write File Record (V1.1b3, 6.15).
-pub const MBM_FC_WRITE_FILE_RECORD: u8 = 0x15;
-/// Mask Write Register (V1.1b3, 6.16).
-pub const MBM_FC_MASK_WRITE_REGISTER: u8 = 0x16;
-/// Read/Write Multiple Registers (V1.1b3, 6.17).
-pub const MBM_FC_READ_WRITE_MULTIPLE_REGISTERS: u8 = 0x17;
-/// Read FIFO Queue (V1.1b3, 6.18).
-pub const MBM_FC_READ_FIFO_QUEUE: u8 = 0x18;
-/// Encapsulated Interface Transport (V1.1b3, 6.19).
-pub const MBM_FC_ENCAPSULATED_INTERFACE: u8 = 0x2B;
 
 /// Sub-function of 08: the device returns the data, of any number of words (V1.1b3, 6.8.1).
 pub const MBM_DIAGNOSTICS_RETURN_QUERY_DATA: u16 = 0x00;
@@ -99,25 +60,6 @@ pub const MBM_RULE_FIXED: u8 = 1;
 pub const MBM_RULE_COUNTED: u8 = 2;
 
 const _: () = {
-    assert!(MBM_FC_READ_COILS == functions::READ_COILS);
-    assert!(MBM_FC_READ_DISCRETE_INPUTS == functions::READ_DISCRETE_INPUTS);
-    assert!(MBM_FC_READ_HOLDING_REGISTERS == functions::READ_HOLDING_REGISTERS);
-    assert!(MBM_FC_READ_INPUT_REGISTERS == functions::READ_INPUT_REGISTERS);
-    assert!(MBM_FC_WRITE_SINGLE_COIL == functions::WRITE_SINGLE_COIL);
-    assert!(MBM_FC_WRITE_SINGLE_REGISTER == functions::WRITE_SINGLE_REGISTER);
-    assert!(MBM_FC_READ_EXCEPTION_STATUS == functions::READ_EXCEPTION_STATUS);
-    assert!(MBM_FC_DIAGNOSTICS == functions::DIAGNOSTICS);
-    assert!(MBM_FC_GET_COMM_EVENT_COUNTER == functions::GET_COMM_EVENT_COUNTER);
-    assert!(MBM_FC_GET_COMM_EVENT_LOG == functions::GET_COMM_EVENT_LOG);
-    assert!(MBM_FC_WRITE_MULTIPLE_COILS == functions::WRITE_MULTIPLE_COILS);
-    assert!(MBM_FC_WRITE_MULTIPLE_REGISTERS == functions::WRITE_MULTIPLE_REGISTERS);
-    assert!(MBM_FC_REPORT_SERVER_ID == functions::REPORT_SERVER_ID);
-    assert!(MBM_FC_READ_FILE_RECORD == functions::READ_FILE_RECORD);
-    assert!(MBM_FC_WRITE_FILE_RECORD == functions::WRITE_FILE_RECORD);
-    assert!(MBM_FC_MASK_WRITE_REGISTER == functions::MASK_WRITE_REGISTER);
-    assert!(MBM_FC_READ_WRITE_MULTIPLE_REGISTERS == functions::READ_WRITE_MULTIPLE_REGISTERS);
-    assert!(MBM_FC_READ_FIFO_QUEUE == functions::READ_FIFO_QUEUE);
-    assert!(MBM_FC_ENCAPSULATED_INTERFACE == functions::ENCAPSULATED_INTERFACE_TRANSPORT);
     use diagnostics::sub_function::*;
     assert!(MBM_DIAGNOSTICS_RETURN_QUERY_DATA == RETURN_QUERY_DATA);
     assert!(MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS == RESTART_COMMUNICATIONS);

@@ -17,20 +17,6 @@ extern "C" {
 
 /* ==== Functions and framings: codes, length rules; RTU, ASCII, TCP ================== */
 
-/** RTU: serial line, binary, with a CRC-16 (serial line guide V1.02, 2.5.1). */
-#define MBM_FRAMING_RTU 0u
-/** ASCII: serial line, hexadecimal characters, with an LRC (serial line guide V1.02, 2.5.2). */
-#define MBM_FRAMING_ASCII 1u
-/** TCP: the PDU follows the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3). */
-#define MBM_FRAMING_TCP 2u
-/** RTU frames in a TCP stream. */
-#define MBM_FRAMING_RTU_OVER_TCP 3u
-/** No frame: the PDU alone, for the mbm_frame functions. */
-#define MBM_FRAMING_NONE 4u
-/** The maximum length of a TCP frame, in bytes. */
-#define MBM_MAX_TCP_FRAME 260
-/** The maximum length of an ASCII frame, in characters. */
-#define MBM_MAX_ASCII_FRAME 513
 /** Read Coils (V1.1b3, 6.1). */
 #define MBM_FC_READ_COILS 1u
 /** Read Discrete Inputs (V1.1b3, 6.2). */
@@ -68,7 +54,21 @@ extern "C" {
 /** Read FIFO Queue (V1.1b3, 6.18). */
 #define MBM_FC_READ_FIFO_QUEUE 24u
 /** Encapsulated Interface Transport (V1.1b3, 6.19). */
-#define MBM_FC_ENCAPSULATED_INTERFACE 43u
+#define MBM_FC_ENCAPSULATED_INTERFACE_TRANSPORT 43u
+/** RTU: serial line, binary, with a CRC-16 (serial line guide V1.02, 2.5.1). */
+#define MBM_FRAMING_RTU 0u
+/** ASCII: serial line, hexadecimal characters, with an LRC (serial line guide V1.02, 2.5.2). */
+#define MBM_FRAMING_ASCII 1u
+/** TCP: the PDU follows the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3). */
+#define MBM_FRAMING_TCP 2u
+/** RTU frames in a TCP stream. */
+#define MBM_FRAMING_RTU_OVER_TCP 3u
+/** No frame: the PDU alone, for the mbm_frame functions. */
+#define MBM_FRAMING_NONE 4u
+/** The maximum length of a TCP frame, in bytes. */
+#define MBM_MAX_TCP_FRAME 260
+/** The maximum length of an ASCII frame, in characters. */
+#define MBM_MAX_ASCII_FRAME 513
 /** Sub-function of 08: the device returns the data, of any number of words (V1.1b3, 6.8.1). */
 #define MBM_DIAGNOSTICS_RETURN_QUERY_DATA 0u
 /** Sub-function of 08: restarts the communications port. The data FF 00 also clear the

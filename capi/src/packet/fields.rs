@@ -5,6 +5,7 @@ use crate::functions::*;
 use mbm::error::Status;
 use mbm::packet::refusal::Head;
 use mbm::pdu::files::{Reads, Records, Writes};
+use mbm::pdu::functions;
 use mbm::pdu::identification::ObjectList;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
@@ -236,58 +237,60 @@ impl mbm_packet {
     pub(crate) fn request<'a>(&self, data: &'a [u8]) -> Result<Request<'a>, Status> {
         let (function, address, quantity) = (self.function, self.address, self.quantity);
         Ok(match function {
-            MBM_FC_READ_COILS | MBM_FC_READ_DISCRETE_INPUTS => Request::ReadBits {
+            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => Request::ReadBits {
                 function,
                 address,
                 quantity,
             },
-            MBM_FC_READ_HOLDING_REGISTERS | MBM_FC_READ_INPUT_REGISTERS => Request::ReadRegisters {
-                function,
-                address,
-                quantity,
-            },
-            MBM_FC_WRITE_SINGLE_COIL => Request::WriteSingleCoil {
+            functions::READ_HOLDING_REGISTERS | functions::READ_INPUT_REGISTERS => {
+                Request::ReadRegisters {
+                    function,
+                    address,
+                    quantity,
+                }
+            }
+            functions::WRITE_SINGLE_COIL => Request::WriteSingleCoil {
                 address,
                 on: self.value != 0,
             },
-            MBM_FC_WRITE_SINGLE_REGISTER => Request::WriteSingleRegister {
+            functions::WRITE_SINGLE_REGISTER => Request::WriteSingleRegister {
                 address,
                 value: self.value,
             },
-            MBM_FC_READ_EXCEPTION_STATUS => Request::ReadExceptionStatus,
-            MBM_FC_DIAGNOSTICS => Request::Diagnostics {
+            functions::READ_EXCEPTION_STATUS => Request::ReadExceptionStatus,
+            functions::DIAGNOSTICS => Request::Diagnostics {
                 sub_function: self.subFunction,
                 data,
             },
-            MBM_FC_GET_COMM_EVENT_COUNTER => Request::GetCommEventCounter,
-            MBM_FC_GET_COMM_EVENT_LOG => Request::GetCommEventLog,
-            MBM_FC_WRITE_MULTIPLE_COILS => Request::WriteMultipleCoils {
+            functions::GET_COMM_EVENT_COUNTER => Request::GetCommEventCounter,
+            functions::GET_COMM_EVENT_LOG => Request::GetCommEventLog,
+            functions::WRITE_MULTIPLE_COILS => Request::WriteMultipleCoils {
                 address,
                 quantity,
                 data,
             },
-            MBM_FC_WRITE_MULTIPLE_REGISTERS => Request::WriteMultipleRegisters {
+            functions::WRITE_MULTIPLE_REGISTERS => Request::WriteMultipleRegisters {
                 address,
                 quantity,
                 data,
             },
-            MBM_FC_REPORT_SERVER_ID => Request::ReportServerId,
-            MBM_FC_READ_FILE_RECORD => Request::ReadFileRecord(Reads::new(data)?),
-            MBM_FC_WRITE_FILE_RECORD => Request::WriteFileRecord(Writes::new(data)?),
-            MBM_FC_MASK_WRITE_REGISTER => Request::MaskWriteRegister {
+            functions::REPORT_SERVER_ID => Request::ReportServerId,
+            functions::READ_FILE_RECORD => Request::ReadFileRecord(Reads::new(data)?),
+            functions::WRITE_FILE_RECORD => Request::WriteFileRecord(Writes::new(data)?),
+            functions::MASK_WRITE_REGISTER => Request::MaskWriteRegister {
                 address,
                 and_mask: self.andMask,
                 or_mask: self.orMask,
             },
-            MBM_FC_READ_WRITE_MULTIPLE_REGISTERS => Request::ReadWriteMultipleRegisters {
+            functions::READ_WRITE_MULTIPLE_REGISTERS => Request::ReadWriteMultipleRegisters {
                 read_address: address,
                 read_quantity: quantity,
                 write_address: self.writeAddress,
                 write_quantity: self.writeQuantity,
                 data,
             },
-            MBM_FC_READ_FIFO_QUEUE => Request::ReadFifoQueue { address },
-            MBM_FC_ENCAPSULATED_INTERFACE => match self.meiType {
+            functions::READ_FIFO_QUEUE => Request::ReadFifoQueue { address },
+            functions::ENCAPSULATED_INTERFACE_TRANSPORT => match self.meiType {
                 MBM_MEI_READ_DEVICE_IDENTIFICATION => Request::ReadDeviceIdentification {
                     code: self.readDeviceIdCode,
                     object: self.objectId,
@@ -316,61 +319,63 @@ impl mbm_packet {
         }
         let malformed = |_| Status::MALFORMED_REPLY;
         Ok(match function {
-            MBM_FC_READ_COILS | MBM_FC_READ_DISCRETE_INPUTS => {
+            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => {
                 Response::ReadBits { function, data }
             }
-            MBM_FC_READ_HOLDING_REGISTERS
-            | MBM_FC_READ_INPUT_REGISTERS
-            | MBM_FC_READ_WRITE_MULTIPLE_REGISTERS => Response::ReadRegisters { function, data },
-            MBM_FC_WRITE_SINGLE_COIL => Response::WriteSingleCoil {
+            functions::READ_HOLDING_REGISTERS
+            | functions::READ_INPUT_REGISTERS
+            | functions::READ_WRITE_MULTIPLE_REGISTERS => {
+                Response::ReadRegisters { function, data }
+            }
+            functions::WRITE_SINGLE_COIL => Response::WriteSingleCoil {
                 address,
                 on: self.value != 0,
             },
-            MBM_FC_WRITE_SINGLE_REGISTER => Response::WriteSingleRegister {
+            functions::WRITE_SINGLE_REGISTER => Response::WriteSingleRegister {
                 address,
                 value: self.value,
             },
-            MBM_FC_READ_EXCEPTION_STATUS => Response::ExceptionStatus {
+            functions::READ_EXCEPTION_STATUS => Response::ExceptionStatus {
                 outputs: self.exceptionStatus,
             },
-            MBM_FC_DIAGNOSTICS => Response::Diagnostics {
+            functions::DIAGNOSTICS => Response::Diagnostics {
                 sub_function: self.subFunction,
                 data,
             },
-            MBM_FC_GET_COMM_EVENT_COUNTER => Response::CommEventCounter {
+            functions::GET_COMM_EVENT_COUNTER => Response::CommEventCounter {
                 status: self.commStatus,
                 events: self.eventCount,
             },
-            MBM_FC_GET_COMM_EVENT_LOG => Response::CommEventLog {
+            functions::GET_COMM_EVENT_LOG => Response::CommEventLog {
                 status: self.commStatus,
                 events: self.eventCount,
                 messages: self.messageCount,
                 log: data,
             },
-            MBM_FC_WRITE_MULTIPLE_COILS | MBM_FC_WRITE_MULTIPLE_REGISTERS => {
+            functions::WRITE_MULTIPLE_COILS | functions::WRITE_MULTIPLE_REGISTERS => {
                 Response::WriteMultiple {
                     function,
                     address,
                     quantity,
                 }
             }
-            MBM_FC_REPORT_SERVER_ID => Response::ServerId {
+            functions::REPORT_SERVER_ID => Response::ServerId {
                 count: self.byteCount,
                 data,
             },
-            MBM_FC_READ_FILE_RECORD => {
+            functions::READ_FILE_RECORD => {
                 Response::ReadFileRecord(Records::new(data).map_err(malformed)?)
             }
-            MBM_FC_WRITE_FILE_RECORD => {
+            functions::WRITE_FILE_RECORD => {
                 Response::WriteFileRecord(Writes::new(data).map_err(malformed)?)
             }
-            MBM_FC_MASK_WRITE_REGISTER => Response::MaskWriteRegister {
+            functions::MASK_WRITE_REGISTER => Response::MaskWriteRegister {
                 address,
                 and_mask: self.andMask,
                 or_mask: self.orMask,
             },
-            MBM_FC_READ_FIFO_QUEUE => Response::FifoQueue { data },
-            MBM_FC_ENCAPSULATED_INTERFACE => match self.meiType {
+            functions::READ_FIFO_QUEUE => Response::FifoQueue { data },
+            functions::ENCAPSULATED_INTERFACE_TRANSPORT => match self.meiType {
                 MBM_MEI_READ_DEVICE_IDENTIFICATION => Response::DeviceIdentification {
                     code: self.readDeviceIdCode,
                     conformity: self.conformity,

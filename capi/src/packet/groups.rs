@@ -1,13 +1,12 @@
 //! Records and objects: the groups in the data of some packets.
 
 use super::{mbm_packet, side, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
-use crate::functions::{
-    MBM_FC_ENCAPSULATED_INTERFACE, MBM_FC_READ_FILE_RECORD, MBM_MEI_READ_DEVICE_IDENTIFICATION,
-};
+use crate::functions::MBM_MEI_READ_DEVICE_IDENTIFICATION;
 use crate::pointers::{array_or_empty, buffer, get, overlap, put};
 use mbm::error::Status;
 use mbm::packet::groups;
 use mbm::pdu::files::Record;
+use mbm::pdu::functions;
 
 /// Registers of a file: one group of function 14 or 15 (hex), in a request or a response.
 #[repr(C)]
@@ -130,7 +129,7 @@ pub unsafe extern "C" fn mbm_packet_nextObject(
 impl mbm_packet {
     fn has_objects(&self) -> bool {
         self.kind == MBM_PACKET_RESPONSE
-            && self.function == MBM_FC_ENCAPSULATED_INTERFACE
+            && self.function == functions::ENCAPSULATED_INTERFACE_TRANSPORT
             && self.meiType == MBM_MEI_READ_DEVICE_IDENTIFICATION
     }
 }
@@ -189,7 +188,8 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
         return Status::INVALID_ARGUMENT.code();
     };
     // A request of function 14 names the registers and has no data.
-    let reads = current.kind == MBM_PACKET_REQUEST && current.function == MBM_FC_READ_FILE_RECORD;
+    let reads =
+        current.kind == MBM_PACKET_REQUEST && current.function == functions::READ_FILE_RECORD;
     let bytes = match added.length.checked_mul(2) {
         _ if reads => 0,
         Some(bytes) => bytes,
