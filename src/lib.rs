@@ -1,5 +1,6 @@
-//! mbm: Modbus for firmware. A master, a client, a server and a sniffer, on serial lines (RTU
-//! and ASCII) and on TCP. The crate does not use a heap, never waits and never panics.
+//! mbm: Modbus for firmware. A master, a client, a plan of values to read, a server, a gateway, a
+//! sniffer and a trace, on serial lines (RTU and ASCII) and on TCP. The crate does not use a
+//! heap, never waits and never panics.
 //!
 //! You call `poll` often; each call does what can be done without waiting. Time is a clock in
 //! microseconds, which may wrap. Your firmware implements [`port::Port`] for its UART or
