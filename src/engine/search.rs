@@ -253,7 +253,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// The next byte begins a frame.
     #[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
-    #[cfg_attr(target_arch = "avr", inline(always))]
     pub(super) fn begin_frame(&mut self) {
         self.run_length = S::Count::ZERO;
         if cfg!(feature = "diagnosis") {
@@ -299,7 +298,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Skips a whole frame that is not the reply. True if it is the reply but the frame buffer
     /// cannot hold it, which ends the request.
-    #[inline(always)]
     fn skip_frame(&mut self) -> bool {
         let kind = self.run_kind;
         if kind == Outcome::MALFORMED && self.seen == Outcome::TOO_LONG {
@@ -322,7 +320,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Forgets what was seen, because it lies within another frame, and waits for the reply again.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn forget(&mut self) {
         self.is_early = false;
         self.exception = 0;
@@ -334,7 +331,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Notes a frame with a right CRC that does not answer the request.
-    #[inline(always)]
     pub(super) fn note_foreign_frame(&mut self) {
         self.foreign_frames = self.foreign_frames.wrapping_add(1);
     }
@@ -348,7 +344,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// How many bytes of the frame buffer the search uses.
-    #[inline(always)]
     pub(super) fn space(&self) -> S::Count {
         self.storage.capacity() - self.kept
     }

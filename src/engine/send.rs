@@ -42,7 +42,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Prepares the search for the reply to the request.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn begin_search(&mut self) {
         self.kept = S::Count::ZERO;
         self.awaits_end = false;
@@ -66,7 +65,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// A right reply has arrived before the request was sent. It belongs to an earlier request,
     /// so more late replies may come.
     #[cold]
-    #[inline(never)]
     pub(super) fn note_unexpected(&mut self) {
         self.exception = 0;
         if self.unit != BROADCAST {
@@ -77,7 +75,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Switches the driver on and begins to send.
-    #[inline(always)]
     pub(super) fn transmit(&mut self) -> Status {
         if self.outgoing == S::Count::ZERO {
             Q::write(self);
@@ -92,7 +89,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Writes the frame to the port, waits until the port has sent it, and keeps the driver on
     /// for the post-flush hold.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn send(&mut self) -> Status {
         if self.phase == Phase::Send {
             let left = self.outgoing - self.sent;
@@ -139,7 +135,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// The status of a request whose port does not go on.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn stalled(&mut self) -> Status {
         // As long as the request waits for its reply, after as long as it waited for silence.
         if self.is_overdue(self.since) {
@@ -151,7 +146,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Waits for the reply until the response timeout, or for the turnaround delay. A port that
     /// does not know when the last bit has left may have bytes left to send.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn wait_for_reply(&mut self) {
         self.wait = if self.phase == Phase::Turnaround {
             self.settings.turnaround_delay.get()
@@ -173,7 +167,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 impl<P, S: Storage, Q> Engine<P, S, Q> {
     /// Appends the CRC to the `length` bytes in the frame buffer, and makes them the frame to
     /// send.
-    #[inline(always)]
     pub(crate) fn append_crc(&mut self, length: S::Count) {
         let [low, high] = crc16(self.storage.slice(S::Count::ZERO, length)).to_bytes();
         self.storage.set_byte(length, low);
@@ -182,7 +175,6 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
     }
 
     /// Sets how many bytes of the frame buffer are to be sent.
-    #[inline(always)]
     pub(crate) fn set_frame_length(&mut self, length: S::Count) {
         self.outgoing = length;
         self.sent = S::Count::ZERO;

@@ -15,7 +15,6 @@ impl<const DEFAULT: u32> Setting<DEFAULT> {
     }
 
     /// The time in microseconds.
-    #[inline(always)]
     pub const fn get(self) -> u32 {
         self.0.wrapping_add(DEFAULT)
     }

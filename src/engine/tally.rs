@@ -11,7 +11,6 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
 
     /// Counts what has happened, if the engine counts: an attempt that ends with `status`; or, if
     /// that is [`Status::PENDING`], one that begins to send, or bytes that have arrived.
-    #[inline(always)]
     pub(super) fn tally(&mut self, status: Status) {
         if let Some(tally) = self.tally {
             tally(self, status);

@@ -26,13 +26,11 @@ pub trait Transaction<P, S: Storage>: Sized {
 
     /// True if the reply repeats data that are in no other request, so that no late reply can
     /// be taken for it.
-    #[inline(always)]
     fn has_unique_reply(&self) -> bool {
         false
     }
 
     /// Microseconds that the reply may take, and that the request may wait for the line.
-    #[inline(always)]
     fn response_timeout(engine: &mut Engine<P, S, Self>) -> u32 {
         engine.settings.response_timeout.get()
     }
@@ -58,7 +56,6 @@ pub trait Transaction<P, S: Storage>: Sized {
     /// For a reply whose length the request does not determine: the length of the reply's frame
     /// that ends with the last received byte, with a right CRC; 0 if there is none. `is_silent`
     /// is true if the line has been silent since.
-    #[inline(always)]
     fn ending_reply(_engine: &mut Engine<P, S, Self>, _is_silent: bool) -> S::Count
     where
         P: Port,
@@ -68,7 +65,6 @@ pub trait Transaction<P, S: Storage>: Sized {
 
     /// Searches the `received` bytes that the port has written to the frame buffer from `first`
     /// on. True if the request ends.
-    #[inline(always)]
     fn search(engine: &mut Engine<P, S, Self>, first: S::Count, received: S::Count) -> bool
     where
         P: Port,

@@ -68,7 +68,6 @@ pub enum CharacterKind {
 
 /// The meaning of `character`, which follows the character `before`. `end` is the end
 /// character of frames.
-#[inline(always)]
 pub const fn kind_of(before: u8, character: u8, end: u8) -> CharacterKind {
     if character == end && before == CARRIAGE_RETURN {
         CharacterKind::End
@@ -110,7 +109,6 @@ pub enum Decoded {
 /// Decodes the frame that fills `bytes`. Digits may be in upper or lower case. If `in_place` is
 /// true, unit, PDU and LRC are written to the front of `bytes`; a malformed frame may then be
 /// partly overwritten. If it is false, `bytes` does not change.
-#[cfg_attr(target_os = "none", inline(never))]
 pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Decoded {
     let length = match bytes {
         [START, characters @ .., CARRIAGE_RETURN, last] if *last == end => characters.len(),
@@ -190,7 +188,6 @@ pub fn emit(
 ///
 /// # Errors
 /// [`Status::BUFFER_TOO_SMALL`]; `buffer` is then unchanged.
-#[cfg_attr(target_os = "none", inline(never))]
 pub fn encode(buffer: &mut [u8], content: usize, end: u8) -> Result<usize, Status> {
     let total = 2 * (content + 1) + DELIMITERS;
     let Some(frame) = buffer.get_mut(..total) else {

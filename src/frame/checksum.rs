@@ -5,7 +5,6 @@
 const POLYNOMIAL: u16 = 0xA001;
 
 /// The CRC after one more bit, which is 0.
-#[inline(always)]
 const fn shifted(crc: u16) -> u16 {
     if crc & 1 != 0 {
         crc >> 1 ^ POLYNOMIAL
@@ -46,7 +45,6 @@ fn by_parity(crc: u16, bytes: &[u8]) -> u16 {
 }
 
 /// [`Crc16::before`], bit by bit.
-#[inline(always)]
 fn undo_by_bits(mut crc: u16, byte: u8) -> u16 {
     for _ in 0..8 {
         let odd = crc & 0x8000 != 0;
@@ -59,7 +57,6 @@ fn undo_by_bits(mut crc: u16, byte: u8) -> u16 {
 }
 
 /// [`Crc16::before`], eight bits in one step: the inverse of [`by_parity`].
-#[inline(always)]
 fn undo_by_parity(crc: u16, byte: u8) -> u16 {
     let [low, high] = crc.to_le_bytes();
     // The high byte is a Gray code of the parity and the upper seven bits of the byte that was
@@ -87,7 +84,6 @@ impl Crc16 {
     pub const RESIDUE: Crc16 = Crc16(0);
 
     /// The CRC after these `bytes` too.
-    #[cfg_attr(target_os = "none", inline(never))]
     #[must_use]
     pub fn with(self, bytes: &[u8]) -> Crc16 {
         // The table takes half a kilobyte of flash. On a host it saves 560 of the 1860 instructions
@@ -100,7 +96,6 @@ impl Crc16 {
 
     /// The inverse of [`Crc16::with`]: the CRC before `byte`, from the CRC after `byte`. (The
     /// fast way takes 40 bytes more code. Only an AVR needs it.)
-    #[inline(always)]
     #[must_use]
     pub fn before(self, byte: u8) -> Crc16 {
         if cfg!(target_arch = "avr") {
@@ -112,7 +107,6 @@ impl Crc16 {
 
     /// The weight that [`Crc16::since_start`] needs for a frame as long as `bytes`, whatever they
     /// are.
-    #[inline(always)]
     #[must_use]
     pub fn weight(bytes: &[u8]) -> Crc16 {
         // The CRC is linear, so what the bytes add is in both.

@@ -86,7 +86,6 @@ pub fn find_first(bytes: &[u8], least: usize, step: usize) -> Option<usize> {
 /// Index of the longest frame at the end of `bytes` whose CRC is right; the length of `bytes` if
 /// there is none. Goes back from the end, and undoes the CRC byte by byte: a frame begins where
 /// the CRC has its initial value. As for [`is_frame`], a frame may lack a PDU.
-#[cfg_attr(target_os = "none", inline(never))]
 pub fn find_last(bytes: &[u8]) -> usize {
     let mut crc = Crc16::RESIDUE;
     let mut start = bytes.len();

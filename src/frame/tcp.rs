@@ -49,7 +49,6 @@ pub fn header(bytes: &[u8]) -> Result<Header, Status> {
 }
 
 /// The length field for a PDU of `pdu` bytes.
-#[inline(always)]
 pub const fn length(pdu: usize) -> [u8; 2] {
     (pdu as u16 + 1).to_be_bytes()
 }

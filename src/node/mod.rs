@@ -82,7 +82,6 @@ impl Node {
 
     /// Takes the status of the request from the line, which has just been polled: a successful
     /// read fills the response words.
-    #[inline(always)]
     pub fn take<P, S: Words>(&mut self, status: Status, line: &mut Line<P, S>) -> Status
     where
         P: Port,
@@ -126,7 +125,6 @@ impl Node {
     }
 
     /// Builds the request of a function, given as [`FunctionSpec::short`]. [`Node::start`] starts it.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn build<P: Port, S: Words>(
         &mut self,
         line: &mut Line<P, S>,
@@ -144,7 +142,6 @@ impl Node {
 
     /// Starts the request that was built. `built` is the status of building it; if it is an
     /// error, nothing is sent.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn start<P: Port, S: Words>(&mut self, line: &mut Line<P, S>, built: Status) -> Status {
         self.transmit_bits = 0;
         self.response_index = 0;

@@ -84,6 +84,7 @@ fn write<P, S: Words>(engine: &mut Line<P, S>) {
 }
 
 /// Clears the bits of the last byte of data, which is at `index`, that the request does not use.
+#[inline(always)]
 fn clear_unused_bits<P, S: Words>(engine: &mut Line<P, S>, index: u8) {
     let byte = engine.storage.byte(index) & engine.request.mask();
     engine.storage.set_byte(index, byte);

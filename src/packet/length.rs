@@ -92,7 +92,6 @@ pub fn function(framing: Framing, bytes: &[u8]) -> Option<u8> {
 }
 
 /// As [`expected`], for an ASCII frame.
-#[inline(never)]
 fn expected_ascii(
     side: PduKind,
     bytes: &[u8],

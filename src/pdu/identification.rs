@@ -48,7 +48,6 @@ impl<'a> IdentificationReply<'a> {
 }
 
 /// Parses what follows the code of a response to Read Device Identification.
-#[inline(always)]
 pub(super) fn read_reply<'a>(
     code: u8,
     reader: &mut Reader<'a>,

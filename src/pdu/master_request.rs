@@ -24,7 +24,6 @@ impl FunctionSpec {
     /// The part that a [`MasterRequest`] needs, in one byte: the function code and three flags.
     /// The compiler converts each constant, which takes less flash than at run time. It must be
     /// one of the master's functions.
-    #[inline(always)]
     pub const fn short(self) -> u8 {
         let mut short = self.function();
         if self.has(RANGE) {

@@ -1,7 +1,6 @@
 //! Division for processors without: a Cortex-M0+ lacks it, and so does the client.
 
 /// Divides, rounded down.
-#[cfg_attr(target_os = "none", inline(never))]
 pub(super) fn quotient(mut dividend: u32, divisor: u32) -> u32 {
     let mut result = 0;
     for shift in (0..u32::BITS).rev() {

@@ -95,7 +95,6 @@ impl Field {
     }
 
     /// The number of bits or registers that the field takes.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub const fn length(&self) -> u32 {
         let count = self.values() as u32;
         if self.value_type == TEXT {
@@ -107,7 +106,6 @@ impl Field {
 
     /// The first bit or register on a line on which every table of every unit has its place.
     /// There are more than 65535 places between two tables.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) const fn place(&self) -> u32 {
         place(self.unit as u8, self.table, self.address)
     }
@@ -118,7 +116,6 @@ impl Field {
     }
 
     /// The place after the last bit or register.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) const fn end_place(&self) -> u32 {
         self.place().wrapping_add(self.length())
     }

@@ -76,7 +76,6 @@ struct Table<'a, L> {
 
 impl<'a, L: ReadLimits> Table<'a, L> {
     /// The field at a position of the sorted table; [`Field::NONE`] past the end.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn field(&self, position: usize) -> &'a Field {
         let position = self.positions.get(position);
         let field = position.and_then(|position| self.fields.get(position.field()));

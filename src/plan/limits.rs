@@ -75,7 +75,6 @@ pub trait ReadLimits {
     }
 
     /// The most bits or registers of one read from the table of a field.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn longest_read(&self, field: &Field) -> u32 {
         let own = self.units().iter().find(|limits| limits.unit == field.unit);
         let (most, all, own): (u16, u16, u16) = if field.is_in_bits() {
@@ -99,7 +98,6 @@ pub trait ReadLimits {
 
     /// True if an address is excluded whose place (see `Field::place`) is from `first` up to, but
     /// not including, `end`.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn excludes(&self, first: u32, end: u32) -> bool {
         self.excluded().iter().any(|range| {
             let unit = match range.unit {

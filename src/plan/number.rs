@@ -20,7 +20,6 @@ impl Words<'_> {
     ///
     /// # Errors
     /// [`Status::INVALID_ARGUMENT`] for a text.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn number(&self) -> Result<u64, Status> {
         let field = self.field;
         let (multiplier, divisor) = scale(field);

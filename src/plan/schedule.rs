@@ -68,7 +68,6 @@ impl Read {
 ///
 /// # Errors
 /// That time.
-#[cfg_attr(target_os = "none", inline(never))]
 pub fn next(reads: &[Read], now: u32) -> Result<&Read, u32> {
     let mut shortest = u32::MAX;
     let mut next = None;

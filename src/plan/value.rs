@@ -180,7 +180,6 @@ impl Words<'_> {
     /// # Errors
     /// [`Status::INVALID_ARGUMENT`] for a float or a text;
     /// [`Status::OUT_OF_RANGE`] if the result is out of range.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn integer(&self) -> Result<i64, Status> {
         let field = self.field;
         if field.value_type > INT64 {
@@ -244,7 +243,6 @@ impl Words<'_> {
 /// `magnitude` times the sum of `whole` and `part / divisor`, rounded to the nearest, halves
 /// up. `part` is less than `divisor`, and that less than 2^31. `None` only if it exceeds 2^63.
 /// (Bit by bit: firmware has no other use for a multiplication and a division of this width.)
-#[inline(always)]
 fn times(mut magnitude: u64, whole: u32, part: u32, divisor: u32) -> Option<u64> {
     let (mut product, mut rest) = (0u64, 0);
     for _ in 0..u64::BITS {

@@ -33,7 +33,6 @@ impl RequestHeader {
     }
 
     /// As [`RequestHeader::set`], with up to four words after the function code.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn set_all(&mut self, spec: FunctionSpec, words: &[usize; 4]) -> Status {
         // `map` would compile to a loop.
         let (first, second) = (words[0] as u16, words[1] as u16);
@@ -106,7 +105,6 @@ impl RequestHeader {
     }
 
     /// Adds the number of words of data to 08, after [`RequestHeader::set`].
-    #[inline(always)]
     pub fn add_words(&mut self, sub_function: u16, words: u16) -> Status {
         self.data_length = (words << 1) as u8;
         self.length = self.data_length.wrapping_add(3);
@@ -190,14 +188,12 @@ impl RequestHeader {
     }
 
     /// The two words of 2B/0E (hex).
-    #[inline(always)]
     pub fn identification(code: u8, object: u8) -> [u16; 2] {
         let mei_type = MEI_READ_DEVICE_IDENTIFICATION;
         [u16::from_be_bytes([mei_type, code]), u16::from(object) << 8]
     }
 
     /// Returns [`Status::OK`] if `code` is a read device id code.
-    #[inline(always)]
     pub fn check_code(code: u8) -> Status {
         value(matches!(code, 1..=4))
     }

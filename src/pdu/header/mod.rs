@@ -205,7 +205,6 @@ impl RequestHeader {
     /// determine the length, the least possible length; `None` if no response to this request
     /// begins with `pdu`. If only the end of the frame determines the length, `whole`; for 11
     /// (hex) the counted length if that is greater.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn expected(&self, pdu: &[u8], whole: usize) -> Option<NonZeroU8> {
         let length = match pdu {
             [] => 2,
@@ -263,7 +262,6 @@ impl RequestHeader {
     /// The status of a complete response, which has the length
     /// [`RequestHeader::expected`]: [`Status::OK`], an exception, or
     /// [`Status::MALFORMED_REPLY`]. `byte` returns a byte of the data that were sent.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn validate(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
         if let [function, code, ..] = pdu {
             if function & EXCEPTION != 0 {
@@ -294,7 +292,6 @@ impl RequestHeader {
 
     /// True if the first `count` bytes of `pdu` are those of the request. `pdu` has at least
     /// that many.
-    #[inline(always)]
     fn is_repeated(&self, pdu: &[u8], count: usize, byte: &impl Fn(usize) -> u8) -> bool {
         for (index, theirs) in pdu.get(..count).unwrap_or_default().iter().enumerate() {
             if *theirs != self.byte_at(index, byte) {
