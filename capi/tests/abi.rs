@@ -1,6 +1,7 @@
 //! Sizes, offsets and constants are the same in C and in Rust. The test compiles and runs a C
 //! program that includes `mbm.h`, and compares what it prints with the values in Rust.
 
+use mbm::pdu::functions;
 use mbm_c::*;
 use std::fs;
 use std::mem::{align_of, offset_of, size_of};
@@ -180,19 +181,24 @@ fn sizes_offsets_and_constants_agree_with_c() {
     }
 }
 
-#[test]
-fn the_probes_include_every_constant_of_the_header() {
+/// The constants of the header that are numbers.
+fn constants() -> Vec<(String, u64)> {
     let parts = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/include/mbm")).unwrap();
     let header: String = parts
         .map(|part| std::fs::read_to_string(part.unwrap().path()).unwrap())
         .collect();
-    let defined: Vec<_> = header
-        .lines()
-        .filter_map(|line| line.strip_prefix("#define MBM_"))
-        .filter_map(|rest| rest.split_once(' '))
-        .filter(|(_, value)| value.trim().trim_end_matches('u').parse::<u64>().is_ok())
-        .map(|(name, _)| format!("MBM_{name}"))
-        .collect();
+    let defined = header.lines().filter_map(|line| {
+        let (name, value) = line.strip_prefix("#define ")?.split_once(' ')?;
+        let value = value.trim().trim_end_matches('u').parse().ok()?;
+        name.starts_with("MBM_").then(|| (name.to_string(), value))
+    });
+    defined.collect()
+}
+
+#[test]
+fn the_probes_include_every_constant_of_the_header() {
+    let mut defined: Vec<_> = constants().into_iter().map(|(name, _)| name).collect();
+    defined.retain(|name| !name.starts_with("MBM_FC_"));
     let mut probed: Vec<_> = probes().into_iter().map(|(name, _)| name).collect();
     probed.retain(|name| name.starts_with("MBM_"));
     for name in &defined {
@@ -202,6 +208,20 @@ fn the_probes_include_every_constant_of_the_header() {
         );
     }
     assert_eq!(defined.len(), probed.len());
+}
+
+#[test]
+fn the_function_codes_of_the_header_are_those_of_the_table() {
+    let mut defined = constants();
+    defined.retain(|(name, _)| name.starts_with("MBM_FC_"));
+    assert_eq!(defined.len(), functions::CODES.len());
+    for (name, code) in defined {
+        let code = u8::try_from(code).unwrap();
+        let words = functions::name(code)
+            .to_uppercase()
+            .replace([' ', '/'], "_");
+        assert_eq!(name, format!("MBM_FC_{words}"));
+    }
 }
 
 #[test]
