@@ -105,8 +105,8 @@ impl Crc16 {
         }
     }
 
-    /// The weight that [`Crc16::since_start`] needs for a frame as long as `bytes`, whatever they
-    /// are.
+    /// The weight of a frame that is as long as `bytes`, for [`Crc16::since_start`]. It depends on
+    /// the length alone.
     #[must_use]
     pub fn weight(bytes: &[u8]) -> Crc16 {
         // The CRC is linear, so what the bytes add is in both.

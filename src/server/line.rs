@@ -9,7 +9,7 @@ use super::{Indication, Reply, Units};
 use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
-use crate::frame::{ascii, tcp, Framing};
+use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::Rule;
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
@@ -266,8 +266,10 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             }
             end = start + received as usize;
             self.end = end as u16;
-            // The CRC is computed for framings without one too: that is less code.
-            self.crc = self.crc.with(self.storage.part(start, end));
+            // Only RTU frames have a CRC.
+            if usize::from(self.request.head) == rtu::PDU {
+                self.crc = self.crc.with(self.storage.part(start, end));
+            }
         }
         received
     }
