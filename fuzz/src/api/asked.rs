@@ -65,11 +65,10 @@ pub fn request(w: &World, client: *mut mbm_client) {
     let words = |count: u16| 2 * usize::from(count);
     let bytes = match choice {
         10 => usize::from(b).div_ceil(8),
-        11 | 21 | 24 => words(if choice == 11 { b } else { c }),
+        11 | 21 => words(if choice == 11 { b } else { c }),
         13 => words(d),
         15 => words(b),
-        22 | 23 => a.into(),
-        25 | 26 => b.into(),
+        23 => b.into(),
         _ => 0,
     };
     let rule: *const mbm_rule = if w.rarely(16) { null() } else { w.put(rule(w)) };
