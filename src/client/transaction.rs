@@ -143,7 +143,8 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
     where
         P: Port,
     {
-        let mut length = engine.end() - engine.content;
+        // The buffer may be larger than any frame.
+        let mut length = (engine.end() - engine.content).min(rtu::MAX_FRAME as u16);
         while length > rtu::MIN_FRAME.into() {
             if engine.would_end(length, is_silent)
                 && engine.ends_with(length, engine.request.function)
