@@ -84,12 +84,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Begins with Modbus TCP frames.
     pub fn begin_tcp(&mut self) {
         let space = tcp_space(self.storage.frame().len());
-        self.begin(
-            tcp::PDU as u8,
-            space,
-            Self::receive_tcp,
-            |server, length| server.encode_tcp(length),
-        );
+        self.begin(tcp::PDU as u8, space, Self::receive_tcp, Self::encode_tcp);
         self.read_ahead = 0;
         self.set_silence(0);
     }
@@ -153,13 +148,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             self.sent = 0;
         }
         is_rtu
-    }
-
-    /// True if the discarding of the echo is on.
-    pub fn discards_echo(&self) -> bool {
-        let after_echo: Receive<P, B> = Self::receive_after_echo;
-        let is_on = |receive| core::ptr::fn_addr_eq(receive, after_echo);
-        self.receive.is_some_and(is_on)
     }
 
     /// As [`Server::receive_rtu`], but first drops the echo of the server's own response. Stops
@@ -394,8 +382,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.read_ahead = 0;
     }
 
-    #[inline(always)]
-    pub(super) fn encode_tcp(&mut self, length: usize) -> usize {
+    fn encode_tcp(&mut self, length: usize) -> usize {
         if let [high, low] = self.storage.part(4, 6) {
             [*high, *low] = tcp::length(length);
         }
