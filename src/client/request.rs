@@ -164,17 +164,10 @@ pub(super) fn is_answer(ended: Status) -> bool {
 /// Stores the data of the complete response `pdu` in the request.
 pub(super) fn store_response<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
     let at = usize::from(request.state().header.data_at());
-    match pdu.get(at..) {
-        Some(data) if at > 0 => store_data(request, data),
-        _ => Status::OK,
-    }
-}
-
-/// Stores the data of a response in the request.
-pub(super) fn store_data<J: ClientRequest>(request: &mut J, data: &[u8]) -> Status {
-    if !request.wants_data() {
-        return Status::OK;
-    }
+    let data = match pdu.get(at..) {
+        Some(data) if at > 0 && request.wants_data() => data,
+        _ => return Status::OK,
+    };
     let state = request.state_mut();
     if data.len() > usize::from(state.capacity) {
         return Status::BUFFER_TOO_SMALL;

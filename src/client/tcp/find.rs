@@ -100,7 +100,6 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     }
 
     /// Skips the received bytes of a frame that is finished with.
-    #[cold]
     fn skip_frame(&mut self) {
         let skipped = self.skip.min(self.end - self.start);
         self.start += skipped;

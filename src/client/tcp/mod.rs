@@ -372,7 +372,6 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
 }
 
 /// Writes the frame of any request to the start of `place`, and returns its length.
-#[cold]
 fn write_frame<J: ClientRequest>(
     request: &J,
     place: &mut [u8],
