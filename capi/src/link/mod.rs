@@ -12,7 +12,7 @@ use core::ffi::c_void;
 use mbm::client::{Backoff, LinkEvent, LinkState};
 use mbm::error::Status;
 use mbm::time::timeout;
-use object::{report, Object, KIND};
+use object::{report, Object};
 
 /// mbm_link_state: there is no link. The client opens it when the wait is over.
 pub const MBM_LINK_IS_DOWN: u8 = 1;
@@ -132,10 +132,10 @@ unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHo
 fn linked(transport: &TransportKind, client: *mut mbm_client) -> LinkedKind {
     LinkedKind {
         kind: TransportKind {
-            advance: KIND.advance,
+            advance: object::advance,
             ..*transport
         },
-        delay: KIND.delay,
+        delay: object::delay,
         client,
     }
 }

@@ -162,20 +162,15 @@ unsafe fn count(link: *mut Object, counter: fn(&mut mbm_linkCounters) -> &mut u3
     }
 }
 
-/// The functions of a client that has a link.
-pub(super) const KIND: LinkedFunctions = LinkedFunctions { advance, delay };
-
-/// See [`KIND`].
-pub(super) struct LinkedFunctions {
-    pub(super) advance: client::Advance,
-    pub(super) delay: unsafe fn(*mut client::Object, now: u32, delay: u32) -> u32,
-}
-
 /// Advances link and client.
 ///
 /// # Safety
 /// As for [`client::Advance`].
-unsafe fn advance(object: *mut client::Object, now: u32, fresh: bool) -> Option<RequestPtr> {
+pub(super) unsafe fn advance(
+    object: *mut client::Object,
+    now: u32,
+    fresh: bool,
+) -> Option<RequestPtr> {
     // SAFETY: as the caller promises. `done` of a request may have ended the link during this
     // poll of the client.
     unsafe {
@@ -311,7 +306,7 @@ pub(super) unsafe extern "C" fn report(context: *mut c_void, _: *mut mbm_clientR
 ///
 /// # Safety
 /// As for [`advance`]; `object` has a link.
-unsafe fn delay(object: *mut client::Object, now: u32, delay: u32) -> u32 {
+pub(super) unsafe fn delay(object: *mut client::Object, now: u32, delay: u32) -> u32 {
     // SAFETY: as the caller promises.
     unsafe {
         let link = (*object).kind.cast::<Object>();
