@@ -1,5 +1,6 @@
 //! Times and options of requests.
 
+use crate::error::Status;
 use crate::time::{self, millis, DEFAULT_SILENCE};
 
 /// A time in microseconds with a default. It stores the difference from the default, so zeroed
@@ -17,6 +18,27 @@ impl<const DEFAULT: u32> Setting<DEFAULT> {
     /// The time in microseconds.
     pub const fn get(self) -> u32 {
         self.0.wrapping_add(DEFAULT)
+    }
+
+    /// Sets a timeout in milliseconds. Returns [`Status::INVALID_ARGUMENT`], with nothing
+    /// changed, above 1 000 000.
+    #[inline(always)]
+    pub fn set_timeout(&mut self, milliseconds: u32) -> Status {
+        let Some(timeout) = time::timeout(milliseconds) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        *self = Setting::new(timeout);
+        Status::OK
+    }
+
+    /// Sets a delay in milliseconds. Returns [`Status::INVALID_ARGUMENT`], with nothing
+    /// changed, above 65 535.
+    pub fn set_delay(&mut self, milliseconds: u32) -> Status {
+        let Ok(delay) = u16::try_from(milliseconds) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        *self = Setting::new(millis(delay));
+        Status::OK
     }
 }
 
@@ -94,6 +116,20 @@ mod tests {
         assert_eq!(settings.gap.get(), time::LONGEST);
         settings.set_gap(7);
         assert_eq!(settings.gap.get(), 7);
+    }
+
+    #[test]
+    fn a_refused_time_changes_nothing() {
+        let mut settings = Settings::DEFAULT;
+        let response_timeout = &mut settings.response_timeout;
+        assert_eq!(response_timeout.set_timeout(1_000_000), Status::OK);
+        let refused = response_timeout.set_timeout(1_000_001);
+        assert_eq!(refused, Status::INVALID_ARGUMENT);
+        assert_eq!(response_timeout.get(), 1_000_000_000);
+        let quiet_time = &mut settings.quiet_time;
+        assert_eq!(quiet_time.set_delay(65_535), Status::OK);
+        assert_eq!(quiet_time.set_delay(65_536), Status::INVALID_ARGUMENT);
+        assert_eq!(quiet_time.get(), 65_535_000);
     }
 
     #[test]

@@ -8,9 +8,8 @@ use crate::framing::MBM_FRAMING_TCP;
 use crate::pointers;
 use crate::storage::mbm_counters;
 use mbm::client::RequestQueue;
-use mbm::engine::{Setting, Settings};
+use mbm::engine::Settings;
 use mbm::error::Status;
-use mbm::time::{millis, timeout};
 
 /// The parts of a client that the settings change.
 pub(super) struct Parts<'a> {
@@ -70,11 +69,7 @@ pub unsafe extern "C" fn mbm_client_setResponseTimeout(
     timeoutMs: u32,
 ) -> u8 {
     set(client, |parts| {
-        let Some(timeout) = timeout(timeoutMs) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        parts.settings.response_timeout = Setting::new(timeout);
-        Status::OK
+        parts.settings.response_timeout.set_timeout(timeoutMs)
     })
 }
 
@@ -121,11 +116,7 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
     delayMs: u32,
 ) -> u8 {
     set(client, |parts| {
-        let Ok(delay) = u16::try_from(delayMs) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        parts.settings.turnaround_delay = Setting::new(millis(delay));
-        Status::OK
+        parts.settings.turnaround_delay.set_delay(delayMs)
     })
 }
 
@@ -142,13 +133,7 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietMs: u32) -> u8 {
-    set(client, |parts| {
-        let Ok(quiet) = u16::try_from(quietMs) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        parts.settings.quiet_time = Setting::new(millis(quiet));
-        Status::OK
-    })
+    set(client, |parts| parts.settings.quiet_time.set_delay(quietMs))
 }
 
 /// Switches echo discarding on or off. Switch it on if the receiver also receives what the

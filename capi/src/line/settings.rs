@@ -3,10 +3,8 @@
 use super::{mbm_line, with_hooks};
 use crate::pointers::{check, with};
 use crate::storage::mbm_counters;
-use mbm::engine::Setting;
 use mbm::error::Status;
 use mbm::port::Port;
-use mbm::time::millis;
 
 /// Sets the baud rate from which the master computes the gap before a request (t3.5, serial
 /// line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure the
@@ -48,11 +46,7 @@ pub unsafe extern "C" fn mbm_line_setGap(line: *mut mbm_line, gapUs: u32) -> u8 
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setTurnaroundDelay(line: *mut mbm_line, delayMs: u32) -> u8 {
     with(line, |line| {
-        let Ok(delay) = u16::try_from(delayMs) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        line.settings.turnaround_delay = Setting::new(millis(delay));
-        Status::OK
+        line.settings.turnaround_delay.set_delay(delayMs)
     })
 }
 
@@ -84,13 +78,7 @@ pub unsafe extern "C" fn mbm_line_setTurnaroundDelay(line: *mut mbm_line, delayM
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setQuietTime(line: *mut mbm_line, quietMs: u32) -> u8 {
-    with(line, |line| {
-        let Ok(quiet) = u16::try_from(quietMs) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        line.settings.quiet_time = Setting::new(millis(quiet));
-        Status::OK
-    })
+    with(line, |line| line.settings.quiet_time.set_delay(quietMs))
 }
 
 /// Sets how often the master repeats a request whose reply is missing, damaged or malformed.

@@ -3,9 +3,7 @@
 use super::mbm_node;
 use crate::line::Core;
 use crate::pointers::{read, with};
-use mbm::engine::Setting;
 use mbm::error::Status;
-use mbm::time::timeout;
 
 /// Sets the unit to which the master sends later requests.
 ///
@@ -39,11 +37,7 @@ pub unsafe extern "C" fn mbm_node_getSlaveID(node: *const mbm_node) -> u8 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeoutMs: u32) -> u8 {
     with(node, |node| {
-        let Some(timeout) = timeout(timeoutMs) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        node.words.response_timeout = Setting::new(timeout);
-        Status::OK
+        node.words.response_timeout.set_timeout(timeoutMs)
     })
 }
 
