@@ -123,8 +123,8 @@ uint8_t mbm_link_reconnect(struct mbm_link *link);
  * @param link        the object
  * @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
  *                    mbm_client_setBackoff
- * @param delayMs     the first wait in milliseconds, 0 to 65535; the default is 500
- * @param maxDelayMs  the longest wait in milliseconds, 0 to 65535; the default is 30000
+ * @param delayMs     the first wait in milliseconds, 0 to 1000000; the default is 500
+ * @param maxDelayMs  the longest wait in milliseconds, 0 to 1000000; the default is 30000
  * @return a status
  */
 uint8_t mbm_link_setBackoff(struct mbm_link *link,

@@ -20,6 +20,7 @@ pub use link::*;
 pub use object::mbm_client;
 pub(crate) use poll::clock;
 pub use poll::*;
+pub(crate) use repeat::set_backoff;
 pub use repeat::*;
 pub use reply::*;
 pub use request::mbm_clientRequest;

@@ -126,15 +126,20 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
     maxDelayMs: u32,
 ) -> u8 {
     set(client, |parts| {
-        let Some(backoff) = Backoff::from_code(backoff) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        let (Some(wait), Some(most)) = (timeout(delayMs), timeout(maxDelayMs)) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        parts.queue.policy.set_backoff(backoff, wait, most);
-        Status::OK
+        set_backoff(&mut parts.queue.policy, backoff, delayMs, maxDelayMs)
     })
+}
+
+/// Sets the waits of `policy`, with the arguments of [`mbm_client_setBackoff`].
+pub(crate) fn set_backoff(policy: &mut Policy, backoff: u8, delay_ms: u32, most_ms: u32) -> Status {
+    let Some(backoff) = Backoff::from_code(backoff) else {
+        return Status::INVALID_ARGUMENT;
+    };
+    let (Some(wait), Some(most)) = (timeout(delay_ms), timeout(most_ms)) else {
+        return Status::INVALID_ARGUMENT;
+    };
+    policy.set_backoff(backoff, wait, most);
+    Status::OK
 }
 
 /// Shortens each wait before a repetition by a random part, so that several clients do not

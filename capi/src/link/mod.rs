@@ -6,10 +6,10 @@ mod port;
 pub use object::{mbm_link, mbm_linkCounters};
 
 use crate::client::object::{self as client, LinkedKind, TransportKind};
-use crate::client::{mbm_client, mbm_linkHooks};
+use crate::client::{mbm_client, mbm_linkHooks, set_backoff};
 use crate::pointers::{self, CObject as _};
 use core::ffi::c_void;
-use mbm::client::{Backoff, LinkEvent, LinkState};
+use mbm::client::{LinkEvent, LinkState};
 use mbm::error::Status;
 use mbm::time::timeout;
 use object::{report, Object};
@@ -213,8 +213,8 @@ pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
 /// @param link        the object
 /// @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
 ///                    mbm_client_setBackoff
-/// @param delayMs     the first wait in milliseconds, 0 to 65535; the default is 500
-/// @param maxDelayMs  the longest wait in milliseconds, 0 to 65535; the default is 30000
+/// @param delayMs     the first wait in milliseconds, 0 to 1000000; the default is 500
+/// @param maxDelayMs  the longest wait in milliseconds, 0 to 1000000; the default is 30000
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setBackoff(
@@ -224,14 +224,8 @@ pub unsafe extern "C" fn mbm_link_setBackoff(
     maxDelayMs: u32,
 ) -> u8 {
     pointers::with(link, |object| {
-        let Some(backoff) = Backoff::from_code(backoff) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        let (Some(wait), Some(most)) = (timeout(delayMs), timeout(maxDelayMs)) else {
-            return Status::INVALID_ARGUMENT;
-        };
-        (*object).core.policy.set_backoff(backoff, wait, most);
-        Status::OK
+        let policy = &mut (*object).core.policy;
+        set_backoff(policy, backoff, delayMs, maxDelayMs)
     })
 }
 
