@@ -6,8 +6,7 @@ mod transaction;
 
 use crate::engine::{Engine, Words, BROADCAST};
 use crate::error::Status;
-use crate::pdu::functions;
-use crate::pdu::functions::FunctionSpec;
+use crate::pdu::functions::{coil_value, FunctionSpec};
 use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
 
@@ -173,7 +172,7 @@ impl Node {
         address: u16,
         on: u16,
     ) -> Status {
-        let value = if on == 0 { 0 } else { functions::COIL_ON };
+        let value = coil_value(on != 0);
         let function = FunctionSpec::WRITE_SINGLE_COIL.short();
         self.request(line, address, value, function)
     }

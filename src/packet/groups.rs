@@ -5,8 +5,7 @@ use super::PduKind;
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 use crate::pdu::files::{Reads, Record, Records, Writes, REFERENCE_TYPE};
-use crate::pdu::functions::READ_FILE_RECORD;
-use crate::pdu::functions::WRITE_FILE_RECORD;
+use crate::pdu::functions::{READ_FILE_RECORD, WRITE_FILE_RECORD};
 
 /// No record number: the responses of 14 contain only data.
 const NO_RECORD: Record = Record {

@@ -1,7 +1,7 @@
 //! Functions that read and write parts of requests and responses. An error is the exception that a
 //! server answers to such a request; [`super::response`] converts it to the error of a response.
 
-use super::functions::{self, COIL_ON};
+use super::functions::{self, coil_value, COIL_ON};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 
@@ -48,6 +48,13 @@ pub(super) fn check_end_and_range(
     }
 }
 
+/// Reads the address and the quantity of a range, with which the PDU ends.
+pub(super) fn last_range(reader: &mut Reader, most: u16) -> Result<(u16, u16), Status> {
+    let (address, quantity) = (word(reader)?, word(reader)?);
+    check_end_and_range(reader, address, quantity, most)?;
+    Ok((address, quantity))
+}
+
 /// Checks that the PDU ends here.
 pub(super) fn expect_end(reader: &Reader) -> Result<(), Status> {
     if reader.is_empty() {
@@ -75,7 +82,7 @@ pub(super) fn is_on(value: u16) -> Result<bool, Status> {
     }
 }
 
-/// Bytes of the data of so many bits.
+/// The number of data bytes that `quantity` bits take.
 pub(super) const fn byte_count(quantity: u16) -> u8 {
     quantity.div_ceil(8) as u8
 }
@@ -84,7 +91,7 @@ pub(super) const fn byte_count(quantity: u16) -> u8 {
 pub(super) fn emit_write_single_coil(writer: &mut Writer, address: u16, on: bool) {
     writer.u8(functions::WRITE_SINGLE_COIL);
     writer.u16(address);
-    writer.u16(if on { COIL_ON } else { 0 });
+    writer.u16(coil_value(on));
 }
 
 /// Writes a request or response of 16 (hex).

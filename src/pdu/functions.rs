@@ -161,6 +161,15 @@ functions! {
 /// The value that switches a single coil on in a request of 05; 0 switches it off (clause 6.5).
 pub const COIL_ON: u16 = 0xFF00;
 
+/// The value in a request of 05 that switches a coil on or off.
+pub const fn coil_value(on: bool) -> u16 {
+    if on {
+        COIL_ON
+    } else {
+        0
+    }
+}
+
 /// How the request and the response of a function are composed: flags and small numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]

@@ -5,7 +5,8 @@ use super::custom;
 use super::diagnostics::{sub_function, sub_function_and_data};
 use super::fields::{
     byte, byte_count, check_end_and_range, check_within, counted, emit_diagnostics,
-    emit_encapsulated, emit_mask_write_register, emit_write_single_coil, expect_end, is_on, word,
+    emit_encapsulated, emit_mask_write_register, emit_write_single_coil, expect_end, is_on,
+    last_range, word,
 };
 use super::files::{Reads, Writes};
 use super::functions;
@@ -325,8 +326,7 @@ impl<'a> Request<'a> {
 }
 
 fn read_bits<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
-    let (address, quantity) = (word(reader)?, word(reader)?);
-    check_end_and_range(reader, address, quantity, MAX_READ_BITS)?;
+    let (address, quantity) = last_range(reader, MAX_READ_BITS)?;
     Ok(Request::ReadBits {
         function,
         address,
@@ -355,8 +355,7 @@ fn write_multiple_coils<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Stat
 }
 
 fn read_registers<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
-    let (address, quantity) = (word(reader)?, word(reader)?);
-    check_end_and_range(reader, address, quantity, MAX_READ_REGISTERS)?;
+    let (address, quantity) = last_range(reader, MAX_READ_REGISTERS)?;
     Ok(Request::ReadRegisters {
         function,
         address,

@@ -3,8 +3,8 @@
 
 use super::diagnostics::{sub_function, sub_function_and_data};
 use super::fields::{
-    byte, byte_count, check_end_and_range, counted, emit_diagnostics, emit_encapsulated,
-    emit_mask_write_register, emit_write_single_coil, is_on, word,
+    byte, byte_count, counted, emit_diagnostics, emit_encapsulated, emit_mask_write_register,
+    emit_write_single_coil, is_on, last_range, word,
 };
 use super::files::{Records, Writes};
 use super::identification::{read_reply, ObjectList, MEI_READ_DEVICE_IDENTIFICATION, MORE};
@@ -327,15 +327,10 @@ fn parse_exception<'a>(function: u8, reader: &mut Reader) -> Result<Response<'a>
 
 fn read_bits<'a>(function: u8, reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
     let data = counted(reader)?;
-    if !is_bits(data) {
+    if data.is_empty() || data.len() > usize::from(byte_count(MAX_READ_BITS)) {
         return Err(Status::MALFORMED_REPLY);
     }
     Ok(Response::ReadBits { function, data })
-}
-
-/// True if the response to a read can have this number of data bytes.
-fn is_bits(data: &[u8]) -> bool {
-    !data.is_empty() && data.len() <= usize::from(byte_count(MAX_READ_BITS))
 }
 
 fn write_single_coil<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
@@ -346,16 +341,11 @@ fn write_single_coil<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
 
 fn read_registers<'a>(function: u8, reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
     let data = counted(reader)?;
-    if !is_registers(data) {
+    let most = 2 * usize::from(MAX_READ_REGISTERS);
+    if data.is_empty() || data.len() > most || !data.len().is_multiple_of(2) {
         return Err(Status::MALFORMED_REPLY);
     }
     Ok(Response::ReadRegisters { function, data })
-}
-
-/// True if the response to a read can have this number of data bytes.
-fn is_registers(data: &[u8]) -> bool {
-    let most = 2 * usize::from(MAX_READ_REGISTERS);
-    !data.is_empty() && data.len() <= most && data.len().is_multiple_of(2)
 }
 
 fn write_single_register<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
@@ -371,8 +361,7 @@ fn write_multiple<'a>(
     most: u16,
     reader: &mut Reader,
 ) -> Result<Response<'a>, Status> {
-    let (address, quantity) = (word(reader)?, word(reader)?);
-    check_end_and_range(reader, address, quantity, most)?;
+    let (address, quantity) = last_range(reader, most)?;
     Ok(Response::WriteMultiple {
         function,
         address,

@@ -7,6 +7,7 @@ use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp};
 use crate::pdu::custom::Function;
+use crate::pdu::functions::DIAGNOSTICS;
 use crate::pdu::length::{self, Length};
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
@@ -324,7 +325,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         let frame = self.storage.frame();
         let unit = frame.first().copied().unwrap_or(0);
         // Sub-function 03 of function 08 changes the end character, from this response on.
-        if let Some(&[_, 0x08, 0, 3, character, 0]) = frame.first_chunk() {
+        if let Some(&[_, DIAGNOSTICS, 0, 3, character, 0]) = frame.first_chunk() {
             self.delimiter = character;
         }
         let frame = self.storage.frame();

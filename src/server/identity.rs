@@ -1,8 +1,9 @@
 //! Functions 07, 11 and 2B/0E: exception status, server id, device identification.
 
 use super::Reply;
-use crate::pdu::functions::ENCAPSULATED_INTERFACE_TRANSPORT;
-use crate::pdu::functions::{READ_EXCEPTION_STATUS, REPORT_SERVER_ID};
+use crate::pdu::functions::{
+    ENCAPSULATED_INTERFACE_TRANSPORT, READ_EXCEPTION_STATUS, REPORT_SERVER_ID,
+};
 use crate::pdu::identification::{
     BASIC, EXTENDED, INDIVIDUAL, MEI_READ_DEVICE_IDENTIFICATION, REGULAR,
 };

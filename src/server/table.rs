@@ -5,8 +5,9 @@
 //! carried out completely or not at all.
 
 use super::Reply;
-use crate::pdu::functions::{MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS};
-use crate::pdu::functions::{WRITE_MULTIPLE_COILS, WRITE_SINGLE_COIL};
+use crate::pdu::functions::{
+    MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS, WRITE_MULTIPLE_COILS, WRITE_SINGLE_COIL,
+};
 use crate::pdu::limits::{
     MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,

@@ -3,7 +3,7 @@
 use super::{two_words, with_more};
 use crate::client::{mbm_client, mbm_clientRequest};
 use mbm::error::Status;
-use mbm::pdu::functions::FunctionSpec;
+use mbm::pdu::functions::{coil_value, FunctionSpec};
 
 /// Function 01: reads coils into the bytes of `reply`, eight in each byte. The first coil is
 /// the lowest bit; the last byte is padded with zeros (V1.1b3, 6.1).
@@ -123,7 +123,7 @@ pub unsafe extern "C" fn mbm_client_writeSingleCoil(
         client,
         request,
         address,
-        if on == 0 { 0 } else { 0xFF00 },
+        coil_value(on != 0),
         FunctionSpec::WRITE_SINGLE_COIL,
     )
 }
