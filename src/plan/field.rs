@@ -1,7 +1,5 @@
 //! A field of the table, and what is wrong with it.
 
-use crate::data::order::Order;
-
 /// The tables of the data model (V1.1b3, 4.3). Each number is the function that reads it.
 pub const COILS: u8 = 1;
 /// The discrete inputs.
@@ -45,7 +43,8 @@ pub struct Field {
     pub table: u8,
     /// [`BIT`] to [`TEXT`].
     pub value_type: u8,
-    /// The order of the bytes: 0 and 1 for [`Order::Abcd`], 2 to 4 for the orders that follow.
+    /// The order of the bytes: 0 and 1 for [`Abcd`](crate::data::order::Order::Abcd), 2 to 4 for
+    /// the orders that follow.
     pub order: u8,
     /// The first bit or register, 0 to 65535, as on the wire.
     pub address: u16,
@@ -133,17 +132,6 @@ impl Field {
     /// True if the values are integers with a sign.
     pub const fn is_signed(&self) -> bool {
         self.is_integer() && self.value_type % 2 == INT16 % 2
-    }
-
-    /// The order of the bytes, if the field names one.
-    pub const fn byte_order(&self) -> Option<Order> {
-        match self.order {
-            0 | 1 => Some(Order::Abcd),
-            2 => Some(Order::Cdab),
-            3 => Some(Order::Badc),
-            4 => Some(Order::Dcba),
-            _ => None,
-        }
     }
 }
 
