@@ -10,7 +10,7 @@ SANITIZED_ARCHIVE := $(BUILD)/sanitized/libmbm.a
 RUST_SANITIZERS := --cfg mbm_reads_single_bytes -Zsanitizer=address -Cdebug-assertions -Coverflow-checks -Copt-level=1 -Cdebuginfo=line-tables-only
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
-INCLUDES := -Iinclude -Iexamples/linux -Ic-tests/support -Ic-tests/shim
+INCLUDES := -Iinclude -Iports/linux -Iexamples/linux -Ic-tests/support -Ic-tests/shim
 CFLAGS := -std=c11 -O1 -g
 CXXFLAGS := -std=c++11 -O1 -g
 MODBUS = $(shell pkg-config --cflags libmodbus)
@@ -18,9 +18,9 @@ LIBS := -Wl,--gc-sections -lmodbus -lcmocka -lpthread
 SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
 
 # Only programs with TLS link the TLS library.
-TLS := $(wildcard examples/linux/mbm_tls*.c) $(wildcard c-tests/support/tls_*.c)
+TLS := $(wildcard ports/linux/mbm_tls*.c) $(wildcard c-tests/support/tls_*.c)
 TLS_LIBS := -lmbedtls -lmbedx509 -lmbedcrypto
-SUPPORT := $(filter-out $(TLS),$(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c))
+SUPPORT := $(filter-out $(TLS),$(wildcard c-tests/support/*.c) $(wildcard ports/linux/mbm_*.c))
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 TLS_TESTS := $(filter test_tls%,$(TESTS))
@@ -30,9 +30,9 @@ TESTED_EXAMPLES := custom_command gateway guarded_server
 TRACE = $(patsubst %,$(BUILD)/$(1)/linux/%.o,trace_options pcap_file)
 # The files that clang-format formats. The headers in include/ are documentation too, and are
 # formatted by hand.
-C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'firmware-tests/*.[ch]' \
+C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'ports/*.[ch]' 'firmware-tests/*.[ch]' \
     'packaging/*.[ch]')
-HEADERS := $(wildcard include/*.h include/mbm/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
+HEADERS := $(wildcard include/*.h include/mbm/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* ports/linux/*.h examples/linux/*.h)
 
 .PHONY: help
 help: ## List the targets
@@ -225,9 +225,12 @@ $(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
 $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
-$(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
+$(BUILD)/$(1)/%.o: ports/%.c $(HEADERS)
+	@mkdir -p $$(@D)
+	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+$(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
 	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
-$(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
+$(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_mqtt_payload: $(BUILD)/$(1)/linux/mqtt_payload.o
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))

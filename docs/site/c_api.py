@@ -73,7 +73,7 @@ def of_part(part, text, compounds):
 
 
 def ports(compounds):
-    """A section for each header of examples/linux."""
+    """A section for each header of ports/linux."""
     made = []
     for file in compounds:
         if file.kind == "file" and "/linux/mbm_" in file.file and file.file.endswith(".h"):

@@ -8,8 +8,8 @@ VARIANTS = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) variants)
 QEMU_TESTS := $(patsubst firmware-tests/qemu/%.c,$(BUILD)/firmware/%,$(wildcard firmware-tests/qemu/test_*.c))
 QEMU_SOURCES := $(filter-out firmware-tests/qemu/test_%,$(wildcard firmware-tests/qemu/*.c)) \
                 $(patsubst %,c-tests/support/%.c,pty server model request)
-QEMU_FLAGS = $(CFLAGS) $(WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal $(MODBUS)
-$(QEMU_TESTS): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h examples/baremetal/*.h include/mbm/*.h)
+QEMU_FLAGS = $(CFLAGS) $(WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal -Iports/baremetal $(MODBUS)
+$(QEMU_TESTS): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h examples/baremetal/*.h ports/baremetal/*.h include/mbm/*.h)
 	@mkdir -p $(@D)
 	@gcc $(QEMU_FLAGS) $< $(QEMU_SOURCES) \
 		-lmodbus -lcmocka -lpthread -o $@

@@ -1,5 +1,5 @@
 /* Reads holding register 100 of unit 17, 2400 baud, 8N1. The board's functions are those of
- * examples/baremetal/board.h in the SDK.
+ * ports/baremetal/board.h in the SDK.
  * Licence: MIT OR Apache-2.0. */
 #include "board.h"
 #include "mbm.h"
