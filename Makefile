@@ -49,6 +49,13 @@ $(ARCHIVE):
 $(SANITIZED_ARCHIVE):
 	@CARGO="$(CARGO)" scripts/build/archive --host $@ $(RUST_SANITIZERS)
 
+# The library for Linux: the archive with the ports of ports/linux, and libmbm-tls.a.
+LIBRARY := $(BUILD)/linux/libmbm.a
+.PHONY: linux
+linux: $(ARCHIVE) ## Build the library for Linux on this machine with its ports, build/linux
+	@scripts/build/ports $(ARCHIVE) $(dir $(LIBRARY))
+	@echo "linux: $(LIBRARY), and for TLS libmbm-tls.a"
+
 MCUS := $(shell scripts/build/archive --list)
 .PHONY: archives
 archives: ## Build the archives for microcontrollers, build/archives and build/minimal
@@ -57,7 +64,7 @@ archives: ## Build the archives for microcontrollers, build/archives and build/m
 	@scripts/check/stack >build/stack.txt && tail -n 1 build/stack.txt
 
 .PHONY: install
-install: $(ARCHIVE) ## Install library, header, ports, pkg-config and CMake files below PREFIX
+install: linux ## Install the library with its ports, and files for pkg-config and CMake, below PREFIX
 	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/build/install
 
 .PHONY: check-install
@@ -407,8 +414,10 @@ AARCH64_LIBRARIES := $(AARCH64_ROOT)/usr/lib/$(AARCH64)
 $(AARCH64_ARCHIVE):
 	@scripts/need binutils-aarch64-linux-gnu
 	+@CARGO="$(CARGO)" MBM_MACHINE=$(AARCH64) scripts/build/archive --host $@
-archive-aarch64: $(AARCH64_ARCHIVE) ## Build the archive for 64-bit Arm Linux, build/machines/aarch64-linux-gnu/libmbm.a
-	@echo "archive-aarch64: $(AARCH64_ARCHIVE)"
+archive-aarch64: $(AARCH64_ARCHIVE) ## Build the library with its ports for 64-bit Arm Linux, build/machines/aarch64-linux-gnu/linux
+	@scripts/need gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+	@MBM_MACHINE=$(AARCH64) scripts/build/ports $(AARCH64_ARCHIVE) $(AARCH64_FOLDER)/linux
+	@echo "archive-aarch64: $(AARCH64_FOLDER)/linux/libmbm.a"
 
 $(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_ROOT)/usr/include \
     -L$(AARCH64_LIBRARIES) -Wl$(comma)-rpath$(comma)$(CURDIR)/$(AARCH64_LIBRARIES),$(AARCH64_ARCHIVE)))

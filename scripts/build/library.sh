@@ -1,14 +1,9 @@
 # The files of the library for C, its templates, and tarballs. scripts/build/install and packaging/*/pack
 # source this file in the top folder.
 
-# The ports for Linux, and the port inside TLS, which needs a library and so has its own folder.
-LINUX_PORTS="mbm_tty.h mbm_tty.c mbm_tcp.h mbm_tcp.c mbm_tcp_listener.c mbm_tcp_set.c mbm_call.h mbm_call.c
-    mbm_udp.h mbm_udp.c"
-TLS_PORTS="mbm_tls.h mbm_tls_linux.h mbm_tls.c mbm_tls_identity.c mbm_tls_linux.c mbm_tls_listener.c mbm_tls_text.c"
-
 # fill TEMPLATE OUTPUT: replaces the placeholders of a template by these variables of the shell:
 #   prefix          the folder of the library, as pkg-config sees it
-#   lib ports tls   folders below prefix
+#   lib             the folder of the library, below prefix
 #   up              the relative path from the folder of the CMake files to prefix
 #   pointer         the bytes of a pointer in the library
 fill() {
@@ -18,9 +13,7 @@ fill() {
     minor=${minor%%.*}
     install -d "$(dirname "$2")"
     sed -e "s|@PREFIX@|$prefix|g" -e "s|@INCLUDEDIR@|\${prefix}/include|g" \
-        -e "s|@LIBDIR@|\${prefix}/$lib|g" -e "s|@PORTSDIR@|\${prefix}/$ports|g" \
-        -e "s|@TLSDIR@|\${prefix}/$tls|g" -e "s|@TLS@|$tls|g" \
-        -e "s|@LIB@|$lib|g" -e "s|@INCLUDE@|include|g" -e "s|@PORTS@|$ports|g" -e "s|@UP@|$up|g" \
+        -e "s|@LIBDIR@|\${prefix}/$lib|g" -e "s|@LIB@|$lib|g" -e "s|@INCLUDE@|include|g" -e "s|@UP@|$up|g" \
         -e "s|@VERSION@|$version|g" -e "s|@MAJOR@|$major|g" -e "s|@MINOR@|$minor|g" \
         -e "s|@POINTER@|$pointer|g" "$1" >"$2"
     chmod 644 "$2"

@@ -115,7 +115,7 @@ pictures: ## Draw the pictures and charts of the pages, docs/pictures, and write
 # The programs that the commands in the pages run.
 PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(KEEP_LINK) $(UDP) $(SNIFF) $(CLIENTS) $(SERVE)
 .PHONY: check-pages
-check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
+check-pages: linux ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
 	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev openssl \
 		gcc-avr avr-libc arduino-core-avr \
 		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi gcc-aarch64-linux-gnu libc6-dev-arm64-cross) \
