@@ -25,7 +25,10 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 TLS_TESTS := $(filter test_tls%,$(TESTS))
 # Examples that the test of the same name runs.
-TESTED_EXAMPLES := custom_command gateway guarded_server
+TESTED_EXAMPLES := custom_server gateway guarded_server
+# The short programs of examples/linux. Each is one file over the ports.
+EXAMPLES := basic custom_client custom_server guarded_server keep_link udp
+PORTS := $(patsubst ports/%.c,%,$(filter-out $(TLS),$(wildcard ports/linux/mbm_*.c)))
 # The options --trace and --pcap of the examples for Linux.
 TRACE = $(patsubst %,$(BUILD)/$(1)/linux/%.o,trace_options pcap_file)
 # The files that clang-format formats. The headers in include/ are documentation too, and are
@@ -240,10 +243,13 @@ $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(pa
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_mqtt_payload: $(BUILD)/$(1)/linux/mqtt_payload.o
-$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
+$(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
+	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
+$(BUILD)/$(1)/linux/gateway: %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(BUILD)/$(1)/linux/gateway: $(BUILD)/$(1)/linux/gateway_line.o
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
+$(BUILD)/$(1)/test_custom_server: | $(BUILD)/$(1)/linux/custom_client
 $(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage $(BUILD)/$(1)/test_gateway_tcp: | $(BUILD)/$(1)/linux/gateway
 endef
 $(eval $(call variant,plain,gcc,g++,))
@@ -298,8 +304,6 @@ SECURE := $(BUILD)/plain/linux/secure
 $(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure mbm_tls mbm_tls_identity mbm_tls_linux mbm_tls_listener mbm_tls_text mbm_tcp mbm_tcp_listener) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections $(TLS_LIBS) -o $@
 UDP := $(BUILD)/plain/linux/udp
-$(UDP): $(patsubst %,$(BUILD)/plain/linux/%.o,udp mbm_udp) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: secure
 secure: ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
@@ -322,22 +326,16 @@ udp: ## Build and check the example over UDP, build/plain/linux/udp
 DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
-$(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 SNIFF := $(BUILD)/plain/linux/sniff
 $(SNIFF): $(patsubst %,$(BUILD)/plain/%.o,linux/sniff linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
-KEEP_LINK := $(BUILD)/plain/linux/keep_link
-$(KEEP_LINK): $(patsubst %,$(BUILD)/plain/%.o,linux/keep_link linux/mbm_tcp linux/mbm_tcp_listener) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
-
 .PHONY: keep-link
-keep-link: ## Build and run the example of a client whose link opens itself again
-	@scripts/need gcc libc6-dev
-	@$(MAKE) --no-print-directory $(KEEP_LINK)
-	@$(KEEP_LINK)
+keep-link: ## Show a client whose connection opens itself again, while a libmodbus server goes and comes back
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
+	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/keep_link $(PEERS)
+	@scripts/check/examples keep_link $(BUILD)/plain
 
 .PHONY: sniff
 sniff: ## Build and check the example that watches a bus, build/plain/linux/sniff
@@ -393,12 +391,6 @@ mqtt: ## Show and check the bridge to MQTT on a libmodbus server and a mosquitto
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3 libmosquitto-dev libcjson-dev mosquitto mosquitto-clients openssl
 	@$(MAKE) --no-print-directory $(MQTT) $(PEERS)
 	@scripts/check/mqtt $(BUILD)/plain
-
-.PHONY: guarded
-guarded: ## Show a server that refreshes registers at each read and refuses one of two clients
-	@scripts/need gcc libc6-dev
-	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/guarded_server
-	@$(BUILD)/plain/linux/guarded_server
 
 # The tests in C as programs for AArch64, run by QEMU's user mode. The machine stays as it is: the
 # libraries for AArch64 are unpacked below build.

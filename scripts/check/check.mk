@@ -3,8 +3,8 @@
 
 # The programs whose sources clang-tidy reads, and the machines of examples/baremetal whose
 # processor Debian's clang 14 knows.
-TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(UDP) $(SERVE) $(PEERS) $(MQTT) $(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) \
-                $(CLIENTS) $(DEMO) $(SNIFF) $(KEEP_LINK) $(BUILD)/plain/linux/basic $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
+TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(SERVE) $(PEERS) $(MQTT) $(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) \
+                $(CLIENTS) $(DEMO) $(SNIFF) $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
                 $(BENCH) $(BENCH_CLIENT) $(BENCH_SERVER) $(BENCH_SNIFFER)
 TIDY_MACHINES = $(filter-out lx106 dc233c,$(MACHINES)) $(VARIANTS)
 # Not the sketches that use an AVR's own registers or libraries.
@@ -113,7 +113,7 @@ pictures: ## Draw the pictures and charts of the pages, docs/pictures, and write
 	@scripts/build/pictures
 
 # The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(KEEP_LINK) $(UDP) $(SNIFF) $(CLIENTS) $(SERVE)
+PAGE_PROGRAMS := $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(BUILD)/plain/linux/gateway $(SNIFF) $(CLIENTS) $(SERVE)
 .PHONY: check-pages
 check-pages: linux ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
 	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev openssl \

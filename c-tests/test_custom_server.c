@@ -1,0 +1,138 @@
+/* The examples custom_server and custom_client, and frames that only a faulty client sends. */
+#define _GNU_SOURCE
+#include "program.h"
+#include "test.h"
+
+#include <arpa/inet.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+static program server;
+static char service[16], output[4096];
+
+static int start_server(void **state)
+{
+    const char *const any[] = {"0", NULL};
+
+    (void)state;
+    program_start(&server, "custom_server", any);
+    program_line(&server, output, sizeof output);
+    return sscanf(output, "ready %15s", service) != 1;
+}
+
+static int stop_server(void **state)
+{
+    (void)state;
+    kill(server.pid, SIGTERM);
+    (void)program_end(&server);
+    return 0;
+}
+
+/* Runs the client. Keeps what it prints, and returns its exit code. */
+static int run(const char *address, const char *second, const char *third)
+{
+    const char *const arguments[] = {"127.0.0.1", service, address, second, third, NULL};
+    program client;
+
+    program_start(&client, "custom_client", arguments);
+    program_rest(&client, output, sizeof output);
+    return program_end(&client);
+}
+
+/* Sends a PDU, given in hexadecimal, and returns the PDU of the response in the same form. */
+static const char *exchange(const char *request)
+{
+    static char response[64];
+    struct sockaddr_in address = {.sin_family = AF_INET,
+                                  .sin_port = htons((uint16_t)atoi(service)),
+                                  .sin_addr = {.s_addr = htonl(INADDR_LOOPBACK)}};
+    uint8_t frame[64] = {0, 1, 0, 0, 0, 0, 1};
+    const int fd = socket(AF_INET, SOCK_STREAM, 0);
+    size_t length = 7, i;
+    ssize_t received;
+
+    for (; *request; request += request[2] ? 3 : 2)
+        frame[length++] = (uint8_t)strtoul((const char[]){request[0], request[1], 0}, NULL, 16);
+    frame[5] = (uint8_t)(length - 6);
+    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
+    assert_int_equal(send(fd, frame, length, 0), length);
+    received = recv(fd, frame, sizeof frame, 0);
+    close(fd);
+    assert_true(received > 7);
+    for (i = 7; i < (size_t)received; i++)
+        sprintf(response + 3 * (i - 7), "%02X ", frame[i]);
+    response[3 * (i - 7) - 1] = 0;
+    return response;
+}
+
+static void a_written_register_is_read_back(void **state)
+{
+    (void)state;
+    assert_int_equal(run("2", "=", "4660"), 0);
+    assert_string_equal(output, "written\n");
+    assert_int_equal(run("1", "3", NULL), 0);
+    assert_string_equal(output, "0\n4660\n0\n");
+}
+
+static void the_tenth_register_is_the_last(void **state)
+{
+    (void)state;
+    assert_int_equal(run("9", "1", NULL), 0);
+    assert_int_equal(run("9", "2", NULL), 1);
+    assert_int_equal(run("65535", "2", NULL), 1);
+    assert_int_equal(run("10", "=", "1"), 1);
+    assert_string_equal(exchange("41 00 09 00 02"), "C1 02");
+    assert_string_equal(exchange("42 00 09 00 02 04 00 01 00 02"), "C2 02");
+}
+
+static void wrong_lengths_return_03_and_change_nothing(void **state)
+{
+    static const char *const wrong[] = {"42 00 00 00 01 03 00 01 02", "42 00 00 00 02 02 00 01",
+                                        "42 00 00 00 01 02 00", "42 00 00 00 00 00"};
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < sizeof wrong / sizeof *wrong; i++)
+        assert_string_equal(exchange(wrong[i]), "C2 03");
+    assert_string_equal(exchange("41 00 00 00"), "C1 03");
+    assert_string_equal(exchange("41"), "C1 03");
+    assert_string_equal(exchange("41 00 00 00 00"), "C1 03");
+    assert_string_equal(exchange("41 00 00 00 02"), "41 00 00 04 00 00 00 00");
+}
+
+static void the_frames_are_those_of_the_two_functions(void **state)
+{
+    (void)state;
+    assert_string_equal(exchange("42 00 03 00 02 04 12 34 AB CD"), "42 00 03 00 02");
+    assert_string_equal(exchange("41 00 03 00 02"), "41 00 03 04 12 34 AB CD");
+    assert_string_equal(exchange("43 01"), "C3 01");
+    assert_string_equal(exchange("03 00 00 00 01"), "83 01");
+}
+
+static void arguments_that_are_missing_print_the_usage(void **state)
+{
+    (void)state;
+    assert_int_equal(run(NULL, NULL, NULL), 2);
+    assert_int_equal(run("1", NULL, NULL), 2);
+    assert_int_equal(run("1", "2", "3"), 2);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(a_written_register_is_read_back, start_server, stop_server),
+        cmocka_unit_test_setup_teardown(the_tenth_register_is_the_last, start_server, stop_server),
+        cmocka_unit_test_setup_teardown(wrong_lengths_return_03_and_change_nothing, start_server,
+                                        stop_server),
+        cmocka_unit_test_setup_teardown(the_frames_are_those_of_the_two_functions, start_server,
+                                        stop_server),
+        cmocka_unit_test_setup_teardown(arguments_that_are_missing_print_the_usage, start_server,
+                                        stop_server),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
