@@ -59,9 +59,19 @@ static void a_wrong_field_is_named(void **state)
     field->count = 63;
     refuses(MBM_ILLEGAL_DATA_VALUE, 1);
     field->count = 1;
-    d.fields[0].address = 21;
-    refuses(MBM_FIELDS_OVERLAP, 1);
-    d.fields[0].address = 0;
+    field->bit = 1; /* of a number */
+    refuses(MBM_INVALID_ARGUMENT, 1);
+    field->type = MBM_TYPE_BIT;
+    field->bit = 16;
+    refuses(MBM_INVALID_ARGUMENT, 1);
+    field->bit = 9;
+    field->count = 8;
+    refuses(MBM_INVALID_ARGUMENT, 1);
+    *field = (mbm_planField){.unit = 1,
+                             .table = HOLDING,
+                             .type = MBM_TYPE_UINT32,
+                             .address = 20,
+                             .intervalMs = field->intervalMs};
     d.setup.readCount = 1;
     refuses(MBM_BUFFER_TOO_SMALL, 1);
     d.setup.readCount = 2;

@@ -163,6 +163,69 @@ static void a_number_is_scaled_and_rounded_to_the_nearest(void **state)
     }
 }
 
+static void bits_of_a_register_are_one_number_in_every_order(void **state)
+{
+    static const struct {
+        uint8_t bit;
+        uint16_t count, value;
+    } parts[] = {{0, 0, 1},   {0, 1, 1},    {15, 1, 1},      {4, 1, 0},      {0, 4, 0x5},
+                 {4, 4, 0xC}, {8, 8, 0xA3}, {3, 13, 0x1478}, {0, 16, 0xA3C5}};
+    uint8_t order;
+    unsigned i;
+
+    (void)state;
+    for (order = MBM_ORDER_ABCD; order <= MBM_ORDER_DCBA; order++) {
+        plan_device_begin(&d, 0);
+        put(7, 0xA3C5, 1, order);
+        for (i = 0; i < COUNT(parts); i++) {
+            mbm_planField *field = plan_device_add(&d, 1, HOLDING, MBM_TYPE_BIT, 7, 1000);
+
+            field->order = order;
+            field->bit = parts[i].bit;
+            field->count = parts[i].count;
+        }
+        d.fields[COUNT(parts) - 1].multiplier = -2;
+        read_all();
+        assert_int_equal(d.requested, 1);
+        assert_int_equal(d.log[0].quantity, 1);
+        for (i = 0; i < COUNT(parts); i++) {
+            int64_t value = i + 1 < COUNT(parts) ? parts[i].value : -2 * parts[i].value;
+            int32_t small;
+            double number;
+
+            assert_true(plan_device_integer(&d, (uint16_t)i, 0) == value);
+            OK(mbm_plan_getInt32(&d.plan, (uint16_t)i, 0, &small));
+            assert_true(small == value);
+            OK(mbm_plan_getNumber(&d.plan, (uint16_t)i, 0, &number));
+            assert_true(number == (double)value);
+            assert_int_equal(mbm_plan_getInt32(&d.plan, (uint16_t)i, 1, &small),
+                             MBM_INVALID_ARGUMENT);
+        }
+    }
+}
+
+static void fields_that_overlap_have_their_own_values_from_one_read(void **state)
+{
+    mbm_planField *half;
+
+    (void)state;
+    put(10, 0x12345678, 2, MBM_ORDER_ABCD);
+    add(MBM_TYPE_UINT32, 10);
+    add(MBM_TYPE_UINT16, 10);
+    half = add(MBM_TYPE_UINT16, 11);
+    half->divisor = 2;
+    add(MBM_TYPE_UINT16, 11);
+    read_all();
+    assert_int_equal(d.requested, 1);
+    assert_int_equal(d.log[0].quantity, 2);
+    assert_true(plan_device_integer(&d, 0, 0) == 0x12345678);
+    assert_true(plan_device_integer(&d, 1, 0) == 0x1234);
+    assert_true(plan_device_integer(&d, 2, 0) == 0x5678 / 2);
+    assert_true(plan_device_integer(&d, 3, 0) == 0x5678);
+    assert_int_equal(plan_device_updates(&d, 0), 1);
+    assert_int_equal(plan_device_updates(&d, 3), 1);
+}
+
 static void a_number_beyond_32_bits_is_too_large_for_int32(void **state)
 {
     static const struct {
@@ -410,6 +473,8 @@ int main(void)
         cmocka_unit_test(integers_have_their_sign_in_every_order),
         cmocka_unit_test(floats_and_doubles_are_numbers_too),
         cmocka_unit_test_setup(a_number_is_scaled_and_rounded_to_the_nearest, rtu),
+        cmocka_unit_test_setup(bits_of_a_register_are_one_number_in_every_order, rtu),
+        cmocka_unit_test_setup(fields_that_overlap_have_their_own_values_from_one_read, rtu),
         cmocka_unit_test_setup(a_number_beyond_32_bits_is_too_large_for_int32, rtu),
         cmocka_unit_test_setup(a_scaled_number_is_the_nearest_double, rtu),
         cmocka_unit_test_setup(a_number_beyond_64_bits_is_too_large, rtu),

@@ -81,8 +81,6 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
         return F("another pending request has this transaction id");
     case MBM_NOT_PENDING:
         return F("the request is not pending");
-    case MBM_FIELDS_OVERLAP:
-        return F("two fields of the plan overlap");
     case MBM_NO_PROGRESS:
         return F("the device repeats itself without an end");
     case MBM_OUT_OF_RANGE:

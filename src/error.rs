@@ -68,8 +68,6 @@ impl Status {
     pub const DUPLICATE_TRANSACTION: Status = Status(0xF1);
     /// The request is not pending: it has ended, or was never queued.
     pub const NOT_PENDING: Status = Status(0xF2);
-    /// Two fields of a plan share an address of one unit and table.
-    pub const FIELDS_OVERLAP: Status = Status(0xF3);
     /// A device says that more follows, but what it sends or names does not come next.
     pub const NO_PROGRESS: Status = Status(0xF4);
     /// A value does not fit into the type that the caller asked for.

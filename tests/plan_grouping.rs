@@ -3,7 +3,9 @@
 #[path = "common/plan.rs"]
 mod plan;
 
-use mbm::plan::field::{BIT, COILS, DISCRETE_INPUTS, HOLDING_REGISTERS, INPUT_REGISTERS};
+use mbm::plan::field::{
+    BIT, COILS, DISCRETE_INPUTS, HOLDING_REGISTERS, INPUT_REGISTERS, TEXT, UINT32,
+};
 use mbm::plan::{ExcludedRange, Field, Limits, UnitLimits};
 use plan::{field, grouped, plain, LIMITS};
 
@@ -12,6 +14,50 @@ fn neighbours_are_one_read() {
     let fields = [field(12), field(10), field(11)];
     let reads = grouped(&fields, &LIMITS).expect("a plan");
     assert_eq!(plain(&reads), [(10, 3)]);
+}
+
+#[test]
+fn fields_that_overlap_are_read_once() {
+    let wide = |address| Field {
+        value_type: UINT32,
+        ..field(address)
+    };
+    // A value and its words, two names of one register, and two values that share a register.
+    let fields = [field(11), wide(10), field(10), field(11), wide(11)];
+    let reads = grouped(&fields, &LIMITS).expect("a plan");
+    assert_eq!(plain(&reads), [(10, 3)]);
+    // Another interval is another read.
+    let slow = Field {
+        interval_ms: 5000,
+        ..field(10)
+    };
+    let reads = grouped(&[wide(10), slow], &LIMITS).expect("a plan");
+    assert_eq!(plain(&reads), [(10, 2), (10, 1)]);
+}
+
+#[test]
+fn fields_that_overlap_are_parted_if_one_read_cannot_hold_them() {
+    let text = |address, count| Field {
+        value_type: TEXT,
+        count,
+        ..field(address)
+    };
+    let fields = [text(0, 200), text(50, 200), field(120), field(60)];
+    let reads = grouped(&fields, &LIMITS).expect("a plan");
+    assert_eq!(plain(&reads), [(0, 100), (50, 100)]);
+}
+
+#[test]
+fn many_fields_of_one_register_are_one_read() {
+    let fields: Vec<_> = (0..16_000)
+        .map(|number| Field {
+            value_type: BIT,
+            bit: (number % 16) as u8,
+            ..field(7)
+        })
+        .collect();
+    let reads = grouped(&fields, &LIMITS).expect("a plan");
+    assert_eq!(plain(&reads), [(7, 1)]);
 }
 
 #[test]

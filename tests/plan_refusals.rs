@@ -22,13 +22,15 @@ fn a_wrong_field_is_refused_with_its_index() {
         change(&mut field);
         [self::field(0), self::field(50), field]
     };
-    let invalid: [fn(&mut Field); 10] = [
+    let invalid: [fn(&mut Field); 12] = [
         |field| field.table = 0,
         |field| field.table = 5,
         |field| field.value_type = 0,
         |field| field.value_type = 11,
-        |field| field.value_type = BIT,
         |field| field.table = COILS,
+        |field| field.bit = 1,
+        |field| (field.value_type, field.bit) = (BIT, 16),
+        |field| (field.value_type, field.bit, field.count) = (BIT, 9, 8),
         |field| field.order = 5,
         |field| field.interval_ms = 0,
         |field| field.divisor = -1,
@@ -59,37 +61,6 @@ fn a_field_at_the_last_address_is_allowed() {
         plain(&grouped(&[last], &LIMITS).expect("a plan")),
         [(65534, 2)]
     );
-}
-
-#[test]
-fn fields_that_overlap_are_refused_with_the_greater_index() {
-    let wide = Field {
-        value_type: UINT32,
-        ..field(9)
-    };
-    refused(
-        Status::FIELDS_OVERLAP,
-        1,
-        &[field(10), wide, field(20)],
-        &LIMITS,
-    );
-    refused(
-        Status::FIELDS_OVERLAP,
-        2,
-        &[wide, field(20), field(10)],
-        &LIMITS,
-    );
-    // Other intervals do not change that, another unit does.
-    let slow = Field {
-        interval_ms: 1,
-        ..field(10)
-    };
-    refused(Status::FIELDS_OVERLAP, 1, &[wide, slow], &LIMITS);
-    let other = Field {
-        unit: 2,
-        ..field(10)
-    };
-    assert_eq!(grouped(&[wide, other], &LIMITS).expect("a plan").len(), 2);
 }
 
 #[test]

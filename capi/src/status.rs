@@ -91,8 +91,6 @@ pub const MBM_QUEUE_FULL: u8 = 0xF0;
 pub const MBM_DUPLICATE_TRANSACTION: u8 = 0xF1;
 /// The request has ended already, or was never queued on this client.
 pub const MBM_NOT_PENDING: u8 = 0xF2;
-/// Two fields of a plan share an address of one unit and table.
-pub const MBM_FIELDS_OVERLAP: u8 = 0xF3;
 /// The device says that more objects of its identification follow, but it sends none, names
 /// an object that is not after those that it has sent, or then sends one before the one that
 /// it named. Reading on might never end.
@@ -133,7 +131,6 @@ statuses! {
     MBM_QUEUE_FULL = Status::QUEUE_FULL, c"the queue is full";
     MBM_DUPLICATE_TRANSACTION = Status::DUPLICATE_TRANSACTION, c"another pending request has this transaction id";
     MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
-    MBM_FIELDS_OVERLAP = Status::FIELDS_OVERLAP, c"two fields of the plan overlap";
     MBM_NO_PROGRESS = Status::NO_PROGRESS, c"the device repeats itself without an end";
     MBM_OUT_OF_RANGE = Status::OUT_OF_RANGE, c"the value is out of the range of its type";
     MBM_CONNECT_TIMED_OUT = Status::CONNECT_TIMED_OUT, c"the connection was not made in time";

@@ -133,8 +133,6 @@ const char *mbm_version(void);
 #define MBM_DUPLICATE_TRANSACTION 241u
 /** The request has ended already, or was never queued on this client. */
 #define MBM_NOT_PENDING 242u
-/** Two fields of a plan share an address of one unit and table. */
-#define MBM_FIELDS_OVERLAP 243u
 /** The device says that more objects of its identification follow, but it sends none, names
  *  an object that is not after those that it has sent, or then sends one before the one that
  *  it named. Reading on might never end. */

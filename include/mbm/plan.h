@@ -80,13 +80,18 @@ typedef struct mbm_planField {
     uint16_t unit;
     /** One of MBM_TABLE_... */
     uint8_t table;
-    /** One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, another for registers. */
+    /** One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, each for registers.
+     *  MBM_TYPE_BIT of a register is `count` of its bits from `bit` on, as one number. */
     uint8_t type;
     /** One of MBM_ORDER_...; MBM_ORDER_DEFAULT is MBM_ORDER_ABCD. */
     uint8_t order;
+    /** For MBM_TYPE_BIT in a table of registers: the lowest bit, 0 (the least significant) to 15.
+     *  Otherwise 0. */
+    uint8_t bit;
     /** The first bit or register, 0 to 65535, as on the wire. */
     uint16_t address;
-    /** The number of values; of a text the number of characters. 0 means 1. */
+    /** The number of values; of a text the number of characters, of bits of a register that of
+     *  these bits. 0 means 1. */
     uint16_t count;
     /** The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL. */
     uint32_t intervalMs;
@@ -214,8 +219,8 @@ typedef struct mbm_planReadInfo {
 /**
  * Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
  *
- * Fields with the same unit, table and interval are read together. Of all ways to cover them
- * within the limits, the plan takes one with the fewest reads, and of these one with the fewest
+ * Fields with the same unit, table and interval are read together, and may overlap: what
+ * several of them share is read once. Of all ways to cover them within the limits, the plan takes one with the fewest reads, and of these one with the fewest
  * bits or registers. All reads are due at once; the rounds after the first are spread, so that
  * reads of one interval follow each other at equal distances.
  *
@@ -230,14 +235,14 @@ typedef struct mbm_planReadInfo {
  * @param setup   table, limits and storage; it stays valid and as it is until the plan ends
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
  * @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or
- *         order, a type that the table does not have, a unit above 255, an interval out of
- *         range, a negative divisor or a scale of a text; MBM_BROADCAST_NOT_ALLOWED for unit 0;
- *         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range;
- *         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be; MBM_FIELDS_OVERLAP for the
- *         later of two that share an address; MBM_BUFFER_TOO_SMALL for the first without
- *         storage for its read or its data. After such a status the plan has ended, and
- *         `positions` and `reads` may be changed. MBM_INVALID_ARGUMENT also for a unit above
- *         255 of limits or of an excluded range
+ *         order, a type that the table does not have, bits beyond those of a register, a unit
+ *         above 255, an interval out of range, a negative divisor or a scale of a text;
+ *         MBM_BROADCAST_NOT_ALLOWED for unit 0; MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
+ *         address 65535 or into an excluded range; MBM_ILLEGAL_DATA_VALUE if it is longer than a
+ *         read may be; MBM_BUFFER_TOO_SMALL for the first without storage for its read or its
+ *         data. After such a status the plan has ended, and `positions` and `reads` may be
+ *         changed. MBM_INVALID_ARGUMENT also for a unit above 255 of limits or of an excluded
+ *         range
  */
 uint8_t mbm_plan_begin(struct mbm_plan *plan,
                        struct mbm_client *client,

@@ -9,7 +9,7 @@ pub const HOLDING_REGISTERS: u8 = 3;
 /// The input registers.
 pub const INPUT_REGISTERS: u8 = 4;
 
-/// The types of a value: a coil or a discrete input.
+/// The types of a value: a coil or a discrete input, or bits of one register.
 pub const BIT: u8 = 1;
 /// One register.
 pub const UINT16: u8 = 2;
@@ -46,6 +46,9 @@ pub struct Field {
     /// The order of the bytes: 0 and 1 for [`Abcd`](crate::data::order::Order::Abcd), 2 to 4 for
     /// the orders that follow.
     pub order: u8,
+    /// For [`BIT`] in a table of registers: the lowest of `count` bits of the register, which are
+    /// one number; 0 is the least significant. Otherwise 0.
+    pub bit: u8,
     /// The first bit or register, 0 to 65535, as on the wire.
     pub address: u16,
     /// The number of values, of a text the number of characters; 0 means 1.
@@ -65,6 +68,7 @@ impl Field {
         table: 0,
         value_type: 0,
         order: 0,
+        bit: 0,
         address: 0,
         count: 0,
         interval_ms: 0,
@@ -72,12 +76,35 @@ impl Field {
         divisor: 0,
     };
 
-    /// The number of values, at least 1.
-    pub const fn values(&self) -> u16 {
+    /// The number of values, of a text of characters, of bits of a register of these; at least 1.
+    pub const fn count(&self) -> u16 {
         if self.count == 0 {
             1
         } else {
             self.count
+        }
+    }
+
+    /// True if it is bits of a register.
+    pub const fn is_part_of_register(&self) -> bool {
+        self.value_type == BIT && !self.is_in_bits()
+    }
+
+    /// The number of bits of a value that is bits of a register; 16 for any other.
+    pub(super) const fn bits(&self) -> u32 {
+        if self.is_part_of_register() {
+            self.count() as u32
+        } else {
+            u16::BITS
+        }
+    }
+
+    /// The number of values.
+    pub const fn values(&self) -> u16 {
+        if self.value_type == TEXT || self.is_part_of_register() {
+            1
+        } else {
+            self.count()
         }
     }
 
@@ -95,11 +122,10 @@ impl Field {
 
     /// The number of bits or registers that the field takes.
     pub const fn length(&self) -> u32 {
-        let count = self.values() as u32;
         if self.value_type == TEXT {
-            count.div_ceil(2)
+            (self.count() as u32).div_ceil(2)
         } else {
-            count << self.value_shift()
+            (self.values() as u32) << self.value_shift()
         }
     }
 

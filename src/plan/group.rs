@@ -17,21 +17,16 @@ pub struct Refusal {
 /// The most fields of one plan.
 pub const MAX_FIELDS: usize = 16_383;
 
-/// The cost of one read. It is more than that of all bits or registers of a table, which cost
-/// 1 each, and [`MAX_FIELDS`] of the longest reads stay below 2^32.
-const READ: u32 = 1 << 17;
-
 /// Groups `fields` into `reads`, with their data in `words` words. Fields are in one read only
-/// if they have the same unit, table and interval. Returns the number of reads.
+/// if they have the same unit, table and interval; they may overlap. Returns the number of reads.
 ///
 /// Of every way to cover all fields within the limits, the result has the fewest reads, and
-/// among those with so few the fewest bits and registers. The time that it takes grows with the
-/// square of the number of fields.
+/// among those with so few the fewest bits and registers. The time that it takes grows with
+/// n log n.
 ///
 /// # Errors
-/// As [`ReadLimits::check`], and [`Status::FIELDS_OVERLAP`] for two fields of one unit and table
-/// that share an address, with the greater index; [`Status::BUFFER_TOO_SMALL`] if `positions`,
-/// `reads` or `words` do not suffice, with the first field that does not fit.
+/// As [`ReadLimits::check`]; [`Status::BUFFER_TOO_SMALL`] if `positions`, `reads` or `words` do
+/// not suffice, with the first field that does not fit.
 /// [`Status::INVALID_ARGUMENT`] for no fields, for more than [`MAX_FIELDS`], and for an
 /// excluded range whose last address is less than its first.
 pub fn group<L: ReadLimits>(
@@ -54,12 +49,14 @@ pub fn group<L: ReadLimits>(
         positions,
         limits,
     };
-    for index in 0..fields.len() {
-        let status = table.sort_in(index);
+    for (index, field) in fields.iter().enumerate() {
+        let status = limits.check(field);
         if status != Status::OK {
             return refused(status, index);
         }
+        table.put(index, index as u16);
     }
+    table.sort();
     table.find_best();
     table.cut(reads, words).map_err(|position| Refusal {
         status: Status::BUFFER_TOO_SMALL,
@@ -75,80 +72,138 @@ struct Table<'a, L> {
 }
 
 impl<'a, L: ReadLimits> Table<'a, L> {
-    /// The field at a position of the sorted table; [`Field::NONE`] past the end.
+    /// The field at a position of the table; [`Field::NONE`] past the end.
     fn field(&self, position: usize) -> &'a Field {
         let position = self.positions.get(position);
         let field = position.and_then(|position| self.fields.get(position.field()));
         field.unwrap_or(&Field::NONE)
     }
 
-    /// Checks a field, and writes its index to the position that it has in the sorted table:
-    /// that is the number of fields that are before it.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn sort_in(&mut self, index: usize) -> Status {
-        let field = self.fields.get(index).unwrap_or(&Field::NONE);
-        let status = self.limits.check(field);
-        if status != Status::OK {
-            return status;
-        }
-        let (place, end) = (field.place(), field.end_place());
-        let mut before = 0;
-        for (other_index, other) in self.fields.iter().enumerate() {
-            let other_place = other.place();
-            if other_index < index && place < other.end_place() && other_place < end {
-                return Status::FIELDS_OVERLAP;
-            }
-            if (other.interval_ms, other_place) < (field.interval_ms, place) {
-                before += 1;
-            }
-        }
-        if let Some(position) = self.positions.get_mut(before) {
-            position.field = index as u16;
-        }
-        Status::OK
+    /// True if the field at the position `left` is before that at `right`.
+    fn is_before(&self, left: usize, right: usize) -> bool {
+        let key = |field: &Field| (field.interval_ms, field.place());
+        key(self.field(left)) < key(self.field(right))
     }
 
-    /// Finds for each position, from the last to the first, the best read that begins there: the
-    /// reads after it are known by then.
+    fn swap(&mut self, left: usize, right: usize) {
+        let of_left = self.field_index(left);
+        let of_right = self.field_index(right);
+        self.put(left, of_right);
+        self.put(right, of_left);
+    }
+
+    fn field_index(&self, position: usize) -> u16 {
+        self.positions.get(position).map_or(0, |own| own.field)
+    }
+
+    fn put(&mut self, position: usize, field: u16) {
+        if let Some(position) = self.positions.get_mut(position) {
+            position.field = field;
+        }
+    }
+
+    /// Sorts by heapsort.
+    fn sort(&mut self) {
+        let mut end = self.positions.len();
+        let mut root = end / 2;
+        loop {
+            // While there is a root left, the heap is being made; after that, the last field of
+            // the heap goes to its end.
+            if root > 0 {
+                root -= 1;
+            } else {
+                end -= 1;
+                if end == 0 {
+                    return;
+                }
+                self.swap(0, end);
+            }
+            let mut parent = root;
+            loop {
+                let mut child = 2 * parent + 1;
+                if child + 1 < end && self.is_before(child, child + 1) {
+                    child += 1;
+                }
+                if child >= end || !self.is_before(parent, child) {
+                    break;
+                }
+                self.swap(parent, child);
+                parent = child;
+            }
+        }
+    }
+
+    /// Finds for each position the best read that ends there: the reads before it are known by
+    /// then. Its first position is kept in `first_or_last`.
+    ///
+    /// A longer read never needs more reads before it. So the best one is among those before
+    /// which the fewest reads are needed: it begins at a position from `start`, where the longest
+    /// read begins, up to `end`. Of these the best is that with the least length of all reads
+    /// before it, less its own place.
+    ///
+    /// A field that lies within an earlier one is in the read of that one at no cost.
     fn find_best(&mut self) {
         let limits = self.limits;
-        for start in (0..self.positions.len()).rev() {
-            let first = self.field(start);
-            let place = first.place();
-            let longest = limits.longest_read(first);
-            let widest = limits.widest_gap(first);
-            let mut best = u32::MAX;
-            let mut best_last = start;
-            let mut last = start;
-            let mut field = first;
-            loop {
-                let end = field.end_place();
-                let length = end.wrapping_sub(place);
-                if length > longest {
-                    break;
-                }
-                let next = last + 1;
-                let after = self.positions.get(next).map_or(0, |next| next.cost_or_read);
-                let cost = (READ + length).wrapping_add(after);
-                // Of two ways that cost the same, the later one has the longer first read.
-                if cost <= best {
-                    (best, best_last) = (cost, last);
-                }
-                field = self.field(next);
-                let next_place = field.place();
+        let mut before = &Field::NONE;
+        let (mut length, mut start, mut end, mut best) = (0, 0, 0, 0);
+        for index in 0..self.positions.len() {
+            let field = self.field(index);
+            let (place, own_end) = (field.place(), field.end_place());
+            let before_end = before.end_place();
+            let is_same = field.interval_ms == before.interval_ms;
+            if is_same && own_end <= before_end {
+                self.set_sum(index, i32::MAX);
+            } else {
+                self.set_sum(index, length - place.cast_signed());
                 // A field of another table is further away than any gap.
-                if field.interval_ms != first.interval_ms
-                    || next_place.wrapping_sub(end) > widest
-                    || limits.excludes(end, next_place)
+                if !is_same
+                    || place.saturating_sub(before_end) > limits.widest_gap(field)
+                    || limits.excludes(before_end, place)
                 {
-                    break;
+                    start = index;
                 }
-                last = next;
+                let longest = limits.longest_read(field);
+                while own_end.wrapping_sub(self.field(start).place()) > longest {
+                    start += 1;
+                }
+                if start >= end {
+                    end = index + 1;
+                    self.keep_least(start, end);
+                }
+                // Of two that are as good, the later one leaves the longer reads before it.
+                if start > best {
+                    best = start;
+                }
+                while best + 1 < end && self.sum(best + 1) == self.sum(best) {
+                    best += 1;
+                }
+                length = own_end.cast_signed() + self.sum(best);
+                before = field;
             }
-            if let Some(position) = self.positions.get_mut(start) {
-                position.cost_or_read = best;
-                position.last = best_last as u16;
+            if let Some(position) = self.positions.get_mut(index) {
+                position.first_or_last = best as u16;
             }
+        }
+    }
+
+    fn sum(&self, position: usize) -> i32 {
+        self.positions
+            .get(position)
+            .map_or(0, |own| own.sum_or_read)
+    }
+
+    fn set_sum(&mut self, position: usize, sum: i32) {
+        if let Some(position) = self.positions.get_mut(position) {
+            position.sum_or_read = sum;
+        }
+    }
+
+    /// Replaces the sum of each position from `start` up to `end` by the least from there on.
+    fn keep_least(&mut self, start: usize, end: usize) {
+        let mut least = i32::MAX;
+        for index in (start..end).rev() {
+            least = least.min(self.sum(index));
+            self.set_sum(index, least);
         }
     }
 
@@ -157,13 +212,26 @@ impl<'a, L: ReadLimits> Table<'a, L> {
     /// # Errors
     /// The position of the first field for which the storage does not suffice.
     fn cut(&mut self, reads: &mut [Read], words: u16) -> Result<usize, usize> {
+        let mut next = self.positions.len();
+        while let Some(end) = next.checked_sub(1) {
+            next = self
+                .positions
+                .get(end)
+                .map_or(0, |end| end.first_or_last.into());
+            if let Some(start) = self.positions.get_mut(next) {
+                start.first_or_last = end as u16;
+            }
+        }
         let (mut start, mut count, mut offset) = (0, 0, 0u16);
-        while let Some(&Position { last, .. }) = self.positions.get(start) {
+        while let Some(&Position {
+            first_or_last: last,
+            ..
+        }) = self.positions.get(start)
+        {
             let Some(read) = reads.get_mut(count) else {
                 return Err(start);
             };
             let first = self.field(start);
-            let end = self.field(last.into()).end_place();
             // Field by field: firmware has no other use for memcpy.
             read.not_before.set(0);
             read.read_at.set(0);
@@ -171,25 +239,28 @@ impl<'a, L: ReadLimits> Table<'a, L> {
             read.first = start as u16;
             read.last = last;
             read.address = first.address;
-            read.quantity = end.wrapping_sub(first.place()) as u16;
             read.offset = offset;
             read.unit = first.unit as u8;
             read.table = first.table;
             read.status.set(Status::PENDING.code());
             read.doublings.set(0);
             read.flags.set(0);
+            let mut quantity = 0;
+            for position in read.positions() {
+                let field = self.field(position);
+                quantity = quantity.max(field.end() - u32::from(first.address));
+                let field = self.positions.get(position).map_or(0, Position::field);
+                if let Some(own) = self.positions.get_mut(field) {
+                    own.sum_or_read = count as i32;
+                }
+            }
+            read.quantity = quantity as u16;
             let own = read.words();
             if own > words.wrapping_sub(offset) {
                 return Err(start);
             }
             offset = offset.wrapping_add(own);
-            while start <= last.into() {
-                let field = self.positions.get(start).map_or(0, Position::field);
-                if let Some(own) = self.positions.get_mut(field) {
-                    own.cost_or_read = count as u32;
-                }
-                start += 1;
-            }
+            start = usize::from(last) + 1;
             count += 1;
         }
         Ok(count)

@@ -46,8 +46,8 @@ pub trait ReadLimits {
     fn excluded(&self) -> &[ExcludedRange];
 
     /// Checks a field by itself: [`Status::OK`]; [`Status::INVALID_ARGUMENT`] for an unknown
-    /// table, type or order, a type that the table does not have, a unit above 255, an interval
-    /// out of range, a negative divisor, or a scale of a text;
+    /// table, type or order, a type that the table does not have, bits beyond those of a register,
+    /// a unit above 255, an interval out of range, a negative divisor, or a scale of a text;
     /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
     /// field goes beyond address 65535 or into an excluded range;
     /// [`Status::ILLEGAL_DATA_VALUE`] if one read cannot hold it.
@@ -55,7 +55,8 @@ pub trait ReadLimits {
         let length = field.length();
         let known = field.table.wrapping_sub(1) < INPUT_REGISTERS
             && field.value_type.wrapping_sub(1) < TEXT
-            && field.is_in_bits() == (field.value_type == BIT)
+            && (field.value_type == BIT || !field.is_in_bits())
+            && u32::from(field.bit) + field.bits() <= u16::BITS
             && field.order <= 4
             && field.unit <= u8::MAX.into()
             && field.divisor >= 0

@@ -9,21 +9,22 @@ use core::ops::Range;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Position {
-    /// While grouping, the cost of the best reads for the fields from here on; then the read
-    /// that the field with this index is in.
-    pub(super) cost_or_read: u32,
+    /// While grouping, what a read that begins here adds to; see `find_best`. Then the read that
+    /// the field with this index is in.
+    pub(super) sum_or_read: i32,
     /// The index of the field at this place of the sorted table.
     pub(super) field: u16,
-    /// The last position of the best read that begins here.
-    pub(super) last: u16,
+    /// The first position of the best read that ends here; then the last one of the read that
+    /// begins here.
+    pub(super) first_or_last: u16,
 }
 
 impl Position {
     /// A position without a field.
     pub const NONE: Position = Position {
-        cost_or_read: 0,
+        sum_or_read: 0,
         field: 0,
-        last: 0,
+        first_or_last: 0,
     };
 
     /// The index of the field at this place of the sorted table.
@@ -33,7 +34,7 @@ impl Position {
 
     /// The index of the read that the field with the index of this position is in.
     pub const fn read(&self) -> usize {
-        self.cost_or_read as usize
+        self.sum_or_read as usize
     }
 }
 

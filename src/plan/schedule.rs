@@ -24,7 +24,7 @@ fn has_come(now: u32, time: u32) -> bool {
 }
 
 /// From now to `time`; 0 if it has come.
-fn until(time: u32, now: u32) -> u32 {
+pub fn until(time: u32, now: u32) -> u32 {
     time.wrapping_sub(now).cast_signed().max(0).cast_unsigned()
 }
 
@@ -63,13 +63,16 @@ impl Read {
     }
 }
 
+/// The longest time that [`next`] returns: as long as no read ends.
+pub const FOREVER: u32 = i32::MAX as u32;
+
 /// The read to send now, the one that is late the longest, and otherwise how many milliseconds
-/// none is due; [`u32::MAX`] if that depends on reads that are queued.
+/// none is due; [`FOREVER`] if that depends on reads that are queued.
 ///
 /// # Errors
 /// That time.
 pub fn next(reads: &[Read], now: u32) -> Result<&Read, u32> {
-    let mut shortest = u32::MAX;
+    let mut shortest = FOREVER;
     let mut next = None;
     let mut latest = 0;
     for read in reads {

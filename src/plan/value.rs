@@ -21,9 +21,10 @@ pub struct Words<'a> {
 /// `address` is the first address of the read.
 ///
 /// # Errors
-/// [`Status::INVALID_ARGUMENT`] if the field has no such value. A text is one value.
+/// [`Status::INVALID_ARGUMENT`] if the field has no such value. A text is one value, and so are
+/// bits of a register.
 pub fn place(field: &Field, address: u16, index: u16) -> Result<(u16, u8), Status> {
-    if index >= field.values() || (field.value_type == TEXT && index > 0) {
+    if index >= field.values() {
         return Err(Status::INVALID_ARGUMENT);
     }
     let place = field
@@ -56,14 +57,16 @@ impl Words<'_> {
     /// The bits of a value of at most 32 bits.
     fn raw_32(&self) -> u32 {
         let field = self.field;
-        if field.value_type == BIT {
+        if field.is_in_bits() {
             return (u16::from_le(self.word(0)) >> self.before & 1).into();
         }
         let mut raw = u32::from(self.word(0)) << 16 | u32::from(self.word(1));
         if self.swaps_bytes() {
             raw = raw.swap_bytes().rotate_left(16);
         }
-        if field.value_shift() == 0 {
+        if field.value_type == BIT {
+            raw >> (16 + field.bit) & ((1 << field.count()) - 1)
+        } else if field.value_shift() == 0 {
             raw >> 16
         } else if self.low_word_first() {
             raw.rotate_left(16)
@@ -137,7 +140,7 @@ impl Words<'_> {
                 low
             }
         };
-        let length = usize::from(field.values());
+        let length = usize::from(field.count());
         let count = (0..length)
             .position(|index| character(index) == 0)
             .unwrap_or(length);

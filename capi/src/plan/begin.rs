@@ -11,8 +11,8 @@ use mbm::plan::{group, schedule};
 
 /// Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
 ///
-/// Fields with the same unit, table and interval are read together. Of all ways to cover them
-/// within the limits, the plan takes one with the fewest reads, and of these one with the fewest
+/// Fields with the same unit, table and interval are read together, and may overlap: what
+/// several of them share is read once. Of all ways to cover them within the limits, the plan takes one with the fewest reads, and of these one with the fewest
 /// bits or registers. All reads are due at once; the rounds after the first are spread, so that
 /// reads of one interval follow each other at equal distances.
 ///
@@ -27,14 +27,14 @@ use mbm::plan::{group, schedule};
 /// @param setup   table, limits and storage; it stays valid and as it is until the plan ends
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
 /// @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or
-///         order, a type that the table does not have, a unit above 255, an interval out of
-///         range, a negative divisor or a scale of a text; MBM_BROADCAST_NOT_ALLOWED for unit 0;
-///         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range;
-///         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be; MBM_FIELDS_OVERLAP for the
-///         later of two that share an address; MBM_BUFFER_TOO_SMALL for the first without
-///         storage for its read or its data. After such a status the plan has ended, and
-///         `positions` and `reads` may be changed. MBM_INVALID_ARGUMENT also for a unit above
-///         255 of limits or of an excluded range
+///         order, a type that the table does not have, bits beyond those of a register, a unit
+///         above 255, an interval out of range, a negative divisor or a scale of a text;
+///         MBM_BROADCAST_NOT_ALLOWED for unit 0; MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
+///         address 65535 or into an excluded range; MBM_ILLEGAL_DATA_VALUE if it is longer than a
+///         read may be; MBM_BUFFER_TOO_SMALL for the first without storage for its read or its
+///         data. After such a status the plan has ended, and `positions` and `reads` may be
+///         changed. MBM_INVALID_ARGUMENT also for a unit above 255 of limits or of an excluded
+///         range
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_begin(
     plan: *mut mbm_plan,
@@ -93,6 +93,7 @@ unsafe fn begin(
         (*object).client = client;
         (*object).begins = (*object).begins.wrapping_add(1);
         (*object).millis = 0;
+        (*object).idle_until = 0;
         (*object).micros = client::clock(client);
         (*object).mark = pointers::BEGUN;
         schedule::start((*object).reads(), 0);

@@ -6,7 +6,7 @@ use crate::client::{self, mbm_client};
 use crate::pointers::{self, CObject};
 use core::slice::from_raw_parts;
 use mbm::error::Status;
-use mbm::plan::Read;
+use mbm::plan::{schedule, Read};
 
 /// What lies behind an `mbm_plan`.
 #[repr(C)]
@@ -21,6 +21,9 @@ pub struct Object {
     pub(super) micros: u32,
     /// The plan's own time in milliseconds.
     pub(super) millis: u32,
+    /// Until then no read is due, unless one ends or is hastened: a poll before it need not look
+    /// at the reads.
+    pub(super) idle_until: u32,
 }
 
 const _: () = {
@@ -61,6 +64,25 @@ impl Object {
     pub(super) unsafe fn reads<'a>(&self) -> &'a [Read] {
         // SAFETY: mbm_plan_begin has written `read_count` reads.
         unsafe { from_raw_parts(self.setup().reads.cast(), self.read_count.into()) }
+    }
+}
+
+/// The read to send now, as [`schedule::next`].
+///
+/// # Safety
+/// `object` is begun.
+pub(super) unsafe fn next<'a>(object: *mut Object, now: u32) -> Result<&'a Read, u32> {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let idle = schedule::until((*object).idle_until, now);
+        if idle > 0 {
+            return Err(idle);
+        }
+        let next = schedule::next((*object).reads(), now);
+        if let Err(idle) = next {
+            (*object).idle_until = now.wrapping_add(idle);
+        }
+        next
     }
 }
 

@@ -1,7 +1,8 @@
 //! Sending the reads that are due, and taking their replies.
 
-use super::object::{time, Object};
+use super::object::{next, time, Object};
 use super::storage::mbm_plan;
+use super::MBM_PLAN_LONGEST_INTERVAL;
 use crate::client::{self, mbm_clientRequest, mbm_client_pending, MBM_CLIENT_DEPTH};
 use crate::pointers;
 use core::ptr::null_mut;
@@ -27,7 +28,7 @@ pub unsafe extern "C" fn mbm_plan_poll(plan: *mut mbm_plan) -> u8 {
         }
         let now = time(object);
         let setup = (*object).setup();
-        let reads = (*object).reads();
+        let mut has_news = false;
         for slot in 0..setup.requestCount {
             let request = setup.requests.add(slot.into());
             let status = Status::from_code((*request).status);
@@ -35,14 +36,18 @@ pub unsafe extern "C" fn mbm_plan_poll(plan: *mut mbm_plan) -> u8 {
                 continue;
             }
             if let Some(read) = read_of(request) {
-                schedule::end(reads, read, status, now, &setup.backoff());
+                schedule::end((*object).reads(), read, status, now, &setup.backoff());
                 (*request).context = null_mut();
+                (*object).idle_until = now;
+                has_news = true;
             }
-            if let Ok(read) = schedule::next(reads, now) {
+            if let Ok(read) = next(object, now) {
                 queue(object, request, read);
             }
         }
-        update(plan);
+        if has_news {
+            update(plan);
+        }
         Status::OK
     })
 }
@@ -134,8 +139,7 @@ pub unsafe extern "C" fn mbm_plan_pollDelay(plan: *mut mbm_plan) -> u32 {
     }
     let now = time(object);
     let setup = (*object).setup();
-    let mut is_free = mbm_client_pending(client) < MBM_CLIENT_DEPTH;
-    let mut has_request = false;
+    let mut is_free = false;
     for slot in 0..setup.requestCount {
         let request = setup.requests.add(slot.into());
         if (*request).status == Status::PENDING.code() {
@@ -144,13 +148,14 @@ pub unsafe extern "C" fn mbm_plan_pollDelay(plan: *mut mbm_plan) -> u32 {
         if read_of(request).is_some() {
             return 0;
         }
-        has_request = true;
+        is_free = true;
     }
-    is_free &= has_request;
-    match schedule::next((*object).reads(), now) {
-        Err(u32::MAX) => u32::MAX,
+    if !is_free || mbm_client_pending(client) == MBM_CLIENT_DEPTH {
+        return u32::MAX;
+    }
+    match next(object, now) {
+        Ok(_) => 0,
+        Err(delay) if delay > MBM_PLAN_LONGEST_INTERVAL => u32::MAX,
         Err(delay) => delay.min(LONGEST_DELAY) * 1000,
-        Ok(_) if is_free => 0,
-        Ok(_) => u32::MAX,
     }
 }

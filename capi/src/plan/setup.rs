@@ -18,13 +18,18 @@ pub struct mbm_planField {
     pub unit: u16,
     /// One of MBM_TABLE_...
     pub table: u8,
-    /// One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, another for registers.
+    /// One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, each for registers.
+    /// MBM_TYPE_BIT of a register is `count` of its bits from `bit` on, as one number.
     pub r#type: u8,
     /// One of MBM_ORDER_...; MBM_ORDER_DEFAULT is MBM_ORDER_ABCD.
     pub order: u8,
+    /// For MBM_TYPE_BIT in a table of registers: the lowest bit, 0 (the least significant) to 15.
+    /// Otherwise 0.
+    pub bit: u8,
     /// The first bit or register, 0 to 65535, as on the wire.
     pub address: u16,
-    /// The number of values; of a text the number of characters. 0 means 1.
+    /// The number of values; of a text the number of characters, of bits of a register that of
+    /// these bits. 0 means 1.
     pub count: u16,
     /// The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL.
     pub intervalMs: u32,
@@ -130,6 +135,7 @@ const _: () = {
     assert!(size_of::<mbm_planField>() == size_of::<Field>());
     assert!(align_of::<mbm_planField>() == align_of::<Field>());
     assert!(offset_of!(mbm_planField, r#type) == offset_of!(Field, value_type));
+    assert!(offset_of!(mbm_planField, bit) == offset_of!(Field, bit));
     assert!(offset_of!(mbm_planField, address) == offset_of!(Field, address));
     assert!(offset_of!(mbm_planField, count) == offset_of!(Field, count));
     assert!(offset_of!(mbm_planField, intervalMs) == offset_of!(Field, interval_ms));

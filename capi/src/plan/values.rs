@@ -332,7 +332,9 @@ pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8
     if pointers::check((*object).client) == Status::BUSY {
         return Status::BUSY.code();
     }
-    schedule::hasten(read, time(object));
+    let now = time(object);
+    schedule::hasten(read, now);
+    (*object).idle_until = now;
     Status::OK.code()
 }
 
