@@ -287,15 +287,19 @@ $(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server bench_tables bench
 BENCH_SNIFFER := $(BUILD)/bench/bench_sniffer
 $(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+BENCH_PLAN := $(BUILD)/bench/bench_plan
+$(BENCH_PLAN): $(BUILD)/bench/bench_plan.o $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
 bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs/reports/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
-	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER)
+	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER) $(BENCH_PLAN)
 	@scripts/bench/speed master $(BENCH)
 	@scripts/bench/speed server $(BENCH_SERVER)
 	@scripts/bench/speed client $(BENCH_CLIENT)
 	@scripts/bench/speed sniffer $(BENCH_SNIFFER)
+	@scripts/bench/speed plan $(BENCH_PLAN)
 	@CARGO="$(CARGO)" scripts/bench/speed frames
 	@scripts/build/pictures
 
