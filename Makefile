@@ -10,7 +10,7 @@ SANITIZED_ARCHIVE := $(BUILD)/sanitized/libmbm.a
 RUST_SANITIZERS := --cfg mbm_reads_single_bytes -Zsanitizer=address -Cdebug-assertions -Coverflow-checks -Copt-level=1 -Cdebuginfo=line-tables-only
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
-INCLUDES := -Iinclude -Iports/linux -Iexamples/linux -Ic-tests/support -Ic-tests/shim
+INCLUDES := -Iinclude -Iports/linux -Iexamples/linux -Ic-tests/support -Ic-tests/shim -Icli
 CFLAGS := -std=c11 -O1 -g
 CXXFLAGS := -std=c++11 -O1 -g
 MODBUS = $(shell pkg-config --cflags libmodbus)
@@ -26,13 +26,17 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
 TLS_TESTS := $(filter test_tls%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_command gateway guarded_server
-# The options --trace and --pcap of the examples for Linux.
-TRACE = $(patsubst %,$(BUILD)/$(1)/linux/%.o,trace_options pcap_file)
+# The options --trace and --pcap of the tool and of examples for Linux.
+TRACE = $(patsubst %,$(BUILD)/$(1)/cli/%.o,trace pcap_file)
+# The command line tool.
+TOOL := $(wildcard cli/*.c)
+TOOL_PORTS := $(wildcard ports/linux/mbm_*.c)
+TOOL_LIBS := -Wl,--gc-sections -lmbedtls -lmbedx509 -lmbedcrypto -lcjson -lyaml -lmosquitto -lm -lpthread
 # The files that clang-format formats. The headers in include/ are documentation too, and are
 # formatted by hand.
-C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'ports/*.[ch]' 'firmware-tests/*.[ch]' \
+C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'cli/*.[ch]' 'examples/*.[ch]' 'ports/*.[ch]' 'firmware-tests/*.[ch]' \
     'packaging/*.[ch]')
-HEADERS := $(wildcard include/*.h include/mbm/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* ports/linux/*.h examples/linux/*.h)
+HEADERS := $(wildcard include/*.h include/mbm/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* ports/linux/*.h examples/linux/*.h cli/*.h)
 
 .PHONY: help
 help: ## List the targets
@@ -225,9 +229,14 @@ $(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
 $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+$(BUILD)/$(1)/cli/%.o: cli/%.c $(HEADERS)
+	@mkdir -p $$(@D)
+	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: ports/%.c $(HEADERS)
 	@mkdir -p $$(@D)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+$(BUILD)/$(1)/mbm: $(TOOL:%.c=$(BUILD)/$(1)/%.o) $(TOOL_PORTS:ports/%.c=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
+	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(TOOL_LIBS) -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
 	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
@@ -363,6 +372,12 @@ gateway: ## Show the gateway at work between pymodbus clients and devices of lib
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv $(BUILD)/plain/linux/gateway $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain
+
+.PHONY: tool
+tool: ## Build the command line tool, build/plain/mbm
+	@scripts/need gcc libc6-dev libmbedtls-dev libcjson-dev libyaml-dev libmosquitto-dev
+	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
+	@echo "tool: $(BUILD)/plain/mbm"
 
 .PHONY: demo
 demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work

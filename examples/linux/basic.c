@@ -4,7 +4,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_tty.h"
-#include "trace_options.h"
+#include "trace.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -14,7 +14,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "mbm_tcp.h"
-#include "trace_options.h"
+#include "trace.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -33,7 +33,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "gateway_line.h"
-#include "trace_options.h"
+#include "trace.h"
 
 #include <errno.h>
 #include <netdb.h>

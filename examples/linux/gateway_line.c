@@ -1,7 +1,7 @@
 #define _GNU_SOURCE
 #include "gateway_line.h"
 
-#include "trace_options.h"
+#include "trace.h"
 
 #include <errno.h>
 #include <fcntl.h>

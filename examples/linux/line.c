@@ -1,7 +1,7 @@
 #define _GNU_SOURCE
 #include "line.h"
 
-#include "trace_options.h"
+#include "trace.h"
 
 #include <errno.h>
 #include <netdb.h>

@@ -10,7 +10,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "line.h"
-#include "trace_options.h"
+#include "trace.h"
 
 #include <errno.h>
 #include <stdio.h>

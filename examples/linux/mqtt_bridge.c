@@ -10,7 +10,7 @@
 #include "line.h"
 #include "mqtt_broker.h"
 #include "mqtt_value.h"
-#include "trace_options.h"
+#include "trace.h"
 
 #include <poll.h>
 #include <stdio.h>

@@ -11,7 +11,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "line.h"
-#include "trace_options.h"
+#include "trace.h"
 
 #include <stdio.h>
 #include <string.h>

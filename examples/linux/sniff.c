@@ -10,7 +10,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "mbm_tty.h"
-#include "trace_options.h"
+#include "trace.h"
 
 #include <ctype.h>
 #include <errno.h>

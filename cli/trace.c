@@ -1,5 +1,5 @@
 #define _GNU_SOURCE
-#include "trace_options.h"
+#include "trace.h"
 
 #include "pcap_file.h"
 
@@ -98,34 +98,44 @@ static void end(void)
     pcap = NULL;
 }
 
+void trace_print(void)
+{
+    if (!is_printed && !pcap)
+        atexit(end);
+    is_printed = 1;
+}
+
+void trace_write(const char *path)
+{
+    if (!is_printed && !pcap)
+        atexit(end);
+    pcap_path = path;
+    pcap = fopen(path, "wb");
+    if (!pcap || pcap_start(pcap) != 0) {
+        fprintf(stderr, "%s: %s\n", path, strerror(errno));
+        exit(1);
+    }
+}
+
 void trace_options(int *argc, char **argv)
 {
     int i, kept = 1;
 
     for (i = 1; i < *argc; i++) {
         if (strcmp(argv[i], "--trace") == 0) {
-            is_printed = 1;
+            trace_print();
         } else if (strcmp(argv[i], "--pcap") == 0) {
             if (i + 1 == *argc) {
                 fprintf(stderr, "--pcap needs the name of a file\n%s", TRACE_HELP);
                 exit(2);
             }
-            pcap_path = argv[++i];
+            trace_write(argv[++i]);
         } else {
             argv[kept++] = argv[i];
         }
     }
     argv[kept] = NULL;
     *argc = kept;
-    if (pcap_path) {
-        pcap = fopen(pcap_path, "wb");
-        if (!pcap || pcap_start(pcap) != 0) {
-            fprintf(stderr, "%s: %s\n", pcap_path, strerror(errno));
-            exit(1);
-        }
-    }
-    if (pcap || is_printed)
-        atexit(end);
 }
 
 /* The link of this name, which is added if there is none. NULL if there are too many. */

@@ -1,21 +1,24 @@
-/* The options --trace and --pcap FILE, which all example programs have: every frame that the
- * program sends, receives or overhears, in words on stderr, and in a file for Wireshark.
+/* The options --trace and --pcap FILE: every frame that the program sends, receives or overhears,
+ * in words on stderr, and in a file for Wireshark.
  *
  * Without the options the ports are as they were, and nothing is traced.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef TRACE_OPTIONS_H
-#define TRACE_OPTIONS_H
+#ifndef TRACE_H
+#define TRACE_H
 
 #include "mbm.h"
 
-/* The description of both options, for a usage text. */
+/* Prints each frame, or writes each to a file too. Call them before any port is traced.
+ * trace_write ends the program if it cannot write the file. */
+void trace_print(void);
+void trace_write(const char *path);
+
+/* For programs without other options: takes both out of the arguments, and describes them. */
 #define TRACE_HELP                                                                                 \
-    "tracing, of all programs:\n"                                                                  \
+    "tracing:\n"                                                                                   \
     "  --trace          prints each frame in words and hexadecimal to stderr, times in UTC\n"      \
     "  --pcap FILE      writes each frame to a pcapng file: wireshark -o mbrtu.tcp.port:503 FILE\n"
-
-/* Takes both options out of the arguments. Ends the program if it cannot write the file. */
 void trace_options(int *argc, char **argv);
 
 /* Returns the port to use instead of the port of a master or client, or of a server. `framing`

@@ -1,0 +1,22 @@
+/* The commands of mbm, each in a file of its own. A command gets its own arguments, the first of
+ * which is "mbm" and its name, and returns an exit code: one of CODE_ of report.h.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef COMMANDS_H
+#define COMMANDS_H
+
+/* A command that is not written yet is missing from the tool. */
+#define MAY_BE_MISSING __attribute__((weak))
+
+int read_command(int argc, char **argv);
+int write_command(int argc, char **argv) MAY_BE_MISSING;
+int call_command(int argc, char **argv) MAY_BE_MISSING;
+int scan_command(int argc, char **argv) MAY_BE_MISSING;
+int identify_command(int argc, char **argv) MAY_BE_MISSING;
+int poll_command(int argc, char **argv) MAY_BE_MISSING;
+int serve_command(int argc, char **argv) MAY_BE_MISSING;
+int sniff_command(int argc, char **argv) MAY_BE_MISSING;
+int gateway_command(int argc, char **argv) MAY_BE_MISSING;
+int bridge_command(int argc, char **argv) MAY_BE_MISSING;
+
+#endif
