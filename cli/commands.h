@@ -9,10 +9,10 @@
 #define MAY_BE_MISSING __attribute__((weak))
 
 int read_command(int argc, char **argv);
-int write_command(int argc, char **argv) MAY_BE_MISSING;
-int call_command(int argc, char **argv) MAY_BE_MISSING;
-int scan_command(int argc, char **argv) MAY_BE_MISSING;
-int identify_command(int argc, char **argv) MAY_BE_MISSING;
+int write_command(int argc, char **argv);
+int call_command(int argc, char **argv);
+int scan_command(int argc, char **argv);
+int identify_command(int argc, char **argv);
 int poll_command(int argc, char **argv) MAY_BE_MISSING;
 int serve_command(int argc, char **argv) MAY_BE_MISSING;
 int sniff_command(int argc, char **argv) MAY_BE_MISSING;

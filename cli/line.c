@@ -275,9 +275,12 @@ const char *line_status(const line *l, const mbm_clientRequest *request, char te
 
 int line_failure(line *l, const mbm_clientRequest *request)
 {
-    return report_failure(request->unit, request->status, request->exception,
-                          request->timeoutMs ? request->timeoutMs : options.timeoutMs,
-                          line_reason(l));
+    /* A datagram that its receiver refused is no loss of the link. */
+    const int has_reason =
+        request->status == MBM_LINK_LOST || (l->place.kind == PLACE_UDP && l->udp.error != 0);
+
+    return report_failure(request->unit, request->status, request->exception, options.timeoutMs,
+                          has_reason ? line_reason(l) : NULL);
 }
 
 uint8_t line_read(line *l, mbm_clientRequest *request, uint8_t table, uint16_t address,

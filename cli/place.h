@@ -21,14 +21,15 @@
 
 #define PLACE_HELP                                                                                 \
     "LINE is one of\n"                                                                             \
-    "  rtu:PATH[?KEY=VALUE&...]     serial line; keys: baud=19200, parity=even|none|odd,\n"        \
-    "                               stop=1|2, rs485=yes, echo=yes, gap=5ms\n"                      \
-    "  ascii:PATH[?KEY=VALUE&...]   the same with ASCII frames; also data=7|8\n"                   \
-    "  tcp://HOST[:PORT]            Modbus TCP; port 502 if left out\n"                            \
-    "  rtu+tcp://HOST:PORT          RTU frames in a TCP stream\n"                                  \
-    "  udp://HOST[:PORT]            Modbus TCP frames in datagrams; port 502 if left out\n"        \
+    "  rtu:PATH[?KEY=VALUE&...]    a serial line; keys: baud=19200, stop=1|2,\n"                   \
+    "                              parity=even|none|odd, gap=5ms, echo=yes,\n"                     \
+    "                              rs485=yes\n"                                                    \
+    "  ascii:PATH[?KEY=VALUE&...]  the same with ASCII frames; also data=7|8\n"                    \
+    "  tcp://HOST[:PORT]           Modbus TCP, port 502 if left out\n"                             \
+    "  rtu+tcp://HOST:PORT         RTU frames in a TCP stream\n"                                   \
+    "  udp://HOST[:PORT]           Modbus TCP frames in datagrams, port 502\n"                     \
     "  tls://HOST[:PORT]?ca=FILE&cert=FILE&key=FILE[&name=NAME]\n"                                 \
-    "                               Modbus/TCP Security; port 802 if left out\n"
+    "                              Modbus/TCP Security, port 802\n"
 
 enum place_kind {
     PLACE_RTU,

@@ -4,6 +4,7 @@
 #include "mbm.h"
 #include "numbers.h"
 
+#include <cjson/cJSON.h>
 #include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -77,7 +78,8 @@ const char *report_advice(uint8_t status, uint8_t exception)
 {
     switch (exception) {
     case 0: break;
-    case MBM_ILLEGAL_FUNCTION: return "The device does not have this function: try another table";
+    case MBM_ILLEGAL_FUNCTION:
+        return "The device does not have this function; values may be in another --table";
     case MBM_ILLEGAL_DATA_ADDRESS:
         return "Check address and count against the device's manual; manuals that count from 1 need "
                "--one-based";
@@ -113,6 +115,8 @@ int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t ti
     const char *space = *advice ? ". " : "";
     char time[32];
 
+    if (status == MBM_RESPONSE_TIMED_OUT && exception == 0 && lost)
+        return report(code, "unit %u did not answer: %s", unit, lost);
     if (status == MBM_RESPONSE_TIMED_OUT && exception == 0)
         return report(code, "unit %u did not answer within %s%s%s", unit,
                       number_time_text(timeoutMs, time), space, advice);
@@ -120,6 +124,25 @@ int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t ti
         return report(code, "unit %u: the link was lost: %s", unit, lost);
     return report(code, "unit %u: %s%s%s", unit, mbm_status_textOf(status, exception), space,
                   advice);
+}
+
+void report_print_json(cJSON *object)
+{
+    char *text = cJSON_PrintUnformatted(object);
+
+    puts(text ? text : "null");
+    (void)fflush(stdout);
+    cJSON_free(text);
+    cJSON_Delete(object);
+}
+
+void report_json(cJSON *object, uint8_t status, uint8_t exception, const char *words)
+{
+    cJSON_AddNumberToObject(object, "code", report_code_of(status, exception));
+    cJSON_AddStringToObject(object, "status", words);
+    if (exception != 0)
+        cJSON_AddNumberToObject(object, "exception", exception);
+    report_print_json(object);
 }
 
 int report_end(int code)

@@ -50,6 +50,12 @@ int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t ti
 /* What to look at after a failure, as a sentence. Empty if nothing helps. */
 const char *report_advice(uint8_t status, uint8_t exception);
 
+/* Prints an object in one line to stdout, and frees it. report_json adds the status of a request
+ * before: its exit code, its status in words, and the code of an exception. */
+struct cJSON;
+void report_print_json(struct cJSON *object);
+void report_json(struct cJSON *object, uint8_t status, uint8_t exception, const char *words);
+
 /* Ctrl-C and SIGTERM set `report_stopped`. */
 extern volatile sig_atomic_t report_stopped;
 void report_catch_signals(void);
