@@ -104,9 +104,9 @@ static const struct argp_option trace_texts[] = {
 
 const struct argp options_trace = {trace_texts, parse_trace, NULL, NULL, NULL, NULL, NULL};
 
-/* --- the client --- */
+/* --- requests and output --- */
 
-static error_t parse_client(int key, char *text, struct argp_state *state)
+static error_t parse_request(int key, char *text, struct argp_state *state)
 {
     switch (key) {
     case TIMEOUT:
@@ -120,26 +120,45 @@ static error_t parse_client(int key, char *text, struct argp_state *state)
         options.in_flight =
             (uint8_t)options_number(state, "--in-flight", text, 1, MBM_CLIENT_DEPTH);
         return 0;
-    case JSON: options.is_json = 1; return 0;
-    case 'q': options.is_quiet = 1; return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
 
-static const struct argp_option client_texts[] = {
+static const struct argp_option request_texts[] = {
     {"timeout", TIMEOUT, "TIME", 0, "How long a reply may take, such as 500ms or 2s (1s)", 2},
     {"retries", RETRIES, "N", 0,
      "How often a request without a right reply is repeated, 0 to 254 (0)", 2},
     {"in-flight", IN_FLIGHT, "N", 0,
      "Requests under way at once on Modbus TCP, 1 to 16 (16); some servers accept only one", 2},
+    {NULL, 0, NULL, 0, NULL, 0}};
+
+const struct argp options_request = {request_texts, parse_request, NULL, NULL, NULL, NULL, NULL};
+
+static error_t parse_output(int key, char *text, struct argp_state *state)
+{
+    (void)text;
+    (void)state;
+    if (key == JSON)
+        options.is_json = 1;
+    else if (key == 'q')
+        options.is_quiet = 1;
+    else
+        return ARGP_ERR_UNKNOWN;
+    return 0;
+}
+
+static const struct argp_option output_texts[] = {
     {"json", JSON, NULL, 0, "Print JSON, one object a line", 3},
     {"quiet", 'q', NULL, 0, "Print no summary and no notes to stderr", 3},
     {NULL, 0, NULL, 0, NULL, 0}};
 
-static const struct argp_child client_children[] = {{&options_trace, 0, NULL, 0},
+const struct argp options_output = {output_texts, parse_output, NULL, NULL, NULL, NULL, NULL};
+
+static const struct argp_child client_children[] = {{&options_request, 0, NULL, 0},
+                                                    {&options_output, 0, NULL, 0},
+                                                    {&options_trace, 0, NULL, 0},
                                                     {NULL, 0, NULL, 0}};
-const struct argp options_client = {client_texts,    parse_client, NULL, NULL,
-                                    client_children, NULL,         NULL};
+const struct argp options_client = {NULL, NULL, NULL, NULL, client_children, NULL, NULL};
 
 /* --- the unit --- */
 

@@ -13,9 +13,11 @@
 #include <stdint.h>
 
 typedef struct client_options {
-    /* of options_client */
+    /* of options_request */
     uint32_t timeoutMs;
-    uint8_t has_timeout, retries, in_flight, is_json, is_quiet;
+    uint8_t has_timeout, retries, in_flight;
+    /* of options_output */
+    uint8_t is_json, is_quiet;
     /* of options_unit */
     uint8_t unit;
     /* of options_values */
@@ -29,7 +31,11 @@ extern client_options options;
 
 /* --trace and --pcap; a program that is no client has these alone. */
 extern const struct argp options_trace;
-/* --timeout, --retries, --in-flight, --json, --quiet, and those of options_trace. */
+/* --timeout, --retries, --in-flight. */
+extern const struct argp options_request;
+/* --json, --quiet. */
+extern const struct argp options_output;
+/* Those of options_request, options_output and options_trace. */
 extern const struct argp options_client;
 /* --unit. */
 extern const struct argp options_unit;
