@@ -8,6 +8,7 @@
 
 #include <errno.h>
 #include <netdb.h>
+#include <poll.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -217,20 +218,37 @@ void line_poll(line *l)
     (void)mbm_client_poll(&l->client);
 }
 
-static int rest(void *context, uint32_t micros)
+/* Sleeps until the terminal or the other descriptor has bytes. An idle line's bytes are noise, and
+ * must not end each sleep. */
+static void wait_tty(line *l, int fd, uint32_t micros)
 {
-    line *l = (line *)context;
+    const int is_waiting = l->tty.isOpen && mbm_client_pending(&l->client) > 0;
+    struct pollfd waits[2] = {{fd, POLLIN, 0}, {is_waiting ? l->tty.fd : -1, POLLIN, 0}};
+    const struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
 
+    if (fd < 0)
+        (void)mbm_tty_wait(&l->tty, micros);
+    else
+        (void)ppoll(waits, 2, &time, NULL);
+}
+
+void line_wait(line *l, int fd, uint32_t micros)
+{
     /* At most a second, since a signal just before the sleep does not end it. */
     if (micros > 1000000)
         micros = 1000000;
     switch (l->place.kind) {
-    case PLACE_UDP: (void)mbm_udp_wait(&l->udp, 1, -1, micros); break;
-    case PLACE_TLS: (void)mbm_tls_wait(&l->tls, &l->tcp, 1, NULL, -1, micros); break;
+    case PLACE_UDP: (void)mbm_udp_wait(&l->udp, 1, fd, micros); break;
+    case PLACE_TLS: (void)mbm_tls_wait(&l->tls, &l->tcp, 1, NULL, fd, micros); break;
     case PLACE_TCP:
-    case PLACE_RTU_OVER_TCP: (void)mbm_tcp_wait(&l->tcp, 1, NULL, -1, micros); break;
-    default: (void)mbm_tty_wait(&l->tty, micros);
+    case PLACE_RTU_OVER_TCP: (void)mbm_tcp_wait(&l->tcp, 1, NULL, fd, micros); break;
+    default: wait_tty(l, fd, micros);
     }
+}
+
+static int rest(void *context, uint32_t micros)
+{
+    line_wait((line *)context, -1, micros);
     return 0;
 }
 
@@ -242,7 +260,7 @@ void line_rest(line *l, uint32_t milliseconds)
         milliseconds = 1000;
     if (micros / 1000 >= milliseconds)
         micros = milliseconds * 1000;
-    (void)rest(l, micros);
+    line_wait(l, -1, micros);
 }
 
 uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued)

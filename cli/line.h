@@ -40,6 +40,10 @@ void line_poll(line *l);
 /* Sleeps until the client has something to do, at most `milliseconds` or a second. */
 void line_rest(line *l, uint32_t milliseconds);
 
+/* Sleeps until bytes arrive on the line or at the descriptor `fd` (-1 for none), at most for a time
+ * in microseconds or a second. */
+void line_wait(line *l, int fd, uint32_t micros);
+
 /* Waits for a request that was queued. Returns its status, MBM_CANCELLED after Ctrl-C. */
 uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued);
 
