@@ -215,7 +215,7 @@ need-check:
 		$(FIRMWARE_LIBC)
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
-		perl valgrind mbpoll libmbedtls-dev openssl
+		perl valgrind mbpoll libmbedtls-dev libyaml-dev libcjson-dev openssl
 
 # The test programs, one folder for each variant: $(1) name, $(2) C compiler, $(3) C++ compiler,
 # $(4) flags, $(5) archive
@@ -242,6 +242,8 @@ $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(pa
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_mqtt_payload: $(BUILD)/$(1)/linux/mqtt_payload.o
+$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device value numbers report)
+$(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(BUILD)/$(1)/linux/gateway: $(BUILD)/$(1)/linux/gateway_line.o
@@ -431,7 +433,7 @@ $(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_R
 test-aarch64: ## Run the tests in C as programs for AArch64 under QEMU: TESTS, TEST as for test-c
 	@scripts/need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user perl mbpoll openssl \
 		pkg-config libmodbus-dev
-	@scripts/need --unpack arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 \
+	@scripts/need --unpack arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 libyaml-dev libyaml-0-2 libcjson-dev libcjson1 \
 		libmbedtls-dev libmbedtls14 libmbedx509-1 libmbedcrypto7
 	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests BUILDS=aarch64
 
