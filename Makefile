@@ -329,10 +329,6 @@ $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty su
 $(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
-SNIFF := $(BUILD)/plain/linux/sniff
-$(SNIFF): $(patsubst %,$(BUILD)/plain/%.o,linux/sniff linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
-
 KEEP_LINK := $(BUILD)/plain/linux/keep_link
 $(KEEP_LINK): $(patsubst %,$(BUILD)/plain/%.o,linux/keep_link linux/mbm_tcp linux/mbm_tcp_listener) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
@@ -344,10 +340,9 @@ keep-link: ## Build and run the example of a client whose link opens itself agai
 	@$(KEEP_LINK)
 
 .PHONY: sniff
-sniff: ## Build and check the example that watches a bus, build/plain/linux/sniff
-	@scripts/need gcc libc6-dev
-	@$(MAKE) --no-print-directory $(SNIFF)
-	@scripts/check/examples sniff $(BUILD)/plain
+sniff: tool ## Check the command that watches a bus, `mbm sniff`
+	@scripts/need python3
+	@scripts/check/sniff $(BUILD)/plain
 
 CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan identify calls)
 $(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_call mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
@@ -365,8 +360,8 @@ clients: ## Build and check the client examples poll_table, scan, logger, identi
 .PHONY: trace
 trace: ## Compare what the examples print with --trace with what tshark reads in their --pcap files
 	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) $(DEMO) $(SNIFF) \
-		$(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway)
+	@$(MAKE) --no-print-directory venv tool $(CLIENTS) $(PEERS) $(DEMO) \
+		$(patsubst %,$(BUILD)/plain/linux/%,basic custom_command)
 	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
 
 .PHONY: gateway
