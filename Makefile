@@ -25,7 +25,7 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 TLS_TESTS := $(filter test_tls%,$(TESTS))
 # Examples that the test of the same name runs.
-TESTED_EXAMPLES := custom_command gateway guarded_server
+TESTED_EXAMPLES := custom_command guarded_server
 # The options --trace and --pcap of the tool and of examples for Linux.
 TRACE = $(patsubst %,$(BUILD)/$(1)/cli/%.o,trace pcap_file)
 # The command line tool.
@@ -246,9 +246,8 @@ $(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device value 
 $(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
-$(BUILD)/$(1)/linux/gateway: $(BUILD)/$(1)/linux/gateway_line.o
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
-$(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage $(BUILD)/$(1)/test_gateway_tcp: | $(BUILD)/$(1)/linux/gateway
+$(patsubst %,$(BUILD)/$(1)/test_%,gateway gateway_replies gateway_shortage gateway_tcp): | $(BUILD)/$(1)/mbm
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS),$(SANITIZED_ARCHIVE)))
@@ -365,9 +364,9 @@ trace: ## Compare what the examples print with --trace with what tshark reads in
 	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
 
 .PHONY: gateway
-gateway: ## Show the gateway at work between pymodbus clients and devices of libmodbus and pymodbus
+gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients and devices of libmodbus and pymodbus
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv $(BUILD)/plain/linux/gateway $(PEERS)
+	@$(MAKE) --no-print-directory venv tool $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain
 
 .PHONY: tool

@@ -13,7 +13,7 @@ static int run(const char *script)
     const char *const none[] = {NULL};
     program p;
 
-    program_start(&p, "custom_command", none);
+    program_start(&p, "linux/custom_command", none);
     assert_int_equal(write(p.input, script, strlen(script)), strlen(script));
     close(p.input);
     p.input = -1;

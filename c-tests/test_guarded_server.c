@@ -20,7 +20,7 @@ static void the_demonstration_shows_a_refresh_and_each_refusal(void **state)
     char *rest;
 
     (void)state;
-    program_start(&p, "guarded_server", none);
+    program_start(&p, "linux/guarded_server", none);
     program_rest(&p, output, sizeof output);
     assert_int_equal(program_end(&p), 0);
     rest = strchr(output, '\n');
@@ -64,7 +64,7 @@ static void libmodbus_clients_are_told_apart(void **state)
     program p;
 
     (void)state;
-    program_start(&p, "guarded_server", any);
+    program_start(&p, "linux/guarded_server", any);
     program_line(&p, output, sizeof output);
     assert_int_equal(strncmp(output, "ready ", 6), 0);
     operator_of = client_of(atoi(output + 6));
@@ -94,9 +94,9 @@ static void wrong_arguments_print_the_usage(void **state)
     program p;
 
     (void)state;
-    program_start(&p, "guarded_server", wrong);
+    program_start(&p, "linux/guarded_server", wrong);
     assert_int_equal(program_end(&p), 2);
-    program_start(&p, "guarded_server", help);
+    program_start(&p, "linux/guarded_server", help);
     program_rest(&p, output, sizeof output);
     assert_int_equal(program_end(&p), 0);
     assert_non_null(strstr(output, "usage: guarded_server"));
