@@ -241,7 +241,8 @@ $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(pa
 	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
-$(BUILD)/$(1)/test_mqtt_payload: $(BUILD)/$(1)/linux/mqtt_payload.o
+$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value)
+$(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device value numbers report)
 $(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
@@ -388,14 +389,10 @@ plan: ## A plan of ten fields at work against a libmodbus server
 	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/plan $(PEERS)
 	@scripts/check/examples plan $(BUILD)/plain
 
-MQTT := $(BUILD)/plain/linux/mqtt_bridge
-$(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fields mqtt_payload mqtt_value line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmosquitto -lcjson -lm -lpthread -o $@
-
 .PHONY: mqtt
-mqtt: ## Show and check the bridge to MQTT on a libmodbus server and a mosquitto broker
-	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3 libmosquitto-dev libcjson-dev mosquitto mosquitto-clients openssl
-	@$(MAKE) --no-print-directory $(MQTT) $(PEERS)
+mqtt: ## Show and check the bridge to MQTT, `mbm bridge`, on a libmodbus server and a mosquitto broker
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3 mosquitto mosquitto-clients openssl
+	@$(MAKE) --no-print-directory tool $(PEERS)
 	@scripts/check/mqtt $(BUILD)/plain
 
 .PHONY: guarded

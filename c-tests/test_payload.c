@@ -1,6 +1,6 @@
-/* The payloads of writes that mqtt_bridge takes: the whole payload is the number that the registers
- * then hold, or nothing is written. */
-#include "mqtt_payload.h"
+/* The payloads of writes that `mbm bridge` takes: the whole payload is the number that the
+ * registers then hold, or nothing is written. */
+#include "payload.h"
 #include "test.h"
 
 #include <float.h>
@@ -10,13 +10,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-static uint16_t words[MQTT_WRITE_WORDS];
+static uint16_t words[VALUE_WORDS];
 static const char *wrong;
 
 static uint16_t parse_bytes(uint8_t type, const char *scale, const char *payload, size_t length)
 {
-    mqtt_field field = {.scale = {.digits = 1, .value = 1}};
-    const mbm_planField planned = {.type = type, .order = MBM_ORDER_ABCD};
+    value_form form = {.type = type, .order = MBM_ORDER_ABCD};
     /* Memory that ends with the payload, so that sanitizers see each byte read beyond it. */
     char *copy = malloc(length > 0 ? length : 1);
     uint16_t count;
@@ -25,10 +24,9 @@ static uint16_t parse_bytes(uint8_t type, const char *scale, const char *payload
     memcpy(copy, payload, length);
     memset(words, 0, sizeof words);
     if (scale) {
-        assert_int_equal(mqtt_payload_scale(scale, &field.scale), 1);
-        field.is_scaled = 1;
+        assert_int_equal(value_scale_read(scale, &form.scale), 1);
     }
-    count = mqtt_payload_parse(&field, &planned, copy, length, words, &wrong);
+    count = payload_parse(&form, copy, length, words, &wrong);
     free(copy);
     return count;
 }
@@ -344,7 +342,7 @@ static void a_fraction_for_an_integer_is_refused_and_not_rounded(void **state)
     (void)state;
     for (i = 0; i < COUNT(rows); i++)
         for (type = MBM_TYPE_BIT; type <= MBM_TYPE_INT64; type++)
-            expect_refused(type, NULL, rows[i], "not whole");
+            expect_refused(type, NULL, rows[i], "not a whole number");
 }
 
 static void a_scaled_number_is_a_multiple_of_the_scale_in_decimal(void **state)
@@ -388,7 +386,7 @@ static void what_a_scaled_integer_is_published_as_can_be_written_back(void **sta
     (void)state;
     for (i = 0; i < COUNT(scales); i++)
         for (raw = 0; raw <= UINT16_MAX; raw += 1 + raw % 7) {
-            /* As print_real of mqtt_value.c. */
+            /* As a scaled value is published. */
             snprintf(payload, sizeof payload, "%.15g", (double)raw * strtod(scales[i], NULL));
             expect(MBM_TYPE_UINT16, scales[i], payload, raw);
         }
@@ -416,14 +414,14 @@ static void a_scale_is_a_decimal_number(void **state)
         "1234567890123456789",
         "0.1234567890123456789",
     };
-    mqtt_scale scale;
+    value_scale scale;
     unsigned i;
 
     (void)state;
     for (i = 0; i < COUNT(bad); i++)
-        if (mqtt_payload_scale(bad[i], &scale))
+        if (value_scale_read(bad[i], &scale))
             fail_msg("%s is taken", bad[i]);
-    assert_int_equal(mqtt_payload_scale("-12.50", &scale), 1);
+    assert_int_equal(value_scale_read("-12.50", &scale), 1);
     assert_int_equal(scale.digits, 125);
     assert_int_equal(scale.exponent, -1);
     assert_int_equal(scale.is_negative, 1);
@@ -502,19 +500,19 @@ static void only_a_bit_takes_a_truth_value(void **state)
 
 static void the_longest_payload_is_read_and_a_longer_one_is_refused(void **state)
 {
-    char payload[MQTT_LONGEST_WRITE + 2];
+    char payload[PAYLOAD_BYTES + 2];
 
     (void)state;
     memset(payload, '0', sizeof payload);
     payload[1] = '.';
     payload[sizeof payload - 1] = '\0';
     expect_refused(MBM_TYPE_UINT16, NULL, payload, "too long");
-    payload[MQTT_LONGEST_WRITE] = '\0';
+    payload[PAYLOAD_BYTES] = '\0';
     expect(MBM_TYPE_UINT16, NULL, payload, 0);
-    memset(payload, '9', MQTT_LONGEST_WRITE);
+    memset(payload, '9', PAYLOAD_BYTES);
     expect_refused(MBM_TYPE_UINT64, NULL, payload, "out of range");
     assert_int_equal(parse(MBM_TYPE_DOUBLE, NULL, payload), 4);
-    memset(payload, '[', MQTT_LONGEST_WRITE);
+    memset(payload, '[', PAYLOAD_BYTES);
     memcpy(payload, "{\"a\":", 5);
     expect_refused(MBM_TYPE_UINT16, NULL, payload, "no number");
 }
