@@ -215,7 +215,7 @@ need-check:
 		$(FIRMWARE_LIBC)
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
-		perl valgrind mbpoll libmbedtls-dev libyaml-dev libcjson-dev openssl
+		perl valgrind mbpoll libmbedtls-dev libyaml-dev libcjson-dev libmosquitto-dev openssl
 
 # The test programs, one folder for each variant: $(1) name, $(2) C compiler, $(3) C++ compiler,
 # $(4) flags, $(5) archive
@@ -358,10 +358,9 @@ clients: ## Build and check the client examples poll_table, scan, logger, identi
 	@$(BUILD)/venv/bin/python scripts/check/clients $(BUILD)/plain
 
 .PHONY: trace
-trace: ## Compare what the examples print with --trace with what tshark reads in their --pcap files
+trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
 	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv tool $(CLIENTS) $(PEERS) $(DEMO) \
-		$(patsubst %,$(BUILD)/plain/linux/%,basic custom_command)
+	@$(MAKE) --no-print-directory venv tool $(PEERS) $(DEMO) $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command)
 	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
 
 .PHONY: gateway
