@@ -344,18 +344,25 @@ sniff: tool ## Check the command that watches a bus, `mbm sniff`
 	@scripts/need python3
 	@scripts/check/sniff $(BUILD)/plain
 
-CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan identify calls)
-$(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_call mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
+$(BUILD)/plain/linux/plan: %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+$(BUILD)/plain/linux/calls: %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,mbm_call mbm_tty mbm_tcp) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 PEERS := $(BUILD)/plain/serve_libmodbus
 $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support/tcp_server support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) -lmodbus -lpthread -o $@
 
-.PHONY: clients
-clients: ## Build and check the client examples poll_table, scan, logger, identify and calls in build/plain/linux
-	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) keep-link
-	@$(BUILD)/venv/bin/python scripts/check/clients $(BUILD)/plain
+.PHONY: tool
+tool: ## Build the command line tool, build/plain/mbm
+	@scripts/need gcc libc6-dev libmbedtls-dev libcjson-dev libyaml-dev libmosquitto-dev
+	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
+	@echo "tool: $(BUILD)/plain/mbm"
+
+.PHONY: check-tool
+check-tool: tool ## Check that tool on servers of libmodbus and pymodbus, also with the sanitizers
+	@scripts/need python3 python3-venv clang libclang-rt-14-dev pkg-config libmodbus-dev openssl
+	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(BUILD)/plain/linux/calls $(PEERS)
+	@$(BUILD)/venv/bin/python scripts/check/tool $(BUILD)/plain $(BUILD)/certificates $(BUILD)/plain/mbm $(BUILD)/sanitized/mbm
 
 .PHONY: trace
 trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
@@ -368,12 +375,6 @@ gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients an
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv tool $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain
-
-.PHONY: tool
-tool: ## Build the command line tool, build/plain/mbm
-	@scripts/need gcc libc6-dev libmbedtls-dev libcjson-dev libyaml-dev libmosquitto-dev
-	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
-	@echo "tool: $(BUILD)/plain/mbm"
 
 .PHONY: demo
 demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work

@@ -96,14 +96,12 @@ static int succeeds(const char *what, mbm_clientRequest *one, uint8_t queued)
     one->status = line_call(&at, one, queued);
     if (one->status == MBM_OK)
         return 1;
-    if (report_stopped)
-        return 0;
     if (failed.status == MBM_OK)
         failed = *one;
     (void)line_status(&at, one, status);
-    if (refused)
+    if (refused && !report_stopped)
         cJSON_AddStringToObject(refused, what, status);
-    if (!options.is_quiet)
+    if (!options.is_quiet && !report_stopped)
         fprintf(stderr, "%s: %s: %s.\n", report_name, what, status);
     return 0;
 }

@@ -110,7 +110,7 @@ static int print_version(void)
 /* Runs a command, which sees its name as that of the program. */
 static int run(const command *chosen, int argc, char **argv)
 {
-    char name[32];
+    static char name[32];
 
     snprintf(name, sizeof name, "mbm %s", chosen->name);
     report_name = argv[0] = name;

@@ -42,13 +42,13 @@ const char *number_read(const char *text, int64_t least, int64_t most, int64_t *
     int64_t value;
 
     if (!rest || *rest)
-        return say("\"%s\" is not a whole decimal number, here from %" PRId64 " to %" PRId64, text,
-                   least, most);
+        return say("\"%.60s\" is not a whole decimal number, here from %" PRId64 " to %" PRId64,
+                   text, least, most);
     value = amount > INT64_MAX ? INT64_MAX : (int64_t)amount;
     if (is_negative)
         value = -value;
     if (amount > INT64_MAX || value < least || value > most)
-        return say("\"%s\" is out of range: from %" PRId64 " to %" PRId64 " is allowed", text,
+        return say("\"%.60s\" is out of range: from %" PRId64 " to %" PRId64 " is allowed", text,
                    least, most);
     *number = value;
     return NULL;
@@ -70,11 +70,11 @@ const char *number_time(const char *text, uint32_t least, uint32_t most, uint32_
     }
     if (i == 4)
         return say(
-            "\"%s\" is not a time: write a whole number and its unit, such as 500ms, 2s or 1m",
+            "\"%.60s\" is not a time: write a whole number and its unit, such as 500ms, 2s or 1m",
             text);
     if (amount > most || amount * units[i].milliseconds < least ||
         amount * units[i].milliseconds > most)
-        return say("\"%s\" is out of range: from %s to %s is allowed", text,
+        return say("\"%.60s\" is out of range: from %s to %s is allowed", text,
                    number_time_text(least, from), number_time_text(most, to));
     *milliseconds = (uint32_t)amount * units[i].milliseconds;
     return NULL;
@@ -107,7 +107,7 @@ const char *number_word(const char *text, const char *const *words, int *index)
                                                   : " and ",
                                    words[i]);
     }
-    return say("\"%s\" is not one of %s", text, list);
+    return say("\"%.60s\" is not one of %s", text, list);
 }
 
 const char *number_hex(const char *text, uint8_t *bytes, size_t capacity, size_t *count)
@@ -122,9 +122,10 @@ const char *number_hex(const char *text, uint8_t *bytes, size_t capacity, size_t
             continue;
         }
         if (!isxdigit((unsigned char)at[0]) || !isxdigit((unsigned char)at[1]))
-            return say("\"%s\" is not hexadecimal bytes, pairs of digits such as 03 or 0A0B", text);
+            return say("\"%.60s\" is not hexadecimal bytes, pairs of digits such as 03 or 0A0B",
+                       text);
         if (*count == capacity)
-            return say("\"%s\" has more than %zu bytes with those before", text, capacity);
+            return say("\"%.60s\" has more than %zu bytes with those before", text, capacity);
         (void)sscanf(at, "%2x", &value);
         bytes[(*count)++] = (uint8_t)value;
         at += 2;

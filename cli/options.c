@@ -7,6 +7,7 @@
 #include "report.h"
 #include "trace.h"
 
+#include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -89,10 +90,10 @@ static error_t parse_trace(int key, char *text, struct argp_state *state)
     (void)state;
     if (key == TRACE)
         trace_print();
-    else if (key == PCAP)
-        trace_write(text);
-    else
+    else if (key != PCAP)
         return ARGP_ERR_UNKNOWN;
+    else if (trace_write(text) != 0)
+        exit(report(CODE_SYSTEM, "%s: %s", text, strerror(errno)));
     return 0;
 }
 

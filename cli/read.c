@@ -142,34 +142,42 @@ static int take(part *p)
     return code != CODE_LINE && code != CODE_NO_REPLY;
 }
 
+/* Ends the parts from `ended` on, of which `queued` are pending or ended, with one status. */
+static void end_others(unsigned ended, unsigned queued, uint8_t status)
+{
+    for (; ended < part_count; ended++) {
+        if (ended < queued)
+            (void)mbm_client_cancel(&at.client, &parts[ended].request);
+        parts[ended].request.unit = options.unit;
+        parts[ended].request.status = status;
+        parts[ended].request.exception = 0;
+    }
+}
+
 /* Reads all parts. The parts after one that failed as all others would get its status. Returns 0
- * after Ctrl-C. */
+ * after Ctrl-C; then the parts that were not read have the status MBM_CANCELLED. */
 static int read_parts(void)
 {
     unsigned queued = 0, ended = 0;
 
-    while (ended < part_count) {
+    for (;;) {
         while (queued < part_count && queued - ended < MBM_CLIENT_DEPTH)
             queue(&parts[queued++]);
         line_poll(&at);
-        while (ended < queued && parts[ended].request.status != MBM_PENDING) {
-            const mbm_clientRequest *failed = &parts[ended].request;
-
-            if (take(&parts[ended++]))
+        for (; ended < queued && parts[ended].request.status != MBM_PENDING; ended++) {
+            if (take(&parts[ended]))
                 continue;
-            for (; ended < part_count; ended++) {
-                if (ended < queued)
-                    (void)mbm_client_cancel(&at.client, &parts[ended].request);
-                parts[ended].request.unit = failed->unit;
-                parts[ended].request.status = failed->status;
-            }
+            end_others(ended + 1, queued, parts[ended].request.status);
+            return 1;
         }
-        if (report_stopped)
-            return ended == part_count;
-        if (ended < part_count)
-            line_rest(&at, 1000);
+        if (ended == part_count)
+            return 1;
+        if (report_stopped) {
+            end_others(ended, queued, MBM_CANCELLED);
+            return 0;
+        }
+        line_rest(&at, 1000);
     }
-    return 1;
 }
 
 /* The part that read a value. */
@@ -412,7 +420,8 @@ int read_command(int argc, char **argv)
         print_csv_head();
     if (interval > 0) {
         read_rounds();
-    } else if (read_parts()) {
+    } else {
+        (void)read_parts();
         show(1);
         report_parts();
     }

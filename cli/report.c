@@ -64,6 +64,7 @@ int report_code_of(uint8_t status, uint8_t exception)
     case MBM_CONNECT_TIMED_OUT:
     case MBM_LINE_BUSY: return CODE_LINE;
     case MBM_RESPONSE_TIMED_OUT:
+    case MBM_CANCELLED: /* by Ctrl-C */
     case MBM_INVALID_SLAVE_ID: return CODE_NO_REPLY;
     case MBM_INVALID_CRC:
     case MBM_INVALID_FUNCTION:
@@ -115,6 +116,8 @@ int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t ti
     const char *space = *advice ? ". " : "";
     char time[32];
 
+    if (status == MBM_CANCELLED)
+        return report(code, "stopped before unit %u answered", unit);
     if (status == MBM_RESPONSE_TIMED_OUT && exception == 0 && lost)
         return report(code, "unit %u did not answer: %s", unit, lost);
     if (status == MBM_RESPONSE_TIMED_OUT && exception == 0)

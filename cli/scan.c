@@ -72,15 +72,13 @@ static void read_parity(const struct argp_state *state, char *item)
 static void read_list(const struct argp_state *state, char *text,
                       void (*read_item)(const struct argp_state *state, char *item))
 {
-    char *comma;
+    char *comma = strchr(text, ',');
 
-    do {
-        comma = strchr(text, ',');
-        if (comma)
-            *comma = '\0';
-        read_item(state, text);
-        text = comma + 1;
-    } while (comma);
+    if (comma)
+        *comma = '\0';
+    read_item(state, text);
+    if (comma)
+        read_list(state, comma + 1, read_item);
 }
 
 static void check_arguments(const struct argp_state *state)

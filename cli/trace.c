@@ -105,16 +105,18 @@ void trace_print(void)
     is_printed = 1;
 }
 
-void trace_write(const char *path)
+int trace_write(const char *path)
 {
     if (!is_printed && !pcap)
         atexit(end);
     pcap_path = path;
     pcap = fopen(path, "wb");
-    if (!pcap || pcap_start(pcap) != 0) {
-        fprintf(stderr, "%s: %s\n", path, strerror(errno));
-        exit(1);
-    }
+    if (pcap && pcap_start(pcap) == 0)
+        return 0;
+    if (pcap)
+        (void)fclose(pcap);
+    pcap = NULL;
+    return -1;
 }
 
 void trace_options(int *argc, char **argv)
@@ -129,7 +131,10 @@ void trace_options(int *argc, char **argv)
                 fprintf(stderr, "--pcap needs the name of a file\n%s", TRACE_HELP);
                 exit(2);
             }
-            trace_write(argv[++i]);
+            if (trace_write(argv[++i]) != 0) {
+                fprintf(stderr, "%s: %s\n", argv[i], strerror(errno));
+                exit(1);
+            }
         } else {
             argv[kept++] = argv[i];
         }

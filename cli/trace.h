@@ -9,10 +9,10 @@
 
 #include "mbm.h"
 
-/* Prints each frame, or writes each to a file too. Call them before any port is traced.
- * trace_write ends the program if it cannot write the file. */
+/* Prints each frame, and writes each to a file. Call them before any port is traced. trace_write
+ * returns 0, or -1 with errno set if it cannot write the file. */
 void trace_print(void);
-void trace_write(const char *path);
+int trace_write(const char *path);
 
 /* For programs without other options: takes both out of the arguments, and describes them. */
 #define TRACE_HELP                                                                                 \

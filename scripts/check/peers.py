@@ -1,5 +1,6 @@
 """The peers of the scripts that check the examples: programs, servers of pymodbus, and a line."""
 
+import asyncio
 import os
 import select
 import subprocess
@@ -32,6 +33,21 @@ def libmodbus(folder):
 def pymodbus(framing, *place):
     script = os.path.join(ROOT, "tests/peer/pymodbus_server.py")
     return start(sys.executable, "-B", script, "--framing", framing, *place)
+
+
+def served(make):
+    """Starts the server of pymodbus that `make` returns, in a thread of its own. Returns its port."""
+    loop = asyncio.new_event_loop()
+
+    async def begin():
+        server = make()
+        await server.serve_forever(background=True)
+        place = getattr(server.transport, "sockets", None)
+        return (place[0].getsockname() if place else server.transport.get_extra_info("sockname"))[1]
+
+    port = loop.run_until_complete(begin())
+    threading.Thread(target=loop.run_forever, daemon=True).start()
+    return port
 
 
 def crc(frame):
