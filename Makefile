@@ -26,7 +26,7 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
 TLS_TESTS := $(filter test_tls%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_command guarded_server
-# The options --trace and --pcap of the tool and of examples for Linux.
+# The options --trace and --pcap of the tool, which the demo has too.
 TRACE = $(patsubst %,$(BUILD)/$(1)/cli/%.o,trace pcap_file)
 # The command line tool.
 TOOL := $(wildcard cli/*.c)
@@ -245,7 +245,7 @@ $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device value numbers report)
 $(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
-$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
+$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
 $(patsubst %,$(BUILD)/$(1)/test_%,gateway gateway_replies gateway_shortage gateway_tcp): | $(BUILD)/$(1)/mbm
@@ -326,7 +326,7 @@ udp: ## Build and check the example over UDP, build/plain/linux/udp
 DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
-$(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
+$(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 KEEP_LINK := $(BUILD)/plain/linux/keep_link
@@ -367,7 +367,7 @@ check-tool: tool ## Check that tool on servers of libmodbus and pymodbus, also w
 .PHONY: trace
 trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
 	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv tool $(PEERS) $(DEMO) $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command)
+	@$(MAKE) --no-print-directory venv tool $(PEERS) $(DEMO)
 	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
 
 .PHONY: gateway

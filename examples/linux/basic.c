@@ -4,7 +4,6 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_tty.h"
-#include "trace.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -34,10 +33,9 @@ int main(int argc, char **argv)
     uint32_t baud;
     uint8_t i;
 
-    trace_options(&argc, argv);
     slave = argc == 4 ? strtoul(argv[3], NULL, 10) : 0;
     if (slave < 1 || slave > 247) {
-        fprintf(stderr, "usage: %s path baud slave\n%s", argv[0], TRACE_HELP);
+        fprintf(stderr, "usage: %s path baud slave\n", argv[0]);
         return 2;
     }
     baud = (uint32_t)strtoul(argv[2], NULL, 10);
@@ -45,7 +43,7 @@ int main(int argc, char **argv)
         perror(argv[1]);
         return 1;
     }
-    port = trace_client(mbm_tty_port(&tty), MBM_FRAMING_RTU, argv[1]);
+    port = mbm_tty_port(&tty);
     mbm_line_beginRtu(&line, &port, frame, sizeof frame);
     mbm_line_setBaudRate(&line, baud);
     mbm_node_begin(&node, &line, (uint8_t)slave, response, READ_WORDS, transmit, WRITE_WORDS);

@@ -14,7 +14,6 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "mbm_tcp.h"
-#include "trace.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -123,14 +122,14 @@ static int begin(void)
     snprintf(service, sizeof service, "%u", listener.port);
     if (mbm_tcp_open(client_end, &addresses, "127.0.0.1", service) != 0)
         return -1;
-    port = trace_client(mbm_tcp_port(client_end), MBM_FRAMING_TCP, "client");
+    port = mbm_tcp_port(client_end);
     if (mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing, sizeof outgoing) !=
         MBM_OK)
         return -1;
     while (mbm_tcp_accept(&listener, server_end, 1) < 0)
         if (errno != EAGAIN || mbm_tcp_wait(NULL, 0, &listener, -1, MBM_TCP_FOREVER) < 0)
             return -1;
-    port = trace_server(mbm_tcp_port(server_end), MBM_FRAMING_TCP, "server");
+    port = mbm_tcp_port(server_end);
     return mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame) == MBM_OK ? 0 : -1;
 }
 
@@ -265,7 +264,7 @@ static int usage(const char *asked)
             "a prompt, or a script with one command a line:\n"
             "  read A N        N registers from A on, by function 41; there are ten\n"
             "  write A V...    writes values from A on, by function 42\n"
-            "  raw F B...      any function with any data, all in hexadecimal\n" TRACE_HELP);
+            "  raw F B...      any function with any data, all in hexadecimal\n");
     return is_help ? 0 : 2;
 }
 
@@ -275,7 +274,6 @@ int main(int argc, char **argv)
     int result = 0;
     char line[2048];
 
-    trace_options(&argc, argv);
     if (argc > 1)
         return usage(argv[1]);
     (void)setvbuf(stdout, NULL, _IOLBF, 0);
