@@ -344,8 +344,6 @@ sniff: tool ## Check the command that watches a bus, `mbm sniff`
 	@scripts/need python3
 	@scripts/check/sniff $(BUILD)/plain
 
-$(BUILD)/plain/linux/plan: %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 $(BUILD)/plain/linux/calls: %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,mbm_call mbm_tty mbm_tcp) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 PEERS := $(BUILD)/plain/serve_libmodbus
@@ -376,6 +374,12 @@ gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients an
 	@$(MAKE) --no-print-directory venv tool $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain
 
+.PHONY: check-serve
+check-serve: tool ## Check mbm serve and its faults with pymodbus, libmodbus and mbm poll, also with the sanitizers
+	@scripts/need python3 python3-venv clang libclang-rt-14-dev mbpoll openssl
+	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm
+	@$(BUILD)/venv/bin/python scripts/check/serve $(BUILD)/certificates $(BUILD)/plain/mbm $(BUILD)/sanitized/mbm
+
 .PHONY: demo
 demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
@@ -384,9 +388,9 @@ demo: ## Show every function against a libmodbus server, frame by frame, and a p
 	@$(MAKE) --no-print-directory plan
 
 .PHONY: plan
-plan: ## A plan of ten fields at work against a libmodbus server
+plan: tool ## A plan of ten fields at work against a libmodbus server
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
-	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/plan $(PEERS)
+	@$(MAKE) --no-print-directory $(PEERS)
 	@scripts/check/examples plan $(BUILD)/plain
 
 .PHONY: mqtt

@@ -23,6 +23,7 @@ enum { PLACES = 32, REST = 500000 };
 static place at;
 static mbm_tty tty;
 static int far_end = -1; /* of a pseudo terminal, kept open so that the line does not hang up */
+static int is_linked;    /* whether the name of a pseudo terminal is a link of this program */
 static mbm_udp udp;
 static mbm_tcp_listener listener;
 static mbm_tls_identity identity;
@@ -59,7 +60,8 @@ static int link_name(const char *target)
             return report(CODE_LINE, "%s: %s is there already and is no link", at.text, at.path);
         (void)unlink(at.path);
     }
-    return symlink(target, at.path) == 0 ? CODE_DONE : cannot_open(strerror(errno));
+    is_linked = symlink(target, at.path) == 0;
+    return is_linked ? CODE_DONE : cannot_open(strerror(errno));
 }
 
 static int open_pty(char *name)
@@ -164,7 +166,7 @@ void serve_line_close(void)
         (void)tcflush(near_end, TCIOFLUSH);
         mbm_tty_detach(&tty);
         (void)close(near_end);
-        if (*at.path)
+        if (is_linked)
             (void)unlink(at.path);
     }
     if (far_end >= 0)
