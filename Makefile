@@ -356,8 +356,13 @@ tool: ## Build the command line tool, build/plain/mbm
 	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
 	@echo "tool: $(BUILD)/plain/mbm"
 
+.PHONY: man
+man: tool ## Make the man pages of that tool, build/man
+	@scripts/need help2man
+	@scripts/build/man $(BUILD)/plain/mbm $(BUILD)/man
+
 .PHONY: check-tool
-check-tool: tool ## Check that tool on servers of libmodbus and pymodbus, also with the sanitizers
+check-tool: man ## Check that tool on servers of libmodbus and pymodbus, also with the sanitizers
 	@scripts/need python3 python3-venv clang libclang-rt-14-dev pkg-config libmodbus-dev openssl
 	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(BUILD)/plain/linux/calls $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/tool $(BUILD)/plain $(BUILD)/certificates $(BUILD)/plain/mbm $(BUILD)/sanitized/mbm

@@ -5,18 +5,15 @@
 #ifndef COMMANDS_H
 #define COMMANDS_H
 
-/* A command that is not written yet is missing from the tool. */
-#define MAY_BE_MISSING __attribute__((weak))
-
 int read_command(int argc, char **argv);
 int write_command(int argc, char **argv);
 int call_command(int argc, char **argv);
 int scan_command(int argc, char **argv);
 int identify_command(int argc, char **argv);
-int poll_command(int argc, char **argv) MAY_BE_MISSING;
-int serve_command(int argc, char **argv) MAY_BE_MISSING;
-int sniff_command(int argc, char **argv) MAY_BE_MISSING;
-int gateway_command(int argc, char **argv) MAY_BE_MISSING;
-int bridge_command(int argc, char **argv) MAY_BE_MISSING;
+int poll_command(int argc, char **argv);
+int serve_command(int argc, char **argv);
+int sniff_command(int argc, char **argv);
+int gateway_command(int argc, char **argv);
+int bridge_command(int argc, char **argv);
 
 #endif

@@ -40,8 +40,7 @@ static void print_help(FILE *file)
           "Commands:\n",
           file);
     for (i = 0; i < COMMANDS; i++)
-        if (commands[i].run)
-            fprintf(file, "  %-10s %s\n", commands[i].name, commands[i].what);
+        fprintf(file, "  %-10s %s\n", commands[i].name, commands[i].what);
     fputs("\nOptions:\n"
           "  --help     show this text; mbm COMMAND --help: the options of a command\n"
           "  --version  show the version\n\n"
@@ -86,9 +85,9 @@ static const command *find(const char *name)
     int i;
 
     for (i = 0; i < COMMANDS; i++) {
-        if (commands[i].run && strcmp(commands[i].name, name) == 0)
+        if (strcmp(commands[i].name, name) == 0)
             return &commands[i];
-        if (commands[i].run && distance(commands[i].name, name) < least) {
+        if (distance(commands[i].name, name) < least) {
             least = distance(commands[i].name, name);
             nearest = &commands[i];
         }

@@ -113,7 +113,7 @@ pictures: ## Draw the pictures and charts of the pages, docs/pictures, and write
 	@scripts/build/pictures
 
 # The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command guarded_server) $(BUILD)/plain/mbm $(KEEP_LINK) $(UDP) $(CLIENTS) $(SERVE)
+PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command guarded_server) $(BUILD)/plain/mbm $(KEEP_LINK) $(UDP) $(SERVE)
 .PHONY: check-pages
 check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
 	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev libmosquitto-dev libcjson-dev libyaml-dev openssl \
