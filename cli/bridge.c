@@ -397,8 +397,9 @@ static const struct argp parser = {
     "LINE FILE",
     "Publishes the values of a device to an MQTT broker, and writes what the broker sends.\v"
     "FILE is a device file; its fields with access write or read-write can be written. "
-    "docs/mqtt.md describes the topics.\n\n" PLACE_HELP
-    "\nmbm bridge --broker broker.local --topic hall1 tcp://192.168.0.7 meter.yaml",
+    "docs/mqtt.md describes the topics.\n\n"
+    "Example:\n\n"
+    "  mbm bridge --broker broker.local tcp://192.168.0.7 meter.yaml\n\n" PLACE_HELP,
     children,
     NULL,
     NULL};

@@ -346,9 +346,10 @@ static const struct argp parser = {
     "LISTEN is where clients connect: tcp://:502, or tcp://ADDRESS:PORT for one address of this "
     "machine; with port 0 it is a free one. mbm prints \"ready PORT\" once it listens.\n\n"
     "UNITS are the unit ids of the LINE before: FIRST-LAST, or FIRST-LAST=UNIT if the unit FIRST of "
-    "clients is UNIT on the line. Several ranges have commas between them. 0=0 passes broadcasts.\n\n" PLACE_HELP
-    "For a gateway only the first four.\n\n"
-    "mbm gateway tcp://:502 'rtu:/dev/ttyUSB0?baud=9600' 1-31 tcp://192.168.0.7 101-131=1",
+    "clients is UNIT on the line. Several ranges have commas between them. 0=0 passes broadcasts.\n\n"
+    "Example:\n\n"
+    "  mbm gateway tcp://:502 rtu:/dev/ttyUSB0 1-31 tcp://192.168.0.7 101-131=1\n\n"
+    "The lines of a gateway are rtu:, ascii:, tcp:// and rtu+tcp://.\n\n" PLACE_HELP,
     children,
     NULL,
     NULL};

@@ -231,9 +231,10 @@ static const struct argp parser = {
     "LINE\n-",
     "Decodes what others send on a line, until Ctrl-C. It sends nothing itself.\v"
     "- is a recording on standard input. Each of its lines is a time in milliseconds, a colon and "
-    "bytes in hexadecimal, such as \"120: 11 03 00 6B\".\n\n" PLACE_HELP
-    "A sniffer listens to rtu:, ascii: and rtu+tcp://.\n\n"
-    "mbm sniff 'rtu:/dev/ttyUSB0?baud=9600&parity=none'",
+    "bytes in hexadecimal, such as \"120: 11 03 00 6B\".\n\n"
+    "Example:\n\n"
+    "  mbm sniff 'rtu:/dev/ttyUSB0?baud=9600&parity=none'\n\n"
+    "A sniffer listens to rtu:, ascii: and rtu+tcp://.\n\n" PLACE_HELP,
     children,
     NULL,
     NULL};
