@@ -105,7 +105,8 @@ static int watch(void)
         code = line_connect(&at);
     port = place_is_tcp(&where) ? mbm_tcp_port(&at.tcp) : mbm_tty_port(&at.tty);
     first = micros(CLOCK_MONOTONIC);
-    epoch = micros(CLOCK_REALTIME);
+    if (code == CODE_DONE)
+        epoch = micros(CLOCK_REALTIME);
     while (code == CODE_DONE && !report_stopped && !ferror(stdout)) {
         int length;
 
@@ -246,7 +247,8 @@ int sniff_command(int argc, char **argv)
     argp_parse(&parser, argc, argv, 0, NULL, NULL);
     begin();
     code = is_recording ? replay() : watch();
-    if (!options.is_quiet && code != CODE_WRONG)
+    /* A line that could not be opened has nothing to sum up. */
+    if (!options.is_quiet && (code == CODE_DONE || epoch))
         fprintf(stderr,
                 "%lu requests, %lu replies, %lu exceptions, %lu unpaired, %lu timeouts, %lu bad "
                 "CRCs, noise %lu times; slowest reply %.1f ms\n",
