@@ -427,13 +427,15 @@ $(AARCH64_ARCHIVE):
 archive-aarch64: $(AARCH64_ARCHIVE) ## Build the archive for 64-bit Arm Linux, build/machines/aarch64-linux-gnu/libmbm.a
 	@echo "archive-aarch64: $(AARCH64_ARCHIVE)"
 
+# The old tag of -rpath counts for the libraries of libraries too.
 $(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_ROOT)/usr/include \
-    -L$(AARCH64_LIBRARIES) -Wl$(comma)-rpath$(comma)$(CURDIR)/$(AARCH64_LIBRARIES),$(AARCH64_ARCHIVE)))
+    -L$(AARCH64_LIBRARIES) -Wl$(comma)--disable-new-dtags$(comma)-rpath$(comma)$(CURDIR)/$(AARCH64_LIBRARIES),$(AARCH64_ARCHIVE)))
 
 test-aarch64: ## Run the tests in C as programs for AArch64 under QEMU: TESTS, TEST as for test-c
 	@scripts/need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user perl mbpoll openssl \
 		pkg-config libmodbus-dev
 	@scripts/need --unpack arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 libyaml-dev libyaml-0-2 libcjson-dev libcjson1 \
+		libmosquitto-dev libmosquitto1 libssl3 \
 		libmbedtls-dev libmbedtls14 libmbedx509-1 libmbedcrypto7
 	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests BUILDS=aarch64
 
