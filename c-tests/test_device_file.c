@@ -201,8 +201,8 @@ static void a_wrong_word_is_refused_with_its_line(void **state)
     static const struct {
         const char *text, *reason;
     } rows[] = {
-        {FIELD("    type: flaot\n"), "5: type: \"flaot\" is not one of bit, uint16, int16, uint32, "
-                                     "int32, uint64, int64, float, double and text"},
+        {FIELD("    type: real\n"), "5: type: \"real\" is not one of bit, uint16, int16, uint32, "
+                                    "int32, uint64, int64, float, double and text"},
         {"fields:\n- name: a\n  table: holdings\n  address: 0\n  type: uint16\n",
          "3: table: \"holdings\" is not one of coils, discrete, holding and input"},
         {UINT16("    order: abcd\n"), "6: order: \"abcd\" is not one of ABCD, CDAB, BADC and DCBA"},
@@ -244,10 +244,10 @@ static void a_wrong_key_is_refused_with_its_line(void **state)
     static const struct {
         const char *text, *reason;
     } rows[] = {
-        {"divice: a\n" UINT16(""),
-         "1: key: \"divice\" is not one of device, unit, interval, order and fields"},
-        {UINT16("    adress: 5\n"),
-         "6: key: \"adress\" is not one of name, table, address, type, count, scale, "
+        {"maker: a\n" UINT16(""),
+         "1: key: \"maker\" is not one of device, unit, interval, order and fields"},
+        {UINT16("    addr: 5\n"),
+         "6: key: \"addr\" is not one of name, table, address, type, count, scale, "
          "unit_of_measurement, access, interval, value, unit, order and description"},
         {UINT16("    address: 7\n"), "6: address is there twice, first in line 4"},
         {UINT16("    name: b\n"), "6: name is there twice, first in line 2"},
