@@ -133,7 +133,7 @@ int main(int argc, char **argv)
         print_help(argc < 2 ? stderr : stdout);
         return argc < 2 ? CODE_WRONG : CODE_DONE;
     }
-    if (strcmp(word, "help") == 0) {
+    if (argc > 2 && strcmp(word, "help") == 0) {
         words = of_help;
         count = 2;
     }

@@ -339,7 +339,7 @@ static void print_json(const char *time)
             print_value(value, 1, text);
             cJSON_AddRawToObject(one, "value", text);
         } else {
-            cJSON_AddNumberToObject(one, "count", p->quantity / each);
+            cJSON_AddNumberToObject(one, "count", (double)p->quantity / each);
             cJSON_AddStringToObject(one, "status", line_status(&at, &p->request, status));
         }
     }

@@ -4,7 +4,7 @@
 # The programs whose sources clang-tidy reads, and the machines of examples/baremetal whose
 # processor Debian's clang 14 knows.
 TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(UDP) $(SERVE) $(PEERS) $(BUILD)/plain/mbm $(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) \
-                $(CLIENTS) $(DEMO) $(KEEP_LINK) $(BUILD)/plain/linux/basic $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
+                $(BUILD)/plain/linux/calls $(DEMO) $(KEEP_LINK) $(BUILD)/plain/linux/basic $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
                 $(BENCH) $(BENCH_CLIENT) $(BENCH_SERVER) $(BENCH_SNIFFER)
 TIDY_MACHINES = $(filter-out lx106 dc233c,$(MACHINES)) $(VARIANTS)
 # Not the sketches that use an AVR's own registers or libraries.
