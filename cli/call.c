@@ -35,6 +35,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case ARGP_KEY_SUCCESS:
         if (length == 0)
             options_wrong(state, "%s is missing", where.text ? "HEX" : "LINE");
+        options_check_unit(state, &where, 1);
         if (asked[MBAP] == 0 || asked[MBAP] > 127)
             options_wrong(state, "HEX begins with %02X: a function code is 01 to 7F", asked[MBAP]);
         return 0;

@@ -35,6 +35,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case ARGP_KEY_SUCCESS:
         if (!where.text)
             options_wrong(state, "LINE is missing");
+        options_check_unit(state, &where, 0);
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }

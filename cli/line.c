@@ -202,6 +202,9 @@ int line_connect(line *l)
         if (l->failed > 0) {
             if (l->place.kind == PLACE_TLS && l->tls.status >= MBM_TLS_TIMED_OUT)
                 advice = "docs/security.md says what to look at";
+            else if (l->place.kind == PLACE_TLS && l->tcp.error != ECONNREFUSED &&
+                     l->tcp.error != ETIMEDOUT)
+                advice = "The server may refuse the certificate: see docs/security.md";
             else if (place_is_tcp(&l->place))
                 advice = "Check host and port, and that the device is on";
             return cannot_open(l, line_reason(l), advice);

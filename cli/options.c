@@ -83,6 +83,14 @@ void options_place(const struct argp_state *state, struct place *where, const ch
         options_wrong(state, "%s", wrong);
 }
 
+void options_check_unit(const struct argp_state *state, const place *where, int is_write)
+{
+    if (options.unit == 0 && !(is_write && place_is_serial(where)))
+        options_wrong(state,
+                      "--unit 0 means all units, for writes on a serial line only; here 1 to 255 "
+                      "is allowed");
+}
+
 /* --- tracing --- */
 
 static error_t parse_trace(int key, char *text, struct argp_state *state)

@@ -12,6 +12,8 @@
 #include <argp.h>
 #include <stdint.h>
 
+struct place;
+
 typedef struct client_options {
     /* of options_request */
     uint32_t timeoutMs;
@@ -59,8 +61,10 @@ uint16_t options_address(const struct argp_state *state, const char *text);
 void options_wrong(const struct argp_state *state, const char *format, ...)
     __attribute__((format(printf, 2, 3), noreturn));
 
+/* Refuses unit 0, to which a client only writes, and only on a serial line. */
+void options_check_unit(const struct argp_state *state, const struct place *where, int is_write);
+
 /* Reads the LINE of a client, or of a server. */
-struct place;
 void options_place(const struct argp_state *state, struct place *where, const char *text,
                    int is_server);
 

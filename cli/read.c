@@ -47,6 +47,7 @@ static void check_arguments(const struct argp_state *state)
 
     if (!address_text)
         options_wrong(state, "%s is missing", where.text ? "ADDRESS" : "LINE");
+    options_check_unit(state, &where, 0);
     address = options_address(state, address_text);
     if (count_text)
         count = (uint32_t)options_number(state, "COUNT", count_text, 1,

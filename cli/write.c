@@ -81,6 +81,7 @@ static void check_arguments(const struct argp_state *state)
     if (!is_bits && options.table != MBM_TABLE_HOLDING_REGISTERS)
         options_wrong(state, "the table %s cannot be written: only coils and holding can",
                       value_table_names[options.table]);
+    options_check_unit(state, &where, 1);
     address = options_address(state, address_text);
     if (options.form.type == MBM_TYPE_TEXT)
         read_text(state, value_texts[0]);
