@@ -10,7 +10,7 @@ SANITIZED_ARCHIVE := $(BUILD)/sanitized/libmbm.a
 RUST_SANITIZERS := --cfg mbm_reads_single_bytes -Zsanitizer=address -Cdebug-assertions -Coverflow-checks -Copt-level=1 -Cdebuginfo=line-tables-only
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
-INCLUDES := -Iinclude -Iports/linux -Iexamples/linux -Ic-tests/support -Ic-tests/shim
+INCLUDES := -Iinclude -Iports/linux -Iexamples/linux -Ic-tests/support -Ic-tests/shim -Icli
 CFLAGS := -std=c11 -O1 -g
 CXXFLAGS := -std=c++11 -O1 -g
 MODBUS = $(shell pkg-config --cflags libmodbus)
@@ -25,17 +25,21 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 TLS_TESTS := $(filter test_tls%,$(TESTS))
 # Examples that the test of the same name runs.
-TESTED_EXAMPLES := custom_server gateway guarded_server
+TESTED_EXAMPLES := custom_server guarded_server
 # The short programs of examples/linux. Each is one file over the ports.
-EXAMPLES := basic custom_client custom_server guarded_server keep_link udp
+EXAMPLES := basic calls custom_client custom_server guarded_server keep_link udp
 PORTS := $(patsubst ports/%.c,%,$(filter-out $(TLS),$(wildcard ports/linux/mbm_*.c)))
-# The options --trace and --pcap of the examples for Linux.
-TRACE = $(patsubst %,$(BUILD)/$(1)/linux/%.o,trace_options pcap_file)
+# The options --trace and --pcap of the tool, which the demo has too.
+TRACE = $(patsubst %,$(BUILD)/$(1)/cli/%.o,trace pcap_file)
+# The command line tool.
+TOOL := $(wildcard cli/*.c)
+TOOL_PORTS := $(wildcard ports/linux/mbm_*.c)
+TOOL_LIBS := -Wl,--gc-sections -lmbedtls -lmbedx509 -lmbedcrypto -lcjson -lyaml -lmosquitto -lm -lpthread
 # The files that clang-format formats. The headers in include/ are documentation too, and are
 # formatted by hand.
-C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'ports/*.[ch]' 'firmware-tests/*.[ch]' \
+C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'cli/*.[ch]' 'examples/*.[ch]' 'ports/*.[ch]' 'firmware-tests/*.[ch]' \
     'packaging/*.[ch]')
-HEADERS := $(wildcard include/*.h include/mbm/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* ports/linux/*.h examples/linux/*.h)
+HEADERS := $(wildcard include/*.h include/mbm/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* ports/linux/*.h examples/linux/*.h cli/*.h)
 
 .PHONY: help
 help: ## List the targets
@@ -221,7 +225,7 @@ need-check:
 		$(FIRMWARE_LIBC)
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
-		perl valgrind mbpoll libmbedtls-dev openssl
+		perl valgrind mbpoll libmbedtls-dev libyaml-dev libcjson-dev libmosquitto-dev openssl
 
 # The test programs, one folder for each variant: $(1) name, $(2) C compiler, $(3) C++ compiler,
 # $(4) flags, $(5) archive
@@ -235,22 +239,27 @@ $(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
 $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+$(BUILD)/$(1)/cli/%.o: cli/%.c $(HEADERS)
+	@mkdir -p $$(@D)
+	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: ports/%.c $(HEADERS)
 	@mkdir -p $$(@D)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+$(BUILD)/$(1)/mbm: $(TOOL:%.c=$(BUILD)/$(1)/%.o) $(TOOL_PORTS:ports/%.c=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
+	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(TOOL_LIBS) -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
 	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
-$(BUILD)/$(1)/test_mqtt_payload: $(BUILD)/$(1)/linux/mqtt_payload.o
+$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value)
+$(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
+$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device value numbers report)
+$(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
-$(BUILD)/$(1)/linux/gateway: %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
-	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
-$(BUILD)/$(1)/linux/gateway: $(BUILD)/$(1)/linux/gateway_line.o
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
 $(BUILD)/$(1)/test_custom_server: | $(BUILD)/$(1)/linux/custom_client
-$(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage $(BUILD)/$(1)/test_gateway_tcp: | $(BUILD)/$(1)/linux/gateway
+$(patsubst %,$(BUILD)/$(1)/test_%,gateway gateway_replies gateway_shortage gateway_tcp): | $(BUILD)/$(1)/mbm
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS),$(SANITIZED_ARCHIVE)))
@@ -331,10 +340,6 @@ DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 
-SNIFF := $(BUILD)/plain/linux/sniff
-$(SNIFF): $(patsubst %,$(BUILD)/plain/%.o,linux/sniff linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
-
 .PHONY: keep-link
 keep-link: ## Show a client whose connection opens itself again, while a libmodbus server goes and comes back
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
@@ -342,36 +347,48 @@ keep-link: ## Show a client whose connection opens itself again, while a libmodb
 	@scripts/check/examples keep_link $(BUILD)/plain
 
 .PHONY: sniff
-sniff: ## Build and check the example that watches a bus, build/plain/linux/sniff
-	@scripts/need gcc libc6-dev
-	@$(MAKE) --no-print-directory $(SNIFF)
-	@scripts/check/examples sniff $(BUILD)/plain
+sniff: tool ## Check the command that watches a bus, `mbm sniff`
+	@scripts/need python3
+	@scripts/check/sniff $(BUILD)/plain
 
-CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan identify calls)
-$(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_call mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 PEERS := $(BUILD)/plain/serve_libmodbus
 $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support/tcp_server support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) -lmodbus -lpthread -o $@
 
-.PHONY: clients
-clients: ## Build and check the client examples poll_table, scan, logger, identify and calls in build/plain/linux
-	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) keep-link
-	@$(BUILD)/venv/bin/python scripts/check/clients $(BUILD)/plain
+.PHONY: tool
+tool: ## Build the command line tool, build/plain/mbm
+	@scripts/need gcc libc6-dev libmbedtls-dev libcjson-dev libyaml-dev libmosquitto-dev
+	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
+	@echo "tool: $(BUILD)/plain/mbm"
+
+.PHONY: man
+man: tool ## Make the man pages of that tool, build/man
+	@scripts/need help2man
+	@scripts/build/man $(BUILD)/plain/mbm $(BUILD)/man
+
+.PHONY: check-tool
+check-tool: man ## Check that tool on servers of libmodbus and pymodbus, also with the sanitizers
+	@scripts/need python3 python3-venv clang libclang-rt-14-dev pkg-config libmodbus-dev openssl
+	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(BUILD)/plain/linux/calls $(PEERS)
+	@$(BUILD)/venv/bin/python scripts/check/tool $(BUILD)/plain $(BUILD)/certificates $(BUILD)/plain/mbm $(BUILD)/sanitized/mbm
 
 .PHONY: trace
-trace: ## Compare what the examples print with --trace with what tshark reads in their --pcap files
+trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
 	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) $(DEMO) $(SNIFF) \
-		$(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway)
+	@$(MAKE) --no-print-directory venv tool $(PEERS) $(DEMO)
 	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
 
 .PHONY: gateway
-gateway: ## Show the gateway at work between pymodbus clients and devices of libmodbus and pymodbus
+gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients and devices of libmodbus and pymodbus
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv $(BUILD)/plain/linux/gateway $(PEERS)
+	@$(MAKE) --no-print-directory venv tool $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain
+
+.PHONY: check-serve
+check-serve: tool ## Check mbm serve and its faults with pymodbus, libmodbus and mbm poll, also with the sanitizers
+	@scripts/need python3 python3-venv clang libclang-rt-14-dev mbpoll openssl
+	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm
+	@$(BUILD)/venv/bin/python scripts/check/serve $(BUILD)/certificates $(BUILD)/plain/mbm $(BUILD)/sanitized/mbm
 
 .PHONY: demo
 demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work
@@ -381,19 +398,15 @@ demo: ## Show every function against a libmodbus server, frame by frame, and a p
 	@$(MAKE) --no-print-directory plan
 
 .PHONY: plan
-plan: ## A plan of ten fields at work against a libmodbus server
+plan: tool ## A plan of ten fields at work against a libmodbus server
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
-	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/plan $(PEERS)
+	@$(MAKE) --no-print-directory $(PEERS)
 	@scripts/check/examples plan $(BUILD)/plain
 
-MQTT := $(BUILD)/plain/linux/mqtt_bridge
-$(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fields mqtt_payload mqtt_value line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmosquitto -lcjson -lm -lpthread -o $@
-
 .PHONY: mqtt
-mqtt: ## Show and check the bridge to MQTT on a libmodbus server and a mosquitto broker
-	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3 libmosquitto-dev libcjson-dev mosquitto mosquitto-clients openssl
-	@$(MAKE) --no-print-directory $(MQTT) $(PEERS)
+mqtt: ## Show and check the bridge to MQTT, `mbm bridge`, on a libmodbus server and a mosquitto broker
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3 mosquitto mosquitto-clients openssl
+	@$(MAKE) --no-print-directory tool $(PEERS)
 	@scripts/check/mqtt $(BUILD)/plain
 
 # The tests in C as programs for AArch64, run by QEMU's user mode. The machine stays as it is: the
@@ -415,13 +428,15 @@ archive-aarch64: $(AARCH64_ARCHIVE) ## Build the library with its ports for 64-b
 	@MBM_MACHINE=$(AARCH64) scripts/build/ports $(AARCH64_ARCHIVE) $(AARCH64_FOLDER)/linux
 	@echo "archive-aarch64: $(AARCH64_FOLDER)/linux/libmbm.a"
 
+# The old tag of -rpath counts for the libraries of libraries too.
 $(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_ROOT)/usr/include \
-    -L$(AARCH64_LIBRARIES) -Wl$(comma)-rpath$(comma)$(CURDIR)/$(AARCH64_LIBRARIES),$(AARCH64_ARCHIVE)))
+    -L$(AARCH64_LIBRARIES) -Wl$(comma)--disable-new-dtags$(comma)-rpath$(comma)$(CURDIR)/$(AARCH64_LIBRARIES),$(AARCH64_ARCHIVE)))
 
 test-aarch64: ## Run the tests in C as programs for AArch64 under QEMU: TESTS, TEST as for test-c
 	@scripts/need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user perl mbpoll openssl \
 		pkg-config libmodbus-dev
-	@scripts/need --unpack arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 \
+	@scripts/need --unpack arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 libyaml-dev libyaml-0-2 libcjson-dev libcjson1 \
+		libmosquitto-dev libmosquitto1 libssl3 \
 		libmbedtls-dev libmbedtls14 libmbedx509-1 libmbedcrypto7
 	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests BUILDS=aarch64
 

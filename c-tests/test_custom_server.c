@@ -19,7 +19,7 @@ static int start_server(void **state)
     const char *const any[] = {"0", NULL};
 
     (void)state;
-    program_start(&server, "custom_server", any);
+    program_start(&server, "linux/custom_server", any);
     program_line(&server, output, sizeof output);
     return sscanf(output, "ready %15s", service) != 1;
 }
@@ -38,7 +38,7 @@ static int run(const char *address, const char *second, const char *third)
     const char *const arguments[] = {"127.0.0.1", service, address, second, third, NULL};
     program client;
 
-    program_start(&client, "custom_client", arguments);
+    program_start(&client, "linux/custom_client", arguments);
     program_rest(&client, output, sizeof output);
     return program_end(&client);
 }

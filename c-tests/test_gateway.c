@@ -1,4 +1,4 @@
-/* The gateway example between libmodbus's TCP client and two devices on ptys: a libmodbus
+/* The gateway between libmodbus's TCP client and two devices on ptys: a libmodbus
  * server and an mbm server. */
 #define _GNU_SOURCE
 #include "asked.h"
@@ -80,7 +80,8 @@ static void halt_peer(void)
 static int start(void **state)
 {
     char paths[3][128], text[64];
-    const char *arguments[] = {"0", "3000", paths[0], paths[1], paths[2], NULL};
+    const char *arguments[] = {"gateway", "--timeout", "3s",     "tcp://:0", paths[0], "1-10",
+                               paths[1],  "11-30",     paths[2], "40-41",    NULL};
     unsigned i;
 
     (void)state;
@@ -101,10 +102,10 @@ static int start(void **state)
     snprintf(name, sizeof name, "/tmp/mbm-gateway-%d", (int)getpid());
     if (symlink(line.path, name) != 0)
         return -1;
-    snprintf(paths[0], sizeof paths[0], "%s,115200,N1,1-10", name);
-    snprintf(paths[1], sizeof paths[1], "%s,115200,N1,11-30", ours.line.path);
-    snprintf(paths[2], sizeof paths[2], "/dev/no-such-line,9600,E1,40-41");
-    program_start(&gateway, "gateway", arguments);
+    snprintf(paths[0], sizeof paths[0], "rtu:%s?baud=115200&parity=none", name);
+    snprintf(paths[1], sizeof paths[1], "rtu:%s?baud=115200&parity=none", ours.line.path);
+    snprintf(paths[2], sizeof paths[2], "rtu:/dev/no-such-line?baud=9600");
+    program_start(&gateway, "mbm", arguments);
     program_line(&gateway, text, sizeof text);
     if (sscanf(text, "ready %d", &port) != 1)
         return -1;
@@ -404,37 +405,45 @@ static void a_libmodbus_server_ignores_the_request_after_one_to_an_absent_unit(v
 static void bad_arguments_end_the_program(void **state)
 {
     static const char *const bad[][8] = {
-        {"0", "300", "/dev/null,19200,E1,9-1"},
-        {"0", "300", "/dev/null,1,E1,1-9"},
-        {"0", "300", "/dev/null,19200,X1,1-9"},
-        {"0", "300", "/dev/null,19200,E3,1-9"},
-        {"0", "300", "/dev/null,19200,E1,1-9", "/dev/zero,19200,E1,9-12"},
-        {"0", "300x", "/dev/null,19200,E1,1-9"},
-        {"0", "300", "/dev/null,19200,E1,1-9,and more"},
-        {"0", "300", "/dev/null,19200,E1"},
-        {"0", "300", "/dev/null,19200,E1,ascii"},
-        {"0", "300", "/dev/null,19200,E1,ascii,1-9"},
-        {"0", "300", "/dev/null,19200,E1,1-9,9-10"},
-        {"0", "300", "/dev/null,19200,E1,1-256"},
-        {"0", "300", "/dev/null,19200,E1,1-9="},
-        {"0", "300", "/dev/null,19200,E1,1-9x5"},
-        {"0", "300", "/dev/null,19200,E1,1-9=248"}, /* the last one would be 256 */
-        {"-f", "0", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"-f", "129", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"-w", "65536", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"-c", "0", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"-c", "256", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"-n", "17", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"0", "300", "ascii:/dev/null,19200,E1"},
-        {"0", "300", "rtu:,19200,E1,1-9"},
-        {"0", "300", "tcp:127.0.0.1"},
-        {"0", "300", "tcp:127.0.0.1,502"},
-        {"0", "300", "tcp:127.0.0.1,502,"},
-        {"0", "300", "tcp:,502,1-9"},
-        {"0", "300", "tcp:127.0.0.1,50x,1-9"},
-        {"0", "300", "tcp:127.0.0.1,502,503,1-9"},
-        {"0", "300", "rtuovertcp:127.0.0.1,,1-9"},
-        {"0", "300", "udp:127.0.0.1,502,1-9"},
+        {"gateway"},
+        {"gateway", "tcp://:0"},
+        {"gateway", "tcp://:0", "rtu:/dev/null"},
+        {"gateway", "0", "rtu:/dev/null", "1-9"},
+        {"gateway", "tcp://:65536", "rtu:/dev/null", "1-9"},
+        {"gateway", "udp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "rtu:/dev/null", "rtu:/dev/null", "1-9"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "9-1"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-9,"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", ""},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-9,and more"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "ascii"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-9,9-10"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-256"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "-1"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-9="},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-9x5"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-9=248"}, /* the last one would be 256 */
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-9", "rtu:/dev/zero"},
+        {"gateway", "tcp://:0", "rtu:/dev/null", "1-9", "rtu:/dev/zero", "9-12"},
+        {"gateway", "tcp://:0", "rtu:/dev/null?baud=1", "1-9"},
+        {"gateway", "tcp://:0", "rtu:/dev/null?parity=X", "1-9"},
+        {"gateway", "tcp://:0", "rtu:/dev/null?stop=3", "1-9"},
+        {"gateway", "tcp://:0", "rtu:?baud=19200", "1-9"},
+        {"gateway", "tcp://:0", "tcp://:502", "1-9"},
+        {"gateway", "tcp://:0", "tcp://127.0.0.1:50x", "1-9"},
+        {"gateway", "tcp://:0", "tcp://127.0.0.1:502:503", "1-9"},
+        {"gateway", "tcp://:0", "rtu+tcp://127.0.0.1", "1-9"},
+        {"gateway", "tcp://:0", "udp://127.0.0.1", "1-9"},
+        {"gateway", "tcp://:0", "pty:", "1-9"},
+        {"gateway", "--timeout", "300", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--timeout", "0ms", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--requests", "0", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--requests", "129", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--queue-time", "65536ms", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--connections", "0", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--connections", "256", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--in-flight", "17", "tcp://:0", "rtu:/dev/null", "1-9"},
     };
     char text[64];
     unsigned i;
@@ -443,7 +452,7 @@ static void bad_arguments_end_the_program(void **state)
     for (i = 0; i < COUNT(bad); i++) {
         program one;
 
-        program_start(&one, "gateway", bad[i]);
+        program_start(&one, "mbm", bad[i]);
         assert_int_equal(program_rest(&one, text, sizeof text), 0);
         assert_int_equal(program_end(&one), 2);
     }

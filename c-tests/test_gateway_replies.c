@@ -1,4 +1,4 @@
-/* Which replies of a device the gateway example passes on. The test plays the device. */
+/* Which replies of a device the gateway passes on. The test plays the device. */
 #define _GNU_SOURCE
 #include "asked.h"
 #include "await.h"
@@ -19,7 +19,7 @@ enum { UNIT = 5 };
 /* How long the gateway waits for its device, in milliseconds: longer than a busy machine
  * takes to run the device, and much shorter than PATIENCE_MS, for which a test waits for
  * the gateway. */
-#define TIMEOUT "4000"
+#define TIMEOUT "4s"
 
 /* A gateway and its one line. The test is the device at the other end of the line. */
 typedef struct gateway {
@@ -28,21 +28,17 @@ typedef struct gateway {
     uint16_t port;
 } gateway;
 
-/* Starts a gateway whose line is at `path`. The options come before the port. */
+/* Starts a gateway whose line is at `path`. The options come after the line. */
 static void start_at(gateway *g, const char *path, const char *timeout, const char *const *options)
 {
-    char text[64], argument[128];
-    const char *arguments[8];
-    unsigned number, count = 0;
+    char text[64], line[128];
+    const char *arguments[10] = {"gateway", "--timeout", timeout, "tcp://:0", line, "1-30"};
+    unsigned number, count = 6;
 
-    snprintf(argument, sizeof argument, "%s,115200,N1,1-30", path);
+    snprintf(line, sizeof line, "rtu:%s?baud=115200&parity=none", path);
     while (options && *options)
         arguments[count++] = *options++;
-    arguments[count++] = "0";
-    arguments[count++] = timeout;
-    arguments[count++] = argument;
-    arguments[count] = NULL;
-    program_start(&g->program, "gateway", arguments);
+    program_start(&g->program, "mbm", arguments);
     program_line(&g->program, text, sizeof text);
     assert_int_equal(sscanf(text, "ready %u", &number), 1);
     g->port = (uint16_t)number;
@@ -211,7 +207,7 @@ static void a_reply_that_does_not_answer_the_request_becomes_0b(void **state)
     int fd;
 
     (void)state;
-    start(&g, "500", NULL);
+    start(&g, "500ms", NULL);
     fd = tcp_connect(g.port);
     for (i = 0; i < COUNT(no_answers); i++) {
         const uint8_t *request = (const uint8_t *)no_answers[i][0];
@@ -326,13 +322,13 @@ static void every_function_of_our_server_passes_through(void **state)
 /* The test checks only the shortest time, since a busy machine makes times longer. */
 static void the_quiet_time_is_an_option(void **state)
 {
-    static const char *const options[] = {"-q", "1000", NULL};
+    static const char *const options[] = {"--quiet-time", "1s", NULL};
     static const char *const bad[][7] = {
-        {"-q", "65536", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"-q", "-1", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"-q", "1x", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"-q", "", "0", "300", "/dev/null,19200,E1,1-9"},
-        {"-x", "1", "0", "300", "/dev/null,19200,E1,1-9"},
+        {"gateway", "--quiet-time", "65536ms", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--quiet-time", "-1ms", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--quiet-time", "1x", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--quiet-time", "", "tcp://:0", "rtu:/dev/null", "1-9"},
+        {"gateway", "--no-such-time", "1s", "tcp://:0", "rtu:/dev/null", "1-9"},
     };
     double before;
     gateway g;
@@ -340,7 +336,7 @@ static void the_quiet_time_is_an_option(void **state)
     int fd;
 
     (void)state;
-    start(&g, "200", options);
+    start(&g, "200ms", options);
     fd = tcp_connect(g.port);
     before = seconds();
     ASK(fd, "\x03\x00\x00\x00\x03");
@@ -354,7 +350,7 @@ static void the_quiet_time_is_an_option(void **state)
     for (i = 0; i < COUNT(bad); i++) {
         char text[64];
 
-        program_start(&g.program, "gateway", bad[i]);
+        program_start(&g.program, "mbm", bad[i]);
         assert_int_equal(program_rest(&g.program, text, sizeof text), 0);
         assert_int_equal(program_end(&g.program), 2);
     }

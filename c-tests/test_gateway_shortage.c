@@ -1,4 +1,4 @@
-/* The gateway example without enough descriptors or places: it serves the connections that
+/* The gateway without enough descriptors or places: it serves the connections that
  * it has, sleeps, accepts waiting connections when there is a free place again, and ends on
  * SIGTERM. */
 #define _GNU_SOURCE
@@ -57,11 +57,12 @@ static int end(void **state)
 static void start(unsigned descriptors, const char *idle)
 {
     char text[64], path[128];
-    const char *arguments[] = {"-i", idle, "0", "3000", path, NULL};
+    const char *arguments[] = {"gateway",  "--idle", idle,   "--timeout", "3s",
+                               "tcp://:0", path,     "1-10", NULL};
     int number;
 
-    snprintf(path, sizeof path, "%s,115200,N1,1-10", name);
-    program_start_limited(&gateway, "gateway", arguments, descriptors);
+    snprintf(path, sizeof path, "rtu:%s?baud=115200&parity=none", name);
+    program_start_limited(&gateway, "mbm", arguments, descriptors);
     program_line(&gateway, text, sizeof text);
     assert_int_equal(sscanf(text, "ready %d", &number), 1);
     port = (uint16_t)number;
@@ -102,7 +103,7 @@ static void with_few_descriptors_the_gateway_serves_sleeps_and_ends(void **state
     for (i = 0; i < COUNT(limits); i++) {
         const unsigned most = limits[i] - OWN < PLACES ? limits[i] - OWN : PLACES;
 
-        start(limits[i], "60");
+        start(limits[i], "60s");
         connect_to(0, most);
         for (k = 0; k < most; k++)
             assert_int_equal(is_served(fds[k]), 1);
@@ -119,7 +120,7 @@ static void connections_beyond_the_descriptors_are_closed_at_once(void **state)
 
     (void)state;
     SKIP_WITHOUT_LIMITS();
-    start(OWN + SERVED, "60");
+    start(OWN + SERVED, "60s");
     connect_to(0, ALL);
     for (i = 0; i < SERVED; i++)
         assert_int_equal(is_served(fds[i]), 1);
@@ -138,7 +139,7 @@ static void a_new_client_gets_the_place_of_an_idle_one(void **state)
     char byte;
 
     (void)state;
-    start(0, "1");
+    start(0, "1s");
     connect_to(0, PLACES);
     /* The connections are silent for at least a second. */
     AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) || (close(fds[PLACES]), 0));
@@ -155,7 +156,7 @@ static void a_new_client_gets_the_descriptor_of_an_idle_one(void **state)
 
     (void)state;
     SKIP_WITHOUT_LIMITS();
-    start(OWN + SERVED, "1");
+    start(OWN + SERVED, "1s");
     connect_to(0, SERVED);
     for (i = SERVED; i < SERVED + 2; i++)
         AWAIT((fds[i] = tcp_connect(port), is_served(fds[i])) || (close(fds[i]), 0));
@@ -167,7 +168,7 @@ static void an_idle_time_of_0_closes_none(void **state)
     unsigned i;
 
     (void)state;
-    start(0, "0");
+    start(0, "0s");
     connect_to(0, PLACES + 1);
     assert_int_equal(is_served(fds[PLACES]), 0);
     for (i = 0; i < PLACES; i++)
@@ -181,7 +182,7 @@ static void a_connection_that_waits_for_its_device_is_not_idle(void **state)
     uint8_t answer[9];
 
     (void)state;
-    start(0, "1");
+    start(0, "1s");
     connect_to(0, 1);
     assert_int_equal(write(fds[0], request, sizeof request), sizeof request);
     /* The request is on the line before the other clients connect. */
@@ -202,7 +203,7 @@ static void a_lost_line_keeps_its_descriptor(void **state)
 
     (void)state;
     SKIP_WITHOUT_LIMITS();
-    start(OWN + SERVED, "60");
+    start(OWN + SERVED, "60s");
     connect_to(0, SERVED + 2);
     for (i = 0; i < SERVED; i++)
         assert_int_equal(is_served(fds[i]), 1);

@@ -1,4 +1,4 @@
-/* The gateway example with lines over TCP: a libmodbus server, and devices that the test plays,
+/* The gateway with lines over TCP: a libmodbus server, and devices that the test plays,
  * whose connections come and go. And its places for clients. */
 #define _GNU_SOURCE
 #include "asked.h"
@@ -20,28 +20,26 @@
 enum { UNIT = 5, NO_LINE = 200, MANY = 40 };
 
 /* Longer than a busy machine takes to run the other end of a connection. */
-#define TIMEOUT "8000"
+#define TIMEOUT "8s"
 
 static program gateway;
 static uint16_t port;
 static int listener, client = -1;
 static uint16_t device_port;
 
-/* Starts a gateway with one line at a TCP port: `host` is tcp:HOST or rtuovertcp:HOST. */
+/* Starts a gateway with one line at a TCP port: `host` is tcp://HOST or rtu+tcp://HOST. */
 static void start_without_client(const char *host, uint16_t to, const char *const *options)
 {
     char text[64], line[64];
-    const char *arguments[8];
-    unsigned number, count = 0;
+    char units[32];
+    const char *arguments[10] = {"gateway", "--timeout", TIMEOUT, "tcp://:0", line, units};
+    unsigned number, count = 6;
 
-    snprintf(line, sizeof line, "%s,%u,1-30,100-100=%d", host, to, UNIT);
+    snprintf(line, sizeof line, "%s:%u", host, to);
+    snprintf(units, sizeof units, "1-30,100=%d", UNIT);
     while (options && *options)
         arguments[count++] = *options++;
-    arguments[count++] = "0";
-    arguments[count++] = TIMEOUT;
-    arguments[count++] = line;
-    arguments[count] = NULL;
-    program_start(&gateway, "gateway", arguments);
+    program_start(&gateway, "mbm", arguments);
     program_line(&gateway, text, sizeof text);
     assert_int_equal(sscanf(text, "ready %u", &number), 1);
     port = (uint16_t)number;
@@ -160,7 +158,7 @@ static void libmodbus_reaches_a_libmodbus_server_over_tcp(void **state)
     (void)state;
     memset(&far, 0, sizeof far);
     tcp_server_start(&far);
-    start("tcp:127.0.0.1", far.port, NULL);
+    start("tcp://127.0.0.1", far.port, NULL);
     peer = modbus_new_tcp("127.0.0.1", port);
     assert_non_null(peer);
     assert_int_equal(modbus_connect(peer), 0);
@@ -188,7 +186,7 @@ static void a_line_of_rtu_over_tcp_has_frames_of_rtu(void **state)
 
     (void)state;
     listener = tcp_listen(&device_port);
-    start("rtuovertcp:127.0.0.1", device_port, NULL);
+    start("rtu+tcp://127.0.0.1", device_port, NULL);
     device = accept_gateway();
     ask(7);
     get(device, found, sizeof found);
@@ -209,7 +207,7 @@ static void a_device_that_closes_an_idle_connection_costs_no_request(void **stat
 
     (void)state;
     listener = tcp_listen(&device_port);
-    start("tcp:127.0.0.1", device_port, NULL);
+    start("tcp://127.0.0.1", device_port, NULL);
     for (round = 1; round < 6; round++) {
         device = accept_gateway();
         ask(round);
@@ -235,7 +233,7 @@ static void a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again(voi
 
     (void)state;
     listener = tcp_listen(&device_port);
-    start("tcp:127.0.0.1", device_port, NULL);
+    start("tcp://127.0.0.1", device_port, NULL);
     device = accept_gateway();
     ask(1);
     (void)take(device, 1);
@@ -256,7 +254,7 @@ static void requests_to_a_device_that_does_not_listen_get_0a_until_it_does(void 
     int device, reserved = tcp_reserve(&device_port);
 
     (void)state;
-    start("tcp:127.0.0.1", device_port, NULL);
+    start("tcp://127.0.0.1", device_port, NULL);
     ask(1);
     expect_exception(1, 0x0A);
     ask(2);
@@ -278,7 +276,7 @@ static void requests_to_a_host_that_is_not_found_get_0a(void **state)
     uint8_t i;
 
     (void)state;
-    start("tcp:no such host", 502, NULL);
+    start("tcp://no-such-host.invalid", 502, NULL);
     for (i = 0; i < 3; i++) {
         ask(i);
         expect_exception(i, 0x0A);
@@ -289,14 +287,14 @@ static void requests_to_a_host_that_is_not_found_get_0a(void **state)
 
 static void a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says(void **state)
 {
-    static const char *const options[] = {"-n", "4", NULL};
+    static const char *const options[] = {"--in-flight", "4", NULL};
     uint16_t transactions[4];
     uint8_t byte;
     int device, i;
 
     (void)state;
     listener = tcp_listen(&device_port);
-    start("tcp:127.0.0.1", device_port, options);
+    start("tcp://127.0.0.1", device_port, options);
     device = accept_gateway();
     for (i = 0; i < 6; i++)
         ask((uint8_t)(10 + i));
@@ -324,7 +322,7 @@ static void expect_places(const char *const *options, unsigned places)
     unsigned i;
 
     listener = tcp_listen(&device_port);
-    start_without_client("tcp:127.0.0.1", device_port, options);
+    start_without_client("tcp://127.0.0.1", device_port, options);
     for (i = 0; i < MANY; i++)
         fds[i] = tcp_connect(port);
     for (i = 0; i < MANY; i++)

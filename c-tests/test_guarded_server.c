@@ -31,7 +31,7 @@ static void libmodbus_clients_are_told_apart(void **state)
     program p;
 
     (void)state;
-    program_start(&p, "guarded_server", any);
+    program_start(&p, "linux/guarded_server", any);
     program_line(&p, output, sizeof output);
     assert_int_equal(strncmp(output, "ready ", 6), 0);
     operator_of = client_of(atoi(output + 6));
@@ -68,7 +68,7 @@ static void a_missing_port_prints_the_usage(void **state)
     program p;
 
     (void)state;
-    program_start(&p, "guarded_server", none);
+    program_start(&p, "linux/guarded_server", none);
     assert_int_equal(program_end(&p), 2);
 }
 

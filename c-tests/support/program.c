@@ -71,7 +71,7 @@ void program_start_limited(program *p, const char *name, const char *const *argu
     path[length] = 0;
     end = strrchr(path, '/');
     must(end != NULL && strlen(name) < 48, name);
-    sprintf(end, "/linux/%s", name);
+    sprintf(end, "/%s", name);
     start(p, path, name, arguments, descriptors, getenv("MBM_EMULATOR"));
 }
 

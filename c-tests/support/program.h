@@ -1,4 +1,4 @@
-/* Runs an example as a process: the one that was built in the same way as the test. */
+/* Runs a program as a process: the one that was built in the same way as the test. */
 #ifndef PROGRAM_H
 #define PROGRAM_H
 
@@ -11,7 +11,8 @@ typedef struct program {
     int output; /* a descriptor: what the program prints, the test reads here */
 } program;
 
-/* Starts linux/NAME from the test's own folder. The arguments end with NULL. */
+/* Starts a program by its path in the folder of the test, for example "mbm" or "linux/basic". The
+ * arguments end with NULL. */
 void program_start(program *p, const char *name, const char *const *arguments);
 
 /* The same with a limit of open descriptors. 0 means no limit. */

@@ -5,7 +5,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_tty.h"
 #include "server.h"
-#include "trace_options.h"
+#include "trace.h"
 
 #include <stdio.h>
 #include <string.h>

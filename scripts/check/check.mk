@@ -3,8 +3,8 @@
 
 # The programs whose sources clang-tidy reads, and the machines of examples/baremetal whose
 # processor Debian's clang 14 knows.
-TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(SERVE) $(PEERS) $(MQTT) $(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) \
-                $(CLIENTS) $(DEMO) $(SNIFF) $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
+TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(SERVE) $(PEERS) $(BUILD)/plain/mbm $(EXAMPLES:%=$(BUILD)/plain/linux/%) \
+                $(DEMO) $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
                 $(BENCH) $(BENCH_CLIENT) $(BENCH_SERVER) $(BENCH_SNIFFER)
 TIDY_MACHINES = $(filter-out lx106 dc233c,$(MACHINES)) $(VARIANTS)
 # Not the sketches that use an AVR's own registers or libraries.
@@ -33,7 +33,7 @@ endef
 compile-commands: export AS_DATABASE := $(AS_DATABASE)
 .PHONY: compile-commands
 compile-commands: ## Write compile_commands.json, for editors and clang-tidy
-	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev libmbedtls-dev openssl valgrind libmosquitto-dev libcjson-dev \
+	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev libmbedtls-dev openssl valgrind libmosquitto-dev libcjson-dev libyaml-dev \
 		libsimavr-dev libelf-dev
 	@$(MAKE) --no-print-directory print-commands | awk "$$AS_DATABASE" >compile_commands.json.new
 	@mv compile_commands.json.new compile_commands.json
@@ -113,10 +113,10 @@ pictures: ## Draw the pictures and charts of the pages, docs/pictures, and write
 	@scripts/build/pictures
 
 # The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(BUILD)/plain/linux/gateway $(SNIFF) $(CLIENTS) $(SERVE)
+PAGE_PROGRAMS := $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(BUILD)/plain/mbm $(SERVE)
 .PHONY: check-pages
 check-pages: linux ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
-	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev openssl \
+	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev libmosquitto-dev libcjson-dev libyaml-dev openssl \
 		gcc-avr avr-libc arduino-core-avr \
 		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi gcc-aarch64-linux-gnu libc6-dev-arm64-cross) \
 		$(FIRMWARE_LIBC)

@@ -1,10 +1,13 @@
-"""The peers of the scripts that check the examples: programs, servers of pymodbus, and a line."""
+"""The peers of the scripts that check mbm and the examples: programs, servers of pymodbus, a line and a device."""
 
+import asyncio
 import os
 import select
+import socket
 import subprocess
 import sys
 import threading
+import time
 import tty
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -32,6 +35,21 @@ def libmodbus(folder):
 def pymodbus(framing, *place):
     script = os.path.join(ROOT, "tests/peer/pymodbus_server.py")
     return start(sys.executable, "-B", script, "--framing", framing, *place)
+
+
+def served(make):
+    """Starts the server of pymodbus that `make` returns, in a thread of its own. Returns its port."""
+    loop = asyncio.new_event_loop()
+
+    async def begin():
+        server = make()
+        await server.serve_forever(background=True)
+        place = getattr(server.transport, "sockets", None)
+        return (place[0].getsockname() if place else server.transport.get_extra_info("sockname"))[1]
+
+    port = loop.run_until_complete(begin())
+    threading.Thread(target=loop.run_forever, daemon=True).start()
+    return port
 
 
 def crc(frame):
@@ -64,3 +82,60 @@ class Wire(threading.Thread):
                 data = os.read(end, 512)
                 self.sent[index] += data
                 os.write(self.ends[1 - index], data)
+
+
+class TcpDevice:
+    """Answers requests of Modbus TCP by a function of the PDU; None is no answer. It may close the
+    connection after each answer, answer late, or be away."""
+
+    def __init__(self, answer=lambda pdu: bytes([3, 2, 0, 42]), hangs_up=False, late=0.0, host="127.0.0.1"):
+        self.answer, self.hangs_up, self.late, self.host = answer, hangs_up, late, host
+        self.port = 0
+        self.asked = []
+        self.come()
+
+    @property
+    def line(self):
+        return f"tcp://[{self.host}]:{self.port}" if ":" in self.host else f"tcp://{self.host}:{self.port}"
+
+    def come(self):
+        family = socket.AF_INET6 if ":" in self.host else socket.AF_INET
+        self.listener = socket.create_server((self.host, self.port), family=family)
+        self.port = self.listener.getsockname()[1]
+        self.peers = []
+        threading.Thread(target=self.accept, args=(self.listener,), daemon=True).start()
+
+    def go(self):
+        self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
+        for peer in self.peers:
+            try:
+                peer.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+            peer.close()
+
+    def accept(self, listener):
+        while True:
+            try:
+                peer, _ = listener.accept()
+            except OSError:
+                return
+            self.peers.append(peer)
+            threading.Thread(target=self.serve, args=(peer,), daemon=True).start()
+
+    def serve(self, peer):
+        try:
+            stream = peer.makefile("rb")
+            while len(head := stream.read(7)) == 7:
+                pdu = stream.read(int.from_bytes(head[4:6], "big") - 1)
+                self.asked.append((head[6], pdu.hex()))
+                reply = self.answer(pdu)
+                if reply is None:
+                    continue
+                time.sleep(self.late)
+                peer.sendall(head[:4] + (len(reply) + 1).to_bytes(2, "big") + head[6:] + reply)
+                if self.hangs_up:
+                    peer.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass

@@ -1,5 +1,5 @@
 """How a plan groups its fields into requests: for docs/plan.md. The fields are those of
-examples/linux/plan.c; `make plan` shows the requests."""
+examples/devices/energy-meter.yaml; `make plan` shows the requests."""
 
 from drawing import LINE, MARGIN, WIDTH, Drawing
 

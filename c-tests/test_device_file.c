@@ -1,0 +1,503 @@
+/* The device file: what is read from it, and each refusal with the line and the reason. */
+#define _GNU_SOURCE
+#include "device.h"
+#include "report.h"
+#include "test.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static char path[] = "/tmp/mbm-device-XXXXXX";
+static device meter;
+
+static int make_file(void **state)
+{
+    const int fd = mkstemp(path);
+
+    (void)state;
+    return fd < 0 ? -1 : close(fd);
+}
+
+static int remove_file(void **state)
+{
+    (void)state;
+    return remove(path);
+}
+
+static int read_bytes(const char *text, size_t length)
+{
+    FILE *file = fopen(path, "wb");
+
+    assert_non_null(file);
+    assert_int_equal(fwrite(text, 1, length, file), length);
+    assert_int_equal(fclose(file), 0);
+    return device_read(&meter, path);
+}
+
+static void read_text(const char *text)
+{
+    if (read_bytes(text, strlen(text)) != CODE_DONE)
+        fail_msg("%s", meter.wrong);
+}
+
+static void expect_reason(const char *text, size_t length, const char *reason)
+{
+    char wanted[DEVICE_WRONG_BYTES + sizeof path];
+
+    assert_int_equal(read_bytes(text, length), CODE_WRONG);
+    snprintf(wanted, sizeof wanted, "%s:%s", path, reason);
+    assert_string_equal(meter.wrong, wanted);
+    assert_null(meter.fields);
+    assert_null(meter.planned);
+    assert_int_equal(meter.count, 0);
+}
+
+static void expect_refused(const char *text, const char *reason)
+{
+    expect_reason(text, strlen(text), reason);
+}
+
+/* A file with one field, of these lines. */
+#define FIELD(lines) "fields:\n  - name: level\n    table: holding\n    address: 7\n" lines
+#define UINT16(lines) FIELD("    type: uint16\n" lines)
+
+/* --- what is read --- */
+
+static void a_field_has_what_its_file_says(void **state)
+{
+    const mbm_planField *planned;
+    const device_field *field;
+
+    (void)state;
+    read_text("device: SDM120\nunit: 3\ninterval: 2s\norder: CDAB\n"
+              "fields:\n"
+              "  - name: voltage\n"
+              "    table: input\n"
+              "    address: 65534\n"
+              "    type: float\n"
+              "    scale: 0.1\n"
+              "    unit_of_measurement: V\n"
+              "    description: Phase 1, voltage\n"
+              "    value: 23.5\n"
+              "  - {name: model, table: holding, address: 0, type: text, count: 5, interval: 1m,\n"
+              "     unit: 255, order: ABCD, access: read-write}\n");
+    assert_string_equal(meter.name, "SDM120");
+    assert_int_equal(meter.count, 2);
+    assert_int_equal(meter.readable, 2);
+    field = meter.fields;
+    planned = meter.planned;
+    assert_string_equal(field->name, "voltage");
+    assert_string_equal(field->unit_of_measurement, "V");
+    assert_string_equal(field->description, "Phase 1, voltage");
+    assert_int_equal(field->line, 6);
+    assert_int_equal(field->access, DEVICE_READ);
+    assert_int_equal(field->form.scale.digits, 1);
+    assert_int_equal(field->form.scale.exponent, -1);
+    assert_int_equal(planned->unit, 3);
+    assert_int_equal(planned->table, MBM_TABLE_INPUT_REGISTERS);
+    assert_int_equal(planned->address, 65534);
+    assert_int_equal(planned->type, MBM_TYPE_FLOAT);
+    assert_int_equal(planned->order, MBM_ORDER_CDAB);
+    assert_int_equal(planned->intervalMs, 2000);
+    assert_int_equal(device_size(planned), 2);
+    /* 235 is 0x436B0000, and the low word comes first. */
+    assert_int_equal(field->words[0], 0x0000);
+    assert_int_equal(field->words[1], 0x436B);
+    field++;
+    planned++;
+    assert_int_equal(field->access, DEVICE_READ | DEVICE_WRITE);
+    assert_null(field->words);
+    assert_null(field->unit_of_measurement);
+    assert_int_equal(field->line, 14);
+    assert_int_equal(planned->unit, 255);
+    assert_int_equal(planned->count, 5);
+    assert_int_equal(planned->order, MBM_ORDER_ABCD);
+    assert_int_equal(planned->intervalMs, 60000);
+    assert_int_equal(device_size(planned), 3);
+    assert_int_equal(device_find(&meter, "model"), 1);
+    assert_int_equal(device_find(&meter, "mode"), -1);
+    device_free(&meter);
+}
+
+static void what_a_file_leaves_out_has_the_documented_value(void **state)
+{
+    (void)state;
+    read_text(UINT16(""));
+    assert_null(meter.name);
+    assert_int_equal(meter.planned->unit, 1);
+    assert_int_equal(meter.planned->intervalMs, 1000);
+    assert_int_equal(meter.planned->order, MBM_ORDER_ABCD);
+    assert_int_equal(meter.planned->count, 1);
+    assert_int_equal(meter.fields->access, DEVICE_READ);
+    assert_int_equal(meter.fields->form.scale.digits, 0);
+    device_free(&meter);
+    read_text("fields: [{name: a, table: coils, address: 65535}]\n");
+    assert_int_equal(meter.planned->type, MBM_TYPE_BIT);
+    device_free(&meter);
+}
+
+static void fields_that_can_only_be_written_come_last(void **state)
+{
+    static const char *const names[] = {"b", "d", "a", "c"};
+    unsigned i;
+
+    (void)state;
+    read_text("fields:\n"
+              "- {name: a, table: holding, address: 0, type: uint16, access: write}\n"
+              "- {name: b, table: holding, address: 1, type: uint16}\n"
+              "- {name: c, table: holding, address: 2, type: uint16, access: write}\n"
+              "- {name: d, table: holding, address: 3, type: uint16, access: read-write}\n");
+    assert_int_equal(meter.count, 4);
+    assert_int_equal(meter.readable, 2);
+    for (i = 0; i < 4; i++) {
+        assert_string_equal(meter.fields[i].name, names[i]);
+        assert_int_equal(meter.planned[i].address, names[i][0] - 'a');
+    }
+    device_free(&meter);
+}
+
+static void expect_words(const char *text, unsigned count, const uint16_t *words)
+{
+    unsigned i;
+
+    read_text(text);
+    assert_non_null(meter.fields->words);
+    assert_int_equal(device_size(meter.planned), count);
+    for (i = 0; i < count; i++)
+        assert_int_equal(meter.fields->words[i], words[i]);
+    device_free(&meter);
+}
+
+#define WORDS(text, ...)                                                                           \
+    expect_words(text, sizeof((const uint16_t[]){__VA_ARGS__}) / 2, (const uint16_t[]){__VA_ARGS__})
+
+static void a_value_becomes_registers_exactly(void **state)
+{
+    (void)state;
+    WORDS(UINT16("    value: 65535\n"), 65535);
+    WORDS(UINT16("    scale: 0.1\n    value: 230.1\n"), 2301);
+    WORDS(UINT16("    scale: 0.1\n    order: BADC\n    value: 230.1\n"), 0xFD08);
+    WORDS(UINT16("    count: 3\n    value: [1, 2, 3]\n"), 1, 2, 3);
+    WORDS(FIELD("    type: int16\n    value: -2\n"), 0xFFFE);
+    WORDS(FIELD("    type: uint32\n    order: DCBA\n    value: 2923517522\n"), 0x5256, 0x41AE);
+    WORDS(FIELD("    type: int64\n    value: -9223372036854775808\n"), 0x8000, 0, 0, 0);
+    WORDS(FIELD("    type: int32\n    count: 2\n    value:\n    - -1\n    - 1\n"), 0xFFFF, 0xFFFF,
+          0, 1);
+    WORDS(FIELD("    type: float\n    value: 230.1\n"), 0x4366, 0x199A);
+    WORDS(FIELD("    type: double\n    value: -1e3\n"), 0xC08F, 0x4000, 0, 0);
+    WORDS(FIELD("    type: text\n    count: 5\n    value: abc\n"), 0x6162, 0x6300, 0);
+    WORDS(FIELD("    type: text\n    count: 4\n    value: \"21 \xC2\xB0\"\n"), 0x3231, 0x20B0);
+    WORDS("fields: [{name: a, table: coils, address: 0, value: on}]", 1);
+    WORDS("fields: [{name: a, table: coils, address: 0, count: 4, value: [1, 0, true, off]}]", 1, 0,
+          1, 0);
+}
+
+/* --- what is refused --- */
+
+static void a_wrong_word_is_refused_with_its_line(void **state)
+{
+    static const struct {
+        const char *text, *reason;
+    } rows[] = {
+        {FIELD("    type: real\n"), "5: type: \"real\" is not one of bit, uint16, int16, uint32, "
+                                    "int32, uint64, int64, float, double and text"},
+        {"fields:\n- name: a\n  table: holdings\n  address: 0\n  type: uint16\n",
+         "3: table: \"holdings\" is not one of coils, discrete, holding and input"},
+        {UINT16("    order: abcd\n"), "6: order: \"abcd\" is not one of ABCD, CDAB, BADC and DCBA"},
+        {"order: 1234\n" UINT16(""), "1: order: \"1234\" is not one of ABCD, CDAB, BADC and DCBA"},
+        {UINT16("    access: rw\n"), "6: access: \"rw\" is not one of read, write and read-write"},
+        {"fields: [{name: a, table: coils, address: 0, value: yes}]",
+         "1: value: \"yes\" is not one of 0, 1, false, true, off and on"},
+        {UINT16("    unit: 0\n"), "6: unit: \"0\" is out of range: from 1 to 255 is allowed"},
+        {"unit: 256\n" UINT16(""), "1: unit: \"256\" is out of range: from 1 to 255 is allowed"},
+        {UINT16("    unit: one\n"),
+         "6: unit: \"one\" is not a whole decimal number, here from 1 to 255"},
+        {UINT16("    unit: 0x10\n"), "6: unit: \"0x10\" begins with 0: write a decimal number"},
+        {UINT16("    unit: 017\n"), "6: unit: \"017\" begins with 0: write a decimal number"},
+        {UINT16("    unit: +5\n"),
+         "6: unit: \"+5\" is not a whole decimal number, here from 1 to 255"},
+        {"fields:\n- name: a\n  table: input\n  address: 65536\n  type: uint16\n",
+         "4: address: \"65536\" is out of range: from 0 to 65535 is allowed"},
+        {UINT16("    interval: 500\n"), "6: interval: \"500\" is not a time: write a whole number "
+                                        "and its unit, such as 500ms, 2s or 1m"},
+        {UINT16("    interval: 0ms\n"),
+         "6: interval: \"0ms\" is out of range: from 1ms to 24h is allowed"},
+        {"interval: 25h\n" UINT16(""),
+         "1: interval: \"25h\" is out of range: from 1ms to 24h is allowed"},
+        {UINT16("    count: 0\n"), "6: count: \"0\" is out of range: from 1 to 2000 is allowed"},
+        {UINT16("    scale: 0\n"),
+         "6: scale: \"0\" is not a decimal number of up to 18 digits other than 0"},
+        {UINT16("    scale: 0,1\n"),
+         "6: scale: \"0,1\" is not a decimal number of up to 18 digits other than 0"},
+    };
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++)
+        expect_refused(rows[i].text, rows[i].reason);
+}
+
+static void a_wrong_key_is_refused_with_its_line(void **state)
+{
+    static const struct {
+        const char *text, *reason;
+    } rows[] = {
+        {"maker: a\n" UINT16(""),
+         "1: key: \"maker\" is not one of device, unit, interval, order and fields"},
+        {UINT16("    addr: 5\n"),
+         "6: key: \"addr\" is not one of name, table, address, type, count, scale, "
+         "unit_of_measurement, access, interval, value, unit, order and description"},
+        {UINT16("    address: 7\n"), "6: address is there twice, first in line 4"},
+        {UINT16("    name: b\n"), "6: name is there twice, first in line 2"},
+        {UINT16("unit: 1\nunit: 2\n"), "7: unit is there twice, first in line 6"},
+        {UINT16("    [a]: 1\n"), "6: key is a list: it must be one word"},
+        {UINT16("    \"\": 1\n"), "6: key is empty"},
+        {"fields:\n- table: holding\n  address: 0\n  type: uint16\n", "2: the field has no name"},
+        {"fields:\n- name: a\n  address: 0\n  type: uint16\n", "2: the field has no table"},
+        {"fields:\n- name: a\n  table: input\n  type: uint16\n", "2: the field has no address"},
+        {"fields:\n- name: a\n  table: input\n  address: 0\n", "2: the field has no type"},
+        {FIELD("    type: text\n"), "2: a text needs its number of characters as count"},
+        {"unit: 1\n", "1: the file has no key fields"},
+        {"- a\n", "1: the file has no key fields"},
+        {"meter\n", "1: the file has no key fields"},
+        {"", " the file is empty"},
+        {"# nothing\n", " the file is empty"},
+        {"fields: []\n", "1: fields is empty"},
+        {"fields:\n", "1: fields must be a list: each field begins with \"-\""},
+        {"fields:\n  name: a\n", "2: fields must be a list: each field begins with \"-\""},
+        {"fields:\n  - a\n", "2: a field is a mapping that begins with \"- name:\""},
+        {"fields:\n  - [a]\n", "2: a field is a mapping that begins with \"- name:\""},
+        {UINT16("    unit: [1, 2]\n"), "6: unit is a list: it must be one word"},
+        {UINT16("    unit: {a: b}\n"), "6: unit is a mapping: it must be one word"},
+        {UINT16("    unit:\n"), "6: unit is empty"},
+        {UINT16("    description: \"a\\0b\"\n"), "6: description has a control character"},
+        {UINT16("    description: \"a\\nb\"\n"), "6: description has a control character"},
+        {"device: \"\"\n" UINT16(""), "1: device is empty"},
+        {UINT16("---\n") UINT16(""), "7: a second document begins: a file has one device"},
+    };
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++)
+        expect_refused(rows[i].text, rows[i].reason);
+}
+
+static void keys_that_do_not_go_together_are_refused(void **state)
+{
+    static const struct {
+        const char *text, *reason;
+    } rows[] = {
+        {FIELD("    type: bit\n"),
+         "5: type is bit: registers have another type, from uint16 to text"},
+        {"fields: [{name: a, table: coils, address: 0,\n type: uint16}]",
+         "2: type is uint16: the type of coils and discrete inputs is bit"},
+        {"fields: [{name: a, table: discrete, address: 0,\n access: write}]",
+         "2: access is write: only coils and holding registers can be written"},
+        {"fields: [{name: a, table: input, address: 0, type: float,\n access: read-write}]",
+         "2: access is read-write: only coils and holding registers can be written"},
+        {"fields: [{name: a, table: coils, address: 0,\n scale: 2}]", "2: a bit has no scale"},
+        {FIELD("    type: text\n    count: 2\n    scale: 2\n"), "7: a text has no scale"},
+        {UINT16("    count: 126\n"),
+         "6: count is 126: these are 126 registers, and one request reads at most 125"},
+        {FIELD("    type: double\n    count: 32\n"),
+         "6: count is 32: these are 128 registers, and one request reads at most 125"},
+        {FIELD("    type: text\n    count: 251\n"),
+         "6: count is 251: these are 126 registers, and one request reads at most 125"},
+        {"fields:\n- name: a\n  table: input\n  type: double\n  address: 65533\n",
+         "5: the field has 4 registers from address 65533 on: addresses end at 65535"},
+        {"fields:\n- name: a\n  table: coils\n  count: 9\n  address: 65530\n",
+         "5: the field has 9 bits from address 65530 on: addresses end at 65535"},
+        {UINT16("") "  - {name: level, table: input, address: 7, type: uint16}\n",
+         "6: the field in line 2 has the name level too"},
+        {UINT16("    count: 2\n") "  - {name: b, table: holding, address: 8, type: uint16}\n",
+         "7: b shares an address with level of line 2"},
+        {UINT16("") "  - {name: b, table: holding, address: 4, type: uint64}\n",
+         "6: b shares an address with level of line 2"},
+    };
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++)
+        expect_refused(rows[i].text, rows[i].reason);
+    read_text(UINT16("") "  - {name: b, table: holding, address: 3, type: uint64}\n"
+                         "  - {name: c, table: input, address: 7, type: uint16}\n"
+                         "  - {name: d, table: holding, address: 7, type: uint16, unit: 2}\n");
+    device_free(&meter);
+}
+
+static void a_value_that_the_registers_cannot_hold_is_refused(void **state)
+{
+    static const struct {
+        const char *text, *reason;
+    } rows[] = {
+        {UINT16("    value: 65536\n"), "6: value: \"65536\" is out of range of uint16"},
+        {UINT16("    value: -1\n"), "6: value: \"-1\" is out of range of uint16"},
+        {UINT16("    value: 1.5\n"), "6: value: \"1.5\" is not a whole number"},
+        {UINT16("    value: high\n"), "6: value: \"high\" is not a decimal number"},
+        {UINT16("    value: 21,5\n"), "6: value: \"21,5\" is not a decimal number"},
+        {UINT16("    value: 0x10\n"), "6: value: \"0x10\" is not a decimal number"},
+        {UINT16("    scale: 0.1\n    value: 230.15\n"),
+         "7: value: \"230.15\" is not a multiple of the scale"},
+        {UINT16("    value: [1]\n"), "6: value is a list: it must be one word"},
+        {UINT16("    count: 2\n    value: 1\n"),
+         "7: value must be a list of 2 values, as count says"},
+        {UINT16("    count: 2\n    value: [1]\n"),
+         "7: value must be a list of 2 values, as count says"},
+        {UINT16("    count: 2\n    value:\n    - 1\n    - 2\n    - 3\n"),
+         "8: value must be a list of 2 values, as count says"},
+        {UINT16("    count: 2\n    value:\n    - 1\n    - x\n"),
+         "9: value: \"x\" is not a decimal number"},
+        {FIELD("    type: float\n    value: 1e39\n"),
+         "6: value: \"1e39\" is out of range of float"},
+        {FIELD("    type: text\n    count: 2\n    value: abc\n"),
+         "7: value has 3 characters, and count is 2"},
+        {FIELD("    type: text\n    count: 9\n    value: \"\xE2\x82\xAC\"\n"),
+         "7: value has a character that is not in Latin-1"},
+        {FIELD("    type: text\n    count: 9\n    value: [a]\n"),
+         "7: value is a list: it must be one word"},
+    };
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++)
+        expect_refused(rows[i].text, rows[i].reason);
+}
+
+static void what_is_not_yaml_is_refused(void **state)
+{
+    (void)state;
+    expect_refused("fields:\n  - name: a\n table: b\n",
+                   "3: this is not YAML: while parsing a block mapping, did not find expected "
+                   "key");
+    expect_refused("fields: [\n\n", "3: this is not YAML: while parsing a flow node, did not find "
+                                    "expected node content");
+    expect_refused("\tfields: 1\n", "1: this is not YAML: while scanning for the next token, found "
+                                    "character that cannot start any token");
+    expect_refused("fields: *a\n", "1: this is not YAML: found undefined alias");
+    expect_refused("fields: \xFF\n", " this is not YAML: invalid leading UTF-8 octet, at byte 8");
+    expect_reason("fields: \0\n", 10,
+                  " this is not YAML: control characters are not allowed, at "
+                  "byte 8");
+}
+
+static void an_anchor_that_holds_itself_is_refused(void **state)
+{
+    (void)state;
+    expect_refused("fields: &a [*a]\n", "1: a field is a mapping that begins with \"- name:\"");
+    expect_refused("&a {fields: *a}\n", "1: fields must be a list: each field begins with \"-\"");
+}
+
+static void a_file_that_cannot_be_read_is_a_failure_of_the_system(void **state)
+{
+    (void)state;
+    assert_int_equal(device_read(&meter, "/nowhere/meter.yaml"), CODE_SYSTEM);
+    assert_string_equal(meter.wrong, "/nowhere/meter.yaml: No such file or directory");
+    assert_int_equal(device_read(&meter, "/tmp"), CODE_SYSTEM);
+    assert_string_equal(meter.wrong, "/tmp: Is a directory");
+}
+
+static void a_file_has_at_most_as_many_fields_as_a_plan(void **state)
+{
+    const size_t size = 80 * ((size_t)MBM_PLAN_MAX_FIELDS + 1);
+    char *text = malloc(size), reason[100];
+    size_t length;
+    int i;
+
+    (void)state;
+    assert_non_null(text);
+    length = (size_t)snprintf(text, size, "fields:\n");
+    for (i = 0; i <= MBM_PLAN_MAX_FIELDS; i++)
+        length += (size_t)snprintf(text + length, size - length,
+                                   "- {name: n%d, table: coils, address: %d}\n", i, i);
+    snprintf(reason, sizeof reason, "2: the file has %d fields: %d are allowed",
+             MBM_PLAN_MAX_FIELDS + 1, MBM_PLAN_MAX_FIELDS);
+    expect_reason(text, length, reason);
+    free(text);
+}
+
+/* --- damaged files --- */
+
+static uint32_t next_random(uint32_t *state)
+{
+    *state ^= *state << 13;
+    *state ^= *state >> 17;
+    *state ^= *state << 5;
+    return *state;
+}
+
+/* The sanitizers find what reads or frees too much, and what is not freed. */
+static void any_damaged_file_is_read_or_refused(void **state)
+{
+    static const char whole[] =
+        "device: SDM120\nunit: 3\ninterval: 2s\norder: CDAB\nfields:\n"
+        "  - name: voltage\n    table: input\n    address: 0\n    type: float\n    scale: 0.1\n"
+        "    unit_of_measurement: V\n    value: 23.5\n"
+        "  - {name: model, table: holding, address: 0, type: text, count: 5, value: abc}\n"
+        "  - {name: three, table: holding, address: 9, type: int16, count: 3, value: [1, -2, 3],\n"
+        "     access: read-write}\n"
+        "  - {name: on, table: coils, address: 1, count: 2, value: [on, off], access: write}\n";
+    static const char pieces[][8] = {"- ", ": ", "\n", "[", "]",  "{",    "}",      "&a ",
+                                     "*a", "0",  "-",  "'", "\"", "\xC3", "text\n", "\n  - "};
+    char bytes[2 * sizeof whole];
+    unsigned round, right = 0;
+    uint32_t random = 1;
+
+    (void)state;
+    for (round = 0; round < 20000; round++) {
+        size_t length = sizeof whole - 1;
+        unsigned change;
+
+        memcpy(bytes, whole, length);
+        for (change = 0; change <= round % 4; change++) {
+            const size_t at = next_random(&random) % length;
+            const char *piece = pieces[next_random(&random) % COUNT(pieces)];
+            const size_t count = next_random(&random) % 9;
+
+            switch (next_random(&random) % 4) {
+            case 0: bytes[at] = (char)next_random(&random); break;
+            case 1:
+                memmove(bytes + at + strlen(piece), bytes + at, length - at);
+                memcpy(bytes + at, piece, strlen(piece));
+                length += strlen(piece);
+                break;
+            case 2:
+                if (at + count < length) {
+                    memmove(bytes + at, bytes + at + count, length - at - count);
+                    length -= count;
+                }
+                break;
+            default: length = round % 50 == 0 ? at + 1 : length; break;
+            }
+        }
+        if (read_bytes(bytes, length) == CODE_DONE) {
+            right++;
+            device_free(&meter);
+        } else {
+            assert_int_equal(memcmp(meter.wrong, path, strlen(path)), 0);
+        }
+    }
+    assert_in_range(right, 100, 19900);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_field_has_what_its_file_says),
+        cmocka_unit_test(what_a_file_leaves_out_has_the_documented_value),
+        cmocka_unit_test(fields_that_can_only_be_written_come_last),
+        cmocka_unit_test(a_value_becomes_registers_exactly),
+        cmocka_unit_test(a_wrong_word_is_refused_with_its_line),
+        cmocka_unit_test(a_wrong_key_is_refused_with_its_line),
+        cmocka_unit_test(keys_that_do_not_go_together_are_refused),
+        cmocka_unit_test(a_value_that_the_registers_cannot_hold_is_refused),
+        cmocka_unit_test(what_is_not_yaml_is_refused),
+        cmocka_unit_test(an_anchor_that_holds_itself_is_refused),
+        cmocka_unit_test(a_file_that_cannot_be_read_is_a_failure_of_the_system),
+        cmocka_unit_test(a_file_has_at_most_as_many_fields_as_a_plan),
+        cmocka_unit_test(any_damaged_file_is_read_or_refused),
+    };
+
+    return cmocka_run_group_tests_name("the device file", tests, make_file, remove_file);
+}

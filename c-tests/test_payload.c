@@ -1,0 +1,606 @@
+/* The payloads of writes that `mbm bridge` takes: the whole payload is the number that the
+ * registers then hold, or nothing is written. */
+#include "payload.h"
+#include "test.h"
+
+#include <float.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static uint16_t words[VALUE_WORDS];
+static const char *wrong;
+
+static uint16_t parse_bytes(uint8_t type, const char *scale, const char *payload, size_t length)
+{
+    value_form form = {.type = type, .order = MBM_ORDER_ABCD};
+    /* Memory that ends with the payload, so that sanitizers see each byte read beyond it. */
+    char *copy = malloc(length > 0 ? length : 1);
+    uint16_t count;
+
+    assert_non_null(copy);
+    memcpy(copy, payload, length);
+    memset(words, 0, sizeof words);
+    if (scale) {
+        assert_int_equal(value_scale_read(scale, &form.scale), 1);
+    }
+    count = payload_parse(&form, copy, length, words, &wrong);
+    free(copy);
+    return count;
+}
+
+static uint16_t parse(uint8_t type, const char *scale, const char *payload)
+{
+    return parse_bytes(type, scale, payload, strlen(payload));
+}
+
+/* The integer in the words of the last payload. */
+static uint64_t written(uint16_t count)
+{
+    uint64_t value = 0;
+    uint16_t at;
+
+    for (at = 0; at < count; at++)
+        value = value << 16 | words[at];
+    return value;
+}
+
+static void expect(uint8_t type, const char *scale, const char *payload, uint64_t value)
+{
+    const uint16_t count = parse(type, scale, payload);
+
+    if (count == 0)
+        fail_msg("%s: %s", payload, wrong);
+    assert_null(wrong);
+    if (written(count) != value)
+        fail_msg("%s: %" PRIx64 " is written, not %" PRIx64, payload, written(count), value);
+}
+
+static void expect_refused(uint8_t type, const char *scale, const char *payload, const char *reason)
+{
+    if (parse(type, scale, payload) != 0)
+        fail_msg("type %d: %s is taken", type, payload);
+    assert_non_null(strstr(wrong, reason));
+}
+
+/* Every type refuses these. */
+static const char *const NO_NUMBERS[] = {
+    "21,5",
+    "0x10",
+    "12abc",
+    "5 6 7",
+    "1x",
+    "x1",
+    "+5",
+    ".5",
+    "5.",
+    "05",
+    "-",
+    "--1",
+    "- 1",
+    "1e",
+    "1e+",
+    "1.e5",
+    "1e5.0",
+    "1_000",
+    "1,000",
+    "1'000",
+    "0b1",
+    "0o7",
+    "1f",
+    "1.0f",
+    "1L",
+    "NaN",
+    "nan",
+    "Inf",
+    "inf",
+    "-inf",
+    "Infinity",
+    "-Infinity",
+    "null",
+    "hot",
+    "\"5\"",
+    "[5]",
+    "[]",
+    "{}",
+    "5;",
+    "5\n6",
+    "\357\273\2775", /* a byte order mark, as octal digits end after three */
+    "\302\2405",     /* a space that does not break */
+    "\xd9\xa5",
+    "1\v",
+    "\f1",
+    " ",
+    "\n",
+    "truetrue",
+    "ONOFF",
+    "ON 1",
+    "on,off",
+    "On",
+    "True",
+    "TRUE",
+    "truex",
+    "yes",
+    "{\"value\":9}}garbage",
+    "{\"value\":9}}",
+    "{\"value\":9} 9",
+    "{\"value\":9}{\"value\":9}",
+    "{\"value\":9",
+    "{\"value\":9,}",
+    "{,\"value\":9}",
+    "{\"value\":9 9}",
+    "{\"value\" 9}",
+    "{\"value\":}",
+    "{value:9}",
+    "{'value':9}",
+    "{\"Value\":9}",
+    "{\"values\":9}",
+    "{\"val\":9}",
+    "{\"value\":\"9\"}",
+    "{\"value\":null}",
+    "{\"value\":[9]}",
+    "{\"value\":{\"value\":9}}",
+    "{\"value\":0x9}",
+    "{\"value\":09}",
+    "{\"value\":+9}",
+    "{\"value\":9.}",
+    "{\"value\":9,5}",
+    "{\"value\":9x}",
+    "{\"value\":NaN}",
+    "{\"value\":ON}",
+    "{\"value\":9,\"value\":9}",
+    "{\"value\":9,\"value\":8}",
+    "{\"v\\u0061lue\":9}",
+    "{\"value\":9,\"v\\u0061lue\":8}",
+    "{\"a\":{\"value\":9}}",
+    "{\"a\":\"\\x\",\"value\":9}",
+    "{\"a\":\"\\u12g4\",\"value\":9}",
+    "{\"a\":\"\n\",\"value\":9}",
+    "{\"a\":truth,\"value\":9}",
+    "{\"a\":[1,],\"value\":9}",
+    "{\"a\":[1}],\"value\":9}",
+    "{\"a\":\"b,\"value\":9}",
+    "[{\"value\":9}]",
+    "{\"value\":9}\\",
+    "// 5",
+    "5 /* 5 */",
+};
+
+static void a_payload_that_is_no_number_as_a_whole_is_refused(void **state)
+{
+    unsigned i;
+    uint8_t type;
+
+    (void)state;
+    for (i = 0; i < COUNT(NO_NUMBERS); i++)
+        for (type = MBM_TYPE_BIT; type <= MBM_TYPE_DOUBLE; type++)
+            expect_refused(type, NULL, NO_NUMBERS[i], "no number");
+}
+
+static void bytes_after_a_zero_byte_are_not_overlooked(void **state)
+{
+    static const struct {
+        const char *payload;
+        size_t length;
+    } rows[] = {
+        {"5\0", 2},
+        {"5\0garbage", 9},
+        {"\0", 1},
+        {"\0005", 2},
+        {"ON\0", 3},
+        {"{\"value\":9}\0", 12},
+        {"{\"value\":9\0}", 12},
+        {"{\"value\0\":9}", 12},
+        {"{\"a\":\"\\\0\",\"value\":9}", 20},
+        {"{\"a\":\"\\u000\0\",\"value\":9}", 24},
+    };
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++) {
+        assert_int_equal(parse_bytes(MBM_TYPE_UINT16, NULL, rows[i].payload, rows[i].length), 0);
+        assert_int_equal(parse_bytes(MBM_TYPE_BIT, NULL, rows[i].payload, rows[i].length), 0);
+    }
+    assert_int_equal(parse_bytes(MBM_TYPE_UINT16, NULL, "", 0), 0);
+}
+
+static void a_payload_ends_where_its_length_says(void **state)
+{
+    (void)state;
+    assert_int_equal(parse_bytes(MBM_TYPE_UINT16, NULL, "1234", 2), 1);
+    assert_int_equal(words[0], 12);
+    assert_int_equal(parse_bytes(MBM_TYPE_UINT16, NULL, "{\"value\":12}", 11), 0);
+}
+
+static void json_may_have_space_and_other_members(void **state)
+{
+    static const char *const rows[] = {
+        "9",
+        " 9",
+        "9\n",
+        "\r\n9\t ",
+        "{\"value\":9}",
+        " { \"value\" : 9 } \n",
+        "{\"unit\":\"V\",\"value\":9}",
+        "{\"value\":9,\"status\":\"success\",\"time\":null}",
+        "{\"a\":{\"value\":1,\"b\":[1,-2.5e3,{}]},\"value\":9}",
+        "{\"a\":\"\\\"}\\u00e9\",\"value\":9}",
+        "{\"a\":[],\"b\":[[],\"\"],\"c\":true,\"d\":false,\"value\":9}",
+        "9.0",
+        "0.9e1",
+        "90e-1",
+        "9.000000000000000000000000000000000000",
+        "0.00000000000000000000000000000009e32",
+    };
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++)
+        expect(MBM_TYPE_UINT16, NULL, rows[i], 9);
+}
+
+static void integers_of_64_bits_are_exact(void **state)
+{
+    static const char *const forms[] = {"%s", "{\"value\":%s}", "%s.0", "%se0", "%s0e-1"};
+    static const struct {
+        uint8_t type;
+        const char *text;
+        uint64_t value;
+    } rows[] = {
+        {MBM_TYPE_UINT64, "9007199254740993", 9007199254740993u},
+        {MBM_TYPE_INT64, "9007199254740993", 9007199254740993u},
+        {MBM_TYPE_INT64, "-9007199254740993", 0 - (uint64_t)9007199254740993u},
+        {MBM_TYPE_UINT64, "18446744073709551615", UINT64_MAX},
+        {MBM_TYPE_INT64, "9223372036854775807", INT64_MAX},
+        {MBM_TYPE_INT64, "-9223372036854775808", (uint64_t)INT64_MAX + 1},
+    };
+    char payload[64];
+    unsigned i, form;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++)
+        for (form = 0; form < COUNT(forms); form++) {
+            snprintf(payload, sizeof payload, forms[form], rows[i].text);
+            expect(rows[i].type, NULL, payload, rows[i].value);
+        }
+}
+
+static void every_integer_of_a_type_is_taken_and_none_beyond(void **state)
+{
+    static const struct {
+        uint8_t type;
+        const char *least, *below, *most, *above;
+    } rows[] = {
+        {MBM_TYPE_BIT, "0", "-1", "1", "2"},
+        {MBM_TYPE_UINT16, "0", "-1", "65535", "65536"},
+        {MBM_TYPE_INT16, "-32768", "-32769", "32767", "32768"},
+        {MBM_TYPE_UINT32, "0", "-1", "4294967295", "4294967296"},
+        {MBM_TYPE_INT32, "-2147483648", "-2147483649", "2147483647", "2147483648"},
+        {MBM_TYPE_UINT64, "-0", "-1", "18446744073709551615", "18446744073709551616"},
+        {MBM_TYPE_INT64, "-9223372036854775808", "-9223372036854775809", "9223372036854775807",
+         "9223372036854775808"},
+    };
+    static const char *const far[] = {
+
+        "1e20",
+        "1e38",
+        "1e39",
+        "1e308",
+        "1e309",
+
+        "1e99999",
+        "1e2147483648",
+        "1e9223372036854775808",
+        "1e18446744073709551616",
+        "1e99999999999999999999999999999999999",
+        "99999999999999999999999999999999999999999999999999999999999999999999999999",
+        "18446744073709551617",
+        "36893488147419103233",
+        "340282366920938463463374607431768211457",
+    };
+    unsigned i, k;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++) {
+        const uint16_t count = parse(rows[i].type, NULL, rows[i].least);
+
+        assert_int_equal(count, parse(rows[i].type, NULL, rows[i].most));
+        assert_int_not_equal(count, 0);
+        expect_refused(rows[i].type, NULL, rows[i].below, "out of range");
+        expect_refused(rows[i].type, NULL, rows[i].above, "out of range");
+        for (k = 0; k < COUNT(far); k++)
+            expect_refused(rows[i].type, NULL, far[k], "out of range");
+    }
+    expect(MBM_TYPE_INT16, NULL, "-1", 0xFFFF);
+    expect(MBM_TYPE_INT16, NULL, "-32768", 0x8000);
+    expect(MBM_TYPE_INT32, NULL, "-2", 0xFFFFFFFE);
+    expect(MBM_TYPE_UINT16, NULL, "0e99999999999999999999", 0);
+    expect(MBM_TYPE_UINT16, NULL, "-0.0", 0);
+}
+
+static void a_fraction_for_an_integer_is_refused_and_not_rounded(void **state)
+{
+    static const char *const rows[] = {
+        "0.5",
+        "1.5",
+        "-0.4",
+        "1.0000000000000000000000000000000000000000000000001",
+        "15e-1",
+        "0.99999999999999999999",
+        "1e-1",
+        "1e-99999",
+        "1e-99999999999999999999999999",
+        "{\"value\":1.5}",
+        "65535.5",
+        "18446744073709551615.5",
+    };
+    unsigned i;
+    uint8_t type;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++)
+        for (type = MBM_TYPE_BIT; type <= MBM_TYPE_INT64; type++)
+            expect_refused(type, NULL, rows[i], "not a whole number");
+}
+
+static void a_scaled_number_is_a_multiple_of_the_scale_in_decimal(void **state)
+{
+    (void)state;
+    expect(MBM_TYPE_UINT16, "0.1", "12.3", 123);
+    expect(MBM_TYPE_UINT16, "0.1", "{\"value\":6553.5}", 65535);
+    expect(MBM_TYPE_UINT16, "0.1", "0.30", 3);
+    expect(MBM_TYPE_INT16, "-0.1", "12.3", (uint16_t)-123);
+    expect(MBM_TYPE_INT16, "-0.1", "-12.3", 123);
+    expect(MBM_TYPE_UINT16, "0.25", "0.75", 3);
+    expect(MBM_TYPE_UINT16, "0.25", "1.5", 6);
+    expect(MBM_TYPE_UINT16, "25e-2", "1e1", 40);
+    expect(MBM_TYPE_UINT16, "10", "120", 12);
+    expect(MBM_TYPE_UINT16, "0.333333", "2.333331", 7);
+    expect(MBM_TYPE_UINT64, "0.001", "18446744073709551.615", UINT64_MAX);
+    expect(MBM_TYPE_INT64, "0.1", "-922337203685477580.8", (uint64_t)INT64_MAX + 1);
+    expect(MBM_TYPE_UINT64, "0.123456789012345678", "0.370370367037037034", 3);
+    expect(MBM_TYPE_UINT64, "0.999999999999999999", "18446744073709551596.553255926290448385",
+           18446744073709551615u);
+    expect_refused(MBM_TYPE_UINT16, "0.1", "12.34", "multiple of the scale");
+    expect_refused(MBM_TYPE_UINT16, "0.1", "0.05", "multiple of the scale");
+    expect_refused(MBM_TYPE_UINT16, "0.25", "0.3", "multiple of the scale");
+    expect_refused(MBM_TYPE_UINT16, "10", "125", "multiple of the scale");
+    expect_refused(MBM_TYPE_UINT16, "3", "10", "multiple of the scale");
+    expect_refused(MBM_TYPE_UINT16, "0.1", "6553.6", "out of range");
+    expect_refused(MBM_TYPE_UINT16, "0.1", "-0.1", "out of range");
+    expect_refused(MBM_TYPE_UINT16, "-0.1", "0.1", "out of range");
+    expect_refused(MBM_TYPE_UINT64, "0.001", "18446744073709551.616", "out of range");
+    expect_refused(MBM_TYPE_UINT16, "1e-300", "1e300", "out of range");
+    expect_refused(MBM_TYPE_UINT16, "1e300", "1e-300", "multiple of the scale");
+}
+
+static void what_a_scaled_integer_is_published_as_can_be_written_back(void **state)
+{
+    static const char *const scales[] = {"0.1",  "0.01", "0.001", "1e-4", "0.5",     "0.25",
+                                         "-0.1", "7",    "10",    "1000", "0.333333"};
+    char payload[64];
+    unsigned i, raw;
+
+    (void)state;
+    for (i = 0; i < COUNT(scales); i++)
+        for (raw = 0; raw <= UINT16_MAX; raw += 1 + raw % 7) {
+            /* As a scaled value is published. */
+            snprintf(payload, sizeof payload, "%.15g", (double)raw * strtod(scales[i], NULL));
+            expect(MBM_TYPE_UINT16, scales[i], payload, raw);
+        }
+}
+
+static void a_scale_is_a_decimal_number(void **state)
+{
+    static const char *const bad[] = {
+        "",
+        "0",
+        "-0.0",
+        "0x1",
+        "0x1p-3",
+        "nan",
+        "inf",
+        "1e400",
+        "1e-400",
+        "1,5",
+        "1 ",
+        " 1",
+        "1x",
+        "+1",
+        ".1",
+        "1.",
+        "1234567890123456789",
+        "0.1234567890123456789",
+    };
+    value_scale scale;
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(bad); i++)
+        if (value_scale_read(bad[i], &scale))
+            fail_msg("%s is taken", bad[i]);
+    assert_int_equal(value_scale_read("-12.50", &scale), 1);
+    assert_int_equal(scale.digits, 125);
+    assert_int_equal(scale.exponent, -1);
+    assert_int_equal(scale.is_negative, 1);
+    assert_true(scale.value == -12.5);
+}
+
+static float float_of_words(void)
+{
+    const uint32_t bits = (uint32_t)words[0] << 16 | words[1];
+    float value;
+
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+static double double_of_words(void)
+{
+    const uint64_t bits = written(4);
+    double value;
+
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+static void a_float_gets_the_nearest_number_or_none(void **state)
+{
+    (void)state;
+    assert_int_equal(parse(MBM_TYPE_FLOAT, NULL, "21.5"), 2);
+    assert_true(float_of_words() == 21.5f);
+    assert_int_equal(parse(MBM_TYPE_FLOAT, NULL, "0.1"), 2);
+    assert_true(float_of_words() == 0.1f);
+    /* Just above the middle of two floats, but as a double exactly in the middle. */
+    assert_int_equal(parse(MBM_TYPE_FLOAT, NULL, "1.00000017881393432617187500001"), 2);
+    assert_true(float_of_words() == 1.00000023841857910156f);
+    assert_int_equal(parse(MBM_TYPE_FLOAT, NULL, "3.4028234663852886e38"), 2);
+    assert_true(float_of_words() == FLT_MAX);
+    assert_int_equal(parse(MBM_TYPE_FLOAT, NULL, "-1e-45"), 2);
+    assert_true(float_of_words() < 0);
+    assert_int_equal(parse(MBM_TYPE_FLOAT, NULL, "0e5"), 2);
+    assert_true(float_of_words() == 0);
+    assert_int_equal(parse(MBM_TYPE_FLOAT, "0.1", "12.5"), 2);
+    assert_true(float_of_words() == 125.0f);
+    assert_int_equal(parse(MBM_TYPE_DOUBLE, NULL, "0.1"), 4);
+    assert_true(double_of_words() == 0.1);
+    assert_int_equal(parse(MBM_TYPE_DOUBLE, NULL, "9007199254740992"), 4);
+    assert_true(double_of_words() == 9007199254740992.0);
+    expect_refused(MBM_TYPE_FLOAT, NULL, "3.5e38", "out of range");
+    expect_refused(MBM_TYPE_FLOAT, NULL, "-1e39", "out of range");
+    expect_refused(MBM_TYPE_FLOAT, NULL, "1e-46", "out of range");
+    expect_refused(MBM_TYPE_FLOAT, "0.001", "1e36", "out of range");
+    expect_refused(MBM_TYPE_DOUBLE, NULL, "1e309", "out of range");
+    expect_refused(MBM_TYPE_DOUBLE, NULL, "1e-400", "out of range");
+    expect_refused(MBM_TYPE_DOUBLE, "1e-300", "1e300", "out of range");
+}
+
+static void only_a_bit_takes_a_truth_value(void **state)
+{
+    static const char *const on[] = {"true",  "on",           "ON", "1", "1.0", "{\"value\":true}",
+                                     " ON\n", "{\"value\":1}"};
+    static const char *const off[] = {
+        "false", "off", "OFF", "0", "-0", "{\"value\":false}", "{\"value\":0.0}"};
+    unsigned i;
+    uint8_t type;
+
+    (void)state;
+    for (i = 0; i < COUNT(on); i++)
+        expect(MBM_TYPE_BIT, NULL, on[i], 1);
+    for (i = 0; i < COUNT(off); i++)
+        expect(MBM_TYPE_BIT, NULL, off[i], 0);
+    for (type = MBM_TYPE_UINT16; type <= MBM_TYPE_DOUBLE; type++) {
+        expect_refused(type, NULL, "true", "no number");
+        expect_refused(type, NULL, "ON", "no number");
+        expect_refused(type, NULL, "{\"value\":false}", "no number");
+    }
+}
+
+static void the_longest_payload_is_read_and_a_longer_one_is_refused(void **state)
+{
+    char payload[PAYLOAD_BYTES + 2];
+
+    (void)state;
+    memset(payload, '0', sizeof payload);
+    payload[1] = '.';
+    payload[sizeof payload - 1] = '\0';
+    expect_refused(MBM_TYPE_UINT16, NULL, payload, "too long");
+    payload[PAYLOAD_BYTES] = '\0';
+    expect(MBM_TYPE_UINT16, NULL, payload, 0);
+    memset(payload, '9', PAYLOAD_BYTES);
+    expect_refused(MBM_TYPE_UINT64, NULL, payload, "out of range");
+    assert_int_equal(parse(MBM_TYPE_DOUBLE, NULL, payload), 4);
+    memset(payload, '[', PAYLOAD_BYTES);
+    memcpy(payload, "{\"a\":", 5);
+    expect_refused(MBM_TYPE_UINT16, NULL, payload, "no number");
+}
+
+static uint64_t random_state = 0x9E3779B97F4A7C15u;
+
+static uint64_t next_random(void)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 7;
+    random_state ^= random_state << 17;
+    return random_state;
+}
+
+static void random_integers_are_written_exactly(void **state)
+{
+    char payload[80];
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < 20000; i++) {
+        const uint64_t value = next_random() >> next_random() % 64;
+        const unsigned decimals = (unsigned)(next_random() % 6);
+        char digits[32], scale[16];
+
+        snprintf(payload, sizeof payload, i % 2 ? "%" PRIu64 : "{\"value\":%" PRIu64 "}", value);
+        expect(MBM_TYPE_UINT64, NULL, payload, value);
+        snprintf(payload, sizeof payload, i % 2 ? "%" PRId64 : "{\"value\":%" PRId64 "}",
+                 (int64_t)value);
+        expect(MBM_TYPE_INT64, NULL, payload, value);
+        /* The same digits with a point in front of the last ones. */
+        snprintf(digits, sizeof digits, "%06" PRIu64, value);
+        snprintf(scale, sizeof scale, "1e-%u", decimals);
+        snprintf(payload, sizeof payload, "%" PRIu64 "%s%s",
+                 decimals ? value / (uint64_t)llround(pow(10, decimals)) : value,
+                 decimals ? "." : "", digits + strlen(digits) - decimals);
+        expect(MBM_TYPE_UINT64, scale, payload, value);
+    }
+}
+
+/* Any bytes: what is taken as a number is one for strtod too, up to its end, and is the number that
+ * is written. */
+static void random_bytes_are_numbers_or_refused(void **state)
+{
+    static const char BYTES[] = "0123456789.-+eE {}[]\":,valuex\\\n\0truefsON";
+    char payload[24];
+    unsigned i, taken = 0;
+
+    (void)state;
+    for (i = 0; i < 400000; i++) {
+        const size_t length = next_random() % 7;
+        char *end;
+        size_t at;
+
+        for (at = 0; at < length; at++)
+            payload[at] = BYTES[next_random() % (next_random() % 2 ? 15 : sizeof BYTES)];
+        payload[length] = '\0';
+        if (parse_bytes(MBM_TYPE_INT16, NULL, payload, length) == 0)
+            continue;
+        taken++;
+        assert_true(strtod(payload, &end) == (double)(int16_t)words[0]);
+        while (end < payload + length && strchr(" \n", *end))
+            end++;
+        assert_ptr_equal(end, payload + length);
+        assert_null(strpbrk(payload, "xX,"));
+    }
+    assert_true(taken > 1000);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_payload_that_is_no_number_as_a_whole_is_refused),
+        cmocka_unit_test(bytes_after_a_zero_byte_are_not_overlooked),
+        cmocka_unit_test(a_payload_ends_where_its_length_says),
+        cmocka_unit_test(json_may_have_space_and_other_members),
+        cmocka_unit_test(integers_of_64_bits_are_exact),
+        cmocka_unit_test(every_integer_of_a_type_is_taken_and_none_beyond),
+        cmocka_unit_test(a_fraction_for_an_integer_is_refused_and_not_rounded),
+        cmocka_unit_test(a_scaled_number_is_a_multiple_of_the_scale_in_decimal),
+        cmocka_unit_test(what_a_scaled_integer_is_published_as_can_be_written_back),
+        cmocka_unit_test(a_scale_is_a_decimal_number),
+        cmocka_unit_test(a_float_gets_the_nearest_number_or_none),
+        cmocka_unit_test(only_a_bit_takes_a_truth_value),
+        cmocka_unit_test(the_longest_payload_is_read_and_a_longer_one_is_refused),
+        cmocka_unit_test(random_integers_are_written_exactly),
+        cmocka_unit_test(random_bytes_are_numbers_or_refused),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,67 @@
+/* The connection of `mbm bridge` to its MQTT broker, by libmosquitto. A thread of libmosquitto
+ * connects, and connects again after the broker was lost, after 1 s, then 2 s, up to 30 s. What
+ * arrives is handed to the program through a pipe, so the program needs no locks.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef BROKER_H
+#define BROKER_H
+
+#include "device.h"
+#include "payload.h"
+
+#include <stdatomic.h>
+
+struct mosquitto;
+
+/* The most levels of a field's name, of which a/b/c has three; and the most bytes of the topic of a
+ * bridge. */
+enum { BROKER_LEVELS = 8, BROKER_TOPIC_BYTES = 200 };
+
+typedef struct broker_options {
+    const char *host;
+    int port;
+    const char *topic;   /* the beginning of all topics */
+    const char *id;      /* the client identifier; NULL for a random one */
+    const char *user;    /* NULL for none; the password is in the environment, MQTT_PASSWORD */
+    const char *ca_file; /* the certificates that sign the broker's; NULL: no TLS */
+    const char *cert_file, *key_file; /* of the bridge; or NULL */
+} broker_options;
+
+/* What the broker sends: that it is connected, or a write to a field that may be written. */
+typedef struct broker_event {
+    enum { BROKER_CONNECTED, BROKER_WRITE } kind;
+    uint16_t field;  /* BROKER_WRITE: the index of the field */
+    uint16_t length; /* BROKER_WRITE: bytes of the payload */
+    char payload[PAYLOAD_BYTES];
+} broker_event;
+
+typedef struct broker {
+    struct mosquitto *mosquitto;
+    const device *device; /* where the fields are */
+    const char *topic;
+    int events[2]; /* a pipe: poll events[0] for POLLIN */
+    atomic_ulong published;
+    atomic_ulong lost; /* writes that the pipe did not take */
+} broker;
+
+/* Returns NULL, or what is wrong with the name of a field: it is the middle of topics. */
+const char *broker_check_name(const char *name);
+
+/* Begins to connect, and does not wait for it. Returns an exit code, after reporting the reason if
+ * it is not CODE_DONE. */
+int broker_begin(broker *of, const broker_options *options, const device *with);
+
+/* Takes the next event. Returns 0 if there is none. */
+int broker_next(broker *of, broker_event *event);
+
+/* Publishes a text below the broker's topic: TOPIC/NAME, or TOPIC/NAME/LAST if `last` is not NULL.
+ * While there is no broker it does nothing: the program publishes everything after
+ * BROKER_CONNECTED.
+ */
+void broker_publish(broker *of, const char *name, const char *last, const char *text,
+                    int is_retained);
+
+/* Publishes that the bridge is offline, and disconnects. */
+void broker_end(broker *of);
+
+#endif

@@ -1,0 +1,138 @@
+/* mbm call: sends any request. Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
+#include "commands.h"
+#include "line.h"
+#include "numbers.h"
+#include "options.h"
+#include "report.h"
+
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { MBAP = 7 };
+
+static line at;
+static place where;
+/* Frames of Modbus TCP: the PDUs behind a header, for mbm_frame_text. */
+static uint8_t asked[MBAP + MBM_MAX_PDU], answered[MBAP + MBM_MAX_PDU];
+static size_t length;
+
+static error_t parse(int key, char *text, struct argp_state *state)
+{
+    const char *wrong;
+
+    switch (key) {
+    case ARGP_KEY_ARG:
+        if (state->arg_num == 0) {
+            options_place(state, &where, text, 0);
+            return 0;
+        }
+        wrong = number_hex(text, asked + MBAP, MBM_MAX_PDU, &length);
+        if (wrong)
+            options_wrong(state, "HEX %s", wrong);
+        return 0;
+    case ARGP_KEY_SUCCESS:
+        if (length == 0)
+            options_wrong(state, "%s is missing", where.text ? "HEX" : "LINE");
+        options_check_unit(state, &where, 1);
+        if (asked[MBAP] == 0 || asked[MBAP] > 127)
+            options_wrong(state, "HEX begins with %02X: a function code is 01 to 7F", asked[MBAP]);
+        return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_child children[] = {
+    {&options_unit, 0, NULL, 0}, {&options_client, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+
+static const struct argp arguments = {
+    NULL,
+    parse,
+    "LINE HEX...",
+    "Sends a request that is given as a PDU in hexadecimal bytes, function code first, without unit "
+    "and checksum. Prints the PDU of the response in hexadecimal, and in words.\v"
+    "Example: read two holding registers from address 100 (hexadecimal 64) on\n\n"
+    "  mbm call tcp://192.168.0.7 --unit 17 03 00 64 00 02\n\n" PLACE_HELP,
+    children,
+    NULL,
+    NULL};
+
+/* Sends a request that mbm understands, or, if it breaks a rule of its function, as it is. */
+static uint8_t queue(mbm_clientRequest *request)
+{
+    static const mbm_rule any_length = {.kind = MBM_RULE_SILENCE};
+    const uint16_t bytes = (uint16_t)(length - 1);
+    const uint8_t status =
+        mbm_client_forward(&at.client, request, asked[MBAP], asked + MBAP + 1, bytes);
+
+    if (status == MBM_PENDING)
+        return status;
+    request->data = asked + MBAP + 1;
+    return mbm_client_custom(&at.client, request, asked[MBAP], bytes, &any_length);
+}
+
+/* The PDU in hexadecimal and in words. */
+static void describe(uint8_t *frame, uint16_t bytes, uint8_t kind, char *hex, char *words)
+{
+    const mbm_framing framing = {.kind = MBM_FRAMING_TCP};
+    uint16_t i;
+
+    *hex = '\0';
+    for (i = 0; i < bytes; i++)
+        sprintf(hex + 3 * i, i + 1 < bytes ? "%02X " : "%02X", frame[MBAP + i]);
+    frame[5] = (uint8_t)(bytes + 1);
+    frame[4] = (uint8_t)((bytes + 1) >> 8);
+    frame[6] = options.unit;
+    (void)mbm_frame_text(&framing, kind, frame, (uint16_t)(MBAP + bytes), words, 2400);
+}
+
+static void show(const mbm_clientRequest *request)
+{
+    char hex[3 * MBM_MAX_PDU + 1], words[2400], status[256];
+    uint16_t bytes = 0;
+    cJSON *all;
+
+    if (request->exception != 0) {
+        answered[MBAP] = asked[MBAP] | 0x80;
+        answered[MBAP + 1] = request->exception;
+        bytes = 2;
+    } else if (request->status == MBM_OK && request->length > 0) {
+        answered[MBAP] = asked[MBAP];
+        bytes = (uint16_t)(1 + request->length);
+    }
+    if (!options.is_json) {
+        describe(answered, bytes, MBM_PACKET_RESPONSE, hex, words);
+        if (bytes > 0)
+            printf("%s\n%s\n", hex, words);
+        else if (request->status == MBM_OK && !options.is_quiet)
+            printf("sent; no device answers this request\n");
+        return;
+    }
+    all = cJSON_CreateObject();
+    cJSON_AddNumberToObject(all, "unit", options.unit);
+    describe(asked, (uint16_t)length, MBM_PACKET_REQUEST, hex, words);
+    cJSON_AddStringToObject(all, "request", hex);
+    describe(answered, bytes, MBM_PACKET_RESPONSE, hex, words);
+    if (bytes > 0) {
+        cJSON_AddStringToObject(all, "response", hex);
+        cJSON_AddStringToObject(all, "words", words);
+    }
+    report_json(all, request->status, request->exception, line_status(&at, request, status));
+}
+
+int call_command(int argc, char **argv)
+{
+    mbm_clientRequest request = {.reply = answered + MBAP + 1, .replyBytes = MBM_MAX_PDU - 1};
+
+    argp_parse(&arguments, argc, argv, 0, NULL, NULL);
+    request.unit = options.unit;
+    if (line_open(&at, &where) == CODE_DONE && line_connect(&at) == CODE_DONE) {
+        request.status = line_call(&at, &request, queue(&request));
+        if (request.status != MBM_OK)
+            (void)line_failure(&at, &request);
+        show(&request);
+    }
+    line_close(&at);
+    return report_code;
+}

@@ -1,0 +1,57 @@
+/* The device file: the fields of a device, as mbm poll, mbm serve and mbm bridge read them.
+ *
+ *     device: SDM120
+ *     unit: 1
+ *     fields:
+ *       - name: voltage
+ *         table: input
+ *         address: 0
+ *         type: float
+ *
+ * docs/serve.md describes every key.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef DEVICE_H
+#define DEVICE_H
+
+#include "value.h"
+
+/* What a field allows. */
+enum { DEVICE_READ = 1, DEVICE_WRITE = 2 };
+
+/* Bytes of the longest name of a field, and of the longest reason why a file is refused. */
+enum { DEVICE_NAME_BYTES = 200, DEVICE_WRONG_BYTES = 600 };
+
+typedef struct device_field {
+    char *name;
+    char *unit_of_measurement; /* NULL if the file gives none */
+    char *description;         /* NULL if the file gives none */
+    value_form form;
+    uint8_t access;  /* DEVICE_READ, DEVICE_WRITE or both */
+    uint16_t *words; /* its value: as many as device_size; NULL if the file gives none */
+    int line;        /* of the file */
+} device_field;
+
+typedef struct device {
+    char *name; /* NULL if the file gives none */
+    /* The fields that can be read come first; the order of the file is kept otherwise. */
+    uint16_t count, readable;
+    device_field *fields;
+    mbm_planField *planned; /* the same fields for mbm_plan_begin */
+    char wrong[DEVICE_WRONG_BYTES];
+} device;
+
+/* Reads a file. Returns CODE_DONE; or CODE_SYSTEM or CODE_WRONG with the reason in `wrong`, a
+ * sentence without its full stop: "meter.yaml:12: ...". Then nothing is to be freed. */
+int device_read(device *into, const char *path);
+
+/* Frees what device_read allocated. */
+void device_free(device *into);
+
+/* Returns the index of the field with this name, or -1. */
+int device_find(const device *from, const char *name);
+
+/* Returns how many registers or bits a field has. */
+uint32_t device_size(const mbm_planField *planned);
+
+#endif

@@ -1,0 +1,70 @@
+/* The faults that mbm serve plays on request: --fault KIND[=VALUE][@WHEN].
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef FAULT_H
+#define FAULT_H
+
+#include "place.h"
+
+#include <stdint.h>
+
+enum fault_kind {
+    FAULT_LATE,
+    FAULT_DEAF,
+    FAULT_SLOW,
+    FAULT_DAMAGED,
+    FAULT_CUT,
+    FAULT_NOISE,
+    FAULT_TWICE,
+    FAULT_EXCEPTION,
+    FAULT_FOREIGN,
+    FAULT_WRONG_LENGTH,
+    FAULT_CLOSE,
+    FAULT_KINDS
+};
+
+#define FAULT_HELP                                                                                 \
+    "FAULT is KIND or KIND=VALUE. It happens to every answer, or with @3 to that of the third "    \
+    "request, with @3- from the third on, with @3/10 to the third and to every tenth after it. "   \
+    "Several --fault options add up.\n"                                                            \
+    "  late=TIME       answers after that time\n"                                                  \
+    "  deaf            does not answer\n"                                                          \
+    "  slow=TIME       pauses between the bytes\n"                                                 \
+    "  damaged         a wrong CRC or LRC; on TCP a wrong protocol identifier\n"                   \
+    "  cut=N           sends only the first N bytes\n"                                             \
+    "  noise=N         sends N other bytes before the answer\n"                                    \
+    "  twice           sends the answer twice\n"                                                   \
+    "  exception=N     answers with exception N, and does nothing else\n"                          \
+    "  foreign         sends an answer of the next unit first\n"                                   \
+    "  wrong-length    a wrong byte count; on TCP a wrong length in the header\n"                  \
+    "  close           closes the connection instead (tcp://, rtu+tcp://, tls://)\n"               \
+    "udp:// has late, deaf, twice, exception and foreign.\n"
+
+enum { FAULT_MOST = 32 };
+
+typedef struct fault {
+    enum fault_kind kind;
+    uint32_t value;        /* milliseconds, or a number */
+    uint32_t first, every; /* the first request, and each so many after it; 0: none after it */
+} fault;
+
+/* The faults of the command line, and how many requests have been counted. */
+typedef struct fault_list {
+    fault faults[FAULT_MOST];
+    uint32_t count, requests, hit;
+} fault_list;
+
+/* The faults of one request. */
+typedef struct fault_choice {
+    uint8_t has[FAULT_KINDS];
+    uint32_t value[FAULT_KINDS];
+} fault_choice;
+
+/* Reads one fault and adds it. Returns NULL, or what is wrong as a sentence without its full stop,
+ * in a buffer that the next call overwrites. */
+const char *fault_read(fault_list *list, const char *text, enum place_kind line);
+
+/* Counts a request, and finds its faults. */
+void fault_choose(fault_list *list, fault_choice *choice);
+
+#endif

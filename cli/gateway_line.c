@@ -1,0 +1,205 @@
+#define _GNU_SOURCE
+#include "gateway_line.h"
+
+#include "report.h"
+#include "trace.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+/* A lookup of a host may block the gateway, so there is a longer pause between two of them. */
+enum { REOPEN_MS = 1000, LOOKUP_MS = 10000 };
+
+static uint32_t micros(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
+}
+
+const char *gateway_line_read(gateway_line *line, const char *text)
+{
+    const char *wrong = place_read(&line->place, text, 0);
+
+    if (!wrong && (line->place.kind == PLACE_UDP || line->place.kind == PLACE_TLS))
+        wrong = "a line of a gateway is rtu:, ascii:, tcp:// or rtu+tcp://";
+    return wrong;
+}
+
+/* --- the link --- */
+
+/* Keeps a descriptor for a line that is not open. Without it, a new connection could take the
+ * line's descriptor, and the line could not be opened again. */
+static void keep_reserve(gateway_line *line)
+{
+    int fd = line->reserve ? 0 : open("/dev/null", O_RDONLY | O_CLOEXEC);
+
+    if (fd > 0)
+        line->reserve = fd;
+}
+
+static void free_reserve(gateway_line *line)
+{
+    if (line->reserve)
+        close(line->reserve);
+    line->reserve = 0;
+}
+
+static void close_line(void *context)
+{
+    gateway_line *line = (gateway_line *)context;
+
+    if (place_is_tcp(&line->place))
+        mbm_tcp_disconnect(&line->tcp);
+    else
+        mbm_tty_close(&line->tty);
+    keep_reserve(line);
+}
+
+static uint8_t link_status(void *context)
+{
+    gateway_line *line = (gateway_line *)context;
+
+    if (place_is_tcp(&line->place))
+        return mbm_tcp_status(&line->tcp);
+    return line->tty.isOpen ? MBM_OK : MBM_LINK_LOST;
+}
+
+/* Looks a host up, and begins to connect. */
+static uint8_t open_tcp(gateway_line *line)
+{
+    mbm_tcp *tcp = &line->tcp;
+
+    if (mbm_tcp_isInUse(tcp))
+        return mbm_tcp_connect(tcp);
+    if (tcp->lookupError && micros() - line->looked_up < LOOKUP_MS * 1000u)
+        return MBM_LINK_LOST;
+    if (mbm_tcp_open(tcp, &line->addresses, line->place.host, line->place.service) == 0)
+        return mbm_tcp_status(tcp);
+    tcp->error = errno;
+    line->looked_up = micros();
+    return MBM_LINK_LOST;
+}
+
+static uint8_t open_line(void *context)
+{
+    gateway_line *line = (gateway_line *)context;
+
+    line->tried = micros();
+    free_reserve(line);
+    if (place_is_tcp(&line->place))
+        return open_tcp(line);
+    if (mbm_tty_openWith(&line->tty, line->place.path, &line->place.tty) == 0)
+        return MBM_OK;
+    line->tty.error = errno;
+    return MBM_LINK_LOST;
+}
+
+/* Prints why a line was lost or not opened, once for each reason. */
+static void on_link(void *context, uint8_t event, uint8_t status)
+{
+    gateway_line *line = (gateway_line *)context;
+    const int error = place_is_tcp(&line->place) ? line->tcp.error : line->tty.error;
+    const char *reason = line->tcp.lookupError ? gai_strerror(line->tcp.lookupError)
+                         : status == MBM_RESPONSE_TIMED_OUT || error == 0 ? mbm_status_text(status)
+                                                                          : strerror(error);
+
+    if (event == MBM_LINK_EVENT_CONNECTED) {
+        line->reason[0] = '\0';
+        return;
+    }
+    if (strncmp(reason, line->reason, sizeof line->reason - 1) != 0)
+        fprintf(stderr, "%s: %s: %s.\n", report_name, line->place.text, reason);
+    snprintf(line->reason, sizeof line->reason, "%s", reason);
+    /* The next request may open a line that was open until now. */
+    if (event == MBM_LINK_EVENT_LOST)
+        line->tried = micros() - REOPEN_MS * 1000u;
+}
+
+static void begin_client(gateway_line *line)
+{
+    const place *where = &line->place;
+    const mbm_port port =
+        trace_client(place_is_tcp(where) ? mbm_tcp_port(&line->tcp) : mbm_tty_port(&line->tty),
+                     where->framing, where->text);
+    mbm_client *client = &line->client;
+
+    switch (where->framing) {
+    case MBM_FRAMING_TCP:
+        (void)mbm_client_beginTcp(client, &port, line->frame, MBM_MAX_TCP_FRAME, line->outgoing,
+                                  sizeof line->outgoing);
+        return;
+    case MBM_FRAMING_RTU_OVER_TCP:
+        (void)mbm_client_beginRtuOverTcp(client, &port, line->frame, sizeof line->frame);
+        return;
+    case MBM_FRAMING_ASCII:
+        (void)mbm_client_beginAscii(client, &port, line->frame, sizeof line->frame);
+        break;
+    default: (void)mbm_client_beginRtu(client, &port, line->frame, sizeof line->frame);
+    }
+    (void)mbm_client_setBaudRate(client, where->tty.baud);
+    (void)mbm_client_setEchoDiscard(client, where->discards_echo);
+    if (where->has_gap)
+        (void)mbm_client_setGap(client, where->gapMs * 1000);
+}
+
+void gateway_line_begin(gateway_line *line, uint16_t timeoutMs, uint16_t quietMs)
+{
+    const mbm_linkHooks hooks = {line, close_line, open_line, link_status};
+
+    keep_reserve(line);
+    begin_client(line);
+    (void)mbm_client_setResponseTimeout(&line->client, timeoutMs);
+    (void)mbm_client_setQuietTime(&line->client, quietMs);
+    (void)mbm_client_setCounters(&line->client, &line->counters);
+    (void)mbm_link_begin(&line->link, &line->client, &hooks);
+    (void)mbm_link_setBackoff(&line->link, MBM_BACKOFF_FIXED, REOPEN_MS, REOPEN_MS);
+    (void)mbm_link_setConnectTimeout(&line->link, timeoutMs);
+    (void)mbm_link_setCallback(&line->link, on_link, line);
+}
+
+/* Whether a line that was open has hung up since the last wait. */
+static int has_hung_up(gateway_line *line)
+{
+    struct pollfd idle = {line->tty.fd, 0, 0};
+
+    return place_is_tcp(&line->place) ? mbm_tcp_isConnected(&line->tcp) < 0 : poll(&idle, 1, 0) > 0;
+}
+
+uint8_t gateway_line_isReady(void *context)
+{
+    gateway_line *line = (gateway_line *)context;
+    const uint8_t state = mbm_link_state(&line->link);
+
+    if ((state == MBM_LINK_IS_UP && mbm_client_pending(&line->client) == 0 && has_hung_up(line)) ||
+        (state == MBM_LINK_IS_DOWN && micros() - line->tried >= REOPEN_MS * 1000u)) {
+        /* The request waits for this attempt, and ends if it fails. */
+        (void)mbm_link_reconnect(&line->link);
+        return 1;
+    }
+    return state != MBM_LINK_IS_DOWN;
+}
+
+int gateway_line_wait(const gateway_line *line, struct pollfd *wait)
+{
+    const int is_open = place_is_tcp(&line->place) ? line->tcp.events != 0 : line->tty.isOpen;
+
+    *wait = (struct pollfd){place_is_tcp(&line->place) ? line->tcp.fd : line->tty.fd,
+                            place_is_tcp(&line->place) ? line->tcp.events : POLLIN, 0};
+    return is_open;
+}
+
+void gateway_line_close(gateway_line *line)
+{
+    if (place_is_tcp(&line->place))
+        mbm_tcp_close(&line->tcp);
+    else
+        mbm_tty_close(&line->tty);
+    free_reserve(line);
+}

@@ -1,0 +1,318 @@
+#define _GNU_SOURCE
+#include "line.h"
+
+#include "numbers.h"
+#include "options.h"
+#include "report.h"
+#include "trace.h"
+
+#include <errno.h>
+#include <netdb.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+uint32_t line_milliseconds(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint32_t)now.tv_sec * 1000u + (uint32_t)now.tv_nsec / 1000000u;
+}
+
+/* --- opening --- */
+
+static int cannot_open(const line *l, const char *reason, const char *advice)
+{
+    return report(CODE_LINE, "%s: %s%s%s", l->place.text, reason, *advice ? ". " : "", advice);
+}
+
+static int open_tty(line *l)
+{
+    const char *advice = "";
+
+    if (mbm_tty_openWith(&l->tty, l->place.path, &l->place.tty) == 0)
+        return CODE_DONE;
+    switch (errno) {
+    case ENOENT: advice = "Is the adapter plugged in? ls /dev/tty* shows the terminals"; break;
+    case EACCES: advice = "On many systems the group dialout may open terminals: see groups"; break;
+    case EBUSY: advice = "Another program has it open"; break;
+    case ENOTTY: advice = "It is no terminal, or its driver has no RS-485"; break;
+    case EINVAL: advice = "The terminal does not have this rate, parity or number of bits"; break;
+    default: break;
+    }
+    return cannot_open(l, strerror(errno), advice);
+}
+
+static int open_tcp(line *l)
+{
+    if (mbm_tcp_openLater(&l->tcp, &l->addresses, l->place.host, l->place.service) != 0)
+        return cannot_open(l, strerror(errno), "");
+    /* A name that does not exist is a mistake of the user. A network that is not there yet is not:
+     * the link waits for it. */
+    if (mbm_tcp_connect(&l->tcp) == MBM_LINK_LOST && l->tcp.error == ENXIO)
+        return cannot_open(l, mbm_tcp_text(&l->tcp), "Check the name of the host");
+    return CODE_DONE;
+}
+
+static int open_udp(line *l)
+{
+    if (mbm_udp_open(&l->udp, l->place.host, l->place.service) == 0)
+        return CODE_DONE;
+    return cannot_open(l, l->udp.lookupError ? gai_strerror(l->udp.lookupError) : strerror(errno),
+                       "Check the name of the host");
+}
+
+static int open_tls(line *l)
+{
+    const mbm_linkHooks hooks = mbm_tcp_link(&l->tcp);
+    const mbm_port below = mbm_tcp_port(&l->tcp);
+    mbm_tls_options tls = {0};
+    int code;
+    uint8_t status;
+
+    if (mbm_tls_load(&l->files, &tls, l->place.cert, l->place.key, l->place.ca) != 0)
+        return report(CODE_WRONG, "%s, %s or %s: %s", l->place.cert, l->place.key, l->place.ca,
+                      strerror(errno));
+    status = mbm_tls_begin(&l->identity, &tls);
+    mbm_tls_forgetKey(&l->files);
+    if (status != 0)
+        return report(CODE_WRONG, "%s: %s (Mbed TLS: -0x%x)", l->place.text, mbm_tls_text(status),
+                      (unsigned)-l->identity.error);
+    code = open_tcp(l);
+    if (code == CODE_DONE)
+        (void)mbm_tls_open(&l->tls, &l->identity, &below, *l->place.name ? l->place.name : NULL,
+                           &hooks);
+    return code;
+}
+
+/* Keeps the reason why the link was lost or not opened, since the next attempt clears it. */
+static void keep_reason(void *context, uint8_t event, uint8_t status)
+{
+    line *l = (line *)context;
+
+    if (event == MBM_LINK_EVENT_CONNECTED)
+        return;
+    l->failed++;
+    if (l->place.kind == PLACE_TLS && l->tls.status == MBM_TLS_REFUSED_BY_PEER)
+        snprintf(l->reason, sizeof l->reason, "%s: %s", mbm_tls_text(l->tls.status),
+                 mbm_tls_alertText(l->tls.alert));
+    else if (l->place.kind == PLACE_TLS && l->tls.status >= MBM_TLS_TIMED_OUT)
+        snprintf(l->reason, sizeof l->reason, "%s", mbm_tls_text(l->tls.status));
+    else if (place_is_tcp(&l->place) && l->tcp.error != 0)
+        snprintf(l->reason, sizeof l->reason, "%s", mbm_tcp_text(&l->tcp));
+    else if (place_is_serial(&l->place) && l->tty.error != 0)
+        snprintf(l->reason, sizeof l->reason, "%s", strerror(l->tty.error));
+    else if (!*l->reason || status == MBM_CONNECT_TIMED_OUT)
+        snprintf(l->reason, sizeof l->reason, "%s", mbm_status_text(status));
+}
+
+static void keep_open(line *l)
+{
+    const mbm_linkHooks hooks = l->place.kind == PLACE_TLS ? mbm_tls_link(&l->tls)
+                                : place_is_tcp(&l->place)  ? mbm_tcp_link(&l->tcp)
+                                                           : mbm_tty_link(&l->tty);
+
+    if (l->place.kind == PLACE_UDP)
+        return;
+    (void)mbm_link_begin(&l->kept, &l->client, &hooks);
+    (void)mbm_link_setBackoff(&l->kept, MBM_BACKOFF_FIXED, 1000, 1000);
+    (void)mbm_link_setCallback(&l->kept, keep_reason, l);
+}
+
+static mbm_port port_of(line *l)
+{
+    switch (l->place.kind) {
+    case PLACE_UDP: return mbm_udp_port(&l->udp);
+    case PLACE_TLS: return mbm_tls_port(&l->tls);
+    case PLACE_TCP:
+    case PLACE_RTU_OVER_TCP: return mbm_tcp_port(&l->tcp);
+    default: return mbm_tty_port(&l->tty);
+    }
+}
+
+static void begin_client(line *l)
+{
+    const mbm_port port = trace_client(port_of(l), l->place.framing, l->place.text);
+
+    switch (l->place.framing) {
+    case MBM_FRAMING_RTU:
+        (void)mbm_client_beginRtu(&l->client, &port, l->incoming, sizeof l->incoming);
+        break;
+    case MBM_FRAMING_ASCII:
+        (void)mbm_client_beginAscii(&l->client, &port, l->incoming, sizeof l->incoming);
+        break;
+    case MBM_FRAMING_RTU_OVER_TCP:
+        (void)mbm_client_beginRtuOverTcp(&l->client, &port, l->incoming, sizeof l->incoming);
+        break;
+    default:
+        (void)mbm_client_beginTcp(&l->client, &port, l->incoming, sizeof l->incoming, l->outgoing,
+                                  sizeof l->outgoing);
+    }
+    if (place_is_serial(&l->place)) {
+        (void)mbm_client_setBaudRate(&l->client, l->place.tty.baud);
+        (void)mbm_client_setEchoDiscard(&l->client, l->place.discards_echo);
+        if (l->place.has_gap)
+            (void)mbm_client_setGap(&l->client, l->place.gapMs * 1000);
+    }
+    if (l->place.framing == MBM_FRAMING_TCP && options.in_flight > 0)
+        (void)mbm_client_setInFlight(&l->client, options.in_flight);
+    (void)mbm_client_setResponseTimeout(&l->client, options.timeoutMs);
+    (void)mbm_client_setRetries(&l->client, options.retries);
+    (void)mbm_client_setCounters(&l->client, &l->counters);
+}
+
+int line_open(line *l, const place *where)
+{
+    int code;
+
+    memset(l, 0, sizeof *l);
+    l->place = *where;
+    code = place_is_serial(where)     ? open_tty(l)
+           : where->kind == PLACE_UDP ? open_udp(l)
+           : where->kind == PLACE_TLS ? open_tls(l)
+                                      : open_tcp(l);
+    if (code != CODE_DONE) {
+        line_close(l);
+        return code;
+    }
+    begin_client(l);
+    keep_open(l);
+    return CODE_DONE;
+}
+
+void line_close(line *l)
+{
+    mbm_tls_close(&l->tls);
+    mbm_tls_end(&l->identity);
+    mbm_tcp_close(&l->tcp);
+    mbm_udp_close(&l->udp);
+    mbm_tty_close(&l->tty);
+}
+
+int line_connect(line *l)
+{
+    const char *advice = "";
+
+    while (l->place.kind != PLACE_UDP && !report_stopped) {
+        line_poll(l);
+        if (mbm_link_state(&l->kept) == MBM_LINK_IS_UP)
+            break;
+        if (l->failed > 0) {
+            if (l->place.kind == PLACE_TLS && l->tls.status >= MBM_TLS_TIMED_OUT)
+                advice = "docs/security.md says what to look at";
+            else if (l->place.kind == PLACE_TLS && l->tcp.error != ECONNREFUSED &&
+                     l->tcp.error != ETIMEDOUT)
+                advice = "The server may refuse the certificate: see docs/security.md";
+            else if (place_is_tcp(&l->place))
+                advice = "Check host and port, and that the device is on";
+            return cannot_open(l, line_reason(l), advice);
+        }
+        line_rest(l, 1000);
+    }
+    return CODE_DONE;
+}
+
+/* --- at work --- */
+
+void line_poll(line *l)
+{
+    (void)mbm_client_poll(&l->client);
+}
+
+/* Sleeps until the terminal or the other descriptor has bytes. An idle line's bytes are noise, and
+ * must not end each sleep. */
+static void wait_tty(line *l, int fd, uint32_t micros)
+{
+    const int is_waiting = l->tty.isOpen && mbm_client_pending(&l->client) > 0;
+    struct pollfd waits[2] = {{fd, POLLIN, 0}, {is_waiting ? l->tty.fd : -1, POLLIN, 0}};
+    const struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+
+    if (fd < 0)
+        (void)mbm_tty_wait(&l->tty, micros);
+    else
+        (void)ppoll(waits, 2, &time, NULL);
+}
+
+void line_wait(line *l, int fd, uint32_t micros)
+{
+    /* At most a second, since a signal just before the sleep does not end it. */
+    if (micros > 1000000)
+        micros = 1000000;
+    switch (l->place.kind) {
+    case PLACE_UDP: (void)mbm_udp_wait(&l->udp, 1, fd, micros); break;
+    case PLACE_TLS: (void)mbm_tls_wait(&l->tls, &l->tcp, 1, NULL, fd, micros); break;
+    case PLACE_TCP:
+    case PLACE_RTU_OVER_TCP: (void)mbm_tcp_wait(&l->tcp, 1, NULL, fd, micros); break;
+    default: wait_tty(l, fd, micros);
+    }
+}
+
+static int rest(void *context, uint32_t micros)
+{
+    line_wait((line *)context, -1, micros);
+    return 0;
+}
+
+void line_rest(line *l, uint32_t milliseconds)
+{
+    uint32_t micros = mbm_client_pollDelay(&l->client);
+
+    if (milliseconds > 1000)
+        milliseconds = 1000;
+    if (micros / 1000 >= milliseconds)
+        micros = milliseconds * 1000;
+    line_wait(l, -1, micros);
+}
+
+uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued)
+{
+    const mbm_caller caller = {.client = &l->client,
+                               .request = request,
+                               .wait = rest,
+                               .port = l,
+                               .timeoutMs = MBM_CALL_FOREVER,
+                               .stop = &report_stopped};
+
+    return mbm_call(&caller, queued);
+}
+
+const char *line_reason(const line *l)
+{
+    if (l->place.kind == PLACE_UDP && l->udp.error != 0)
+        return strerror(l->udp.error);
+    return *l->reason ? l->reason : NULL;
+}
+
+const char *line_status(const line *l, const mbm_clientRequest *request, char text[256])
+{
+    const char *reason = request->status == MBM_LINK_LOST ? line_reason(l) : NULL;
+
+    snprintf(text, 256, "%s%s%s", mbm_status_textOf(request->status, request->exception),
+             reason ? ": " : "", reason ? reason : "");
+    return text;
+}
+
+int line_failure(line *l, const mbm_clientRequest *request)
+{
+    /* A datagram that its receiver refused is no loss of the link. */
+    const int has_reason =
+        request->status == MBM_LINK_LOST || (l->place.kind == PLACE_UDP && l->udp.error != 0);
+
+    return report_failure(request->unit, request->status, request->exception, options.timeoutMs,
+                          has_reason ? line_reason(l) : NULL);
+}
+
+uint8_t line_read(line *l, mbm_clientRequest *request, uint8_t table, uint16_t address,
+                  uint16_t quantity)
+{
+    switch (table) {
+    case MBM_TABLE_COILS: return mbm_client_readCoils(&l->client, request, address, quantity);
+    case MBM_TABLE_DISCRETE_INPUTS:
+        return mbm_client_readDiscreteInputs(&l->client, request, address, quantity);
+    case MBM_TABLE_INPUT_REGISTERS:
+        return mbm_client_readInputRegisters(&l->client, request, address, quantity);
+    default: return mbm_client_readHoldingRegisters(&l->client, request, address, quantity);
+    }
+}

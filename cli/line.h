@@ -1,0 +1,67 @@
+/* A client of a place, which opens its line again when it was lost.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef LINE_H
+#define LINE_H
+
+#include "mbm_call.h"
+#include "mbm_tls_linux.h"
+#include "mbm_udp.h"
+#include "place.h"
+
+typedef struct line {
+    mbm_client client;
+    mbm_counters counters;
+    place place;
+    mbm_link kept; /* opens the terminal or connection again when it was lost; not of UDP */
+    mbm_tty tty;
+    mbm_tcp tcp;
+    mbm_tcp_addresses addresses;
+    mbm_udp udp;
+    mbm_tls tls;
+    mbm_tls_identity identity;
+    mbm_tls_files files;
+    unsigned failed;  /* how often the link was lost or not opened */
+    char reason[160]; /* why it was the last time */
+    uint8_t incoming[1024], outgoing[1024];
+} line;
+
+/* Opens a place and begins its client, with the settings of options.h. A connection is made later,
+ * by line_poll. Returns CODE_DONE, or another exit code after reporting the reason. */
+int line_open(line *l, const place *where);
+void line_close(line *l);
+
+/* Waits until there is a connection. Returns as line_open. */
+int line_connect(line *l);
+
+/* Moves requests on. A terminal or connection that was lost is opened again a second later. */
+void line_poll(line *l);
+
+/* Sleeps until the client has something to do, at most `milliseconds` or a second. */
+void line_rest(line *l, uint32_t milliseconds);
+
+/* Sleeps until bytes arrive on the line or at the descriptor `fd` (-1 for none), at most for a time
+ * in microseconds or a second. */
+void line_wait(line *l, int fd, uint32_t micros);
+
+/* Waits for a request that was queued. Returns its status, MBM_CANCELLED after Ctrl-C. */
+uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued);
+
+/* Why the link was lost, or NULL if that is not known. */
+const char *line_reason(const line *l);
+
+/* Reports how a request failed. Returns the exit code. */
+int line_failure(line *l, const mbm_clientRequest *request);
+
+/* The status of a request in words. For a lost link it includes the reason. `text` has 256 bytes.
+ */
+const char *line_status(const line *l, const mbm_clientRequest *request, char text[256]);
+
+/* Queues a read of a table, one of MBM_TABLE_. */
+uint8_t line_read(line *l, mbm_clientRequest *request, uint8_t table, uint16_t address,
+                  uint16_t quantity);
+
+/* The time in milliseconds since some moment. It wraps. */
+uint32_t line_milliseconds(void);
+
+#endif

@@ -1,0 +1,29 @@
+/* Numbers, times and words as people type them, read strictly.
+ *
+ * Each function returns NULL, or what is wrong with the text, in a buffer that the next call of any
+ * of them overwrites: a sentence without its full stop, which begins with the text in quotes.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef NUMBERS_H
+#define NUMBERS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* A whole decimal number: digits, after a minus if `least` is negative. */
+const char *number_read(const char *text, int64_t least, int64_t most, int64_t *number);
+
+/* A time: a whole decimal number and ms, s, m or h. In milliseconds. */
+const char *number_time(const char *text, uint32_t least, uint32_t most, uint32_t *milliseconds);
+
+/* One of several words, whose list ends with NULL. `index` receives its place in the list. */
+const char *number_word(const char *text, const char *const *words, int *index);
+
+/* Hexadecimal bytes: pairs of digits, without or with spaces between them. Appends them to `bytes`,
+ * which has `*count` of `capacity`. */
+const char *number_hex(const char *text, uint8_t *bytes, size_t capacity, size_t *count);
+
+/* Writes a time as number_time reads it. Returns `text`. */
+const char *number_time_text(uint32_t milliseconds, char text[32]);
+
+#endif

@@ -1,0 +1,249 @@
+#define _GNU_SOURCE
+#include "options.h"
+
+#include "mbm.h"
+#include "numbers.h"
+#include "place.h"
+#include "report.h"
+#include "trace.h"
+
+#include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { TRACE = 0x1000, PCAP, TIMEOUT, RETRIES, IN_FLIGHT, JSON, SCALE, HEX, ONE_BASED };
+
+client_options options = {.timeoutMs = 1000,
+                          .unit = 1,
+                          .table = MBM_TABLE_HOLDING_REGISTERS,
+                          .form = {.type = MBM_TYPE_UINT16, .order = MBM_ORDER_ABCD}};
+
+/* --- texts of the command line --- */
+
+void options_wrong(const struct argp_state *state, const char *format, ...)
+{
+    char text[1024];
+    va_list arguments;
+
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    argp_error(state, "%s.", text);
+    exit(CODE_WRONG);
+}
+
+int64_t options_number(const struct argp_state *state, const char *what, const char *text,
+                       int64_t least, int64_t most)
+{
+    int64_t number = 0;
+    const char *wrong = number_read(text, least, most, &number);
+
+    if (wrong)
+        options_wrong(state, "%s %s", what, wrong);
+    return number;
+}
+
+uint32_t options_time(const struct argp_state *state, const char *what, const char *text,
+                      uint32_t least, uint32_t most)
+{
+    uint32_t milliseconds = 0;
+    const char *wrong = number_time(text, least, most, &milliseconds);
+
+    if (wrong)
+        options_wrong(state, "%s %s", what, wrong);
+    return milliseconds;
+}
+
+int options_word(const struct argp_state *state, const char *what, const char *text,
+                 const char *const *words)
+{
+    int index = 0;
+    const char *wrong = number_word(text, words, &index);
+
+    if (wrong)
+        options_wrong(state, "%s %s", what, wrong);
+    return index;
+}
+
+uint16_t options_address(const struct argp_state *state, const char *text)
+{
+    const int first = options.is_one_based;
+
+    return (uint16_t)(options_number(state, "ADDRESS", text, first, 65535 + first) - first);
+}
+
+void options_place(const struct argp_state *state, struct place *where, const char *text,
+                   int is_server)
+{
+    const char *wrong = place_read(where, text, is_server);
+
+    if (wrong)
+        options_wrong(state, "%s", wrong);
+}
+
+void options_check_unit(const struct argp_state *state, const place *where, int is_write)
+{
+    if (options.unit == 0 && !(is_write && place_is_serial(where)))
+        options_wrong(state,
+                      "--unit 0 means all units, for writes on a serial line only; here 1 to 255 "
+                      "is allowed");
+}
+
+/* --- tracing --- */
+
+static error_t parse_trace(int key, char *text, struct argp_state *state)
+{
+    (void)state;
+    if (key == TRACE)
+        trace_print();
+    else if (key != PCAP)
+        return ARGP_ERR_UNKNOWN;
+    else if (trace_write(text) != 0)
+        exit(report(CODE_SYSTEM, "%s: %s", text, strerror(errno)));
+    return 0;
+}
+
+static const struct argp_option trace_texts[] = {
+    {"trace", TRACE, NULL, 0, "Print each frame in words and hexadecimal to stderr, times in UTC",
+     9},
+    {"pcap", PCAP, "FILE", 0, "Write each frame to a pcapng file, for Wireshark", 9},
+    {NULL, 0, NULL, 0, NULL, 0}};
+
+const struct argp options_trace = {trace_texts, parse_trace, NULL, NULL, NULL, NULL, NULL};
+
+/* --- requests and output --- */
+
+static error_t parse_request(int key, char *text, struct argp_state *state)
+{
+    switch (key) {
+    case TIMEOUT:
+        options.timeoutMs = options_time(state, "--timeout", text, 1, 1000000);
+        options.has_timeout = 1;
+        return 0;
+    case RETRIES:
+        options.retries = (uint8_t)options_number(state, "--retries", text, 0, 254);
+        return 0;
+    case IN_FLIGHT:
+        options.in_flight =
+            (uint8_t)options_number(state, "--in-flight", text, 1, MBM_CLIENT_DEPTH);
+        return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option request_texts[] = {
+    {"timeout", TIMEOUT, "TIME", 0, "How long a reply may take, such as 500ms or 2s (1s)", 2},
+    {"retries", RETRIES, "N", 0,
+     "How often a request without a right reply is repeated, 0 to 254 (0)", 2},
+    {"in-flight", IN_FLIGHT, "N", 0,
+     "Requests under way at once on Modbus TCP, 1 to 16 (16); some servers accept only one", 2},
+    {NULL, 0, NULL, 0, NULL, 0}};
+
+const struct argp options_request = {request_texts, parse_request, NULL, NULL, NULL, NULL, NULL};
+
+static error_t parse_output(int key, char *text, struct argp_state *state)
+{
+    (void)text;
+    (void)state;
+    if (key == JSON)
+        options.is_json = 1;
+    else if (key == 'q')
+        options.is_quiet = 1;
+    else
+        return ARGP_ERR_UNKNOWN;
+    return 0;
+}
+
+static const struct argp_option output_texts[] = {
+    {"json", JSON, NULL, 0, "Print JSON, one object a line", 3},
+    {"quiet", 'q', NULL, 0, "Print no summary and no notes to stderr", 3},
+    {NULL, 0, NULL, 0, NULL, 0}};
+
+const struct argp options_output = {output_texts, parse_output, NULL, NULL, NULL, NULL, NULL};
+
+static const struct argp_child client_children[] = {{&options_request, 0, NULL, 0},
+                                                    {&options_output, 0, NULL, 0},
+                                                    {&options_trace, 0, NULL, 0},
+                                                    {NULL, 0, NULL, 0}};
+const struct argp options_client = {NULL, NULL, NULL, NULL, client_children, NULL, NULL};
+
+/* --- the unit --- */
+
+static error_t parse_unit(int key, char *text, struct argp_state *state)
+{
+    if (key != 'u')
+        return ARGP_ERR_UNKNOWN;
+    options.unit = (uint8_t)options_number(state, "--unit", text, 0, 255);
+    return 0;
+}
+
+static const struct argp_option unit_texts[] = {
+    {"unit", 'u', "N", 0, "The unit id of the device, 1 to 255; 0 writes to all (1)", 1},
+    {NULL, 0, NULL, 0, NULL, 0}};
+
+const struct argp options_unit = {unit_texts, parse_unit, NULL, NULL, NULL, NULL, NULL};
+
+/* --- values --- */
+
+static void fit_type(const struct argp_state *state)
+{
+    const int is_bits =
+        options.table == MBM_TABLE_COILS || options.table == MBM_TABLE_DISCRETE_INPUTS;
+
+    if (is_bits && !options.has_type)
+        options.form.type = MBM_TYPE_BIT;
+    if (is_bits != (options.form.type == MBM_TYPE_BIT))
+        options_wrong(state, "the table %s has no values of type %s",
+                      value_table_names[options.table], value_type_names[options.form.type]);
+    if (options.form.scale.digits != 0 &&
+        (options.form.type == MBM_TYPE_TEXT || options.form.type == MBM_TYPE_BIT ||
+         options.form.is_hex))
+        options_wrong(state, "--scale needs a number, not a bit, a text or --hex");
+    if (options.form.is_hex && options.form.type >= MBM_TYPE_FLOAT)
+        options_wrong(state, "--hex needs an integer type");
+}
+
+static error_t parse_values(int key, char *text, struct argp_state *state)
+{
+    switch (key) {
+    case 't':
+        options.table = (uint8_t)(1 + options_word(state, "--table", text, value_table_names + 1));
+        return 0;
+    case 'T':
+        options.form.type =
+            (uint8_t)(1 + options_word(state, "--type", text, value_type_names + 1));
+        options.has_type = 1;
+        return 0;
+    case 'o':
+        options.form.order =
+            (uint8_t)(1 + options_word(state, "--order", text, value_order_names + 1));
+        return 0;
+    case SCALE:
+        if (!value_scale_read(text, &options.form.scale))
+            options_wrong(state, "--scale \"%s\" is not a decimal number other than 0, such as 0.1",
+                          text);
+        return 0;
+    case HEX: options.form.is_hex = 1; return 0;
+    case ONE_BASED: options.is_one_based = 1; return 0;
+    case ARGP_KEY_END: fit_type(state); return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option value_texts[] = {
+    {"table", 't', "TABLE", 0, "coils, discrete, input or holding (holding)", 1},
+    {"type", 'T', "TYPE", 0,
+     "bit, uint16, int16, uint32, int32, uint64, int64, float, double or text (uint16, of coils and "
+     "discrete inputs bit)",
+     1},
+    {"order", 'o', "ORDER", 0,
+     "Order of the bytes of a value: ABCD, CDAB, BADC or DCBA; A is the most significant one (ABCD)",
+     1},
+    {"scale", SCALE, "NUMBER", 0, "The value is the device's number times this, such as 0.1", 1},
+    {"hex", HEX, NULL, 0, "Values of integer types are hexadecimal", 1},
+    {"one-based", ONE_BASED, NULL, 0, "ADDRESS counts from 1, as in many manuals", 1},
+    {NULL, 0, NULL, 0, NULL, 0}};
+
+const struct argp options_values = {value_texts, parse_values, NULL, NULL, NULL, NULL, NULL};

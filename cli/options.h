@@ -1,0 +1,71 @@
+/* Options that several commands share, as children of their argp parsers.
+ *
+ *     static const struct argp_child children[] = {
+ *         {&options_unit, 0, NULL, 0}, {&options_client, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef OPTIONS_H
+#define OPTIONS_H
+
+#include "value.h"
+
+#include <argp.h>
+#include <stdint.h>
+
+struct place;
+
+typedef struct client_options {
+    /* of options_request */
+    uint32_t timeoutMs;
+    uint8_t has_timeout, retries, in_flight;
+    /* of options_output */
+    uint8_t is_json, is_quiet;
+    /* of options_unit */
+    uint8_t unit;
+    /* of options_values */
+    uint8_t table; /* one of MBM_TABLE_ */
+    value_form form;
+    uint8_t has_type, is_one_based;
+} client_options;
+
+/* What the options say; their defaults if they are not given. */
+extern client_options options;
+
+/* --trace and --pcap; a program that is no client has these alone. */
+extern const struct argp options_trace;
+/* --timeout, --retries, --in-flight. */
+extern const struct argp options_request;
+/* --json, --quiet. */
+extern const struct argp options_output;
+/* Those of options_request, options_output and options_trace. */
+extern const struct argp options_client;
+/* --unit. */
+extern const struct argp options_unit;
+/* --table, --type, --order, --scale, --hex, --one-based. At the end of the command line the type is
+ * that of the table: a bit, or a uint16 if none is given. */
+extern const struct argp options_values;
+
+/* Of a text on the command line, where `what` names it, for example "COUNT". They end the program
+ * with CODE_WRONG, after saying what is allowed, if the text is not right. */
+int64_t options_number(const struct argp_state *state, const char *what, const char *text,
+                       int64_t least, int64_t most);
+uint32_t options_time(const struct argp_state *state, const char *what, const char *text,
+                      uint32_t least, uint32_t most);
+int options_word(const struct argp_state *state, const char *what, const char *text,
+                 const char *const *words);
+
+/* Reads an address, with --one-based from 1 on. Call it when all options are read. */
+uint16_t options_address(const struct argp_state *state, const char *text);
+
+/* Ends the program with CODE_WRONG and a sentence that argp follows by where to find help. */
+void options_wrong(const struct argp_state *state, const char *format, ...)
+    __attribute__((format(printf, 2, 3), noreturn));
+
+/* Refuses unit 0, to which a client only writes, and only on a serial line. */
+void options_check_unit(const struct argp_state *state, const struct place *where, int is_write);
+
+/* Reads the LINE of a client, or of a server. */
+void options_place(const struct argp_state *state, struct place *where, const char *text,
+                   int is_server);
+
+#endif

@@ -1,0 +1,216 @@
+#define _GNU_SOURCE
+#include "payload.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* The bytes that have not been read yet. */
+typedef struct cursor {
+    const char *at, *end;
+} cursor;
+
+/* --- JSON (RFC 8259). Each function returns 0 if the next bytes are not what it skips. --- */
+
+static int skip_value(cursor *in);
+
+static int is_digit(const cursor *in)
+{
+    return in->at < in->end && *in->at >= '0' && *in->at <= '9';
+}
+
+static int is_space(char one)
+{
+    return one == ' ' || one == '\t' || one == '\r' || one == '\n';
+}
+
+static void skip_space(cursor *in)
+{
+    while (in->at < in->end && is_space(*in->at))
+        in->at++;
+}
+
+static int skip_char(cursor *in, char one)
+{
+    if (in->at == in->end || *in->at != one)
+        return 0;
+    in->at++;
+    return 1;
+}
+
+static int skip_word(cursor *in, const char *word)
+{
+    const size_t length = strlen(word);
+
+    if ((size_t)(in->end - in->at) < length || memcmp(in->at, word, length) != 0)
+        return 0;
+    in->at += length;
+    return 1;
+}
+
+static int skip_digits(cursor *in)
+{
+    if (!is_digit(in))
+        return 0;
+    while (is_digit(in))
+        in->at++;
+    return 1;
+}
+
+static int skip_number(cursor *in)
+{
+    (void)skip_char(in, '-');
+    if (!skip_char(in, '0') && !skip_digits(in))
+        return 0;
+    if (skip_char(in, '.') && !skip_digits(in))
+        return 0;
+    if (!skip_char(in, 'e') && !skip_char(in, 'E'))
+        return 1;
+    if (!skip_char(in, '-'))
+        (void)skip_char(in, '+');
+    return skip_digits(in);
+}
+
+static int skip_escape(cursor *in)
+{
+    int left = 4;
+
+    if (in->at == in->end || !strchr("\"\\/bfnrtu", *in->at) || !*in->at)
+        return 0;
+    if (*in->at++ != 'u')
+        return 1;
+    while (left > 0 && in->at < in->end && *in->at && strchr("0123456789abcdefABCDEF", *in->at)) {
+        in->at++;
+        left--;
+    }
+    return left == 0;
+}
+
+static int skip_string(cursor *in)
+{
+    if (!skip_char(in, '"'))
+        return 0;
+    while (in->at < in->end && *in->at != '"') {
+        const unsigned char one = (unsigned char)*in->at++;
+
+        if (one < ' ' || (one == '\\' && !skip_escape(in)))
+            return 0;
+    }
+    return skip_char(in, '"');
+}
+
+/* After a bracket: skips the items or members up to the bracket that closes them. If `value` is not
+ * NULL, it gets the member of that name, and each name must be plain and "value" be there once. */
+static int skip_rest(cursor *in, char closing, cursor *value)
+{
+    skip_space(in);
+    if (skip_char(in, closing))
+        return 1;
+    for (;;) {
+        cursor name, found;
+        int is_value;
+
+        skip_space(in);
+        name.at = in->at;
+        if (closing == '}') {
+            if (!skip_string(in))
+                return 0;
+            name.end = in->at;
+            skip_space(in);
+            if (!skip_char(in, ':'))
+                return 0;
+            skip_space(in);
+        }
+        found.at = in->at;
+        if (!skip_value(in))
+            return 0;
+        found.end = in->at;
+        if (value) {
+            /* An escape could spell "value" in another way. */
+            if (memchr(name.at, '\\', (size_t)(name.end - name.at)))
+                return 0;
+            is_value = skip_word(&name, "\"value\"");
+            if (is_value && value->at)
+                return 0;
+            if (is_value)
+                *value = found;
+        }
+        skip_space(in);
+        if (skip_char(in, closing))
+            return 1;
+        if (!skip_char(in, ','))
+            return 0;
+    }
+}
+
+/* The depth of its calls is limited by the length of the payload. */
+static int skip_value(cursor *in)
+{
+    if (skip_char(in, '{'))
+        return skip_rest(in, '}', NULL);
+    if (skip_char(in, '['))
+        return skip_rest(in, ']', NULL);
+    if (in->at < in->end && *in->at == '"')
+        return skip_string(in);
+    return skip_word(in, "true") || skip_word(in, "false") || skip_word(in, "null") ||
+           skip_number(in);
+}
+
+/* --- payloads --- */
+
+/* Returns the value in a payload: all of it without the space around it, or the member "value".
+ * Without one, the result is empty. */
+static cursor find_value(const char *payload, size_t length)
+{
+    cursor in = {payload, payload + length}, value = {NULL, NULL};
+
+    skip_space(&in);
+    while (in.at < in.end && is_space(in.end[-1]))
+        in.end--;
+    if (!skip_char(&in, '{'))
+        return in;
+    if (!skip_rest(&in, '}', &value) || in.at != in.end)
+        value.at = value.end = NULL;
+    return value;
+}
+
+/* Returns 0 or 1, or -1 if the value is no truth value. */
+static int read_truth(cursor value)
+{
+    static const char *const WORDS[] = {"false", "true", "off", "on", "OFF", "ON"};
+    int at;
+
+    for (at = 0; value.at && at < 6; at++) {
+        cursor in = value;
+
+        if (skip_word(&in, WORDS[at]) && in.at == in.end)
+            return at & 1;
+    }
+    return -1;
+}
+
+uint16_t payload_parse(const value_form *form, const char *payload, size_t length,
+                       uint16_t words[VALUE_WORDS], const char **wrong)
+{
+    static char reason[80];
+    cursor value, in;
+    uint16_t count;
+
+    *wrong = length > PAYLOAD_BYTES ? "the payload is too long" : NULL;
+    if (*wrong)
+        return 0;
+    in = value = find_value(payload, length);
+    if (form->type == MBM_TYPE_BIT && read_truth(value) >= 0) {
+        words[0] = (uint16_t)read_truth(value);
+        return 1;
+    }
+    if (!value.at || !skip_number(&in) || in.at != value.end) {
+        *wrong = "the payload is no number";
+        return 0;
+    }
+    count = value_read(form, value.at, (size_t)(value.end - value.at), words, wrong);
+    if (count == 0) {
+        snprintf(reason, sizeof reason, "the number %s", *wrong);
+        *wrong = reason;
+    }
+    return count;
+}

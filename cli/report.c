@@ -1,0 +1,156 @@
+#define _GNU_SOURCE
+#include "report.h"
+
+#include "mbm.h"
+#include "numbers.h"
+
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+const char *report_name = "mbm";
+int report_code;
+volatile sig_atomic_t report_stopped;
+
+static void stop(int number)
+{
+    (void)number;
+    report_stopped = 1;
+}
+
+void report_catch_signals(void)
+{
+    struct sigaction action = {0};
+
+    action.sa_handler = stop;
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGPIPE, &action, NULL);
+}
+
+int report_note(int code)
+{
+    if (report_code == CODE_DONE)
+        report_code = code;
+    return report_code;
+}
+
+int report(int code, const char *format, ...)
+{
+    char text[1024];
+    size_t length;
+    va_list arguments;
+
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    length = strlen(text);
+    fprintf(stderr, "%s: %s%s\n", report_name, text,
+            length > 0 && strchr(".?!", text[length - 1]) ? "" : ".");
+    (void)report_note(code);
+    return code;
+}
+
+int report_code_of(uint8_t status, uint8_t exception)
+{
+    if (exception != 0)
+        return CODE_EXCEPTION;
+    switch (status) {
+    case MBM_OK: return CODE_DONE;
+    case MBM_LINK_LOST:
+    case MBM_CONNECT_TIMED_OUT:
+    case MBM_LINE_BUSY: return CODE_LINE;
+    case MBM_RESPONSE_TIMED_OUT:
+    case MBM_CANCELLED: /* by Ctrl-C */
+    case MBM_INVALID_SLAVE_ID: return CODE_NO_REPLY;
+    case MBM_INVALID_CRC:
+    case MBM_INVALID_FUNCTION:
+    case MBM_MALFORMED_REPLY:
+    case MBM_BUFFER_TOO_SMALL:
+    case MBM_NO_PROGRESS: return CODE_DAMAGED;
+    default: return CODE_WRONG;
+    }
+}
+
+const char *report_advice(uint8_t status, uint8_t exception)
+{
+    switch (exception) {
+    case 0: break;
+    case MBM_ILLEGAL_FUNCTION:
+        return "The device does not have this function; values may be in another --table";
+    case MBM_ILLEGAL_DATA_ADDRESS:
+        return "Check address and count against the device's manual; manuals that count from 1 need "
+               "--one-based";
+    case MBM_ILLEGAL_DATA_VALUE:
+        return "Check the count and the values against the device's manual";
+    case MBM_SLAVE_DEVICE_BUSY: return "Try again later";
+    case MBM_GATEWAY_PATH_UNAVAILABLE: return "Check the gateway's settings for this unit";
+    case MBM_GATEWAY_TARGET_FAILED_TO_RESPOND:
+        return "Check the unit's number, and the line behind the gateway";
+    default: return "";
+    }
+    switch (status) {
+    case MBM_RESPONSE_TIMED_OUT:
+        return "Check the unit's number, baud rate, parity and wiring. A slow device needs a longer "
+               "--timeout";
+    case MBM_INVALID_SLAVE_ID: return "Check the unit's number";
+    case MBM_INVALID_CRC:
+        return "Check baud rate, parity, wiring and termination, and that no two devices have the "
+               "same unit id";
+    case MBM_LINE_BUSY: return "Is another master on the line?";
+    case MBM_INVALID_FUNCTION:
+    case MBM_NO_PROGRESS:
+    case MBM_MALFORMED_REPLY: return "--trace shows what the device sent";
+    default: return "";
+    }
+}
+
+int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t timeoutMs,
+                   const char *lost)
+{
+    const int code = report_code_of(status, exception);
+    const char *advice = report_advice(status, exception);
+    const char *space = *advice ? ". " : "";
+    char time[32];
+
+    if (status == MBM_CANCELLED)
+        return report(code, "stopped before unit %u answered", unit);
+    if (status == MBM_RESPONSE_TIMED_OUT && exception == 0 && lost)
+        return report(code, "unit %u did not answer: %s", unit, lost);
+    if (status == MBM_RESPONSE_TIMED_OUT && exception == 0)
+        return report(code, "unit %u did not answer within %s%s%s", unit,
+                      number_time_text(timeoutMs, time), space, advice);
+    if (status == MBM_LINK_LOST && lost)
+        return report(code, "unit %u: the link was lost: %s", unit, lost);
+    return report(code, "unit %u: %s%s%s", unit, mbm_status_textOf(status, exception), space,
+                  advice);
+}
+
+void report_print_json(cJSON *object)
+{
+    char *text = cJSON_PrintUnformatted(object);
+
+    puts(text ? text : "null");
+    (void)fflush(stdout);
+    cJSON_free(text);
+    cJSON_Delete(object);
+}
+
+void report_json(cJSON *object, uint8_t status, uint8_t exception, const char *words)
+{
+    cJSON_AddNumberToObject(object, "code", report_code_of(status, exception));
+    cJSON_AddStringToObject(object, "status", words);
+    if (exception != 0)
+        cJSON_AddNumberToObject(object, "exception", exception);
+    report_print_json(object);
+}
+
+int report_end(int code)
+{
+    if ((ferror(stdout) || fclose(stdout) != 0) && errno != EBADF)
+        code = report(CODE_SYSTEM, "standard output: %s", strerror(errno));
+    return code;
+}

@@ -1,0 +1,67 @@
+/* What mbm says on stderr, and its exit codes.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef REPORT_H
+#define REPORT_H
+
+#include <signal.h>
+#include <stdint.h>
+
+enum {
+    CODE_DONE = 0,
+    CODE_SYSTEM = 1,    /* a file, the memory */
+    CODE_WRONG = 2,     /* the command line, or what a file says */
+    CODE_LINE = 3,      /* the line could not be opened, or was lost */
+    CODE_NO_REPLY = 4,  /* no reply in time */
+    CODE_EXCEPTION = 5, /* the device answered with an exception */
+    CODE_DAMAGED = 6    /* the reply was damaged or malformed */
+};
+
+#define REPORT_EXIT_CODES                                                                          \
+    "Exit codes:\n"                                                                                \
+    "  0  done\n"                                                                                  \
+    "  1  the system failed: a file, the memory\n"                                                 \
+    "  2  the command line or a file is wrong\n"                                                   \
+    "  3  the line could not be opened, or was lost\n"                                             \
+    "  4  no reply in time\n"                                                                      \
+    "  5  the device answered with an exception\n"                                                 \
+    "  6  the reply was damaged or malformed\n"                                                    \
+    "Of several results the first failure counts.\n"
+
+/* "mbm" and the command, which begin each sentence. */
+extern const char *report_name;
+
+/* Prints a sentence, given without its full stop, after report_name to stderr. Returns the code.
+ * The first code of a program that is not CODE_DONE stays in report_code. */
+int report(int code, const char *format, ...) __attribute__((format(printf, 2, 3)));
+extern int report_code;
+
+/* Notes a failure that is shown in another way. Returns report_code. */
+int report_note(int code);
+
+/* The exit code for the status of a request. */
+int report_code_of(uint8_t status, uint8_t exception);
+
+/* Notes and reports how a request to a unit failed, and what to look at. `timeoutMs` is how long it
+ * waited; `lost` says why the link was lost, or is NULL. Returns the exit code. */
+int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t timeoutMs,
+                   const char *lost);
+
+/* What to look at after a failure, as a sentence. Empty if nothing helps. */
+const char *report_advice(uint8_t status, uint8_t exception);
+
+/* Prints an object in one line to stdout, and frees it. report_json adds the status of a request
+ * before: its exit code, its status in words, and the code of an exception. */
+struct cJSON;
+void report_print_json(struct cJSON *object);
+void report_json(struct cJSON *object, uint8_t status, uint8_t exception, const char *words);
+
+/* Ctrl-C and SIGTERM set `report_stopped`. */
+extern volatile sig_atomic_t report_stopped;
+void report_catch_signals(void);
+
+/* Closes standard output. Returns the exit code: `code`, or CODE_SYSTEM after reporting that the
+ * output could not be written. */
+int report_end(int code);
+
+#endif

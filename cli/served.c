@@ -1,0 +1,251 @@
+#define _GNU_SOURCE
+#include "served.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { CELLS = 65536, BITMAP = CELLS / 8, STEP = 5, FLIPS = 8 };
+
+static int has(const uint8_t *bitmap, uint16_t address)
+{
+    return bitmap[address / 8] >> address % 8 & 1;
+}
+
+static void add(uint8_t *bitmap, uint16_t address)
+{
+    bitmap[address / 8] |= (uint8_t)(1u << address % 8);
+}
+
+/* --- random values --- */
+
+static uint32_t random_state = 1;
+
+static uint32_t next_random(void)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 17;
+    random_state ^= random_state << 5;
+    return random_state;
+}
+
+/* The value that a random register has at first. */
+static uint16_t first_value(const served_cells *cells, uint16_t address)
+{
+    return (uint16_t)((cells->seed + address) * 2654435761u >> 16);
+}
+
+/* A random register moves by up to STEP at each read, a bit flips at one read of FLIPS. `values`
+ * has what a cell has moved by. */
+static uint16_t vary(served_cells *cells, uint16_t address, int is_bit)
+{
+    if (is_bit)
+        cells->values[address] ^= next_random() % FLIPS == 0;
+    else
+        cells->values[address] =
+            (uint16_t)(cells->values[address] + next_random() % (2 * STEP + 1) - STEP);
+    return (uint16_t)(cells->values[address] + first_value(cells, address));
+}
+
+/* --- the cells of a table --- */
+
+static uint16_t get(void *context, uint16_t address)
+{
+    served_cells *cells = (served_cells *)context;
+
+    return cells->values[address];
+}
+
+static uint16_t get_random_register(void *context, uint16_t address)
+{
+    served_cells *cells = (served_cells *)context;
+
+    return has(cells->written, address) ? cells->values[address] : vary(cells, address, 0);
+}
+
+static uint16_t get_random_bit(void *context, uint16_t address)
+{
+    served_cells *cells = (served_cells *)context;
+
+    return has(cells->written, address) ? cells->values[address] : vary(cells, address, 1) & 1;
+}
+
+static void set(void *context, uint16_t address, uint16_t value)
+{
+    served_cells *cells = (served_cells *)context;
+
+    cells->values[address] = value;
+    if (cells->written)
+        add(cells->written, address);
+}
+
+static uint8_t exists(void *context, uint16_t address)
+{
+    const served_cells *cells = (const served_cells *)context;
+
+    return (uint8_t)(has(cells->readable, address) || has(cells->writable, address));
+}
+
+/* Refuses a request unless the bitmap has all its cells. */
+static uint8_t check(const uint8_t *bitmap, const mbm_access *access)
+{
+    uint32_t i;
+
+    for (i = 0; i < access->quantity; i++)
+        if (!has(bitmap, (uint16_t)(access->address + i)))
+            return MBM_ILLEGAL_DATA_ADDRESS;
+    return 0;
+}
+
+static uint8_t before_read(void *context, const mbm_access *access)
+{
+    return check(((const served_cells *)context)->readable, access);
+}
+
+static uint8_t before_write(void *context, const mbm_access *access)
+{
+    return check(((const served_cells *)context)->writable, access);
+}
+
+/* Makes the cells of a table. Returns 0, or -1 without memory. */
+static int make_cells(served_units *units, uint8_t unit, uint8_t table, enum served_kind kind)
+{
+    const int is_bit = table <= MBM_TABLE_DISCRETE_INPUTS;
+    served_cells *cells = &units->cells[unit][table - 1];
+
+    cells->kind = kind;
+    cells->seed = (uint32_t)(units->units[unit].id * 4 + table) * 40503u;
+    cells->callbacks.context = cells->hooks.context = cells;
+    cells->callbacks.get = kind != SERVED_RANDOM ? get
+                           : is_bit              ? get_random_bit
+                                                 : get_random_register;
+    if (table == MBM_TABLE_COILS || table == MBM_TABLE_HOLDING_REGISTERS)
+        cells->callbacks.set = set;
+    cells->values = (uint16_t *)calloc(CELLS, sizeof *cells->values);
+    if (kind == SERVED_RANDOM)
+        cells->written = (uint8_t *)calloc(1, BITMAP);
+    if (kind == SERVED_DEVICE) {
+        cells->readable = (uint8_t *)calloc(1, BITMAP);
+        cells->writable = (uint8_t *)calloc(1, BITMAP);
+        cells->callbacks.isValid = exists;
+        cells->hooks.beforeRead = before_read;
+        cells->hooks.beforeWrite = before_write;
+        (void)mbm_dataCallbacks_setHooks(&cells->callbacks, &cells->hooks);
+    }
+    if (!cells->values || (kind == SERVED_RANDOM && !cells->written) ||
+        (kind == SERVED_DEVICE && !(cells->readable && cells->writable)))
+        return -1;
+    (void)mbm_unit_serveCallbacks(&units->units[unit], &cells->callbacks, table);
+    return 0;
+}
+
+/* --- units --- */
+
+static uint16_t see_request(void *context, const mbm_request *request, uint8_t *response,
+                            uint16_t capacity)
+{
+    const served_hook *hook = (const served_hook *)context;
+    const uint8_t exception = hook->before(hook->context, request);
+
+    (void)response;
+    (void)capacity;
+    return exception ? MBM_REPLY_EXCEPTION | exception : MBM_REPLY_DECLINED;
+}
+
+static void identify(served_units *units, uint8_t id, const char *text)
+{
+    units->objects[id].id = id;
+    units->objects[id].data = (const uint8_t *)text;
+    units->objects[id].length = (uint8_t)strlen(text);
+}
+
+/* Makes units with all tables. The order of the records matters: the first one sees each request.
+ * Returns 0, or -1 without memory. */
+static int begin(served_units *units, enum served_kind kind, const uint8_t *ids, uint8_t count,
+                 const char *name, served_hook *hook)
+{
+    uint8_t i, table;
+
+    memset(units, 0, sizeof *units);
+    units->units = (mbm_unit *)calloc(count, sizeof *units->units);
+    units->cells = (served_cells(*)[4])calloc(count, sizeof *units->cells);
+    units->count = count;
+    if (!units->units || !units->cells)
+        return -1;
+    units->every_request.serve = see_request;
+    units->every_request.context = hook;
+    identify(units, 0, "mbm");
+    identify(units, 1, name ? name : "mbm serve");
+    identify(units, 2, mbm_version());
+    units->identification.objects = units->objects;
+    units->identification.count = 3;
+    for (i = 0; i < count; i++) {
+        units->units[i].id = ids[i];
+        (void)mbm_unit_serveCustom(&units->units[i], &units->every_request);
+        (void)mbm_unit_serveIdentification(&units->units[i], &units->identification);
+        for (table = MBM_TABLE_COILS; table <= MBM_TABLE_INPUT_REGISTERS; table++)
+            if (make_cells(units, i, table, kind) != 0)
+                return -1;
+    }
+    return 0;
+}
+
+int served_make_units(served_units *units, enum served_kind kind, const uint8_t *ids, uint8_t count,
+                      served_hook *hook)
+{
+    return begin(units, kind, ids, count, NULL, hook);
+}
+
+/* Adds a field to its unit. */
+static void add_field(served_units *units, const device_field *field, const mbm_planField *planned)
+{
+    const uint32_t size = device_size(planned);
+    served_cells *cells;
+    uint8_t unit = 0;
+    uint32_t i;
+
+    while (units->units[unit].id != planned->unit)
+        unit++;
+    cells = &units->cells[unit][planned->table - 1];
+    for (i = 0; i < size; i++) {
+        const uint16_t address = (uint16_t)(planned->address + i);
+
+        if (field->words)
+            cells->values[address] = field->words[i];
+        if (field->access & DEVICE_READ)
+            add(cells->readable, address);
+        if (field->access & DEVICE_WRITE)
+            add(cells->writable, address);
+    }
+}
+
+int served_make_device(served_units *units, const device *from, served_hook *hook)
+{
+    uint8_t ids[255], is_known[256] = {0}, count = 0;
+    uint16_t i;
+
+    for (i = 0; i < from->count; i++)
+        is_known[from->planned[i].unit] = 1;
+    for (i = 1; i <= 255; i++)
+        if (is_known[i])
+            ids[count++] = (uint8_t)i;
+    if (begin(units, SERVED_DEVICE, ids, count, from->name, hook) != 0)
+        return -1;
+    for (i = 0; i < from->count; i++)
+        add_field(units, &from->fields[i], &from->planned[i]);
+    return 0;
+}
+
+void served_free(served_units *units)
+{
+    uint8_t i, table;
+
+    for (i = 0; units->cells && i < units->count; i++)
+        for (table = 0; table < 4; table++) {
+            free(units->cells[i][table].values);
+            free(units->cells[i][table].readable);
+            free(units->cells[i][table].writable);
+            free(units->cells[i][table].written);
+        }
+    free(units->cells);
+    free(units->units);
+}

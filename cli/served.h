@@ -1,0 +1,46 @@
+/* The data that mbm serve serves: units whose cells come from a device file, vary at random, or
+ * hold what is written. A cell is a register, a coil or a discrete input.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef SERVED_H
+#define SERVED_H
+
+#include "device.h"
+
+enum served_kind { SERVED_DEVICE, SERVED_RANDOM, SERVED_ECHO };
+
+/* A table of a unit. */
+typedef struct served_cells {
+    mbm_dataCallbacks callbacks;
+    mbm_accessHooks hooks;
+    enum served_kind kind;
+    uint32_t seed;
+    uint16_t *values;
+    /* One bit for each address. Only cells of a device may be neither readable nor writable. Of
+     * random cells `written` are those that hold what was written. */
+    uint8_t *readable, *writable, *written;
+} served_cells;
+
+/* Called for each request before it is served; returns an exception code, or 0. */
+typedef struct served_hook {
+    uint8_t (*before)(void *context, const mbm_request *request);
+    void *context;
+} served_hook;
+
+typedef struct served_units {
+    mbm_unit *units;
+    uint8_t count;
+    served_cells (*cells)[4]; /* the tables of each unit */
+    mbm_custom every_request;
+    mbm_serverIdentification identification;
+    mbm_object objects[3];
+} served_units;
+
+/* Makes the units of a device in the order of their ids, or `count` units with these ids. `hook`
+ * must outlive them. Returns 0, or -1 without memory. */
+int served_make_device(served_units *units, const device *from, served_hook *hook);
+int served_make_units(served_units *units, enum served_kind kind, const uint8_t *ids, uint8_t count,
+                      served_hook *hook);
+void served_free(served_units *units);
+
+#endif

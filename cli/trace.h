@@ -1,0 +1,33 @@
+/* The options --trace and --pcap FILE: every frame that the program sends, receives or overhears,
+ * in words on stderr, and in a file for Wireshark.
+ *
+ * Without the options the ports are as they were, and nothing is traced.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef TRACE_H
+#define TRACE_H
+
+#include "mbm.h"
+
+/* Prints each frame, and writes each to a file. Call them before any port is traced. trace_write
+ * returns 0, or -1 with errno set if it cannot write the file. */
+void trace_print(void);
+int trace_write(const char *path);
+
+/* For programs without other options: takes both out of the arguments, and describes them. */
+#define TRACE_HELP                                                                                 \
+    "tracing:\n"                                                                                   \
+    "  --trace          prints each frame in words and hexadecimal to stderr, times in UTC\n"      \
+    "  --pcap FILE      writes each frame to a pcapng file: wireshark -o mbrtu.tcp.port:503 FILE\n"
+void trace_options(int *argc, char **argv);
+
+/* Returns the port to use instead of the port of a master or client, or of a server. `framing`
+ * is one of MBM_FRAMING_. `name` tells the link from others; a link with the same name as one
+ * before takes its place. */
+mbm_port trace_client(mbm_port port, uint8_t framing, const char *name);
+mbm_port trace_server(mbm_port port, uint8_t framing, const char *name);
+
+/* Traces an event of a sniffer. `time` is in microseconds since 1970. */
+void trace_event(const mbm_event *event, uint8_t framing, const char *name, uint64_t time);
+
+#endif
