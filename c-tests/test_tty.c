@@ -159,6 +159,24 @@ static void any_rate_is_set_if_the_options_allow_it(void **state)
     assert_same(&before, &after);
 }
 
+/* The C library fails if the terminal takes none of the changes. */
+static void a_pty_that_lacks_only_the_parity_is_opened(void **state)
+{
+    const mbm_tty_options frames[] = {PLAIN,
+                                      {.baud = 19200, .parity = 'O', .stop = 1},
+                                      {.baud = 19200, .parity = 'E', .stop = 1, .data = 7}};
+    mbm_tty left_open, tty;
+    size_t i;
+
+    (void)state;
+    assert_int_equal(mbm_tty_open(&left_open, line.path, 19200, 'N', 1), 0);
+    for (i = 0; i < COUNT(frames); i++) {
+        assert_int_equal(mbm_tty_openWith(&tty, line.path, &frames[i]), 0);
+        mbm_tty_close(&tty);
+    }
+    mbm_tty_close(&left_open);
+}
+
 static void options_that_no_terminal_has_are_refused_with_einval(void **state)
 {
     static const mbm_tty_options bad[] = {
@@ -394,6 +412,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(every_rate_of_termios_can_be_set),
         TEST(any_rate_is_set_if_the_options_allow_it),
+        TEST(a_pty_that_lacks_only_the_parity_is_opened),
         TEST(options_that_no_terminal_has_are_refused_with_einval),
         TEST(a_failed_open_sets_errno),
         TEST(close_leaves_the_terminal_as_it_was_found),

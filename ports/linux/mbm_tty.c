@@ -310,14 +310,17 @@ static int lock(mbm_tty *tty)
 }
 
 /* tcsetattr succeeds if it could do any part of its task, so the settings are read back. A
- * pty sends no bits over a wire, and its driver ignores parity and seven bits. */
+ * pty sends no bits over a wire, and its driver has neither parity nor seven bits. */
 static int set(const mbm_tty *tty, const mbm_tty_options *options)
 {
     const tcflag_t frame = CSIZE | PARENB | PARODD | CSTOPB;
     struct termios wanted, got;
 
-    if (tcgetattr(tty->fd, &wanted) < 0 || mbm_tty_settings(&wanted, options) < 0 ||
-        tcsetattr(tty->fd, TCSANOW, &wanted) < 0 || tcgetattr(tty->fd, &got) < 0)
+    if (tcgetattr(tty->fd, &wanted) < 0 || mbm_tty_settings(&wanted, options) < 0)
+        return -1;
+    if (!tty->has_uart)
+        wanted.c_cflag = (wanted.c_cflag & ~(tcflag_t)(PARENB | PARODD)) | CS8;
+    if (tcsetattr(tty->fd, TCSANOW, &wanted) < 0 || tcgetattr(tty->fd, &got) < 0)
         return -1;
     if (cfgetospeed(&got) != cfgetospeed(&wanted) ||
         (tty->has_uart && ((got.c_cflag ^ wanted.c_cflag) & frame) != 0))
