@@ -361,6 +361,21 @@ tool: ## Build the command line tool, build/plain/mbm
 	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
 	@echo "tool: $(BUILD)/plain/mbm"
 
+# The tool as it is installed: optimised and hardened, over the library of the ports.
+INSTALLED_TOOL := $(BUILD)/linux/mbm
+HARDENED := -O2 -D_FORTIFY_SOURCE=2 -fstack-protector-strong -fPIE -pie -Wl,-z,relro,-z,now,--as-needed
+$(INSTALLED_TOOL): linux $(TOOL) $(wildcard cli/*.h)
+	@scripts/need gcc libc6-dev libmbedtls-dev libcjson-dev libyaml-dev libmosquitto-dev
+	@gcc -std=c11 $(HARDENED) -Iinclude -Iports/linux $(TOOL) $(BUILD)/linux/libmbm-tls.a $(LIBRARY) $(TOOL_LIBS) -o $@
+
+.PHONY: install-tool
+install-tool: $(INSTALLED_TOOL) man ## Install that tool, its man pages and completion below PREFIX
+	@install -D -m 755 $(INSTALLED_TOOL) "$(DESTDIR)$(or $(PREFIX),/usr/local)/bin/mbm"
+	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/man/man1" $(BUILD)/man/*.1
+	@install -D -m 644 cli/completion/mbm.bash "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/bash-completion/completions/mbm"
+	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/zsh/vendor-completions" cli/completion/_mbm
+	@echo "install-tool: mbm $$(scripts/version) is in $(DESTDIR)$(or $(PREFIX),/usr/local)/bin"
+
 .PHONY: man
 man: tool ## Make the man pages of that tool, build/man
 	@scripts/need help2man

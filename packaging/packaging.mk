@@ -11,9 +11,9 @@ $(MCU_BUILDS): build-archive-%:
 
 .PHONY: dist
 dist: $(ARCHIVE) ## Write all packages to dist/, with their SHA-256 sums; builds what they contain
-	@scripts/need gcc libc6-dev libmbedtls-dev gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+	@scripts/need gcc libc6-dev libmbedtls-dev gcc-aarch64-linux-gnu libc6-dev-arm64-cross dpkg-dev
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
-	@$(MAKE) --no-print-directory assembler linux archive-aarch64
+	@$(MAKE) --no-print-directory assembler $(INSTALLED_TOOL) man archive-aarch64
 	@scripts/release/dist
 
 KINDS ?=
