@@ -29,8 +29,6 @@ TESTED_EXAMPLES := custom_server guarded_server
 # The short programs of examples/linux. Each is one file over the ports.
 EXAMPLES := basic calls custom_client custom_server guarded_server keep_link udp
 PORTS := $(patsubst ports/%.c,%,$(filter-out $(TLS),$(wildcard ports/linux/mbm_*.c)))
-# The options --trace and --pcap of the tool, which the demo has too.
-TRACE = $(patsubst %,$(BUILD)/$(1)/cli/%.o,trace pcap_file)
 # The command line tool.
 TOOL := $(wildcard cli/*.c)
 TOOL_PORTS := $(wildcard ports/linux/mbm_*.c)
@@ -336,10 +334,6 @@ udp: ## Build and check the example over UDP, build/plain/linux/udp
 	@$(MAKE) --no-print-directory venv $(UDP)
 	@$(BUILD)/venv/bin/python scripts/check/examples udp $(BUILD)/plain
 
-DEMO := $(BUILD)/plain/linux/demo
-$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
-
 .PHONY: keep-link
 keep-link: ## Show a client whose connection opens itself again, while a libmodbus server goes and comes back
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
@@ -390,7 +384,7 @@ check-tool: man ## Check that tool on servers of libmodbus and pymodbus, also wi
 .PHONY: trace
 trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
 	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv tool $(PEERS) $(DEMO)
+	@$(MAKE) --no-print-directory venv tool $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
 
 .PHONY: gateway
@@ -406,10 +400,10 @@ check-serve: tool ## Check mbm serve and its faults with pymodbus, libmodbus and
 	@$(BUILD)/venv/bin/python scripts/check/serve $(BUILD)/certificates $(BUILD)/plain/mbm $(BUILD)/sanitized/mbm
 
 .PHONY: demo
-demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work
+demo: tool ## Show every function against a libmodbus server, frame by frame, and a plan at work
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
-	@$(MAKE) --no-print-directory $(DEMO) $(BUILD)/plain/linux/basic
-	@$(DEMO)
+	@$(MAKE) --no-print-directory $(PEERS)
+	@scripts/check/examples demo $(BUILD)/plain
 	@$(MAKE) --no-print-directory plan
 
 .PHONY: plan

@@ -119,30 +119,6 @@ int trace_write(const char *path)
     return -1;
 }
 
-void trace_options(int *argc, char **argv)
-{
-    int i, kept = 1;
-
-    for (i = 1; i < *argc; i++) {
-        if (strcmp(argv[i], "--trace") == 0) {
-            trace_print();
-        } else if (strcmp(argv[i], "--pcap") == 0) {
-            if (i + 1 == *argc) {
-                fprintf(stderr, "--pcap needs the name of a file\n%s", TRACE_HELP);
-                exit(2);
-            }
-            if (trace_write(argv[++i]) != 0) {
-                fprintf(stderr, "%s: %s\n", argv[i], strerror(errno));
-                exit(1);
-            }
-        } else {
-            argv[kept++] = argv[i];
-        }
-    }
-    argv[kept] = NULL;
-    *argc = kept;
-}
-
 /* The link of this name, which is added if there is none. NULL if there are too many. */
 static traced *link_of(uint8_t framing, const char *name)
 {

@@ -14,13 +14,6 @@
 void trace_print(void);
 int trace_write(const char *path);
 
-/* For programs without other options: takes both out of the arguments, and describes them. */
-#define TRACE_HELP                                                                                 \
-    "tracing:\n"                                                                                   \
-    "  --trace          prints each frame in words and hexadecimal to stderr, times in UTC\n"      \
-    "  --pcap FILE      writes each frame to a pcapng file: wireshark -o mbrtu.tcp.port:503 FILE\n"
-void trace_options(int *argc, char **argv);
-
 /* Returns the port to use instead of the port of a master or client, or of a server. `framing`
  * is one of MBM_FRAMING_. `name` tells the link from others; a link with the same name as one
  * before takes its place. */

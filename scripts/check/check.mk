@@ -4,7 +4,7 @@
 # The programs whose sources clang-tidy reads, and the machines of examples/baremetal whose
 # processor Debian's clang 14 knows.
 TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(SERVE) $(PEERS) $(BUILD)/plain/mbm $(EXAMPLES:%=$(BUILD)/plain/linux/%) \
-                $(DEMO) $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
+                $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
                 $(BENCH) $(BENCH_CLIENT) $(BENCH_SERVER) $(BENCH_SNIFFER)
 TIDY_MACHINES = $(filter-out lx106 dc233c,$(MACHINES)) $(VARIANTS)
 # Not the sketches that use an AVR's own registers or libraries.

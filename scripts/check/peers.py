@@ -18,6 +18,38 @@ def word(address):
     return (address * 40503 + 0x1234) & 0xFFFF
 
 
+def bit(address):
+    """The coil that these servers have at an address at first."""
+    return word(address) >> 7 & 1
+
+
+def numbered(address, values):
+    """What `mbm read` prints of values at consecutive addresses."""
+    return "".join(f"{address + i:5}  {value}\n" for i, value in enumerate(values))
+
+
+def demonstration():
+    """Each function of a client on a libmodbus server: the words of a command of mbm after the line and the
+    unit, what it prints, and its exit code."""
+    wrote = "unit 17: wrote {} from address {} on, function {}\n"
+    return [
+        ("read 2 6", numbered(2, [word(2 + i) for i in range(6)]), 0),
+        ("read --table input 8 2", numbered(8, [word(8 + i) ^ 0xFFFF for i in range(2)]), 0),
+        ("write 40 48879", wrote.format("1 holding register", 40, "06"), 0),
+        ("write 0 1 2 3", wrote.format("3 holding registers", 0, "10"), 0),
+        ("read --hex 0 3", numbered(0, ["0x0001", "0x0002", "0x0003"]), 0),
+        ("call 16 00 28 FF 00 00 12", "16 00 28 FF 00 00 12\nunit 17  reply      16 mask write register  40: and FF00 or 0012\n", 0),
+        ("call 17 00 28 00 02 00 29 00 01 02 0A 0B",
+         "17 04 BE 12 0A 0B\nunit 17  reply      17 read/write multiple registers: 48658 2571\n", 0),
+        ("write --table coils 20 1", wrote.format("1 coil", 20, "05"), 0),
+        ("write --table coils 21 1 0 1", wrote.format("3 coils", 21, "0F"), 0),
+        ("read --table coils 20 5", numbered(20, [1, 1, 0, 1, bit(24)]), 0),
+        ("read --table discrete 30 4", numbered(30, [1 - bit(30 + i) for i in range(4)]), 0),
+        ("read 500", "", 5),
+        ("read --unit 99 --timeout 200ms 0", "", 4),
+    ]
+
+
 def start(*command, **options):
     """Starts a program that prints `ready`; returns it and the words after that."""
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options)
