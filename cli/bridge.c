@@ -430,7 +430,7 @@ int bridge_command(int argc, char **argv)
         (void)mbm_plan_end(&plan);
         broker_end(&mqtt);
         if (!options.is_quiet)
-            fprintf(stderr, "%lu messages published, %lu writes lost\n",
+            fprintf(stderr, "%s: messages published: %lu, writes lost: %lu.\n", report_name,
                     atomic_load(&mqtt.published), atomic_load(&mqtt.lost));
     }
     line_close(&at);

@@ -256,15 +256,15 @@ static void print_summary(void)
 {
     unsigned i;
 
-    fprintf(stderr, "%lu connections, %u refused, %u closed as idle\n", connected, listener.refused,
-            listener.idle);
+    fprintf(stderr, "%s: connections: %lu, refused: %u, closed as idle: %u.\n", report_name,
+            connected, listener.refused, listener.idle);
     for (i = 0; i < config.lineCount; i++) {
         const mbm_counters *counts = &lines[i].counters;
 
         fprintf(stderr,
-                "%s: %u requests, %u replies, of which %u exceptions; %u timeouts, %u bad CRCs\n",
-                lines[i].place.text, counts->requests, counts->replies, counts->exceptions,
-                counts->timeouts, counts->badCrc);
+                "%s: %s: requests: %u, replies: %u, exceptions: %u, timeouts: %u, bad CRCs: %u.\n",
+                report_name, lines[i].place.text, counts->requests, counts->replies,
+                counts->exceptions, counts->timeouts, counts->badCrc);
     }
 }
 

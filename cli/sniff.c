@@ -250,10 +250,10 @@ int sniff_command(int argc, char **argv)
     /* A line that could not be opened has nothing to sum up. */
     if (!options.is_quiet && (code == CODE_DONE || epoch))
         fprintf(stderr,
-                "%lu requests, %lu replies, %lu exceptions, %lu unpaired, %lu timeouts, %lu bad "
-                "CRCs, noise %lu times; slowest reply %.1f ms\n",
-                totals[MBM_EVENT_REQUEST], totals[MBM_EVENT_REPLY], totals[MBM_EVENT_EXCEPTION],
-                totals[MBM_EVENT_UNPAIRED], totals[MBM_EVENT_TIMEOUT], totals[MBM_EVENT_BAD_CRC],
-                totals[MBM_EVENT_NOISE], slowest / 1000.0);
+                "%s: requests: %lu, replies: %lu, exceptions: %lu, unpaired: %lu, timeouts: %lu, "
+                "bad CRCs: %lu, noise: %lu times, slowest reply: %.1f ms.\n",
+                report_name, totals[MBM_EVENT_REQUEST], totals[MBM_EVENT_REPLY],
+                totals[MBM_EVENT_EXCEPTION], totals[MBM_EVENT_UNPAIRED], totals[MBM_EVENT_TIMEOUT],
+                totals[MBM_EVENT_BAD_CRC], totals[MBM_EVENT_NOISE], slowest / 1000.0);
     return code;
 }
