@@ -333,7 +333,7 @@ static int read_type(reader *from, const yaml_node_t *field, yaml_node_t *const 
 static int read_place(reader *from, const yaml_node_t *field, yaml_node_t *const *values,
                       mbm_planField *planned)
 {
-    uint32_t address, count = 1, size;
+    uint32_t address = 0, count = 1, size;
     const int is_bit = planned->type == MBM_TYPE_BIT;
 
     if (planned->type == MBM_TYPE_TEXT && !values[COUNT])
@@ -345,7 +345,7 @@ static int read_place(reader *from, const yaml_node_t *field, yaml_node_t *const
     planned->count = (uint16_t)count;
     size = device_size(planned);
     if (size > (is_bit ? MOST_BITS : MOST_REGISTERS))
-        return refuse(from, line_of(values[COUNT]),
+        return refuse(from, line_of(values[COUNT] ? values[COUNT] : field),
                       "count is %u: these are %u registers, and one request reads at most %d",
                       count, size, MOST_REGISTERS);
     if (address + size > 65536)
