@@ -189,6 +189,10 @@ static void a_value_becomes_registers_exactly(void **state)
     WORDS(FIELD("    type: double\n    value: -1e3\n"), 0xC08F, 0x4000, 0, 0);
     WORDS(FIELD("    type: text\n    count: 5\n    value: abc\n"), 0x6162, 0x6300, 0);
     WORDS(FIELD("    type: text\n    count: 4\n    value: \"21 \xC2\xB0\"\n"), 0x3231, 0x20B0);
+    WORDS(FIELD("    type: bit\n    bit: 15\n    value: on\n"), 0x8000);
+    WORDS(FIELD("    type: bit\n    bit: 4\n    count: 3\n    value: 5\n"), 0x0050);
+    WORDS(FIELD("    type: bit\n    count: 16\n    value: 65535\n"), 0xFFFF);
+    WORDS(FIELD("    type: bit\n    bit: 4\n    order: BADC\n    value: on\n"), 0x1000);
     WORDS("fields: [{name: a, table: coils, address: 0, value: on}]", 1);
     WORDS("fields: [{name: a, table: coils, address: 0, count: 4, value: [1, 0, true, off]}]", 1, 0,
           1, 0);
@@ -247,7 +251,7 @@ static void a_wrong_key_is_refused_with_its_line(void **state)
         {"maker: a\n" UINT16(""),
          "1: key: \"maker\" is not one of device, unit, interval, order and fields"},
         {UINT16("    addr: 5\n"),
-         "6: key: \"addr\" is not one of name, table, address, type, count, scale, "
+         "6: key: \"addr\" is not one of name, table, address, type, bit, count, scale, "
          "unit_of_measurement, access, interval, value, unit, order and description"},
         {UINT16("    address: 7\n"), "6: address is there twice, first in line 4"},
         {UINT16("    name: b\n"), "6: name is there twice, first in line 2"},
@@ -289,8 +293,17 @@ static void keys_that_do_not_go_together_are_refused(void **state)
     static const struct {
         const char *text, *reason;
     } rows[] = {
-        {FIELD("    type: bit\n"),
-         "5: type is bit: registers have another type, from uint16 to text"},
+        {UINT16("    bit: 3\n"),
+         "6: bit is for fields of the type bit in the tables holding and input"},
+        {"fields: [{name: a, table: coils, address: 0,\n bit: 3}]",
+         "2: bit is for fields of the type bit in the tables holding and input"},
+        {FIELD("    type: bit\n    bit: 16\n"),
+         "6: bit: \"16\" is out of range: from 0 to 15 is allowed"},
+        {FIELD("    type: bit\n    bit: 13\n    count: 4\n"),
+         "7: the field has 4 bits from bit 13 on: a register has the bits 0 to 15"},
+        {FIELD("    type: bit\n    access: read-write\n"),
+         "6: access is read-write: bits of a register cannot be written"},
+        {FIELD("    type: bit\n    bit: 1\n    scale: 2\n"), "7: a bit has no scale"},
         {"fields: [{name: a, table: coils, address: 0,\n type: uint16}]",
          "2: type is uint16: the type of coils and discrete inputs is bit"},
         {"fields: [{name: a, table: discrete, address: 0,\n access: write}]",
@@ -311,19 +324,23 @@ static void keys_that_do_not_go_together_are_refused(void **state)
          "5: the field has 9 bits from address 65530 on: addresses end at 65535"},
         {UINT16("") "  - {name: level, table: input, address: 7, type: uint16}\n",
          "6: the field in line 2 has the name level too"},
-        {UINT16("    count: 2\n") "  - {name: b, table: holding, address: 8, type: uint16}\n",
-         "7: b shares an address with level of line 2"},
-        {UINT16("") "  - {name: b, table: holding, address: 4, type: uint64}\n",
-         "6: b shares an address with level of line 2"},
+        {UINT16(
+             "    count: 2\n    value: [1, 2]\n") "  - {name: b, table: holding, address: 8, type: uint16, value: 3}\n",
+         "8: b shares an address with level of line 2, and has another value"},
+        {UINT16(
+             "    value: 12\n") "  - {name: b, table: holding, address: 7, type: bit, bit: 2, value: off}\n",
+         "7: b shares an address with level of line 2, and has another value"},
     };
     unsigned i;
 
     (void)state;
     for (i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
-    read_text(UINT16("") "  - {name: b, table: holding, address: 3, type: uint64}\n"
-                         "  - {name: c, table: input, address: 7, type: uint16}\n"
-                         "  - {name: d, table: holding, address: 7, type: uint16, unit: 2}\n");
+    read_text(UINT16(
+        "    value: 12\n") "  - {name: b, table: holding, address: 7, type: bit, bit: 2, count: 2, value: 3}\n"
+                           "  - {name: c, table: input, address: 7, type: uint16, value: 1}\n"
+                           "  - {name: d, table: holding, address: 7, type: uint16, unit: 2, value: 2}\n"
+                           "  - {name: e, table: holding, address: 4, type: uint64}\n");
     device_free(&meter);
 }
 
@@ -340,6 +357,8 @@ static void a_value_that_the_registers_cannot_hold_is_refused(void **state)
         {UINT16("    value: 0x10\n"), "6: value: \"0x10\" is not a decimal number"},
         {UINT16("    scale: 0.1\n    value: 230.15\n"),
          "7: value: \"230.15\" is not a multiple of the scale"},
+        {FIELD("    type: bit\n    count: 3\n    value: 8\n"),
+         "7: value: \"8\" is out of range: from 0 to 7 is allowed"},
         {UINT16("    value: [1]\n"), "6: value is a list: it must be one word"},
         {UINT16("    count: 2\n    value: 1\n"),
          "7: value must be a list of 2 values, as count says"},

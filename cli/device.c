@@ -25,6 +25,7 @@ enum {
     TABLE,
     ADDRESS,
     TYPE,
+    BIT,
     COUNT,
     SCALE,
     MEASURE,
@@ -37,7 +38,7 @@ enum {
     FIELD_KEYS
 };
 static const char *const FIELD_NAMES[] = {
-    "name",   "table",    "address", "type", "count", "scale",       "unit_of_measurement",
+    "name",   "table",    "address", "type", "bit",   "count",       "scale", "unit_of_measurement",
     "access", "interval", "value",   "unit", "order", "description", NULL};
 
 /* A file that is being read. */
@@ -194,6 +195,38 @@ static int read_keys(reader *from, const yaml_node_t *mapping, const char *const
     return 1;
 }
 
+/* --- the words of a field --- */
+
+int device_is_part(const mbm_planField *planned)
+{
+    return planned->type == MBM_TYPE_BIT && planned->table >= MBM_TABLE_HOLDING_REGISTERS;
+}
+
+uint32_t device_size(const mbm_planField *planned)
+{
+    const uint16_t count = planned->count ? planned->count : 1;
+    const uint16_t one = value_registers(planned->type, count);
+
+    return planned->type == MBM_TYPE_TEXT || device_is_part(planned) ? one : (uint32_t)one * count;
+}
+
+/* The word of a register with these bits from `bit` on. */
+static uint16_t part_of(const mbm_planField *planned, uint16_t bits)
+{
+    mbm_registers registers;
+    uint16_t word = 0;
+
+    (void)mbm_registers_intoWords(&registers, &word, 1, 0);
+    (void)mbm_registers_setUint16(&registers, 0, planned->order, (uint16_t)(bits << planned->bit));
+    return word;
+}
+
+uint16_t device_mask(const mbm_planField *planned)
+{
+    return device_is_part(planned) ? part_of(planned, (uint16_t)((1u << planned->count) - 1))
+                                   : 0xFFFF;
+}
+
 /* --- a value --- */
 
 /* Writes a text of UTF-8 as Latin-1, as far as it fits. Returns its length, or -1 if a character is
@@ -237,6 +270,29 @@ static int read_text_value(reader *from, const yaml_node_t *node, const mbm_plan
     return 1;
 }
 
+/* Reads one bit. Returns 1, 0 after a refusal. */
+static uint16_t read_bit(reader *from, const yaml_node_t *node, uint16_t *word)
+{
+    const uint8_t position = read_word(from, "value", node, BITS);
+
+    *word = (uint16_t)((position - 1) & 1);
+    return position != 0;
+}
+
+/* Reads the number that bits of a register are. Returns 1, 0 after a refusal. */
+static uint16_t read_part(reader *from, const yaml_node_t *node, const mbm_planField *planned,
+                          uint16_t *word)
+{
+    uint32_t number = 0;
+
+    if (planned->count == 1
+            ? read_bit(from, node, word) == 0
+            : !read_number(from, "value", node, 0, (1u << planned->count) - 1, &number))
+        return 0;
+    *word = part_of(planned, planned->count == 1 ? *word : (uint16_t)number);
+    return 1;
+}
+
 /* Reads one number or bit. Returns how many words it has, 0 after a refusal. */
 static uint16_t read_one_value(reader *from, const yaml_node_t *node, const device_field *field,
                                const mbm_planField *planned, uint16_t *words)
@@ -246,13 +302,10 @@ static uint16_t read_one_value(reader *from, const yaml_node_t *node, const devi
 
     if (!text)
         return 0;
-    if (planned->type == MBM_TYPE_BIT) {
-        words[0] = read_word(from, "value", node, BITS);
-        if (words[0] == 0)
-            return 0;
-        words[0] = (uint16_t)((words[0] - 1) & 1);
-        return 1;
-    }
+    if (device_is_part(planned))
+        return read_part(from, node, planned, words);
+    if (planned->type == MBM_TYPE_BIT)
+        return read_bit(from, node, words);
     count = value_read(&field->form, text, strlen(text), number, &wrong);
     if (count == 0)
         (void)refuse(from, line_of(node), "value: \"%s\" %s%s%s", text, wrong,
@@ -275,7 +328,7 @@ static int read_value(reader *from, const yaml_node_t *node, device_field *field
         return fail(from, ENOMEM);
     if (planned->type == MBM_TYPE_TEXT)
         return read_text_value(from, node, planned, field->words);
-    if (planned->count == 1)
+    if (planned->count == 1 || device_is_part(planned))
         return read_one_value(from, node, field, planned, field->words) > 0;
     if (node->type != YAML_SEQUENCE_NODE ||
         node->data.sequence.items.top - node->data.sequence.items.start != planned->count)
@@ -294,14 +347,6 @@ static int read_value(reader *from, const yaml_node_t *node, device_field *field
 }
 
 /* --- a field --- */
-
-uint32_t device_size(const mbm_planField *planned)
-{
-    const uint16_t count = planned->count ? planned->count : 1,
-                   one = value_registers(planned->type, count);
-
-    return planned->type == MBM_TYPE_TEXT ? one : (uint32_t)one * count;
-}
 
 /* Whether table and type are known and go together. Returns 0 after a refusal. */
 static int read_type(reader *from, const yaml_node_t *field, yaml_node_t *const *values,
@@ -323,9 +368,9 @@ static int read_type(reader *from, const yaml_node_t *field, yaml_node_t *const 
         return refuse(from, line_of(values[TYPE]),
                       "type is %s: the type of coils and discrete inputs is bit",
                       value_type_names[planned->type]);
-    if (!is_bits && planned->type == MBM_TYPE_BIT)
-        return refuse(from, line_of(values[TYPE]),
-                      "type is bit: registers have another type, from uint16 to text");
+    if (values[BIT] && !device_is_part(planned))
+        return refuse(from, line_of(values[BIT]),
+                      "bit is for fields of the type bit in the tables holding and input");
     return 1;
 }
 
@@ -333,19 +378,25 @@ static int read_type(reader *from, const yaml_node_t *field, yaml_node_t *const 
 static int read_place(reader *from, const yaml_node_t *field, yaml_node_t *const *values,
                       mbm_planField *planned)
 {
-    uint32_t address, count = 1, size;
-    const int is_bit = planned->type == MBM_TYPE_BIT;
+    uint32_t address = 0, bit = 0, count = 1, size;
+    const int is_bit = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
 
     if (planned->type == MBM_TYPE_TEXT && !values[COUNT])
         return refuse(from, line_of(field), "a text needs its number of characters as count");
     if (!read_number(from, "address", values[ADDRESS], 0, 65535, &address) ||
+        (values[BIT] && !read_number(from, "bit", values[BIT], 0, 15, &bit)) ||
         (values[COUNT] && !read_number(from, "count", values[COUNT], 1, MOST_BITS, &count)))
         return 0;
     planned->address = (uint16_t)address;
     planned->count = (uint16_t)count;
+    planned->bit = (uint8_t)bit;
+    if (device_is_part(planned) && bit + count > 16)
+        return refuse(from, line_of(values[COUNT] ? values[COUNT] : field),
+                      "the field has %u bits from bit %u on: a register has the bits 0 to 15",
+                      count, bit);
     size = device_size(planned);
     if (size > (is_bit ? MOST_BITS : MOST_REGISTERS))
-        return refuse(from, line_of(values[COUNT]),
+        return refuse(from, line_of(values[COUNT] ? values[COUNT] : field),
                       "count is %u: these are %u registers, and one request reads at most %d",
                       count, size, MOST_REGISTERS);
     if (address + size > 65536)
@@ -382,6 +433,9 @@ static int read_access(reader *from, const yaml_node_t *node, const mbm_planFiel
         return refuse(from, line_of(node),
                       "access is %s: only coils and holding registers can be written",
                       ACCESSES[field->access - 1]);
+    if (node && field->access > DEVICE_READ && device_is_part(planned))
+        return refuse(from, line_of(node), "access is %s: bits of a register cannot be written",
+                      ACCESSES[field->access - 1]);
     return field->access != 0;
 }
 
@@ -406,21 +460,37 @@ static int read_scale(reader *from, const yaml_node_t *node, const mbm_planField
     return 1;
 }
 
-/* Whether no field before has the same name or one of its addresses. Returns 0 after a refusal. */
-static int is_alone(reader *from, const yaml_node_t *node, uint16_t at)
+/* Returns whether two fields have an address in common for which the file gives other values. */
+static int is_contradiction(const device *of, uint16_t one, uint16_t other)
+{
+    const mbm_planField *a = &of->planned[one], *b = &of->planned[other];
+    const uint16_t mask = device_mask(a) & device_mask(b);
+    const uint32_t end_a = a->address + device_size(a), end_b = b->address + device_size(b);
+    uint32_t at = a->address > b->address ? a->address : b->address;
+
+    if (a->unit != b->unit || a->table != b->table || !of->fields[one].words ||
+        !of->fields[other].words)
+        return 0;
+    for (; at < end_a && at < end_b; at++)
+        if ((of->fields[one].words[at - a->address] ^ of->fields[other].words[at - b->address]) &
+            mask)
+            return 1;
+    return 0;
+}
+
+/* Whether a field goes with those before it. Returns 0 after a refusal. */
+static int check_others(reader *from, const yaml_node_t *node, uint16_t at)
 {
     const device_field *fields = from->into->fields;
-    const mbm_planField *planned = from->into->planned, *one = &planned[at];
     uint16_t i;
 
     for (i = 0; i < at; i++) {
         if (strcmp(fields[i].name, fields[at].name) == 0)
             return refuse(from, line_of(node), "the field in line %d has the name %s too",
                           fields[i].line, fields[i].name);
-        if (planned[i].unit == one->unit && planned[i].table == one->table &&
-            planned[i].address < one->address + device_size(one) &&
-            one->address < planned[i].address + device_size(&planned[i]))
-            return refuse(from, line_of(node), "%s shares an address with %s of line %d",
+        if (is_contradiction(from->into, i, at))
+            return refuse(from, line_of(node),
+                          "%s shares an address with %s of line %d, and has another value",
                           fields[at].name, fields[i].name, fields[i].line);
     }
     return 1;
@@ -454,7 +524,7 @@ static int read_field(reader *from, yaml_node_t *node)
            read_access(from, values[ACCESS], planned, field) &&
            read_scale(from, values[SCALE], planned, field) &&
            read_value(from, values[VALUE], field, planned) &&
-           is_alone(from, node, (uint16_t)(into->count - 1));
+           check_others(from, node, (uint16_t)(into->count - 1));
 }
 
 /* --- the file --- */

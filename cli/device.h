@@ -54,4 +54,9 @@ int device_find(const device *from, const char *name);
 /* Returns how many registers or bits a field has. */
 uint32_t device_size(const mbm_planField *planned);
 
+/* Returns whether a field is bits of one register, and which bits of its words a field has: all but
+ * of such a field. */
+int device_is_part(const mbm_planField *planned);
+uint16_t device_mask(const mbm_planField *planned);
+
 #endif

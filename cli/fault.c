@@ -37,13 +37,14 @@ static const struct {
 
 static char said[700];
 
-__attribute__((format(printf, 1, 2))) static const char *say(const char *format, ...)
+static const char *say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+static const char *say(const char *format, ...)
 {
-    va_list values;
+    va_list arguments;
 
-    va_start(values, format);
-    (void)vsnprintf(said, sizeof said, format, values);
-    va_end(values);
+    va_start(arguments, format);
+    vsnprintf(said, sizeof said, format, arguments);
+    va_end(arguments);
     return said;
 }
 

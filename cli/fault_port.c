@@ -112,10 +112,15 @@ static void lengthen(uint8_t framing, parts *of)
 
 /* --- what is sent --- */
 
+/* Bytes without a pause between them are one piece, so that they are sent at once. */
 static void add_piece(fault_port *port, uint32_t pause, const uint8_t *bytes, uint16_t length)
 {
     memcpy(port->bytes + port->end, bytes, length);
     port->end = (uint16_t)(port->end + length);
+    if (port->count > 0 && pause == 0 && !port->is_datagrams) {
+        port->ends[port->count - 1] = port->end;
+        return;
+    }
     port->pauses[port->count] = pause;
     port->ends[port->count++] = port->end;
 }
@@ -125,7 +130,7 @@ static void make_pieces(fault_port *port, const uint8_t *answer, uint16_t length
 {
     const fault_choice *chosen = &port->chosen;
     uint8_t frame[MBM_MAX_ASCII_FRAME + 4], noise[256];
-    parts of, foreign;
+    parts of = {0}, foreign;
     uint16_t count;
 
     take_apart(port->framing, answer, length, &of);
@@ -252,7 +257,8 @@ static void after_sending(void *context)
         port->below.postTransmission(port->below.context);
 }
 
-mbm_port fault_port_begin(fault_port *port, const mbm_port *below, uint8_t framing)
+mbm_port fault_port_begin(fault_port *port, const mbm_port *below, uint8_t framing,
+                          int is_datagrams)
 {
     const mbm_port above = {.context = port,
                             .read = read_bytes,
@@ -265,6 +271,7 @@ mbm_port fault_port_begin(fault_port *port, const mbm_port *below, uint8_t frami
     memset(port, 0, sizeof *port);
     port->below = *below;
     port->framing = framing;
+    port->is_datagrams = (uint8_t)is_datagrams;
     port->random = 1;
     return above;
 }

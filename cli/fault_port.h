@@ -12,7 +12,7 @@ enum { FAULT_PORT_BYTES = 2048, FAULT_PORT_PIECES = 4 };
 
 typedef struct fault_port {
     mbm_port below;
-    uint8_t framing, is_lost, is_closing;
+    uint8_t framing, is_datagrams, is_lost, is_closing;
     fault_choice chosen; /* the faults of the request that is answered; all 0: none */
     /* What is to be sent: pieces, each after a pause. */
     uint8_t bytes[FAULT_PORT_BYTES];
@@ -23,8 +23,10 @@ typedef struct fault_port {
     uint32_t random;
 } fault_port;
 
-/* Begins it on a port. Returns the port for the server, whose context is the fault_port. */
-mbm_port fault_port_begin(fault_port *port, const mbm_port *below, uint8_t framing);
+/* Begins it on a port, which may send each frame as a datagram. Returns the port for the server,
+ * whose context is the fault_port. */
+mbm_port fault_port_begin(fault_port *port, const mbm_port *below, uint8_t framing,
+                          int is_datagrams);
 
 /* How long nothing is due, in microseconds; UINT32_MAX if nothing is to be sent. */
 uint32_t fault_port_delay(fault_port *port);

@@ -199,7 +199,7 @@ static void begin(served_units *units, int i, const mbm_port *below)
     else
         snprintf(name, sizeof name, "client %d", i + 1);
     traced = trace_server(*below, at.framing, name);
-    port = fault_port_begin(&ports[i], &traced, at.framing);
+    port = fault_port_begin(&ports[i], &traced, at.framing, at.kind == PLACE_UDP);
     switch (at.framing) {
     case MBM_FRAMING_RTU:
         (void)mbm_server_beginRtu(&servers[i], &port, units->units, units->count, frames[i],

@@ -16,6 +16,10 @@ static int print_one(const mbm_plan *plan, const device *of, uint16_t field, uin
     if (planned->type == MBM_TYPE_BIT) {
         if (mbm_plan_getInteger(plan, field, index, &integer) != MBM_OK)
             return 0;
+        if (planned->count > 1 && device_is_part(planned)) {
+            snprintf(text, VALUE_TEXT_BYTES, "%d", (int)integer);
+            return 1;
+        }
         bit = (uint16_t)integer;
         (void)mbm_registers_ofWords(&registers, &bit, 1, 0);
         value_print(&of->fields[field].form, &registers, 0, 1, is_json, text);
@@ -33,7 +37,8 @@ int value_text(const mbm_plan *plan, const device *of, uint16_t field, int is_js
                char text[VALUE_TEXT_LONGEST])
 {
     const mbm_planField *planned = &of->planned[field];
-    const uint16_t count = planned->type == MBM_TYPE_TEXT ? 1 : planned->count;
+    const uint16_t count =
+        planned->type == MBM_TYPE_TEXT || device_is_part(planned) ? 1 : planned->count;
     const int is_array = is_json && count > 1;
     size_t length = 0;
     uint16_t index;
