@@ -210,6 +210,11 @@ pub mod sniffer;
 pub mod text;
 pub mod trace;
 
+// The examples of the guide are tests.
+#[cfg(all(doctest, feature = "embedded-io", feature = "embedded-io-async"))]
+#[doc = include_str!("../docs/guide-rust.md")]
+struct Guide;
+
 pub mod client;
 pub mod gateway;
 pub mod master;

@@ -62,7 +62,7 @@ impl DelayNs for Delay {
 fn call(number: u32, parameter: *const u32) {
     // SAFETY: the debugger reads the parameter, and changes no memory.
     unsafe {
-        asm!("bkpt 0xAB", inout("r0") number => _, in("r1") parameter, options(nostack));
+        asm!("bkpt 0xAB", in("r0") number, lateout("r0") _, in("r1") parameter, options(nostack));
     }
 }
 
