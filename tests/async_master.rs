@@ -152,6 +152,7 @@ fn all_ten_functions_are_answered() {
     let both = master.read_write_multiple_registers((103, &mut words), (104, &[0xABCD]));
     assert_eq!(bench.run(both), Ok(()));
     assert_eq!(words, [0x1055, 0xABCD]);
+    assert!(!bench.wire.borrow().is_cut_off);
 }
 
 #[test]

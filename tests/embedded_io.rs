@@ -72,12 +72,12 @@ fn driver(wire: &Rc<RefCell<Wire>>) -> impl FnMut(bool) {
 
 fn serial(bench: &Bench) -> impl Port {
     let (wire, uart) = (&bench.wire, Uart(bench.wire.clone()));
-    EmbeddedIo::serial(uart, clock(wire)).with_driver(driver(wire))
+    EmbeddedIo::serial(uart, clock(wire)).with_driver(driver(wire), 115_200)
 }
 
 fn stream(bench: &Bench) -> impl Port {
     let (wire, uart) = (&bench.wire, Uart(bench.wire.clone()));
-    EmbeddedIo::stream(uart, clock(wire)).with_driver(driver(wire))
+    EmbeddedIo::stream(uart, clock(wire)).with_driver(driver(wire), 115_200)
 }
 
 type Words = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
@@ -103,6 +103,32 @@ fn a_master_reads_registers_through_a_uart() {
     let port = serial(&bench);
     assert_eq!(read(&mut bench, port), Ok(vec![0x1002, 0x1003, 0x1004]));
     assert!(!bench.wire.borrow().driver);
+}
+
+#[test]
+fn the_driver_is_on_until_the_last_byte_has_left_and_off_before_the_reply() {
+    for accepts in [1, 3, 256] {
+        let mut bench = Bench::new();
+        bench.wire.borrow_mut().accepts = accepts;
+        let mut master = master(serial(&bench));
+        let words = [7; 10];
+        assert_eq!(master.write_multiple_registers(100, &words), Ok(()));
+        let mut times = [0; 2];
+        let result = master.wait(|| {
+            let wire = bench.wire.borrow();
+            if !wire.is_flushed() {
+                times[0] = wire.now;
+            } else if wire.driver {
+                times[1] = wire.now;
+            }
+            drop(wire);
+            bench.pass();
+        });
+        assert_eq!(result, Ok(()), "{accepts}");
+        assert!(!bench.wire.borrow().is_cut_off, "{accepts}");
+        let after = times[1] - times[0];
+        assert!((50..=250).contains(&after), "{accepts}: {after}");
+    }
 }
 
 #[test]

@@ -1,13 +1,14 @@
 //! A port over the traits of the crate embedded-io, for UARTs and sockets of a HAL.
 
 use super::Port;
+use crate::time::{character, elapsed};
 use ::embedded_io::{Read, ReadReady, Write, WriteReady};
 
 /// A [`Port`] over a device that implements [`Read`], [`ReadReady`], [`Write`] and
 /// [`WriteReady`].
 ///
-/// `clock` returns the time in microseconds, which wraps at 2^32. The device does not say when its
-/// last byte has left, so set the baud rate: `settings().set_baud_rate(..)`.
+/// `clock` returns the time in microseconds, which wraps at 2^32. The traits do not say when the last
+/// byte has left, so set the baud rate: `settings().set_baud_rate(..)`.
 #[derive(Clone, Debug)]
 pub struct EmbeddedIo<D, C, E = fn(bool)> {
     /// The UART or socket.
@@ -16,6 +17,11 @@ pub struct EmbeddedIo<D, C, E = fn(bool)> {
     driver: E,
     /// A read that fails has lost characters, and not the link.
     is_serial: bool,
+    /// The time of a character, with an RS-485 driver; 0 without one.
+    character: u16,
+    /// The accepted bytes have left `wait` microseconds after `since`.
+    since: u32,
+    wait: u32,
 }
 
 impl<D, C> EmbeddedIo<D, C> {
@@ -28,6 +34,9 @@ impl<D, C> EmbeddedIo<D, C> {
             clock,
             driver: |_| {},
             is_serial: true,
+            character: 0,
+            since: 0,
+            wait: 0,
         }
     }
 
@@ -39,17 +48,24 @@ impl<D, C> EmbeddedIo<D, C> {
             clock,
             driver: |_| {},
             is_serial: false,
+            character: 0,
+            since: 0,
+            wait: 0,
         }
     }
 
     /// As this port, with an RS-485 driver: `driver` switches it on with `true` before the first
-    /// byte is sent, and off after the last one.
-    pub fn with_driver<E: FnMut(bool)>(self, driver: E) -> EmbeddedIo<D, C, E> {
+    /// byte is sent, and off after the last one. From the baud rate the port computes when that
+    /// byte has left; it stays on for one character more.
+    pub fn with_driver<E: FnMut(bool)>(self, driver: E, baud: u32) -> EmbeddedIo<D, C, E> {
         EmbeddedIo {
             device: self.device,
             clock: self.clock,
             driver,
             is_serial: self.is_serial,
+            character: character(baud),
+            since: self.since,
+            wait: self.wait,
         }
     }
 }
@@ -62,6 +78,19 @@ fn count(bytes: usize) -> i16 {
 
 /// What a port returns whose link is lost.
 const LOST: i16 = -1;
+
+impl<D, C: FnMut() -> u32, E> EmbeddedIo<D, C, E> {
+    /// Notes that the device has accepted bytes.
+    fn note_sent(&mut self, bytes: usize) {
+        let (now, character) = ((self.clock)(), u32::from(self.character));
+        if elapsed(now, self.since) >= self.wait {
+            self.since = now;
+            self.wait = character;
+        }
+        let more = character.saturating_mul(bytes as u32);
+        self.wait = self.wait.saturating_add(more);
+    }
+}
 
 impl<D, C, E> Port for EmbeddedIo<D, C, E>
 where
@@ -85,7 +114,13 @@ where
     fn write(&mut self, bytes: &[u8]) -> i16 {
         match self.device.write_ready() {
             Ok(false) => 0,
-            Ok(true) => self.device.write(bytes).map_or(LOST, count),
+            Ok(true) => match self.device.write(bytes) {
+                Ok(written) => {
+                    self.note_sent(written);
+                    count(written)
+                }
+                Err(_) => LOST,
+            },
             Err(_) => LOST,
         }
     }
@@ -94,11 +129,17 @@ where
         (self.clock)()
     }
 
+    fn flush(&mut self) -> bool {
+        !self.knows_when_sent() || elapsed((self.clock)(), self.since) >= self.wait
+    }
+
     fn knows_when_sent(&self) -> bool {
-        false
+        self.character > 0
     }
 
     fn pre_transmission(&mut self) {
+        // The last frame has left, however long ago: the clock may have wrapped.
+        self.wait = 0;
         (self.driver)(true);
     }
 

@@ -29,6 +29,8 @@ pub struct Wire {
     pub is_cut: bool,
     /// The RS-485 driver is on.
     pub driver: bool,
+    /// The driver was off while bytes left the UART.
+    pub is_cut_off: bool,
     /// All bytes that were sent.
     pub sent: Vec<u8>,
 }
@@ -137,8 +139,12 @@ impl Bench {
 
     /// Lets 50 microseconds pass, in which the device receives and answers.
     pub fn pass(&mut self) {
-        self.wire.borrow_mut().now += 50;
-        let now = self.wire.borrow().now;
+        let now = {
+            let wire = &mut *self.wire.borrow_mut();
+            wire.is_cut_off |= !wire.driver && !wire.is_flushed();
+            wire.now += 50;
+            wire.now
+        };
         let server = &mut self.server;
         let served = self
             .device
