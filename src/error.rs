@@ -11,13 +11,13 @@ use core::task::Poll;
 /// The outcome of a call: success, an exception code of the remote device, or an error of
 /// the library, the line or the caller.
 #[repr(transparent)]
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Status(u8);
 
 /// Why a call or a request failed: a [`Status`] other than [`Status::OK`].
 // It is never 0, so `Result<(), Error>` is one byte, the number of the status.
 #[repr(transparent)]
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Error(NonZeroU8);
 
 /// Defines the statuses that are errors: their constants, numbers and texts. `others` are texts
@@ -44,6 +44,18 @@ macro_rules! statuses {
                 match self.0 {
                     $($code => const { c_text(concat!($text, "\0")) },)*
                     $($other => const { c_text(concat!($other_text, "\0")) },)*
+                }
+            }
+        }
+
+        /// The name of the constant, or the number of a status without a name.
+        impl fmt::Debug for Status {
+            fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+                match self.0 {
+                    0x00 => formatter.write_str("OK"),
+                    0xEB => formatter.write_str("PENDING"),
+                    $($code => formatter.write_str(stringify!($name)),)*
+                    unnamed => write!(formatter, "{unnamed:#04x}"),
                 }
             }
         }
@@ -266,9 +278,15 @@ impl fmt::Display for Status {
     }
 }
 
+impl fmt::Debug for Error {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        fmt::Debug::fmt(&self.status(), formatter)
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        self.status().fmt(formatter)
+        fmt::Display::fmt(&self.status(), formatter)
     }
 }
 

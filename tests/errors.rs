@@ -89,6 +89,14 @@ fn statuses_with_a_name_have_a_text_of_their_own() {
 }
 
 #[test]
+fn a_panic_shows_the_name_of_the_constant() {
+    assert_eq!(format!("{:?}", Status::OK), "OK");
+    assert_eq!(format!("{:?}", Status::PENDING), "PENDING");
+    assert_eq!(format!("{:?}", Error::LINE_BUSY), "LINE_BUSY");
+    assert_eq!(format!("{:?}", Status::from_code(0x1F)), "0x1f");
+}
+
+#[test]
 fn an_error_can_be_boxed_with_other_errors() {
     fn read() -> Result<(), Box<dyn std::error::Error>> {
         Err(Error::LINK_LOST)?
