@@ -88,14 +88,20 @@ HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && scripts
 header: ## Generate include/mbm.h and its parts from the source
 	@$(HEADER)
 
+# The features of the core that add a crate.
+FEATURES := defmt,embedded-io,embedded-io-async
 .PHONY: check
 check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header, docs, functions, spelling, symbols
 	@$(CARGO) fmt --all --check
-	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
-	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus -- -D warnings
+	@for crate in fuzz bench model examples/rust; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
+	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus,$(FEATURES) -- -D warnings
+	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
 	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
+	@for feature in $(subst $(comma), ,$(FEATURES)); do \
+		$(CARGO) clippy --quiet --no-default-features --features $$feature -- -D warnings || exit 1; done
 	@$(CARGO) clippy --quiet --manifest-path model/Cargo.toml --target-dir $(BUILD)/model --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
+	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps -p mbm --features $(FEATURES)
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin circles
@@ -118,7 +124,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 format: ## Format Rust, C and C++ as `make check` requires
 	@scripts/need clang-format
 	@$(CARGO) fmt --all
-	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
+	@for crate in fuzz bench model examples/rust; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
 	@clang-format -i $(C_SOURCES)
 
 .PHONY: abi

@@ -1,6 +1,6 @@
 //! Reading and writing of big-endian numbers with bounds checks. Nothing here can panic.
 
-use crate::error::Status;
+use crate::error::Error;
 use core::cell::Cell;
 
 /// Moves the bytes from the index `from` to the end to the front of `bytes`.
@@ -110,12 +110,12 @@ impl<'a> Writer<'a> {
     /// Returns the number of bytes written.
     ///
     /// # Errors
-    /// [`Status::BUFFER_TOO_SMALL`] if they did not all fit.
-    pub fn finish(self) -> Result<usize, Status> {
+    /// [`Error::BUFFER_TOO_SMALL`] if they did not all fit.
+    pub fn finish(self) -> Result<usize, Error> {
         if self.length <= self.bytes.len() {
             Ok(self.length)
         } else {
-            Err(Status::BUFFER_TOO_SMALL)
+            Err(Error::BUFFER_TOO_SMALL)
         }
     }
 }
@@ -150,7 +150,7 @@ mod tests {
         writer.u16(0x0A0B);
         writer.u16(0x0C0D);
         writer.u8(9);
-        assert_eq!(writer.finish(), Err(Status::BUFFER_TOO_SMALL));
+        assert_eq!(writer.finish(), Err(Error::BUFFER_TOO_SMALL));
         assert_eq!(bytes, [0x0A, 0x0B, 3]);
     }
 }

@@ -1,9 +1,9 @@
 //! mbm: Modbus for firmware. A master, a client, a plan of values to read, a server, a gateway, a
 //! sniffer and a trace, on serial lines (RTU and ASCII) and on TCP. The crate does not use a
-//! heap, never waits and never panics.
+//! heap and never panics.
 //!
-//! You call `poll` often; each call does what can be done without waiting. Time is a clock in
-//! microseconds, which may wrap. Your firmware implements [`port::Port`] for its UART or
+//! You call `poll` often; each call does what can be done without waiting. Functions return
+//! `Result` with [`error::Error`]. Time is a clock in microseconds, which may wrap. Your firmware implements [`port::Port`] for its UART or
 //! socket, to read and write bytes:
 //!
 //! ```
@@ -24,6 +24,7 @@
 //! }
 //! ```
 //!
+//! With the feature `embedded-io`, `port::EmbeddedIo` is such a port over the UART of a HAL.
 //! The examples below use a `Uart` with a simulated device on its line.
 //!
 //! # A master
@@ -32,113 +33,78 @@
 //! registers of unit 17:
 //!
 //! ```
-//! # use mbm::port::Port;
-//! # struct Uart { sends: &'static [u8], now: u32, arriving: &'static [u8], sent: usize }
-//! # impl Port for Uart {
-//! #     fn read(&mut self, bytes: &mut [u8]) -> i16 {
-//! #         let count = bytes.len().min(self.arriving.len());
-//! #         let (now, later) = self.arriving.split_at(count);
-//! #         bytes[..count].copy_from_slice(now);
-//! #         self.arriving = later;
-//! #         count as i16
-//! #     }
-//! #     fn write(&mut self, bytes: &[u8]) -> i16 {
-//! #         self.sent += bytes.len();
-//! #         self.arriving = self.sends;
-//! #         bytes.len() as i16
-//! #     }
-//! #     fn micros(&mut self) -> u32 { self.now += 100; self.now }
-//! # }
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
 //! use mbm::engine::Buffers;
-//! use mbm::error::Status;
 //! use mbm::master::Master;
 //!
-//! # let sends = &[17, 3, 4, 0x02, 0x2B, 0x00, 0x64, 0x9B, 0xA9];
-//! # let uart = Uart { sends, now: 0, arriving: &[], sent: 0 };
-//! // The frame buffer, the words to be read, the words to be written.
+//! # fn main() -> Result<(), mbm::error::Error> {
+//! # let uart = uart();
+//! // The frame buffer, the words that a read fills, the words that a write sends.
 //! let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
 //! let mut master = Master::new(17, uart, buffers);
 //! master.settings().set_baud_rate(9600);
 //!
-//! assert_eq!(master.read_holding_registers(107, 2), Status::PENDING);
-//! while master.poll() == Status::PENDING {
-//!     // The firmware does its other work here.
+//! master.read_holding_registers(107, 2)?;
+//! master.wait(|| { /* The firmware does its other work here. */ })?;
+//! assert_eq!(master.response(), [555, 100]);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! [`master::Master::poll`] does not wait: a main loop calls it until it returns `Poll::Ready`.
+//!
+//! With the feature `embedded-io-async`, `master::AsyncMaster` has the same functions as futures.
+//! `uart` is a UART of embedded-io-async, `micros` a clock, and `Delay` is `DelayNs` of
+//! embedded-hal-async, which every executor's timer has:
+//!
+#![cfg_attr(feature = "embedded-io-async", doc = "```")]
+#![cfg_attr(not(feature = "embedded-io-async"), doc = "```ignore")]
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+//! use mbm::engine::Buffers;
+//! use mbm::error::Error;
+//! use mbm::master::AsyncMaster;
+//!
+//! async fn read() -> Result<[u16; 2], Error> {
+//!     let buffers = Buffers::new([0; 32], [0; 10], [0; 10]);
+//!     let mut master = AsyncMaster::new(17, uart(), micros, Delay, buffers);
+//!     master.settings().set_baud_rate(9600);
+//!
+//!     let mut words = [0; 2];
+//!     master.read_holding_registers(107, &mut words).await?;
+//!     Ok(words)
 //! }
-//! assert_eq!(master.status(), Status::OK);
-//! assert_eq!([master.response_word(0), master.response_word(1)], [555, 100]);
+//! # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
 //! ```
 //!
 //! # A client
 //!
 //! [`client::Client`] queues requests of every function, and retries them as its policy says.
-//! On TCP it has many requests in flight at the same time. You implement [`client::ClientRequest`] for
-//! your request, which holds the data to send and the data received:
+//! On TCP it has many requests in flight at the same time. [`client::Request`] is a request with
+//! its data in slices:
 //!
 //! ```
-//! # use mbm::port::Port;
-//! # struct Uart { sends: &'static [u8], now: u32, arriving: &'static [u8], sent: usize }
-//! # impl Port for Uart {
-//! #     fn read(&mut self, bytes: &mut [u8]) -> i16 {
-//! #         let count = bytes.len().min(self.arriving.len());
-//! #         let (now, later) = self.arriving.split_at(count);
-//! #         bytes[..count].copy_from_slice(now);
-//! #         self.arriving = later;
-//! #         count as i16
-//! #     }
-//! #     fn write(&mut self, bytes: &[u8]) -> i16 {
-//! #         self.sent += bytes.len();
-//! #         self.arriving = self.sends;
-//! #         bytes.len() as i16
-//! #     }
-//! #     fn micros(&mut self) -> u32 { self.now += 100; self.now }
-//! # }
-//! use mbm::client::{Client, ClientRequest, Serial, RequestState};
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
+//! use mbm::client::{Client, Request, Serial};
 //! use mbm::engine::Frame;
-//! use mbm::error::Status;
-//! use mbm::pdu::functions::FunctionSpec;
 //!
-//! struct Read {
-//!     state: RequestState,
-//!     received: [u8; 4],
-//! }
-//!
-//! impl ClientRequest for Read {
-//!     fn state(&self) -> &RequestState {
-//!         &self.state
-//!     }
-//!     fn state_mut(&mut self) -> &mut RequestState {
-//!         &mut self.state
-//!     }
-//!     fn byte(&self, _: usize) -> u8 {
-//!         0 // A read sends no data.
-//!     }
-//!     fn store(&mut self, data: &[u8], _: u8) {
-//!         self.received[..data.len()].copy_from_slice(data);
-//!     }
-//! }
-//!
-//! let mut state = RequestState::NONE;
-//! state.unit = 17;
-//! state.capacity = 4;
-//! let status = state.header.set(FunctionSpec::READ_HOLDING_REGISTERS, 107, 2);
-//! assert_eq!(status, Status::OK);
-//!
-//! # let sends = &[17, 3, 4, 0x02, 0x2B, 0x00, 0x64, 0x9B, 0xA9];
-//! # let uart = Uart { sends, now: 0, arriving: &[], sent: 0 };
-//! let line = Serial::new(uart, Frame::new([0; 256]));
+//! # fn main() -> Result<(), mbm::error::Error> {
+//! # let uart = uart();
+//! let mut words = [0; 2];
 //! // Up to four requests are queued or in flight.
-//! let mut client: Client<_, Read, 4> = Client::new(line);
-//! assert!(client.queue(Read { state, received: [0; 4] }).is_ok());
+//! let mut client: Client<_, _, 4> = Client::new(Serial::new(uart, Frame::new([0; 256])));
+//! let request = Request::read_holding_registers(17, 107, &mut words)?;
+//! assert!(client.queue(request).is_ok());
 //!
-//! let mut now = 0;
-//! let read = loop {
-//!     now += 100; // The clock of the port.
-//!     if let Some(read) = client.poll(now, true) {
-//!         break read;
-//!     }
-//! };
-//! assert_eq!(read.state.status, Status::OK);
-//! assert_eq!(read.received, [0x02, 0x2B, 0x00, 0x64]);
+//! # for now in (0..1_000_000).step_by(100) {
+//! // In the main loop, with the time of the clock:
+//! while let Some(request) = client.poll(now) {
+//!     request.result()?;
+//!     assert_eq!(request.registers(), [555, 100]);
+//! #   return Ok(());
+//! }
+//! # }
+//! # panic!("the request does not end")
+//! # }
 //! ```
 //!
 //! # A server
@@ -147,28 +113,12 @@
 //! services, which answer them:
 //!
 //! ```
-//! # use mbm::port::Port;
-//! # struct Uart { sends: &'static [u8], now: u32, arriving: &'static [u8], sent: usize }
-//! # impl Port for Uart {
-//! #     fn read(&mut self, bytes: &mut [u8]) -> i16 {
-//! #         let count = bytes.len().min(self.arriving.len());
-//! #         let (now, later) = self.arriving.split_at(count);
-//! #         bytes[..count].copy_from_slice(now);
-//! #         self.arriving = later;
-//! #         count as i16
-//! #     }
-//! #     fn write(&mut self, bytes: &[u8]) -> i16 {
-//! #         self.sent += bytes.len();
-//! #         self.arriving = self.sends;
-//! #         bytes.len() as i16
-//! #     }
-//! #     fn micros(&mut self) -> u32 { self.now += 100; self.now }
-//! # }
-//! use mbm::error::Status;
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
 //! use mbm::frame::Framing;
 //! use mbm::server::storage::{HoldingRegisters, RegisterArray};
 //! use mbm::server::{Server, Unit};
 //!
+//! # fn main() -> Result<(), mbm::error::Error> {
 //! let mut words = [555, 100, 0];
 //! # {
 //! # let arriving = &[17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55];
@@ -183,12 +133,13 @@
 //!
 //! # for now in (0..100_000).step_by(100) {
 //! // In the main loop, with the time of the clock:
-//! let status = server.serve(now, &mut units[..]);
-//! assert_eq!(status, Status::OK);
+//! server.serve(now, &mut units[..])?;
 //! # }
 //! # }
 //! // A master wrote 888 to register 109.
 //! assert_eq!(words, [555, 100, 888]);
+//! # Ok(())
+//! # }
 //! ```
 //!
 //! # Packets
@@ -209,7 +160,7 @@
 //! let frame = Framing::Rtu.parse(&mut buffer[..length], ascii::END)?;
 //! assert_eq!(frame.unit, 17);
 //! assert_eq!(Request::parse(frame.pdu)?, request);
-//! # Ok::<(), mbm::error::Status>(())
+//! # Ok::<(), mbm::error::Error>(())
 //! ```
 //!
 //! # Layers
@@ -223,8 +174,17 @@
 //! Each of them may use `atomic`, `error`, `time`, `port`, `ring` and `data`. `make check`
 //! enforces this rule.
 //!
-//! No module allocates memory, has global variables, waits or panics. The C ABI is the crate
-//! `mbm-c`.
+//! No module allocates memory, has global variables or panics, and none waits but
+//! [`master::Master::wait`]. The C ABI is the crate `mbm-c`.
+//!
+//! # Features
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | `diagnosis` (default) | a failed request says why: see [`error::Error::INVALID_SLAVE_ID`]. Frames are counted, and deviating replies can be accepted |
+//! | `embedded-io` | `port::EmbeddedIo`, a port over embedded-io |
+//! | `embedded-io-async` | `master::AsyncMaster`, a master with futures, over embedded-io-async and embedded-hal-async |
+//! | `defmt` | `defmt::Format` for [`error::Status`] and [`error::Error`] |
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -249,6 +209,11 @@ pub mod pdu;
 pub mod sniffer;
 pub mod text;
 pub mod trace;
+
+// The examples of the guide are tests.
+#[cfg(all(doctest, feature = "embedded-io", feature = "embedded-io-async"))]
+#[doc = include_str!("../docs/guide-rust.md")]
+struct Guide;
 
 pub mod client;
 pub mod gateway;

@@ -91,7 +91,7 @@ proptest! {
                 prop_assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
                 let mut brought = false;
                 let task = loop {
-                    if let Some(task) = client.poll(end.now(), true) {
+                    if let Some(task) = client.poll(end.now()) {
                         break task;
                     }
                     if !brought && !end.sent().is_empty() {

@@ -19,7 +19,7 @@ fn read(unit: u8) -> Task {
 fn send_times<L: Transport<Task>>(end: &End, client: &mut Client<L, Task, 4>) -> (Vec<u32>, Task) {
     let mut send_times = Vec::new();
     for _ in 0..10_000 {
-        if let Some(task) = client.poll(end.now(), true) {
+        if let Some(task) = client.poll(end.now()) {
             return (send_times, task);
         }
         if !end.sent().is_empty() {
@@ -119,7 +119,7 @@ fn other_requests_are_sent_while_one_waits_for_its_retry() {
     assert!(client.queue(read(2)).is_ok());
     let mut order = Vec::new();
     for _ in 0..100_000 {
-        let ended = client.poll(end.now(), true);
+        let ended = client.poll(end.now());
         order.extend(end.sent().first().copied());
         if ended.is_some_and(|task| task.state.unit == 1) {
             break;
@@ -142,7 +142,7 @@ fn the_delay_between_requests_to_one_unit_does_not_delay_other_units() {
     }
     let mut sent = Vec::new();
     while client.pending() > 0 {
-        while client.poll(end.now(), true).is_some() {}
+        while client.poll(end.now()).is_some() {}
         if let Some(unit) = end.sent().get(6) {
             sent.push((*unit, end.now()));
         }
@@ -164,12 +164,12 @@ fn outcomes_of_requests_are_counted_for_each_unit() {
     send_times(&end, &mut client);
     for pdu in [&[3, 2, 0, 7][..], &[0x83, 4]] {
         assert!(client.queue(read(1)).is_ok());
-        client.poll(end.now(), true);
+        client.poll(end.now());
         let request = end.sent();
         let mut frame = vec![request[0], request[1], 0, 0, 0, pdu.len() as u8 + 1, 1];
         frame.extend(pdu);
         end.deliver(0, &frame);
-        assert!(client.poll(end.now(), true).is_some());
+        assert!(client.poll(end.now()).is_some());
     }
     let unit = client.line.storage.units[1];
     assert_eq!(
@@ -185,14 +185,14 @@ fn a_jump_of_the_clock_ends_a_wait_but_loses_no_reply() {
     let (end, mut client) = serial(Lent::default());
     assert!(client.queue(read(1)).is_ok());
     for _ in 0..100 {
-        assert!(client.poll(end.now(), true).is_none());
+        assert!(client.poll(end.now()).is_none());
         end.pass(100);
     }
     assert!(!end.sent().is_empty());
     end.deliver(0, &[1, 3, 2, 0, 7, 0xF9, 0x86]);
     // The clock jumps ahead by 15 minutes. The reply that has arrived is still taken.
     end.pass(900_000_000);
-    let task = client.poll(end.now(), true).unwrap();
+    let task = client.poll(end.now()).unwrap();
     assert_eq!(
         (task.state.status, task.received()),
         (Status::OK, &[0, 7][..])
@@ -201,13 +201,13 @@ fn a_jump_of_the_clock_ends_a_wait_but_loses_no_reply() {
     assert!(client.queue(read(1)).is_ok());
     let queued = end.now();
     while end.sent().is_empty() {
-        assert!(client.poll(end.now(), true).is_none());
+        assert!(client.poll(end.now()).is_none());
         end.pass(100);
         assert!(end.now().wrapping_sub(queued) < 1_000_000);
     }
-    assert!(client.poll(end.now(), true).is_none());
+    assert!(client.poll(end.now()).is_none());
     end.pass(0u32.wrapping_sub(60_000_000));
-    let task = client.poll(end.now(), true).unwrap();
+    let task = client.poll(end.now()).unwrap();
     assert_eq!(task.state.status, Status::RESPONSE_TIMED_OUT);
 }
 

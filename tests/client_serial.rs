@@ -33,7 +33,7 @@ fn ascii_client() -> (End, Transport) {
 /// Polls every 100 us until a task ends, for at most ten seconds.
 fn run(end: &End, client: &mut Transport) -> Task {
     for _ in 0..100_000 {
-        if let Some(task) = client.poll(end.now(), true) {
+        if let Some(task) = client.poll(end.now()) {
             return task;
         }
         end.pass(100);
@@ -44,7 +44,7 @@ fn run(end: &End, client: &mut Transport) -> Task {
 /// Polls until the client has sent bytes, and returns them.
 fn sent(end: &End, client: &mut Transport) -> Vec<u8> {
     for _ in 0..3_000 {
-        assert!(client.poll(end.now(), true).is_none());
+        assert!(client.poll(end.now()).is_none());
         let bytes = end.sent();
         if !bytes.is_empty() {
             return bytes;
@@ -184,7 +184,7 @@ fn requests_are_sent_one_after_the_other_and_in_order() {
         assert_eq!(request[0], number);
         // Nothing else is sent while this one is under way.
         end.pass(5_000);
-        assert!(client.poll(end.now(), true).is_none());
+        assert!(client.poll(end.now()).is_none());
         assert!(end.sent().is_empty());
         end.deliver(0, &frame(number, &[3, 2, 0, number]));
         let task = run(&end, &mut client);
@@ -245,11 +245,11 @@ fn a_lost_link_ends_the_active_request_and_the_queued_ones() {
     assert!(client.is_connected());
     end.0.borrow_mut().dead = true;
     for number in 1..=3 {
-        let task = client.poll(end.now(), true).unwrap();
+        let task = client.poll(end.now()).unwrap();
         assert_eq!(task.state.status, Status::LINK_LOST);
         assert_eq!(task.state.transaction, number);
     }
-    assert!(client.poll(end.now(), true).is_none());
+    assert!(client.poll(end.now()).is_none());
     assert!(!client.is_connected());
     end.0.borrow_mut().dead = false;
     client.reconnect();
@@ -264,7 +264,7 @@ fn a_reconnect_ends_only_the_active_request() {
     }
     sent(&end, &mut client);
     end.deliver(0, &[1, 3]);
-    client.poll(end.now(), true);
+    client.poll(end.now());
     client.reconnect();
     let task = run(&end, &mut client);
     assert_eq!(
@@ -301,7 +301,7 @@ fn a_suspended_client_sends_nothing() {
     assert!(!client.suspend());
     assert!(client.queue(read(1, 1)).is_ok());
     end.pass(50_000);
-    assert!(client.poll(end.now(), true).is_none());
+    assert!(client.poll(end.now()).is_none());
     assert_eq!(client.poll_delay(end.now()), u32::MAX);
     assert!(end.sent().is_empty());
     client.take_back();

@@ -31,7 +31,7 @@ fn read(transaction: u16) -> Task {
 /// Polls once as C does. Returns the number and the status of each request that ended.
 fn poll<L: Transport<Task>>(end: &End, client: &mut Client<L, Task, 16>) -> Vec<(u16, Status)> {
     let mut ended = Vec::new();
-    while let Some(task) = client.poll(end.now(), ended.is_empty()) {
+    while let Some(task) = client.poll(end.now()) {
         ended.push((task.state.transaction, task.state.status));
     }
     ended

@@ -4,7 +4,7 @@
 #[path = "common/vectors.rs"]
 mod vectors;
 
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::pdu::custom::{is_user_defined, Function, Rule};
 use mbm::pdu::length::{self, Length};
 use mbm::pdu::request::Request;
@@ -30,11 +30,11 @@ const FUNCTIONS: [Function; 4] = [
 const FIXED: [u8; 4] = [0x41, 1, 2, 3];
 const COUNTED: [u8; 6] = [0x5A, 9, 2, 7, 8, 0xEE];
 
-fn parse(pdu: &[u8]) -> Result<Request<'_>, Status> {
+fn parse(pdu: &[u8]) -> Result<Request<'_>, Error> {
     Request::parse_with(pdu, &FUNCTIONS)
 }
 
-fn parse_response(pdu: &[u8]) -> Result<Response<'_>, Status> {
+fn parse_response(pdu: &[u8]) -> Result<Response<'_>, Error> {
     Response::parse_with(pdu, &FUNCTIONS)
 }
 
@@ -79,8 +79,8 @@ fn declared_functions_outside_the_user_defined_ranges_are_read_too() {
     assert_eq!(parse(&COUNTED), Ok(Request::Custom { function, data }));
     let response = Response::Custom { function, data };
     assert_eq!(parse_response(&COUNTED), Ok(response));
-    assert_eq!(Request::parse(&COUNTED), Err(Status::ILLEGAL_FUNCTION));
-    assert_eq!(Response::parse(&COUNTED), Err(Status::INVALID_FUNCTION));
+    assert_eq!(Request::parse(&COUNTED), Err(Error::ILLEGAL_FUNCTION));
+    assert_eq!(Response::parse(&COUNTED), Err(Error::INVALID_FUNCTION));
 }
 
 #[test]
@@ -89,8 +89,8 @@ fn a_length_that_breaks_its_rule_is_refused() {
         let longer = [pdu, &[0]].concat();
         let wrong = (1..pdu.len()).map(|end| &pdu[..end]).chain([&longer[..]]);
         for wrong in wrong {
-            assert_eq!(parse(wrong), Err(Status::ILLEGAL_DATA_VALUE));
-            assert_eq!(parse_response(wrong), Err(Status::MALFORMED_REPLY));
+            assert_eq!(parse(wrong), Err(Error::ILLEGAL_DATA_VALUE));
+            assert_eq!(parse_response(wrong), Err(Error::MALFORMED_REPLY));
         }
     }
 }
@@ -118,7 +118,7 @@ fn a_declaration_does_not_change_a_function_of_the_standard() {
     }
     for code in (0x80..=0xFF).chain([0]) {
         let refused = Request::parse_with(&[code, 1], &all).map(drop);
-        assert_eq!(refused, Err(Status::ILLEGAL_FUNCTION), "{code:02X}");
+        assert_eq!(refused, Err(Error::ILLEGAL_FUNCTION), "{code:02X}");
     }
 }
 

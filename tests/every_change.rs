@@ -4,7 +4,7 @@
 #[path = "common/vectors.rs"]
 mod vectors;
 
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::pdu::custom::{Function, Rule};
 use mbm::pdu::length::{self, Length};
 use vectors::{all, parse_and_emit, right_pdus, Direction, Vector};
@@ -33,13 +33,13 @@ fn length(direction: Direction, pdu: &[u8]) -> Length {
 /// Panics unless the PDU is read and written again unchanged, or refused with a status that
 /// such a PDU can have.
 fn right_or_refused(direction: Direction, pdu: &[u8]) {
-    let expected: &[Status] = match direction {
+    let expected: &[Error] = match direction {
         Direction::Request => &[
-            Status::ILLEGAL_FUNCTION,
-            Status::ILLEGAL_DATA_ADDRESS,
-            Status::ILLEGAL_DATA_VALUE,
+            Error::ILLEGAL_FUNCTION,
+            Error::ILLEGAL_DATA_ADDRESS,
+            Error::ILLEGAL_DATA_VALUE,
         ],
-        Direction::Response => &[Status::INVALID_FUNCTION, Status::MALFORMED_REPLY],
+        Direction::Response => &[Error::INVALID_FUNCTION, Error::MALFORMED_REPLY],
     };
     match parse_and_emit(direction, pdu) {
         Ok(again) => assert_eq!(again, pdu),
@@ -68,9 +68,9 @@ fn every_truncated_pdu_that_contains_its_length_is_refused() {
             if !ends_with_silence(&vector) && !user {
                 let refused = parse_and_emit(vector.direction, part).unwrap_err();
                 let expected = match vector.direction {
-                    Direction::Request if end == 0 => Status::ILLEGAL_FUNCTION,
-                    Direction::Request => Status::ILLEGAL_DATA_VALUE,
-                    Direction::Response => Status::MALFORMED_REPLY,
+                    Direction::Request if end == 0 => Error::ILLEGAL_FUNCTION,
+                    Direction::Request => Error::ILLEGAL_DATA_VALUE,
+                    Direction::Response => Error::MALFORMED_REPLY,
                 };
                 assert_eq!(refused, expected, "{} cut to {end}", vector.name);
             }
@@ -89,8 +89,8 @@ fn every_longer_pdu_that_contains_its_length_is_refused() {
         if !ends_with_silence(&vector) && !user && !server_id {
             let refused = parse_and_emit(vector.direction, &longer).unwrap_err();
             let expected = match vector.direction {
-                Direction::Request => Status::ILLEGAL_DATA_VALUE,
-                Direction::Response => Status::MALFORMED_REPLY,
+                Direction::Request => Error::ILLEGAL_DATA_VALUE,
+                Direction::Response => Error::MALFORMED_REPLY,
             };
             assert_eq!(refused, expected, "{} and a byte more", vector.name);
         }

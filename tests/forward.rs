@@ -3,7 +3,7 @@
 #[path = "common/vectors.rs"]
 mod vectors;
 
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::pdu::header::RequestHeader;
 use mbm::pdu::request::Request;
 use proptest::prelude::*;
@@ -12,12 +12,9 @@ use vectors::{all, right_pdus, Direction};
 
 /// Forwards a request PDU. Returns its outline and the PDU that is sent, or the status that
 /// refuses it.
-fn forward(pdu: &[u8]) -> Result<(RequestHeader, Vec<u8>), Status> {
+fn forward(pdu: &[u8]) -> Result<(RequestHeader, Vec<u8>), Error> {
     let mut header = RequestHeader::NONE;
-    match header.forward(pdu[0], &pdu[1..]) {
-        Status::OK => {}
-        refused => return Err(refused),
-    }
+    header.forward(pdu[0], &pdu[1..]).result()?;
     let data = &pdu[pdu.len() - usize::from(header.data_length())..];
     let mut sent = vec![0; usize::from(header.request_length())];
     header.emit(&mut sent, |index| data[index]);
@@ -113,7 +110,7 @@ fn a_request_that_every_server_must_refuse_is_refused_with_that_exception() {
         (&[0x2B, 0x0E, 5, 0], Status::ILLEGAL_DATA_VALUE),
         (&[0x2B, 0x0E, 1, 0, 0], Status::ILLEGAL_DATA_VALUE),
     ] {
-        assert_eq!(forward(pdu).err(), Some(status), "{pdu:02X?}");
+        assert_eq!(forward(pdu).map(drop), status.result(), "{pdu:02X?}");
     }
     for function in 0..=255 {
         assert!(forward(&[&[function][..], &[1; 253]].concat()).is_err());

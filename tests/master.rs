@@ -55,9 +55,8 @@ fn master(reply: &[u8]) -> Master<Wire, Lent> {
 
 fn finish(master: &mut Master<Wire, Lent>) -> Status {
     for _ in 0..1_000_000 {
-        match master.poll() {
-            Status::PENDING => {}
-            status => return status,
+        if master.poll().is_ready() {
+            return master.status();
         }
     }
     panic!("the transaction does not end");
@@ -66,23 +65,19 @@ fn finish(master: &mut Master<Wire, Lent>) -> Status {
 #[test]
 fn registers_are_read_into_the_response_words() {
     let mut master = master(&sealed(&[7, 3, 4, 0x12, 0x34, 0x56, 0x78]));
-    assert_eq!(master.read_holding_registers(0x6B, 2), Status::PENDING);
+    assert_eq!(master.read_holding_registers(0x6B, 2), Ok(()));
     assert_eq!(finish(&mut master), Status::OK);
     assert_eq!(master.port().sent, sealed(&[7, 3, 0, 0x6B, 0, 2]));
-    assert_eq!(master.available(), 2);
-    assert_eq!((master.receive(), master.receive()), (0x1234, 0x5678));
-    assert_eq!(master.receive(), 0xFFFF);
+    assert_eq!(master.response(), [0x1234, 0x5678]);
 }
 
 #[test]
 fn unused_bits_of_the_last_word_are_zero_even_if_the_device_sets_them() {
     let mut master = master(&sealed(&[7, 1, 3, 0xFF, 0xFF, 0xFF]));
-    assert_eq!(master.read_coils(0, 17), Status::PENDING);
+    assert_eq!(master.read_coils(0, 17), Ok(()));
     assert_eq!(finish(&mut master), Status::OK);
-    assert_eq!(
-        (master.response_word(0), master.response_word(1)),
-        (0xFFFF, 1)
-    );
+    assert_eq!(master.response(), [0xFFFF, 1]);
+    assert!(master.response_bits().eq([true; 17]));
 }
 
 #[test]
@@ -91,7 +86,7 @@ fn noise_and_a_frame_of_another_unit_are_counted_and_skipped() {
     bytes.extend([0, 0, 0]);
     bytes.extend(sealed(&[7, 6, 0, 1, 0, 3]));
     let mut master = master(&bytes);
-    assert_eq!(master.write_single_register(1, 3), Status::PENDING);
+    assert_eq!(master.write_single_register(1, 3), Ok(()));
     assert_eq!(finish(&mut master), Status::OK);
     let counters = master.storage().counters;
     assert_eq!(counters[Counter::ForeignFrames as usize], 1);
@@ -105,7 +100,7 @@ fn data_that_look_like_a_damaged_reply_inside_a_frame_of_another_unit_do_not_end
     // The frame of unit 8 contains 07 06, which looks like the start of the expected reply.
     let bytes = sealed(&[8, 3, 8, 7, 6, 0, 0, 0, 0, 0, 0]);
     let mut master = master(&bytes);
-    assert_eq!(master.write_single_register(1, 3), Status::PENDING);
+    assert_eq!(master.write_single_register(1, 3), Ok(()));
     assert_eq!(finish(&mut master), Status::INVALID_SLAVE_ID);
 }
 
@@ -113,9 +108,9 @@ fn data_that_look_like_a_damaged_reply_inside_a_frame_of_another_unit_do_not_end
 fn a_request_that_is_answered_after_one_retry_succeeds() {
     let mut master = master(&[]);
     master.settings().retries = 1;
-    assert_eq!(master.write_single_coil(5, 1), Status::PENDING);
+    assert_eq!(master.write_single_coil(5, true), Ok(()));
     while master.storage().counters[Counter::Timeouts as usize] == 0 {
-        assert_eq!(master.poll(), Status::PENDING);
+        assert!(master.poll().is_pending());
     }
     master.port().reply = sealed(&[7, 5, 0, 5, 0xFF, 0]);
     assert_eq!(finish(&mut master), Status::OK);
@@ -139,10 +134,10 @@ fn a_reply_at_the_end_of_the_buffer_is_not_taken_for_an_echo() {
         // The master expects an echo, but none arrives.
         master.settings().echo_discard = true;
         let read = registers as u16;
-        let started = master.read_write_multiple_registers(0x6B, read, 1, 1);
-        assert_eq!(started, Status::PENDING);
-        while master.poll() == Status::PENDING {}
+        let started = master.read_write_multiple_registers(0x6B, read, 1, &[9]);
+        assert_eq!(started, Ok(()));
+        while master.poll().is_pending() {}
         assert_eq!(master.status(), Status::OK);
-        assert_eq!(master.receive(), 1);
+        assert_eq!(master.response()[0], 1);
     }
 }

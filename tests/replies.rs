@@ -5,7 +5,7 @@
 mod exchanges;
 
 use exchanges::CASES;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::pdu::header::RequestHeader;
 use mbm::pdu::identification::{
     IdentificationReply, ObjectList, BASIC, EXTENDED, INDIVIDUAL, REGULAR,
@@ -32,7 +32,7 @@ fn every_response_is_restored_from_the_data_that_the_client_stores() {
         assert_eq!(pdu[wanted.len()..], [0xEE; 253][wanted.len()..]);
         let short = &mut pdu[..wanted.len() - 1];
         let refused = header.restore_response(short, stored.len() as u8, received, sent);
-        assert_eq!(refused, Err(Status::BUFFER_TOO_SMALL));
+        assert_eq!(refused, Err(Error::BUFFER_TOO_SMALL));
         let exception = header.exception_pdu(2);
         assert_eq!(
             Response::parse(&exception),
@@ -50,7 +50,7 @@ fn reply(more: bool, next_object: u8, ids: &[u8]) -> (bool, u8, Vec<u8>) {
     (more, next_object, objects)
 }
 
-fn take(stream: &mut ObjectStream, reply: (bool, u8, Vec<u8>)) -> Result<Next, Status> {
+fn take(stream: &mut ObjectStream, reply: (bool, u8, Vec<u8>)) -> Result<Next, Error> {
     let (more_follows, next_object, objects) = reply;
     let count = (objects.len() / 3) as u8;
     stream.take(&IdentificationReply {
@@ -96,7 +96,7 @@ fn a_stream_never_requests_an_object_that_does_not_come_next() {
     let before = stream;
     assert_eq!(
         take(&mut stream, reply(true, 9, &[5, 4])),
-        Err(Status::NO_PROGRESS)
+        Err(Error::NO_PROGRESS)
     );
     assert_eq!(stream, before);
     assert_eq!(take(&mut stream, reply(true, 5, &[7])), Ok(Next::Stuck));
@@ -107,7 +107,7 @@ fn one_object_is_the_one_that_was_requested() {
     let mut stream = ObjectStream::new(INDIVIDUAL, 4);
     assert_eq!(
         take(&mut stream, reply(false, 0, &[3])),
-        Err(Status::MALFORMED_REPLY)
+        Err(Error::MALFORMED_REPLY)
     );
     assert_eq!(take(&mut stream, reply(false, 0, &[4])), Ok(Next::End));
 }

@@ -149,7 +149,10 @@ fn the_longest_frame_fits_into_a_buffer_of_its_length() {
     wire.borrow_mut().arriving = query.iter().map(|byte| (0, *byte)).collect();
     for now in [0, 1_000, 2_000, 3_999, 4_000, 4_001] {
         wire.borrow_mut().now = now;
-        device.with_unit(|unit| server.serve(now, &mut [unit][..]));
+        assert_eq!(
+            device.with_unit(|unit| server.serve(now, &mut [unit][..])),
+            Ok(())
+        );
     }
     assert_eq!(wire.borrow().sent[0], (4_000, query));
 }

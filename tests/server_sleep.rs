@@ -77,7 +77,7 @@ impl Program {
             reply: self.slow_reply,
         };
         if self.polled == Polled::AsOnHost {
-            assert_eq!(server.serve(now, &mut units), Status::OK);
+            assert_eq!(server.serve(now, &mut units), Ok(()));
             return;
         }
         if server.look(now) == Status::PENDING {

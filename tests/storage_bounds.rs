@@ -5,7 +5,6 @@ mod common;
 
 use common::master::{sealed, Call, Line};
 use mbm::engine::{Buffers, Counter, Storage, Words};
-use mbm::error::Status;
 use mbm::master::Master;
 use proptest::prelude::*;
 
@@ -68,7 +67,7 @@ impl Words for Strict {
         );
         self.lent.load_words(to, count, high_first);
     }
-    fn response(&mut self) -> &mut [u16] {
+    fn response(&self) -> &[u16] {
         self.lent.response()
     }
     fn response_words(&self) -> u8 {
@@ -164,14 +163,14 @@ proptest! {
             master.settings().echo_discard = echo;
             master.set_lenient(lenient);
             for bytes in &lines {
-                if call.start(&mut master) != Status::PENDING {
+                if call.start(&mut master, &[]).is_err() {
                     break;
                 }
                 // With `at_end`, noise fills the buffer so that the bytes end where it ends.
                 let noise = if at_end { space.min(255).saturating_sub(bytes.len()) } else { 0 };
                 let bytes = [&vec![0; noise], &bytes[..]].concat();
                 master.port().deliver(&bytes, piece, step);
-                while master.poll() == Status::PENDING {}
+                while master.poll().is_pending() {}
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The work, done by mbm.
 
 use mbm::data::{bits, registers};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::frame::{ascii, rtu, tcp, Adu, Framing};
 use mbm::pdu::header::RequestHeader;
 use mbm::pdu::request::Request;
@@ -33,8 +33,8 @@ impl Model {
 pub fn emit(
     framing: Framing,
     buffer: &mut [u8],
-    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>,
-) -> Result<usize, Status> {
+    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Error>,
+) -> Result<usize, Error> {
     match framing {
         Framing::Rtu => rtu::emit(buffer, UNIT, pdu),
         Framing::Ascii => ascii::emit(buffer, UNIT, ascii::END, pdu),
@@ -43,7 +43,7 @@ pub fn emit(
 }
 
 #[inline(always)]
-pub fn open(framing: Framing, frame: &[u8]) -> Result<Adu<'_>, Status> {
+pub fn open(framing: Framing, frame: &[u8]) -> Result<Adu<'_>, Error> {
     match framing {
         Framing::Rtu => rtu::parse(frame),
         _ => tcp::parse(frame),
@@ -57,7 +57,7 @@ pub fn answer(
     frame: &[u8],
     buffer: &mut [u8],
     model: &mut Model,
-) -> Result<usize, Status> {
+) -> Result<usize, Error> {
     let request = Request::parse(open(framing, frame)?.pdu)?;
     let response = match request {
         // From addresses that begin a word, as the peers' tables do a byte.
@@ -70,7 +70,7 @@ pub fn answer(
             let data = &mut model.place[..usize::from(quantity).div_ceil(8)];
             bits::send(
                 data,
-                words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?,
+                words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?,
                 quantity as u8,
             );
             Response::ReadBits { function, data }
@@ -83,19 +83,19 @@ pub fn answer(
             let from = usize::from(address);
             let words = model.words.get(from..from + usize::from(quantity));
             let data = &mut model.place[..2 * usize::from(quantity)];
-            registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?);
+            registers::send(data, words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?);
             Response::ReadRegisters { function, data }
         }
         Request::WriteSingleCoil { address, on } => {
             let word = model.coils.get_mut(usize::from(address / 16));
             let bit = 1 << (address % 16);
-            let word = word.ok_or(Status::ILLEGAL_DATA_ADDRESS)?;
+            let word = word.ok_or(Error::ILLEGAL_DATA_ADDRESS)?;
             *word = if on { *word | bit } else { *word & !bit };
             Response::WriteSingleCoil { address, on }
         }
         Request::WriteSingleRegister { address, value } => {
             let word = model.words.get_mut(usize::from(address));
-            *word.ok_or(Status::ILLEGAL_DATA_ADDRESS)? = value;
+            *word.ok_or(Error::ILLEGAL_DATA_ADDRESS)? = value;
             Response::WriteSingleRegister { address, value }
         }
         Request::WriteMultipleCoils {
@@ -108,7 +108,7 @@ pub fn answer(
                 .coils
                 .get_mut(from..from + usize::from(quantity).div_ceil(16));
             bits::take(
-                words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?,
+                words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?,
                 data,
                 quantity as u8,
             );
@@ -125,7 +125,7 @@ pub fn answer(
         } => {
             let from = usize::from(address);
             let words = model.words.get_mut(from..from + usize::from(quantity));
-            registers::take(words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, data);
+            registers::take(words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?, data);
             Response::WriteMultiple {
                 function: 16,
                 address,
@@ -138,7 +138,7 @@ pub fn answer(
             or_mask,
         } => {
             let word = model.words.get_mut(usize::from(address));
-            let word = word.ok_or(Status::ILLEGAL_DATA_ADDRESS)?;
+            let word = word.ok_or(Error::ILLEGAL_DATA_ADDRESS)?;
             *word = (*word & and_mask) | (or_mask & !and_mask);
             Response::MaskWriteRegister {
                 address,
@@ -157,17 +157,17 @@ pub fn answer(
             let words = model
                 .words
                 .get_mut(from..from + usize::from(write_quantity));
-            registers::take(words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, data);
+            registers::take(words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?, data);
             let from = usize::from(read_address);
             let words = model.words.get(from..from + usize::from(read_quantity));
             let data = &mut model.place[..2 * usize::from(read_quantity)];
-            registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?);
+            registers::send(data, words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?);
             Response::ReadRegisters {
                 function: 0x17,
                 data,
             }
         }
-        _ => return Err(Status::ILLEGAL_FUNCTION),
+        _ => return Err(Error::ILLEGAL_FUNCTION),
     };
     emit(framing, buffer, |pdu| response.emit(pdu))
 }

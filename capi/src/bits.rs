@@ -3,10 +3,10 @@
 
 use super::pointers::{put_result, slice, slice_mut};
 use mbm::data::bits::{self, Packed};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 
-fn code(result: Result<(), Status>) -> u8 {
-    result.err().unwrap_or(Status::OK).code()
+fn code(result: Result<(), Error>) -> u8 {
+    Status::from(result).code()
 }
 
 /// The number of bytes or words that hold `quantity` bits.

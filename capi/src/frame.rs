@@ -5,7 +5,7 @@ use super::packet::{
     mbm_length, mbm_packet, own, put_expected, reply_length, side, MBM_PACKET_REQUEST,
 };
 use super::pointers::{array, array_or_empty, buffer, get, put, put_length};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::frame::checksum::{crc16, lrc, Crc16};
 use mbm::frame::{Adu, Framing};
 use mbm::packet::refusal::{Exception, Head};
@@ -37,10 +37,10 @@ fn function(framing: Option<Framing>, bytes: &[u8]) -> Option<u8> {
 unsafe fn format(
     framing: *const mbm_framing,
     code: impl FnOnce(Option<Framing>) -> Option<u8>,
-) -> Result<FrameFormat, Status> {
+) -> Result<FrameFormat, Error> {
     // SAFETY: as the caller promises.
     unsafe {
-        let description = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
+        let description = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
         let framing = description.core()?;
         Ok(FrameFormat {
             framing,
@@ -79,10 +79,10 @@ pub unsafe extern "C" fn mbm_frame_build(
     unsafe {
         let build = || {
             let packet = get(packet).filter(|packet| !packet.lies_in(frame, capacity));
-            let packet = packet.ok_or(Status::INVALID_ARGUMENT)?;
+            let packet = packet.ok_or(Error::INVALID_ARGUMENT)?;
             let format = format(framing, |_| Some(packet.function))?;
             let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
-            let buffer = buffer.ok_or(Status::INVALID_ARGUMENT)?;
+            let buffer = buffer.ok_or(Error::INVALID_ARGUMENT)?;
             let data = packet.data()?;
             let Head {
                 transaction, unit, ..
@@ -133,7 +133,7 @@ pub unsafe extern "C" fn mbm_frame_parse(
     let arguments = unsafe {
         side(kind).and_then(|pdu_kind| {
             let bytes = buffer(frame, frameLength).filter(|_| !packet.is_null());
-            let bytes = bytes.ok_or(Status::INVALID_ARGUMENT)?;
+            let bytes = bytes.ok_or(Error::INVALID_ARGUMENT)?;
             let format = format(framing, |framing| function(framing, bytes))?;
             Ok((pdu_kind, bytes, format))
         })
@@ -157,9 +157,9 @@ pub unsafe extern "C" fn mbm_frame_parse(
             found.unit = adu.unit.into();
             found.transaction = adu.transaction;
             let taken = found.take(pdu_kind, adu.pdu, format.own.as_slice());
-            taken.err().unwrap_or(Status::OK)
+            Status::from(taken)
         }
-        Err(refused) => refused,
+        Err(refused) => refused.status(),
     };
     put(packet, found);
     status.code()
@@ -191,12 +191,12 @@ pub unsafe extern "C" fn mbm_frame_exception(
 ) -> u8 {
     let build = || {
         let request = get(request).filter(|packet| packet.kind == MBM_PACKET_REQUEST);
-        let request = request.ok_or(Status::INVALID_ARGUMENT)?;
+        let request = request.ok_or(Error::INVALID_ARGUMENT)?;
         let format = format(framing, |_| None)?;
         let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
-        let buffer = buffer.ok_or(Status::INVALID_ARGUMENT)?;
+        let buffer = buffer.ok_or(Error::INVALID_ARGUMENT)?;
         let code = Status::from_code(code);
-        let framing = format.framing.ok_or(Status::INVALID_ARGUMENT)?;
+        let framing = format.framing.ok_or(Error::INVALID_ARGUMENT)?;
         let exception = Exception::new(framing, request.head()?, code)?;
         exception.emit(framing, format.end, buffer)
     };
@@ -231,7 +231,7 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
 ) -> u8 {
     let measure = || {
         let pdu_kind = side(kind)?;
-        let bytes = array_or_empty(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
+        let bytes = array_or_empty(bytes, have.into()).ok_or(Error::INVALID_ARGUMENT)?;
         let format = format(framing, |framing| function(framing, bytes))?;
         let own = format.own.as_slice();
         match format.framing {
@@ -243,10 +243,10 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
 }
 
 /// The length of a PDU, from its first bytes.
-fn pdu_length(pdu_kind: PduKind, bytes: &[u8], own: &[Function]) -> Result<Length, Status> {
+fn pdu_length(pdu_kind: PduKind, bytes: &[u8], own: &[Function]) -> Result<Length, Error> {
     match pdu_kind.length(bytes, own) {
         Length::Exactly(bytes) | Length::AtLeast(bytes) if bytes > MAX_PDU => {
-            Err(Status::MALFORMED_FRAME)
+            Err(Error::MALFORMED_FRAME)
         }
         length => Ok(length),
     }
@@ -272,7 +272,7 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
     expected: *mut mbm_length,
 ) -> u8 {
     let measure = || {
-        let packet = get(request).ok_or(Status::INVALID_ARGUMENT)?;
+        let packet = get(request).ok_or(Error::INVALID_ARGUMENT)?;
         let format = format(framing, |_| Some(packet.function))?;
         let own = format.own.as_slice();
         let unit = packet.head()?.unit;
@@ -308,7 +308,7 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
     let bytes = array_or_empty(bytes, have.into()).filter(|_| !expected.is_null());
     let length = match bytes {
         Some(bytes) => length::looks_like_tcp(bytes, allowUnknown != 0, &[]),
-        None => Err(Status::INVALID_ARGUMENT),
+        None => Err(Error::INVALID_ARGUMENT),
     };
     put_length(expected, length)
 }

@@ -1,7 +1,7 @@
 //! The framings, as C programs name them.
 
 use super::functions::mbm_function;
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::frame::{ascii, tcp, Framing};
 
 /// RTU: serial line, binary, with a CRC-16 (serial line guide V1.02, 2.5.1).
@@ -47,16 +47,16 @@ pub struct mbm_framing {
 
 impl mbm_framing {
     /// Converts the framing to the core's type. `None` is MBM_FRAMING_NONE.
-    pub(super) fn core(&self) -> Result<Option<Framing>, Status> {
+    pub(super) fn core(&self) -> Result<Option<Framing>, Error> {
         match Framing::from_code(self.kind) {
-            None if self.kind != MBM_FRAMING_NONE => Err(Status::INVALID_ARGUMENT),
+            None if self.kind != MBM_FRAMING_NONE => Err(Error::INVALID_ARGUMENT),
             framing => Ok(framing),
         }
     }
 
     /// As [`Self::core`], but MBM_FRAMING_NONE is an error.
-    pub(super) fn of_frames(&self) -> Result<Framing, Status> {
-        self.core()?.ok_or(Status::INVALID_ARGUMENT)
+    pub(super) fn of_frames(&self) -> Result<Framing, Error> {
+        self.core()?.ok_or(Error::INVALID_ARGUMENT)
     }
 
     /// The last character of an ASCII frame.

@@ -1,7 +1,7 @@
 //! Sub-functions and other codes of functions, and the functions that a user declares. The function
 //! codes of the header are made of the table in `src/pdu/functions.rs`.
 
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::pdu::custom::{Function, Rule};
 use mbm::pdu::limits::MAX_PDU;
 use mbm::pdu::{diagnostics, identification};
@@ -129,17 +129,17 @@ pub(super) fn rule(rule: mbm_rule) -> Option<Rule> {
 /// The declaration of a function code, if `functions` has one.
 ///
 /// # Errors
-/// [`Status::INVALID_ARGUMENT`] if any item of `functions` is not a valid declaration.
+/// [`Error::INVALID_ARGUMENT`] if any item of `functions` is not a valid declaration.
 pub(super) fn declared(
     functions: &[mbm_function],
     code: Option<u8>,
-) -> Result<Option<Function>, Status> {
+) -> Result<Option<Function>, Error> {
     let mut found = None;
     for function in functions {
         let rules = rule(function.request).zip(rule(function.response));
         let (request, response) = match rules {
             Some(rules) if (1..=127).contains(&function.code) => rules,
-            _ => return Err(Status::INVALID_ARGUMENT),
+            _ => return Err(Error::INVALID_ARGUMENT),
         };
         if found.is_none() && Some(function.code) == code {
             found = Some(Function {

@@ -2,7 +2,7 @@
 //! to values, and to the objects that C programs begin.
 
 use core::slice::{from_raw_parts, from_raw_parts_mut};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 
 /// The array of `count` items at `first`. `None` if `first` is NULL, or if the array
 /// would be longer than any memory.
@@ -78,7 +78,7 @@ pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
 ///
 /// # Safety
 /// As for [`put`].
-pub(crate) unsafe fn put_length(place: *mut u16, length: Result<usize, Status>) -> u8 {
+pub(crate) unsafe fn put_length(place: *mut u16, length: Result<usize, Error>) -> u8 {
     match length {
         // SAFETY: as the caller promises.
         Ok(length) => unsafe { put(place, length as u16) },
@@ -268,10 +268,10 @@ pub(crate) unsafe fn read<'a, O: CObject, T>(
 /// `place` is NULL or points to a `T`.
 pub(crate) unsafe fn put_result<T>(
     place: *mut T,
-    find: impl FnOnce() -> Result<T, Status>,
-) -> Result<(), Status> {
+    find: impl FnOnce() -> Result<T, Error>,
+) -> Result<(), Error> {
     if place.is_null() {
-        return Err(Status::INVALID_ARGUMENT);
+        return Err(Error::INVALID_ARGUMENT);
     }
     let found = find()?;
     // SAFETY: not NULL, so storage of a `T`.
@@ -283,10 +283,10 @@ pub(crate) unsafe fn put_result<T>(
 ///
 /// # Safety
 /// `items` is NULL or points to `count` items, which nothing writes while the slice lives.
-pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [T], Status> {
+pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [T], Error> {
     match (items.is_null(), count) {
         (_, 0) => Ok(&[]),
-        (true, _) => Err(Status::INVALID_ARGUMENT),
+        (true, _) => Err(Error::INVALID_ARGUMENT),
         // SAFETY: not NULL, so an array.
         (false, _) => Ok(unsafe { from_raw_parts(items, count) }),
     }
@@ -296,10 +296,10 @@ pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [
 ///
 /// # Safety
 /// As for [`slice`]; nothing else reads the items either.
-pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a mut [T], Status> {
+pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a mut [T], Error> {
     match (items.is_null(), count) {
         (_, 0) => Ok(&mut []),
-        (true, _) => Err(Status::INVALID_ARGUMENT),
+        (true, _) => Err(Error::INVALID_ARGUMENT),
         // SAFETY: not NULL, so an array.
         (false, _) => Ok(unsafe { from_raw_parts_mut(items, count) }),
     }
@@ -312,9 +312,9 @@ pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a
 ///
 /// # Safety
 /// `text` is NULL or points to characters that a NUL ends.
-pub(crate) unsafe fn text<'a>(text: *const u8, most: usize) -> Result<&'a [u8], Status> {
+pub(crate) unsafe fn text<'a>(text: *const u8, most: usize) -> Result<&'a [u8], Error> {
     if text.is_null() {
-        return Err(Status::INVALID_ARGUMENT);
+        return Err(Error::INVALID_ARGUMENT);
     }
     let mut count = 0;
     // SAFETY: no byte after the NUL is read.

@@ -1,21 +1,12 @@
 //! The status codes and the function that explains them.
 
-use core::ffi::{c_char, CStr};
+use core::ffi::c_char;
 use mbm::error::Status;
 
-/// Asserts that each constant of C equals the core's number, and defines the function that
-/// returns the text of a status.
+/// Asserts that each constant of C equals the core's number.
 macro_rules! statuses {
-    ($($constant:ident = $core:expr, $text:literal;)*) => {
+    ($($constant:ident = $core:expr;)*) => {
         $(const _: () = assert!($constant == $core.code());)*
-
-        const fn text(status: u8) -> &'static CStr {
-            match status {
-                $($constant => $text,)*
-                0x01..=0x7F => c"the device sent an exception code that the standard does not name",
-                _ => c"not a status",
-            }
-        }
     };
 }
 
@@ -102,38 +93,38 @@ pub const MBM_OUT_OF_RANGE: u8 = 0xF6;
 pub const MBM_CONNECT_TIMED_OUT: u8 = 0xF7;
 
 statuses! {
-    MBM_OK = Status::OK, c"success";
-    MBM_ILLEGAL_FUNCTION = Status::ILLEGAL_FUNCTION, c"exception 01: illegal function";
-    MBM_ILLEGAL_DATA_ADDRESS = Status::ILLEGAL_DATA_ADDRESS, c"exception 02: illegal data address";
-    MBM_ILLEGAL_DATA_VALUE = Status::ILLEGAL_DATA_VALUE, c"exception 03: illegal data value";
-    MBM_SLAVE_DEVICE_FAILURE = Status::SLAVE_DEVICE_FAILURE, c"exception 04: slave device failure";
-    MBM_ACKNOWLEDGE = Status::exception(5), c"exception 05: acknowledge, the request takes long";
-    MBM_SLAVE_DEVICE_BUSY = Status::exception(6), c"exception 06: slave device busy";
-    MBM_MEMORY_PARITY_ERROR = Status::exception(8), c"exception 08: memory parity error";
-    MBM_GATEWAY_PATH_UNAVAILABLE = Status::exception(0x0A), c"exception 0A: gateway path unavailable";
-    MBM_GATEWAY_TARGET_FAILED_TO_RESPOND = Status::exception(0x0B), c"exception 0B: gateway target device failed to respond";
-    MBM_INVALID_SLAVE_ID = Status::INVALID_SLAVE_ID, c"only other units answered";
-    MBM_INVALID_FUNCTION = Status::INVALID_FUNCTION, c"the unit answered another function";
-    MBM_RESPONSE_TIMED_OUT = Status::RESPONSE_TIMED_OUT, c"no complete reply in time";
-    MBM_INVALID_CRC = Status::INVALID_CRC, c"the reply arrived damaged (CRC)";
-    MBM_INVALID_ARGUMENT = Status::INVALID_ARGUMENT, c"invalid argument: NULL, out of range, or of another kind";
-    MBM_MALFORMED_REPLY = Status::MALFORMED_REPLY, c"the reply does not answer the request";
-    MBM_LINK_LOST = Status::LINK_LOST, c"the port reported a lost link";
-    MBM_BUSY = Status::BUSY, c"in use: a request is under way, or a hook of the object called";
-    MBM_BROADCAST_NOT_ALLOWED = Status::BROADCAST_NOT_ALLOWED, c"a read cannot be broadcast";
-    MBM_BUFFER_TOO_SMALL = Status::BUFFER_TOO_SMALL, c"a buffer is too small for request or reply";
-    MBM_NOT_INITIALISED = Status::NOT_INITIALISED, c"the object was never begun or has no buffers";
-    MBM_PENDING = Status::PENDING, c"under way, poll again";
-    MBM_LINE_BUSY = Status::LINE_BUSY, c"the line never fell silent or the port took no bytes";
-    MBM_CANCELLED = Status::CANCELLED, c"cancelled";
-    MBM_INCOMPLETE_FRAME = Status::INCOMPLETE_FRAME, c"the frame is not whole yet";
-    MBM_MALFORMED_FRAME = Status::MALFORMED_FRAME, c"no frame of this framing begins like that";
-    MBM_QUEUE_FULL = Status::QUEUE_FULL, c"the queue is full";
-    MBM_DUPLICATE_TRANSACTION = Status::DUPLICATE_TRANSACTION, c"another pending request has this transaction id";
-    MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
-    MBM_NO_PROGRESS = Status::NO_PROGRESS, c"the device repeats itself without an end";
-    MBM_OUT_OF_RANGE = Status::OUT_OF_RANGE, c"the value is out of the range of its type";
-    MBM_CONNECT_TIMED_OUT = Status::CONNECT_TIMED_OUT, c"the connection was not made in time";
+    MBM_OK = Status::OK;
+    MBM_ILLEGAL_FUNCTION = Status::ILLEGAL_FUNCTION;
+    MBM_ILLEGAL_DATA_ADDRESS = Status::ILLEGAL_DATA_ADDRESS;
+    MBM_ILLEGAL_DATA_VALUE = Status::ILLEGAL_DATA_VALUE;
+    MBM_SLAVE_DEVICE_FAILURE = Status::SLAVE_DEVICE_FAILURE;
+    MBM_ACKNOWLEDGE = Status::ACKNOWLEDGE;
+    MBM_SLAVE_DEVICE_BUSY = Status::SERVER_DEVICE_BUSY;
+    MBM_MEMORY_PARITY_ERROR = Status::MEMORY_PARITY_ERROR;
+    MBM_GATEWAY_PATH_UNAVAILABLE = Status::GATEWAY_PATH_UNAVAILABLE;
+    MBM_GATEWAY_TARGET_FAILED_TO_RESPOND = Status::GATEWAY_TARGET_FAILED_TO_RESPOND;
+    MBM_INVALID_SLAVE_ID = Status::INVALID_SLAVE_ID;
+    MBM_INVALID_FUNCTION = Status::INVALID_FUNCTION;
+    MBM_RESPONSE_TIMED_OUT = Status::RESPONSE_TIMED_OUT;
+    MBM_INVALID_CRC = Status::INVALID_CRC;
+    MBM_INVALID_ARGUMENT = Status::INVALID_ARGUMENT;
+    MBM_MALFORMED_REPLY = Status::MALFORMED_REPLY;
+    MBM_LINK_LOST = Status::LINK_LOST;
+    MBM_BUSY = Status::BUSY;
+    MBM_BROADCAST_NOT_ALLOWED = Status::BROADCAST_NOT_ALLOWED;
+    MBM_BUFFER_TOO_SMALL = Status::BUFFER_TOO_SMALL;
+    MBM_NOT_INITIALISED = Status::NOT_INITIALISED;
+    MBM_PENDING = Status::PENDING;
+    MBM_LINE_BUSY = Status::LINE_BUSY;
+    MBM_CANCELLED = Status::CANCELLED;
+    MBM_INCOMPLETE_FRAME = Status::INCOMPLETE_FRAME;
+    MBM_MALFORMED_FRAME = Status::MALFORMED_FRAME;
+    MBM_QUEUE_FULL = Status::QUEUE_FULL;
+    MBM_DUPLICATE_TRANSACTION = Status::DUPLICATE_TRANSACTION;
+    MBM_NOT_PENDING = Status::NOT_PENDING;
+    MBM_NO_PROGRESS = Status::NO_PROGRESS;
+    MBM_OUT_OF_RANGE = Status::OUT_OF_RANGE;
+    MBM_CONNECT_TIMED_OUT = Status::CONNECT_TIMED_OUT;
 }
 
 /// Explains a status in a few words of English. For 1 to 3 these are the words of the device's
@@ -149,7 +140,7 @@ statuses! {
 /// @return a constant string, never NULL
 #[no_mangle]
 pub extern "C" fn mbm_status_text(status: u8) -> *const c_char {
-    text(status).as_ptr()
+    Status::from_code(status).c_text().as_ptr()
 }
 
 /// Explains how a request ended: as mbm_status_text, but for a request that a master or a client
@@ -170,7 +161,7 @@ pub extern "C" fn mbm_status_textOf(status: u8, exceptionCode: u8) -> *const c_c
         (MBM_ILLEGAL_DATA_VALUE, 0) => {
             c"refused, nothing was sent: the standard or a buffer does not allow the quantity or value"
         }
-        _ => text(status),
+        _ => Status::from_code(status).c_text(),
     };
     text.as_ptr()
 }

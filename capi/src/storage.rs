@@ -43,7 +43,7 @@ pub(super) struct NodeWords {
 
 impl NodeWords {
     /// The words that reads fill.
-    pub(super) fn response(&mut self) -> &mut [u16] {
+    pub(super) fn response(&self) -> &[u16] {
         // SAFETY: as the header of mbm_node_begin demands.
         unsafe { words(self.response, self.response_words) }
     }
@@ -191,7 +191,7 @@ impl Words for LineStorage {
         }
     }
 
-    fn response(&mut self) -> &mut [u16] {
+    fn response(&self) -> &[u16] {
         // SAFETY: see above.
         unsafe { (*self.words).response() }
     }

@@ -4,7 +4,7 @@ use super::framing::mbm_framing;
 use super::packet::side;
 use super::pointers::{array_or_empty, buffer, get};
 use core::ffi::c_char;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::text::{self, TextWriter};
 
 /// The writer of a line of text into a buffer of C. It is an error if `size` is 0: the
@@ -12,18 +12,18 @@ use mbm::text::{self, TextWriter};
 ///
 /// # Safety
 /// `text` is NULL or points to `size` bytes, which nothing else uses meanwhile.
-pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<TextWriter<'a>, Status> {
+pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<TextWriter<'a>, Error> {
     // SAFETY: as the caller promises; a character is a byte.
-    let text = unsafe { buffer(text.cast(), size) }.ok_or(Status::INVALID_ARGUMENT)?;
+    let text = unsafe { buffer(text.cast(), size) }.ok_or(Error::INVALID_ARGUMENT)?;
     match text.first_mut() {
         Some(first) => *first = 0,
-        None => return Err(Status::BUFFER_TOO_SMALL),
+        None => return Err(Error::BUFFER_TOO_SMALL),
     }
     Ok(TextWriter::new(text))
 }
 
 /// The status code of a text: whether the whole text fitted.
-pub(super) fn outcome(written: Result<TextWriter, Status>) -> u8 {
+pub(super) fn outcome(written: Result<TextWriter, Error>) -> u8 {
     match written.and_then(TextWriter::finish) {
         Ok(_) => Status::OK.code(),
         Err(refused) => refused.code(),
@@ -55,10 +55,10 @@ pub unsafe extern "C" fn mbm_frame_text(
 ) -> u8 {
     let write = || {
         let mut line = line(text, size)?;
-        let description = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
+        let description = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
         let (framing, end) = (description.of_frames()?, description.end());
         let frame = array_or_empty(frame, frameLength.into());
-        let frame = frame.ok_or(Status::INVALID_ARGUMENT)?;
+        let frame = frame.ok_or(Error::INVALID_ARGUMENT)?;
         text::frame(&mut line, framing, side(kind)?, frame, end);
         Ok(line)
     };

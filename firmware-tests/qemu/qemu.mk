@@ -5,17 +5,26 @@ BAREMETAL := examples/baremetal/Makefile
 MACHINES = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) machines)
 VARIANTS = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) variants)
 
-QEMU_TESTS := $(patsubst firmware-tests/qemu/%.c,$(BUILD)/firmware/%,$(wildcard firmware-tests/qemu/test_*.c))
+# Needs no archive, so it runs once.
+RUST_QEMU_TEST := $(BUILD)/firmware/test_rust
+QEMU_TESTS := $(filter-out $(RUST_QEMU_TEST),$(patsubst firmware-tests/qemu/%.c,$(BUILD)/firmware/%,$(wildcard firmware-tests/qemu/test_*.c)))
 QEMU_SOURCES := $(filter-out firmware-tests/qemu/test_%,$(wildcard firmware-tests/qemu/*.c)) \
                 $(patsubst %,c-tests/support/%.c,pty server model request)
 QEMU_FLAGS = $(CFLAGS) $(WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal -Iports/baremetal $(MODBUS)
-$(QEMU_TESTS): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h examples/baremetal/*.h ports/baremetal/*.h include/mbm/*.h)
+$(QEMU_TESTS) $(RUST_QEMU_TEST): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h examples/baremetal/*.h ports/baremetal/*.h include/mbm/*.h)
 	@mkdir -p $(@D)
 	@gcc $(QEMU_FLAGS) $< $(QEMU_SOURCES) \
 		-lmodbus -lcmocka -lpthread -o $@
 
 # The images with the library as assembler source.
 FROM_SOURCE := $(BUILD)/baremetal-source
+
+.PHONY: firmware-test-rust
+firmware-test-rust: ## Run firmware in Rust on a Cortex-M7 in QEMU, over the traits of embedded-io
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm gcc-arm-none-eabi
+	@CARGO="$(CARGO)" scripts/build/rust-firmware $(BUILD)/baremetal/mps2-an500/rust.elf
+	@$(MAKE) -s --no-print-directory $(RUST_QEMU_TEST)
+	@scripts/check/run-c-tests $(RUST_QEMU_TEST)
 
 .PHONY: firmware-test-qemu
 firmware-test-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, RISC-V, Xtensa
@@ -36,6 +45,7 @@ firmware-test-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, R
 	for machine in $(MACHINES); do build $$machine main; build $$machine serve; done; \
 	for variant in $(VARIANTS); do build $$variant main; done
 	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
+	@$(MAKE) -s --no-print-directory firmware-test-rust
 	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
 	@MBM_FIRMWARE=$(FROM_SOURCE) MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
 	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire; from archives, and from assembler source"

@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::frame::ascii;
 use mbm_fuzz::naive;
 
@@ -18,7 +18,7 @@ fuzz_target!(|data: &[u8]| {
         return;
     };
     let written = ascii::emit(&mut buffer, unit, end, |place| {
-        let place = place.get_mut(..pdu.len()).ok_or(Status::BUFFER_TOO_SMALL)?;
+        let place = place.get_mut(..pdu.len()).ok_or(Error::BUFFER_TOO_SMALL)?;
         place.copy_from_slice(pdu);
         Ok(pdu.len())
     });
@@ -57,7 +57,7 @@ fn check_frame(frame: &[u8], end: u8) {
         }
         Err(status) => assert!(matches!(
             status,
-            Status::INCOMPLETE_FRAME | Status::MALFORMED_FRAME | Status::INVALID_CRC
+            Error::INCOMPLETE_FRAME | Error::MALFORMED_FRAME | Error::INVALID_CRC
         )),
     }
 }

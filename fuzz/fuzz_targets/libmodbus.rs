@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::frame::{rtu, tcp, Adu};
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
@@ -127,7 +127,7 @@ fuzz_target!(|data: &[u8]| {
     compare(&frame, served, over_tcp);
 });
 
-fn parse(frame: &[u8], over_tcp: bool) -> Result<Adu<'_>, Status> {
+fn parse(frame: &[u8], over_tcp: bool) -> Result<Adu<'_>, Error> {
     if over_tcp {
         tcp::parse(frame)
     } else {

@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::functions::REPORT_SERVER_ID;
 use mbm::pdu::header::RequestHeader;
@@ -88,7 +88,7 @@ fn check_restored(input: &mut Input) {
     assert_eq!(&restored[..response.len()], response);
     let short = &mut restored[..response.len() - 1];
     let refused = header.restore_response(short, count, received, sent);
-    assert_eq!(refused, Err(Status::BUFFER_TOO_SMALL));
+    assert_eq!(refused, Err(Error::BUFFER_TOO_SMALL));
 }
 
 fn check_stream(input: &mut Input) {

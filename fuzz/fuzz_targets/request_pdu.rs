@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::pdu::custom::is_user_defined;
 use mbm::pdu::files::{Reads, Writes};
 use mbm::pdu::length;
@@ -23,7 +23,7 @@ fn check_received(pdu: &[u8]) {
             assert_eq!(request.emit(&mut buffer), Ok(pdu.len()));
             assert_eq!(&buffer[..pdu.len()], pdu);
             let short = request.emit(&mut buffer[..pdu.len() - 1]);
-            assert_eq!(short, Err(Status::BUFFER_TOO_SMALL));
+            assert_eq!(short, Err(Error::BUFFER_TOO_SMALL));
             lengths::agree(pdu, |front| length::request(front, &[]));
             request.response_length(&[]);
         }

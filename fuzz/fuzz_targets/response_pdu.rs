@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::pdu::custom::is_user_defined;
 use mbm::pdu::files::{Records, Writes};
 use mbm::pdu::identification::ObjectList;
@@ -24,7 +24,7 @@ fn check_received(pdu: &[u8]) {
             assert_eq!(response.emit(&mut buffer), Ok(pdu.len()));
             assert_eq!(&buffer[..pdu.len()], pdu);
             let short = response.emit(&mut buffer[..pdu.len() - 1]);
-            assert_eq!(short, Err(Status::BUFFER_TOO_SMALL));
+            assert_eq!(short, Err(Error::BUFFER_TOO_SMALL));
             match response {
                 // Some devices send more than their byte count says. Only the framing shows the
                 // length of such a response.
@@ -34,7 +34,7 @@ fn check_received(pdu: &[u8]) {
         }
         Err(status) => assert!(matches!(
             status,
-            Status::INVALID_FUNCTION | Status::MALFORMED_REPLY
+            Error::INVALID_FUNCTION | Error::MALFORMED_REPLY
         )),
     }
 }

@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::frame::rtu;
 use mbm_fuzz::naive;
 
@@ -14,9 +14,9 @@ fuzz_target!(|data: &[u8]| {
 
 fn check_frame(frame: &[u8]) {
     let expected = match frame.len() {
-        0..=3 => Err(Status::INCOMPLETE_FRAME),
-        257.. => Err(Status::MALFORMED_FRAME),
-        _ if !naive::has_crc(frame) => Err(Status::INVALID_CRC),
+        0..=3 => Err(Error::INCOMPLETE_FRAME),
+        257.. => Err(Error::MALFORMED_FRAME),
+        _ if !naive::has_crc(frame) => Err(Error::INVALID_CRC),
         length => Ok((frame[0], &frame[1..length - 2])),
     };
     let parsed = rtu::parse(frame);

@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::frame::tcp;
 use mbm_fuzz::naive;
 
@@ -32,10 +32,10 @@ fn check_frame(frame: &[u8]) {
             });
             assert_eq!(&buffer[..length.expect("the frame fits")], frame);
             for end in 0..frame.len() {
-                assert_eq!(tcp::parse(&frame[..end]), Err(Status::INCOMPLETE_FRAME));
+                assert_eq!(tcp::parse(&frame[..end]), Err(Error::INCOMPLETE_FRAME));
             }
         }
-        Err(Status::INCOMPLETE_FRAME) => {
+        Err(Error::INCOMPLETE_FRAME) => {
             // If the header is valid, the missing bytes complete the frame.
             if let Ok(header) = tcp::header(frame) {
                 let mut check_frame = frame.to_vec();

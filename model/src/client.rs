@@ -146,7 +146,7 @@ pub fn play(schedule: Schedule, quiet_time: u32) -> Ended {
         assert!(queued.is_ok(), "the request was refused");
         let mut waited = 0;
         let task = loop {
-            if let Some(task) = client.poll(end.now(), true) {
+            if let Some(task) = client.poll(end.now()) {
                 break task;
             }
             if !end.sent().is_empty() {

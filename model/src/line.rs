@@ -277,7 +277,7 @@ impl State {
         self.lasts = 0;
         self.own_damaged = false;
         self.own_exception = false;
-        if self.master.read_holding_registers(0, 1) != Status::PENDING {
+        if self.master.read_holding_registers(0, 1).is_err() {
             self.wrong = Some("a request was refused");
         }
     }
@@ -291,7 +291,7 @@ impl State {
         self.silent = (self.silent + time).min(TIMEOUT);
         self.send_slow_reply(time);
         for _ in 0..16 {
-            self.master.poll();
+            let _ = self.master.poll();
             if !std::mem::take(&mut self.master.port().sent).is_empty() {
                 if let Some(slow) = &mut self.slow {
                     slow.may_be_late |= self.owed.is_empty();
@@ -329,11 +329,11 @@ impl State {
     /// Checks how the request has ended, and starts the next one.
     fn ended(&mut self) {
         let status = self.master.status();
-        if self.master.poll() != status || self.master.is_pending() {
+        if self.master.poll() != status.poll() || self.master.is_pending() {
             self.wrong = Some(TWICE);
         }
         let answered = !status.is_failure();
-        self.right = status == Status::OK && self.master.response_word(0) == u16::from(self.number);
+        self.right = status == Status::OK && self.master.response() == [u16::from(self.number)];
         if answered {
             let own = self.right || (status != Status::OK && self.own_exception);
             if !own && !self.beyond_bound {

@@ -46,5 +46,5 @@ pub fn lent(bytes: usize) -> Lent {
 pub fn clear(lent: &mut Lent) {
     let space = lent.capacity();
     lent.bytes(0, space).fill(0);
-    lent.response().fill(0);
+    lent.store_words(0, 2 * lent.response_words(), true);
 }

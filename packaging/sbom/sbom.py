@@ -26,13 +26,16 @@ from cyclonedx.output.json import JsonV1Dot6
 from packageurl import PackageURL
 
 LICENCE = "MIT OR Apache-2.0"
-# The manifests whose lock files say what is built, and what each is for.
-MANIFESTS = {
-    "Cargo.toml": "tests",
-    "fuzz/Cargo.toml": "fuzzing",
-    "bench/Cargo.toml": "benchmarks",
-    "model/Cargo.toml": "model checking",
-}
+# The manifests whose lock files say what is built, with options of Cargo, and what each is for. The
+# first has the library.
+MANIFESTS = [
+    (["Cargo.toml"], "tests"),
+    (["Cargo.toml", "--all-features"], "features of the crate"),
+    (["examples/rust/Cargo.toml"], "an example"),
+    (["fuzz/Cargo.toml"], "fuzzing"),
+    (["bench/Cargo.toml"], "benchmarks"),
+    (["model/Cargo.toml"], "model checking"),
+]
 SHIPPED = "mbm-archive"
 TOOLS = "checking and building"
 TOOL = re.compile(r"scripts/cargo-tool ([a-z][a-z-]*) (?:(\d+\.\d+\.\d+)|\$\((\w+)\))")
@@ -58,7 +61,7 @@ def component(kind, name, version, *, licence, purpose=None, sha256=(), descript
 
 
 def metadata(manifest):
-    command = ["cargo", "metadata", "--format-version=1", "--locked", "--manifest-path", manifest]
+    command = ["cargo", "metadata", "--format-version=1", "--locked", "--manifest-path", *manifest]
     return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
@@ -85,11 +88,11 @@ def shipped(resolve, root):
 def crates():
     """The components of all lock files, and for those in the library what each depends on."""
     components, edges = {}, {}
-    for manifest, purpose in MANIFESTS.items():
-        data, sums = metadata(manifest), checksums(manifest)
+    for manifest, purpose in MANIFESTS:
+        data, sums = metadata(manifest), checksums(manifest[0])
         packages = {package["id"]: package for package in data["packages"]}
         inside = set()
-        if manifest == "Cargo.toml":
+        if manifest == MANIFESTS[0][0]:
             root = next(id for id, package in packages.items() if package["name"] == SHIPPED)
             inside = shipped(data["resolve"], root)
             for node in data["resolve"]["nodes"]:

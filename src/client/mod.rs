@@ -2,12 +2,14 @@
 //! returns each request that has ended.
 //!
 //! A serial line carries one request at a time, a TCP stream as many as the
-//! queue holds. The caller implements [`ClientRequest`], which is a request with its data.
-//! The client copies data only between a request and a frame buffer.
+//! queue holds. [`Request`] is a request with its data in slices. A program that keeps the data
+//! in another way, as the C API does, implements [`ClientRequest`]. The client copies data only
+//! between a request and a frame buffer.
 
 mod link;
 mod policy;
 mod queue;
+mod ready;
 mod request;
 mod retry;
 mod serial;
@@ -20,6 +22,7 @@ mod units;
 pub use link::{Link, LinkEvent, LinkHooks, LinkState};
 pub use policy::{Backoff, Policy};
 pub use queue::RequestQueue;
+pub use ready::Request;
 pub use request::{ClientRequest, RequestState};
 pub use retry::{again, again_when_busy, NO_RETRIES};
 pub use serial::Serial;
@@ -45,9 +48,10 @@ pub const ASCII_SILENCE: u32 = millis(1000);
 const WRITE_RETRY_DELAY: u32 = millis(1);
 
 /// A client on a [`Transport`], for up to `N` requests that are queued or in flight.
-#[repr(C)]
 pub struct Client<L, J, const N: usize> {
     queue: RequestQueue<J, N>,
+    /// The last poll returned a request, so the next one continues it: it reads no new bytes.
+    is_continued: bool,
     /// The serial line or TCP stream.
     pub line: L,
 }
@@ -81,7 +85,11 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
         let mut queue = RequestQueue::new();
         queue.has_broadcast = L::HAS_BROADCAST;
         queue.has_transaction_ids = L::HAS_TRANSACTION_IDS;
-        Client { queue, line }
+        Client {
+            queue,
+            is_continued: false,
+            line,
+        }
     }
 
     /// Queues a request. [`Client::poll`] returns it when it has ended.
@@ -97,13 +105,15 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     }
 
     /// Advances all requests to the time `now`, without waiting, and returns one request
-    /// that has ended. Call it with `fresh` true first, because new bytes may have arrived;
-    /// then with `fresh` false until it returns `None`.
-    pub fn poll(&mut self, now: u32, fresh: bool) -> Option<J> {
+    /// that has ended. Call it until it returns `None`: `while let Some(request) =
+    /// client.poll(now)`.
+    pub fn poll(&mut self, now: u32) -> Option<J> {
         if self.queue.suspended {
             return None;
         }
-        self.line.advance(&mut self.queue, now, fresh)
+        let ended = self.line.advance(&mut self.queue, now, !self.is_continued);
+        self.is_continued = ended.is_some();
+        ended
     }
 
     /// Time in microseconds from `now` until poll has something to do, if no byte arrives

@@ -1,11 +1,11 @@
 //! Typed values in registers, accessed by register address. The registers are data bytes
 //! in the order of the wire, or words as the master stores them.
 //!
-//! An access beyond the registers returns [`Status::ILLEGAL_DATA_ADDRESS`]; nothing panics.
+//! An access beyond the registers returns [`Error::ILLEGAL_DATA_ADDRESS`]; nothing panics.
 
 use super::order::Order;
 use super::value::Value;
-use crate::error::Status;
+use crate::error::Error;
 
 /// Consecutive registers, accessed as bytes in the order of the wire.
 pub trait RegisterBytes {
@@ -98,15 +98,15 @@ impl<C: RegisterBytes> Registers<C> {
     /// Registers in `cells`; the first has the address `first`.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`] if they go beyond address 65535;
-    /// [`Status::INVALID_ARGUMENT`] if the number of bytes is odd.
-    pub fn new(cells: C, first: u16, order: Order) -> Result<Self, Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`] if they go beyond address 65535;
+    /// [`Error::INVALID_ARGUMENT`] if the number of bytes is odd.
+    pub fn new(cells: C, first: u16, order: Order) -> Result<Self, Error> {
         let length = cells.length();
         if !length.is_multiple_of(2) {
-            return Err(Status::INVALID_ARGUMENT);
+            return Err(Error::INVALID_ARGUMENT);
         }
         if length / 2 > usize::from(u16::MAX - first).saturating_add(1) {
-            return Err(Status::ILLEGAL_DATA_ADDRESS);
+            return Err(Error::ILLEGAL_DATA_ADDRESS);
         }
         Ok(Registers {
             cells,
@@ -117,16 +117,16 @@ impl<C: RegisterBytes> Registers<C> {
 
     /// The index of the high byte of the register `address`, if `length` bytes from there
     /// exist.
-    fn byte_index(&self, address: u16, length: usize) -> Result<usize, Status> {
+    fn byte_index(&self, address: u16, length: usize) -> Result<usize, Error> {
         let Some(before) = address.checked_sub(self.first) else {
-            return Err(Status::ILLEGAL_DATA_ADDRESS);
+            return Err(Error::ILLEGAL_DATA_ADDRESS);
         };
         // Counted in registers, so that a `usize` of 16 bits does not overflow.
         let whole = self.cells.length() / 2;
         let wanted = length.div_ceil(2);
         match whole.checked_sub(before.into()) {
             Some(left) if wanted <= left => Ok(2 * usize::from(before)),
-            _ => Err(Status::ILLEGAL_DATA_ADDRESS),
+            _ => Err(Error::ILLEGAL_DATA_ADDRESS),
         }
     }
 
@@ -134,8 +134,8 @@ impl<C: RegisterBytes> Registers<C> {
     /// becomes `bytes[n ^ mask]`, see [`Order::mask`].
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
-    pub fn load(&self, address: u16, mask: usize, bytes: &mut [u8]) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
+    pub fn load(&self, address: u16, mask: usize, bytes: &mut [u8]) -> Result<(), Error> {
         let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter_mut().enumerate() {
             *byte = self.cells.byte(start + (place ^ mask)).unwrap_or(0);
@@ -146,16 +146,16 @@ impl<C: RegisterBytes> Registers<C> {
     /// The number that begins at the register `address`, in the order [`Registers::order`].
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]
-    pub fn get<T: Value>(&self, address: u16) -> Result<T, Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn get<T: Value>(&self, address: u16) -> Result<T, Error> {
         self.get_in(self.order, address)
     }
 
     /// As [`Registers::get`], in another order.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]
-    pub fn get_in<T: Value>(&self, order: Order, address: u16) -> Result<T, Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn get_in<T: Value>(&self, order: Order, address: u16) -> Result<T, Error> {
         let mut bytes = T::Bytes::default();
         let mask = order.mask(bytes.as_ref().len());
         self.load(address, mask, bytes.as_mut())?;
@@ -165,8 +165,8 @@ impl<C: RegisterBytes> Registers<C> {
     /// Copies raw bytes in the order of the wire, from the high byte of `address` on.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
-    pub fn bytes(&self, address: u16, bytes: &mut [u8]) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
+    pub fn bytes(&self, address: u16, bytes: &mut [u8]) -> Result<(), Error> {
         self.load(address, 0, bytes)
     }
 
@@ -175,16 +175,16 @@ impl<C: RegisterBytes> Registers<C> {
     /// every `order`.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
-    pub fn bytes_in(&self, order: Order, address: u16, bytes: &mut [u8]) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
+    pub fn bytes_in(&self, order: Order, address: u16, bytes: &mut [u8]) -> Result<(), Error> {
         self.load(address, order.swaps_bytes().into(), bytes)
     }
 
     /// The high or the low byte of a register.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]
-    pub fn u8(&self, address: u16, high: bool) -> Result<u8, Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn u8(&self, address: u16, high: bool) -> Result<u8, Error> {
         let place = self.byte_index(address, 2)? + usize::from(!high);
         Ok(self.cells.byte(place).unwrap_or(0))
     }
@@ -192,17 +192,17 @@ impl<C: RegisterBytes> Registers<C> {
     /// As [`Registers::u8`], signed.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]
-    pub fn i8(&self, address: u16, high: bool) -> Result<i8, Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn i8(&self, address: u16, high: bool) -> Result<i8, Error> {
         self.u8(address, high).map(u8::cast_signed)
     }
 
     /// Bit `bit` of a register; bit 0 is the least significant.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::INVALID_ARGUMENT`] if `bit` is greater
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] if `bit` is greater
     /// than 15.
-    pub fn bit(&self, address: u16, bit: u8) -> Result<bool, Status> {
+    pub fn bit(&self, address: u16, bit: u8) -> Result<bool, Error> {
         let (high, mask) = byte_of_bit(bit)?;
         Ok(self.u8(address, high)? & mask != 0)
     }
@@ -212,14 +212,14 @@ impl<C: RegisterBytes> Registers<C> {
     /// the first of the two characters of a register is its low byte.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::BUFFER_TOO_SMALL`] if `buffer` cannot
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::BUFFER_TOO_SMALL`] if `buffer` cannot
     /// hold the text. Nothing is copied then.
     pub fn text<'b>(
         &self,
         address: u16,
         length: usize,
         buffer: &'b mut [u8],
-    ) -> Result<&'b mut [u8], Status> {
+    ) -> Result<&'b mut [u8], Error> {
         self.text_in(self.order, address, length, buffer)
     }
 
@@ -233,7 +233,7 @@ impl<C: RegisterBytes> Registers<C> {
         address: u16,
         length: usize,
         buffer: &'b mut [u8],
-    ) -> Result<&'b mut [u8], Status> {
+    ) -> Result<&'b mut [u8], Error> {
         let start = self.byte_index(address, length)?;
         let mask = usize::from(order.swaps_bytes());
         let character = |place| self.cells.byte(start + (place ^ mask)).unwrap_or(0);
@@ -241,7 +241,7 @@ impl<C: RegisterBytes> Registers<C> {
         while count < length && character(count) != 0 {
             count += 1;
         }
-        let text = buffer.get_mut(..count).ok_or(Status::BUFFER_TOO_SMALL)?;
+        let text = buffer.get_mut(..count).ok_or(Error::BUFFER_TOO_SMALL)?;
         for (place, byte) in text.iter_mut().enumerate() {
             *byte = character(place);
         }
@@ -251,8 +251,8 @@ impl<C: RegisterBytes> Registers<C> {
     /// True if `bytes` equals the raw bytes from the high byte of `address` on.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]
-    pub fn is_equal(&self, address: u16, bytes: &[u8]) -> Result<bool, Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn is_equal(&self, address: u16, bytes: &[u8]) -> Result<bool, Error> {
         let start = self.byte_index(address, bytes.len())?;
         let mut held = bytes.iter().enumerate();
         Ok(held.all(|(place, byte)| self.cells.byte(start + place) == Some(*byte)))
@@ -264,8 +264,8 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// [`Registers::load`] reads them.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
-    pub fn store(&mut self, address: u16, mask: usize, bytes: &[u8]) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    pub fn store(&mut self, address: u16, mask: usize, bytes: &[u8]) -> Result<(), Error> {
         let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter().enumerate() {
             self.cells.set_byte(start + (place ^ mask), *byte);
@@ -277,16 +277,16 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// [`Registers::order`].
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
-    pub fn set<T: Value>(&mut self, address: u16, value: T) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    pub fn set<T: Value>(&mut self, address: u16, value: T) -> Result<(), Error> {
         self.set_in(self.order, address, value)
     }
 
     /// As [`Registers::set`], in another order.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
-    pub fn set_in<T: Value>(&mut self, order: Order, address: u16, value: T) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    pub fn set_in<T: Value>(&mut self, order: Order, address: u16, value: T) -> Result<(), Error> {
         let bytes = value.to_bytes();
         let mask = order.mask(bytes.as_ref().len());
         self.store(address, mask, bytes.as_ref())
@@ -296,24 +296,24 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// number of bytes is odd, the low byte of the last register does not change.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
-    pub fn set_bytes(&mut self, address: u16, bytes: &[u8]) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    pub fn set_bytes(&mut self, address: u16, bytes: &[u8]) -> Result<(), Error> {
         self.store(address, 0, bytes)
     }
 
     /// As [`Registers::set_bytes`], in the order in which [`Registers::bytes_in`] reads them.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
-    pub fn set_bytes_in(&mut self, order: Order, address: u16, bytes: &[u8]) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    pub fn set_bytes_in(&mut self, order: Order, address: u16, bytes: &[u8]) -> Result<(), Error> {
         self.store(address, order.swaps_bytes().into(), bytes)
     }
 
     /// Sets the high or the low byte of a register; the other byte does not change.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]
-    pub fn set_u8(&mut self, address: u16, high: bool, value: u8) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn set_u8(&mut self, address: u16, high: bool, value: u8) -> Result<(), Error> {
         let place = self.byte_index(address, 2)? + usize::from(!high);
         self.cells.set_byte(place, value);
         Ok(())
@@ -322,8 +322,8 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// As [`Registers::set_u8`], signed.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]
-    pub fn set_i8(&mut self, address: u16, high: bool, value: i8) -> Result<(), Status> {
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn set_i8(&mut self, address: u16, high: bool, value: i8) -> Result<(), Error> {
         self.set_u8(address, high, value.cast_unsigned())
     }
 
@@ -331,9 +331,9 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// bits do not change.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::INVALID_ARGUMENT`] if `bit` is greater
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] if `bit` is greater
     /// than 15.
-    pub fn set_bit(&mut self, address: u16, bit: u8, on: bool) -> Result<(), Status> {
+    pub fn set_bit(&mut self, address: u16, bit: u8, on: bool) -> Result<(), Error> {
         let (high, mask) = byte_of_bit(bit)?;
         let others = self.u8(address, high)? & !mask;
         self.set_u8(address, high, if on { others | mask } else { others })
@@ -344,9 +344,9 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// too.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::BUFFER_TOO_SMALL`] if the text is longer
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::BUFFER_TOO_SMALL`] if the text is longer
     /// than the field. Nothing is set then.
-    pub fn set_text(&mut self, address: u16, length: usize, text: &[u8]) -> Result<(), Status> {
+    pub fn set_text(&mut self, address: u16, length: usize, text: &[u8]) -> Result<(), Error> {
         self.set_text_in(self.order, address, length, text)
     }
 
@@ -360,10 +360,10 @@ impl<C: RegisterBytesMut> Registers<C> {
         address: u16,
         length: usize,
         text: &[u8],
-    ) -> Result<(), Status> {
+    ) -> Result<(), Error> {
         let start = self.byte_index(address, length)?;
         if text.len() > length {
-            return Err(Status::BUFFER_TOO_SMALL);
+            return Err(Error::BUFFER_TOO_SMALL);
         }
         let mask = usize::from(order.swaps_bytes());
         for place in 0..length + length % 2 {
@@ -376,10 +376,10 @@ impl<C: RegisterBytesMut> Registers<C> {
 
 /// The byte of a register that contains bit `bit`, true for the high byte, and the mask of
 /// the bit in that byte.
-fn byte_of_bit(bit: u8) -> Result<(bool, u8), Status> {
+fn byte_of_bit(bit: u8) -> Result<(bool, u8), Error> {
     if bit < 16 {
         Ok((bit >= 8, 1 << (bit % 8)))
     } else {
-        Err(Status::INVALID_ARGUMENT)
+        Err(Error::INVALID_ARGUMENT)
     }
 }

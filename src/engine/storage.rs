@@ -133,7 +133,7 @@ pub trait Words: Storage<Count = u8> {
     fn load_words(&mut self, to: u8, count: u8, high_first: bool);
 
     /// The response words, at most 255: a successful read fills them.
-    fn response(&mut self) -> &mut [u16];
+    fn response(&self) -> &[u16];
 
     /// How many response words there are.
     fn response_words(&self) -> u8;
@@ -275,8 +275,8 @@ where
         }
     }
 
-    fn response(&mut self) -> &mut [u16] {
-        self.response.as_mut()
+    fn response(&self) -> &[u16] {
+        self.response.as_ref()
     }
 
     fn response_words(&self) -> u8 {

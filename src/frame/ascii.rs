@@ -3,7 +3,7 @@
 
 use super::checksum::lrc;
 use super::Adu;
-use crate::error::Status;
+use crate::error::Error;
 
 /// The colon at the start of a frame.
 pub const START: u8 = b':';
@@ -139,20 +139,20 @@ pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Decoded {
 /// Decodes the frame that fills `bytes`, in place. Digits may be in upper or lower case.
 ///
 /// # Errors
-/// [`Status::INCOMPLETE_FRAME`] if the end is missing; [`Status::MALFORMED_FRAME`] if the colon
-/// is missing, or if the characters are not pairs of digits; [`Status::INVALID_CRC`] if the LRC
+/// [`Error::INCOMPLETE_FRAME`] if the end is missing; [`Error::MALFORMED_FRAME`] if the colon
+/// is missing, or if the characters are not pairs of digits; [`Error::INVALID_CRC`] if the LRC
 /// is wrong. After an error, `bytes` may be overwritten.
-pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
+pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
     if bytes.first().is_none_or(|first| *first == START)
         && bytes.len() <= MAX_FRAME
         && (bytes.len() < DELIMITERS || !bytes.ends_with(&[CARRIAGE_RETURN, end]))
     {
-        return Err(Status::INCOMPLETE_FRAME);
+        return Err(Error::INCOMPLETE_FRAME);
     }
     let length = match decode(bytes, end, true) {
         Decoded::Valid(length) => length,
-        Decoded::WrongLrc(_) => return Err(Status::INVALID_CRC),
-        Decoded::Malformed => return Err(Status::MALFORMED_FRAME),
+        Decoded::WrongLrc(_) => return Err(Error::INVALID_CRC),
+        Decoded::Malformed => return Err(Error::MALFORMED_FRAME),
     };
     match bytes.get(..length.into()) {
         Some([unit, pdu @ ..]) => Ok(Adu {
@@ -160,7 +160,7 @@ pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
             unit: *unit,
             pdu,
         }),
-        _ => Err(Status::MALFORMED_FRAME),
+        _ => Err(Error::MALFORMED_FRAME),
     }
 }
 
@@ -168,15 +168,15 @@ pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
 /// front of the slice that it gets, and returns the length of the PDU.
 ///
 /// # Errors
-/// The error of `pdu`; [`Status::BUFFER_TOO_SMALL`].
+/// The error of `pdu`; [`Error::BUFFER_TOO_SMALL`].
 pub fn emit(
     buffer: &mut [u8],
     unit: u8,
     end: u8,
-    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>,
-) -> Result<usize, Status> {
+    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Error>,
+) -> Result<usize, Error> {
     let Some((first, place)) = buffer.split_first_mut() else {
-        return Err(Status::BUFFER_TOO_SMALL);
+        return Err(Error::BUFFER_TOO_SMALL);
     };
     *first = unit;
     let content = 1 + pdu(place)?;
@@ -187,11 +187,11 @@ pub fn emit(
 /// length of the frame.
 ///
 /// # Errors
-/// [`Status::BUFFER_TOO_SMALL`]; `buffer` is then unchanged.
-pub fn encode(buffer: &mut [u8], content: usize, end: u8) -> Result<usize, Status> {
+/// [`Error::BUFFER_TOO_SMALL`]; `buffer` is then unchanged.
+pub fn encode(buffer: &mut [u8], content: usize, end: u8) -> Result<usize, Error> {
     let total = 2 * (content + 1) + DELIMITERS;
     let Some(frame) = buffer.get_mut(..total) else {
-        return Err(Status::BUFFER_TOO_SMALL);
+        return Err(Error::BUFFER_TOO_SMALL);
     };
     let check = lrc(frame.get(..content).unwrap_or_default());
     // From the last byte to the first, so that no byte is overwritten before it is encoded.
@@ -234,7 +234,7 @@ mod tests {
         assert_eq!((length, &buffer[..]), (Ok(9), FRAME));
         assert_eq!(
             emit(&mut buffer[..8], 2, END, |_| Ok(1)),
-            Err(Status::BUFFER_TOO_SMALL)
+            Err(Error::BUFFER_TOO_SMALL)
         );
     }
 
@@ -247,11 +247,11 @@ mod tests {
     fn a_frame_without_its_end_is_incomplete() {
         for end in 0..FRAME.len() {
             let mut bytes = FRAME[..end].to_vec();
-            assert_eq!(parse(&mut bytes, END), Err(Status::INCOMPLETE_FRAME));
+            assert_eq!(parse(&mut bytes, END), Err(Error::INCOMPLETE_FRAME));
         }
         assert_eq!(
             parse(&mut FRAME.to_vec(), b'!'),
-            Err(Status::INCOMPLETE_FRAME)
+            Err(Error::INCOMPLETE_FRAME)
         );
     }
 
@@ -264,14 +264,14 @@ mod tests {
             b":07\r\n",
         ] {
             let mut bytes = frame.to_vec();
-            assert_eq!(parse(&mut bytes, END), Err(Status::MALFORMED_FRAME));
+            assert_eq!(parse(&mut bytes, END), Err(Error::MALFORMED_FRAME));
         }
     }
 
     #[test]
     fn a_wrong_lrc_is_detected() {
         let mut bytes = b":0207F6\r\n".to_vec();
-        assert_eq!(parse(&mut bytes, END), Err(Status::INVALID_CRC));
+        assert_eq!(parse(&mut bytes, END), Err(Error::INVALID_CRC));
     }
 
     #[test]

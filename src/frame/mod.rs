@@ -8,7 +8,7 @@ pub mod tcp;
 
 pub use adu::Adu;
 
-use crate::error::Status;
+use crate::error::Error;
 
 /// The framing: how frames are encoded and separated.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -54,9 +54,9 @@ impl Framing {
     /// it; `end` is its end character. Other framings ignore `end`.
     ///
     /// # Errors
-    /// [`Status::INCOMPLETE_FRAME`]; [`Status::MALFORMED_FRAME`]; [`Status::INVALID_CRC`] if the
+    /// [`Error::INCOMPLETE_FRAME`]; [`Error::MALFORMED_FRAME`]; [`Error::INVALID_CRC`] if the
     /// CRC or the LRC is wrong.
-    pub fn parse(self, bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
+    pub fn parse(self, bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
         match self {
             Framing::Rtu | Framing::RtuOverTcp => rtu::parse(bytes),
             Framing::Ascii => ascii::parse(bytes, end),
@@ -69,15 +69,15 @@ impl Framing {
     /// `transaction`, only ASCII uses `end`.
     ///
     /// # Errors
-    /// The error of `pdu`; [`Status::BUFFER_TOO_SMALL`].
+    /// The error of `pdu`; [`Error::BUFFER_TOO_SMALL`].
     pub fn emit(
         self,
         buffer: &mut [u8],
         transaction: u16,
         unit: u8,
         end: u8,
-        pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>,
-    ) -> Result<usize, Status> {
+        pdu: impl FnOnce(&mut [u8]) -> Result<usize, Error>,
+    ) -> Result<usize, Error> {
         match self {
             Framing::Rtu | Framing::RtuOverTcp => rtu::emit(buffer, unit, pdu),
             Framing::Ascii => ascii::emit(buffer, unit, end, pdu),

@@ -3,7 +3,7 @@
 
 use super::checksum::{crc16, Crc16};
 use super::Adu;
-use crate::error::Status;
+use crate::error::Error;
 
 /// Bytes of the longest frame: unit, PDU of 253 bytes, CRC.
 pub const MAX_FRAME: usize = 256;
@@ -42,14 +42,14 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
 /// Parses the frame that fills `bytes`.
 ///
 /// # Errors
-/// [`Status::INCOMPLETE_FRAME`] for fewer bytes than the shortest frame has,
-/// [`Status::MALFORMED_FRAME`] for more than the longest has; [`Status::INVALID_CRC`].
-pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
+/// [`Error::INCOMPLETE_FRAME`] for fewer bytes than the shortest frame has,
+/// [`Error::MALFORMED_FRAME`] for more than the longest has; [`Error::INVALID_CRC`].
+pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Error> {
     if bytes.len() < usize::from(MIN_FRAME) {
-        return Err(Status::INCOMPLETE_FRAME);
+        return Err(Error::INCOMPLETE_FRAME);
     }
     if bytes.len() > MAX_FRAME {
-        return Err(Status::MALFORMED_FRAME);
+        return Err(Error::MALFORMED_FRAME);
     }
     match bytes {
         [unit, pdu @ .., _, _] if is_frame(bytes) => Ok(Adu {
@@ -57,7 +57,7 @@ pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
             unit: *unit,
             pdu,
         }),
-        _ => Err(Status::INVALID_CRC),
+        _ => Err(Error::INVALID_CRC),
     }
 }
 
@@ -104,18 +104,18 @@ pub fn find_last(bytes: &[u8]) -> usize {
 /// front of the slice that it gets, and returns the length of the PDU.
 ///
 /// # Errors
-/// The error of `pdu`; [`Status::BUFFER_TOO_SMALL`].
+/// The error of `pdu`; [`Error::BUFFER_TOO_SMALL`].
 pub fn emit(
     buffer: &mut [u8],
     unit: u8,
-    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>,
-) -> Result<usize, Status> {
+    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Error>,
+) -> Result<usize, Error> {
     let space = buffer.len().saturating_sub(OVERHEAD);
     let place = buffer.get_mut(PDU..PDU + space);
-    let length = pdu(place.ok_or(Status::BUFFER_TOO_SMALL)?)?;
+    let length = pdu(place.ok_or(Error::BUFFER_TOO_SMALL)?)?;
     // This check also lets the compiler prove that the frame's length does not overflow.
     if length > space {
-        return Err(Status::BUFFER_TOO_SMALL);
+        return Err(Error::BUFFER_TOO_SMALL);
     }
     write(buffer, unit, length, |_| ());
     Ok(length + OVERHEAD)

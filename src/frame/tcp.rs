@@ -1,7 +1,7 @@
 //! TCP frames: an MBAP header and a PDU (messaging on TCP/IP guide V1.0b, 3.1.3).
 
 use super::Adu;
-use crate::error::Status;
+use crate::error::Error;
 use core::ops::RangeInclusive;
 
 /// Index of the PDU in a frame, after transaction, protocol, length and unit.
@@ -31,15 +31,15 @@ pub struct Header {
 /// checked as soon as they are complete, even if the rest of the header is still missing.
 ///
 /// # Errors
-/// [`Status::INCOMPLETE_FRAME`] if bytes of the header are missing;
-/// [`Status::MALFORMED_FRAME`] if the bytes cannot begin a Modbus TCP frame.
-pub fn header(bytes: &[u8]) -> Result<Header, Status> {
+/// [`Error::INCOMPLETE_FRAME`] if bytes of the header are missing;
+/// [`Error::MALFORMED_FRAME`] if the bytes cannot begin a Modbus TCP frame.
+pub fn header(bytes: &[u8]) -> Result<Header, Error> {
     let Some([a, b, c, d, e, f, unit]) = bytes.first_chunk() else {
         return Err(partial_header_error(bytes));
     };
     let length = u16::from_be_bytes([*e, *f]);
     if u16::from_ne_bytes([*c, *d]) != 0 || !VALID_LENGTHS.contains(&length) {
-        return Err(Status::MALFORMED_FRAME);
+        return Err(Error::MALFORMED_FRAME);
     }
     Ok(Header {
         transaction: u16::from_be_bytes([*a, *b]),
@@ -64,25 +64,25 @@ pub const fn next_part(have: usize) -> usize {
 
 /// The error for an incomplete header.
 #[cold]
-fn partial_header_error(bytes: &[u8]) -> Status {
+fn partial_header_error(bytes: &[u8]) -> Error {
     let is_valid_so_far = match *bytes {
         [_, _, c, d, e, f, ..] => c | d == 0 && VALID_LENGTHS.contains(&u16::from_be_bytes([e, f])),
         [_, _, c, d, ..] => c | d == 0,
         _ => true,
     };
     if is_valid_so_far {
-        Status::INCOMPLETE_FRAME
+        Error::INCOMPLETE_FRAME
     } else {
-        Status::MALFORMED_FRAME
+        Error::MALFORMED_FRAME
     }
 }
 
 /// Parses the frame that fills `bytes`.
 ///
 /// # Errors
-/// As [`header`]; [`Status::INCOMPLETE_FRAME`] also if bytes of the PDU are missing;
-/// [`Status::MALFORMED_FRAME`] also if bytes follow the frame.
-pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
+/// As [`header`]; [`Error::INCOMPLETE_FRAME`] also if bytes of the PDU are missing;
+/// [`Error::MALFORMED_FRAME`] also if bytes follow the frame.
+pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Error> {
     let Some(([a, b, protocol_and_length @ .., unit], pdu)) = bytes.split_first_chunk::<PDU>()
     else {
         return Err(parse_error(bytes));
@@ -101,10 +101,10 @@ pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
 
 /// The error for bytes that are not one whole frame.
 #[cold]
-fn parse_error(bytes: &[u8]) -> Status {
+fn parse_error(bytes: &[u8]) -> Error {
     match header(bytes) {
-        Ok(header) if bytes.len() > header.total => Status::MALFORMED_FRAME,
-        Ok(_) => Status::INCOMPLETE_FRAME,
+        Ok(header) if bytes.len() > header.total => Error::MALFORMED_FRAME,
+        Ok(_) => Error::INCOMPLETE_FRAME,
         Err(error) => error,
     }
 }
@@ -113,15 +113,15 @@ fn parse_error(bytes: &[u8]) -> Status {
 /// front of the slice that it gets, and returns the length of the PDU.
 ///
 /// # Errors
-/// The error of `pdu`; [`Status::BUFFER_TOO_SMALL`].
+/// The error of `pdu`; [`Error::BUFFER_TOO_SMALL`].
 pub fn emit(
     buffer: &mut [u8],
     transaction: u16,
     unit: u8,
-    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>,
-) -> Result<usize, Status> {
+    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Error>,
+) -> Result<usize, Error> {
     let Some((header, place)) = buffer.split_first_chunk_mut::<PDU>() else {
-        return Err(Status::BUFFER_TOO_SMALL);
+        return Err(Error::BUFFER_TOO_SMALL);
     };
     let length = pdu(place)?;
     let [a, b] = transaction.to_be_bytes();
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn a_part_of_a_frame_is_incomplete() {
         for end in 0..FRAME.len() {
-            assert_eq!(parse(&FRAME[..end]), Err(Status::INCOMPLETE_FRAME));
+            assert_eq!(parse(&FRAME[..end]), Err(Error::INCOMPLETE_FRAME));
         }
     }
 
@@ -160,13 +160,13 @@ mod tests {
         for length in [0u16, 1, 255, 256, 65535] {
             let [high, low] = length.to_be_bytes();
             let bytes = [0, 1, 0, 0, high, low, 1, 3, 0, 0, 0, 1];
-            assert_eq!(header(&bytes), Err(Status::MALFORMED_FRAME), "{length}");
+            assert_eq!(header(&bytes), Err(Error::MALFORMED_FRAME), "{length}");
         }
         assert_eq!(header(&[0, 1, 0, 0, 0, 254, 1]).unwrap().total, MAX_FRAME);
     }
 
     #[test]
     fn another_protocol_is_malformed() {
-        assert_eq!(header(&[0, 1, 0, 1]), Err(Status::MALFORMED_FRAME));
+        assert_eq!(header(&[0, 1, 0, 1]), Err(Error::MALFORMED_FRAME));
     }
 }

@@ -4,7 +4,7 @@ use super::object::{Gateway, PATH_UNAVAILABLE};
 use super::route::{Route, ALL_LINES, LOCAL};
 use super::state::{Stage, NONE};
 use super::storage::GatewayStorage;
-use crate::error::Status;
+use crate::error::{Error, Status};
 use crate::frame::tcp;
 
 /// Most reads of a connection in one poll, so that a client whose requests need no response
@@ -86,7 +86,7 @@ impl<S: GatewayStorage> Gateway<S> {
                 self.storage.connection(connection).receiving = NONE;
                 self.direct(connection, request, header.unit);
             }
-            Err(Status::MALFORMED_FRAME) => self.lose(connection, Status::MALFORMED_FRAME),
+            Err(Error::MALFORMED_FRAME) => self.lose(connection, Status::MALFORMED_FRAME),
             _ => {}
         }
     }

@@ -3,7 +3,7 @@
 
 use super::PduKind;
 use crate::bytes::{Reader, Writer};
-use crate::error::Status;
+use crate::error::Error;
 use crate::pdu::files::{Reads, Record, Records, Writes, REFERENCE_TYPE};
 use crate::pdu::functions::{READ_FILE_RECORD, WRITE_FILE_RECORD};
 
@@ -47,8 +47,8 @@ pub fn record(side: PduKind, function: u8, groups: &[u8]) -> Option<(Record, &[u
 /// bytes.
 ///
 /// # Errors
-/// [`Status::ILLEGAL_FUNCTION`] for functions other than 14 and 15;
-/// [`Status::BUFFER_TOO_SMALL`]; the error of a request or response that contains only this
+/// [`Error::ILLEGAL_FUNCTION`] for functions other than 14 and 15;
+/// [`Error::BUFFER_TOO_SMALL`]; the error of a request or response that contains only this
 /// record.
 pub fn put_record(
     side: PduKind,
@@ -56,11 +56,11 @@ pub fn put_record(
     head: Record,
     data: &[u8],
     place: &mut [u8],
-) -> Result<usize, Status> {
+) -> Result<usize, Error> {
     let mut writer = Writer::new(place);
     let is_read = function == READ_FILE_RECORD;
     if !is_read && function != WRITE_FILE_RECORD {
-        return Err(Status::ILLEGAL_FUNCTION);
+        return Err(Error::ILLEGAL_FUNCTION);
     }
     if is_read && side == PduKind::Response {
         // A count that does not fit a byte is refused below, when the group is read.
@@ -95,11 +95,11 @@ pub fn object(groups: &[u8]) -> Option<(u8, &[u8], usize)> {
 /// bytes.
 ///
 /// # Errors
-/// [`Status::ILLEGAL_DATA_VALUE`] if the value is longer than 255 bytes;
-/// [`Status::BUFFER_TOO_SMALL`].
-pub fn put_object(id: u8, value: &[u8], place: &mut [u8]) -> Result<usize, Status> {
+/// [`Error::ILLEGAL_DATA_VALUE`] if the value is longer than 255 bytes;
+/// [`Error::BUFFER_TOO_SMALL`].
+pub fn put_object(id: u8, value: &[u8], place: &mut [u8]) -> Result<usize, Error> {
     if value.len() > 0xFF {
-        return Err(Status::ILLEGAL_DATA_VALUE);
+        return Err(Error::ILLEGAL_DATA_VALUE);
     }
     let mut writer = Writer::new(place);
     writer.u8(id);
@@ -138,7 +138,7 @@ mod tests {
             let found = record(side, function, &bytes[..length]);
             assert_eq!(found, Some((head, data, length)));
             let short = put_record(side, function, head, data, &mut bytes[..length - 1]);
-            assert_eq!(short, Err(Status::BUFFER_TOO_SMALL));
+            assert_eq!(short, Err(Error::BUFFER_TOO_SMALL));
         }
     }
 
@@ -156,49 +156,49 @@ mod tests {
                 0x14,
                 head(0, 1),
                 0,
-                Status::ILLEGAL_DATA_ADDRESS,
+                Error::ILLEGAL_DATA_ADDRESS,
             ),
             (
                 PduKind::Request,
                 0x14,
                 head(1, 0),
                 0,
-                Status::ILLEGAL_DATA_VALUE,
+                Error::ILLEGAL_DATA_VALUE,
             ),
             (
                 PduKind::Request,
                 0x15,
                 head(1, 2),
                 2,
-                Status::ILLEGAL_DATA_VALUE,
+                Error::ILLEGAL_DATA_VALUE,
             ),
             (
                 PduKind::Request,
                 0x15,
                 head(1, 250),
                 500,
-                Status::ILLEGAL_DATA_VALUE,
+                Error::ILLEGAL_DATA_VALUE,
             ),
             (
                 PduKind::Response,
                 0x14,
                 NO_RECORD,
                 3,
-                Status::ILLEGAL_DATA_VALUE,
+                Error::ILLEGAL_DATA_VALUE,
             ),
             (
                 PduKind::Response,
                 0x14,
                 NO_RECORD,
                 510,
-                Status::ILLEGAL_DATA_VALUE,
+                Error::ILLEGAL_DATA_VALUE,
             ),
             (
                 PduKind::Request,
                 0x18,
                 head(1, 1),
                 0,
-                Status::ILLEGAL_FUNCTION,
+                Error::ILLEGAL_FUNCTION,
             ),
         ] {
             let found = put_record(side, function, head, &[0; 510][..count], &mut bytes);
@@ -213,6 +213,6 @@ mod tests {
         assert_eq!(object(&bytes), Some((1, &b"mbm"[..], 5)));
         assert_eq!(object(&bytes[..4]), None);
         let short = put_object(1, b"mbms", &mut bytes);
-        assert_eq!(short, Err(Status::BUFFER_TOO_SMALL));
+        assert_eq!(short, Err(Error::BUFFER_TOO_SMALL));
     }
 }

@@ -6,7 +6,7 @@ pub mod groups;
 pub mod length;
 pub mod refusal;
 
-use crate::error::Status;
+use crate::error::Error;
 use crate::pdu::custom::Function;
 use crate::pdu::length::{self as pdu_length, Length};
 use crate::pdu::request::Request;
@@ -40,7 +40,7 @@ pub fn emit_request(
     request: &Request,
     functions: &[Function],
     place: &mut [u8],
-) -> Result<usize, Status> {
+) -> Result<usize, Error> {
     let length = request.emit(place)?;
     if let Request::Custom { .. } = request {
         Request::parse_with(place.get(..length).unwrap_or_default(), functions)?;
@@ -57,7 +57,7 @@ pub fn emit_response(
     response: &Response,
     functions: &[Function],
     place: &mut [u8],
-) -> Result<usize, Status> {
+) -> Result<usize, Error> {
     let length = response.emit(place)?;
     if let Response::Custom { .. } = response {
         Response::parse_with(place.get(..length).unwrap_or_default(), functions)?;
@@ -82,13 +82,13 @@ mod tests {
             let request = Request::Custom { function, data };
             assert_eq!(emit_request(&request, &own, &mut place).is_ok(), taken);
             let undeclared = emit_request(&request, &[], &mut place);
-            assert_eq!(undeclared, Err(Status::ILLEGAL_FUNCTION));
+            assert_eq!(undeclared, Err(Error::ILLEGAL_FUNCTION));
         }
         for (data, taken) in [(&[1, 2][..], true), (&[2, 2], false), (&[], false)] {
             let response = Response::Custom { function, data };
             assert_eq!(emit_response(&response, &own, &mut place).is_ok(), taken);
             let undeclared = emit_response(&response, &[], &mut place);
-            assert_eq!(undeclared, Err(Status::INVALID_FUNCTION));
+            assert_eq!(undeclared, Err(Error::INVALID_FUNCTION));
         }
     }
 }

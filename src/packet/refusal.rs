@@ -1,7 +1,7 @@
 //! Decodes a request frame. For a request that is refused, builds the exception that answers
 //! it.
 
-use crate::error::Status;
+use crate::error::{Error, Status};
 use crate::frame::Framing;
 use crate::pdu::custom::Function;
 use crate::pdu::request::Request;
@@ -30,17 +30,17 @@ impl Exception {
     /// The exception that answers a request with this head.
     ///
     /// # Errors
-    /// [`Status::BROADCAST_NOT_ALLOWED`] for a broadcast, which is never answered;
-    /// [`Status::INVALID_ARGUMENT`] if `status` is no exception code;
-    /// [`Status::ILLEGAL_FUNCTION`] for a function code from 0x80 on, which an exception
+    /// [`Error::BROADCAST_NOT_ALLOWED`] for a broadcast, which is never answered;
+    /// [`Error::INVALID_ARGUMENT`] if `status` is no exception code;
+    /// [`Error::ILLEGAL_FUNCTION`] for a function code from 0x80 on, which an exception
     /// cannot contain.
-    pub const fn new(framing: Framing, head: Head, status: Status) -> Result<Self, Status> {
+    pub const fn new(framing: Framing, head: Head, status: Status) -> Result<Self, Error> {
         if !status.is_exception() {
-            Err(Status::INVALID_ARGUMENT)
+            Err(Error::INVALID_ARGUMENT)
         } else if framing.is_serial() && head.unit == 0 {
-            Err(Status::BROADCAST_NOT_ALLOWED)
+            Err(Error::BROADCAST_NOT_ALLOWED)
         } else if head.function & EXCEPTION != 0 {
-            Err(Status::ILLEGAL_FUNCTION)
+            Err(Error::ILLEGAL_FUNCTION)
         } else {
             Ok(Exception {
                 head,
@@ -53,8 +53,8 @@ impl Exception {
     /// ASCII frame.
     ///
     /// # Errors
-    /// [`Status::BUFFER_TOO_SMALL`].
-    pub fn emit(&self, framing: Framing, end: u8, buffer: &mut [u8]) -> Result<usize, Status> {
+    /// [`Error::BUFFER_TOO_SMALL`].
+    pub fn emit(&self, framing: Framing, end: u8, buffer: &mut [u8]) -> Result<usize, Error> {
         let response = Response::Exception {
             function: self.head.function,
             code: self.code,
@@ -89,8 +89,8 @@ pub fn request<'a>(
     end: u8,
     functions: &[Function],
 ) -> Result<(Head, Request<'a>), Refusal> {
-    let adu = framing.parse(bytes, end).map_err(|status| Refusal {
-        status,
+    let adu = framing.parse(bytes, end).map_err(|error| Refusal {
+        status: error.status(),
         head: None,
         exception: None,
     })?;
@@ -101,10 +101,10 @@ pub fn request<'a>(
     };
     match Request::parse_with(adu.pdu, functions) {
         Ok(request) => Ok((head, request)),
-        Err(status) => Err(Refusal {
-            status,
+        Err(error) => Err(Refusal {
+            status: error.status(),
             head: Some(head),
-            exception: Exception::new(framing, head, status).ok(),
+            exception: Exception::new(framing, head, error.status()).ok(),
         }),
     }
 }

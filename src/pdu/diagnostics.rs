@@ -2,7 +2,7 @@
 
 use super::fields::word;
 use crate::bytes::Reader;
-use crate::error::Status;
+use crate::error::Error;
 
 /// The sub-functions of 08 (clause 6.8.1).
 pub mod sub_function {
@@ -47,17 +47,15 @@ const fn is_known(sub_function: u16) -> bool {
 }
 
 /// Reads a sub-function and its data: one word, or any number of words for Return Query Data.
-pub(super) fn sub_function_and_data<'a>(
-    reader: &mut Reader<'a>,
-) -> Result<(u16, &'a [u8]), Status> {
+pub(super) fn sub_function_and_data<'a>(reader: &mut Reader<'a>) -> Result<(u16, &'a [u8]), Error> {
     let sub_function = word(reader)?;
     if !is_known(sub_function) {
-        return Err(Status::ILLEGAL_FUNCTION);
+        return Err(Error::ILLEGAL_FUNCTION);
     }
     let data = reader.rest();
     let one = sub_function != sub_function::RETURN_QUERY_DATA;
     if data.is_empty() || !data.len().is_multiple_of(2) || (one && data.len() != 2) {
-        return Err(Status::ILLEGAL_DATA_VALUE);
+        return Err(Error::ILLEGAL_DATA_VALUE);
     }
     Ok((sub_function, data))
 }

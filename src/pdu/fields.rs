@@ -3,22 +3,22 @@
 
 use super::functions::{self, coil_value, COIL_ON};
 use crate::bytes::{Reader, Writer};
-use crate::error::Status;
+use crate::error::{Error, Status};
 
 /// Reads a byte; an error if the PDU has ended.
-pub(super) fn byte(reader: &mut Reader) -> Result<u8, Status> {
-    reader.u8().ok_or(Status::ILLEGAL_DATA_VALUE)
+pub(super) fn byte(reader: &mut Reader) -> Result<u8, Error> {
+    reader.u8().ok_or(Error::ILLEGAL_DATA_VALUE)
 }
 
 /// Reads a word; an error if the PDU has ended.
-pub(super) fn word(reader: &mut Reader) -> Result<u16, Status> {
-    reader.u16().ok_or(Status::ILLEGAL_DATA_VALUE)
+pub(super) fn word(reader: &mut Reader) -> Result<u16, Error> {
+    reader.u16().ok_or(Error::ILLEGAL_DATA_VALUE)
 }
 
 /// Reads a byte count and as many bytes of data.
-pub(super) fn counted<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Status> {
+pub(super) fn counted<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Error> {
     let count = usize::from(byte(reader)?);
-    reader.take(count).ok_or(Status::ILLEGAL_DATA_VALUE)
+    reader.take(count).ok_or(Error::ILLEGAL_DATA_VALUE)
 }
 
 /// Checks a range of addresses as every device would (application protocol,
@@ -40,45 +40,42 @@ pub(super) fn check_end_and_range(
     address: u16,
     quantity: u16,
     most: u16,
-) -> Result<(), Status> {
+) -> Result<(), Error> {
     expect_end(reader)?;
-    match check_range(address, quantity, most) {
-        Status::OK => Ok(()),
-        refused => Err(refused),
-    }
+    check_range(address, quantity, most).result()
 }
 
 /// Reads the address and the quantity of a range, with which the PDU ends.
-pub(super) fn last_range(reader: &mut Reader, most: u16) -> Result<(u16, u16), Status> {
+pub(super) fn last_range(reader: &mut Reader, most: u16) -> Result<(u16, u16), Error> {
     let (address, quantity) = (word(reader)?, word(reader)?);
     check_end_and_range(reader, address, quantity, most)?;
     Ok((address, quantity))
 }
 
 /// Checks that the PDU ends here.
-pub(super) fn expect_end(reader: &Reader) -> Result<(), Status> {
+pub(super) fn expect_end(reader: &Reader) -> Result<(), Error> {
     if reader.is_empty() {
         Ok(())
     } else {
-        Err(Status::ILLEGAL_DATA_VALUE)
+        Err(Error::ILLEGAL_DATA_VALUE)
     }
 }
 
 /// Checks that `count` is within `limits`, the least and the greatest value.
-pub(super) fn check_within(count: usize, limits: (usize, usize)) -> Result<(), Status> {
+pub(super) fn check_within(count: usize, limits: (usize, usize)) -> Result<(), Error> {
     if (limits.0..=limits.1).contains(&count) {
         Ok(())
     } else {
-        Err(Status::ILLEGAL_DATA_VALUE)
+        Err(Error::ILLEGAL_DATA_VALUE)
     }
 }
 
 /// True if the value of a single coil is on, false if it is off.
-pub(super) fn is_on(value: u16) -> Result<bool, Status> {
+pub(super) fn is_on(value: u16) -> Result<bool, Error> {
     match value {
         COIL_ON => Ok(true),
         0 => Ok(false),
-        _ => Err(Status::ILLEGAL_DATA_VALUE),
+        _ => Err(Error::ILLEGAL_DATA_VALUE),
     }
 }
 

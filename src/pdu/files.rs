@@ -3,7 +3,7 @@
 use super::fields::{byte, check_within, counted, word};
 use super::limits::{FILE_DATA_BYTES, MAX_RECORD, READ_FILE_BYTES, WRITE_FILE_BYTES};
 use crate::bytes::Reader;
-use crate::error::Status;
+use crate::error::Error;
 
 /// The only reference type that the standard defines.
 pub const REFERENCE_TYPE: u8 = 6;
@@ -33,7 +33,7 @@ pub struct Records<'a>(pub(super) &'a [u8]);
 
 /// Reads the head of the next sub-request. Also returns whether such records can exist; this
 /// is not an error yet, because a server checks all counts before it (figures 24 and 25).
-fn next_record(reader: &mut Reader) -> Result<(Record, bool), Status> {
+fn next_record(reader: &mut Reader) -> Result<(Record, bool), Error> {
     let reference = byte(reader)?;
     let record = Record {
         file: word(reader)?,
@@ -41,7 +41,7 @@ fn next_record(reader: &mut Reader) -> Result<(Record, bool), Status> {
         length: word(reader)?,
     };
     if record.length == 0 {
-        return Err(Status::ILLEGAL_DATA_VALUE);
+        return Err(Error::ILLEGAL_DATA_VALUE);
     }
     let last = record.record.checked_add(record.length - 1);
     let exists = reference == REFERENCE_TYPE
@@ -51,11 +51,11 @@ fn next_record(reader: &mut Reader) -> Result<(Record, bool), Status> {
 }
 
 /// An error unless the records of all sub-requests can exist.
-fn check_exist(exist: bool) -> Result<(), Status> {
+fn check_exist(exist: bool) -> Result<(), Error> {
     if exist {
         Ok(())
     } else {
-        Err(Status::ILLEGAL_DATA_ADDRESS)
+        Err(Error::ILLEGAL_DATA_ADDRESS)
     }
 }
 
@@ -63,10 +63,10 @@ impl<'a> Reads<'a> {
     /// The sub-requests in `bytes`.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_VALUE`] for wrong counts, or for more records than one response
-    /// can hold; [`Status::ILLEGAL_DATA_ADDRESS`] for a reference type, file number or record
+    /// [`Error::ILLEGAL_DATA_VALUE`] for wrong counts, or for more records than one response
+    /// can hold; [`Error::ILLEGAL_DATA_ADDRESS`] for a reference type, file number or record
     /// number that the standard does not allow.
-    pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         check_within(bytes.len(), READ_FILE_BYTES)?;
         let mut reader = Reader::new(bytes);
         let mut space = FILE_DATA_BYTES.1;
@@ -74,9 +74,7 @@ impl<'a> Reads<'a> {
         while !reader.is_empty() {
             let (record, exists) = next_record(&mut reader)?;
             let answer = sub_response_length(record.length);
-            space = space
-                .checked_sub(answer)
-                .ok_or(Status::ILLEGAL_DATA_VALUE)?;
+            space = space.checked_sub(answer).ok_or(Error::ILLEGAL_DATA_VALUE)?;
             exist &= exists;
         }
         check_exist(exist)?;
@@ -107,10 +105,10 @@ fn sub_response_length(records: u16) -> usize {
 }
 
 /// Reads the next sub-request of 15: its head, its data, and whether such records can exist.
-fn next_write<'a>(reader: &mut Reader<'a>) -> Result<(Record, &'a [u8], bool), Status> {
+fn next_write<'a>(reader: &mut Reader<'a>) -> Result<(Record, &'a [u8], bool), Error> {
     let (record, exists) = next_record(reader)?;
     let data = reader.take(usize::from(record.length).saturating_mul(2));
-    Ok((record, data.ok_or(Status::ILLEGAL_DATA_VALUE)?, exists))
+    Ok((record, data.ok_or(Error::ILLEGAL_DATA_VALUE)?, exists))
 }
 
 impl<'a> Writes<'a> {
@@ -118,7 +116,7 @@ impl<'a> Writes<'a> {
     ///
     /// # Errors
     /// As [`Reads::new`].
-    pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         check_within(bytes.len(), WRITE_FILE_BYTES)?;
         let mut reader = Reader::new(bytes);
         let mut exist = true;
@@ -145,13 +143,13 @@ impl<'a> Writes<'a> {
 }
 
 /// Reads the data of the next sub-response of 14.
-fn next_data<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Status> {
+fn next_data<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Error> {
     let group = counted(reader)?;
     match group.split_first() {
         Some((&REFERENCE_TYPE, data)) if !data.is_empty() && data.len().is_multiple_of(2) => {
             Ok(data)
         }
-        _ => Err(Status::ILLEGAL_DATA_VALUE),
+        _ => Err(Error::ILLEGAL_DATA_VALUE),
     }
 }
 
@@ -159,8 +157,8 @@ impl<'a> Records<'a> {
     /// The sub-responses in `bytes`.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_VALUE`] for wrong counts.
-    pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
+    /// [`Error::ILLEGAL_DATA_VALUE`] for wrong counts.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         // The sub-response of one record has four bytes, although the least byte count in
         // the standard's table is seven.
         check_within(bytes.len(), (4, FILE_DATA_BYTES.1))?;

@@ -3,7 +3,7 @@
 
 use super::fields::{byte, counted};
 use crate::bytes::Reader;
-use crate::error::Status;
+use crate::error::Error;
 
 /// CANopen General Reference (clause 6.20).
 pub const MEI_CANOPEN: u8 = 0x0D;
@@ -40,10 +40,10 @@ impl<'a> IdentificationReply<'a> {
     /// stores.
     ///
     /// # Errors
-    /// [`Status::MALFORMED_REPLY`] if they are not well-formed, for example if an object is
+    /// [`Error::MALFORMED_REPLY`] if they are not well-formed, for example if an object is
     /// cut off.
-    pub fn parse(code: u8, bytes: &'a [u8]) -> Result<Self, Status> {
-        read_reply(code, &mut Reader::new(bytes)).map_err(|_| Status::MALFORMED_REPLY)
+    pub fn parse(code: u8, bytes: &'a [u8]) -> Result<Self, Error> {
+        read_reply(code, &mut Reader::new(bytes)).map_err(|_| Error::MALFORMED_REPLY)
     }
 }
 
@@ -51,7 +51,7 @@ impl<'a> IdentificationReply<'a> {
 pub(super) fn read_reply<'a>(
     code: u8,
     reader: &mut Reader<'a>,
-) -> Result<IdentificationReply<'a>, Status> {
+) -> Result<IdentificationReply<'a>, Error> {
     let conformity = byte(reader)?;
     let (more, next_object, count) = (byte(reader)?, byte(reader)?, byte(reader)?);
     // The conformity level is not checked, nor the next object if none follows: some devices
@@ -62,7 +62,7 @@ pub(super) fn read_reply<'a>(
         _ => false,
     };
     if !is_right {
-        return Err(Status::ILLEGAL_DATA_VALUE);
+        return Err(Error::ILLEGAL_DATA_VALUE);
     }
     Ok(IdentificationReply {
         conformity,
@@ -80,7 +80,7 @@ pub struct ObjectList<'a> {
 }
 
 /// Reads the id and the value of the next object.
-fn object<'a>(reader: &mut Reader<'a>) -> Result<(u8, &'a [u8]), Status> {
+fn object<'a>(reader: &mut Reader<'a>) -> Result<(u8, &'a [u8]), Error> {
     let id = byte(reader)?;
     Ok((id, counted(reader)?))
 }
@@ -89,8 +89,8 @@ impl<'a> ObjectList<'a> {
     /// The `count` objects in `bytes`.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_VALUE`] unless `bytes` are exactly `count` objects.
-    pub fn new(count: u8, bytes: &'a [u8]) -> Result<Self, Status> {
+    /// [`Error::ILLEGAL_DATA_VALUE`] unless `bytes` are exactly `count` objects.
+    pub fn new(count: u8, bytes: &'a [u8]) -> Result<Self, Error> {
         let mut reader = Reader::new(bytes);
         for _ in 0..count {
             object(&mut reader)?;
@@ -98,7 +98,7 @@ impl<'a> ObjectList<'a> {
         if reader.is_empty() {
             Ok(ObjectList { count, bytes })
         } else {
-            Err(Status::ILLEGAL_DATA_VALUE)
+            Err(Error::ILLEGAL_DATA_VALUE)
         }
     }
 

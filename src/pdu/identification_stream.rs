@@ -2,7 +2,7 @@
 //! objects names the object to request next.
 
 use super::identification::{IdentificationReply, INDIVIDUAL};
-use crate::error::Status;
+use crate::error::Error;
 
 /// What follows a reply.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -50,18 +50,18 @@ impl ObjectStream {
     /// requested object: a device that does not have that object begins with the first one.
     ///
     /// # Errors
-    /// [`Status::MALFORMED_REPLY`] if a request for one object was answered with another.
-    /// [`Status::NO_PROGRESS`] if a later reply has an object before the one that the device
+    /// [`Error::MALFORMED_REPLY`] if a request for one object was answered with another.
+    /// [`Error::NO_PROGRESS`] if a later reply has an object before the one that the device
     /// itself named. On an error nothing changes.
-    pub fn take(&mut self, reply: &IdentificationReply) -> Result<Next, Status> {
+    pub fn take(&mut self, reply: &IdentificationReply) -> Result<Next, Error> {
         let mut least = self.least;
         for (id, _) in reply.objects.iter() {
             if self.code == INDIVIDUAL && id != self.requested {
-                return Err(Status::MALFORMED_REPLY);
+                return Err(Error::MALFORMED_REPLY);
             }
             let id = u16::from(id);
             if id < self.least {
-                return Err(Status::NO_PROGRESS);
+                return Err(Error::NO_PROGRESS);
             }
             least = least.max(id + 1);
         }

@@ -4,7 +4,7 @@ use super::custom::{find, is_free, is_user_defined, Function, Rule};
 use super::diagnostics::sub_function::RETURN_QUERY_DATA;
 use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use super::{functions, EXCEPTION};
-use crate::error::Status;
+use crate::error::Error;
 
 /// The length of a PDU or frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -118,12 +118,12 @@ pub(super) fn objects(pdu: &[u8]) -> Length {
 
 /// Checks the length of a PDU of a user-defined function. Without a `rule`, the function code
 /// must be one that the standard leaves to users, and any length is right.
-pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), Status> {
+pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), Error> {
     if !is_free(function) {
-        return Err(Status::ILLEGAL_FUNCTION);
+        return Err(Error::ILLEGAL_FUNCTION);
     }
     let matches_echo = match rule.map(|rule| by_rule(pdu, rule)) {
-        None if !is_user_defined(function) => return Err(Status::ILLEGAL_FUNCTION),
+        None if !is_user_defined(function) => return Err(Error::ILLEGAL_FUNCTION),
         None | Some(Length::Silence) => true,
         Some(Length::Exactly(length)) => length == pdu.len(),
         Some(_) => false,
@@ -131,6 +131,6 @@ pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), 
     if matches_echo {
         Ok(())
     } else {
-        Err(Status::ILLEGAL_DATA_VALUE)
+        Err(Error::ILLEGAL_DATA_VALUE)
     }
 }

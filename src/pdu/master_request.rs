@@ -6,7 +6,7 @@ use super::limits::{
     MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,
 };
-use crate::error::Status;
+use crate::error::{Error, Status};
 
 /// Function code, and at most four words of address and quantity.
 const HEAD: usize = 9;
@@ -78,14 +78,10 @@ impl MasterRequest {
     ///
     /// # Errors
     /// The status with which `build` refuses.
-    pub fn build(
-        build: impl FnOnce(&mut MasterRequest) -> Status,
-    ) -> Result<MasterRequest, Status> {
+    pub fn build(build: impl FnOnce(&mut MasterRequest) -> Status) -> Result<MasterRequest, Error> {
         let mut request = MasterRequest::NONE;
-        match build(&mut request) {
-            Status::OK => Ok(request),
-            refused => Err(refused),
-        }
+        build(&mut request).result()?;
+        Ok(request)
     }
 
     /// Sets the request of a function, given as [`FunctionSpec::short`], with an address and a
@@ -226,6 +222,15 @@ impl MasterRequest {
     pub fn set_reads(&mut self, bytes: u8) {
         self.reads = bytes;
         self.last_bits = 0;
+    }
+
+    /// Bits of data in a successful response.
+    pub const fn bits(&self) -> u16 {
+        let bits = self.reads as u16 * 8;
+        match self.last_bits {
+            0 => bits,
+            used => bits + used as u16 - 8,
+        }
     }
 
     /// Bytes of the caller's words that are sent.

@@ -17,7 +17,7 @@ use super::limits::{
     MAX_WRITE_REGISTERS,
 };
 use crate::bytes::{Reader, Writer};
-use crate::error::Status;
+use crate::error::Error;
 use core::mem::discriminant;
 
 /// A request PDU. Register data are in the order of the wire, high byte first. The first bit
@@ -100,11 +100,11 @@ impl<'a> Request<'a> {
     /// Parses a request PDU. The functions 65 to 72 and 100 to 110 are user-defined.
     ///
     /// # Errors
-    /// The exception that a server answers: [`Status::ILLEGAL_FUNCTION`] for
-    /// an unknown function or sub-function, [`Status::ILLEGAL_DATA_VALUE`] for
-    /// a wrong length, quantity or value, [`Status::ILLEGAL_DATA_ADDRESS`] for addresses beyond
+    /// The exception that a server answers: [`Error::ILLEGAL_FUNCTION`] for
+    /// an unknown function or sub-function, [`Error::ILLEGAL_DATA_VALUE`] for
+    /// a wrong length, quantity or value, [`Error::ILLEGAL_DATA_ADDRESS`] for addresses beyond
     /// 65535.
-    pub fn parse(pdu: &'a [u8]) -> Result<Self, Status> {
+    pub fn parse(pdu: &'a [u8]) -> Result<Self, Error> {
         Request::parse_with(pdu, &[])
     }
 
@@ -113,12 +113,12 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::parse`].
-    pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Status> {
+    pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Error> {
         let mut reader = Reader::new(pdu);
         // The variable is changed in place: moving it would cost as much time as parsing.
         let mut request = Request::read(pdu, &mut reader, functions);
         if (request.is_ok() && !reader.is_empty()) || pdu.len() > MAX_PDU {
-            request = Err(Status::ILLEGAL_DATA_VALUE);
+            request = Err(Error::ILLEGAL_DATA_VALUE);
         }
         request
     }
@@ -127,8 +127,8 @@ impl<'a> Request<'a> {
         pdu: &[u8],
         reader: &mut Reader<'a>,
         functions: &[custom::Function],
-    ) -> Result<Self, Status> {
-        let function = reader.u8().ok_or(Status::ILLEGAL_FUNCTION)?;
+    ) -> Result<Self, Error> {
+        let function = reader.u8().ok_or(Error::ILLEGAL_FUNCTION)?;
         match function {
             functions::READ_COILS | functions::READ_DISCRETE_INPUTS => read_bits(function, reader),
             functions::READ_HOLDING_REGISTERS | functions::READ_INPUT_REGISTERS => {
@@ -188,12 +188,12 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// The error that [`Request::parse`] returns for such a request, so that no malformed
-    /// request is sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
-    pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
+    /// request is sent; [`Error::BUFFER_TOO_SMALL`] if it does not fit.
+    pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Error> {
         let mut writer = Writer::new(pdu);
         self.write(&mut writer);
         if writer.length() > MAX_PDU {
-            return Err(Status::ILLEGAL_DATA_VALUE);
+            return Err(Error::ILLEGAL_DATA_VALUE);
         }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
@@ -206,7 +206,7 @@ impl<'a> Request<'a> {
         if same {
             Ok(length)
         } else {
-            Err(Status::ILLEGAL_FUNCTION)
+            Err(Error::ILLEGAL_FUNCTION)
         }
     }
 
@@ -325,7 +325,7 @@ impl<'a> Request<'a> {
     }
 }
 
-fn read_bits<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
+fn read_bits<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Error> {
     let (address, quantity) = last_range(reader, MAX_READ_BITS)?;
     Ok(Request::ReadBits {
         function,
@@ -334,17 +334,17 @@ fn read_bits<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Statu
     })
 }
 
-fn write_single_coil<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
+fn write_single_coil<'a>(reader: &mut Reader) -> Result<Request<'a>, Error> {
     let (address, value) = (word(reader)?, word(reader)?);
     let on = is_on(value)?;
     Ok(Request::WriteSingleCoil { address, on })
 }
 
-fn write_multiple_coils<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+fn write_multiple_coils<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
     let (address, quantity) = (word(reader)?, word(reader)?);
     let data = counted(reader)?;
     if data.len() != usize::from(byte_count(quantity)) {
-        return Err(Status::ILLEGAL_DATA_VALUE);
+        return Err(Error::ILLEGAL_DATA_VALUE);
     }
     check_end_and_range(reader, address, quantity, MAX_WRITE_BITS)?;
     Ok(Request::WriteMultipleCoils {
@@ -354,7 +354,7 @@ fn write_multiple_coils<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Stat
     })
 }
 
-fn read_registers<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
+fn read_registers<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Error> {
     let (address, quantity) = last_range(reader, MAX_READ_REGISTERS)?;
     Ok(Request::ReadRegisters {
         function,
@@ -363,14 +363,14 @@ fn read_registers<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, 
     })
 }
 
-fn write_single_register<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
+fn write_single_register<'a>(reader: &mut Reader) -> Result<Request<'a>, Error> {
     Ok(Request::WriteSingleRegister {
         address: word(reader)?,
         value: word(reader)?,
     })
 }
 
-fn write_multiple_registers<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+fn write_multiple_registers<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
     let (address, quantity) = (word(reader)?, word(reader)?);
     let data = values(reader, quantity)?;
     check_end_and_range(reader, address, quantity, MAX_WRITE_REGISTERS)?;
@@ -381,7 +381,7 @@ fn write_multiple_registers<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, 
     })
 }
 
-fn mask_write_register<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
+fn mask_write_register<'a>(reader: &mut Reader) -> Result<Request<'a>, Error> {
     Ok(Request::MaskWriteRegister {
         address: word(reader)?,
         and_mask: word(reader)?,
@@ -389,7 +389,7 @@ fn mask_write_register<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
     })
 }
 
-fn read_write_registers<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+fn read_write_registers<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
     let (read_address, read_quantity) = (word(reader)?, word(reader)?);
     let (write_address, write_quantity) = (word(reader)?, word(reader)?);
     let data = values(reader, write_quantity)?;
@@ -413,16 +413,16 @@ fn read_write_registers<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Stat
 }
 
 /// Reads a byte count and the data of `quantity` registers.
-fn values<'a>(reader: &mut Reader<'a>, quantity: u16) -> Result<&'a [u8], Status> {
+fn values<'a>(reader: &mut Reader<'a>, quantity: u16) -> Result<&'a [u8], Error> {
     let data = counted(reader)?;
     if data.len().is_multiple_of(2) && data.len() / 2 == usize::from(quantity) {
         Ok(data)
     } else {
-        Err(Status::ILLEGAL_DATA_VALUE)
+        Err(Error::ILLEGAL_DATA_VALUE)
     }
 }
 
-fn diagnostics<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+fn diagnostics<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
     let (sub_function, data) = sub_function_and_data(reader)?;
     let allowed = match (sub_function, data) {
         (sub_function::RETURN_QUERY_DATA, _) => true,
@@ -433,28 +433,28 @@ fn diagnostics<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     if allowed {
         Ok(Request::Diagnostics { sub_function, data })
     } else {
-        Err(Status::ILLEGAL_DATA_VALUE)
+        Err(Error::ILLEGAL_DATA_VALUE)
     }
 }
 
-fn read_file_record<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+fn read_file_record<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
     let bytes = counted(reader)?;
     expect_end(reader)?;
     Ok(Request::ReadFileRecord(Reads::new(bytes)?))
 }
 
-fn write_file_record<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+fn write_file_record<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
     let bytes = counted(reader)?;
     expect_end(reader)?;
     Ok(Request::WriteFileRecord(Writes::new(bytes)?))
 }
 
-fn read_fifo_queue<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
+fn read_fifo_queue<'a>(reader: &mut Reader) -> Result<Request<'a>, Error> {
     let address = word(reader)?;
     Ok(Request::ReadFifoQueue { address })
 }
 
-fn encapsulated<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+fn encapsulated<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
     let mei_type = byte(reader)?;
     if mei_type != MEI_READ_DEVICE_IDENTIFICATION {
         let data = reader.rest();
@@ -462,7 +462,7 @@ fn encapsulated<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     }
     let (code, object) = (byte(reader)?, byte(reader)?);
     if !(BASIC..=INDIVIDUAL).contains(&code) {
-        return Err(Status::ILLEGAL_DATA_VALUE);
+        return Err(Error::ILLEGAL_DATA_VALUE);
     }
     Ok(Request::ReadDeviceIdentification { code, object })
 }

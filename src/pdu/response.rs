@@ -14,7 +14,7 @@ use super::limits::{
 };
 use super::{custom, functions, length, EXCEPTION};
 use crate::bytes::{Reader, Writer};
-use crate::error::Status;
+use crate::error::{Error, Status};
 use core::mem::discriminant;
 
 /// A response PDU. Register data are in the order of the wire, high byte first. The first bit
@@ -111,9 +111,9 @@ impl<'a> Response<'a> {
     /// Parses a response PDU. The functions 65 to 72 and 100 to 110 are user-defined.
     ///
     /// # Errors
-    /// [`Status::INVALID_FUNCTION`] for an unknown function, [`Status::MALFORMED_REPLY`] for
+    /// [`Error::INVALID_FUNCTION`] for an unknown function, [`Error::MALFORMED_REPLY`] for
     /// all other errors.
-    pub fn parse(pdu: &'a [u8]) -> Result<Self, Status> {
+    pub fn parse(pdu: &'a [u8]) -> Result<Self, Error> {
         Response::parse_with(pdu, &[])
     }
 
@@ -122,7 +122,7 @@ impl<'a> Response<'a> {
     ///
     /// # Errors
     /// As [`Response::parse`].
-    pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Status> {
+    pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Error> {
         let mut reader = Reader::new(pdu);
         // The variable is changed in place: moving it would cost as much time as parsing.
         let mut response = Response::read(pdu, &mut reader, functions);
@@ -131,7 +131,7 @@ impl<'a> Response<'a> {
             Err(status) => status == Status::INVALID_FUNCTION && pdu.len() <= MAX_PDU,
         };
         if !in_order {
-            response = Err(Status::MALFORMED_REPLY);
+            response = Err(Error::MALFORMED_REPLY);
         }
         response
     }
@@ -140,8 +140,8 @@ impl<'a> Response<'a> {
         pdu: &[u8],
         reader: &mut Reader<'a>,
         functions: &[custom::Function],
-    ) -> Result<Self, Status> {
-        let function = reader.u8().ok_or(Status::MALFORMED_REPLY)?;
+    ) -> Result<Self, Error> {
+        let function = reader.u8().ok_or(Error::MALFORMED_REPLY)?;
         match function {
             functions::READ_COILS | functions::READ_DISCRETE_INPUTS => read_bits(function, reader),
             functions::READ_HOLDING_REGISTERS
@@ -167,7 +167,7 @@ impl<'a> Response<'a> {
             function => {
                 let declared = custom::find(functions, function);
                 match length::check(pdu, function, declared.map(|it| it.response)) {
-                    Err(Status::ILLEGAL_FUNCTION) => Err(Status::INVALID_FUNCTION),
+                    Err(Error::ILLEGAL_FUNCTION) => Err(Error::INVALID_FUNCTION),
                     checked => checked.map(|()| {
                         let data = reader.rest();
                         Response::Custom { function, data }
@@ -206,12 +206,12 @@ impl<'a> Response<'a> {
     ///
     /// # Errors
     /// The error that [`Response::parse`] returns for such a response, so that no malformed
-    /// response is sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
-    pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
+    /// response is sent; [`Error::BUFFER_TOO_SMALL`] if it does not fit.
+    pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Error> {
         let mut writer = Writer::new(pdu);
         self.write(&mut writer);
         if writer.length() > MAX_PDU {
-            return Err(Status::MALFORMED_REPLY);
+            return Err(Error::MALFORMED_REPLY);
         }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
@@ -225,7 +225,7 @@ impl<'a> Response<'a> {
         if same {
             Ok(length)
         } else {
-            Err(Status::INVALID_FUNCTION)
+            Err(Error::INVALID_FUNCTION)
         }
     }
 
@@ -314,10 +314,10 @@ impl<'a> Response<'a> {
     }
 }
 
-fn parse_exception<'a>(function: u8, reader: &mut Reader) -> Result<Response<'a>, Status> {
-    let code = reader.u8().ok_or(Status::MALFORMED_REPLY)?;
+fn parse_exception<'a>(function: u8, reader: &mut Reader) -> Result<Response<'a>, Error> {
+    let code = reader.u8().ok_or(Error::MALFORMED_REPLY)?;
     if Status::exception(code) == Status::MALFORMED_REPLY {
-        return Err(Status::MALFORMED_REPLY);
+        return Err(Error::MALFORMED_REPLY);
     }
     Ok(Response::Exception {
         function: function & !EXCEPTION,
@@ -325,30 +325,30 @@ fn parse_exception<'a>(function: u8, reader: &mut Reader) -> Result<Response<'a>
     })
 }
 
-fn read_bits<'a>(function: u8, reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+fn read_bits<'a>(function: u8, reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
     let data = counted(reader)?;
     if data.is_empty() || data.len() > usize::from(byte_count(MAX_READ_BITS)) {
-        return Err(Status::MALFORMED_REPLY);
+        return Err(Error::MALFORMED_REPLY);
     }
     Ok(Response::ReadBits { function, data })
 }
 
-fn write_single_coil<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
+fn write_single_coil<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
     let (address, value) = (word(reader)?, word(reader)?);
     let on = is_on(value)?;
     Ok(Response::WriteSingleCoil { address, on })
 }
 
-fn read_registers<'a>(function: u8, reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+fn read_registers<'a>(function: u8, reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
     let data = counted(reader)?;
     let most = 2 * usize::from(MAX_READ_REGISTERS);
     if data.is_empty() || data.len() > most || !data.len().is_multiple_of(2) {
-        return Err(Status::MALFORMED_REPLY);
+        return Err(Error::MALFORMED_REPLY);
     }
     Ok(Response::ReadRegisters { function, data })
 }
 
-fn write_single_register<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
+fn write_single_register<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
     Ok(Response::WriteSingleRegister {
         address: word(reader)?,
         value: word(reader)?,
@@ -356,11 +356,7 @@ fn write_single_register<'a>(reader: &mut Reader) -> Result<Response<'a>, Status
 }
 
 /// Parses a response of 0F or 10, which writes at most `most` coils or registers.
-fn write_multiple<'a>(
-    function: u8,
-    most: u16,
-    reader: &mut Reader,
-) -> Result<Response<'a>, Status> {
+fn write_multiple<'a>(function: u8, most: u16, reader: &mut Reader) -> Result<Response<'a>, Error> {
     let (address, quantity) = last_range(reader, most)?;
     Ok(Response::WriteMultiple {
         function,
@@ -369,7 +365,7 @@ fn write_multiple<'a>(
     })
 }
 
-fn mask_write_register<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
+fn mask_write_register<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
     Ok(Response::MaskWriteRegister {
         address: word(reader)?,
         and_mask: word(reader)?,
@@ -377,33 +373,33 @@ fn mask_write_register<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> 
     })
 }
 
-fn exception_status<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
+fn exception_status<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
     let outputs = byte(reader)?;
     Ok(Response::ExceptionStatus { outputs })
 }
 
-fn diagnostics<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+fn diagnostics<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
     let (sub_function, data) = sub_function_and_data(reader)?;
     if sub_function == sub_function::FORCE_LISTEN_ONLY {
-        return Err(Status::MALFORMED_REPLY);
+        return Err(Error::MALFORMED_REPLY);
     }
     Ok(Response::Diagnostics { sub_function, data })
 }
 
-fn event_counter<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
+fn event_counter<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
     Ok(Response::CommEventCounter {
         status: word(reader)?,
         events: word(reader)?,
     })
 }
 
-fn event_log<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+fn event_log<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
     let mut reader = Reader::new(counted(reader)?);
     let (status, events) = (word(&mut reader)?, word(&mut reader)?);
     let messages = word(&mut reader)?;
     let log = reader.rest();
     if log.len() > MAX_EVENTS {
-        return Err(Status::ILLEGAL_DATA_VALUE);
+        return Err(Error::ILLEGAL_DATA_VALUE);
     }
     Ok(Response::CommEventLog {
         status,
@@ -424,29 +420,29 @@ fn emit_event_log(writer: &mut Writer, words: [u16; 3], log: &[u8]) {
 
 /// In some devices the byte count covers only the id, and more bytes follow. So the result
 /// contains the count and all bytes after it.
-fn server_id<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+fn server_id<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
     let count = byte(reader)?;
     let data = reader.rest();
     if usize::from(count) > data.len() {
-        return Err(Status::ILLEGAL_DATA_VALUE);
+        return Err(Error::ILLEGAL_DATA_VALUE);
     }
     Ok(Response::ServerId { count, data })
 }
 
-fn read_file_record<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+fn read_file_record<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
     Ok(Response::ReadFileRecord(Records::new(counted(reader)?)?))
 }
 
-fn write_file_record<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+fn write_file_record<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
     Ok(Response::WriteFileRecord(Writes::new(counted(reader)?)?))
 }
 
-fn fifo_queue<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+fn fifo_queue<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
     let (bytes, count) = (word(reader)?, word(reader)?);
     let data = reader.rest();
     let agree = count <= MAX_FIFO && bytes == 2 + 2 * count && data.len() == 2 * usize::from(count);
     if !agree {
-        return Err(Status::ILLEGAL_DATA_VALUE);
+        return Err(Error::ILLEGAL_DATA_VALUE);
     }
     Ok(Response::FifoQueue { data })
 }
@@ -458,7 +454,7 @@ fn emit_fifo_queue(writer: &mut Writer, data: &[u8]) {
     writer.put(data);
 }
 
-fn encapsulated<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+fn encapsulated<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
     let mei_type = byte(reader)?;
     if mei_type != MEI_READ_DEVICE_IDENTIFICATION {
         let data = reader.rest();

@@ -3,7 +3,7 @@
 
 use super::field::{DOUBLE, FLOAT, TEXT};
 use super::value::{scale, Words};
-use crate::error::Status;
+use crate::error::Error;
 
 const SIGN: u64 = 1 << 63;
 /// The exponent of infinity and of what is no number.
@@ -19,13 +19,13 @@ impl Words<'_> {
     /// even one. Infinities and what is no number have no scale but its sign.
     ///
     /// # Errors
-    /// [`Status::INVALID_ARGUMENT`] for a text.
-    pub fn number(&self) -> Result<u64, Status> {
+    /// [`Error::INVALID_ARGUMENT`] for a text.
+    pub fn number(&self) -> Result<u64, Error> {
         let field = self.field;
         let (multiplier, divisor) = scale(field);
         let mut sign = if field.multiplier < 0 { SIGN } else { 0 };
         let (significand, exponent) = match field.value_type {
-            TEXT => return Err(Status::INVALID_ARGUMENT),
+            TEXT => return Err(Error::INVALID_ARGUMENT),
             FLOAT | DOUBLE => {
                 let bits = self.double()?;
                 sign ^= bits & SIGN;

@@ -4,7 +4,7 @@
 use super::divide::quotient;
 use super::field::{Field, BIT, DOUBLE, FLOAT, INT16, INT32, INT64, TEXT};
 use crate::data::value::{ShortDouble, Value as _};
-use crate::error::Status;
+use crate::error::Error;
 
 /// A value: its words, and its field.
 #[derive(Clone, Copy)]
@@ -21,11 +21,11 @@ pub struct Words<'a> {
 /// `address` is the first address of the read.
 ///
 /// # Errors
-/// [`Status::INVALID_ARGUMENT`] if the field has no such value. A text is one value, and so are
+/// [`Error::INVALID_ARGUMENT`] if the field has no such value. A text is one value, and so are
 /// bits of a register.
-pub fn place(field: &Field, address: u16, index: u16) -> Result<(u16, u8), Status> {
+pub fn place(field: &Field, address: u16, index: u16) -> Result<(u16, u8), Error> {
     if index >= field.values() {
-        return Err(Status::INVALID_ARGUMENT);
+        return Err(Error::INVALID_ARGUMENT);
     }
     let place = field
         .address
@@ -96,13 +96,13 @@ impl Words<'_> {
     /// The bits of a float of 32 bits; of 64 bits, those of the nearest of 32.
     ///
     /// # Errors
-    /// [`Status::INVALID_ARGUMENT`] for other types.
-    pub fn float(&self) -> Result<u32, Status> {
+    /// [`Error::INVALID_ARGUMENT`] for other types.
+    pub fn float(&self) -> Result<u32, Error> {
         let raw = self.raw();
         match self.field.value_type {
             FLOAT => Ok(raw as u32),
             DOUBLE => Ok(ShortDouble::from_bytes(raw.to_be_bytes()).0.to_bits()),
-            _ => Err(Status::INVALID_ARGUMENT),
+            _ => Err(Error::INVALID_ARGUMENT),
         }
     }
 
@@ -110,7 +110,7 @@ impl Words<'_> {
     ///
     /// # Errors
     /// As [`Words::float`].
-    pub fn double(&self) -> Result<u64, Status> {
+    pub fn double(&self) -> Result<u64, Error> {
         let raw = self.raw();
         match self.field.value_type {
             FLOAT => {
@@ -118,19 +118,19 @@ impl Words<'_> {
                 Ok(u64::from_be_bytes(number.to_bytes()))
             }
             DOUBLE => Ok(raw),
-            _ => Err(Status::INVALID_ARGUMENT),
+            _ => Err(Error::INVALID_ARGUMENT),
         }
     }
 
     /// Copies a text, up to its first NUL and without it; returns how many characters.
     ///
     /// # Errors
-    /// [`Status::INVALID_ARGUMENT`] for a field of another type; [`Status::BUFFER_TOO_SMALL`]
+    /// [`Error::INVALID_ARGUMENT`] for a field of another type; [`Error::BUFFER_TOO_SMALL`]
     /// if `text` cannot hold it. Nothing is copied then.
-    pub fn text(&self, text: &mut [u8]) -> Result<usize, Status> {
+    pub fn text(&self, text: &mut [u8]) -> Result<usize, Error> {
         let field = self.field;
         if field.value_type != TEXT {
-            return Err(Status::INVALID_ARGUMENT);
+            return Err(Error::INVALID_ARGUMENT);
         }
         let character = |index: usize| {
             let [high, low] = self.word(index / 2).to_be_bytes();
@@ -144,7 +144,7 @@ impl Words<'_> {
         let count = (0..length)
             .position(|index| character(index) == 0)
             .unwrap_or(length);
-        let text = text.get_mut(..count).ok_or(Status::BUFFER_TOO_SMALL)?;
+        let text = text.get_mut(..count).ok_or(Error::BUFFER_TOO_SMALL)?;
         for (index, place) in text.iter_mut().enumerate() {
             *place = character(index);
         }
@@ -181,21 +181,21 @@ impl Words<'_> {
     /// nearest, halves away from 0.
     ///
     /// # Errors
-    /// [`Status::INVALID_ARGUMENT`] for a float or a text;
-    /// [`Status::OUT_OF_RANGE`] if the result is out of range.
-    pub fn integer(&self) -> Result<i64, Status> {
+    /// [`Error::INVALID_ARGUMENT`] for a float or a text;
+    /// [`Error::OUT_OF_RANGE`] if the result is out of range.
+    pub fn integer(&self) -> Result<i64, Error> {
         let field = self.field;
         if field.value_type > INT64 {
-            return Err(Status::INVALID_ARGUMENT);
+            return Err(Error::INVALID_ARGUMENT);
         }
         let (raw, is_below) = self.magnitude();
         let (multiplier, divisor) = scale(field);
         let whole = quotient(multiplier, divisor);
         let part = multiplier.wrapping_sub(whole.wrapping_mul(divisor));
-        let scaled = times(raw, whole, part, divisor).ok_or(Status::OUT_OF_RANGE)?;
+        let scaled = times(raw, whole, part, divisor).ok_or(Error::OUT_OF_RANGE)?;
         let is_below = is_below != (field.multiplier < 0);
         if scaled > i64::MAX as u64 + u64::from(is_below) {
-            return Err(Status::OUT_OF_RANGE);
+            return Err(Error::OUT_OF_RANGE);
         }
         Ok(if is_below {
             scaled.wrapping_neg()
@@ -208,12 +208,12 @@ impl Words<'_> {
     /// As [`Words::integer`], with 32 bits throughout.
     ///
     /// # Errors
-    /// As [`Words::integer`]; [`Status::INVALID_ARGUMENT`] also for an integer of 64 bits, and
-    /// [`Status::OUT_OF_RANGE`] also if the product before the division does not fit into 32 bits.
-    pub fn int32(&self) -> Result<i32, Status> {
+    /// As [`Words::integer`]; [`Error::INVALID_ARGUMENT`] also for an integer of 64 bits, and
+    /// [`Error::OUT_OF_RANGE`] also if the product before the division does not fit into 32 bits.
+    pub fn int32(&self) -> Result<i32, Error> {
         let field = self.field;
         if field.value_type > INT32 {
-            return Err(Status::INVALID_ARGUMENT);
+            return Err(Error::INVALID_ARGUMENT);
         }
         let mut raw = self.raw_32();
         let mut is_below = field.multiplier < 0;
@@ -228,11 +228,11 @@ impl Words<'_> {
         let (multiplier, divisor) = scale(field);
         let half = divisor / 2;
         if raw > quotient(u32::MAX - half, multiplier) {
-            return Err(Status::OUT_OF_RANGE);
+            return Err(Error::OUT_OF_RANGE);
         }
         let scaled = quotient(raw * multiplier + half, divisor);
         if scaled > i32::MAX as u32 + u32::from(is_below) {
-            return Err(Status::OUT_OF_RANGE);
+            return Err(Error::OUT_OF_RANGE);
         }
         Ok(if is_below {
             scaled.wrapping_neg()

@@ -80,7 +80,7 @@ fn read(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
     }
     let reads = match Reads::new(kept) {
         Ok(reads) => reads,
-        Err(refused) => return refusal(refused),
+        Err(refused) => return refusal(refused.status()),
     };
     if !reads.iter().all(|record| files.contains(record)) {
         return Reply::ABSENT;
@@ -113,7 +113,7 @@ fn read(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
 fn write(files: &mut impl Files, request: &[u8], length: usize) -> Reply {
     let writes = match Writes::new(request) {
         Ok(writes) => writes,
-        Err(refused) => return refusal(refused),
+        Err(refused) => return refusal(refused.status()),
     };
     if !writes.iter().all(|(record, _)| files.contains(record)) {
         return Reply::ABSENT;

@@ -2,7 +2,7 @@
 
 use super::indication::SERIAL;
 use super::line::{EncodeAdu, Receive, Server, ServerStorage};
-use crate::error::Status;
+use crate::error::{Error, Status};
 use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp};
@@ -350,7 +350,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                     return self.found(header.total - tcp::PDU);
                 }
                 Ok(header) => until = header.total,
-                Err(Status::INCOMPLETE_FRAME) => {}
+                Err(Error::INCOMPLETE_FRAME) => {}
                 Err(_) => return self.fail_stream(),
             }
             let received = self.read_bytes_not_inlined(until);

@@ -7,7 +7,7 @@
 use super::indication::STREAM;
 use super::{Indication, Reply, Units};
 use crate::bytes::move_to_front;
-use crate::error::Status;
+use crate::error::{Error, Status};
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::Rule;
@@ -328,18 +328,21 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// As [`Server::poll`], but `units` serve the request, and their reply is sent. One call
     /// serves one request at most, so a flood of requests does not block the program.
-    pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Status {
-        let status = self.look(now);
-        if status == Status::PENDING {
-            let info = self.request;
-            let reply = units.serve(&info, self.pdu());
-            if !self.answer(reply) {
-                return Status::OK;
+    ///
+    /// # Errors
+    /// As [`Server::poll`].
+    pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Result<(), Error> {
+        match self.look(now) {
+            Status::PENDING => {
+                let info = self.request;
+                let reply = units.serve(&info, self.pdu());
+                if !self.answer(reply) {
+                    return Ok(());
+                }
             }
-        } else if status != Status::OK {
-            return status;
+            status => status.result()?,
         }
-        self.go_on()
+        self.go_on().result()
     }
 
     /// Takes the reply to the request. The PDU of a response has overwritten that of the request.

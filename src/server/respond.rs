@@ -3,7 +3,7 @@
 use super::framing::{ascii_space, rtu_space, tcp_space};
 use super::indication::{SERIAL, STREAM};
 use super::{Indication, Reply, Units};
-use crate::error::Status;
+use crate::error::{Error, Status};
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::limits::MAX_PDU;
 
@@ -23,7 +23,7 @@ pub fn respond(
     buffer: &mut [u8],
     length: usize,
     units: &mut (impl Units + ?Sized),
-) -> Result<usize, Status> {
+) -> Result<usize, Error> {
     let (mut info, space) = (Indication::NONE, buffer.len());
     let frame = buffer.get_mut(..length).unwrap_or_default();
     let adu = framing.parse(frame, delimiter);
@@ -53,7 +53,7 @@ pub fn respond(
     }
     let reply = units.serve(&info, place);
     if reply == Reply::PENDING {
-        return Err(Status::PENDING);
+        return Status::PENDING.result().map(|()| 0);
     }
     let mut written = reply.write_exception(place);
     if written == 0 {

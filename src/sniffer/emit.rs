@@ -146,9 +146,7 @@ impl Sniffer {
                 let is_broadcast = unit == 0 && self.framing != Framing::Tcp;
                 self.requests.keep(&frame, is_broadcast, functions, time);
                 event.kind = EventKind::Request;
-                event.status = Request::parse_with(pdu, functions)
-                    .err()
-                    .unwrap_or(Status::OK);
+                event.status = Request::parse_with(pdu, functions).map(drop).into();
             }
             FrameRole::Reply(index) => {
                 let slot = self.requests.get(index);
@@ -190,7 +188,7 @@ fn content(framing: Framing, frame: &[u8]) -> (u16, u8, &[u8]) {
 /// The status of a response PDU.
 fn answer(pdu: &[u8], functions: &[Function]) -> Status {
     match (Response::parse_with(pdu, functions), pdu) {
-        (Err(refused), _) => refused,
+        (Err(refused), _) => refused.status(),
         (Ok(_), [code, exception, ..]) if code & EXCEPTION != 0 => Status::exception(*exception),
         (Ok(_), _) => Status::OK,
     }

@@ -2,7 +2,7 @@
 
 use super::pairing::Requests;
 use super::stream::{RxStream, Timing};
-use crate::error::Status;
+use crate::error::Error;
 use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::packet::PduKind;
@@ -255,7 +255,7 @@ impl Context<'_> {
     /// Examines the TCP bytes at the place of the search.
     pub fn tcp(&self, stream: &RxStream, bytes: &[u8], capacity: usize) -> Candidate {
         let header = match tcp::header(bytes) {
-            Err(Status::INCOMPLETE_FRAME) if !self.has_timed_out(stream) => {
+            Err(Error::INCOMPLETE_FRAME) if !self.has_timed_out(stream) => {
                 return Candidate::Wait(tcp::next_part(bytes.len()));
             }
             Err(_) => return Candidate::NoFrame,

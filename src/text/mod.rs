@@ -6,7 +6,7 @@ mod writer;
 pub use writer::TextWriter;
 
 use crate::bytes::Reader;
-use crate::error::Status;
+use crate::error::Error;
 use crate::frame::{ascii, rtu, tcp, Adu, Framing};
 use crate::packet::PduKind;
 use crate::pdu::diagnostics::sub_function as sub;
@@ -64,13 +64,13 @@ fn characters(line: &mut TextWriter, side: PduKind, frame: &[u8], end: u8) {
             }
             ascii::parse(copy, end)
         }
-        None => Err(Status::MALFORMED_FRAME),
+        None => Err(Error::MALFORMED_FRAME),
     };
     adu(line, side, parsed, frame.len());
 }
 
 /// Describes a decoded frame, or the error of a frame of `length` bytes.
-fn adu(line: &mut TextWriter, side: PduKind, parsed: Result<Adu, Status>, length: usize) {
+fn adu(line: &mut TextWriter, side: PduKind, parsed: Result<Adu, Error>, length: usize) {
     match parsed {
         Ok(adu) if side == PduKind::Request => {
             start(line, adu.unit, "request");
@@ -85,8 +85,8 @@ fn adu(line: &mut TextWriter, side: PduKind, parsed: Result<Adu, Status>, length
             );
             response(line, adu.pdu, &[]);
         }
-        Err(Status::INVALID_CRC) => bytes(line, "bad CRC", length),
-        Err(Status::INCOMPLETE_FRAME) => bytes(line, "incomplete frame", length),
+        Err(Error::INVALID_CRC) => bytes(line, "bad CRC", length),
+        Err(Error::INCOMPLETE_FRAME) => bytes(line, "incomplete frame", length),
         Err(_) => bytes(line, "no frame", length),
     }
 }

@@ -1,7 +1,7 @@
 //! Writes a line of text into a buffer of the caller. `core::fmt` would add kilobytes to a
 //! firmware image.
 
-use crate::error::Status;
+use crate::error::Error;
 use crate::frame::ascii::character;
 
 /// A line of ASCII text in a buffer. If the buffer is too small, the rest of the text is cut
@@ -128,15 +128,15 @@ impl<'a> TextWriter<'a> {
     /// Ends the text and returns its number of characters.
     ///
     /// # Errors
-    /// [`Status::BUFFER_TOO_SMALL`] if the text was cut off.
-    pub fn finish(self) -> Result<usize, Status> {
+    /// [`Error::BUFFER_TOO_SMALL`] if the text was cut off.
+    pub fn finish(self) -> Result<usize, Error> {
         if let Some(end) = self.text.get_mut(self.length) {
             *end = 0;
         } else {
-            return Err(Status::BUFFER_TOO_SMALL);
+            return Err(Error::BUFFER_TOO_SMALL);
         }
         if self.is_cut {
-            Err(Status::BUFFER_TOO_SMALL)
+            Err(Error::BUFFER_TOO_SMALL)
         } else {
             Ok(self.length)
         }
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
     use std::string::String;
 
-    fn text(size: usize, write: impl FnOnce(&mut TextWriter)) -> (Result<usize, Status>, String) {
+    fn text(size: usize, write: impl FnOnce(&mut TextWriter)) -> (Result<usize, Error>, String) {
         let mut buffer = std::vec![0xEE; size];
         let mut line = TextWriter::new(&mut buffer);
         write(&mut line);
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn text_that_does_not_fit_is_cut_and_still_ends_with_zero() {
         assert_eq!(text(4, |line| line.put("abc")), (Ok(3), "abc".into()));
-        let short = Err(Status::BUFFER_TOO_SMALL);
+        let short = Err(Error::BUFFER_TOO_SMALL);
         assert_eq!(text(3, |line| line.put("abc")), (short, "ab".into()));
         assert_eq!(text(1, |line| line.put("abc")), (short, "".into()));
         assert_eq!(text(0, |_| ()), (short, "".into()));

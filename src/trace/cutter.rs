@@ -2,7 +2,7 @@
 
 use super::record::{Direction, Observer, Record};
 use crate::bytes::move_items;
-use crate::error::Status;
+use crate::error::{Error, Status};
 use crate::frame::ascii::Decoded;
 use crate::frame::{ascii, rtu, Framing};
 use crate::packet::{length, PduKind};
@@ -51,7 +51,7 @@ impl Rules {
         kind: PduKind,
         bytes: &[u8],
         observer: &impl Observer,
-    ) -> Result<Length, Status> {
+    ) -> Result<Length, Error> {
         let code = length::function(self.framing, bytes);
         let declaration = code.and_then(|code| observer.declaration(code));
         length::expected(self.framing, kind, bytes, self.end, declaration.as_slice())

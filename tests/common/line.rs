@@ -131,6 +131,7 @@ impl Line {
         let server = &mut self.server;
         self.device
             .with_unit(|unit| server.serve(now, &mut [unit][..]))
+            .into()
     }
 
     /// Polls every `step` microseconds for `time` microseconds; returns the sent frames.

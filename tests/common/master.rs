@@ -1,7 +1,7 @@
 //! A master on a line whose bytes the test chooses.
 
 use mbm::engine::{Buffers, Words};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::frame::checksum::crc16;
 use mbm::master::Master;
 use mbm::pdu::functions;
@@ -88,7 +88,7 @@ impl Call {
     }
 
     /// The request that the call builds, or the status that refuses it.
-    pub fn query(&self) -> Result<MasterRequest, Status> {
+    pub fn query(&self) -> Result<MasterRequest, Error> {
         let [a, b, c, d] = self.words;
         MasterRequest::build(|query| match self.function {
             0x01 => query.set(FunctionSpec::READ_COILS.short(), a, b),
@@ -109,19 +109,35 @@ impl Call {
         })
     }
 
-    pub fn start<P: Port, S: Words>(&self, master: &mut Master<P, S>) -> Status {
+    /// Starts the request, which sends `words`, as many as it says. Words that are missing are 0.
+    pub fn start<P: Port, S: Words>(
+        &self,
+        master: &mut Master<P, S>,
+        words: &[u16],
+    ) -> Result<(), Error> {
         let [a, b, c, d] = self.words;
+        let words = |quantity: u16| -> Vec<u16> {
+            let words = words.iter().copied().chain(std::iter::repeat(0));
+            words.take(quantity.into()).collect()
+        };
+        let bits = |quantity: u16| -> Vec<bool> {
+            let words = words(quantity.div_ceil(16));
+            let bits = words
+                .iter()
+                .flat_map(|word| (0..16).map(move |bit| word >> bit & 1 != 0));
+            bits.take(quantity.into()).collect()
+        };
         match self.function {
             0x01 => master.read_coils(a, b),
             0x02 => master.read_discrete_inputs(a, b),
             0x03 => master.read_holding_registers(a, b),
             0x04 => master.read_input_registers(a, b),
-            0x05 => master.write_single_coil(a, b),
+            0x05 => master.write_single_coil(a, b != 0),
             0x06 => master.write_single_register(a, b),
-            0x0F => master.write_multiple_coils(a, b),
-            0x10 => master.write_multiple_registers(a, b),
+            0x0F => master.write_multiple_coils(a, &bits(b)),
+            0x10 => master.write_multiple_registers(a, &words(b)),
             0x16 => master.mask_write_register(a, b, c),
-            0x17 => master.read_write_multiple_registers(a, b, c, d),
+            0x17 => master.read_write_multiple_registers(a, b, c, &words(d)),
             other => panic!("the master has no function {other:#x}"),
         }
     }
@@ -141,25 +157,21 @@ impl<const SINGLE: bool> TestMaster<SINGLE> {
 
     /// Sends a request that gets no reply; returns the sent bytes.
     pub fn send(&mut self, call: Call, words: &[u16]) -> Vec<u8> {
-        assert_eq!(self.start(call, words), Status::PENDING);
+        assert_eq!(self.start(call, words), Ok(()));
         assert!(self.end().is_failure());
         std::mem::take(&mut self.0.port().sent)
     }
 
     /// Starts a request with `words` to send.
-    pub fn start(&mut self, call: Call, words: &[u16]) -> Status {
-        for (index, word) in words.iter().enumerate() {
-            self.0.set_transmit_word(index, *word);
-        }
-        call.start(&mut self.0)
+    pub fn start(&mut self, call: Call, words: &[u16]) -> Result<(), Error> {
+        call.start(&mut self.0, words)
     }
 
     /// Polls until the active request has ended; returns its status.
     pub fn end(&mut self) -> Status {
         for _ in 0..100_000 {
-            match self.0.poll() {
-                Status::PENDING => {}
-                status => return status,
+            if self.0.poll().is_ready() {
+                return self.0.status();
             }
         }
         panic!("the request does not end");
@@ -168,14 +180,14 @@ impl<const SINGLE: bool> TestMaster<SINGLE> {
     /// Sends a request, delivers `bytes` as in [`Line::deliver`], and returns the status with
     /// which the request ends.
     pub fn request(&mut self, call: Call, bytes: &[u8], piece: usize, step: u32) -> Status {
-        assert_eq!(call.start(&mut self.0), Status::PENDING);
+        assert_eq!(call.start(&mut self.0, &[]), Ok(()));
         self.0.port().deliver(bytes, piece, step);
         self.end()
     }
 
     /// The words that the last request has read.
     pub fn words(&mut self) -> Vec<u16> {
-        (0..self.0.available()).map(|_| self.0.receive()).collect()
+        self.0.response().to_vec()
     }
 }
 

@@ -6,3 +6,5 @@ pub mod device;
 pub mod line;
 #[allow(dead_code)]
 pub mod master;
+#[allow(dead_code)]
+pub mod uart;

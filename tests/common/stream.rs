@@ -50,7 +50,7 @@ pub fn response((wire, unit, address): (u16, u8, u16)) -> Vec<u8> {
 /// Polls once as C does: until no further request has ended.
 pub fn poll(end: &End, client: &mut TcpIp) -> Vec<Task> {
     let mut ended = Vec::new();
-    while let Some(task) = client.poll(end.now(), ended.is_empty()) {
+    while let Some(task) = client.poll(end.now()) {
         ended.push(task);
     }
     ended

@@ -3,7 +3,7 @@
 // Each test file uses only a part of this module.
 #![allow(dead_code)]
 
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::frame::{ascii, Framing};
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
@@ -92,7 +92,7 @@ pub fn right_pdus() -> Vec<Vector> {
 
 /// Reads a PDU and writes it again. Returns the written bytes, or the status that refuses
 /// the PDU.
-pub fn parse_and_emit(direction: Direction, pdu: &[u8]) -> Result<Vec<u8>, Status> {
+pub fn parse_and_emit(direction: Direction, pdu: &[u8]) -> Result<Vec<u8>, Error> {
     let mut buffer = [0; 253];
     let length = match direction {
         Direction::Request => Request::parse(pdu)?.emit(&mut buffer),

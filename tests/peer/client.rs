@@ -87,7 +87,7 @@ impl<L: Transport<Task>> Requester<L> {
         let until = Instant::now() + PEER_TIMEOUT;
         while Instant::now() < until {
             let now = self.begun.elapsed().as_micros() as u32;
-            if let Some(task) = self.client.poll(now, true) {
+            if let Some(task) = self.client.poll(now) {
                 return task;
             }
             let delay = self.client.poll_delay(now).clamp(50, 1000);

@@ -25,7 +25,7 @@ mod server;
 #[ignore = "run `make test`, or `make venv build/plain/serve` and `cargo test --features pymodbus`"]
 fn the_tests_against_pymodbus_are_off() {}
 
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::frame::{ascii, Adu, Framing};
 
 /// The unit and the transaction identifier of every frame.
@@ -40,7 +40,7 @@ const FRAMINGS: [(Framing, &str); 3] = [
 ];
 
 /// The frame of the PDU that `pdu` writes.
-fn frame(framing: Framing, pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>) -> Vec<u8> {
+fn frame(framing: Framing, pdu: impl FnOnce(&mut [u8]) -> Result<usize, Error>) -> Vec<u8> {
     let mut buffer = [0; 600];
     let length = framing
         .emit(&mut buffer, TRANSACTION, UNIT, ascii::END, pdu)

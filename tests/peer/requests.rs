@@ -290,7 +290,7 @@ fn reserved_sub_functions_are_refused_though_pymodbus_has_them() {
             let mut sent = from_hex(&query(&format!("call {name} {call}")));
             let adu = open(framing, &mut sent);
             let read = Request::parse(adu.pdu);
-            assert_eq!(read, Err(mbm::error::Status::ILLEGAL_FUNCTION));
+            assert_eq!(read, Err(mbm::error::Error::ILLEGAL_FUNCTION));
         }
     }
 }
@@ -302,6 +302,6 @@ fn a_delimiter_in_the_low_byte_is_refused_though_pymodbus_sends_it_there() {
         let mut sent = from_hex(&query(&format!("call {name} {call}")));
         let adu = open(framing, &mut sent);
         let read = Request::parse(adu.pdu);
-        assert_eq!(read, Err(mbm::error::Status::ILLEGAL_DATA_VALUE));
+        assert_eq!(read, Err(mbm::error::Error::ILLEGAL_DATA_VALUE));
     }
 }

@@ -311,6 +311,6 @@ fn a_response_to_force_listen_only_is_malformed_though_pymodbus_sends_one() {
         )));
         let adu = open(framing, &mut sent);
         let read = Response::parse(adu.pdu);
-        assert_eq!(read, Err(mbm::error::Status::MALFORMED_REPLY));
+        assert_eq!(read, Err(mbm::error::Error::MALFORMED_REPLY));
     }
 }

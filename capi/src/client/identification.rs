@@ -8,7 +8,7 @@ use crate::packet::mbm_object;
 use core::ffi::c_void;
 use core::ptr::null_mut;
 use core::slice::from_raw_parts;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::packet::groups;
 use mbm::pdu::identification::IdentificationReply;
 use mbm::pdu::identification_stream::{Next, ObjectStream};
@@ -131,7 +131,7 @@ unsafe fn stream(identification: *mut mbm_identification) -> *mut ObjectStream {
 ///
 /// # Safety
 /// `identification` points to an identification whose request has a reply of `length` bytes.
-unsafe fn accept(identification: *mut mbm_identification, length: u8) -> Result<Next, Status> {
+unsafe fn accept(identification: *mut mbm_identification, length: u8) -> Result<Next, Error> {
     // SAFETY: as the caller promises; nothing else uses the reply during this call.
     unsafe {
         let bytes = from_raw_parts((*identification).request.reply.cast(), length.into());

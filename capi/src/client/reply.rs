@@ -4,22 +4,22 @@ use super::request::{mbm_clientRequest, RequestPtr};
 use crate::packet::{mbm_packet, MBM_PACKET_RESPONSE};
 use crate::pointers::{buffer, overlap, put};
 use mbm::client::ClientRequest as _;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::pdu::custom::{Function, Rule};
 use mbm::pdu::response::Response;
 
 /// Writes the PDU of the reply to `pdu`, and returns its fields.
-fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Status> {
+fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Error> {
     let state = request.state();
     let header = &state.header;
     let function = header.function();
     let length = match state.status {
-        Status::OK if function == 0 || !state.has_reply() => return Err(Status::INVALID_ARGUMENT),
+        Status::OK if function == 0 || !state.has_reply() => return Err(Error::INVALID_ARGUMENT),
         Status::OK if header.has_data() && !request.wants_data() => {
-            return Err(Status::BUFFER_TOO_SMALL);
+            return Err(Error::BUFFER_TOO_SMALL);
         }
         Status::OK if header.repeats_data() && !request.has_data() => {
-            return Err(Status::INVALID_ARGUMENT);
+            return Err(Error::INVALID_ARGUMENT);
         }
         Status::OK => {
             let received = |index| request.received_byte(index);
@@ -27,11 +27,14 @@ fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Status> 
             header.restore_response(pdu, state.length, received, sent)?
         }
         status if status.is_exception() && status.code() == state.exception => {
-            let place = pdu.first_chunk_mut().ok_or(Status::BUFFER_TOO_SMALL)?;
+            let place = pdu.first_chunk_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
             *place = header.exception_pdu(state.exception);
             place.len()
         }
-        status => return Err(status),
+        status => {
+            status.result()?;
+            0
+        }
     };
     let pdu = pdu.get(..length).unwrap_or_default();
     let mut packet = mbm_packet::of(MBM_PACKET_RESPONSE, pdu);
@@ -89,12 +92,12 @@ pub unsafe extern "C" fn mbm_client_reply(
     unsafe {
         let made = || {
             let request = RequestPtr::new(request.cast_mut());
-            let request = request.ok_or(Status::INVALID_ARGUMENT)?;
+            let request = request.ok_or(Error::INVALID_ARGUMENT)?;
             if request.lies_in(|bytes, length| overlap(bytes, length, pdu, capacity)) {
-                return Err(Status::INVALID_ARGUMENT);
+                return Err(Error::INVALID_ARGUMENT);
             }
             let place = buffer(pdu, capacity).filter(|_| !packet.is_null());
-            packet_of(request, place.ok_or(Status::INVALID_ARGUMENT)?)
+            packet_of(request, place.ok_or(Error::INVALID_ARGUMENT)?)
         };
         match made() {
             Ok(made) => put(packet, made),

@@ -2,7 +2,7 @@
 
 use super::{mbm_packet, MBM_PACKET_EXCEPTION, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
 use crate::functions::*;
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::packet::refusal::Head;
 use mbm::pdu::files::{Reads, Records, Writes};
 use mbm::pdu::functions;
@@ -54,10 +54,10 @@ impl mbm_packet {
     }
 
     /// The transaction, the unit and the function code, if the unit is one.
-    pub(crate) fn head(&self) -> Result<Head, Status> {
+    pub(crate) fn head(&self) -> Result<Head, Error> {
         Ok(Head {
             transaction: self.transaction,
-            unit: self.unit.try_into().or(Err(Status::INVALID_ARGUMENT))?,
+            unit: self.unit.try_into().or(Err(Error::INVALID_ARGUMENT))?,
             function: self.function,
         })
     }
@@ -234,7 +234,7 @@ impl mbm_packet {
     }
 
     /// The request that the fields describe, with `data` as its data.
-    pub(crate) fn request<'a>(&self, data: &'a [u8]) -> Result<Request<'a>, Status> {
+    pub(crate) fn request<'a>(&self, data: &'a [u8]) -> Result<Request<'a>, Error> {
         let (function, address, quantity) = (self.function, self.address, self.quantity);
         Ok(match function {
             functions::READ_COILS | functions::READ_DISCRETE_INPUTS => Request::ReadBits {
@@ -302,11 +302,11 @@ impl mbm_packet {
     }
 
     /// The response or exception that the fields describe, with `data` as its data.
-    pub(crate) fn response<'a>(&self, data: &'a [u8]) -> Result<Response<'a>, Status> {
+    pub(crate) fn response<'a>(&self, data: &'a [u8]) -> Result<Response<'a>, Error> {
         let (function, address, quantity) = (self.function, self.address, self.quantity);
         match self.kind {
             MBM_PACKET_EXCEPTION if function & EXCEPTION != 0 => {
-                return Err(Status::INVALID_FUNCTION)
+                return Err(Error::INVALID_FUNCTION)
             }
             MBM_PACKET_EXCEPTION => {
                 return Ok(Response::Exception {
@@ -315,9 +315,9 @@ impl mbm_packet {
                 })
             }
             MBM_PACKET_RESPONSE => {}
-            _ => return Err(Status::INVALID_ARGUMENT),
+            _ => return Err(Error::INVALID_ARGUMENT),
         }
-        let malformed = |_| Status::MALFORMED_REPLY;
+        let malformed = |_| Error::MALFORMED_REPLY;
         Ok(match function {
             functions::READ_COILS | functions::READ_DISCRETE_INPUTS => {
                 Response::ReadBits { function, data }

@@ -3,7 +3,7 @@
 use super::{mbm_packet, side, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
 use crate::functions::MBM_MEI_READ_DEVICE_IDENTIFICATION;
 use crate::pointers::{array_or_empty, buffer, get, overlap, put};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::packet::groups;
 use mbm::pdu::files::Record;
 use mbm::pdu::functions;
@@ -144,9 +144,9 @@ unsafe fn add(
     storage: *mut u8,
     capacity: u16,
     (data, length): (*const u8, u16),
-    write: impl FnOnce(&mut mbm_packet, &[u8], &mut [u8]) -> Result<usize, Status>,
-) -> Result<(), Status> {
-    let refused = Status::INVALID_ARGUMENT;
+    write: impl FnOnce(&mut mbm_packet, &[u8], &mut [u8]) -> Result<usize, Error>,
+) -> Result<(), Error> {
+    let refused = Error::INVALID_ARGUMENT;
     // SAFETY: as the caller promises; data and storage do not overlap.
     unsafe {
         let mut extended = get(packet).ok_or(refused)?;
@@ -204,7 +204,7 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
         groups::put_record(side(packet.kind)?, packet.function, head, data, space)
     };
     let done = add(packet, storage, capacity, (added.data, bytes), write);
-    done.err().unwrap_or(Status::OK).code()
+    Status::from(done).code()
 }
 
 /// Adds an object to the data of a response of function 2B/0E (hex) that you are going to
@@ -231,13 +231,13 @@ pub unsafe extern "C" fn mbm_packet_addObject(
     };
     let write = |packet: &mut mbm_packet, value: &[u8], space: &mut [u8]| {
         if !packet.has_objects() {
-            return Err(Status::ILLEGAL_FUNCTION);
+            return Err(Error::ILLEGAL_FUNCTION);
         }
         let count = packet.objectCount.checked_add(1);
-        packet.objectCount = count.ok_or(Status::BUFFER_TOO_SMALL)?;
+        packet.objectCount = count.ok_or(Error::BUFFER_TOO_SMALL)?;
         groups::put_object(added.id, value, space)
     };
     let value = (added.data, added.length.into());
     let done = add(packet, storage, capacity, value, write);
-    done.err().unwrap_or(Status::OK).code()
+    Status::from(done).code()
 }

@@ -8,7 +8,7 @@ pub use groups::*;
 
 use super::functions::{declared, mbm_function};
 use super::pointers::{array_or_empty, overlap, put};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::packet::{self, PduKind};
 use mbm::pdu::custom::Function;
 use mbm::pdu::length::Length;
@@ -162,11 +162,11 @@ pub struct mbm_packet {
 }
 
 /// The kind of PDU for a number of C.
-pub(super) fn side(kind: u8) -> Result<PduKind, Status> {
+pub(super) fn side(kind: u8) -> Result<PduKind, Error> {
     match kind {
         MBM_PACKET_REQUEST => Ok(PduKind::Request),
         MBM_PACKET_RESPONSE => Ok(PduKind::Response),
-        _ => Err(Status::INVALID_ARGUMENT),
+        _ => Err(Error::INVALID_ARGUMENT),
     }
 }
 
@@ -175,10 +175,10 @@ impl mbm_packet {
     ///
     /// # Safety
     /// `data` is NULL or points to `dataLength` bytes.
-    pub(super) unsafe fn data<'a>(&self) -> Result<&'a [u8], Status> {
+    pub(super) unsafe fn data<'a>(&self) -> Result<&'a [u8], Error> {
         // SAFETY: as the caller promises.
         let data = unsafe { array_or_empty(self.data, self.dataLength.into()) };
-        data.ok_or(Status::INVALID_ARGUMENT)
+        data.ok_or(Error::INVALID_ARGUMENT)
     }
 
     /// True if the data overlap a buffer that is to be written.
@@ -192,7 +192,7 @@ impl mbm_packet {
         data: &[u8],
         functions: &[Function],
         place: &mut [u8],
-    ) -> Result<usize, Status> {
+    ) -> Result<usize, Error> {
         match self.kind {
             MBM_PACKET_REQUEST => packet::emit_request(&self.request(data)?, functions, place),
             _ => packet::emit_response(&self.response(data)?, functions, place),
@@ -205,7 +205,7 @@ impl mbm_packet {
         side: PduKind,
         pdu: &[u8],
         functions: &[Function],
-    ) -> Result<(), Status> {
+    ) -> Result<(), Error> {
         match side {
             PduKind::Request => self.take_request(&Request::parse_with(pdu, functions)?),
             PduKind::Response => self.take_response(&Response::parse_with(pdu, functions)?),
@@ -222,10 +222,10 @@ pub(super) unsafe fn own(
     functions: *const mbm_function,
     count: u8,
     code: Option<u8>,
-) -> Result<Option<Function>, Status> {
+) -> Result<Option<Function>, Error> {
     // SAFETY: as the caller promises.
     let functions = unsafe { array_or_empty(functions, count.into()) };
-    declared(functions.ok_or(Status::INVALID_ARGUMENT)?, code)
+    declared(functions.ok_or(Error::INVALID_ARGUMENT)?, code)
 }
 
 /// Measures the reply to a request. Fails for a request that cannot be built.
@@ -236,9 +236,9 @@ pub(super) unsafe fn reply_length(
     packet: &mbm_packet,
     functions: &[Function],
     measure: impl FnOnce(&Request) -> Length,
-) -> Result<Length, Status> {
+) -> Result<Length, Error> {
     if packet.kind != MBM_PACKET_REQUEST {
-        return Err(Status::INVALID_ARGUMENT);
+        return Err(Error::INVALID_ARGUMENT);
     }
     // SAFETY: as the caller promises.
     let request = packet.request(unsafe { packet.data() }?)?;
@@ -251,7 +251,7 @@ pub(super) unsafe fn reply_length(
 ///
 /// # Safety
 /// As for [`put`].
-pub(super) unsafe fn put_expected(place: *mut mbm_length, length: Result<Length, Status>) -> u8 {
+pub(super) unsafe fn put_expected(place: *mut mbm_length, length: Result<Length, Error>) -> u8 {
     let known = match length {
         Ok(length) => length,
         Err(_) => Length::Unknown,

@@ -9,7 +9,7 @@ use core::mem::MaybeUninit;
 use core::slice::from_raw_parts;
 #[cfg(target_arch = "avr")]
 use mbm::data::value::{ShortDouble, Value as _};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::plan::value::{place, Words};
 use mbm::plan::{schedule, Field, Position, Read};
 
@@ -92,7 +92,7 @@ unsafe fn find_words(
         }
         let (first, before) = match place(field, read.address, index) {
             Ok(place) => place,
-            Err(refused) => return refused,
+            Err(refused) => return refused.status(),
         };
         let data = (*object).setup().data.add((read.offset + first).into());
         words.write(Words {
@@ -114,17 +114,16 @@ unsafe fn get<T>(
     field: u16,
     index: u16,
     place: *mut T,
-    find: impl FnOnce(&Words) -> Result<T, Status>,
+    find: impl FnOnce(&Words) -> Result<T, Error>,
 ) -> u8 {
     // SAFETY: as the caller promises.
     unsafe {
         let mut words = MaybeUninit::uninit();
-        let result =
-            pointers::put_result(place, || match find_words(plan, field, index, &mut words) {
-                Status::OK => find(words.assume_init_ref()),
-                refused => Err(refused),
-            });
-        result.err().unwrap_or(Status::OK).code()
+        let result = pointers::put_result(place, || {
+            find_words(plan, field, index, &mut words).result()?;
+            find(words.assume_init_ref())
+        });
+        Status::from(result).code()
     }
 }
 
@@ -267,7 +266,7 @@ pub unsafe extern "C" fn mbm_plan_getText(
 ) -> u8 {
     let copy = |words: &Words| {
         let text = slice_mut::<u8>(text.cast(), capacity.into())?;
-        let (end, place) = text.split_last_mut().ok_or(Status::BUFFER_TOO_SMALL)?;
+        let (end, place) = text.split_last_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
         let count = words.text(place)?;
         *place.get_mut(count).unwrap_or(end) = 0;
         Ok(())
@@ -279,10 +278,7 @@ pub unsafe extern "C" fn mbm_plan_getText(
     unsafe {
         let mut words = MaybeUninit::uninit();
         match find_words(plan, field, 0, &mut words) {
-            Status::OK => copy(words.assume_init_ref())
-                .err()
-                .unwrap_or(Status::OK)
-                .code(),
+            Status::OK => Status::from(copy(words.assume_init_ref())).code(),
             refused => refused.code(),
         }
     }
@@ -303,7 +299,7 @@ pub unsafe extern "C" fn mbm_plan_getRegisters(
 ) -> u8 {
     get(plan, field, 0, registers, |words| {
         if words.field.is_in_bits() {
-            return Err(Status::INVALID_ARGUMENT);
+            return Err(Error::INVALID_ARGUMENT);
         }
         Ok(mbm_registers {
             data: words.words.as_ptr().cast(),
@@ -353,12 +349,10 @@ pub unsafe extern "C" fn mbm_plan_getRead(
     let find = || {
         // SAFETY: as the header demands.
         let own = unsafe {
-            match pointers::check(plan) {
-                Status::OK => (*pointers::object(plan)).reads().get(usize::from(index)),
-                refused => return Err(refused),
-            }
+            pointers::check(plan).result()?;
+            (*pointers::object(plan)).reads().get(usize::from(index))
         };
-        let own = own.ok_or(Status::INVALID_ARGUMENT)?;
+        let own = own.ok_or(Error::INVALID_ARGUMENT)?;
         Ok(mbm_planReadInfo {
             intervalMs: own.interval_ms,
             address: own.address,
@@ -369,5 +363,5 @@ pub unsafe extern "C" fn mbm_plan_getRead(
         })
     };
     let found = pointers::put_result(read, find);
-    found.err().unwrap_or(Status::OK).code()
+    Status::from(found).code()
 }

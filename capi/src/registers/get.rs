@@ -6,7 +6,7 @@ use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
 use mbm::data::value::{ShortDouble, Value};
 use mbm::data::view::Registers;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 
 /// Writes the value that `find` returns to `value`.
 ///
@@ -15,7 +15,7 @@ use mbm::error::Status;
 unsafe fn get_value<T>(
     registers: *const mbm_registers,
     value: *mut T,
-    find: impl FnOnce(&Registers<BorrowedRegisters>) -> Result<T, Status>,
+    find: impl FnOnce(&Registers<BorrowedRegisters>) -> Result<T, Error>,
 ) -> u8 {
     // SAFETY: as the caller promises.
     code(unsafe {
@@ -203,7 +203,7 @@ pub unsafe extern "C" fn mbm_registers_getString(
     code(unsafe {
         view(registers, order, false).and_then(|registers| {
             let text = slice_mut::<u8>(text.cast(), capacity.into())?;
-            let (end, place) = text.split_last_mut().ok_or(Status::BUFFER_TOO_SMALL)?;
+            let (end, place) = text.split_last_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
             let count = registers.text(address, length.into(), place)?.len();
             *place.get_mut(count).unwrap_or(end) = 0;
             Ok(())

@@ -11,7 +11,7 @@ use super::pointers;
 use core::ffi::c_void;
 use mbm::data::order::Order;
 use mbm::data::view::{RegisterBytes, RegisterBytesMut, Registers};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 
 /// Passed to a function: use the order of the mbm_registers. As that order itself:
 /// MBM_ORDER_ABCD.
@@ -61,19 +61,19 @@ pub struct mbm_registers {
 }
 
 /// The order that a call names; `default` for MBM_ORDER_DEFAULT.
-pub(super) fn order(code: u8, default: Order) -> Result<Order, Status> {
+pub(super) fn order(code: u8, default: Order) -> Result<Order, Error> {
     match code {
         MBM_ORDER_DEFAULT => Ok(default),
         MBM_ORDER_ABCD => Ok(Order::Abcd),
         MBM_ORDER_CDAB => Ok(Order::Cdab),
         MBM_ORDER_BADC => Ok(Order::Badc),
         MBM_ORDER_DCBA => Ok(Order::Dcba),
-        _ => Err(Status::INVALID_ARGUMENT),
+        _ => Err(Error::INVALID_ARGUMENT),
     }
 }
 
-fn code(result: Result<(), Status>) -> u8 {
-    result.err().unwrap_or(Status::OK).code()
+fn code(result: Result<(), Error>) -> u8 {
+    Status::from(result).code()
 }
 
 /// The registers of an `mbm_registers`, as bytes in the order of the wire.
@@ -116,18 +116,18 @@ unsafe fn view(
     registers: *const mbm_registers,
     call_order: u8,
     to_write: bool,
-) -> Result<Registers<BorrowedRegisters>, Status> {
+) -> Result<Registers<BorrowedRegisters>, Error> {
     // SAFETY: as the caller promises.
-    let fields = unsafe { pointers::get(registers) }.ok_or(Status::INVALID_ARGUMENT)?;
+    let fields = unsafe { pointers::get(registers) }.ok_or(Error::INVALID_ARGUMENT)?;
     if fields.data.is_null() {
-        return Err(Status::NOT_INITIALISED);
+        return Err(Error::NOT_INITIALISED);
     }
     let words = match fields.kind {
         MBM_REGISTERS_INTO_WORDS => true,
         MBM_REGISTERS_INTO_BYTES => false,
         MBM_REGISTERS_OF_WORDS if !to_write => true,
         MBM_REGISTERS_OF_BYTES if !to_write => false,
-        _ => return Err(Status::INVALID_ARGUMENT),
+        _ => return Err(Error::INVALID_ARGUMENT),
     };
     let default = order(fields.order, Order::Abcd)?;
     let cells = BorrowedRegisters {

@@ -9,7 +9,7 @@ use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
 use mbm::data::value::{ShortDouble, Value};
 use mbm::data::view::Registers;
-use mbm::error::Status;
+use mbm::error::Error;
 
 /// Runs `action` on registers that may be written.
 ///
@@ -18,7 +18,7 @@ use mbm::error::Status;
 unsafe fn with(
     registers: *const mbm_registers,
     order: u8,
-    action: impl FnOnce(&mut Registers<BorrowedRegisters>) -> Result<(), Status>,
+    action: impl FnOnce(&mut Registers<BorrowedRegisters>) -> Result<(), Error>,
 ) -> u8 {
     // SAFETY: as the caller promises.
     code(unsafe { view(registers, order, true) }.and_then(|mut registers| action(&mut registers)))
@@ -164,7 +164,7 @@ pub unsafe extern "C" fn mbm_registers_setDouble(
                 bytes.reverse();
                 set(registers, address, order, bytes.as_ptr(), 8)
             }
-            None => Status::INVALID_ARGUMENT.code(),
+            None => Error::INVALID_ARGUMENT.code(),
         }
     }
 }

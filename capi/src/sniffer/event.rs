@@ -4,7 +4,7 @@ use crate::packet::{mbm_packet, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
 use crate::pointers::{array_or_empty, get};
 use crate::text::{line, outcome};
 use core::ffi::c_char;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::packet::PduKind;
 use mbm::pdu::custom::Function;
 use mbm::sniffer::{Event, EventKind, RequestStart};
@@ -146,7 +146,7 @@ impl mbm_event {
     ///
     /// # Safety
     /// `frame` and `pdu` are NULL or point to as many bytes as their lengths say.
-    unsafe fn core_event<'a>(&self) -> Result<Event<'a>, Status> {
+    unsafe fn core_event<'a>(&self) -> Result<Event<'a>, Error> {
         // SAFETY: as the caller promises.
         let (frame, pdu) = unsafe {
             (
@@ -159,15 +159,15 @@ impl mbm_event {
             .map(RequestStart::new)
             .filter(|_| self.requestHeadLength > 0);
         Ok(Event {
-            kind: EventKind::from_code(self.kind).ok_or(Status::INVALID_ARGUMENT)?,
+            kind: EventKind::from_code(self.kind).ok_or(Error::INVALID_ARGUMENT)?,
             status: Status::from_code(self.status),
             time: self.timeUs,
             response_time: self.responseTimeUs,
             transaction: self.packet.transaction,
             unit: self.unit,
             function: self.function,
-            frame: frame.ok_or(Status::INVALID_ARGUMENT)?,
-            pdu: pdu.ok_or(Status::INVALID_ARGUMENT)?,
+            frame: frame.ok_or(Error::INVALID_ARGUMENT)?,
+            pdu: pdu.ok_or(Error::INVALID_ARGUMENT)?,
             length: self.length.into(),
             asked,
         })
@@ -192,7 +192,7 @@ pub unsafe extern "C" fn mbm_event_text(
 ) -> u8 {
     let write = || {
         let mut line = line(text, size)?;
-        let event = get(event).ok_or(Status::INVALID_ARGUMENT)?;
+        let event = get(event).ok_or(Error::INVALID_ARGUMENT)?;
         event.core_event()?.text(&mut line);
         Ok(line)
     };

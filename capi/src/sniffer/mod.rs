@@ -8,7 +8,7 @@ use crate::framing::is_delimiter;
 use crate::functions::{declared, mbm_function};
 use crate::pointers::{self, array_or_empty, buffer, put, read, CObject, BEGUN};
 use core::ffi::c_void;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::frame::Framing;
 use mbm::pdu::custom::{Function, Rule};
 use mbm::sniffer::{BusDirection, Sniffer, MIN_BUFFER};
@@ -103,14 +103,14 @@ const NO_FUNCTION: Function = Function {
 };
 
 /// Converts the declarations of C to those of the core.
-fn convert(functions: &[mbm_function]) -> Result<[Function; FUNCTIONS], Status> {
+fn convert(functions: &[mbm_function]) -> Result<[Function; FUNCTIONS], Error> {
     let mut converted = [NO_FUNCTION; FUNCTIONS];
     if functions.len() > FUNCTIONS {
-        return Err(Status::INVALID_ARGUMENT);
+        return Err(Error::INVALID_ARGUMENT);
     }
     for (place, function) in converted.iter_mut().zip(functions) {
         let declaration = declared(core::slice::from_ref(function), Some(function.code))?;
-        *place = declaration.ok_or(Status::INVALID_ARGUMENT)?;
+        *place = declaration.ok_or(Error::INVALID_ARGUMENT)?;
     }
     Ok(converted)
 }

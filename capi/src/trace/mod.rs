@@ -14,7 +14,7 @@ use crate::port::{countable, mbm_port, PortRef};
 use core::ffi::c_void;
 use core::ptr::null;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::frame::Framing;
 use mbm::packet::PduKind;
 use mbm::port::Port;
@@ -103,16 +103,16 @@ unsafe impl CObject for mbm_trace {
 unsafe fn with_core<T>(
     trace: *mut mbm_trace,
     action: impl FnOnce(&mut Core) -> T,
-) -> Result<T, Status> {
+) -> Result<T, Error> {
     // SAFETY: as the caller promises. Nothing else makes a reference to the core of a marked
     // object.
     unsafe {
-        match check(trace) {
-            Status::OK => {
+        match check(trace).result() {
+            Ok(()) => {
                 let core = object(trace);
                 Ok(with_hooks(trace, || action(&mut *core)))
             }
-            refused => Err(refused),
+            Err(refused) => Err(refused),
         }
     }
 }
@@ -151,8 +151,8 @@ unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) 
 }
 
 /// What the port of a trace returns that must not be used now.
-fn unusable(status: Status) -> i16 {
-    if status == Status::BUSY {
+fn unusable(error: Error) -> i16 {
+    if error == Error::BUSY {
         0
     } else {
         -1
@@ -214,20 +214,20 @@ unsafe fn begin(
     size: u16,
     hook: TraceHook,
     context: *mut c_void,
-) -> Result<(), Status> {
+) -> Result<(), Error> {
     let (described, kind) = described(framing)?;
     let port = get(port).filter(mbm_port::is_complete);
-    let port = port.ok_or(Status::INVALID_ARGUMENT)?;
+    let port = port.ok_or(Error::INVALID_ARGUMENT)?;
     // A trace that passes its own bytes on to itself would never end.
     let is_own = port.context == trace.cast();
     if trace.is_null() || buffer.is_null() || hook.is_none() || is_own {
-        return Err(Status::INVALID_ARGUMENT);
+        return Err(Error::INVALID_ARGUMENT);
     }
     if size < MBM_MIN_TRACE_BUFFER {
-        return Err(Status::BUFFER_TOO_SMALL);
+        return Err(Error::BUFFER_TOO_SMALL);
     }
     if mbm_trace::mark(trace).read() == IN_HOOK {
-        return Err(Status::BUSY);
+        return Err(Error::BUSY);
     }
     let observer = CObserver {
         hook,
@@ -264,23 +264,23 @@ unsafe fn begin(
 ///
 /// # Safety
 /// `framing` is NULL or points to a description whose declarations are valid.
-unsafe fn described(framing: *const mbm_framing) -> Result<(mbm_framing, Framing), Status> {
+unsafe fn described(framing: *const mbm_framing) -> Result<(mbm_framing, Framing), Error> {
     // SAFETY: as the caller promises.
     let (described, functions) = unsafe {
-        let described = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
+        let described = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
         let count = described.functionCount;
         (described, array_or_empty(described.functions, count.into()))
     };
-    declared(functions.ok_or(Status::INVALID_ARGUMENT)?, None)?;
+    declared(functions.ok_or(Error::INVALID_ARGUMENT)?, None)?;
     if !is_delimiter(described.end()) {
-        return Err(Status::INVALID_ARGUMENT);
+        return Err(Error::INVALID_ARGUMENT);
     }
     Ok((described, described.of_frames()?))
 }
 
 /// The code of a result.
-fn code(result: Result<(), Status>) -> u8 {
-    result.err().unwrap_or(Status::OK).code()
+fn code(result: Result<(), Error>) -> u8 {
+    Status::from(result).code()
 }
 
 /// Begins the trace of a line or client. Then begin that line or client with

@@ -6,7 +6,7 @@ use crate::client::queue::RequestQueue;
 use crate::client::request::{data_of, is_answer, store_response, ClientRequest};
 use crate::client::storage::ClientStorage;
 use crate::engine::Counter;
-use crate::error::Status;
+use crate::error::{Error, Status};
 use crate::frame::tcp::{self, Header};
 use crate::port::Port;
 
@@ -58,7 +58,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             let rest = self.storage.bytes(self.start, self.end - self.start);
             let header = match tcp::header(rest) {
                 Ok(header) => header,
-                Err(Status::INCOMPLETE_FRAME) => return None,
+                Err(Error::INCOMPLETE_FRAME) => return None,
                 Err(_) => {
                     self.skip_byte();
                     continue;

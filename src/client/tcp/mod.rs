@@ -9,7 +9,7 @@ use super::storage::ClientStorage;
 use super::transport::Transport;
 use crate::bytes::move_to_front;
 use crate::engine::{Counter, Settings};
-use crate::error::Status;
+use crate::error::{Error, Status};
 use crate::frame::tcp;
 use crate::port::Port;
 
@@ -246,7 +246,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         };
         let length = match write_frame(request, space, self.next) {
             Ok(length) => length,
-            Err(refused) if begin == 0 => return refused,
+            Err(refused) if begin == 0 => return refused.status(),
             Err(_) if stuck => return Status::LINE_BUSY,
             Err(_) => return Status::BUSY,
         };
@@ -372,16 +372,12 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
 }
 
 /// Writes the frame of any request to the start of `place`, and returns its length.
-fn write_frame<J: ClientRequest>(
-    request: &J,
-    place: &mut [u8],
-    wire: u16,
-) -> Result<usize, Status> {
+fn write_frame<J: ClientRequest>(request: &J, place: &mut [u8], wire: u16) -> Result<usize, Error> {
     let state = request.state();
     let header = &state.header;
     tcp::emit(place, wire, state.unit(), |pdu| {
         let length = usize::from(header.request_length());
-        let pdu = pdu.get_mut(..length).ok_or(Status::BUFFER_TOO_SMALL)?;
+        let pdu = pdu.get_mut(..length).ok_or(Error::BUFFER_TOO_SMALL)?;
         header.emit(pdu, data_of(request));
         Ok(length)
     })

@@ -5,7 +5,7 @@ use super::super::functions::ENCAPSULATED_INTERFACE_TRANSPORT;
 use super::super::functions::REPEATS_DATA;
 use super::super::EXCEPTION;
 use super::RequestHeader;
-use crate::error::Status;
+use crate::error::Error;
 
 /// The longest part of a response before its data: that of 18.
 const BEFORE_DATA: usize = 5;
@@ -37,14 +37,14 @@ impl RequestHeader {
     /// also if the device counted fewer bytes.
     ///
     /// # Errors
-    /// [`Status::BUFFER_TOO_SMALL`] if it does not fit.
+    /// [`Error::BUFFER_TOO_SMALL`] if it does not fit.
     pub fn restore_response(
         &self,
         pdu: &mut [u8],
         stored: u8,
         received: impl Fn(usize) -> u8,
         sent: impl Fn(usize) -> u8,
-    ) -> Result<usize, Status> {
+    ) -> Result<usize, Error> {
         let at = usize::from(self.data_at());
         let length = if self.has_data() {
             at + usize::from(stored)
@@ -53,7 +53,7 @@ impl RequestHeader {
         } else {
             self.repeated.into()
         };
-        let place = pdu.get_mut(..length).ok_or(Status::BUFFER_TOO_SMALL)?;
+        let place = pdu.get_mut(..length).ok_or(Error::BUFFER_TOO_SMALL)?;
         let before = self.before_data(stored);
         for (index, byte) in place.iter_mut().enumerate() {
             *byte = if !self.has_data() {

@@ -1,7 +1,7 @@
 //! Reads a register of unit 17, over a port with a simulated device on its line.
 
 use mbm::engine::Buffers;
-use mbm::error::Status;
+use mbm::error::Error;
 use mbm::master::Master;
 use mbm::port::Port;
 
@@ -38,12 +38,12 @@ impl Port for Line {
     }
 }
 
-fn main() {
+fn main() -> Result<(), Error> {
     let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
     let mut master = Master::new(17, Line::default(), buffers);
     master.settings().set_baud_rate(19200);
-    assert_eq!(master.read_holding_registers(2, 1), Status::PENDING);
-    while master.poll() == Status::PENDING {}
-    assert_eq!(master.status(), Status::OK);
-    println!("register 2: {:#06x}", master.response_word(0));
+    master.read_holding_registers(2, 1)?;
+    master.wait(|| {})?;
+    println!("register 2: {:#06x}", master.response()[0]);
+    Ok(())
 }

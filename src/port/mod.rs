@@ -1,5 +1,11 @@
 //! The interface to the UART or socket and to the clock, which the firmware implements.
 
+#[cfg(feature = "embedded-io")]
+mod embedded_io;
+
+#[cfg(feature = "embedded-io")]
+pub use self::embedded_io::EmbeddedIo;
+
 /// A byte stream and a clock. No function may block.
 pub trait Port {
     /// True if a master and a client's line read one byte at a time: that takes less code, 56

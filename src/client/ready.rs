@@ -1,0 +1,344 @@
+//! Ready-made requests, whose data are slices of the program.
+
+use super::request::{ClientRequest, RequestState};
+use crate::data::registers;
+use crate::error::{Error, Status};
+use crate::pdu::functions::{coil_value, FunctionSpec};
+use crate::pdu::header::RequestHeader;
+
+/// The data that a request sends, or the place for those that it receives.
+#[derive(Default, Debug)]
+enum Slice<'a> {
+    #[default]
+    None,
+    Registers(&'a mut [u16]),
+    Coils(&'a mut [bool]),
+    Bytes(&'a mut [u8]),
+}
+
+impl Slice<'_> {
+    /// How many bytes on the wire it can hold.
+    fn capacity(&self) -> u16 {
+        let bytes = match self {
+            Slice::None => 0,
+            Slice::Registers(words) => words.len().saturating_mul(2),
+            Slice::Coils(coils) => coils.len().div_ceil(8),
+            Slice::Bytes(bytes) => bytes.len(),
+        };
+        quantity(bytes)
+    }
+
+    fn byte(&self, index: usize) -> u8 {
+        match self {
+            Slice::None => 0,
+            Slice::Registers(words) => {
+                let [high, low] = words.get(index / 2).copied().unwrap_or(0).to_be_bytes();
+                match index.is_multiple_of(2) {
+                    true => high,
+                    false => low,
+                }
+            }
+            Slice::Coils(coils) => {
+                let coils = coils.chunks(8).nth(index).unwrap_or_default();
+                coils
+                    .iter()
+                    .rev()
+                    .fold(0, |byte, on| byte << 1 | u8::from(*on))
+            }
+            Slice::Bytes(bytes) => bytes.get(index).copied().unwrap_or(0),
+        }
+    }
+
+    fn store(&mut self, data: &[u8], mask: u8) {
+        match self {
+            Slice::None => {}
+            Slice::Registers(words) => registers::take(words, data),
+            Slice::Coils(coils) => {
+                for (coils, byte) in coils.chunks_mut(8).zip(data) {
+                    for (bit, coil) in coils.iter_mut().enumerate() {
+                        *coil = byte >> bit & 1 != 0;
+                    }
+                }
+            }
+            Slice::Bytes(bytes) => {
+                for (place, byte) in bytes.iter_mut().zip(data) {
+                    *place = *byte;
+                }
+                let last = data.len().wrapping_sub(1);
+                if let Some(last) = bytes.get_mut(last) {
+                    *last &= mask;
+                }
+            }
+        }
+    }
+}
+
+/// A number of items. No request has more than 65535, so these are refused too.
+fn quantity(items: usize) -> u16 {
+    items.try_into().unwrap_or(u16::MAX)
+}
+
+/// A request with its data in slices. The client returns it when it has ended, and it can be
+/// queued again.
+///
+/// The slices of a request that writes are mutable too, so that the program can change the values
+/// before it queues the request again.
+#[derive(Debug)]
+pub struct Request<'a> {
+    /// The unit, the timeout and the limit of retries, which you may set, and the outcome.
+    pub state: RequestState,
+    sends: Slice<'a>,
+    takes: Slice<'a>,
+}
+
+impl<'a> Request<'a> {
+    /// A request that a header describes. `sends` has its data in the order of the wire, as many
+    /// bytes as the header says; `takes` is the place for those of the response. For functions that
+    /// have no constructor here.
+    ///
+    /// # Errors
+    /// [`Error::INVALID_ARGUMENT`] if `sends` has another length.
+    pub fn with_header(
+        unit: u8,
+        header: RequestHeader,
+        sends: &'a mut [u8],
+        takes: &'a mut [u8],
+    ) -> Result<Self, Error> {
+        if sends.len() != usize::from(header.data_length()) {
+            return Err(Error::INVALID_ARGUMENT);
+        }
+        let build = |built: &mut RequestHeader| {
+            *built = header;
+            Status::OK
+        };
+        Request::build(unit, Slice::Bytes(sends), Slice::Bytes(takes), build)
+    }
+
+    fn build(
+        unit: u8,
+        sends: Slice<'a>,
+        takes: Slice<'a>,
+        build: impl FnOnce(&mut RequestHeader) -> Status,
+    ) -> Result<Self, Error> {
+        let mut state = RequestState::NONE;
+        state.unit = unit.into();
+        state.capacity = takes.capacity();
+        build(&mut state.header).result()?;
+        Ok(Request {
+            state,
+            sends,
+            takes,
+        })
+    }
+
+    /// A request with two words after the function code, and one slice.
+    fn short(
+        unit: u8,
+        spec: FunctionSpec,
+        (first, second): (u16, u16),
+        sends: Slice<'a>,
+        takes: Slice<'a>,
+    ) -> Result<Self, Error> {
+        Request::build(unit, sends, takes, |header| header.set(spec, first, second))
+    }
+
+    /// 01: reads 1 to 2000 coils, as many as `coils` has.
+    ///
+    /// # Errors
+    /// Of this and the other constructors: [`Error::ILLEGAL_DATA_VALUE`] for a quantity that the
+    /// standard does not allow; [`Error::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535.
+    pub fn read_coils(unit: u8, address: u16, coils: &'a mut [bool]) -> Result<Self, Error> {
+        let words = (address, quantity(coils.len()));
+        let spec = FunctionSpec::READ_COILS;
+        Request::short(unit, spec, words, Slice::None, Slice::Coils(coils))
+    }
+
+    /// 02: reads 1 to 2000 discrete inputs, as many as `inputs` has.
+    ///
+    /// # Errors
+    /// As [`Request::read_coils`].
+    pub fn read_discrete_inputs(
+        unit: u8,
+        address: u16,
+        inputs: &'a mut [bool],
+    ) -> Result<Self, Error> {
+        let words = (address, quantity(inputs.len()));
+        let spec = FunctionSpec::READ_DISCRETE_INPUTS;
+        Request::short(unit, spec, words, Slice::None, Slice::Coils(inputs))
+    }
+
+    /// 03: reads 1 to 125 holding registers, as many as `registers` has.
+    ///
+    /// # Errors
+    /// As [`Request::read_coils`].
+    pub fn read_holding_registers(
+        unit: u8,
+        address: u16,
+        registers: &'a mut [u16],
+    ) -> Result<Self, Error> {
+        let words = (address, quantity(registers.len()));
+        let spec = FunctionSpec::READ_HOLDING_REGISTERS;
+        Request::short(unit, spec, words, Slice::None, Slice::Registers(registers))
+    }
+
+    /// 04: reads 1 to 125 input registers, as many as `registers` has.
+    ///
+    /// # Errors
+    /// As [`Request::read_coils`].
+    pub fn read_input_registers(
+        unit: u8,
+        address: u16,
+        registers: &'a mut [u16],
+    ) -> Result<Self, Error> {
+        let words = (address, quantity(registers.len()));
+        let spec = FunctionSpec::READ_INPUT_REGISTERS;
+        Request::short(unit, spec, words, Slice::None, Slice::Registers(registers))
+    }
+
+    /// 05: switches one coil.
+    ///
+    /// # Errors
+    /// None: every address is allowed.
+    pub fn write_single_coil(unit: u8, address: u16, on: bool) -> Result<Self, Error> {
+        let words = (address, coil_value(on));
+        let spec = FunctionSpec::WRITE_SINGLE_COIL;
+        Request::short(unit, spec, words, Slice::None, Slice::None)
+    }
+
+    /// 06: writes one register.
+    ///
+    /// # Errors
+    /// None: every address is allowed.
+    pub fn write_single_register(unit: u8, address: u16, value: u16) -> Result<Self, Error> {
+        let spec = FunctionSpec::WRITE_SINGLE_REGISTER;
+        Request::short(unit, spec, (address, value), Slice::None, Slice::None)
+    }
+
+    /// 0F: writes 1 to 1968 coils.
+    ///
+    /// # Errors
+    /// As [`Request::read_coils`].
+    pub fn write_multiple_coils(
+        unit: u8,
+        address: u16,
+        coils: &'a mut [bool],
+    ) -> Result<Self, Error> {
+        let words = (address, quantity(coils.len()));
+        let spec = FunctionSpec::WRITE_MULTIPLE_COILS;
+        Request::short(unit, spec, words, Slice::Coils(coils), Slice::None)
+    }
+
+    /// 10: writes 1 to 123 registers.
+    ///
+    /// # Errors
+    /// As [`Request::read_coils`].
+    pub fn write_multiple_registers(
+        unit: u8,
+        address: u16,
+        registers: &'a mut [u16],
+    ) -> Result<Self, Error> {
+        let words = (address, quantity(registers.len()));
+        let spec = FunctionSpec::WRITE_MULTIPLE_REGISTERS;
+        Request::short(unit, spec, words, Slice::Registers(registers), Slice::None)
+    }
+
+    /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
+    ///
+    /// # Errors
+    /// None: every address is allowed.
+    pub fn mask_write_register(
+        unit: u8,
+        address: u16,
+        and_mask: u16,
+        or_mask: u16,
+    ) -> Result<Self, Error> {
+        Request::build(unit, Slice::None, Slice::None, |header| {
+            header.mask_write_register(address, and_mask, or_mask)
+        })
+    }
+
+    /// 17: writes 1 to 121 registers, then reads 1 to 125.
+    ///
+    /// # Errors
+    /// As [`Request::read_coils`].
+    pub fn read_write_multiple_registers(
+        unit: u8,
+        (read_address, read): (u16, &'a mut [u16]),
+        (write_address, write): (u16, &'a mut [u16]),
+    ) -> Result<Self, Error> {
+        let (reads, writes) = (quantity(read.len()), quantity(write.len()));
+        let (sends, takes) = (Slice::Registers(write), Slice::Registers(read));
+        Request::build(unit, sends, takes, |header| {
+            header.read_write_registers(read_address, reads, write_address, writes)
+        })
+    }
+
+    /// The result of a request that the client has returned.
+    ///
+    /// # Errors
+    /// Why it failed; `PENDING` while it is in progress.
+    pub fn result(&self) -> Result<(), Error> {
+        self.state.status.result()
+    }
+
+    /// The registers that were read; none if the request reads others or has failed.
+    pub fn registers(&self) -> &[u16] {
+        match &self.takes {
+            Slice::Registers(words) => words.get(..usize::from(self.state.length / 2)),
+            _ => None,
+        }
+        .unwrap_or_default()
+    }
+
+    /// The coils or discrete inputs that were read; none if the request reads others or has
+    /// failed.
+    pub fn coils(&self) -> &[bool] {
+        match &self.takes {
+            Slice::Coils(coils) if self.state.length > 0 => coils,
+            _ => &[],
+        }
+    }
+
+    /// The bytes that a request of [`Request::with_header`] has received.
+    pub fn bytes(&self) -> &[u8] {
+        match &self.takes {
+            Slice::Bytes(bytes) => bytes.get(..usize::from(self.state.length)),
+            _ => None,
+        }
+        .unwrap_or_default()
+    }
+
+    /// The registers that the request writes.
+    pub fn registers_to_write(&mut self) -> &mut [u16] {
+        match &mut self.sends {
+            Slice::Registers(words) => words,
+            _ => &mut [],
+        }
+    }
+
+    /// The coils that the request writes.
+    pub fn coils_to_write(&mut self) -> &mut [bool] {
+        match &mut self.sends {
+            Slice::Coils(coils) => coils,
+            _ => &mut [],
+        }
+    }
+}
+
+impl ClientRequest for Request<'_> {
+    fn state(&self) -> &RequestState {
+        &self.state
+    }
+
+    fn state_mut(&mut self) -> &mut RequestState {
+        &mut self.state
+    }
+
+    fn byte(&self, index: usize) -> u8 {
+        self.sends.byte(index)
+    }
+
+    fn store(&mut self, data: &[u8], mask: u8) {
+        self.takes.store(data, mask);
+    }
+}

@@ -1,0 +1,412 @@
+//! A master whose functions are futures, over the traits of embedded-io-async.
+
+use super::Master;
+use crate::engine::{Settings, Words};
+use crate::error::Error;
+use crate::port::Port;
+use core::future::{poll_fn, Future};
+use core::pin::pin;
+use core::task::Poll;
+use embedded_hal_async::delay::DelayNs;
+use embedded_io_async::{Read, Write};
+
+/// Bytes that are received in one piece.
+const PIECE: usize = 64;
+
+/// The pause before the next poll while the device does not go on, in microseconds.
+const PAUSE: u32 = 200;
+
+/// What is to be sent.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Outgoing {
+    /// Nothing.
+    None,
+    /// This many bytes of the frame buffer.
+    Frame(u8),
+    /// The device did not take the frame in time.
+    Stuck,
+}
+
+/// The port between the engine, which never waits, and the device, which is awaited. The frame to
+/// send stays in the frame buffer.
+#[derive(Debug)]
+struct Bridge<C, E> {
+    clock: C,
+    driver: E,
+    outgoing: Outgoing,
+    is_lost: bool,
+    received: [u8; PIECE],
+    /// Of `received`, the bytes that the engine has not read yet.
+    start: usize,
+    end: usize,
+}
+
+impl<C: FnMut() -> u32, E: FnMut(bool)> Port for Bridge<C, E> {
+    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+        let received = self.received.get(self.start..self.end).unwrap_or_default();
+        if received.is_empty() && self.is_lost {
+            return -1;
+        }
+        let mut count = 0;
+        for (place, byte) in bytes.iter_mut().zip(received) {
+            *place = *byte;
+            count += 1;
+        }
+        self.start += count;
+        count as i16
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> i16 {
+        // The engine writes the whole frame in one call, as all of it is accepted.
+        let length = bytes.len() as u8;
+        self.outgoing = Outgoing::Frame(length);
+        length.into()
+    }
+
+    fn micros(&mut self) -> u32 {
+        (self.clock)()
+    }
+
+    fn flush(&mut self) -> bool {
+        self.outgoing == Outgoing::None
+    }
+
+    fn pre_transmission(&mut self) {
+        (self.driver)(true);
+    }
+
+    fn post_transmission(&mut self) {
+        (self.driver)(false);
+    }
+}
+
+impl<C, E> Bridge<C, E> {
+    const fn new(clock: C, driver: E) -> Self {
+        Bridge {
+            clock,
+            driver,
+            outgoing: Outgoing::None,
+            is_lost: false,
+            received: [0; PIECE],
+            start: 0,
+            end: 0,
+        }
+    }
+
+    /// The place for received bytes; empty if the engine has to read first.
+    fn place(&mut self) -> &mut [u8] {
+        if self.start == self.end {
+            self.start = 0;
+            self.end = 0;
+        }
+        self.received.get_mut(self.end..).unwrap_or_default()
+    }
+}
+
+/// A master of one RTU line, whose functions are futures. It has one request at a time.
+///
+/// - `D` is the UART: [`Read`] and [`Write`] of embedded-io-async. Its read must lose no byte if
+///   its future is dropped, as a UART with a receive buffer does. A read that fails means that
+///   characters were damaged or lost, a write that fails that the link is lost.
+/// - `C` is the clock, in microseconds, which wraps at 2^32. `T` is [`DelayNs`] of
+///   embedded-hal-async. An executor's timer has both.
+/// - `S` are the buffers, as those of [`Master`]. Values are copied between them and the slices of
+///   a call.
+///
+/// If the future of a request is dropped, the request is cancelled, and the driver is switched
+/// off. The next request can follow at once.
+#[derive(Debug)]
+pub struct AsyncMaster<D, C, T, S: Words, E = fn(bool)> {
+    master: Master<Bridge<C, E>, S>,
+    device: D,
+    timer: T,
+}
+
+impl<D, C: FnMut() -> u32, T, S: Words> AsyncMaster<D, C, T, S> {
+    /// A master that sends requests to `unit`.
+    pub fn new(unit: u8, device: D, clock: C, timer: T, buffers: S) -> Self {
+        AsyncMaster::with_driver(unit, device, clock, timer, buffers, |_| {})
+    }
+}
+
+impl<D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)> AsyncMaster<D, C, T, S, E> {
+    /// As [`AsyncMaster::new`], with an RS-485 driver: `driver` switches it on with `true` before
+    /// the first byte is sent, and off after the last one.
+    pub fn with_driver(unit: u8, device: D, clock: C, timer: T, buffers: S, driver: E) -> Self {
+        AsyncMaster {
+            master: Master::new(unit, Bridge::new(clock, driver), buffers),
+            device,
+            timer,
+        }
+    }
+
+    /// Timeouts, retries and other settings of requests.
+    pub fn settings(&mut self) -> &mut Settings {
+        self.master.settings()
+    }
+
+    /// The buffers, with the counters.
+    pub fn storage(&mut self) -> &mut S {
+        self.master.storage()
+    }
+
+    /// The UART.
+    pub fn device(&mut self) -> &mut D {
+        &mut self.device
+    }
+
+    /// Sets the unit for later requests; 0 means broadcast.
+    pub fn set_unit(&mut self, unit: u8) {
+        self.master.set_unit(unit);
+    }
+
+    /// The exception code of the last reply as received; 0 if it was no exception.
+    pub fn exception_code(&self) -> u8 {
+        self.master.exception_code()
+    }
+}
+
+impl<D, C, T, S, E> AsyncMaster<D, C, T, S, E>
+where
+    D: Read + Write,
+    C: FnMut() -> u32,
+    T: DelayNs,
+    S: Words,
+    E: FnMut(bool),
+{
+    /// Makes a request, and waits until it has ended.
+    async fn request(
+        &mut self,
+        start: impl FnOnce(&mut Master<Bridge<C, E>, S>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let port = self.master.port();
+        port.is_lost = false;
+        port.outgoing = Outgoing::None;
+        start(&mut self.master)?;
+        let running = Running(self);
+        loop {
+            if let Poll::Ready(result) = running.0.master.poll() {
+                return result;
+            }
+            running.0.go_on().await;
+        }
+    }
+
+    /// Waits until the next poll has something to do.
+    async fn go_on(&mut self) {
+        let line = &mut self.master.line;
+        if let Outgoing::Frame(length) = line.port.outgoing {
+            let settings = &line.settings;
+            let characters = u32::from(settings.any_character()) << 8;
+            let limit = characters.saturating_add(settings.response_timeout.get());
+            let frame = line.storage.slice(0, length);
+            let device = &mut self.device;
+            let send = async {
+                device.write_all(frame).await?;
+                device.flush().await
+            };
+            let sent = first(send, self.timer.delay_us(limit)).await;
+            let port = &mut line.port;
+            port.outgoing = match sent {
+                Some(_) => Outgoing::None,
+                None => Outgoing::Stuck,
+            };
+            port.is_lost = matches!(sent, Some(Err(_)));
+            return;
+        }
+        let delay = self.master.poll_delay();
+        if !self.master.is_waiting() {
+            // The device is stuck, or the driver stays on for a while.
+            return self.timer.delay_us(PAUSE).await;
+        }
+        if delay == 0 {
+            return;
+        }
+        let port = self.master.port();
+        let place = port.place();
+        if place.is_empty() {
+            return self.timer.delay_us(delay).await;
+        }
+        match first(self.device.read(place), self.timer.delay_us(delay)).await {
+            Some(Ok(0)) => port.is_lost = true,
+            Some(Ok(count)) => port.end = (port.end + count).min(PIECE),
+            // A device that fails at once again must not keep other tasks from running.
+            Some(Err(_)) => self.timer.delay_us(delay.min(PAUSE)).await,
+            None => {}
+        }
+    }
+
+    /// 01: reads 1 to 2000 coils, as many as `coils` has.
+    ///
+    /// # Errors
+    /// Of this and the other functions: an exception of the device, for example
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::RESPONSE_TIMED_OUT`], [`Error::INVALID_CRC`],
+    /// [`Error::LINK_LOST`] or another error of the line. Refused without sending are a quantity
+    /// or addresses that the standard does not allow ([`Error::ILLEGAL_DATA_VALUE`],
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]), and what the buffers cannot hold
+    /// ([`Error::BUFFER_TOO_SMALL`], [`Error::ILLEGAL_DATA_VALUE`]).
+    pub async fn read_coils(&mut self, address: u16, coils: &mut [bool]) -> Result<(), Error> {
+        let quantity = super::quantity(coils.len());
+        self.request(|master| master.read_coils(address, quantity))
+            .await?;
+        self.take_bits(coils);
+        Ok(())
+    }
+
+    /// 02: reads 1 to 2000 discrete inputs, as many as `inputs` has.
+    ///
+    /// # Errors
+    /// As [`AsyncMaster::read_coils`].
+    pub async fn read_discrete_inputs(
+        &mut self,
+        address: u16,
+        inputs: &mut [bool],
+    ) -> Result<(), Error> {
+        let quantity = super::quantity(inputs.len());
+        self.request(|master| master.read_discrete_inputs(address, quantity))
+            .await?;
+        self.take_bits(inputs);
+        Ok(())
+    }
+
+    /// 03: reads 1 to 125 holding registers, as many as `registers` has.
+    ///
+    /// # Errors
+    /// As [`AsyncMaster::read_coils`].
+    pub async fn read_holding_registers(
+        &mut self,
+        address: u16,
+        registers: &mut [u16],
+    ) -> Result<(), Error> {
+        let quantity = super::quantity(registers.len());
+        self.request(|master| master.read_holding_registers(address, quantity))
+            .await?;
+        self.take_words(registers);
+        Ok(())
+    }
+
+    /// 04: reads 1 to 125 input registers, as many as `registers` has.
+    ///
+    /// # Errors
+    /// As [`AsyncMaster::read_coils`].
+    pub async fn read_input_registers(
+        &mut self,
+        address: u16,
+        registers: &mut [u16],
+    ) -> Result<(), Error> {
+        let quantity = super::quantity(registers.len());
+        self.request(|master| master.read_input_registers(address, quantity))
+            .await?;
+        self.take_words(registers);
+        Ok(())
+    }
+
+    /// 05: switches one coil.
+    ///
+    /// # Errors
+    /// As [`AsyncMaster::read_coils`].
+    pub async fn write_single_coil(&mut self, address: u16, on: bool) -> Result<(), Error> {
+        self.request(|master| master.write_single_coil(address, on))
+            .await
+    }
+
+    /// 06: writes one register.
+    ///
+    /// # Errors
+    /// As [`AsyncMaster::read_coils`].
+    pub async fn write_single_register(&mut self, address: u16, value: u16) -> Result<(), Error> {
+        self.request(|master| master.write_single_register(address, value))
+            .await
+    }
+
+    /// 0F: writes 1 to 1968 coils.
+    ///
+    /// # Errors
+    /// As [`AsyncMaster::read_coils`].
+    pub async fn write_multiple_coils(
+        &mut self,
+        address: u16,
+        coils: &[bool],
+    ) -> Result<(), Error> {
+        self.request(|master| master.write_multiple_coils(address, coils))
+            .await
+    }
+
+    /// 10: writes 1 to 123 registers.
+    ///
+    /// # Errors
+    /// As [`AsyncMaster::read_coils`].
+    pub async fn write_multiple_registers(
+        &mut self,
+        address: u16,
+        registers: &[u16],
+    ) -> Result<(), Error> {
+        self.request(|master| master.write_multiple_registers(address, registers))
+            .await
+    }
+
+    /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
+    ///
+    /// # Errors
+    /// As [`AsyncMaster::read_coils`].
+    pub async fn mask_write_register(
+        &mut self,
+        address: u16,
+        and_mask: u16,
+        or_mask: u16,
+    ) -> Result<(), Error> {
+        self.request(|master| master.mask_write_register(address, and_mask, or_mask))
+            .await
+    }
+
+    /// 17: writes 1 to 121 registers, then reads 1 to 125.
+    ///
+    /// # Errors
+    /// As [`AsyncMaster::read_coils`].
+    pub async fn read_write_multiple_registers(
+        &mut self,
+        (read_address, read): (u16, &mut [u16]),
+        (write_address, write): (u16, &[u16]),
+    ) -> Result<(), Error> {
+        let quantity = super::quantity(read.len());
+        self.request(|master| {
+            master.read_write_multiple_registers(read_address, quantity, write_address, write)
+        })
+        .await?;
+        self.take_words(read);
+        Ok(())
+    }
+
+    fn take_words(&self, registers: &mut [u16]) {
+        for (place, word) in registers.iter_mut().zip(self.master.response()) {
+            *place = *word;
+        }
+    }
+
+    fn take_bits(&self, bits: &mut [bool]) {
+        for (place, bit) in bits.iter_mut().zip(self.master.response_bits()) {
+            *place = bit;
+        }
+    }
+}
+
+/// A request in progress. If the future that has it is dropped, the request is cancelled.
+struct Running<'a, D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)>(
+    &'a mut AsyncMaster<D, C, T, S, E>,
+);
+
+impl<D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)> Drop for Running<'_, D, C, T, S, E> {
+    fn drop(&mut self) {
+        self.0.master.cancel();
+    }
+}
+
+/// The result of `future`; `None` if `timer` has ended before.
+async fn first<F: Future>(future: F, timer: impl Future<Output = ()>) -> Option<F::Output> {
+    let (mut future, mut timer) = (pin!(future), pin!(timer));
+    poll_fn(|context| match future.as_mut().poll(context) {
+        Poll::Ready(result) => Poll::Ready(Some(result)),
+        Poll::Pending => timer.as_mut().poll(context).map(|()| None),
+    })
+    .await
+}

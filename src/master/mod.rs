@@ -1,0 +1,279 @@
+//! A master of one serial line, for programs in Rust: the ten functions of the Arduino library
+//! ModbusMaster. Each function starts a request; [`Master::poll`] advances it to its end.
+
+#[cfg(feature = "embedded-io-async")]
+mod asynchronous;
+
+#[cfg(feature = "embedded-io-async")]
+pub use self::asynchronous::AsyncMaster;
+
+use crate::engine::{Settings, Words};
+use crate::error::{Error, Status};
+use crate::node::{Line, Node};
+use crate::pdu::functions::FunctionSpec;
+use crate::port::Port;
+use core::task::Poll;
+
+/// A serial line with one node, its port and its buffers.
+#[derive(Clone, Hash, Debug)]
+pub struct Master<P, S: Words> {
+    node: Node,
+    line: Line<P, S>,
+    /// How many bits the last successful read has stored in the response words.
+    bits: u16,
+}
+
+impl<P, S: Words> Master<P, S> {
+    /// The port.
+    pub fn port(&mut self) -> &mut P {
+        &mut self.line.port
+    }
+
+    /// The buffers.
+    pub fn storage(&mut self) -> &mut S {
+        &mut self.line.storage
+    }
+
+    /// Timeouts, retries and other settings of requests.
+    pub fn settings(&mut self) -> &mut Settings {
+        &mut self.line.settings
+    }
+
+    /// Sets the unit for later requests; 0 means broadcast.
+    pub fn set_unit(&mut self, unit: u8) {
+        self.node.set_unit(unit);
+    }
+
+    /// The unit for requests.
+    pub fn unit(&self) -> u8 {
+        self.node.unit()
+    }
+
+    /// See [`crate::engine::Engine::rebase`].
+    #[doc(hidden)]
+    pub fn rebase(&mut self, now: u32, longest: u32) {
+        self.line.rebase(now, longest);
+    }
+
+    /// The status of the last request; [`Status::PENDING`] while it is in progress.
+    pub fn status(&self) -> Status {
+        self.node.status()
+    }
+
+    /// The exception code of the last reply as received; 0 if it was no exception.
+    pub fn exception_code(&self) -> u8 {
+        self.node.exception_code()
+    }
+
+    /// True if the last poll found nothing to do and the driver is off.
+    pub fn is_waiting(&self) -> bool {
+        self.line.is_waiting()
+    }
+
+    /// True while a request is in progress.
+    pub fn is_pending(&self) -> bool {
+        self.line.is_pending()
+    }
+
+    /// The words of the last successful read. After a read of coils or discrete inputs, each has
+    /// 16 of them, the first in the lowest bit.
+    pub fn response(&self) -> &[u16] {
+        let words = self.line.storage.response();
+        let count = usize::from(self.node.available());
+        words.get(..count).unwrap_or_default()
+    }
+
+    /// The coils or discrete inputs of the last successful read.
+    pub fn response_bits(&self) -> impl Iterator<Item = bool> + '_ {
+        let words = self.response().iter();
+        words
+            .flat_map(|word| (0..16).map(move |bit| word >> bit & 1 != 0))
+            .take(self.bits.into())
+    }
+}
+
+/// Functions that make a request of the node, if the line is ready.
+macro_rules! requests {
+    ($($(#[$doc:meta])* fn $name:ident($($argument:ident: $type:ty),*) => $call:expr;)*) => {$(
+        $(#[$doc])*
+        ///
+        /// # Errors
+        /// As [`Master::read_coils`].
+        pub fn $name(&mut self, $($argument: $type),*) -> Result<(), Error> {
+            self.start($call)
+        }
+    )*};
+}
+
+/// A request with an address and a quantity or value.
+macro_rules! request {
+    ($spec:ident, $address:ident, $word:ident) => {
+        |node: &mut Node, line: &mut Line<P, S>| {
+            node.request(line, $address, $word, FunctionSpec::$spec.short())
+        }
+    };
+}
+
+impl<P: Port, S: Words> Master<P, S> {
+    /// A master that sends requests to `unit` through `port`.
+    pub const fn new(unit: u8, port: P, storage: S) -> Self {
+        Master {
+            node: Node::new(unit),
+            line: Line::new(port, storage),
+            bits: 0,
+        }
+    }
+
+    /// Sets whether a reply that deviates from the standard is accepted if no right reply
+    /// comes, and whether reads are sent to unit 0: see
+    /// [`crate::engine::Engine::lenient`].
+    pub fn set_lenient(&mut self, on: bool) {
+        self.line.set_observer(Line::<P, S>::lenient(on));
+    }
+
+    /// Cancels the request in progress, if there is one. Its status becomes
+    /// [`Status::CANCELLED`].
+    pub fn cancel(&mut self) {
+        if self.node.is_pending() {
+            self.line.cancel();
+            self.node.end(Status::CANCELLED);
+        }
+    }
+
+    /// Advances the request in progress, without waiting. Returns [`Poll::Pending`] until
+    /// the request has ended, then its result.
+    pub fn poll(&mut self) -> Poll<Result<(), Error>> {
+        if self.node.is_pending() {
+            let now = self.line.port.micros();
+            let status = self.line.poll(now);
+            if self.node.take(status, &mut self.line) == Status::OK {
+                self.note_bits();
+            }
+        }
+        self.status().poll()
+    }
+
+    fn note_bits(&mut self) {
+        let request = self.line.request();
+        if request.is_read() {
+            self.bits = request.bits();
+        }
+    }
+
+    /// Polls until the request in progress has ended, and calls `idle` between the polls.
+    ///
+    /// # Errors
+    /// The error with which the request has ended.
+    pub fn wait(&mut self, mut idle: impl FnMut()) -> Result<(), Error> {
+        loop {
+            if let Poll::Ready(result) = self.poll() {
+                return result;
+            }
+            idle();
+        }
+    }
+
+    /// Time in microseconds until poll has something to do, if no byte arrives before;
+    /// `u32::MAX` if there is no request.
+    pub fn poll_delay(&mut self) -> u32 {
+        let now = self.line.port.micros();
+        self.line.poll_delay(now)
+    }
+
+    /// Starts the request that `start` makes, if the line is ready.
+    fn start(
+        &mut self,
+        start: impl FnOnce(&mut Node, &mut Line<P, S>) -> Status,
+    ) -> Result<(), Error> {
+        let status = match self.line.ready() {
+            Status::OK => start(&mut self.node, &mut self.line),
+            Status::BUSY => Status::BUSY,
+            refused => {
+                self.node.end(refused);
+                refused
+            }
+        };
+        match status {
+            Status::PENDING => Ok(()),
+            refused => refused.result(),
+        }
+    }
+
+    /// 01: reads 1 to 2000 coils into the response words.
+    ///
+    /// # Errors
+    /// Nothing is sent then: [`Error::BUSY`] while a request is in progress;
+    /// [`Error::ILLEGAL_DATA_VALUE`] for a quantity that the standard or the buffers do not
+    /// allow; [`Error::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535;
+    /// [`Error::BUFFER_TOO_SMALL`]; [`Error::BROADCAST_NOT_ALLOWED`];
+    /// [`Error::NOT_INITIALISED`] if the port or the frame buffer cannot be used.
+    pub fn read_coils(&mut self, address: u16, quantity: u16) -> Result<(), Error> {
+        self.start(request!(READ_COILS, address, quantity))
+    }
+
+    requests! {
+        /// 02: reads 1 to 2000 discrete inputs into the response words.
+        fn read_discrete_inputs(address: u16, quantity: u16)
+            => request!(READ_DISCRETE_INPUTS, address, quantity);
+        /// 03: reads 1 to 125 holding registers into the response words.
+        fn read_holding_registers(address: u16, quantity: u16)
+            => request!(READ_HOLDING_REGISTERS, address, quantity);
+        /// 04: reads 1 to 125 input registers into the response words.
+        fn read_input_registers(address: u16, quantity: u16)
+            => request!(READ_INPUT_REGISTERS, address, quantity);
+        /// 05: switches one coil.
+        fn write_single_coil(address: u16, on: bool)
+            => |node: &mut Node, line| node.write_single_coil(line, address, on.into());
+        /// 06: writes one register.
+        fn write_single_register(address: u16, value: u16)
+            => |node: &mut Node, line| node.write_single_register(line, address, value);
+        /// 0F: writes 1 to 1968 coils.
+        fn write_multiple_coils(address: u16, coils: &[bool])
+            => |node: &mut Node, line| {
+                let quantity = put_bits(line, coils);
+                node.request(line, address, quantity, FunctionSpec::WRITE_MULTIPLE_COILS.short())
+            };
+        /// 10: writes 1 to 123 registers.
+        fn write_multiple_registers(address: u16, words: &[u16])
+            => |node: &mut Node, line| {
+                let quantity = put_words(line, words);
+                let function = FunctionSpec::WRITE_MULTIPLE_REGISTERS.short();
+                node.request(line, address, quantity, function)
+            };
+        /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
+        fn mask_write_register(address: u16, and_mask: u16, or_mask: u16)
+            => |node: &mut Node, line| node.mask_write_register(line, address, and_mask, or_mask);
+        /// 17: writes 1 to 121 registers, then reads 1 to 125 into the response words.
+        fn read_write_multiple_registers(
+            read_address: u16, read_quantity: u16, write_address: u16, words: &[u16]
+        ) => |node: &mut Node, line| {
+            let write = (write_address, put_words(line, words));
+            node.read_write_multiple_registers(line, (read_address, read_quantity), write)
+        };
+    }
+}
+
+/// A number of items. More than 65535 are refused as 65535 are.
+fn quantity(items: usize) -> u16 {
+    items.try_into().unwrap_or(u16::MAX)
+}
+
+/// Copies words into the transmit words, and returns their number. A request refuses a number that
+/// they cannot hold.
+fn put_words<P, S: Words>(line: &mut Line<P, S>, words: &[u16]) -> u16 {
+    for (place, word) in line.storage.transmit().iter_mut().zip(words) {
+        *place = *word;
+    }
+    quantity(words.len())
+}
+
+/// As [`put_words`], for bits.
+fn put_bits<P, S: Words>(line: &mut Line<P, S>, bits: &[bool]) -> u16 {
+    for (place, bits) in line.storage.transmit().iter_mut().zip(bits.chunks(16)) {
+        *place = bits
+            .iter()
+            .rev()
+            .fold(0, |word, on| word << 1 | u16::from(*on));
+    }
+    quantity(bits.len())
+}

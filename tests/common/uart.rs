@@ -1,0 +1,154 @@
+//! A UART of a master, with a device at the other end of its line. The line has its own clock.
+
+use super::device::Device;
+use mbm::frame::Framing;
+use mbm::port::Port;
+use mbm::server::Server;
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// The duration of a character at 115200 baud in microseconds.
+pub const CHARACTER: u32 = 96;
+
+/// The state of the UART.
+#[derive(Default)]
+pub struct Wire {
+    pub now: u32,
+    to_device: VecDeque<(u32, u8)>,
+    to_master: VecDeque<(u32, u8)>,
+    /// How many bytes the UART accepts at once; 0: none.
+    pub accepts: usize,
+    /// The next read fails.
+    pub read_fails: bool,
+    /// Every write fails.
+    pub write_fails: bool,
+    /// No more bytes can be read.
+    pub is_closed: bool,
+    /// The device receives nothing.
+    pub is_cut: bool,
+    /// The RS-485 driver is on.
+    pub driver: bool,
+    /// The driver was off while bytes left the UART.
+    pub is_cut_off: bool,
+    /// All bytes that were sent.
+    pub sent: Vec<u8>,
+}
+
+impl Wire {
+    /// True if a byte has arrived at the master.
+    pub fn has_arrived(&self) -> bool {
+        self.to_master
+            .front()
+            .is_some_and(|first| first.0 <= self.now)
+    }
+
+    /// True once all bytes have left the UART.
+    pub fn is_flushed(&self) -> bool {
+        self.to_device.is_empty()
+    }
+
+    /// Fills `bytes` with what has arrived at the master, and returns how many.
+    pub fn receive(&mut self, bytes: &mut [u8]) -> usize {
+        let mut count = 0;
+        for place in bytes {
+            if !self.has_arrived() {
+                break;
+            }
+            *place = self.to_master.pop_front().unwrap().1;
+            count += 1;
+        }
+        count
+    }
+
+    /// Sends as many of the bytes as the UART accepts, and returns how many.
+    pub fn send(&mut self, bytes: &[u8]) -> usize {
+        assert!(self.driver, "the driver is off");
+        let count = bytes.len().min(self.accepts);
+        let mut at = self.to_device.back().map_or(self.now, |last| last.0);
+        for byte in &bytes[..count] {
+            at += CHARACTER;
+            self.to_device.push_back((at, *byte));
+            self.sent.push(*byte);
+        }
+        count
+    }
+
+    /// Adds bytes that arrive at the master now.
+    pub fn arrive(&mut self, bytes: &[u8]) {
+        let now = self.now;
+        self.to_master.extend(bytes.iter().map(|byte| (now, *byte)));
+    }
+}
+
+/// The device's end.
+struct DeviceEnd(Rc<RefCell<Wire>>);
+
+impl Port for DeviceEnd {
+    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+        let wire = &mut *self.0.borrow_mut();
+        let mut count = 0;
+        while count < bytes.len() {
+            match wire.to_device.front() {
+                Some(first) if first.0 <= wire.now => bytes[count] = first.1,
+                _ => break,
+            }
+            wire.to_device.pop_front();
+            count += usize::from(!wire.is_cut);
+        }
+        count as i16
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> i16 {
+        let wire = &mut *self.0.borrow_mut();
+        let mut at = wire.now;
+        for byte in bytes {
+            at += CHARACTER;
+            wire.to_master.push_back((at, *byte));
+        }
+        bytes.len() as i16
+    }
+
+    fn micros(&mut self) -> u32 {
+        self.0.borrow().now
+    }
+}
+
+/// The UART's line with a device.
+pub struct Bench {
+    pub wire: Rc<RefCell<Wire>>,
+    server: Server<DeviceEnd, [u8; 256]>,
+    pub device: Device,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        let wire = Wire {
+            accepts: usize::MAX,
+            ..Wire::default()
+        };
+        let wire = Rc::new(RefCell::new(wire));
+        let mut server = Server::with_framing(Framing::Rtu, DeviceEnd(wire.clone()), [0; 256]);
+        server.set_silence(mbm::time::silence(115_200));
+        Bench {
+            wire,
+            server,
+            device: Device::new(),
+        }
+    }
+
+    /// Lets 50 microseconds pass, in which the device receives and answers.
+    pub fn pass(&mut self) {
+        let now = {
+            let wire = &mut *self.wire.borrow_mut();
+            wire.is_cut_off |= !wire.driver && !wire.is_flushed();
+            wire.now += 50;
+            wire.now
+        };
+        let server = &mut self.server;
+        let served = self
+            .device
+            .with_unit(|unit| server.serve(now, &mut [unit][..]));
+        assert_eq!(served, Ok(()));
+    }
+}

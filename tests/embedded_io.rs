@@ -1,0 +1,212 @@
+//! The port over embedded-io, on a simulated line with a device.
+#![cfg(feature = "embedded-io")]
+
+mod common;
+
+use common::uart::{Bench, Wire};
+use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
+use mbm::engine::Buffers;
+use mbm::error::{Error, Status};
+use mbm::master::Master;
+use mbm::port::{EmbeddedIo, Port};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// A UART that panics if it would have to wait.
+#[derive(Clone)]
+struct Uart(Rc<RefCell<Wire>>);
+
+impl ErrorType for Uart {
+    type Error = ErrorKind;
+}
+
+impl Read for Uart {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
+        let wire = &mut *self.0.borrow_mut();
+        if std::mem::take(&mut wire.read_fails) {
+            return Err(ErrorKind::Other);
+        }
+        assert!(wire.is_closed || wire.has_arrived(), "a read would wait");
+        Ok(wire.receive(bytes))
+    }
+}
+
+impl ReadReady for Uart {
+    fn read_ready(&mut self) -> Result<bool, ErrorKind> {
+        let wire = self.0.borrow();
+        Ok(wire.is_closed || wire.read_fails || wire.has_arrived())
+    }
+}
+
+impl Write for Uart {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        let wire = &mut *self.0.borrow_mut();
+        if wire.write_fails {
+            return Err(ErrorKind::BrokenPipe);
+        }
+        assert!(wire.accepts > 0, "a write would wait");
+        Ok(wire.send(bytes))
+    }
+
+    fn flush(&mut self) -> Result<(), ErrorKind> {
+        panic!("a flush would wait");
+    }
+}
+
+impl WriteReady for Uart {
+    fn write_ready(&mut self) -> Result<bool, ErrorKind> {
+        let wire = self.0.borrow();
+        Ok(wire.accepts > 0 || wire.write_fails)
+    }
+}
+
+fn clock(wire: &Rc<RefCell<Wire>>) -> impl FnMut() -> u32 {
+    let wire = wire.clone();
+    move || wire.borrow().now
+}
+
+fn driver(wire: &Rc<RefCell<Wire>>) -> impl FnMut(bool) {
+    let wire = wire.clone();
+    move |on| wire.borrow_mut().driver = on
+}
+
+fn serial(bench: &Bench) -> impl Port {
+    let (wire, uart) = (&bench.wire, Uart(bench.wire.clone()));
+    EmbeddedIo::serial(uart, clock(wire)).with_driver(driver(wire), 115_200)
+}
+
+fn stream(bench: &Bench) -> impl Port {
+    let (wire, uart) = (&bench.wire, Uart(bench.wire.clone()));
+    EmbeddedIo::stream(uart, clock(wire)).with_driver(driver(wire), 115_200)
+}
+
+type Words = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
+
+fn master<P: Port>(port: P) -> Master<P, Words> {
+    let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
+    let mut master = Master::new(17, port, buffers);
+    master.settings().set_baud_rate(115_200);
+    master
+}
+
+/// Reads three registers.
+fn read(bench: &mut Bench, port: impl Port) -> Result<Vec<u16>, Error> {
+    let mut master = master(port);
+    master.read_holding_registers(102, 3)?;
+    master.wait(|| bench.pass())?;
+    Ok(master.response().to_vec())
+}
+
+#[test]
+fn a_master_reads_registers_through_a_uart() {
+    let mut bench = Bench::new();
+    let port = serial(&bench);
+    assert_eq!(read(&mut bench, port), Ok(vec![0x1002, 0x1003, 0x1004]));
+    assert!(!bench.wire.borrow().driver);
+}
+
+#[test]
+fn the_driver_is_on_until_the_last_byte_has_left_and_off_before_the_reply() {
+    for accepts in [1, 3, 256] {
+        let mut bench = Bench::new();
+        bench.wire.borrow_mut().accepts = accepts;
+        let mut master = master(serial(&bench));
+        let words = [7; 10];
+        assert_eq!(master.write_multiple_registers(100, &words), Ok(()));
+        let mut times = [0; 2];
+        let result = master.wait(|| {
+            let wire = bench.wire.borrow();
+            if !wire.is_flushed() {
+                times[0] = wire.now;
+            } else if wire.driver {
+                times[1] = wire.now;
+            }
+            drop(wire);
+            bench.pass();
+        });
+        assert_eq!(result, Ok(()), "{accepts}");
+        assert!(!bench.wire.borrow().is_cut_off, "{accepts}");
+        let after = times[1] - times[0];
+        assert!((50..=250).contains(&after), "{accepts}: {after}");
+    }
+}
+
+#[test]
+fn a_uart_may_take_a_frame_in_pieces() {
+    for accepts in 1..8 {
+        let mut bench = Bench::new();
+        bench.wire.borrow_mut().accepts = accepts;
+        let port = serial(&bench);
+        assert!(read(&mut bench, port).is_ok(), "{accepts}");
+    }
+}
+
+#[test]
+fn a_uart_without_bytes_reads_none_and_is_not_asked() {
+    let bench = Bench::new();
+    assert_eq!(serial(&bench).read(&mut [0; 8]), 0);
+    assert_eq!(stream(&bench).read(&mut [0; 8]), 0);
+}
+
+#[test]
+fn a_uart_that_is_full_accepts_no_byte_and_is_not_asked() {
+    let bench = Bench::new();
+    bench.wire.borrow_mut().accepts = 0;
+    assert_eq!(serial(&bench).write(&[1, 2]), 0);
+    assert_eq!(stream(&bench).write(&[1, 2]), 0);
+}
+
+#[test]
+fn a_uart_that_stays_full_ends_the_request_as_a_busy_line() {
+    let mut bench = Bench::new();
+    bench.wire.borrow_mut().accepts = 0;
+    let port = serial(&bench);
+    assert_eq!(read(&mut bench, port), Err(Error::LINE_BUSY));
+    assert!(!bench.wire.borrow().driver);
+}
+
+#[test]
+fn a_damaged_character_of_a_serial_line_is_not_a_lost_link() {
+    let mut bench = Bench::new();
+    bench.wire.borrow_mut().read_fails = true;
+    let mut port = serial(&bench);
+    assert_eq!(port.read(&mut [0; 8]), 0);
+    bench.wire.borrow_mut().read_fails = true;
+    assert!(read(&mut bench, port).is_ok());
+}
+
+#[test]
+fn an_error_of_a_stream_is_a_lost_link() {
+    let mut bench = Bench::new();
+    bench.wire.borrow_mut().read_fails = true;
+    let port = stream(&bench);
+    assert_eq!(read(&mut bench, port), Err(Error::LINK_LOST));
+}
+
+#[test]
+fn the_end_of_a_stream_is_a_lost_link() {
+    let mut bench = Bench::new();
+    bench.wire.borrow_mut().is_closed = true;
+    let port = stream(&bench);
+    assert_eq!(read(&mut bench, port), Err(Error::LINK_LOST));
+}
+
+#[test]
+fn a_write_that_fails_is_a_lost_link() {
+    let mut bench = Bench::new();
+    bench.wire.borrow_mut().write_fails = true;
+    let port = serial(&bench);
+    assert_eq!(read(&mut bench, port), Err(Error::LINK_LOST));
+    let port = stream(&bench);
+    assert_eq!(read(&mut bench, port), Err(Error::LINK_LOST));
+}
+
+#[test]
+fn a_device_that_receives_nothing_times_out() {
+    let mut bench = Bench::new();
+    bench.wire.borrow_mut().is_cut = true;
+    let mut master = master(serial(&bench));
+    assert_eq!(master.write_single_register(100, 1), Ok(()));
+    assert_eq!(master.wait(|| bench.pass()), Err(Error::RESPONSE_TIMED_OUT));
+    assert_eq!(master.status(), Status::RESPONSE_TIMED_OUT);
+}
