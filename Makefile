@@ -317,13 +317,13 @@ bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs
 	@scripts/build/pictures
 
 # Programs with TLS or UDP, which pymodbus talks with too.
-SECURE := $(BUILD)/plain/linux/secure
-$(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure mbm_tls mbm_tls_identity mbm_tls_linux mbm_tls_listener mbm_tls_text mbm_tcp mbm_tcp_listener) $(ARCHIVE)
+SECURE := $(BUILD)/plain/linux/secure_server
+$(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure_server mbm_tls mbm_tls_identity mbm_tls_linux mbm_tls_listener mbm_tls_text mbm_tcp mbm_tcp_listener) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections $(TLS_LIBS) -o $@
 UDP := $(BUILD)/plain/linux/udp
 
 .PHONY: secure
-secure: ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
+secure: tool ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
 	@scripts/need python3 python3-venv gcc libc6-dev libmbedtls-dev openssl
 	@$(MAKE) --no-print-directory venv certificates $(SECURE)
 	@$(BUILD)/venv/bin/python scripts/check/examples secure $(BUILD)/plain $(BUILD)/certificates
