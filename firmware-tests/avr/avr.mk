@@ -9,9 +9,13 @@ assembler: ## Write the library as assembler source, one file for each instructi
 library: assembler
 	@packaging/arduino/library
 
-.PHONY: arduino
-arduino: library ## Build and check the Arduino libraries in build/arduino, and pack them into two zips in dist/
+.PHONY: arduino-zip
+arduino-zip: library ## Pack the Arduino libraries into two zips in dist/
+	@mkdir -p dist
 	@packaging/arduino/pack dist
+
+.PHONY: arduino
+arduino: arduino-zip ## Pack the Arduino libraries, and assemble them for every processor that they serve
 	@packaging/arduino/check
 	@scripts/check/assembler
 
