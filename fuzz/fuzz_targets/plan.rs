@@ -23,6 +23,11 @@ fn field(input: &mut Input) -> Field {
         table: shape >> 2 & 7,
         value_type: input.u8() % 12,
         order: shape >> 5,
+        bit: if shape & 0x60 == 0 {
+            input.u8() % 17
+        } else {
+            0
+        },
         address: match input.u8() {
             byte @ 0..0xE0 => byte.into(),
             _ => input.u16(),
@@ -42,34 +47,35 @@ fn field(input: &mut Input) -> Field {
     }
 }
 
-/// True if a read from the first to the last field touches an excluded address.
-fn excludes(limits: &Limits, first: &Field, last: &Field) -> bool {
+/// True if a read from the first field up to `end` touches an excluded address.
+fn excludes(limits: &Limits, first: &Field, end: u32) -> bool {
     limits.excluded.iter().any(|range| {
         (range.unit == 0 || range.unit == first.unit)
             && range.table == first.table
-            && u32::from(range.first) < last.end()
+            && u32::from(range.first) < end
             && range.last >= first.address
     })
 }
 
-/// The least reads, and the least bits and registers of those, of the fields of one group.
+/// The least reads, and the least bits and registers of those, of the fields of one group, which
+/// are sorted by their addresses.
 fn best(own: &[Field], limits: &Limits) -> (usize, u32) {
-    let mut least = vec![(0, 0)];
-    for end in 1..=own.len() {
-        let mut found = (usize::MAX, u32::MAX);
-        for start in 0..end {
-            let (first, last) = (&own[start], &own[end - 1]);
-            let length = last.end() - u32::from(first.address);
-            let gaps = own[start..end]
-                .windows(2)
-                .all(|pair| u32::from(pair[1].address) - pair[0].end() <= limits.widest_gap(first));
-            let touched = excludes(limits, first, last);
-            if gaps && !touched && length <= limits.longest_read(first) {
-                let (reads, quantity): (usize, u32) = least[start];
-                found = found.min((reads + 1, quantity + length));
+    let mut least = vec![(usize::MAX, u32::MAX); own.len() + 1];
+    least[0] = (0, 0);
+    for (start, first) in own.iter().enumerate() {
+        let mut end = u32::from(first.address);
+        for (index, field) in own.iter().enumerate().skip(start) {
+            if u32::from(field.address) > end + limits.widest_gap(first) {
+                break;
             }
+            end = end.max(field.end());
+            let length = end - u32::from(first.address);
+            if excludes(limits, first, end) || length > limits.longest_read(first) {
+                break;
+            }
+            let (reads, quantity) = least[start];
+            least[index + 1] = least[index + 1].min((reads + 1, quantity + length));
         }
-        least.push(found);
     }
     least[own.len()]
 }
@@ -171,7 +177,7 @@ fuzz_target!(|data: &[u8]| {
             let field = &fields[own];
             for index in 0..3 {
                 let Ok((first, before)) = place(field, read.address, index) else {
-                    assert!(index >= field.values() || (field.value_type == 10 && index > 0));
+                    assert!(index >= field.values());
                     continue;
                 };
                 let view = Words {

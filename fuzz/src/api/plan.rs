@@ -27,10 +27,11 @@ fn field(w: &World) -> mbm_planField {
         },
         r#type: match (good, bits) {
             (true, true) => MBM_TYPE_BIT,
-            (true, false) => 2 + (byte >> 2) % 9,
+            (true, false) => 1 + (byte >> 2) % 10,
             _ => w.byte() % 12,
         },
         order: if good { byte % 5 } else { byte % 8 },
+        bit: if w.rarely(3) { w.byte() % 17 } else { 0 },
         address: w.word(),
         count: w.word() % 40,
         intervalMs: if good {

@@ -76,6 +76,7 @@ fn begin(life: &Life) {
             table: 3 + w.byte() % 2,
             r#type: MBM_TYPE_UINT16,
             order: 0,
+            bit: 0,
             address: 20 * at,
             count: 1 + u16::from(w.byte()) % 4,
             intervalMs: 1 + u32::from(w.byte()) * 2,
