@@ -252,7 +252,7 @@ static void a_wrong_key_is_refused_with_its_line(void **state)
          "1: key: \"maker\" is not one of device, unit, interval, order and fields"},
         {UINT16("    addr: 5\n"),
          "6: key: \"addr\" is not one of name, table, address, type, bit, count, scale, "
-         "unit_of_measurement, access, interval, value, unit, order and description"},
+         "unit_of_measurement, access, interval, value, unit, order, description and enumeration"},
         {UINT16("    address: 7\n"), "6: address is there twice, first in line 4"},
         {UINT16("    name: b\n"), "6: name is there twice, first in line 2"},
         {UINT16("unit: 1\nunit: 2\n"), "7: unit is there twice, first in line 6"},
@@ -376,6 +376,81 @@ static void a_value_that_the_registers_cannot_hold_is_refused(void **state)
          "7: value has a character that is not in Latin-1"},
         {FIELD("    type: text\n    count: 9\n    value: [a]\n"),
          "7: value is a list: it must be one word"},
+    };
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++)
+        expect_refused(rows[i].text, rows[i].reason);
+}
+
+static void an_enumeration_names_the_numbers_of_its_field(void **state)
+{
+    static const uint16_t off[] = {0, 1}, on[] = {0xFFFF, 0xFFFF}, other[] = {1, 0};
+    static const uint16_t swapped[] = {0x0400}, bits[] = {5}, none[] = {4};
+
+    (void)state;
+    read_text(FIELD("    type: int32\n    enumeration:\n      1: off\n      -1: \"on\"\n"));
+    assert_int_equal(meter.fields->label_count, 2);
+    assert_string_equal(meter.fields->labels[1].number, "-1");
+    assert_int_equal(meter.fields->labels[1].line, 8);
+    assert_string_equal(device_label_of(&meter, 0, off), "off");
+    assert_string_equal(device_label_of(&meter, 0, on), "on");
+    assert_null(device_label_of(&meter, 0, other));
+    device_free(&meter);
+    read_text(UINT16("    order: BADC\n    enumeration: {4: running}\n"));
+    assert_string_equal(device_label_of(&meter, 0, swapped), "running");
+    assert_null(device_label_of(&meter, 0, none));
+    device_free(&meter);
+    read_text(
+        FIELD("    type: bit\n    bit: 4\n    count: 3\n    enumeration: {5: keypad, 7: bus}\n"));
+    assert_string_equal(device_label_of(&meter, 0, bits), "keypad");
+    device_free(&meter);
+    read_text(UINT16(""));
+    assert_null(device_label_of(&meter, 0, off));
+    device_free(&meter);
+}
+
+static void a_wrong_enumeration_is_refused_with_its_line(void **state)
+{
+    static const struct {
+        const char *text, *reason;
+    } rows[] = {
+        {UINT16("    enumeration:\n      1: off\n      2: on\n      1: ready\n"),
+         "9: enumeration has the number 1 twice, first in line 7"},
+        {UINT16("    enumeration:\n      1: off\n      2: off\n"),
+         "8: enumeration has the name off twice, first in line 7"},
+        {UINT16("    enumeration:\n      1: off\n      65536: on\n"),
+         "8: enumeration: \"65536\" is out of range of uint16"},
+        {UINT16("    enumeration: {-1: off}\n"),
+         "6: enumeration: \"-1\" is out of range of uint16"},
+        {FIELD("    type: int64\n    enumeration: {9223372036854775808: off}\n"),
+         "6: enumeration: \"9223372036854775808\" is out of range of int64"},
+        {"fields: [{name: a, table: coils, address: 0,\n enumeration: {2: on}}]",
+         "2: enumeration: \"2\" is out of range: from 0 to 1 is allowed"},
+        {FIELD("    type: bit\n    bit: 4\n    count: 3\n    enumeration: {8: on}\n"),
+         "8: enumeration: \"8\" is out of range: from 0 to 7 is allowed"},
+        {UINT16("    enumeration: {0x10: off}\n"),
+         "6: enumeration: \"0x10\" is not a whole decimal number"},
+        {UINT16("    enumeration: {1.5: off}\n"),
+         "6: enumeration: \"1.5\" is not a whole decimal number"},
+        {UINT16("    enumeration: {off: 1}\n"),
+         "6: enumeration: \"off\" is not a whole decimal number"},
+        {UINT16("    enumeration: {010: off}\n"),
+         "6: enumeration: \"010\" begins with 0: write a decimal number"},
+        {UINT16("    enumeration: {1: }\n"), "6: enumeration is empty"},
+        {UINT16("    enumeration: {1: [a]}\n"), "6: enumeration is a list: it must be one word"},
+        {UINT16("    enumeration: {}\n"), "6: enumeration is empty"},
+        {UINT16("    enumeration: off\n"), "6: enumeration must be a mapping of numbers to names, "
+                                           "such as {0: stopped, 1: running}"},
+        {FIELD("    type: float\n    enumeration: {1: off}\n"),
+         "6: a float has no enumeration: only integers and bits have one"},
+        {FIELD("    type: text\n    count: 2\n    enumeration: {1: off}\n"),
+         "7: a text has no enumeration: only integers and bits have one"},
+        {UINT16("    scale: 0.1\n    enumeration: {1: off}\n"),
+         "7: a field with a scale has no enumeration"},
+        {UINT16("    enumeration: {1: off}\n    enumeration: {2: on}\n"),
+         "7: enumeration is there twice, first in line 6"},
     };
     unsigned i;
 
@@ -511,6 +586,8 @@ int main(void)
         cmocka_unit_test(a_wrong_key_is_refused_with_its_line),
         cmocka_unit_test(keys_that_do_not_go_together_are_refused),
         cmocka_unit_test(a_value_that_the_registers_cannot_hold_is_refused),
+        cmocka_unit_test(an_enumeration_names_the_numbers_of_its_field),
+        cmocka_unit_test(a_wrong_enumeration_is_refused_with_its_line),
         cmocka_unit_test(what_is_not_yaml_is_refused),
         cmocka_unit_test(an_anchor_that_holds_itself_is_refused),
         cmocka_unit_test(a_file_that_cannot_be_read_is_a_failure_of_the_system),

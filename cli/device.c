@@ -11,7 +11,14 @@
 #include <string.h>
 #include <yaml.h>
 
-enum { MOST_REGISTERS = 125, MOST_BITS = 2000, MOST_WORD = 100, UNIT = 1, INTERVAL_MS = 1000 };
+enum {
+    MOST_REGISTERS = 125,
+    MOST_BITS = 2000,
+    MOST_WORD = 100,
+    MOST_LABELS = 1000,
+    UNIT = 1,
+    INTERVAL_MS = 1000
+};
 
 /* Lists of words, beside those of value.h: the number of a word is its position, from 1 on. */
 static const char *const ACCESSES[] = {"read", "write", "read-write", NULL};
@@ -35,11 +42,14 @@ enum {
     FIELD_UNIT,
     ORDER,
     DESCRIPTION,
+    ENUMERATION,
     FIELD_KEYS
 };
 static const char *const FIELD_NAMES[] = {
-    "name",   "table",    "address", "type", "bit",   "count",       "scale", "unit_of_measurement",
-    "access", "interval", "value",   "unit", "order", "description", NULL};
+    "name",   "table",       "address",     "type",
+    "bit",    "count",       "scale",       "unit_of_measurement",
+    "access", "interval",    "value",       "unit",
+    "order",  "description", "enumeration", NULL};
 
 /* A file that is being read. */
 typedef struct reader {
@@ -346,6 +356,122 @@ static int read_value(reader *from, const yaml_node_t *node, device_field *field
     return 1;
 }
 
+/* --- an enumeration --- */
+
+/* How many registers a number of a field has: 1 for bits. */
+static uint16_t number_size(const mbm_planField *planned)
+{
+    return value_registers(planned->type, 1);
+}
+
+/* Reads a number of an enumeration, as value_read reads a value without a scale. Returns 0 after a
+ * refusal. */
+static int read_label_number(reader *from, const yaml_node_t *node, const mbm_planField *planned,
+                             device_label *label)
+{
+    const char *text = read_text(from, "enumeration", node, VALUE_LONGEST), *digits, *wrong;
+    const uint32_t most = device_is_part(planned) ? (1u << planned->count) - 1 : 1;
+    value_form form = {.type = planned->type, .order = planned->order};
+
+    if (!text)
+        return 0;
+    digits = text + (text[0] == '-');
+    if (digits[0] == '\0' || digits[strspn(digits, "0123456789")] != '\0')
+        return refuse(from, line_of(node), "enumeration: \"%s\" is not a whole decimal number",
+                      text);
+    if (digits[0] == '0' && (digits[1] != '\0' || digits > text))
+        return refuse(from, line_of(node),
+                      "enumeration: \"%s\" begins with 0: write a decimal number", text);
+    if (planned->type == MBM_TYPE_BIT) {
+        form.type = MBM_TYPE_UINT16;
+        form.order = MBM_ORDER_ABCD;
+    }
+    if (value_read(&form, text, strlen(text), label->words, &wrong) == 0 ||
+        (planned->type == MBM_TYPE_BIT && label->words[0] > most)) {
+        if (planned->type == MBM_TYPE_BIT)
+            return refuse(from, line_of(node),
+                          "enumeration: \"%s\" is out of range: from 0 to %u is allowed", text,
+                          (unsigned)most);
+        return refuse(from, line_of(node), "enumeration: \"%s\" is out of range of %s", text,
+                      value_type_names[planned->type]);
+    }
+    label->number = strdup(text);
+    return label->number ? 1 : fail(from, ENOMEM);
+}
+
+/* Reads a number and its name, which must not be there yet. Returns 0 after a refusal. */
+static int read_label(reader *from, const yaml_node_pair_t *pair, const mbm_planField *planned,
+                      device_field *field)
+{
+    const yaml_node_t *number = yaml_document_get_node(&from->document, pair->key);
+    const yaml_node_t *name = yaml_document_get_node(&from->document, pair->value);
+    device_label *label = &field->labels[field->label_count];
+    const size_t size = number_size(planned) * sizeof *label->words;
+    const device_label *other;
+
+    field->label_count++;
+    label->line = (int)line_of(number);
+    if (!read_label_number(from, number, planned, label) ||
+        !copy_text(from, "enumeration", name, DEVICE_NAME_BYTES, &label->name))
+        return 0;
+    for (other = field->labels; other < label; other++) {
+        if (memcmp(other->words, label->words, size) == 0)
+            return refuse(from, line_of(number),
+                          "enumeration has the number %s twice, first in line %d", label->number,
+                          other->line);
+        if (strcmp(other->name, label->name) == 0)
+            return refuse(from, line_of(name),
+                          "enumeration has the name %s twice, first in line %d", label->name,
+                          other->line);
+    }
+    return 1;
+}
+
+static int read_enumeration(reader *from, const yaml_node_t *node, const yaml_node_t *scale,
+                            const mbm_planField *planned, device_field *field)
+{
+    const yaml_node_pair_t *pair;
+    size_t count;
+
+    if (!node)
+        return 1;
+    if (planned->type >= MBM_TYPE_FLOAT)
+        return refuse(from, line_of(node),
+                      "a %s has no enumeration: only integers and bits have one",
+                      value_type_names[planned->type]);
+    if (scale)
+        return refuse(from, line_of(node), "a field with a scale has no enumeration");
+    if (node->type != YAML_MAPPING_NODE)
+        return refuse(from, line_of(node),
+                      "enumeration must be a mapping of numbers to names, such as {0: stopped, 1: "
+                      "running}");
+    count = (size_t)(node->data.mapping.pairs.top - node->data.mapping.pairs.start);
+    if (count == 0)
+        return refuse(from, line_of(node), "enumeration is empty");
+    if (count > MOST_LABELS)
+        return refuse(from, line_of(node), "enumeration has %zu names: %d are allowed", count,
+                      MOST_LABELS);
+    field->labels = (device_label *)calloc(count, sizeof *field->labels);
+    if (!field->labels)
+        return fail(from, ENOMEM);
+    for (pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++)
+        if (!read_label(from, pair, planned, field))
+            return 0;
+    return 1;
+}
+
+const char *device_label_of(const device *from, uint16_t field, const uint16_t *words)
+{
+    const device_field *of = &from->fields[field];
+    const size_t size = number_size(&from->planned[field]) * sizeof *words;
+    uint16_t i;
+
+    for (i = 0; i < of->label_count; i++)
+        if (memcmp(of->labels[i].words, words, size) == 0)
+            return of->labels[i].name;
+    return NULL;
+}
+
 /* --- a field --- */
 
 /* Whether table and type are known and go together. Returns 0 after a refusal. */
@@ -448,6 +574,7 @@ static int read_scale(reader *from, const yaml_node_t *node, const mbm_planField
     field->form.order = planned->order;
     if (!node)
         return 1;
+    field->scale_line = (int)line_of(node);
     text = read_text(from, "scale", node, VALUE_LONGEST);
     if (!text)
         return 0;
@@ -524,6 +651,7 @@ static int read_field(reader *from, yaml_node_t *node)
            read_access(from, values[ACCESS], planned, field) &&
            read_scale(from, values[SCALE], planned, field) &&
            read_value(from, values[VALUE], field, planned) &&
+           read_enumeration(from, values[ENUMERATION], values[SCALE], planned, field) &&
            check_others(from, node, (uint16_t)(into->count - 1));
 }
 
@@ -683,6 +811,11 @@ void device_free(device *into)
     while (into->count > 0) {
         device_field *field = &into->fields[--into->count];
 
+        while (field->label_count > 0) {
+            free(field->labels[--field->label_count].name);
+            free(field->labels[field->label_count].number);
+        }
+        free(field->labels);
         free(field->name);
         free(field->unit_of_measurement);
         free(field->description);

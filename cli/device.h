@@ -1,4 +1,5 @@
-/* The device file: the fields of a device, as mbm poll, mbm serve and mbm bridge read them.
+/* The device file: the fields of a device, as mbm poll, mbm serve, mbm bridge and mbm header read
+ * them.
  *
  *     device: SDM120
  *     unit: 1
@@ -22,6 +23,14 @@ enum { DEVICE_READ = 1, DEVICE_WRITE = 2 };
 /* Bytes of the longest name of a field, and of the longest reason why a file is refused. */
 enum { DEVICE_NAME_BYTES = 200, DEVICE_WRONG_BYTES = 600 };
 
+/* A number of an enumeration and its name. */
+typedef struct device_label {
+    char *name;
+    char *number;                /* as in the file */
+    uint16_t words[VALUE_WORDS]; /* as in the registers; of bits the number */
+    int line;                    /* of the file */
+} device_label;
+
 typedef struct device_field {
     char *name;
     char *unit_of_measurement; /* NULL if the file gives none */
@@ -29,7 +38,9 @@ typedef struct device_field {
     value_form form;
     uint8_t access;  /* DEVICE_READ, DEVICE_WRITE or both */
     uint16_t *words; /* its value: as many as device_size; NULL if the file gives none */
-    int line;        /* of the file */
+    device_label *labels;
+    uint16_t label_count;
+    int line, scale_line; /* of the file */
 } device_field;
 
 typedef struct device {
@@ -50,6 +61,10 @@ void device_free(device *into);
 
 /* Returns the index of the field with this name, or -1. */
 int device_find(const device *from, const char *name);
+
+/* Returns the name that an enumeration has for a value of a field: its words as in the registers,
+ * of bits the number. NULL if there is none. */
+const char *device_label_of(const device *from, uint16_t field, const uint16_t *words);
 
 /* Returns how many registers or bits a field has. */
 uint32_t device_size(const mbm_planField *planned);

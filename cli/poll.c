@@ -228,9 +228,27 @@ static void print_column(const char *text, int width)
     printf("  %s%*s", text, width > width_of(text) ? width - width_of(text) : 0, "");
 }
 
+/* Appends the names of an enumeration, as far as they fit: " (off)", of several values " (off,on)",
+ * with "-" for a value without a name. Nothing if no value has one. */
+static void add_names(uint16_t field, char *text, size_t capacity)
+{
+    const uint16_t count = value_count(&meter.planned[field]);
+    size_t length = strlen(text);
+    uint16_t i, named = 0;
+
+    for (i = 0; i < count; i++)
+        named = (uint16_t)(named + (value_name(&plan, &meter, field, i) != NULL));
+    for (i = 0; named > 0 && i < count && length < capacity; i++) {
+        const char *name = value_name(&plan, &meter, field, i);
+
+        length += (size_t)snprintf(text + length, capacity - length, "%s%s%s", i == 0 ? " (" : ",",
+                                   name ? name : "-", i + 1 == count ? ")" : "");
+    }
+}
+
 static void print_row(uint16_t field, int name_width)
 {
-    static char value[VALUE_TEXT_LONGEST + DEVICE_NAME_BYTES];
+    static char value[VALUE_TEXT_LONGEST + 3 * DEVICE_NAME_BYTES];
     const char *measure = meter.fields[field].unit_of_measurement;
     char status[256], age[32] = "";
     uint32_t ageMs;
@@ -240,7 +258,8 @@ static void print_row(uint16_t field, int name_width)
     if (!value_text(&plan, &meter, field, 0, value))
         strcpy(value, "-");
     else if (measure)
-        snprintf(value + strlen(value), DEVICE_NAME_BYTES, " %s", measure);
+        snprintf(value + strlen(value), DEVICE_NAME_BYTES + 2, " %s", measure);
+    add_names(field, value, sizeof value);
     if (ageMs != UINT32_MAX)
         snprintf(age, sizeof age, "%ums", (unsigned)ageMs);
     print_column(meter.fields[field].name, name_width);
@@ -263,6 +282,23 @@ static void print_rows(uint32_t round, const char *time)
         print_row(i, name_width);
 }
 
+/* The names of an enumeration for JSON: a text or null, of several values an array of them. */
+static cJSON *json_names(uint16_t field)
+{
+    const uint16_t count = value_count(&meter.planned[field]);
+    cJSON *array = count > 1 ? cJSON_CreateArray() : NULL, *one = NULL;
+    uint16_t i;
+
+    for (i = 0; i < count; i++) {
+        const char *name = value_name(&plan, &meter, field, i);
+
+        one = name ? cJSON_CreateString(name) : cJSON_CreateNull();
+        if (array)
+            cJSON_AddItemToArray(array, one);
+    }
+    return array ? array : one;
+}
+
 static void print_json(uint16_t field, uint32_t round, const char *time)
 {
     static char value[VALUE_TEXT_LONGEST];
@@ -281,6 +317,8 @@ static void print_json(uint16_t field, uint32_t round, const char *time)
         cJSON_AddRawToObject(object, "value", value);
     else
         cJSON_AddNullToObject(object, "value");
+    if (of->label_count > 0)
+        cJSON_AddItemToObject(object, "value_name", json_names(field));
     if (of->unit_of_measurement)
         cJSON_AddStringToObject(object, "unit_of_measurement", of->unit_of_measurement);
     if (ageMs != UINT32_MAX)

@@ -33,12 +33,40 @@ static int print_one(const mbm_plan *plan, const device *of, uint16_t field, uin
     return 1;
 }
 
+uint16_t value_count(const mbm_planField *planned)
+{
+    return planned->type == MBM_TYPE_TEXT || device_is_part(planned) ? 1 : planned->count;
+}
+
+const char *value_name(const mbm_plan *plan, const device *of, uint16_t field, uint16_t index)
+{
+    const mbm_planField *planned = &of->planned[field];
+    const uint16_t size = value_registers(planned->type, 1);
+    uint16_t words[VALUE_WORDS] = {0}, i;
+    mbm_registers registers;
+    int64_t integer;
+
+    if (of->fields[field].label_count == 0)
+        return NULL;
+    if (planned->type == MBM_TYPE_BIT) {
+        if (mbm_plan_getInteger(plan, field, index, &integer) != MBM_OK)
+            return NULL;
+        words[0] = (uint16_t)integer;
+    } else {
+        if (mbm_plan_getRegisters(plan, field, &registers) != MBM_OK)
+            return NULL;
+        for (i = 0; i < size; i++)
+            (void)mbm_registers_getUint16(&registers,
+                                          (uint16_t)(planned->address + index * size + i),
+                                          MBM_ORDER_ABCD, &words[i]);
+    }
+    return device_label_of(of, field, words);
+}
+
 int value_text(const mbm_plan *plan, const device *of, uint16_t field, int is_json,
                char text[VALUE_TEXT_LONGEST])
 {
-    const mbm_planField *planned = &of->planned[field];
-    const uint16_t count =
-        planned->type == MBM_TYPE_TEXT || device_is_part(planned) ? 1 : planned->count;
+    const uint16_t count = value_count(&of->planned[field]);
     const int is_array = is_json && count > 1;
     size_t length = 0;
     uint16_t index;

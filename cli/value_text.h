@@ -14,4 +14,11 @@ enum { VALUE_TEXT_LONGEST = 16384 };
 int value_text(const mbm_plan *plan, const device *of, uint16_t field, int is_json,
                char text[VALUE_TEXT_LONGEST]);
 
+/* How many values a field has: several numbers in a row or bits of a table; otherwise 1. */
+uint16_t value_count(const mbm_planField *planned);
+
+/* Returns the name that the enumeration of a field has for one of its values. NULL if it has none,
+ * or if no value has arrived yet. */
+const char *value_name(const mbm_plan *plan, const device *of, uint16_t field, uint16_t index);
+
 #endif
