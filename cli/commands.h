@@ -14,6 +14,7 @@ int poll_command(int argc, char **argv);
 int serve_command(int argc, char **argv);
 int sniff_command(int argc, char **argv);
 int gateway_command(int argc, char **argv);
+int header_command(int argc, char **argv);
 int bridge_command(int argc, char **argv);
 
 #endif

@@ -23,6 +23,7 @@ static const command commands[] = {
     {"scan", "find the units that answer, and at which rate", scan_command},
     {"identify", "show what a device says about itself", identify_command},
     {"poll", "read the values of a device file", poll_command},
+    {"header", "write a C header from a device file, for firmware", header_command},
     {"serve", "be a device, with faults on request", serve_command},
     {"sniff", "decode what others send on a line", sniff_command},
     {"gateway", "pass requests from Modbus TCP to serial lines", gateway_command},

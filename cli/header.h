@@ -1,0 +1,68 @@
+/* The C header of a device: what cli/header.c, which is `mbm header`, shares with the writers of
+ * its parts. Each part is written to `out`, which is in memory: nothing is kept of a header that is
+ * refused.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef HEADER_H
+#define HEADER_H
+
+#include "device.h"
+
+#include <stdio.h>
+
+/* The scale of a field: the number in the registers is multiplied, then divided. 1 and 1 without a
+ * scale. */
+typedef struct header_scale {
+    int32_t multiplier, divisor;
+} header_scale;
+
+typedef struct header {
+    FILE *out;
+    const device *of;
+    const char *path, *file; /* of the device file, whole and without its folders */
+    char *upper, *lower;     /* the C name of the device */
+    char **fields;           /* the C names of its fields, in upper case */
+    header_scale *scales;
+    void *names;   /* that the header defines: a tree of tsearch */
+    uint16_t unit; /* of all fields; 0 if they have several */
+    /* What a plan of the fields needs. */
+    uint16_t gap, reads, words;
+} header;
+
+/* Chooses the C names of the device and of its fields. `name` is that of the device, or NULL to
+ * take that of the file. Returns 0 after reporting a refusal. */
+int header_choose_names(header *h, const char *name);
+
+/* Frees what the names took. */
+void header_free_names(header *h);
+
+/* Notes a name that the header defines, a field's name and what follows it, such as "_ADDRESS".
+ * Returns 0 after reporting that there is the same name already. */
+int header_define(header *h, uint16_t field, const char *suffix, int line);
+
+/* Turns a text into a part of a C name: letters in upper case, digits, and _ for each run of other
+ * characters. NULL without memory; empty if no character is left. */
+char *header_upper(const char *text);
+
+/* The same name in lower case, to be freed. NULL without memory. */
+char *header_lower(const char *upper);
+
+/* Writes a text for a comment in C: what would end or begin a comment, or change the direction of
+ * the line, is replaced. */
+void header_comment(FILE *out, const char *text);
+
+/* Writes where a field is, such as "holding registers 0 to 1 of unit 17". */
+void header_place(FILE *out, const mbm_planField *planned);
+
+/* The C type of a field's value; that of a bit is uint8_t. */
+const char *header_type(const mbm_planField *planned);
+
+/* Write a part of the header. They return 0 after reporting a refusal. */
+int header_write_fields(header *h);
+int header_write_plan(header *h);
+int header_write_server(header *h);
+
+/* Writes the page of documentation. */
+void header_write_page(header *h);
+
+#endif

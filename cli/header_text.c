@@ -1,0 +1,293 @@
+/* The parts of a device's header that every program may include: the constants of its fields, and
+ * the table of its plan. Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
+#include "header.h"
+
+#include "report.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const ACCESSES[] = {"", "read", "write", "read and write"};
+
+/* --- what the parts share --- */
+
+void header_comment(FILE *out, const char *text)
+{
+    for (; *text; text++) {
+        const unsigned char *at = (const unsigned char *)text;
+
+        /* U+202A to U+202E and U+2066 to U+2069. */
+        if (at[0] == 0xE2 && ((at[1] == 0x80 && at[2] >= 0xAA && at[2] <= 0xAE) ||
+                              (at[1] == 0x81 && at[2] >= 0xA6 && at[2] <= 0xA9))) {
+            fputc('?', out);
+            text += 2;
+            continue;
+        }
+        fputc(*text, out);
+        if ((text[0] == '*' && text[1] == '/') || (text[0] == '/' && text[1] == '*') ||
+            (text[0] == '?' && text[1] == '?'))
+            fputc(' ', out);
+    }
+}
+
+void header_place(FILE *out, const mbm_planField *planned)
+{
+    static const char *const ONE[] = {"", "coil", "discrete input", "holding register",
+                                      "input register"};
+    const uint32_t size = device_size(planned);
+
+    if (device_is_part(planned)) {
+        fprintf(out, planned->count > 1 ? "bits %u" : "bit %u", planned->bit);
+        if (planned->count > 1)
+            fprintf(out, " to %u", planned->bit + planned->count - 1u);
+        fprintf(out, " of ");
+    }
+    fprintf(out, "%s%s %u", ONE[planned->table], size > 1 ? "s" : "", planned->address);
+    if (size > 1)
+        fprintf(out, " to %u", (unsigned)(planned->address + size - 1));
+}
+
+const char *header_type(const mbm_planField *planned)
+{
+    static const char *const TYPES[] = {"",         "uint8_t", "uint16_t", "int16_t",
+                                        "uint32_t", "int32_t", "uint64_t", "int64_t",
+                                        "float",    "double",  "char"};
+
+    return device_is_part(planned) && planned->count > 8 ? "uint16_t" : TYPES[planned->type];
+}
+
+/* --- fields --- */
+
+/* Writes a whole number as a constant in C of a type that holds it everywhere. */
+static void write_constant(FILE *out, const char *number)
+{
+    const int is_negative = number[0] == '-';
+    const uint64_t amount = strtoull(number + is_negative, NULL, 10);
+
+    if (is_negative && amount == (uint64_t)INT64_MAX + 1)
+        fprintf(out, "(-9223372036854775807ll - 1)");
+    else if (is_negative && amount == (uint64_t)INT32_MAX + 1)
+        fprintf(out, "(-2147483647l - 1)");
+    else if (is_negative)
+        fprintf(out, "(-%" PRIu64 "%s)", amount,
+                amount <= 32767       ? ""
+                : amount <= INT32_MAX ? "l"
+                                      : "ll");
+    else
+        fprintf(out, "%" PRIu64 "%s", amount,
+                amount <= 65535        ? "u"
+                : amount <= UINT32_MAX ? "ul"
+                                       : "ull");
+}
+
+/* Whether an enumerator, which is an int of 16 bits or more, can have all numbers. */
+static int has_small_numbers(const device_field *field)
+{
+    uint16_t i;
+
+    for (i = 0; i < field->label_count; i++) {
+        const char *number = field->labels[i].number;
+
+        /* The numbers of uint64 that are too large become INT64_MAX. */
+        if (strtoll(number, NULL, 10) > 32767 || strtoll(number, NULL, 10) < -32767)
+            return 0;
+    }
+    return 1;
+}
+
+/* Writes the enumeration of a field. */
+static int write_labels(header *h, uint16_t at)
+{
+    const device_field *field = &h->of->fields[at];
+    const int is_small = has_small_numbers(field);
+    uint16_t i;
+
+    if (field->label_count == 0)
+        return 1;
+    if (is_small)
+        fprintf(h->out, "enum {\n");
+    for (i = 0; i < field->label_count; i++) {
+        const device_label *label = &field->labels[i];
+        char *name = header_upper(label->name), *suffix = NULL;
+        int is_new;
+
+        if (!name || asprintf(&suffix, "_%s", name) < 0) {
+            free(name);
+            (void)report(CODE_SYSTEM, "there is no memory");
+            return 0;
+        }
+        if (name[0] == '\0') {
+            (void)report(CODE_WRONG,
+                         "%s:%d: enumeration: the name \"%s\" has none of the letters A to Z and "
+                         "digits, of which names in C are made",
+                         h->path, label->line, label->name);
+            is_new = 0;
+        } else {
+            is_new = header_define(h, at, suffix, label->line);
+        }
+        if (is_new) {
+            fprintf(h->out, is_small ? "    %s_%s%s = " : "#define %s_%s%s ", h->upper,
+                    h->fields[at], suffix);
+            if (is_small)
+                fprintf(h->out, "%s%s", label->number, i + 1 < field->label_count ? "," : "");
+            else
+                write_constant(h->out, label->number);
+            fprintf(h->out, " /* ");
+            header_comment(h->out, label->name);
+            fprintf(h->out, " */\n");
+        }
+        free(name);
+        free(suffix);
+        if (!is_new)
+            return 0;
+    }
+    if (is_small)
+        fprintf(h->out, "};\n");
+    return 1;
+}
+
+/* Writes one constant of a field. */
+static int write_macro(header *h, uint16_t at, const char *suffix, uint32_t value)
+{
+    fprintf(h->out, "#define %s_%s%s %" PRIu32 "u\n", h->upper, h->fields[at], suffix, value);
+    return header_define(h, at, suffix, h->of->fields[at].line);
+}
+
+static void write_what_it_is(header *h, uint16_t at)
+{
+    const mbm_planField *planned = &h->of->planned[at];
+    const device_field *field = &h->of->fields[at];
+    const header_scale *scale = &h->scales[at];
+
+    fprintf(h->out, "\n/* ");
+    header_comment(h->out, field->name);
+    fprintf(h->out, ": ");
+    header_place(h->out, planned);
+    if (h->unit == 0)
+        fprintf(h->out, " of unit %u", planned->unit);
+    if (planned->type != MBM_TYPE_BIT)
+        fprintf(h->out, ", %s", value_type_names[planned->type]);
+    if (planned->type == MBM_TYPE_TEXT)
+        fprintf(h->out, " of %u characters", planned->count);
+    else if (planned->count > 1 && !device_is_part(planned))
+        fprintf(h->out, ", %u values", planned->count);
+    if (planned->order != MBM_ORDER_ABCD && planned->type != MBM_TYPE_BIT)
+        fprintf(h->out, ", order %s", value_order_names[planned->order]);
+    fprintf(h->out, "; %s.", ACCESSES[field->access]);
+    if (field->form.scale.digits || field->unit_of_measurement) {
+        fprintf(h->out, "\n * In ");
+        if (field->form.scale.digits)
+            fprintf(h->out, "%" PRId32, scale->multiplier);
+        if (scale->divisor != 1)
+            fprintf(h->out, "/%" PRId32, scale->divisor);
+        if (field->form.scale.digits && field->unit_of_measurement)
+            fputc(' ', h->out);
+        if (field->unit_of_measurement)
+            header_comment(h->out, field->unit_of_measurement);
+        fputc('.', h->out);
+    }
+    if (field->description) {
+        fprintf(h->out, "\n * ");
+        header_comment(h->out, field->description);
+    }
+    fprintf(h->out, " */\n");
+}
+
+static int write_field(header *h, uint16_t at)
+{
+    const mbm_planField *planned = &h->of->planned[at];
+    const device_field *field = &h->of->fields[at];
+    const header_scale *scale = &h->scales[at];
+
+    write_what_it_is(h, at);
+    if ((h->unit == 0 && !write_macro(h, at, "_UNIT", planned->unit)) ||
+        !write_macro(h, at, "_ADDRESS", planned->address) ||
+        !write_macro(h, at, "_SIZE", device_size(planned)) ||
+        (planned->count > 1 && !device_is_part(planned) &&
+         !write_macro(h, at, "_COUNT", planned->count)) ||
+        (device_is_part(planned) && (!write_macro(h, at, "_BIT", planned->bit) ||
+                                     !write_macro(h, at, "_BITS", planned->count))))
+        return 0;
+    if (field->form.scale.digits) {
+        fprintf(h->out, "#define %s_%s_MULTIPLIER ", h->upper, h->fields[at]);
+        fprintf(h->out, scale->multiplier < 0 ? "(%" PRId32 ")\n" : "%" PRId32 "\n",
+                scale->multiplier);
+        fprintf(h->out, "#define %s_%s_DIVISOR %" PRId32 "\n", h->upper, h->fields[at],
+                scale->divisor);
+        if (!header_define(h, at, "_MULTIPLIER", field->line) ||
+            !header_define(h, at, "_DIVISOR", field->line))
+            return 0;
+    }
+    return write_labels(h, at);
+}
+
+int header_write_fields(header *h)
+{
+    uint16_t i;
+
+    fprintf(h->out,
+            "\n/* ==== Fields: addresses as on the wire, sizes in registers or bits ==== */\n");
+    if (h->unit != 0)
+        fprintf(h->out, "\n#define %s_UNIT %uu\n", h->upper, h->unit);
+    for (i = 0; i < h->of->count; i++)
+        if (!write_field(h, i))
+            return 0;
+    return 1;
+}
+
+/* --- the plan --- */
+
+static void write_row(header *h, uint16_t at)
+{
+    static const char *const TABLES[] = {"", "COILS", "DISCRETE_INPUTS", "HOLDING_REGISTERS",
+                                         "INPUT_REGISTERS"};
+    static const char *const TYPES[] = {"",       "BIT",   "UINT16", "INT16",  "UINT32", "INT32",
+                                        "UINT64", "INT64", "FLOAT",  "DOUBLE", "TEXT"};
+    const mbm_planField *planned = &h->of->planned[at];
+    const header_scale *scale = &h->scales[at];
+    const int is_scaled = h->of->fields[at].form.scale.digits != 0;
+
+    fprintf(h->out, "    /* %s_%s */\n", h->upper, h->fields[at]);
+    fprintf(h->out,
+            "    {%uu, MBM_TABLE_%s, MBM_TYPE_%s, MBM_ORDER_%s, %uu, %uu, %uu, %" PRIu32
+            "u, %" PRId32 ", %" PRId32 "}%s\n",
+            planned->unit, TABLES[planned->table], TYPES[planned->type],
+            value_order_names[planned->order], planned->bit, planned->address, planned->count,
+            planned->intervalMs, is_scaled ? scale->multiplier : 0, is_scaled ? scale->divisor : 0,
+            at + 1 < h->of->readable ? "," : "");
+}
+
+int header_write_plan(header *h)
+{
+    const uint16_t count = h->of->readable;
+    uint16_t i;
+
+    if (count == 0)
+        return 1;
+    fprintf(h->out,
+            "\n/* ==== The plan: the fields that can be read ==== */\n\n"
+            "#ifdef %s_PLAN\n#include \"mbm.h\"\n\n"
+            "/* The fields of the plan, for mbm_plan_getInt32 and the like. */\n"
+            "enum %s_field {\n",
+            h->upper, h->lower);
+    for (i = 0; i < count; i++)
+        fprintf(h->out, "    %s_%s%s\n", h->upper, h->fields[i], i + 1 < count ? "," : "");
+    fprintf(
+        h->out,
+        "};\n\n"
+        "/* What the plan needs with these gaps: mbm_planPosition, mbm_planRead, words of data. "
+        "*/\n"
+        "#define %s_FIELDS %uu\n#define %s_READS %uu\n#define %s_DATA_WORDS %uu\n"
+        "#define %s_REGISTER_GAP %uu\n#define %s_BIT_GAP %uu\n\n"
+        "/* The members of mbm_planField in their order. */\n"
+        "static const mbm_planField %s_fields[%s_FIELDS] = {\n",
+        h->upper, count, h->upper, h->reads, h->upper, h->words, h->upper,
+        h->gap < MBM_MAX_READ_REGISTERS ? h->gap : MBM_MAX_READ_REGISTERS, h->upper, h->gap,
+        h->lower, h->upper);
+    for (i = 0; i < count; i++)
+        write_row(h, i);
+    fprintf(h->out, "};\n#endif\n");
+    return 1;
+}
