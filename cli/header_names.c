@@ -87,10 +87,12 @@ static int store(header *h, char *text, int line)
         (void)report(CODE_WRONG, "%s:%d: the C name %s is one that each header has: choose another",
                      h->path, line, text);
     else
-        (void)report(CODE_WRONG,
-                     "%s:%d: the C name %s is there already, from line %d. Case, and characters "
-                     "other than letters and digits, make no difference in C",
-                     h->path, line, text, other->line);
+        (void)report(
+            CODE_WRONG,
+            "%s:%d: the C name %s is that of line %d too: choose another. Case, spaces and "
+            "signs make no difference",
+            h->path, line > other->line ? line : other->line, text,
+            line > other->line ? other->line : line);
     free_name(name);
     return 0;
 }

@@ -31,7 +31,7 @@ _mbm() {
         rtu:* | ascii:*)
             words=$(compgen -G "${word#*:}*" | grep -e '/tty' -e '/pts' -e '/dev$' | sed "s|^|${word%%:*}:|") ;;
         */* | ?*.*) ;;
-        *) [[ $line =~ \ (rtu|ascii|(rtu\+)?tcp|udp|tls): ]] || words="rtu:/dev/tty ascii:/dev/tty tcp:// rtu+tcp:// udp:// tls://" ;;
+        *) [[ $command == header || $line =~ \ (rtu|ascii|(rtu\+)?tcp|udp|tls): ]] || words="rtu:/dev/tty ascii:/dev/tty tcp:// rtu+tcp:// udp:// tls://" ;;
         esac
         compopt -o nospace -o default 2>/dev/null
     fi

@@ -1,0 +1,164 @@
+/* A program from the header that mbm header writes: a client with a plan, and a server with its
+ * tables. scripts/check/serve compiles it for each device of examples/devices and holds it against
+ * mbm serve and mbm poll.
+ *
+ *     device poll HOST PORT     reads every field once, and prints the values of each in a line
+ *     device serve PORT         serves the values of the device file; PORT 0 takes a free one
+ *
+ * HEADER is the header in quotes, UPPER and LOWER are the device's name in C.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#define JOIN(one, other) one##_##other
+#define NAME(one, other) JOIN(one, other)
+#include HEADER
+#include "mbm_tcp.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum {
+    FIELDS = NAME(UPPER, FIELDS),
+    READS = NAME(UPPER, READS),
+    WORDS = NAME(UPPER, DATA_WORDS),
+    PATIENCE = 20000000
+};
+
+static mbm_tcp tcp = MBM_INIT;
+
+/* --- a client --- */
+
+static mbm_client client = MBM_INIT;
+static mbm_plan plan = MBM_INIT;
+static mbm_planPosition positions[FIELDS];
+static mbm_planRead reads[READS];
+static uint16_t words[WORDS];
+static mbm_clientRequest request = MBM_INIT;
+static const mbm_planSetup setup = {.fields = NAME(LOWER, fields),
+                                    .positions = positions,
+                                    .reads = reads,
+                                    .data = words,
+                                    .requests = &request,
+                                    .fieldCount = FIELDS,
+                                    .readCount = READS,
+                                    .dataWords = WORDS,
+                                    .bitGap = NAME(UPPER, BIT_GAP),
+                                    .registerGap = NAME(UPPER, REGISTER_GAP),
+                                    .requestCount = 1};
+
+static int is_every_field_read(void)
+{
+    uint16_t i;
+
+    for (i = 0; i < FIELDS; i++)
+        if (mbm_plan_getStatus(&plan, i, NULL) == MBM_PENDING)
+            return 0;
+    return 1;
+}
+
+static void print_field(uint16_t field)
+{
+    const mbm_planField *of = &NAME(LOWER, fields)[field];
+    const int is_number = of->type == MBM_TYPE_BIT && of->table >= MBM_TABLE_HOLDING_REGISTERS;
+    const uint8_t status = mbm_plan_getStatus(&plan, field, NULL);
+    uint16_t i, count = is_number ? 1 : of->count;
+    char text[251] = "";
+    int64_t integer;
+    double number;
+
+    if (status != MBM_OK) {
+        printf("%s\n", mbm_status_text(status));
+        return;
+    }
+    if (of->type == MBM_TYPE_TEXT) {
+        (void)mbm_plan_getText(&plan, field, text, sizeof text);
+        printf("%s\n", text);
+        return;
+    }
+    for (i = 0; i < count; i++) {
+        if (of->divisor == 0 && mbm_plan_getInteger(&plan, field, i, &integer) == MBM_OK)
+            printf("%lld", (long long)integer);
+        else if (mbm_plan_getNumber(&plan, field, i, &number) == MBM_OK)
+            printf("%.17g", number);
+        printf("%s", i + 1 < count ? " " : "\n");
+    }
+}
+
+/* Whether a plan with one read or one word of data less is refused, as it must be. */
+static int is_storage_exact(void)
+{
+    mbm_planSetup less = setup;
+    mbm_plan other = MBM_INIT;
+
+    less.readCount--;
+    if (mbm_plan_begin(&other, &client, &less, NULL) == MBM_OK)
+        return 0;
+    less = setup;
+    less.dataWords--;
+    return mbm_plan_begin(&other, &client, &less, NULL) != MBM_OK;
+}
+
+static int poll_device(const char *host, const char *service)
+{
+    const mbm_port port = mbm_tcp_port(&tcp);
+    const uint32_t begin = port.micros(port.context);
+    static mbm_tcp_addresses addresses;
+    static uint8_t incoming[1024], outgoing[1024];
+    uint16_t i, wrong = 0;
+
+    if (mbm_tcp_open(&tcp, &addresses, host, service) != 0) {
+        perror(host);
+        return 1;
+    }
+    if (mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing, sizeof outgoing) !=
+            MBM_OK ||
+        !is_storage_exact() || mbm_plan_begin(&plan, &client, &setup, &wrong) != MBM_OK) {
+        fprintf(stderr, "field %u is refused\n", wrong);
+        return 1;
+    }
+    while (!is_every_field_read() && port.micros(port.context) - begin < PATIENCE) {
+        (void)mbm_plan_poll(&plan);
+        (void)mbm_client_poll(&client);
+        mbm_tcp_wait(&tcp, 1, NULL, -1, 1000);
+    }
+    for (i = 0; i < FIELDS; i++)
+        print_field(i);
+    mbm_tcp_close(&tcp);
+    return 0;
+}
+
+/* --- a server --- */
+
+static mbm_tcp_listener listener = MBM_INIT;
+static mbm_server server = MBM_INIT;
+static mbm_unit unit = {.id = NAME(UPPER, UNIT)};
+static uint8_t frame[MBM_MAX_TCP_FRAME];
+
+static int serve_device(const char *service)
+{
+    const mbm_port port = mbm_tcp_port(&tcp);
+
+    NAME(LOWER, initialise)();
+    if (NAME(LOWER, serve)(&unit) != MBM_OK || mbm_tcp_listen(&listener, NULL, service) != 0) {
+        perror(service);
+        return 1;
+    }
+    (void)setvbuf(stdout, NULL, _IOLBF, 0);
+    printf("ready %u\n", listener.port);
+    for (;;) {
+        mbm_tcp_wait(&tcp, 1, &listener, -1, MBM_TCP_FOREVER);
+        if (mbm_tcp_accept(&listener, &tcp, 1) >= 0)
+            (void)mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame);
+        if (mbm_tcp_isInUse(&tcp) && mbm_server_poll(&server) != MBM_OK)
+            mbm_tcp_close(&tcp);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    if (argc == 4 && strcmp(argv[1], "poll") == 0)
+        return poll_device(argv[2], argv[3]);
+    if (argc == 3 && strcmp(argv[1], "serve") == 0)
+        return serve_device(argv[2]);
+    fprintf(stderr, "usage: device poll HOST PORT, or device serve PORT\n");
+    return 2;
+}
