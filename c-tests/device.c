@@ -23,10 +23,9 @@ enum {
     PATIENCE = 20000000
 };
 
-static mbm_tcp tcp = MBM_INIT;
-
 /* --- a client --- */
 
+static mbm_tcp tcp = MBM_INIT;
 static mbm_client client = MBM_INIT;
 static mbm_plan plan = MBM_INIT;
 static mbm_planPosition positions[FIELDS];
@@ -128,14 +127,17 @@ static int poll_device(const char *host, const char *service)
 
 /* --- a server --- */
 
+enum { PLACES = 4 };
+
 static mbm_tcp_listener listener = MBM_INIT;
-static mbm_server server = MBM_INIT;
+static mbm_tcp places[PLACES] = MBM_INIT;
+static mbm_server servers[PLACES] = MBM_INIT;
 static mbm_unit unit = {.id = NAME(UPPER, UNIT)};
-static uint8_t frame[MBM_MAX_TCP_FRAME];
+static uint8_t frames[PLACES][MBM_MAX_TCP_FRAME];
 
 static int serve_device(const char *service)
 {
-    const mbm_port port = mbm_tcp_port(&tcp);
+    int i;
 
     NAME(LOWER, initialise)();
     if (NAME(LOWER, serve)(&unit) != MBM_OK || mbm_tcp_listen(&listener, NULL, service) != 0) {
@@ -145,11 +147,15 @@ static int serve_device(const char *service)
     (void)setvbuf(stdout, NULL, _IOLBF, 0);
     printf("ready %u\n", listener.port);
     for (;;) {
-        mbm_tcp_wait(&tcp, 1, &listener, -1, MBM_TCP_FOREVER);
-        if (mbm_tcp_accept(&listener, &tcp, 1) >= 0)
-            (void)mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame);
-        if (mbm_tcp_isInUse(&tcp) && mbm_server_poll(&server) != MBM_OK)
-            mbm_tcp_close(&tcp);
+        mbm_tcp_wait(places, PLACES, &listener, -1, MBM_TCP_FOREVER);
+        while ((i = mbm_tcp_accept(&listener, places, PLACES)) >= 0) {
+            const mbm_port port = mbm_tcp_port(&places[i]);
+
+            (void)mbm_server_beginTcp(&servers[i], &port, &unit, 1, frames[i], MBM_MAX_TCP_FRAME);
+        }
+        for (i = 0; i < PLACES; i++)
+            if (mbm_tcp_isInUse(&places[i]) && mbm_server_poll(&servers[i]) != MBM_OK)
+                mbm_tcp_close(&places[i]);
     }
 }
 
