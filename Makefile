@@ -379,7 +379,7 @@ install-tool: $(INSTALLED_TOOL) man ## Install that tool, its man pages and comp
 .PHONY: man
 man: tool ## Make the man pages of that tool, build/man
 	@scripts/need help2man
-	@scripts/build/man $(BUILD)/plain/mbm $(BUILD)/man
+	@cli/man $(BUILD)/plain/mbm $(BUILD)/man
 
 .PHONY: check-tool
 check-tool: man ## Check that tool on servers of libmodbus and pymodbus, also with the sanitizers

@@ -22,7 +22,7 @@ FROM_SOURCE := $(BUILD)/baremetal-source
 .PHONY: firmware-test-rust
 firmware-test-rust: ## Run firmware in Rust on a Cortex-M7 in QEMU, over the traits of embedded-io
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm gcc-arm-none-eabi
-	@CARGO="$(CARGO)" scripts/build/rust-firmware $(BUILD)/baremetal/mps2-an500/rust.elf
+	@CARGO="$(CARGO)" examples/rust/build $(BUILD)/baremetal/mps2-an500/rust.elf
 	@$(MAKE) -s --no-print-directory $(RUST_QEMU_TEST)
 	@scripts/check/run-c-tests $(RUST_QEMU_TEST)
 
