@@ -7,12 +7,19 @@
 #include <cjson/cJSON.h>
 #include <errno.h>
 #include <stdarg.h>
+#include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 const char *report_name = "mbm";
 int report_code;
 volatile sig_atomic_t report_stopped;
+
+const char *const report_level_names[] = {"error", "warning", "info", "debug", NULL};
+const int report_level_numbers[] = {REPORT_ERROR, REPORT_WARNING, REPORT_INFO, REPORT_DEBUG};
+int report_level = REPORT_INFO;
 
 static void stop(int number)
 {
@@ -38,20 +45,59 @@ int report_note(int code)
     return report_code;
 }
 
+/* Whether stderr is the journal: JOURNAL_STREAM has the numbers of its socket. */
+static int is_journal(void)
+{
+    const char *stream = getenv("JOURNAL_STREAM");
+    struct stat file;
+    char expected[48];
+
+    if (!stream || fstat(2, &file) != 0)
+        return 0;
+    snprintf(expected, sizeof expected, "%" PRIuMAX ":%" PRIuMAX, (uintmax_t)file.st_dev,
+             (uintmax_t)file.st_ino);
+    return strcmp(stream, expected) == 0;
+}
+
+/* The full stop that a sentence lacks. */
+static const char *stop_of(const char *text)
+{
+    const size_t length = strlen(text);
+
+    return length > 0 && strchr(".?!", text[length - 1]) ? "" : ".";
+}
+
 int report(int code, const char *format, ...)
 {
     char text[1024];
-    size_t length;
     va_list arguments;
 
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    length = strlen(text);
-    fprintf(stderr, "%s: %s%s\n", report_name, text,
-            length > 0 && strchr(".?!", text[length - 1]) ? "" : ".");
+    fprintf(stderr, "%s%s: %s%s\n", is_journal() ? "<3>" : "", report_name, text, stop_of(text));
     (void)report_note(code);
     return code;
+}
+
+void report_log(int level, const char *format, ...)
+{
+    char text[1024], before[16];
+    va_list arguments;
+    int word = 0;
+
+    if (level > report_level)
+        return;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    while (report_level_numbers[word] != level)
+        word++;
+    if (is_journal())
+        snprintf(before, sizeof before, "<%d>", level);
+    else
+        snprintf(before, sizeof before, "%s: ", report_level_names[word]);
+    fprintf(stderr, "%s%s%s\n", before, text, stop_of(text));
 }
 
 int report_code_of(uint8_t status, uint8_t exception)

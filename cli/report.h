@@ -36,6 +36,21 @@ extern const char *report_name;
 int report(int code, const char *format, ...) __attribute__((format(printf, 2, 3)));
 extern int report_code;
 
+/* The levels of log lines, which are those of the system's log. */
+enum { REPORT_ERROR = 3, REPORT_WARNING = 4, REPORT_INFO = 6, REPORT_DEBUG = 7 };
+
+/* The words for the levels, for --log-level, and the level of each. NULL ends the words. */
+extern const char *const report_level_names[];
+extern const int report_level_numbers[];
+
+/* Lines above this level are left out: REPORT_INFO at first. */
+extern int report_level;
+
+/* Prints a log line of a service to stderr, given without its full stop: "warning:
+ * rtu:/dev/ttyUSB0: Input/output error." If stderr is systemd's journal, the level is "<4>" before
+ * the line, as the journal wants it. Any thread may call it. */
+void report_log(int level, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
 /* Notes a failure that is shown in another way. Returns report_code. */
 int report_note(int code);
 
