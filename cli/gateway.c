@@ -10,143 +10,224 @@
 #include "gateway_line.h"
 #include "options.h"
 #include "report.h"
+#include "service.h"
 #include "trace.h"
 
 #include <errno.h>
 #include <netdb.h>
 #include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum {
     CONNECTIONS = 16,
-    MOST_CONNECTIONS = UINT8_MAX,
-    SHARED_REQUESTS = 128, /* the places for requests beside one for each connection */
-    LINES = 32,
-    NAP_MICROS = 10000 /* the sleep if the system refuses to poll */
+    SPARE_LINES = 8,    /* places for lines that a reload may add */
+    NAP_MICROS = 10000, /* the sleep if the system refuses to poll */
+    ROUTES = UINT8_MAX
 };
 
 /* All storage is the program's own; mbm allocates nothing. */
-static gateway_line lines[LINES];
+static gateway_line lines[GATEWAY_LINES];
 static mbm_gateway gateway = MBM_INIT;
-static mbm_gatewayLine gateway_lines[LINES] = MBM_INIT;
-static mbm_gatewayRoute routes[256];
-static mbm_gatewayConnection connections[MOST_CONNECTIONS] = MBM_INIT;
-static mbm_gatewayRequest requests[MOST_CONNECTIONS + SHARED_REQUESTS] = MBM_INIT;
+static mbm_gatewayLine gateway_lines[GATEWAY_LINES] = MBM_INIT;
+static mbm_gatewayRoute routes[ROUTES];
+static mbm_gatewayConnection connections[GATEWAY_CONNECTIONS] = MBM_INIT;
+static mbm_gatewayRequest requests[GATEWAY_CONNECTIONS + GATEWAY_REQUESTS] = MBM_INIT;
 static mbm_gatewayConfig config = {
     .routes = routes,
+    .routeCount = ROUTES,
     .lines = gateway_lines,
     .connections = connections,
     .requests = requests,
 };
-static mbm_tcp tcps[MOST_CONNECTIONS] = MBM_INIT;
+static mbm_tcp tcps[GATEWAY_CONNECTIONS] = MBM_INIT;
 static mbm_tcp_listener listener = MBM_INIT;
-static unsigned long connected;
-static sigset_t awake; /* the signal mask during a sleep, which SIGINT and SIGTERM may end */
+static unsigned long connected, reloads, refused_reloads;
 
-/* What the command line says. */
-static struct {
-    place listen;
-    uint32_t idleMs;
-    uint16_t timeoutMs, quietMs, queueMs;
-    uint8_t connections, requests, in_flight, is_quiet;
-} settings = {.idleMs = 60000,
-              .timeoutMs = 1000,
-              .quietMs = 100,
-              .connections = CONNECTIONS,
-              .requests = 8,
-              .in_flight = 1};
+/* What the command line says, and what is in force: the same, or with what the file says. */
+static gateway_setup given = {.idleMs = 60000,
+                              .connections = CONNECTIONS,
+                              .requests = 8,
+                              .pace = {.timeoutMs = 1000, .quietMs = 100, .in_flight = 1}};
+static gateway_setup setup;
+static const char *path;                /* of the file; NULL: the command line has the lines */
+static uint8_t place_of[GATEWAY_LINES]; /* the index in `lines` of each line of the setup */
+static int is_quiet;
 
-/* --- the map of units --- */
+/* --- lines and routes --- */
 
-/* Reads a number from 0 to 255. Returns what follows it, or NULL. */
-static const char *read_unit(const char *text, unsigned *unit)
+/* Fills the map of units with the routes of lines that are there. */
+static void map_units(void)
 {
-    const size_t digits = strspn(text, "0123456789");
+    unsigned i, count = 0;
 
-    *unit = digits > 0 && digits <= 3 ? (unsigned)strtoul(text, NULL, 10) : 256;
-    return *unit <= 255 ? text + digits : NULL;
+    for (i = 0; i < setup.route_count; i++) {
+        mbm_gatewayRoute route = setup.routes[i];
+
+        route.line = place_of[route.line];
+        if (lines[route.line].is_used)
+            routes[count++] = route;
+    }
+    /* No unit is in a range whose last unit is below its first. */
+    while (count < ROUTES)
+        routes[count++] = (mbm_gatewayRoute){1, 0, 0, 0};
 }
 
-/* Adds FIRST[-LAST][=UNIT]. Returns NULL, or what is wrong with it. */
-static const char *add_route(const char *text, uint8_t to)
+static void set_line(unsigned index)
 {
-    unsigned first, last, unit, i;
+    const unsigned slot = place_of[index];
+    const int is_tcp = lines[slot].place.framing == MBM_FRAMING_TCP;
 
-    if (config.routeCount == UINT8_MAX)
-        return "a gateway has at most 255 ranges";
-    text = read_unit(text, &first);
-    last = first;
-    if (text && *text == '-')
-        text = read_unit(text + 1, &last);
-    unit = first;
-    if (text && *text == '=')
-        text = read_unit(text + 1, &unit);
-    if (!text || *text)
-        return "units are FIRST-LAST or FIRST-LAST=UNIT, from 0 to 255, such as 1-31 or 101-131=1";
-    if (first > last)
-        return "the first unit of a range is above its last one";
-    if (unit + last - first > 255)
-        return "the last unit of the range would be above 255 on the line";
-    for (i = 0; i < config.routeCount; i++)
-        if (first <= routes[i].last && last >= routes[i].first)
-            return "a range before has one of these units";
-    routes[config.routeCount++] =
-        (mbm_gatewayRoute){(uint16_t)first, (uint16_t)last, to, (uint16_t)unit};
+    gateway_line_set(&lines[slot], &setup.lines[index].pace);
+    gateway_lines[slot].inFlight = (uint8_t)(is_tcp ? setup.lines[index].pace.in_flight : 1);
+}
+
+static int begin_line(unsigned index)
+{
+    const unsigned slot = place_of[index];
+
+    if (!gateway_line_begin(&lines[slot], &setup.lines[index].place, &setup.lines[index].pace))
+        return report(CODE_SYSTEM, "not enough memory");
+    set_line(index);
+    return CODE_DONE;
+}
+
+/* Sets what a reload may change of the whole gateway. */
+static void set_gateway(void)
+{
+    (void)mbm_gateway_setInFlight(&gateway, (uint16_t)setup.requests);
+    (void)mbm_gateway_setQueueTime(&gateway, setup.queueMs);
+    listener.idleTimeMs = setup.idleMs;
+}
+
+/* Begins the gateway and its lines, with all settings. Returns an exit code. */
+static int begin(void)
+{
+    unsigned i, places = setup.line_count;
+
+    if (path)
+        places = places + SPARE_LINES > GATEWAY_LINES ? GATEWAY_LINES : places + SPARE_LINES;
+    for (i = 0; i < places; i++) {
+        gateway_line_leave(&lines[i]);
+        gateway_lines[i] = (mbm_gatewayLine){
+            .client = &lines[i].client, .context = &lines[i], .isReady = gateway_line_isReady};
+    }
+    for (i = 0; i < setup.line_count; i++) {
+        place_of[i] = (uint8_t)i;
+        if (begin_line(i) != CODE_DONE)
+            return CODE_SYSTEM;
+    }
+    /* The gateway checks the routes that it begins with: each must be one. */
+    for (i = 0; i < ROUTES; i++)
+        routes[i] = setup.routes[i < setup.route_count ? i : 0];
+    config.lineCount = (uint8_t)places;
+    config.connectionCount = (uint8_t)setup.connections;
+    config.requestCount = (uint16_t)(setup.connections + GATEWAY_REQUESTS);
+    (void)mbm_gateway_begin(&gateway, &config);
+    map_units();
+    set_gateway();
+    return CODE_DONE;
+}
+
+/* --- the file again --- */
+
+/* The place of a line that is in force already and is not taken, or -1. */
+static int find_place(const char *text, const uint8_t taken[GATEWAY_LINES])
+{
+    int slot;
+
+    for (slot = 0; slot < config.lineCount; slot++)
+        if (lines[slot].is_used && !taken[slot] && strcmp(lines[slot].text, text) == 0)
+            return slot;
+    return -1;
+}
+
+/* Returns NULL, or why the gateway must begin anew for this file. */
+static const char *needs_restart(const gateway_setup *next)
+{
+    if (strcmp(next->listen_text, setup.listen_text) != 0)
+        return "listen has changed";
+    if (next->connections != setup.connections)
+        return "connections has changed";
+    if (next->line_count > config.lineCount)
+        return "it has more lines than there are places";
     return NULL;
 }
 
-/* Reads UNITS, ranges with commas between them, of the last line. */
-static void read_units(const struct argp_state *state, const char *text)
+/* Replaces the setup by one that is right. Lines that both have go on as they are. */
+static void apply(gateway_setup *next)
 {
-    char copy[1024], *rest = NULL, *range;
-    const char *wrong = NULL;
+    uint8_t taken[GATEWAY_LINES] = {0}, is_new[GATEWAY_LINES] = {0}, next_places[GATEWAY_LINES];
+    unsigned i, slot, kept = 0, removed = 0;
 
-    if (strlen(text) >= sizeof copy || !*text || text[strlen(text) - 1] == ',')
-        wrong = "units are ranges with commas between them, such as 1-31,101-131=1";
-    snprintf(copy, sizeof copy, "%s", text);
-    for (range = strtok_r(copy, ",", &rest); range && !wrong; range = strtok_r(NULL, ",", &rest))
-        wrong = add_route(range, (uint8_t)(config.lineCount - 1));
-    if (wrong)
-        options_wrong(state, "UNITS \"%s\": %s", text, wrong);
-}
+    for (i = 0; i < next->line_count; i++) {
+        const int found = find_place(next->lines[i].text, taken);
 
-static void add_line(const struct argp_state *state, const char *text)
-{
-    const char *wrong;
-
-    if (config.lineCount == LINES)
-        options_wrong(state, "\"%s\" is one line too many: %d are allowed", text, LINES);
-    wrong = gateway_line_read(&lines[config.lineCount], text);
-    if (wrong)
-        options_wrong(state, "%s", wrong);
-    config.lineCount++;
-}
-
-/* Begins the gateway and its lines, with all settings. */
-static void begin(void)
-{
-    unsigned i;
-
-    for (i = 0; i < config.lineCount; i++) {
-        gateway_line *line = &lines[i];
-
-        gateway_line_begin(line, settings.timeoutMs, settings.quietMs);
-        gateway_lines[i] = (mbm_gatewayLine){
-            .client = &line->client,
-            .context = line,
-            .isReady = gateway_line_isReady,
-            .inFlight = line->place.framing == MBM_FRAMING_TCP ? settings.in_flight : 1};
+        is_new[i] = found < 0;
+        if (found < 0)
+            continue;
+        next_places[i] = (uint8_t)found;
+        taken[found] = 1;
+        kept++;
     }
-    config.connectionCount = settings.connections;
-    config.requestCount = (uint16_t)(settings.connections + SHARED_REQUESTS);
-    (void)mbm_gateway_begin(&gateway, &config);
-    (void)mbm_gateway_setInFlight(&gateway, settings.requests);
-    (void)mbm_gateway_setQueueTime(&gateway, settings.queueMs);
-    listener.idleTimeMs = settings.idleMs;
+    for (slot = 0; slot < config.lineCount; slot++)
+        if (lines[slot].is_used && !taken[slot]) {
+            gateway_line_close(&lines[slot]);
+            removed++;
+        }
+    for (i = slot = 0; i < next->line_count; i++) {
+        if (!is_new[i])
+            continue;
+        while (taken[slot])
+            slot++;
+        next_places[i] = (uint8_t)slot;
+        taken[slot] = 1;
+    }
+    gateway_setup_free(&setup);
+    setup = *next;
+    memcpy(place_of, next_places, sizeof place_of);
+    /* The requests of removed lines are answered before their places have other lines. */
+    map_units();
+    (void)mbm_gateway_poll(&gateway);
+    for (i = 0; i < setup.line_count; i++) {
+        if (!is_new[i])
+            set_line(i);
+        else
+            (void)begin_line(i);
+    }
+    map_units();
+    set_gateway();
+    report_log(REPORT_INFO, "%s is in force. Lines kept: %u, removed: %u, added: %u", path, kept,
+               removed, setup.line_count - kept);
+}
+
+static void reload(void)
+{
+    static gateway_setup next;
+    const char *why;
+
+    if (!path) {
+        report_log(REPORT_WARNING,
+                   "SIGHUP reads the file of the gateway, and this one was begun without a file");
+        return;
+    }
+    service_is_reloading();
+    next = given;
+    if (gateway_file_read(&next, path) != CODE_DONE) {
+        report_log(REPORT_ERROR, "%s. The file before stays in force", next.wrong);
+    } else if ((why = needs_restart(&next)) != NULL) {
+        report_log(REPORT_ERROR, "%s: %s, which needs a restart. The file before stays in force",
+                   path, why);
+    } else {
+        apply(&next);
+        reloads++;
+        service_is_ready();
+        return;
+    }
+    refused_reloads++;
+    gateway_setup_free(&next);
+    service_is_ready();
 }
 
 /* --- connections --- */
@@ -161,6 +242,7 @@ static void take_connections(void)
 
         connected++;
         snprintf(name, sizeof name, "client %d", slot);
+        report_log(REPORT_DEBUG, "%s is connected", name);
         port = trace_server(mbm_tcp_port(&tcps[slot]), MBM_FRAMING_TCP, name);
         if (mbm_gateway_open(&gateway, (uint8_t)slot, &port) != MBM_OK)
             mbm_tcp_close(&tcps[slot]);
@@ -170,6 +252,7 @@ static void take_connections(void)
 /* Gives the requests of a connection up, and closes it. */
 static void drop_connection(unsigned slot)
 {
+    report_log(REPORT_DEBUG, "client %u is disconnected", slot);
     mbm_gateway_close(&gateway, (uint8_t)slot);
     mbm_tcp_close(&tcps[slot]);
 }
@@ -187,17 +270,10 @@ static short events_of(unsigned slot)
 /* The descriptors of one sleep. A descriptor that is not open is left out, since the system
  * refuses a list that is longer than the limit of descriptors. */
 static struct {
-    struct pollfd polls[1 + LINES + MOST_CONNECTIONS];
-    uint8_t slots[1 + LINES + MOST_CONNECTIONS]; /* of the connections */
+    struct pollfd polls[1 + GATEWAY_LINES + GATEWAY_CONNECTIONS + SERVICE_WAITS];
+    uint8_t slots[GATEWAY_CONNECTIONS]; /* of the connections */
     nfds_t count;
 } waits;
-
-static int sleep_for(uint32_t micros)
-{
-    const struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
-
-    return ppoll(waits.polls, waits.count, micros == UINT32_MAX ? NULL : &time, &awake);
-}
 
 /* Sleeps until there is something to do. */
 static void wait_for_work(void)
@@ -219,11 +295,10 @@ static void wait_for_work(void)
         waits.polls[waits.count++] = (struct pollfd){listener.fd, POLLIN, 0};
     else if (delay > MBM_TCP_RETRY)
         delay = MBM_TCP_RETRY;
-    if (sleep_for(delay) < 0 && errno != EINTR) {
+    if (service_wait(waits.polls, waits.count, delay) < 0 && errno != EINTR) {
         /* The system refuses to poll: it has no memory, or the limit of descriptors was
          * lowered. */
-        waits.count = 0;
-        (void)sleep_for(NAP_MICROS);
+        (void)poll(NULL, 0, NAP_MICROS / 1000);
         return;
     }
     for (n = 0; n < clients; n++) {
@@ -239,8 +314,14 @@ static void work(void)
 {
     unsigned slot;
 
+    if (service_reload_is_wanted())
+        reload();
+    service_work();
     take_connections();
     mbm_gateway_poll(&gateway);
+    for (slot = 0; slot < config.lineCount; slot++)
+        if (lines[slot].is_used)
+            gateway_line_watch(&lines[slot]);
     for (slot = 0; slot < config.connectionCount; slot++) {
         if (!mbm_tcp_isInUse(&tcps[slot]))
             continue;
@@ -252,19 +333,54 @@ static void work(void)
     wait_for_work();
 }
 
+static const stats_kind KINDS[] = {
+    {"clients", "Clients that are connected.", 0},
+    {"connections", "Connections that were accepted.", 1},
+    {"refused_connections", "Connections that found no place.", 1},
+    {"idle_connections_closed", "Connections that were closed as idle.", 1},
+    {"reloads", "How often a file came in force.", 1},
+    {"reload_failures", "How often a file was refused.", 1},
+};
+
+static void fill_stats(stats *numbers)
+{
+    unsigned i;
+
+    numbers->command = "gateway";
+    numbers->kinds = KINDS;
+    numbers->count = sizeof KINDS / sizeof KINDS[0];
+    for (i = 0; i < config.connectionCount; i++)
+        numbers->values[0] += (uint64_t)mbm_tcp_isInUse(&tcps[i]);
+    numbers->values[1] = connected;
+    numbers->values[2] = listener.refused;
+    numbers->values[3] = listener.idle;
+    numbers->values[4] = reloads;
+    numbers->values[5] = refused_reloads;
+    for (i = 0; i < setup.line_count; i++) {
+        const gateway_line *line = &lines[place_of[i]];
+
+        numbers->lines[numbers->line_count++] =
+            (stats_line){.name = line->text,
+                         .counters = &line->counters,
+                         .link = &line->losses,
+                         .is_up = mbm_link_state(&line->link) == MBM_LINK_IS_UP};
+    }
+}
+
 static void print_summary(void)
 {
     unsigned i;
 
     fprintf(stderr, "%s: connections: %lu, refused: %u, closed as idle: %u.\n", report_name,
             connected, listener.refused, listener.idle);
-    for (i = 0; i < config.lineCount; i++) {
-        const mbm_counters *counts = &lines[i].counters;
+    for (i = 0; i < setup.line_count; i++) {
+        const gateway_line *line = &lines[place_of[i]];
+        const mbm_counters *counts = &line->counters;
 
         fprintf(stderr,
                 "%s: %s: requests: %u, replies: %u, exceptions: %u, timeouts: %u, bad CRCs: %u.\n",
-                report_name, lines[i].place.text, counts->requests, counts->replies,
-                counts->exceptions, counts->timeouts, counts->badCrc);
+                report_name, line->text, counts->requests, counts->replies, counts->exceptions,
+                counts->timeouts, counts->badCrc);
     }
 }
 
@@ -272,47 +388,62 @@ static void print_summary(void)
 
 enum { IDLE = 0x100, IN_FLIGHT, QUEUE_TIME, QUIET_TIME, REQUESTS, TIMEOUT };
 
+/* Reads a word that is no option: FILE, or LISTEN and then LINE and UNITS by turns. */
+static void read_word(const struct argp_state *state, char *text)
+{
+    const unsigned number = state->arg_num;
+    const size_t length = strlen(text);
+    const char *wrong = NULL;
+
+    if (number == 0 && length > 5 && strcmp(text + length - 5, ".yaml") == 0)
+        path = text;
+    else if (path)
+        options_wrong(state, "\"%s\" is one word too many: the lines are in the file", text);
+    else if (number == 0)
+        wrong = gateway_setup_listen(&given, text);
+    else if (number % 2 == 1)
+        wrong = gateway_setup_line(&given, text);
+    else
+        wrong = gateway_setup_units(&given, text);
+    if (wrong)
+        options_wrong(state, number > 0 && number % 2 == 0 ? "UNITS %s" : "%s", wrong);
+}
+
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     switch (key) {
     case 'c':
-        settings.connections =
-            (uint8_t)options_number(state, "--connections", text, 1, MOST_CONNECTIONS);
+        given.connections =
+            (uint32_t)options_number(state, "--connections", text, 1, GATEWAY_CONNECTIONS);
         return 0;
-    case 'q': settings.is_quiet = 1; return 0;
+    case 'q': is_quiet = 1; return 0;
     case REQUESTS:
-        settings.requests = (uint8_t)options_number(state, "--requests", text, 1, SHARED_REQUESTS);
+        given.requests = (uint32_t)options_number(state, "--requests", text, 1, GATEWAY_REQUESTS);
         return 0;
     case IN_FLIGHT:
-        settings.in_flight =
-            (uint8_t)options_number(state, "--in-flight", text, 1, MBM_CLIENT_DEPTH);
+        given.pace.in_flight =
+            (uint32_t)options_number(state, "--in-flight", text, 1, MBM_CLIENT_DEPTH);
         return 0;
-    case IDLE: settings.idleMs = options_time(state, "--idle", text, 0, 1000000000); return 0;
+    case IDLE: given.idleMs = options_time(state, "--idle", text, 0, 1000000000); return 0;
     case TIMEOUT:
-        settings.timeoutMs = (uint16_t)options_time(state, "--timeout", text, 1, UINT16_MAX);
+        given.pace.timeoutMs = options_time(state, "--timeout", text, 1, UINT16_MAX);
         return 0;
     case QUIET_TIME:
-        settings.quietMs = (uint16_t)options_time(state, "--quiet-time", text, 0, UINT16_MAX);
+        given.pace.quietMs = options_time(state, "--quiet-time", text, 0, UINT16_MAX);
         return 0;
     case QUEUE_TIME:
-        settings.queueMs = (uint16_t)options_time(state, "--queue-time", text, 0, UINT16_MAX);
+        given.queueMs = options_time(state, "--queue-time", text, 0, UINT16_MAX);
         return 0;
-    case ARGP_KEY_ARG:
-        if (state->arg_num % 2 == 1)
-            add_line(state, text);
-        else if (state->arg_num > 0)
-            read_units(state, text);
-        else
-            options_place(state, &settings.listen, text, 1);
-        return 0;
+    case ARGP_KEY_ARG: read_word(state, text); return 0;
     case ARGP_KEY_END:
+        if (state->arg_num == 0)
+            options_wrong(state, "a gateway needs FILE, or LISTEN, and for each LINE its UNITS");
+        if (state->arg_num == 1 && path)
+            return 0;
         if (state->arg_num < 3)
             options_wrong(state, "a gateway needs LISTEN, and for each LINE its UNITS");
         if (state->arg_num % 2 == 0)
             options_wrong(state, "UNITS of the last line are missing, such as 1-31");
-        if (settings.listen.kind != PLACE_TCP)
-            options_wrong(state, "LISTEN \"%s\": a gateway listens at tcp://, such as tcp://:502",
-                          settings.listen.text);
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -337,18 +468,22 @@ static const struct argp_option texts[] = {
     {"quiet", 'q', NULL, 0, "Print no summary to stderr", 3},
     {NULL, 0, NULL, 0, NULL, 0}};
 
-static const struct argp_child children[] = {{&options_trace, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+static const struct argp_child children[] = {
+    {&options_service, 0, NULL, 0}, {&options_trace, 0, NULL, 0}, {NULL, 0, NULL, 0}};
 static const struct argp parser = {
     texts,
     parse,
-    "LISTEN LINE UNITS [LINE UNITS]...",
+    "FILE.yaml\nLISTEN LINE UNITS [LINE UNITS]...",
     "Passes requests from Modbus TCP to the devices of serial lines and of TCP.\v"
+    "FILE has the keys listen and lines, and what the options say; docs/gateway.md describes it. "
+    "SIGHUP reads it again: lines that stay the same, and all clients, stay connected.\n\n"
     "LISTEN is where clients connect: tcp://:502, or tcp://ADDRESS:PORT for one address of this "
     "machine; with port 0 it is a free one. mbm prints \"ready PORT\" once it listens.\n\n"
     "UNITS are the unit ids of the LINE before: FIRST-LAST, or FIRST-LAST=UNIT if the unit FIRST of "
     "clients is UNIT on the line. Several ranges have commas between them. 0=0 passes broadcasts.\n\n"
-    "Example:\n\n"
-    "  mbm gateway tcp://:502 rtu:/dev/ttyUSB0 1-31 tcp://192.168.0.7 101-131=1\n\n"
+    "Examples:\n\n"
+    "  mbm gateway tcp://:502 rtu:/dev/ttyUSB0 1-31 tcp://192.168.0.7 101-131=1\n"
+    "  mbm gateway gateway.yaml --metrics 127.0.0.1:9100\n\n" SERVICE_HELP
     "The lines of a gateway are rtu:, ascii:, tcp:// and rtu+tcp://.\n\n" PLACE_HELP,
     children,
     NULL,
@@ -356,32 +491,43 @@ static const struct argp parser = {
 
 int gateway_command(int argc, char **argv)
 {
-    sigset_t ends;
     unsigned i;
+    int code = CODE_DONE;
 
     argp_parse(&parser, argc, argv, 0, NULL, NULL);
-    begin();
-    if (mbm_tcp_listen(&listener, place_host(&settings.listen), settings.listen.service) != 0)
-        return report(CODE_LINE, "%s: %s%s", settings.listen.text,
+    for (i = 0; i < given.line_count; i++)
+        given.lines[i].pace = given.pace;
+    setup = given;
+    if (path)
+        code = gateway_file_read(&setup, path);
+    if (code != CODE_DONE)
+        return report(code, "%s", setup.wrong);
+    if (begin() != CODE_DONE)
+        return CODE_SYSTEM;
+    if (mbm_tcp_listen(&listener, place_host(&setup.listen), setup.listen.service) != 0)
+        return report(CODE_LINE, "%s: %s%s", setup.listen.text,
                       listener.lookupError ? gai_strerror(listener.lookupError) : strerror(errno),
                       errno == EACCES       ? ". Ports below 1024 need the right to them"
                       : errno == EADDRINUSE ? ". Another program listens there"
                                             : "");
-    sigemptyset(&ends);
-    sigaddset(&ends, SIGINT);
-    sigaddset(&ends, SIGTERM);
-    sigprocmask(SIG_BLOCK, &ends, &awake);
+    code = service_begin(fill_stats);
+    if (code != CODE_DONE)
+        return code;
     printf("ready %u\n", listener.port);
     fflush(stdout);
+    service_is_ready();
     while (!report_stopped)
         work();
+    service_end();
     for (i = 0; i < config.connectionCount; i++)
         if (mbm_tcp_isInUse(&tcps[i]))
             drop_connection(i);
-    for (i = 0; i < config.lineCount; i++)
-        gateway_line_close(&lines[i]);
-    if (!settings.is_quiet)
+    if (!is_quiet)
         print_summary();
+    for (i = 0; i < config.lineCount; i++)
+        if (lines[i].is_used)
+            gateway_line_close(&lines[i]);
+    gateway_setup_free(&setup);
     mbm_tcp_closeListener(&listener);
     return CODE_DONE;
 }

@@ -8,6 +8,7 @@
 #include <fcntl.h>
 #include <netdb.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -15,21 +16,15 @@
 /* A lookup of a host may block the gateway, so there is a longer pause between two of them. */
 enum { REOPEN_MS = 1000, LOOKUP_MS = 10000 };
 
+/* After so many requests in a row without a right reply a line is reported. */
+enum { SILENT_AFTER = 5 };
+
 static uint32_t micros(void)
 {
     struct timespec now;
 
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
-}
-
-const char *gateway_line_read(gateway_line *line, const char *text)
-{
-    const char *wrong = place_read(&line->place, text, 0);
-
-    if (!wrong && (line->place.kind == PLACE_UDP || line->place.kind == PLACE_TLS))
-        wrong = "a line of a gateway is rtu:, ascii:, tcp:// or rtu+tcp://";
-    return wrong;
 }
 
 /* --- the link --- */
@@ -111,11 +106,14 @@ static void on_link(void *context, uint8_t event, uint8_t status)
                                                                           : strerror(error);
 
     if (event == MBM_LINK_EVENT_CONNECTED) {
+        if (line->reason[0])
+            report_log(REPORT_INFO, "%s: the line is open again", line->place.text);
         line->reason[0] = '\0';
         return;
     }
     if (strncmp(reason, line->reason, sizeof line->reason - 1) != 0)
-        fprintf(stderr, "%s: %s: %s.\n", report_name, line->place.text, reason);
+        report_log(REPORT_WARNING, "%s: %s. The line is opened again each second", line->place.text,
+                   reason);
     snprintf(line->reason, sizeof line->reason, "%s", reason);
     /* The next request may open a line that was open until now. */
     if (event == MBM_LINK_EVENT_LOST)
@@ -149,19 +147,98 @@ static void begin_client(gateway_line *line)
         (void)mbm_client_setGap(client, where->gapMs * 1000);
 }
 
-void gateway_line_begin(gateway_line *line, uint16_t timeoutMs, uint16_t quietMs)
+void gateway_line_set(gateway_line *line, const gateway_pace *pace)
+{
+    (void)mbm_client_setResponseTimeout(&line->client, pace->timeoutMs);
+    (void)mbm_client_setQuietTime(&line->client, pace->quietMs);
+    (void)mbm_link_setConnectTimeout(&line->link, pace->timeoutMs);
+}
+
+int gateway_line_begin(gateway_line *line, const place *where, const gateway_pace *pace)
 {
     const mbm_linkHooks hooks = {line, close_line, open_line, link_status};
 
+    memset(&line->counters, 0, sizeof line->counters);
+    memset(&line->known, 0, sizeof line->known);
+    memset(&line->losses, 0, sizeof line->losses);
+    line->is_silent = 0;
+    line->reason[0] = '\0';
+    line->text = strdup(where->text);
+    if (!line->text)
+        return 0;
+    line->place = *where;
+    line->place.text = line->text;
+    line->is_used = 1;
+    line->tried = micros() - REOPEN_MS * 1000u;
     keep_reserve(line);
     begin_client(line);
-    (void)mbm_client_setResponseTimeout(&line->client, timeoutMs);
-    (void)mbm_client_setQuietTime(&line->client, quietMs);
     (void)mbm_client_setCounters(&line->client, &line->counters);
     (void)mbm_link_begin(&line->link, &line->client, &hooks);
     (void)mbm_link_setBackoff(&line->link, MBM_BACKOFF_FIXED, REOPEN_MS, REOPEN_MS);
-    (void)mbm_link_setConnectTimeout(&line->link, timeoutMs);
     (void)mbm_link_setCallback(&line->link, on_link, line);
+    (void)mbm_link_setCounters(&line->link, &line->losses);
+    gateway_line_set(line, pace);
+    return 1;
+}
+
+/* --- a place without a line --- */
+
+static int16_t no_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    (void)context;
+    (void)bytes;
+    (void)capacity;
+    return -1;
+}
+
+static int16_t no_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)context;
+    (void)bytes;
+    (void)length;
+    return -1;
+}
+
+static uint32_t no_micros(void *context)
+{
+    (void)context;
+    return micros();
+}
+
+void gateway_line_leave(gateway_line *line)
+{
+    const mbm_port nowhere = {.read = no_read, .write = no_write, .micros = no_micros};
+
+    (void)mbm_client_beginRtuOverTcp(&line->client, &nowhere, line->frame, sizeof line->frame);
+}
+
+/* --- at work --- */
+
+void gateway_line_watch(gateway_line *line)
+{
+    const mbm_counters *now = &line->counters;
+    const uint32_t damaged = now->badCrc - line->known.badCrc,
+                   failed = damaged + now->timeouts - line->known.timeouts;
+
+    if (now->replies != line->known.replies) {
+        if (line->is_silent)
+            report_log(REPORT_INFO, "%s: a device answers again", line->place.text);
+        line->is_silent = 0;
+        line->known = *now;
+    } else if (!line->is_silent && failed >= SILENT_AFTER) {
+        line->is_silent = 1;
+        if (damaged > 0)
+            report_log(
+                REPORT_WARNING,
+                "%s: the last %u requests got no right reply, %u of them damaged ones. Check "
+                "wiring, baud rate and parity, and that no two devices have one unit id",
+                line->place.text, failed, damaged);
+        else
+            report_log(REPORT_WARNING,
+                       "%s: the last %u requests got no reply. Check device, wiring, baud rate and "
+                       "parity",
+                       line->place.text, failed);
+    }
 }
 
 /* Whether a line that was open has hung up since the last wait. */
@@ -175,8 +252,10 @@ static int has_hung_up(gateway_line *line)
 uint8_t gateway_line_isReady(void *context)
 {
     gateway_line *line = (gateway_line *)context;
-    const uint8_t state = mbm_link_state(&line->link);
+    const uint8_t state = line->is_used ? mbm_link_state(&line->link) : MBM_LINK_IS_DOWN;
 
+    if (!line->is_used)
+        return 0;
     if ((state == MBM_LINK_IS_UP && mbm_client_pending(&line->client) == 0 && has_hung_up(line)) ||
         (state == MBM_LINK_IS_DOWN && micros() - line->tried >= REOPEN_MS * 1000u)) {
         /* The request waits for this attempt, and ends if it fails. */
@@ -188,7 +267,9 @@ uint8_t gateway_line_isReady(void *context)
 
 int gateway_line_wait(const gateway_line *line, struct pollfd *wait)
 {
-    const int is_open = place_is_tcp(&line->place) ? line->tcp.events != 0 : line->tty.isOpen;
+    const int is_open = !line->is_used               ? 0
+                        : place_is_tcp(&line->place) ? line->tcp.events != 0
+                                                     : line->tty.isOpen;
 
     *wait = (struct pollfd){place_is_tcp(&line->place) ? line->tcp.fd : line->tty.fd,
                             place_is_tcp(&line->place) ? line->tcp.events : POLLIN, 0};
@@ -197,9 +278,13 @@ int gateway_line_wait(const gateway_line *line, struct pollfd *wait)
 
 void gateway_line_close(gateway_line *line)
 {
+    line->is_used = 0;
     if (place_is_tcp(&line->place))
         mbm_tcp_close(&line->tcp);
     else
         mbm_tty_close(&line->tty);
     free_reserve(line);
+    free(line->text);
+    line->text = NULL;
+    gateway_line_leave(line);
 }

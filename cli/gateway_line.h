@@ -6,14 +6,18 @@
 #ifndef GATEWAY_LINE_H
 #define GATEWAY_LINE_H
 
-#include "place.h"
+#include "gateway_file.h"
 
 #include <poll.h>
 
 typedef struct gateway_line {
     mbm_client client;
-    mbm_counters counters;
+    mbm_counters counters, known; /* `known`: at the last good reply */
     mbm_link link;
+    mbm_linkCounters losses;
+    uint8_t is_used;   /* 0: a place for a line, which refuses every request */
+    uint8_t is_silent; /* and that was reported */
+    char *text;
     place place;
     mbm_tty tty;
     mbm_tcp tcp;
@@ -26,11 +30,18 @@ typedef struct gateway_line {
     uint8_t outgoing[MBM_MAX_TCP_FRAME]; /* of Modbus TCP */
 } gateway_line;
 
-/* Reads the name of a line. Returns NULL, or what is wrong with it. */
-const char *gateway_line_read(gateway_line *line, const char *text);
+/* Begins the client and the link, which opens the line in the first poll of the client. The text of
+ * the place is copied. Returns 0 without memory. */
+int gateway_line_begin(gateway_line *line, const place *where, const gateway_pace *pace);
 
-/* Begins the client and the link, which opens the line in the first poll of the client. */
-void gateway_line_begin(gateway_line *line, uint16_t timeoutMs, uint16_t quietMs);
+/* Sets what a reload may change of a line. */
+void gateway_line_set(gateway_line *line, const gateway_pace *pace);
+
+/* Makes a zeroed or closed line a place that refuses every request: requests that it had end. */
+void gateway_line_leave(gateway_line *line);
+
+/* Reports devices that have become silent or damaged, and that answer again. */
+void gateway_line_watch(gateway_line *line);
 
 /* `isReady` of mbm_gatewayLine. A line that is not open is opened for a request, but at most once a
  * second. */
@@ -39,6 +50,7 @@ uint8_t gateway_line_isReady(void *context);
 /* What to poll for the line. Returns 0 if it has no descriptor. */
 int gateway_line_wait(const gateway_line *line, struct pollfd *wait);
 
+/* Closes the line, which may be begun again. */
 void gateway_line_close(gateway_line *line);
 
 #endif

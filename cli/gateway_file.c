@@ -1,0 +1,223 @@
+#define _GNU_SOURCE
+#include "gateway_file.h"
+
+#include "report.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LONGEST_LINE = 1500, LONGEST_UNITS = 1023 };
+
+enum {
+    LISTEN,
+    CONNECTIONS,
+    REQUESTS,
+    IDLE,
+    QUEUE_TIME,
+    TIMEOUT,
+    QUIET_TIME,
+    IN_FLIGHT,
+    THE_LINES,
+    GATEWAY_KEYS
+};
+static const char *const GATEWAY_NAMES[] = {"listen",     "connections", "requests",   "idle",
+                                            "queue_time", "timeout",     "quiet_time", "in_flight",
+                                            "lines",      NULL};
+enum { LINE, UNITS, LINE_TIMEOUT, LINE_QUIET_TIME, LINE_IN_FLIGHT, LINE_KEYS };
+static const char *const LINE_NAMES[] = {"line",       "units",     "timeout",
+                                         "quiet_time", "in_flight", NULL};
+
+/* --- the map of units --- */
+
+/* Reads a number from 0 to 255. Returns what follows it, or NULL. */
+static const char *read_unit(const char *text, unsigned *unit)
+{
+    const size_t digits = strspn(text, "0123456789");
+
+    *unit = digits > 0 && digits <= 3 ? (unsigned)strtoul(text, NULL, 10) : 256;
+    return *unit <= 255 ? text + digits : NULL;
+}
+
+/* Adds FIRST[-LAST][=UNIT]. Returns NULL, or what is wrong with it. */
+static const char *add_route(gateway_setup *to, const char *text)
+{
+    unsigned first, last, unit, i;
+
+    if (to->route_count == UINT8_MAX)
+        return "a gateway has at most 255 ranges";
+    text = read_unit(text, &first);
+    last = first;
+    if (text && *text == '-')
+        text = read_unit(text + 1, &last);
+    unit = first;
+    if (text && *text == '=')
+        text = read_unit(text + 1, &unit);
+    if (!text || *text)
+        return "units are FIRST-LAST or FIRST-LAST=UNIT, from 0 to 255, such as 1-31 or 101-131=1";
+    if (first > last)
+        return "the first unit of a range is above its last one";
+    if (unit + last - first > 255)
+        return "the last unit of the range would be above 255 on the line";
+    for (i = 0; i < to->route_count; i++)
+        if (first <= to->routes[i].last && last >= to->routes[i].first)
+            return "a range before has one of these units";
+    to->routes[to->route_count++] = (mbm_gatewayRoute){
+        (uint16_t)first, (uint16_t)last, (uint8_t)(to->line_count - 1), (uint16_t)unit};
+    return NULL;
+}
+
+const char *gateway_setup_units(gateway_setup *to, const char *text)
+{
+    static char said[LONGEST_UNITS + 100];
+    char copy[LONGEST_UNITS + 1], *rest = NULL, *range;
+    const char *wrong = NULL;
+
+    if (strlen(text) >= sizeof copy || !*text || text[strlen(text) - 1] == ',')
+        wrong = "units are ranges with commas between them, such as 1-31,101-131=1";
+    snprintf(copy, sizeof copy, "%s", text);
+    for (range = strtok_r(copy, ",", &rest); range && !wrong; range = strtok_r(NULL, ",", &rest))
+        wrong = add_route(to, range);
+    if (!wrong)
+        return NULL;
+    snprintf(said, sizeof said, "\"%s\": %s", text, wrong);
+    return said;
+}
+
+/* --- lines --- */
+
+const char *gateway_setup_line(gateway_setup *to, const char *text)
+{
+    static char said[LONGEST_LINE + 100];
+    const char *wrong;
+    uint8_t i;
+
+    if (to->line_count == GATEWAY_LINES) {
+        snprintf(said, sizeof said, "\"%s\" is one line too many: %d are allowed", text,
+                 GATEWAY_LINES);
+        return said;
+    }
+    for (i = 0; i < to->line_count; i++)
+        if (strcmp(to->lines[i].text, text) == 0) {
+            snprintf(said, sizeof said, "the line %s is there twice", text);
+            return said;
+        }
+    to->lines[i].text = strdup(text);
+    if (!to->lines[i].text)
+        return "there is not enough memory";
+    to->line_count++;
+    to->lines[i].pace = (gateway_pace){0, 0, 0};
+    wrong = place_read(&to->lines[i].place, to->lines[i].text, 0);
+    if (!wrong && (to->lines[i].place.kind == PLACE_UDP || to->lines[i].place.kind == PLACE_TLS))
+        wrong = "a line of a gateway is rtu:, ascii:, tcp:// or rtu+tcp://";
+    return wrong;
+}
+
+const char *gateway_setup_listen(gateway_setup *to, const char *text)
+{
+    static char said[LONGEST_LINE + 100];
+    const char *wrong;
+
+    to->listen_text = strdup(text);
+    if (!to->listen_text)
+        return "there is not enough memory";
+    wrong = place_read(&to->listen, to->listen_text, 1);
+    if (wrong || to->listen.kind == PLACE_TCP)
+        return wrong;
+    snprintf(said, sizeof said, "\"%s\": a gateway listens at tcp://, such as tcp://:502", text);
+    return said;
+}
+
+/* --- the file --- */
+
+/* Reads the settings that a line may have of its own. The keys follow each other. */
+static int read_pace(yaml_file *file, yaml_node_t *const *values, gateway_pace *pace)
+{
+    return yaml_file_time(file, "timeout", values[0], 1, UINT16_MAX, &pace->timeoutMs) &&
+           yaml_file_time(file, "quiet_time", values[1], 0, UINT16_MAX, &pace->quietMs) &&
+           yaml_file_number(file, "in_flight", values[2], 1, MBM_CLIENT_DEPTH, &pace->in_flight);
+}
+
+static int read_line(yaml_file *file, const yaml_node_t *node, gateway_setup *into)
+{
+    yaml_node_t *values[LINE_KEYS] = {NULL};
+    const char *text, *wrong;
+
+    if (!yaml_file_keys(file, "a line", node, LINE_NAMES, values))
+        return 0;
+    if (!values[LINE])
+        return yaml_file_refuse(file, node, "the line has no key line");
+    if (!values[UNITS])
+        return yaml_file_refuse(file, node, "the line has no units, such as \"units: 1-31\"");
+    text = yaml_file_text(file, "line", values[LINE], LONGEST_LINE);
+    if (!text)
+        return 0;
+    wrong = gateway_setup_line(into, text);
+    if (wrong)
+        return yaml_file_refuse(file, values[LINE], "line: %s", wrong);
+    text = yaml_file_text(file, "units", values[UNITS], LONGEST_UNITS);
+    if (!text)
+        return 0;
+    wrong = gateway_setup_units(into, text);
+    if (wrong)
+        return yaml_file_refuse(file, values[UNITS], "units: %s", wrong);
+    into->lines[into->line_count - 1].pace = into->pace;
+    return read_pace(file, &values[LINE_TIMEOUT], &into->lines[into->line_count - 1].pace);
+}
+
+static int read_root(yaml_file *file, const yaml_node_t *root, gateway_setup *into)
+{
+    yaml_node_t *values[GATEWAY_KEYS] = {NULL};
+    const yaml_node_item_t *item;
+    const char *text, *wrong;
+    size_t count;
+
+    if (!yaml_file_keys(file, "the file", root, GATEWAY_NAMES, values))
+        return 0;
+    if (!values[LISTEN] || !values[THE_LINES])
+        return yaml_file_refuse(file, root, "the file has no key %s",
+                                values[LISTEN] ? "lines" : "listen");
+    text = yaml_file_text(file, "listen", values[LISTEN], LONGEST_LINE);
+    if (!text)
+        return 0;
+    wrong = gateway_setup_listen(into, text);
+    if (wrong)
+        return yaml_file_refuse(file, values[LISTEN], "listen: %s", wrong);
+    if (!yaml_file_number(file, "connections", values[CONNECTIONS], 1, GATEWAY_CONNECTIONS,
+                          &into->connections) ||
+        !yaml_file_number(file, "requests", values[REQUESTS], 1, GATEWAY_REQUESTS,
+                          &into->requests) ||
+        !yaml_file_time(file, "idle", values[IDLE], 0, 1000000000, &into->idleMs) ||
+        !yaml_file_time(file, "queue_time", values[QUEUE_TIME], 0, UINT16_MAX, &into->queueMs) ||
+        !read_pace(file, &values[TIMEOUT], &into->pace))
+        return 0;
+    item = yaml_file_list(file, "lines", values[THE_LINES], GATEWAY_LINES, &count);
+    if (!item)
+        return 0;
+    for (; count > 0; count--, item++)
+        if (!read_line(file, yaml_document_get_node(&file->document, *item), into))
+            return 0;
+    return 1;
+}
+
+int gateway_file_read(gateway_setup *into, const char *path)
+{
+    static yaml_file file;
+    const yaml_node_t *root = yaml_file_open(&file, path);
+
+    if (root)
+        (void)read_root(&file, root, into);
+    yaml_file_close(&file);
+    memcpy(into->wrong, file.wrong, sizeof into->wrong);
+    return file.code;
+}
+
+void gateway_setup_free(gateway_setup *setup)
+{
+    while (setup->line_count > 0)
+        free(setup->lines[--setup->line_count].text);
+    free(setup->listen_text);
+    setup->listen_text = NULL;
+    setup->route_count = 0;
+}
