@@ -173,6 +173,25 @@ static void expect_words(const char *text, unsigned count, const uint16_t *words
 #define WORDS(text, ...)                                                                           \
     expect_words(text, sizeof((const uint16_t[]){__VA_ARGS__}) / 2, (const uint16_t[]){__VA_ARGS__})
 
+static void bits_of_a_register_are_written_if_the_device_writes_masks(void **state)
+{
+    (void)state;
+    read_text("mask_write: yes\nfields:\n"
+              "  - {name: pump, table: holding, address: 7, type: bit, bit: 3, access: write}\n"
+              "  - {name: mode, table: holding, address: 7, type: bit, bit: 4, count: 3,\n"
+              "     order: BADC, access: read-write}\n");
+    assert_int_equal(meter.writes_masks, 1);
+    /* The field that can be read comes first. Its order swaps the bytes of the register. */
+    assert_int_equal(device_mask(&meter.planned[0]), 0x7000);
+    assert_int_equal(device_part(&meter.planned[0], 5), 0x5000);
+    assert_int_equal(device_mask(&meter.planned[1]), 0x0008);
+    assert_int_equal(device_part(&meter.planned[1], 1), 0x0008);
+    device_free(&meter);
+    read_text("mask_write: no\n" UINT16(""));
+    assert_int_equal(meter.writes_masks, 0);
+    device_free(&meter);
+}
+
 static void a_value_becomes_registers_exactly(void **state)
 {
     (void)state;
@@ -249,7 +268,7 @@ static void a_wrong_key_is_refused_with_its_line(void **state)
         const char *text, *reason;
     } rows[] = {
         {"maker: a\n" UINT16(""),
-         "1: key: \"maker\" is not one of device, unit, interval, order and fields"},
+         "1: key: \"maker\" is not one of device, unit, interval, order, mask_write and fields"},
         {UINT16("    addr: 5\n"),
          "6: key: \"addr\" is not one of name, table, address, type, bit, count, scale, "
          "unit_of_measurement, access, interval, value, unit, order, description and enumeration"},
@@ -302,7 +321,12 @@ static void keys_that_do_not_go_together_are_refused(void **state)
         {FIELD("    type: bit\n    bit: 13\n    count: 4\n"),
          "7: the field has 4 bits from bit 13 on: a register has the bits 0 to 15"},
         {FIELD("    type: bit\n    access: read-write\n"),
-         "6: access is read-write: bits of a register cannot be written"},
+         "6: access is read-write: bits of a register cannot be written, unless the device has "
+         "function 22 and the file says \"mask_write: yes\""},
+        {"mask_write: no\n" FIELD("    type: bit\n    access: write\n"),
+         "7: access is write: bits of a register cannot be written, unless the device has function "
+         "22 and the file says \"mask_write: yes\""},
+        {"mask_write: true\n" UINT16(""), "1: mask_write: \"true\" is not one of no and yes"},
         {FIELD("    type: bit\n    bit: 1\n    scale: 2\n"), "7: a bit has no scale"},
         {"fields: [{name: a, table: coils, address: 0,\n type: uint16}]",
          "2: type is uint16: the type of coils and discrete inputs is bit"},
@@ -581,6 +605,7 @@ int main(void)
         cmocka_unit_test(a_field_has_what_its_file_says),
         cmocka_unit_test(what_a_file_leaves_out_has_the_documented_value),
         cmocka_unit_test(fields_that_can_only_be_written_come_last),
+        cmocka_unit_test(bits_of_a_register_are_written_if_the_device_writes_masks),
         cmocka_unit_test(a_value_becomes_registers_exactly),
         cmocka_unit_test(a_wrong_word_is_refused_with_its_line),
         cmocka_unit_test(a_wrong_key_is_refused_with_its_line),

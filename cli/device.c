@@ -22,11 +22,13 @@ enum {
 
 /* Lists of words, beside those of value.h: the number of a word is its position, from 1 on. */
 static const char *const ACCESSES[] = {"read", "write", "read-write", NULL};
+static const char *const ANSWERS[] = {"no", "yes", NULL};
 static const char *const BITS[] = {"0", "1", "false", "true", "off", "on", NULL};
 
 /* The keys of the file and of a field. The numbers count from 0 here. */
-enum { DEVICE, DEVICE_UNIT, DEVICE_INTERVAL, DEVICE_ORDER, FIELDS, DEVICE_KEYS };
-static const char *const DEVICE_NAMES[] = {"device", "unit", "interval", "order", "fields", NULL};
+enum { DEVICE, DEVICE_UNIT, DEVICE_INTERVAL, DEVICE_ORDER, MASK_WRITE, FIELDS, DEVICE_KEYS };
+static const char *const DEVICE_NAMES[] = {"device",     "unit",   "interval", "order",
+                                           "mask_write", "fields", NULL};
 enum {
     NAME,
     TABLE,
@@ -220,8 +222,7 @@ uint32_t device_size(const mbm_planField *planned)
     return planned->type == MBM_TYPE_TEXT || device_is_part(planned) ? one : (uint32_t)one * count;
 }
 
-/* The word of a register with these bits from `bit` on. */
-static uint16_t part_of(const mbm_planField *planned, uint16_t bits)
+uint16_t device_part(const mbm_planField *planned, uint16_t bits)
 {
     mbm_registers registers;
     uint16_t word = 0;
@@ -233,7 +234,7 @@ static uint16_t part_of(const mbm_planField *planned, uint16_t bits)
 
 uint16_t device_mask(const mbm_planField *planned)
 {
-    return device_is_part(planned) ? part_of(planned, (uint16_t)((1u << planned->count) - 1))
+    return device_is_part(planned) ? device_part(planned, (uint16_t)((1u << planned->count) - 1))
                                    : 0xFFFF;
 }
 
@@ -299,7 +300,7 @@ static uint16_t read_part(reader *from, const yaml_node_t *node, const mbm_planF
             ? read_bit(from, node, word) == 0
             : !read_number(from, "value", node, 0, (1u << planned->count) - 1, &number))
         return 0;
-    *word = part_of(planned, planned->count == 1 ? *word : (uint16_t)number);
+    *word = device_part(planned, planned->count == 1 ? *word : (uint16_t)number);
     return 1;
 }
 
@@ -559,8 +560,10 @@ static int read_access(reader *from, const yaml_node_t *node, const mbm_planFiel
         return refuse(from, line_of(node),
                       "access is %s: only coils and holding registers can be written",
                       ACCESSES[field->access - 1]);
-    if (node && field->access > DEVICE_READ && device_is_part(planned))
-        return refuse(from, line_of(node), "access is %s: bits of a register cannot be written",
+    if (node && field->access > DEVICE_READ && device_is_part(planned) && !from->into->writes_masks)
+        return refuse(from, line_of(node),
+                      "access is %s: bits of a register cannot be written, unless the device has "
+                      "function 22 and the file says \"mask_write: yes\"",
                       ACCESSES[field->access - 1]);
     return field->access != 0;
 }
@@ -705,6 +708,13 @@ static int read_device(reader *from, yaml_node_t *root)
         return 0;
     if (values[DEVICE_ORDER])
         from->order = read_word(from, "order", values[DEVICE_ORDER], value_order_names + 1);
+    if (values[MASK_WRITE]) {
+        const uint8_t word = read_word(from, "mask_write", values[MASK_WRITE], ANSWERS);
+
+        from->into->writes_masks = word == 2;
+        if (word == 0)
+            return 0;
+    }
     return from->order != 0 && read_fields(from, values[FIELDS]);
 }
 

@@ -47,6 +47,7 @@ typedef struct device {
     char *name; /* NULL if the file gives none */
     /* The fields that can be read come first; the order of the file is kept otherwise. */
     uint16_t count, readable;
+    uint8_t writes_masks; /* the device has function 22, by which bits of a register are written */
     device_field *fields;
     mbm_planField *planned; /* the same fields for mbm_plan_begin */
     char wrong[DEVICE_WRONG_BYTES];
@@ -73,5 +74,8 @@ uint32_t device_size(const mbm_planField *planned);
  * of such a field. */
 int device_is_part(const mbm_planField *planned);
 uint16_t device_mask(const mbm_planField *planned);
+
+/* Returns the word of a register in which the bits of a field are this number. */
+uint16_t device_part(const mbm_planField *planned, uint16_t bits);
 
 #endif
