@@ -517,6 +517,135 @@ static void the_longest_payload_is_read_and_a_longer_one_is_refused(void **state
     expect_refused(MBM_TYPE_UINT16, NULL, payload, "no number");
 }
 
+/* --- texts and several values --- */
+
+static uint16_t all[PAYLOAD_WORDS];
+
+static uint16_t parse_all(uint8_t type, uint16_t count, const char *payload, size_t length)
+{
+    const value_form form = {.type = type, .order = MBM_ORDER_ABCD};
+    char *copy = malloc(length > 0 ? length : 1);
+    uint16_t words_used;
+
+    assert_non_null(copy);
+    memcpy(copy, payload, length);
+    memset(all, 0xEE, sizeof all);
+    words_used = payload_parse_all(&form, count, copy, length, all, &wrong);
+    free(copy);
+    return words_used;
+}
+
+static void expect_text(const char *payload, const char *latin)
+{
+    char found[9] = "";
+    int i;
+
+    if (parse_all(MBM_TYPE_TEXT, 8, payload, strlen(payload)) != 4)
+        fail_msg("%s: %s", payload, wrong);
+    for (i = 0; i < 8; i++)
+        found[i] = (char)(all[i / 2] >> (i % 2 ? 0 : 8));
+    assert_string_equal(found, latin);
+    assert_int_equal(all[4], 0xEEEE);
+}
+
+static void a_text_is_the_payload_or_a_json_string(void **state)
+{
+    (void)state;
+    expect_text("pump", "pump");
+    expect_text("pump no1", "pump no1");
+    expect_text(" a b ", " a b ");
+    expect_text("12", "12");
+    expect_text("caf\303\251", "caf\351");
+    expect_text("\"\"", "");
+    expect_text("\"pump\"", "pump");
+    expect_text("\"a\\\"\\\\\\/\\n\"", "a\"\\/\n");
+    expect_text("\"caf\\u00e9\"", "caf\351");
+    expect_text("{\"value\":\"pump\"}", "pump");
+    expect_text("{ \"by\": 1, \"value\" : \"\\u0041\" }", "A");
+}
+
+static void expect_wrong(uint8_t type, uint16_t count, const char *payload, const char *reason)
+{
+    if (parse_all(type, count, payload, strlen(payload)) != 0)
+        fail_msg("%s is taken", payload);
+    if (!strstr(wrong, reason))
+        fail_msg("%s: %s, and not: %s", payload, wrong, reason);
+}
+
+static void a_text_that_does_not_fit_is_refused(void **state)
+{
+    static char longest[PAYLOAD_LONGEST + 2];
+
+    (void)state;
+    expect_wrong(MBM_TYPE_TEXT, 8, "123456789", "longer than the field");
+    expect_wrong(MBM_TYPE_TEXT, 8, "\342\202\254", "not in Latin-1");
+    expect_wrong(MBM_TYPE_TEXT, 8, "\"\\u20ac\"", "not in Latin-1");
+    expect_wrong(MBM_TYPE_TEXT, 8, "\"\\u0000\"", "NUL");
+    expect_wrong(MBM_TYPE_TEXT, 8, "\303", "not in Latin-1");
+    expect_wrong(MBM_TYPE_TEXT, 8, "\"pump", "no text");
+    expect_wrong(MBM_TYPE_TEXT, 8, "\"pump\"x", "no text");
+    expect_wrong(MBM_TYPE_TEXT, 8, "{\"value\":5}", "no text");
+    expect_wrong(MBM_TYPE_TEXT, 8, "{\"other\":\"a\"}", "no text");
+    assert_int_equal(parse_all(MBM_TYPE_TEXT, 8, "a\0b", 3), 0);
+    assert_int_equal(parse_all(MBM_TYPE_TEXT, 8, "", 0), 0);
+    memset(longest, 'a', sizeof longest - 1);
+    expect_wrong(MBM_TYPE_TEXT, 8, longest, "too long");
+}
+
+static void several_values_are_all_written(void **state)
+{
+    static const char *const right[] = {"1,2,3", "[1,2,3]", " [ 1 , 2 ,3 ] ", "1, 2, 3\n",
+                                        "{\"value\":[1,2,3]}"};
+    static const char *const bits[] = {"1,0,1", "[true,false,true]", "ON,OFF,ON",
+                                       "{\"value\":[1,false,1]}"};
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(right); i++) {
+        if (parse_all(MBM_TYPE_UINT16, 3, right[i], strlen(right[i])) != 3)
+            fail_msg("%s: %s", right[i], wrong);
+        assert_int_equal(all[0] * 100 + all[1] * 10 + all[2], 123);
+        assert_int_equal(parse_all(MBM_TYPE_UINT32, 3, right[i], strlen(right[i])), 6);
+        assert_int_equal(all[1] * 100 + all[3] * 10 + all[5], 123);
+    }
+    for (i = 0; i < COUNT(bits); i++) {
+        if (parse_all(MBM_TYPE_BIT, 3, bits[i], strlen(bits[i])) != 3)
+            fail_msg("%s: %s", bits[i], wrong);
+        assert_int_equal(all[0] * 100 + all[1] * 10 + all[2], 101);
+    }
+}
+
+static void a_list_with_one_wrong_value_is_refused(void **state)
+{
+    static const char *const wrongs[] = {"",
+                                         "1",
+                                         "1,2",
+                                         "1,2,3,4",
+                                         "1,2,",
+                                         "1,,3",
+                                         ",1,2",
+                                         "[1,2,3",
+                                         "1,2,3]",
+                                         "[1,2,3],4",
+                                         "[[1,2,3]]",
+                                         "1 2 3",
+                                         "1;2;3",
+                                         "[1,2,3]x",
+                                         "{\"value\":1}",
+                                         "[]",
+                                         "{\"other\":[1,2,3]}",
+                                         "[{\"value\":1},2,3]"};
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(wrongs); i++)
+        if (parse_all(MBM_TYPE_UINT16, 3, wrongs[i], strlen(wrongs[i])) != 0)
+            fail_msg("%s is taken", wrongs[i]);
+    expect_wrong(MBM_TYPE_UINT16, 3, "1,65536,3", "value 2: the number is out of range");
+    expect_wrong(MBM_TYPE_UINT16, 3, "1,2", "no list of 3 values");
+    expect_wrong(MBM_TYPE_BIT, 3, "1,0,2", "value 3");
+}
+
 static uint64_t random_state = 0x9E3779B97F4A7C15u;
 
 static uint64_t next_random(void)
@@ -598,6 +727,10 @@ int main(void)
         cmocka_unit_test(a_float_gets_the_nearest_number_or_none),
         cmocka_unit_test(only_a_bit_takes_a_truth_value),
         cmocka_unit_test(the_longest_payload_is_read_and_a_longer_one_is_refused),
+        cmocka_unit_test(a_text_is_the_payload_or_a_json_string),
+        cmocka_unit_test(a_text_that_does_not_fit_is_refused),
+        cmocka_unit_test(several_values_are_all_written),
+        cmocka_unit_test(a_list_with_one_wrong_value_is_refused),
         cmocka_unit_test(random_integers_are_written_exactly),
         cmocka_unit_test(random_bytes_are_numbers_or_refused),
     };

@@ -2,6 +2,7 @@
 #include "payload.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* The bytes that have not been read yet. */
@@ -213,4 +214,148 @@ uint16_t payload_parse(const value_form *form, const char *payload, size_t lengt
         *wrong = reason;
     }
     return count;
+}
+
+/* --- texts --- */
+
+/* The number of four hexadecimal digits, which skip_escape has checked. */
+static unsigned long read_hex(const char *at)
+{
+    char digits[5] = "";
+
+    memcpy(digits, at, 4);
+    return strtoul(digits, NULL, 16);
+}
+
+/* Takes an escape of a JSON string. Returns the character. */
+static unsigned long read_escape(cursor *in)
+{
+    static const char LETTERS[] = "bfnrt", CONTROLS[] = "\b\f\n\r\t";
+    const char letter = *in->at++;
+    const char *found = strchr(LETTERS, letter);
+
+    if (letter == 'u') {
+        in->at += 4;
+        return read_hex(in->at - 4);
+    }
+    return (unsigned char)(found ? CONTROLS[found - LETTERS] : letter);
+}
+
+/* Takes a character of UTF-8. Returns it, or a number that Latin-1 does not have. */
+static unsigned long read_utf8(cursor *in)
+{
+    const unsigned char first = (unsigned char)*in->at++;
+
+    if (first < 0x80)
+        return first;
+    if ((first != 0xC2 && first != 0xC3) || in->at == in->end ||
+        ((unsigned char)*in->at & 0xC0) != 0x80)
+        return 0x100;
+    return (unsigned long)(first & 3) << 6 | ((unsigned char)*in->at++ & 0x3F);
+}
+
+/* Writes a text, of which the bytes of a JSON string may be escapes. */
+static const char *write_text(const value_form *form, uint16_t count, cursor in, int is_string,
+                              uint16_t *words)
+{
+    char latin[VALUE_LONGEST_TEXT + 1];
+    mbm_registers registers;
+    uint16_t length = 0;
+
+    while (in.at < in.end) {
+        unsigned long one;
+
+        if (is_string && *in.at == '\\') {
+            in.at++;
+            one = read_escape(&in);
+        } else {
+            one = read_utf8(&in);
+        }
+        if (one == 0)
+            return "the text has a NUL, which ends a text";
+        if (one > 0xFF)
+            return "the text has a character that is not in Latin-1";
+        if (length == count)
+            return "the text is longer than the field";
+        latin[length++] = (char)one;
+    }
+    latin[length] = '\0';
+    (void)mbm_registers_intoWords(&registers, words, value_registers(MBM_TYPE_TEXT, count), 0);
+    (void)mbm_registers_setString(&registers, 0, count, form->order, latin);
+    return NULL;
+}
+
+static const char *read_text(const value_form *form, uint16_t count, const char *payload,
+                             size_t length, uint16_t *words)
+{
+    cursor value = {payload, payload + length}, in;
+
+    if (*payload == '{')
+        value = find_value(payload, length);
+    in = value;
+    if (*payload != '{' && *payload != '"')
+        return write_text(form, count, value, 0, words);
+    if (!value.at || !skip_string(&in) || in.at != value.end)
+        return "the payload is no text";
+    value.at++;
+    value.end--;
+    return write_text(form, count, value, 1, words);
+}
+
+/* --- several values --- */
+
+static const char *read_values(const value_form *form, uint16_t count, const char *payload,
+                               size_t length, uint16_t *words)
+{
+    static char reason[100];
+    cursor in = find_value(payload, length);
+    const char *wrong = NULL;
+    uint16_t at;
+
+    if (in.at && skip_char(&in, '[')) {
+        if (in.at < in.end && in.end[-1] == ']')
+            in.end--;
+        else
+            in.at = NULL;
+    }
+    for (at = 0; in.at && at < count; at++) {
+        const char *start, *end;
+        uint16_t used;
+
+        skip_space(&in);
+        start = in.at;
+        while (in.at < in.end && *in.at != ',')
+            in.at++;
+        end = in.at;
+        if (start == end || *start == '{' || (in.at < in.end) != (at + 1 < count))
+            break;
+        used = payload_parse(form, start, (size_t)(end - start), words, &wrong);
+        if (used == 0) {
+            snprintf(reason, sizeof reason, "value %u: %s", at + 1, wrong);
+            return reason;
+        }
+        words += used;
+        if (at + 1 < count)
+            in.at++;
+    }
+    if (at == count)
+        return NULL;
+    snprintf(reason, sizeof reason, "the payload is no list of %u values", count);
+    return reason;
+}
+
+uint16_t payload_parse_all(const value_form *form, uint16_t count, const char *payload,
+                           size_t length, uint16_t words[PAYLOAD_WORDS], const char **wrong)
+{
+    const uint16_t size = value_registers(form->type, count);
+
+    if (count == 1 && form->type != MBM_TYPE_TEXT)
+        return payload_parse(form, payload, length, words, wrong);
+    *wrong = length > PAYLOAD_LONGEST      ? "the payload is too long"
+             : length == 0                 ? "the payload is empty"
+             : form->type == MBM_TYPE_TEXT ? read_text(form, count, payload, length, words)
+                                           : read_values(form, count, payload, length, words);
+    if (*wrong)
+        return 0;
+    return form->type == MBM_TYPE_TEXT ? size : (uint16_t)(size * count);
 }

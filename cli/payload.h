@@ -6,8 +6,11 @@
 
 #include "value.h"
 
-/* Bytes of the longest payload of a write. */
-enum { PAYLOAD_BYTES = VALUE_LONGEST };
+enum {
+    PAYLOAD_BYTES = VALUE_LONGEST, /* of the longest payload of a single value */
+    PAYLOAD_LONGEST = 3000,        /* bytes of the longest payload of a text or of several values */
+    PAYLOAD_WORDS = 2000           /* the most words of a payload: a word for each coil */
+};
 
 /* Converts a payload of `length` bytes to the words of a write. The whole payload must be a number,
  * a truth value, or a JSON object with one member "value" that is a number or a truth value. White
@@ -16,5 +19,13 @@ enum { PAYLOAD_BYTES = VALUE_LONGEST };
  * reason in `wrong`, which the next call overwrites. */
 uint16_t payload_parse(const value_form *form, const char *payload, size_t length,
                        uint16_t words[VALUE_WORDS], const char **wrong);
+
+/* As payload_parse, for a text of `count` characters, or for `count` values. The payload of a text
+ * is the text itself, as UTF-8, a JSON string, or a JSON object with such a member "value"; what
+ * follows the text in the registers is 0. Several values are numbers or truth values with commas
+ * between them, without or with the brackets of a JSON array, or an object with such an array as
+ * "value". */
+uint16_t payload_parse_all(const value_form *form, uint16_t count, const char *payload,
+                           size_t length, uint16_t words[PAYLOAD_WORDS], const char **wrong);
 
 #endif
