@@ -1,373 +1,396 @@
-/* Publishes the values of a device file to an MQTT broker, and writes what the broker sends: `mbm
+/* Publishes the values of device files to an MQTT broker, and writes what the broker sends: `mbm
  * bridge`. docs/mqtt.md has the topics and the options.
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
-#include "broker.h"
+#include "bridge_file.h"
 #include "commands.h"
-#include "line.h"
+#include "discovery.h"
 #include "options.h"
 #include "report.h"
-#include "value_text.h"
+#include "service.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
-enum {
-    REQUESTS = 4, /* reads in the client's queue at once */
-    WRITES = 8    /* writes that wait or are under way */
-};
+enum { UNREACHED_MS = 5000 /* after so long without the broker it is reported */ };
 
-/* What was published of a field. */
-typedef struct published {
-    char *value; /* NULL: nothing */
-    uint8_t status;
-    uint8_t is_answered; /* the unit answered the last read */
-    uint8_t has_ended;   /* the first read has ended */
-} published;
+/* What the command line says, and what is in force. */
+static bridge_setup given, setup;
+static broker_options to;
+static const char *path; /* of the file; NULL: the command line has the lines */
+static bridge_line *lines[BRIDGE_LINES];
+static unsigned line_count;
+static unsigned long reloads, refused_reloads;
+static uint32_t alone_since; /* since when there is no broker */
+static int is_alone;         /* and that was reported */
 
-/* A unit: how many of its fields have which state. */
-typedef struct unit_state {
-    uint16_t fields, answered, ended;
-    enum { UNKNOWN, OFFLINE, ONLINE } state;
-} unit_state;
+/* --- the files again --- */
 
-typedef struct write_request {
-    mbm_clientRequest request;
-    uint16_t words[VALUE_WORDS];
-    uint16_t field;
-    uint8_t is_used;
-} write_request;
+/* A line as it will be: one that is there or a new one, with a table to read, or NULL to go on. */
+typedef struct next_line {
+    bridge_line *line;
+    bridge_table *table;
+    int is_new;
+} next_line;
 
-static line at;
-static mbm_plan plan = MBM_INIT;
-static mbm_planSetup setup;
-static device fields;
-static broker mqtt;
-static published *last;
-static unit_state units[256];
-static write_request writes[WRITES];
-
-/* What the command line says. */
-static broker_options to = {.host = "localhost", .topic = "modbus"};
-static place where;
-static const char *path;
-static int is_plain, is_every;
-
-/* Whether a status came from the unit itself, and not from a line or gateway that lacks it. */
-static int is_answer(uint8_t status)
+static bridge_line *find_line(const char *text, const char *topic)
 {
-    return status < 0x80 && status != MBM_GATEWAY_PATH_UNAVAILABLE &&
-           status != MBM_GATEWAY_TARGET_FAILED_TO_RESPOND;
+    unsigned i;
+
+    for (i = 0; i < line_count; i++)
+        if (strcmp(lines[i]->text, text) == 0 && strcmp(lines[i]->topic, topic) == 0)
+            return lines[i];
+    return NULL;
 }
 
-static void publish_unit(unsigned unit)
+/* Prepares a line of a setup. Returns an exit code, with the reason in `wrong`. */
+static int prepare(const bridge_setup *from, unsigned index, next_line *next,
+                   char wrong[DEVICE_WRONG_BYTES])
 {
-    char name[16];
+    const char *file = from->lines[index].path;
+    int code;
 
-    snprintf(name, sizeof name, "unit/%u", unit);
-    broker_publish(&mqtt, name, "status", units[unit].state == ONLINE ? "online" : "offline", 1);
+    next->table = bridge_table_read(file, bridge_setup_gap(from), &code, wrong);
+    if (!next->table)
+        return code;
+    next->line = find_line(from->lines[index].text, from->lines[index].topic);
+    next->is_new = !next->line;
+    if (next->is_new)
+        next->line = bridge_line_make(from->lines[index].text, file, from->lines[index].topic,
+                                      &from->lines[index].place);
+    if (!next->line) {
+        snprintf(wrong, DEVICE_WRONG_BYTES, "not enough memory");
+        return CODE_SYSTEM;
+    }
+    if (!next->is_new && strcmp(next->line->path, file) == 0 &&
+        next->line->table->digest == next->table->digest) {
+        bridge_table_free(next->table);
+        next->table = NULL;
+    }
+    return CODE_DONE;
 }
 
-/* A unit is online while it answers one of its reads. */
-static void update_unit(uint16_t field, uint8_t status)
+static void forget(next_line *next, unsigned count)
 {
-    const uint16_t number = fields.planned[field].unit;
-    unit_state *unit = &units[number];
-    published *was = &last[field];
-    const uint8_t answered = (uint8_t)is_answer(status);
+    unsigned i;
 
-    unit->ended = (uint16_t)(unit->ended + !was->has_ended);
-    was->has_ended = 1;
-    unit->answered = (uint16_t)(unit->answered + answered - was->is_answered);
-    was->is_answered = answered;
-    if (unit->answered > 0 ? unit->state != ONLINE
-                           : unit->ended == unit->fields && unit->state != OFFLINE) {
-        unit->state = unit->answered > 0 ? ONLINE : OFFLINE;
-        publish_unit(number);
+    for (i = 0; i < count; i++) {
+        bridge_table_free(next[i].table);
+        if (next[i].is_new && next[i].line)
+            bridge_line_end(next[i].line);
     }
 }
 
-/* Publishes the last value of a field, with its status and the time at which it was read. */
-static void publish_value(uint16_t field)
+/* Prepares all lines of a setup. Returns an exit code, with the reason in `wrong`; nothing is left
+ * then. */
+static int prepare_all(const bridge_setup *from, next_line next[BRIDGE_LINES],
+                       char wrong[DEVICE_WRONG_BYTES])
 {
-    static char json[VALUE_TEXT_LONGEST + 128];
-    const published *what = &last[field];
-    const char *value = what->value ? what->value : "null";
-    struct timespec now;
-    struct tm utc;
-    uint32_t age = 0;
-    char when[32];
+    unsigned i;
+    int code = CODE_DONE;
 
-    if (is_plain) {
-        /* Plain text has no place for a status: what failed is not published. */
-        if (what->value && what->status == MBM_OK)
-            broker_publish(&mqtt, fields.fields[field].name, NULL, value, 1);
-        return;
+    memset(next, 0, BRIDGE_LINES * sizeof *next);
+    for (i = 0; i < from->line_count && code == CODE_DONE; i++)
+        code = prepare(from, i, &next[i], wrong);
+    if (code != CODE_DONE)
+        forget(next, from->line_count);
+    return code;
+}
+
+static void remove_lines(const next_line *next, unsigned count, unsigned *removed)
+{
+    unsigned i, j;
+
+    for (i = 0; i < line_count; i++) {
+        for (j = 0; j < count && next[j].line != lines[i]; j++)
+            ;
+        if (j < count)
+            continue;
+        bridge_line_clear(lines[i]);
+        bridge_line_end(lines[i]);
+        (*removed)++;
     }
-    (void)mbm_plan_getStatus(&plan, field, &age);
-    clock_gettime(CLOCK_REALTIME, &now);
-    if (what->value) {
-        now.tv_sec -= age / 1000;
-        now.tv_nsec -= (long)(age % 1000) * 1000000;
-        if (now.tv_nsec < 0) {
-            now.tv_nsec += 1000000000;
-            now.tv_sec--;
+}
+
+/* Puts a setup in force that was prepared. Lines that both have go on as they are. */
+static void apply(next_line next[BRIDGE_LINES], unsigned count)
+{
+    unsigned i, kept = 0, changed = 0, added = 0, removed = 0;
+
+    remove_lines(next, count, &removed);
+    line_count = 0;
+    for (i = 0; i < count; i++) {
+        bridge_line *one = next[i].line;
+
+        if (next[i].is_new && bridge_line_begin(one, next[i].table, 1) != CODE_DONE) {
+            bridge_table_free(next[i].table);
+            bridge_line_end(one);
+            continue;
         }
+        if (next[i].is_new) {
+            bridge_line_connected(one);
+            added++;
+        } else if (next[i].table) {
+            char *file = strdup(setup.lines[i].path);
+
+            bridge_line_replace(one, next[i].table);
+            free(one->path);
+            one->path = file;
+            changed++;
+        } else {
+            kept++;
+        }
+        lines[line_count++] = one;
     }
-    gmtime_r(&now.tv_sec, &utc);
-    (void)strftime(when, sizeof when, "%Y-%m-%dT%H:%M:%S", &utc);
-    snprintf(json, sizeof json, "{\"value\":%s,\"status\":\"%s\",\"time\":\"%s.%03ldZ\"}", value,
-             mbm_status_text(what->status), when, now.tv_nsec / 1000000);
-    broker_publish(&mqtt, fields.fields[field].name, NULL, json, 1);
+    report_log(REPORT_INFO,
+               "the files are in force. Lines kept: %u, with a new device file: %u, removed: %u, "
+               "added: %u",
+               kept, changed, removed, added);
 }
 
-/* Called by the plan for each field whose read has ended. */
-static void on_update(void *context, mbm_plan *ended, uint16_t field)
+/* The first setting that differs, or NULL. */
+static const char *changed_setting(const bridge_setup *next)
 {
-    static char text[VALUE_TEXT_LONGEST];
-    published *was = &last[field];
-    const uint8_t status = mbm_plan_getStatus(ended, field, NULL);
-    int is_new = is_every || status != was->status || !was->has_ended;
+    int i;
 
-    (void)context;
-    if (status == MBM_OK && value_text(ended, &fields, field, !is_plain, text) &&
-        (!was->value || strcmp(text, was->value) != 0)) {
-        free(was->value);
-        was->value = strdup(text);
-        is_new = 1;
+    for (i = 0; i < BRIDGE_SETTINGS; i++) {
+        const char *before = setup.values[i] ? setup.values[i] : "";
+        const char *after = next->values[i] ? next->values[i] : "";
+
+        if (strcmp(before, after) != 0)
+            return bridge_names[i];
     }
-    was->status = status;
-    update_unit(field, status);
-    if (is_new)
-        publish_value(field);
+    return NULL;
 }
 
-/* What a new connection has to publish: everything that has been read. */
-static void publish_all(void)
+/* Reads the file of the bridge, or takes the lines of the command line. Returns an exit code, with
+ * the reason in its `wrong`. */
+static int read_setup(bridge_setup *into)
 {
-    unsigned number;
-    uint16_t field;
-
-    for (number = 1; number < 256; number++)
-        if (units[number].state != UNKNOWN)
-            publish_unit(number);
-    for (field = 0; field < fields.readable; field++)
-        if (last[field].has_ended)
-            publish_value(field);
+    if (bridge_setup_copy(into, &given))
+        return path ? bridge_file_read(into, path) : CODE_DONE;
+    snprintf(into->wrong, sizeof into->wrong, "not enough memory");
+    return CODE_SYSTEM;
 }
 
-static void publish_result(uint16_t field, const char *result)
+static void reload(void)
 {
-    broker_publish(&mqtt, fields.fields[field].name, "result", result, 0);
+    static next_line next_lines[BRIDGE_LINES];
+    static bridge_setup next;
+    char wrong[DEVICE_WRONG_BYTES] = "";
+    const char *differs;
+
+    service_is_reloading();
+    if (read_setup(&next) != CODE_DONE) {
+        snprintf(wrong, sizeof wrong, "%s", next.wrong);
+    } else if ((differs = changed_setting(&next)) != NULL) {
+        snprintf(wrong, sizeof wrong, "%s: %s has changed, which needs a restart", path, differs);
+    } else if (prepare_all(&next, next_lines, wrong) == CODE_DONE) {
+        bridge_setup_free(&setup);
+        setup = next;
+        memset(&next, 0, sizeof next);
+        apply(next_lines, setup.line_count);
+        reloads++;
+    }
+    if (*wrong) {
+        report_log(REPORT_ERROR, "%s. The files before stay in force", wrong);
+        refused_reloads++;
+        bridge_setup_free(&next);
+    }
+    service_is_ready();
 }
 
-static void on_written(void *context, mbm_clientRequest *request)
+/* --- the broker --- */
+
+/* The line whose topic begins this name, or NULL. */
+static bridge_line *line_of(const char *name)
 {
-    write_request *write = (write_request *)context;
-    char text[256];
+    unsigned i;
 
-    publish_result(write->field, line_status(&at, request, text));
-    if (write->field < fields.readable)
-        (void)mbm_plan_refresh(&plan, write->field);
-    write->is_used = 0;
-}
-
-/* Begins the write of a payload. Returns NULL, or why it is refused. */
-static const char *begin_write(uint16_t field, const char *payload, size_t length)
-{
-    const mbm_planField *planned = &fields.planned[field];
-    write_request *write = writes;
-    const char *wrong;
-    uint16_t count;
-    uint8_t status;
-
-    while (write < writes + WRITES && write->is_used)
-        write++;
-    if (write == writes + WRITES)
-        return "too many writes wait";
-    memset(write, 0, sizeof *write);
-    count = payload_parse(&fields.fields[field].form, payload, length, write->words, &wrong);
-    if (count == 0)
-        return wrong;
-    write->field = field;
-    write->request.unit = planned->unit;
-    write->request.data = write->words;
-    write->request.done = on_written;
-    write->request.context = write;
-    if (planned->table == MBM_TABLE_COILS)
-        status = mbm_client_writeSingleCoil(&at.client, &write->request, planned->address,
-                                            (uint8_t)write->words[0]);
-    else if (count == 1)
-        status = mbm_client_writeSingleRegister(&at.client, &write->request, planned->address,
-                                                write->words[0]);
-    else
-        status =
-            mbm_client_writeMultipleRegisters(&at.client, &write->request, planned->address, count);
-    if (status != MBM_OK && status != MBM_PENDING)
-        return mbm_status_text(status);
-    write->is_used = 1;
+    for (i = 0; i < line_count; i++)
+        if (strncmp(name, lines[i]->below, strlen(lines[i]->below)) == 0)
+            return lines[i];
     return NULL;
 }
 
 static void take_events(void)
 {
-    broker_event event;
+    static broker_event event;
+    unsigned i;
 
-    while (broker_next(&mqtt, &event)) {
-        const char *wrong;
+    while (broker_next(&bridge.mqtt, &event)) {
+        bridge_line *owner;
 
         if (event.kind == BROKER_CONNECTED) {
-            publish_all();
+            for (i = 0; i < line_count; i++)
+                bridge_line_connected(lines[i]);
+            broker_publish(&bridge.mqtt, "status", NULL, "online", 1);
             continue;
         }
-        wrong = begin_write(event.field, event.payload, event.length);
-        if (wrong)
-            publish_result(event.field, wrong);
+        owner = line_of(event.bytes);
+        if (owner)
+            bridge_line_write(owner, event.bytes + strlen(owner->below), &event);
+        else
+            broker_publish(&bridge.mqtt, event.bytes, "result", "there is no such field", 0);
     }
 }
 
-/* Sleeps until bytes or an event arrive, or until the client or the plan has something to do. */
-static void rest(void)
+/* Reports once that there is no broker for some time. Returns how long to sleep at most. */
+static uint32_t watch_broker(void)
 {
-    const uint32_t client = mbm_client_pollDelay(&at.client), planned = mbm_plan_pollDelay(&plan);
-
-    line_wait(&at, mqtt.events[0], client < planned ? client : planned);
-}
-
-/* Whether the bridge can publish and write all fields. */
-static int check_fields(void)
-{
-    uint16_t field;
-
-    for (field = 0; field < fields.count; field++) {
-        const device_field *one = &fields.fields[field];
-        const mbm_planField *planned = &fields.planned[field];
-        const char *wrong = broker_check_name(one->name);
-
-        if (!wrong && (one->access & DEVICE_WRITE) &&
-            (planned->count > 1 || planned->type == MBM_TYPE_TEXT))
-            wrong = "the bridge writes only single numbers and bits";
-        if (wrong)
-            return report(CODE_WRONG, "%s:%d: %s: %s", path, one->line, one->name, wrong);
+    if (atomic_load(&bridge.mqtt.is_connected)) {
+        alone_since = line_milliseconds();
+        is_alone = 0;
+        return UINT32_MAX;
     }
-    if (fields.readable == 0)
-        return report(CODE_WRONG, "%s: no field can be read", path);
-    return CODE_DONE;
+    if (!is_alone && line_milliseconds() - alone_since >= UNREACHED_MS) {
+        report_log(REPORT_WARNING,
+                   "the broker %s cannot be reached. The bridge reads on, and tries it again",
+                   bridge.mqtt.address);
+        is_alone = 1;
+    }
+    return is_alone ? UINT32_MAX : 1000000;
 }
 
-/* Gives the plan its storage. Returns an exit code. */
-static int begin_plan(void)
-{
-    const size_t count = fields.readable;
-    uint8_t status;
-    uint16_t wrong;
-    size_t field;
+/* --- work --- */
 
-    last = (published *)calloc(count, sizeof *last);
-    setup.fields = fields.planned;
-    setup.fieldCount = setup.readCount = fields.readable;
-    setup.positions = (mbm_planPosition *)calloc(count, sizeof *setup.positions);
-    setup.reads = (mbm_planRead *)calloc(count, sizeof *setup.reads);
-    setup.data = (uint16_t *)calloc(65535, sizeof *setup.data);
-    setup.requests = (mbm_clientRequest *)calloc(REQUESTS, sizeof *setup.requests);
-    if (!last || !setup.positions || !setup.reads || !setup.data || !setup.requests)
-        return report(CODE_SYSTEM, "%s: not enough memory", path);
-    setup.dataWords = 65535;
-    setup.requestCount = REQUESTS;
-    setup.update = on_update;
-    for (field = 0; field < count; field++)
-        units[fields.planned[field].unit].fields++;
-    status = mbm_plan_begin(&plan, &at.client, &setup, &wrong);
-    if (status == MBM_OK)
-        return CODE_DONE;
-    if (wrong < fields.readable)
-        return report(CODE_WRONG, "%s:%d: %s", path, fields.fields[wrong].line,
-                      mbm_status_text(status));
-    return report(CODE_WRONG, "%s: %s", path, mbm_status_text(status));
+/* Sleeps until there is something to do. */
+static void rest(uint32_t micros)
+{
+    static struct pollfd polls[1 + BRIDGE_LINES + SERVICE_WAITS];
+    nfds_t count = 0;
+    unsigned i;
+
+    polls[count++] = (struct pollfd){bridge.mqtt.events[0], POLLIN, 0};
+    for (i = 0; i < line_count; i++)
+        count += (nfds_t)bridge_line_polls(lines[i], &polls[count], &micros);
+    (void)service_wait(polls, count, micros);
 }
 
-static void free_all(void)
+static void work(void)
 {
-    uint16_t field;
+    unsigned i;
 
-    for (field = 0; last && field < fields.readable; field++)
-        free(last[field].value);
-    free(last);
-    free(setup.positions);
-    free(setup.reads);
-    free(setup.data);
-    free(setup.requests);
-    device_free(&fields);
+    if (service_reload_is_wanted())
+        reload();
+    service_work();
+    take_events();
+    for (i = 0; i < line_count; i++)
+        bridge_line_poll(lines[i]);
+    if (!report_stopped)
+        rest(watch_broker());
+}
+
+static const stats_kind KINDS[] = {
+    {"mqtt_connected", "1 while the broker is connected.", 0},
+    {"mqtt_connects", "How often the broker was connected.", 1},
+    {"mqtt_publishes", "Messages that were published.", 1},
+    {"writes", "Writes that a device has confirmed.", 1},
+    {"failed_writes", "Writes that were refused or failed.", 1},
+    {"lost_writes", "Writes that found no place.", 1},
+    {"reloads", "How often files came in force.", 1},
+    {"reload_failures", "How often files were refused.", 1},
+};
+
+static void fill_stats(stats *numbers)
+{
+    unsigned i;
+
+    numbers->command = "bridge";
+    numbers->kinds = KINDS;
+    numbers->count = sizeof KINDS / sizeof KINDS[0];
+    numbers->values[0] = (uint64_t)atomic_load(&bridge.mqtt.is_connected);
+    numbers->values[1] = atomic_load(&bridge.mqtt.connects);
+    numbers->values[2] = atomic_load(&bridge.mqtt.published);
+    numbers->values[3] = bridge.written;
+    numbers->values[4] = bridge.refused;
+    numbers->values[5] = atomic_load(&bridge.mqtt.lost);
+    numbers->values[6] = reloads;
+    numbers->values[7] = refused_reloads;
+    for (i = 0; i < line_count; i++) {
+        const line *at = &lines[i]->at;
+        const int has_link = at->place.kind != PLACE_UDP;
+
+        numbers->lines[numbers->line_count++] =
+            (stats_line){.name = *lines[i]->topic ? lines[i]->topic : lines[i]->text,
+                         .counters = &at->counters,
+                         .link = has_link ? &at->losses : NULL,
+                         .is_up = !has_link || mbm_link_state(&at->kept) == MBM_LINK_IS_UP};
+    }
 }
 
 /* --- the command line --- */
 
-enum { ALL = 0x100, CA, CERT, GAP, ID, KEY, PLAIN, USER };
+enum { ALL = 0x100, CA, CERT, DISCOVERY, DISCOVERY_PREFIX, GAP, ID, KEEP_ALIVE, KEY, PLAIN, USER };
 
-/* Reads HOST[:PORT], or [IPV6][:PORT]. */
-static void read_broker(const struct argp_state *state, char *text)
+static void take_value(const struct argp_state *state, int setting, const char *option,
+                       const char *text)
 {
-    char *end = *text == '[' ? strchr(text, ']') : NULL;
-    char *port = strchr(end ? end : text, ':');
+    const char *wrong = bridge_setup_value(&given, setting, text);
 
-    if (strpbrk(text, ", /@") || (port && (strchr(port + 1, ':') || (end && port != end + 1))))
-        options_wrong(state,
-                      "--broker \"%s\" is not HOST or HOST:PORT; an IPv6 address needs "
-                      "brackets, such as [::1]:1883",
-                      text);
-    if (port)
-        to.port = (int)options_number(state, "the port of --broker", port + 1, 1, 65535);
-    if (port)
-        *port = '\0';
-    if (end)
-        *end = '\0';
-    to.host = text + (end != NULL);
-    if (!*to.host)
-        options_wrong(state, "--broker has no host");
+    if (wrong)
+        options_wrong(state, "%s %s", option, wrong);
+}
+
+static const char *pending; /* the LINE whose FILE follows */
+
+/* Reads a word that is no option: FILE of a bridge, or LINE and FILE by turns. */
+static void read_word(const struct argp_state *state, char *text)
+{
+    const size_t length = strlen(text);
+    const char *wrong = NULL;
+    place where;
+
+    if (state->arg_num == 0 && length > 5 && strcmp(text + length - 5, ".yaml") == 0) {
+        path = text;
+    } else if (path) {
+        options_wrong(state, "\"%s\" is one word too many: the lines are in the file", text);
+    } else if (state->arg_num % 2 == 0) {
+        options_place(state, &where, text, 0);
+        pending = text;
+    } else {
+        wrong = bridge_setup_line(&given, pending, text, NULL);
+        pending = NULL;
+    }
+    if (wrong)
+        options_wrong(state, "%s", wrong);
 }
 
 static void check_options(const struct argp_state *state)
 {
-    if (state->arg_num != 2)
-        options_wrong(state, "a bridge needs LINE and FILE");
-    if (!to.ca_file && (to.cert_file || to.key_file))
-        options_wrong(state, "--cert and --key need --ca");
-    if (!to.cert_file != !to.key_file)
-        options_wrong(state, "--cert and --key need each other");
-    if (to.port == 0)
-        to.port = to.ca_file ? 8883 : 1883;
+    const char *wrong = bridge_setup_check(&given, "--");
+
+    if (!path && (given.line_count == 0 || pending))
+        options_wrong(state, "a bridge needs LINE and FILE, or a FILE of a bridge");
+    if (wrong && !path)
+        options_wrong(state, "%s", wrong);
+    /* The topics of one line need no name that tells it from others. */
+    if (given.line_count == 1)
+        given.lines[0].topic[0] = '\0';
 }
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     switch (key) {
-    case 'b': read_broker(state, text); return 0;
-    case 't':
-        if (strlen(text) > BROKER_TOPIC_BYTES || !*text || strpbrk(text, "+#"))
-            options_wrong(state, "--topic \"%s\" is not 1 to %d bytes without + and #", text,
-                          BROKER_TOPIC_BYTES);
-        to.topic = text;
+    case 'b': take_value(state, BRIDGE_BROKER, "--broker", text); return 0;
+    case 't': take_value(state, BRIDGE_TOPIC, "--topic", text); return 0;
+    case ID: take_value(state, BRIDGE_ID, "--id", text); return 0;
+    case USER: take_value(state, BRIDGE_USER, "--user", text); return 0;
+    case CA: take_value(state, BRIDGE_CA, "--ca", text); return 0;
+    case CERT: take_value(state, BRIDGE_CERT, "--cert", text); return 0;
+    case KEY: take_value(state, BRIDGE_KEY, "--key", text); return 0;
+    case KEEP_ALIVE: take_value(state, BRIDGE_KEEP_ALIVE, "--keep-alive", text); return 0;
+    case DISCOVERY: take_value(state, BRIDGE_DISCOVERY, "--discovery", text); return 0;
+    case DISCOVERY_PREFIX:
+        take_value(state, BRIDGE_DISCOVERY_PREFIX, "--discovery-prefix", text);
         return 0;
-    case ID: to.id = text; return 0;
-    case USER: to.user = text; return 0;
-    case CA: to.ca_file = text; return 0;
-    case CERT: to.cert_file = text; return 0;
-    case KEY: to.key_file = text; return 0;
-    case PLAIN: is_plain = 1; return 0;
-    case ALL: is_every = 1; return 0;
-    case GAP: setup.registerGap = (uint8_t)options_number(state, "--gap", text, 0, 123); return 0;
+    case PLAIN: take_value(state, BRIDGE_PLAIN, "--plain", "yes"); return 0;
+    case ALL: take_value(state, BRIDGE_ALL, "--all", "yes"); return 0;
+    case GAP: take_value(state, BRIDGE_GAP, "--gap", text); return 0;
     case 'q': options.is_quiet = 1; return 0;
-    case ARGP_KEY_ARG:
-        if (state->arg_num == 0)
-            options_place(state, &where, text, 0);
-        else if (state->arg_num == 1)
-            path = text;
-        else
-            options_wrong(state, "\"%s\" is one word too many: a bridge has LINE and FILE", text);
-        return 0;
+    case ARGP_KEY_ARG: read_word(state, text); return 0;
     case ARGP_KEY_END: check_options(state); return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -382,58 +405,103 @@ static const struct argp_option texts[] = {
     {"ca", CA, "FILE", 0, "Connect with TLS; the certificates that sign the broker's", 1},
     {"cert", CERT, "FILE", 0, "The bridge's certificate", 1},
     {"key", KEY, "FILE", 0, "The bridge's key", 1},
+    {"keep-alive", KEEP_ALIVE, "TIME", 0,
+     "After this time without a sign of the broker it is taken for lost, 5s to 1h (15s)", 1},
     {"plain", PLAIN, NULL, 0, "Publish plain text instead of JSON", 2},
     {"all", ALL, NULL, 0, "Publish every reading, not only changes", 2},
+    {"discovery", DISCOVERY, "WHOSE", 0,
+     "Publish for each field how homeassistant finds it, by MQTT discovery", 2},
+    {"discovery-prefix", DISCOVERY_PREFIX, "PREFIX", 0,
+     "The beginning of the topics of discovery (homeassistant)", 2},
     {"gap", GAP, "N", 0, "Registers between two fields that one request may read too, 0 to 123 (0)",
      3},
     {"quiet", 'q', NULL, 0, "Print no summary to stderr", 4},
     {NULL, 0, NULL, 0, NULL, 0}};
 
-static const struct argp_child children[] = {
-    {&options_request, 0, NULL, 3}, {&options_trace, 0, NULL, 4}, {NULL, 0, NULL, 0}};
+static const struct argp_child children[] = {{&options_request, 0, NULL, 3},
+                                             {&options_service, 0, NULL, 0},
+                                             {&options_trace, 0, NULL, 4},
+                                             {NULL, 0, NULL, 0}};
 static const struct argp parser = {
     texts,
     parse,
-    "LINE FILE",
-    "Publishes the values of a device to an MQTT broker, and writes what the broker sends.\v"
-    "FILE is a device file; its fields with access write or read-write can be written. "
-    "docs/mqtt.md describes the topics.\n\n"
-    "Example:\n\n"
-    "  mbm bridge --broker broker.local tcp://192.168.0.7 meter.yaml\n\n" PLACE_HELP,
+    "LINE FILE [LINE FILE]...\nBRIDGE.yaml",
+    "Publishes the values of devices to an MQTT broker, and writes what the broker sends.\v"
+    "FILE is a device file; its fields with access write or read-write can be written. Several "
+    "lines have topics below the name of their file. BRIDGE.yaml has the keys lines and broker, and "
+    "what the options say. docs/mqtt.md describes topics and files.\n\n"
+    "SIGHUP reads the files again: broker, and lines that stay the same, stay connected.\n\n"
+    "Examples:\n\n"
+    "  mbm bridge --broker broker.local tcp://192.168.0.7 meter.yaml\n"
+    "  mbm bridge --discovery homeassistant rtu:/dev/ttyUSB0 meter.yaml tcp://192.168.0.7 pump.yaml\n"
+    "  mbm bridge bridge.yaml --metrics 127.0.0.1:9100\n\n" SERVICE_HELP PLACE_HELP,
     children,
     NULL,
     NULL};
+
+/* Opens all lines. Of the command line, each terminal must be there. Returns an exit code. */
+static int begin_lines(void)
+{
+    static next_line next[BRIDGE_LINES];
+    char wrong[DEVICE_WRONG_BYTES];
+    unsigned i;
+    int code = prepare_all(&setup, next, wrong);
+
+    if (code != CODE_DONE)
+        return report(code, "%s", wrong);
+    for (i = 0; i < setup.line_count; i++) {
+        code = bridge_line_begin(next[i].line, next[i].table, path != NULL);
+        if (code != CODE_DONE) {
+            forget(next + i, setup.line_count - i);
+            return code;
+        }
+        lines[line_count++] = next[i].line;
+    }
+    return CODE_DONE;
+}
+
+/* Begins all of it. Returns an exit code, after reporting the reason if it is not CODE_DONE. */
+static int begin(void)
+{
+    int code = read_setup(&setup);
+
+    if (code != CODE_DONE)
+        return report(code, "%s", setup.wrong);
+    if (!bridge_setup_options(&setup, &to))
+        return report(CODE_SYSTEM, "not enough memory");
+    bridge.is_plain = (uint8_t)bridge_setup_is(&setup, BRIDGE_PLAIN);
+    bridge.is_every = (uint8_t)bridge_setup_is(&setup, BRIDGE_ALL);
+    bridge.has_discovery = (uint8_t)bridge_setup_is(&setup, BRIDGE_DISCOVERY);
+    if (setup.values[BRIDGE_DISCOVERY_PREFIX])
+        discovery_prefix = strdup(setup.values[BRIDGE_DISCOVERY_PREFIX]);
+    code = begin_lines();
+    if (code == CODE_DONE)
+        code = service_begin(fill_stats);
+    if (code == CODE_DONE)
+        code = broker_begin(&bridge.mqtt, &to);
+    alone_since = line_milliseconds();
+    return code;
+}
 
 int bridge_command(int argc, char **argv)
 {
     int code;
 
     argp_parse(&parser, argc, argv, 0, NULL, NULL);
-    code = device_read(&fields, path);
-    if (code != CODE_DONE)
-        return report(code, "%s", fields.wrong);
-    code = check_fields();
-    if (code == CODE_DONE)
-        code = line_open(&at, &where);
-    if (code == CODE_DONE)
-        code = begin_plan();
-    if (code == CODE_DONE)
-        code = broker_begin(&mqtt, &to, &fields);
-    while (code == CODE_DONE && !report_stopped) {
-        take_events();
-        (void)mbm_plan_poll(&plan);
-        line_poll(&at);
-        if (!report_stopped)
-            rest();
-    }
+    code = begin();
     if (code == CODE_DONE) {
-        (void)mbm_plan_end(&plan);
-        broker_end(&mqtt);
+        service_is_ready();
+        while (!report_stopped)
+            work();
+        service_end();
+        broker_end(&bridge.mqtt);
         if (!options.is_quiet)
             fprintf(stderr, "%s: messages published: %lu, writes lost: %lu.\n", report_name,
-                    atomic_load(&mqtt.published), atomic_load(&mqtt.lost));
+                    atomic_load(&bridge.mqtt.published), atomic_load(&bridge.mqtt.lost));
     }
-    line_close(&at);
-    free_all();
+    while (line_count > 0)
+        bridge_line_end(lines[--line_count]);
+    bridge_setup_free(&setup);
+    bridge_setup_free(&given);
     return code;
 }

@@ -5,14 +5,18 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <mosquitto.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-/* Bytes of the longest topic. */
-enum { LONGEST_TOPIC = 512 };
+enum { LONGEST_TOPIC = BROKER_LONGEST_TOPIC };
+
+/* A write to a pipe is whole only up to PIPE_BUF. */
+_Static_assert(sizeof(broker_event) <= PIPE_BUF, "an event is longer than a pipe takes at once");
 
 /* The ends of the topics of a write and of its result. */
 static const char SET[] = "/set", RESULT[] = "/result";
@@ -26,21 +30,44 @@ static void join(char topic[LONGEST_TOPIC], const char *first, const char *name,
  * Returns 0 if it is full. */
 static int send_event(broker *of, const broker_event *event)
 {
-    return write(of->events[1], event, sizeof *event) == (ssize_t)sizeof *event;
+    const size_t size =
+        offsetof(broker_event, bytes) + (size_t)event->name_bytes + (size_t)event->length;
+
+    return write(of->events[1], event, size) == (ssize_t)size;
 }
 
-/* Subscribes to the topics of writes: for the answers to writes to unknown fields, to those of each
- * name with up to BROKER_LEVELS levels. */
-static void subscribe(broker *of)
+/* Calls a function with each of the topics of writes below a name. */
+static void for_levels(broker *of, const char *below, void (*each)(broker *of, const char *topic))
 {
-    char topic[LONGEST_TOPIC], levels[2 * BROKER_LEVELS + 1] = "";
+    char topic[LONGEST_TOPIC], levels[BROKER_TOPIC_BYTES + 2 * BROKER_LEVELS + 1];
     int count;
 
+    snprintf(levels, sizeof levels, "%s", below);
     for (count = 0; count < BROKER_LEVELS; count++) {
         strcat(levels, count > 0 ? "/+" : "+");
         join(topic, of->topic, levels, SET + 1);
-        mosquitto_subscribe(of->mosquitto, NULL, topic, 1);
+        each(of, topic);
     }
+}
+
+static void subscribe_topic(broker *of, const char *topic)
+{
+    mosquitto_subscribe(of->mosquitto, NULL, topic, 1);
+}
+
+static void unsubscribe_topic(broker *of, const char *topic)
+{
+    mosquitto_unsubscribe(of->mosquitto, NULL, topic);
+}
+
+void broker_subscribe(broker *of, const char *below)
+{
+    for_levels(of, below, subscribe_topic);
+}
+
+void broker_unsubscribe(broker *of, const char *below)
+{
+    for_levels(of, below, unsubscribe_topic);
 }
 
 static void on_connect(struct mosquitto *mosquitto, void *context, int refused)
@@ -50,36 +77,26 @@ static void on_connect(struct mosquitto *mosquitto, void *context, int refused)
 
     (void)mosquitto;
     if (refused) {
-        fprintf(stderr, "%s: the broker refuses: %s.\n", report_name,
-                mosquitto_connack_string(refused));
+        report_log(REPORT_ERROR, "the broker %s refuses: %s", of->address,
+                   mosquitto_connack_string(refused));
         return;
     }
-    subscribe(of);
-    broker_publish(of, "status", NULL, "online", 1);
+    report_log(REPORT_INFO, "the broker %s is connected", of->address);
+    atomic_store(&of->is_connected, 1);
+    atomic_fetch_add(&of->connects, 1);
+    atomic_store(&of->is_new, 1);
+    /* It wakes the program. If the pipe is full, the program is awake. */
     (void)send_event(of, &event);
 }
 
-/* Hands a write on to the program. Returns NULL, or why it is refused. */
-static const char *take_write(broker *of, const char *name, const struct mosquitto_message *message)
+static void on_disconnect(struct mosquitto *mosquitto, void *context, int reason)
 {
-    const int field = device_find(of->device, name);
-    broker_event event = {.kind = BROKER_WRITE};
+    broker *of = (broker *)context;
 
-    if (field < 0)
-        return "there is no such field";
-    if (!(of->device->fields[field].access & DEVICE_WRITE))
-        return "the field is not writable";
-    if (message->retain)
-        return "a retained write is not carried out: it would be repeated";
-    if (message->payloadlen > PAYLOAD_BYTES)
-        return "the payload is too long";
-    event.field = (uint16_t)field;
-    event.length = (uint16_t)message->payloadlen;
-    memcpy(event.payload, message->payload, event.length);
-    if (send_event(of, &event))
-        return NULL;
-    atomic_fetch_add(&of->lost, 1);
-    return "too many writes wait";
+    (void)mosquitto;
+    if (atomic_exchange(&of->is_connected, 0) && reason != MOSQ_ERR_SUCCESS)
+        report_log(REPORT_WARNING, "the broker %s is lost: %s. The bridge connects again",
+                   of->address, mosquitto_strerror(reason));
 }
 
 static void on_message(struct mosquitto *mosquitto, void *context,
@@ -87,21 +104,29 @@ static void on_message(struct mosquitto *mosquitto, void *context,
 {
     broker *of = (broker *)context;
     const size_t first = strlen(of->topic) + 1, length = strlen(message->topic);
-    const char *wrong;
-    char name[LONGEST_TOPIC];
+    broker_event event = {.kind = BROKER_WRITE, .is_retained = message->retain};
+    size_t name;
 
     (void)mosquitto;
     /* A publisher clears a retained message with an empty one. */
     if (message->payloadlen <= 0)
         return;
     /* A name whose result would have too long a topic is no field's. */
-    if (length < first + sizeof SET - 1 || length + sizeof RESULT > sizeof name)
+    if (length < first + sizeof SET - 1 || length + sizeof RESULT > LONGEST_TOPIC)
         return;
-    snprintf(name, sizeof name, "%.*s", (int)(length - first - (sizeof SET - 1)),
-             message->topic + first);
-    wrong = take_write(of, name, message);
-    if (wrong)
-        broker_publish(of, name, RESULT + 1, wrong, 0);
+    name = length - first - (sizeof SET - 1);
+    memcpy(event.bytes, message->topic + first, name);
+    event.bytes[name] = '\0';
+    event.name_bytes = (uint16_t)(name + 1);
+    event.is_too_long = message->payloadlen > PAYLOAD_LONGEST;
+    if (!event.is_too_long) {
+        event.length = (uint16_t)message->payloadlen;
+        memcpy(event.bytes + event.name_bytes, message->payload, event.length);
+    }
+    if (send_event(of, &event))
+        return;
+    atomic_fetch_add(&of->lost, 1);
+    broker_publish(of, event.bytes, RESULT + 1, "too many writes wait", 0);
 }
 
 const char *broker_check_name(const char *name)
@@ -141,14 +166,17 @@ static const char *text_of(int error)
     return error == MOSQ_ERR_ERRNO ? strerror(errno) : mosquitto_strerror(error);
 }
 
-int broker_begin(broker *of, const broker_options *options, const device *with)
+int broker_begin(broker *of, const broker_options *options)
 {
+    static char address[300];
     char topic[LONGEST_TOPIC];
     int error;
 
     memset(of, 0, sizeof *of);
-    of->device = with;
     of->topic = options->topic;
+    snprintf(address, sizeof address, strchr(options->host, ':') ? "[%s]:%d" : "%s:%d",
+             options->host, options->port);
+    of->address = address;
     if (pipe2(of->events, O_NONBLOCK | O_CLOEXEC) != 0)
         return report(CODE_SYSTEM, "a pipe: %s", strerror(errno));
     mosquitto_lib_init();
@@ -156,6 +184,7 @@ int broker_begin(broker *of, const broker_options *options, const device *with)
     if (!of->mosquitto)
         return report(CODE_SYSTEM, "the MQTT client: %s", strerror(errno));
     mosquitto_connect_callback_set(of->mosquitto, on_connect);
+    mosquitto_disconnect_callback_set(of->mosquitto, on_disconnect);
     mosquitto_message_callback_set(of->mosquitto, on_message);
     mosquitto_reconnect_delay_set(of->mosquitto, 1, 30, 1);
     join(topic, options->topic, "status", NULL);
@@ -170,18 +199,39 @@ int broker_begin(broker *of, const broker_options *options, const device *with)
     if (error)
         return report(CODE_SYSTEM, "the MQTT client: %s", text_of(error));
     /* A broker that cannot be reached now is tried again by the thread. */
-    error = mosquitto_connect_async(of->mosquitto, options->host, options->port, 15);
+    error = mosquitto_connect_async(of->mosquitto, options->host, options->port,
+                                    options->keep_alive ? options->keep_alive : 15);
     if (error == MOSQ_ERR_INVAL)
         return report(CODE_WRONG, "the broker %s: %s", options->host, text_of(error));
     if (error)
-        fprintf(stderr, "%s: the broker %s: %s. The bridge tries again.\n", report_name,
-                options->host, text_of(error));
+        report_log(REPORT_WARNING, "the broker %s: %s. The bridge tries again", of->address,
+                   text_of(error));
     return CODE_DONE;
 }
 
 int broker_next(broker *of, broker_event *event)
 {
-    return read(of->events[0], event, sizeof *event) == (ssize_t)sizeof *event;
+    const size_t head = offsetof(broker_event, bytes);
+    size_t rest;
+
+    do {
+        if (atomic_exchange(&of->is_new, 0)) {
+            event->kind = BROKER_CONNECTED;
+            return 1;
+        }
+        if (read(of->events[0], event, head) != (ssize_t)head)
+            return 0;
+    } while (event->kind == BROKER_CONNECTED);
+    /* The pipe has the whole event. */
+    rest = (size_t)event->name_bytes + event->length;
+    return read(of->events[0], event->bytes, rest) == (ssize_t)rest;
+}
+
+static void publish(broker *of, const char *topic, const char *text, int is_retained)
+{
+    if (mosquitto_publish(of->mosquitto, NULL, topic, (int)strlen(text), text, 0, is_retained) ==
+        MOSQ_ERR_SUCCESS)
+        atomic_fetch_add(&of->published, 1);
 }
 
 void broker_publish(broker *of, const char *name, const char *last, const char *text,
@@ -190,9 +240,12 @@ void broker_publish(broker *of, const char *name, const char *last, const char *
     char topic[LONGEST_TOPIC];
 
     join(topic, of->topic, name, last);
-    if (mosquitto_publish(of->mosquitto, NULL, topic, (int)strlen(text), text, 0, is_retained) ==
-        MOSQ_ERR_SUCCESS)
-        atomic_fetch_add(&of->published, 1);
+    publish(of, topic, text, is_retained);
+}
+
+void broker_publish_at(broker *of, const char *topic, const char *text)
+{
+    publish(of, topic, text, 1);
 }
 
 void broker_end(broker *of)

@@ -20,6 +20,7 @@ enum { BROKER_LEVELS = 8, BROKER_TOPIC_BYTES = 200 };
 typedef struct broker_options {
     const char *host;
     int port;
+    int keep_alive;      /* seconds; 0: 15 */
     const char *topic;   /* the beginning of all topics */
     const char *id;      /* the client identifier; NULL for a random one */
     const char *user;    /* NULL for none; the password is in the environment, MQTT_PASSWORD */
@@ -27,20 +28,23 @@ typedef struct broker_options {
     const char *cert_file, *key_file; /* of the bridge; or NULL */
 } broker_options;
 
-/* What the broker sends: that it is connected, or a write to a field that may be written. */
+/* Bytes of the longest topic, with its end. */
+enum { BROKER_LONGEST_TOPIC = 512 };
+
+/* What the broker sends: that it is connected, or a write: a message to TOPIC/NAME/set. */
 typedef struct broker_event {
     enum { BROKER_CONNECTED, BROKER_WRITE } kind;
-    uint16_t field;  /* BROKER_WRITE: the index of the field */
-    uint16_t length; /* BROKER_WRITE: bytes of the payload */
-    char payload[PAYLOAD_BYTES];
+    uint8_t is_retained, is_too_long; /* without its payload then */
+    uint16_t name_bytes, length; /* of the bytes: first the name and its zero, then the payload */
+    char bytes[BROKER_LONGEST_TOPIC + PAYLOAD_LONGEST];
 } broker_event;
 
 typedef struct broker {
     struct mosquitto *mosquitto;
-    const device *device; /* where the fields are */
-    const char *topic;
-    int events[2]; /* a pipe: poll events[0] for POLLIN */
-    atomic_ulong published;
+    const char *topic, *address;     /* `address` is for log lines */
+    int events[2];                   /* a pipe: poll events[0] for POLLIN */
+    atomic_int is_connected, is_new; /* is_new: connected, and the program does not know it yet */
+    atomic_ulong published, connects;
     atomic_ulong lost; /* writes that the pipe did not take */
 } broker;
 
@@ -49,7 +53,13 @@ const char *broker_check_name(const char *name);
 
 /* Begins to connect, and does not wait for it. Returns an exit code, after reporting the reason if
  * it is not CODE_DONE. */
-int broker_begin(broker *of, const broker_options *options, const device *with);
+int broker_begin(broker *of, const broker_options *options);
+
+/* Subscribes to the writes of all names below a name of several levels, which ends with /; or of
+ * all names, if it is empty: names of up to BROKER_LEVELS levels, so that writes to unknown fields
+ * are answered. Or ends that. To be called after BROKER_CONNECTED. */
+void broker_subscribe(broker *of, const char *below);
+void broker_unsubscribe(broker *of, const char *below);
 
 /* Takes the next event. Returns 0 if there is none. */
 int broker_next(broker *of, broker_event *event);
@@ -60,6 +70,9 @@ int broker_next(broker *of, broker_event *event);
  */
 void broker_publish(broker *of, const char *name, const char *last, const char *text,
                     int is_retained);
+
+/* Publishes a retained text at any topic, or removes what is retained there, if `text` is empty. */
+void broker_publish_at(broker *of, const char *topic, const char *text);
 
 /* Publishes that the bridge is offline, and disconnects. */
 void broker_end(broker *of);

@@ -87,14 +87,21 @@ static int open_tls(line *l)
     return code;
 }
 
-/* Keeps the reason why the link was lost or not opened, since the next attempt clears it. */
-static void keep_reason(void *context, uint8_t event, uint8_t status)
+/* Keeps the reason why the link was lost or not opened, since the next attempt clears it. A loss is
+ * logged once, with its first reason and with each other one. */
+static void take_link(void *context, uint8_t event, uint8_t status)
 {
     line *l = (line *)context;
+    char before[sizeof l->reason];
 
-    if (event == MBM_LINK_EVENT_CONNECTED)
+    if (event == MBM_LINK_EVENT_CONNECTED) {
+        if (l->is_told)
+            report_log(REPORT_INFO, "%s: the line is open again", l->place.text);
+        l->is_told = 0;
         return;
+    }
     l->failed++;
+    snprintf(before, sizeof before, "%s", l->reason);
     if (l->place.kind == PLACE_TLS && l->tls.status == MBM_TLS_REFUSED_BY_PEER)
         snprintf(l->reason, sizeof l->reason, "%s: %s", mbm_tls_text(l->tls.status),
                  mbm_tls_alertText(l->tls.alert));
@@ -106,6 +113,10 @@ static void keep_reason(void *context, uint8_t event, uint8_t status)
         snprintf(l->reason, sizeof l->reason, "%s", strerror(l->tty.error));
     else if (!*l->reason || status == MBM_CONNECT_TIMED_OUT)
         snprintf(l->reason, sizeof l->reason, "%s", mbm_status_text(status));
+    if (l->is_logged && (!l->is_told || strcmp(before, l->reason) != 0))
+        report_log(REPORT_WARNING, "%s: %s. The line is opened again each second", l->place.text,
+                   l->reason);
+    l->is_told = l->is_logged;
 }
 
 static void keep_open(line *l)
@@ -118,7 +129,8 @@ static void keep_open(line *l)
         return;
     (void)mbm_link_begin(&l->kept, &l->client, &hooks);
     (void)mbm_link_setBackoff(&l->kept, MBM_BACKOFF_FIXED, 1000, 1000);
-    (void)mbm_link_setCallback(&l->kept, keep_reason, l);
+    (void)mbm_link_setCallback(&l->kept, take_link, l);
+    (void)mbm_link_setCounters(&l->kept, &l->losses);
 }
 
 static mbm_port port_of(line *l)
@@ -163,13 +175,13 @@ static void begin_client(line *l)
     (void)mbm_client_setCounters(&l->client, &l->counters);
 }
 
-int line_open(line *l, const place *where)
+static int open_place(line *l, const place *where, int (*open_serial)(line *l))
 {
     int code;
 
     memset(l, 0, sizeof *l);
     l->place = *where;
-    code = place_is_serial(where)     ? open_tty(l)
+    code = place_is_serial(where)     ? open_serial(l)
            : where->kind == PLACE_UDP ? open_udp(l)
            : where->kind == PLACE_TLS ? open_tls(l)
                                       : open_tcp(l);
@@ -180,6 +192,23 @@ int line_open(line *l, const place *where)
     begin_client(l);
     keep_open(l);
     return CODE_DONE;
+}
+
+int line_open(line *l, const place *where)
+{
+    return open_place(l, where, open_tty);
+}
+
+static int open_tty_later(line *l)
+{
+    if (mbm_tty_openLater(&l->tty, l->place.path, &l->place.tty) == 0)
+        return CODE_DONE;
+    return cannot_open(l, strerror(errno), "");
+}
+
+int line_open_later(line *l, const place *where)
+{
+    return open_place(l, where, open_tty_later);
 }
 
 void line_close(line *l)
@@ -247,6 +276,27 @@ void line_wait(line *l, int fd, uint32_t micros)
     case PLACE_RTU_OVER_TCP: (void)mbm_tcp_wait(&l->tcp, 1, NULL, fd, micros); break;
     default: wait_tty(l, fd, micros);
     }
+}
+
+int line_polls(line *l, struct pollfd *wait, uint32_t *micros)
+{
+    uint32_t delay = mbm_client_pollDelay(&l->client);
+
+    if (l->place.kind == PLACE_TLS && mbm_tls_pollDelay(&l->tls) < delay)
+        delay = mbm_tls_pollDelay(&l->tls);
+    if (delay < *micros)
+        *micros = delay;
+    if (l->place.kind == PLACE_UDP) {
+        *wait = (struct pollfd){l->udp.fd, POLLIN, 0};
+        return l->udp.port != 0 && !l->udp.isLost;
+    }
+    if (place_is_tcp(&l->place)) {
+        *wait = (struct pollfd){l->tcp.fd, l->tcp.events, 0};
+        return l->tcp.events != 0;
+    }
+    /* An idle line's bytes are noise. Without events only its loss ends the sleep. */
+    *wait = (struct pollfd){l->tty.fd, mbm_client_pending(&l->client) > 0 ? POLLIN : 0, 0};
+    return l->tty.isOpen;
 }
 
 static int rest(void *context, uint32_t micros)

@@ -9,6 +9,8 @@
 #include "mbm_udp.h"
 #include "place.h"
 
+#include <poll.h>
+
 typedef struct line {
     mbm_client client;
     mbm_counters counters;
@@ -21,14 +23,20 @@ typedef struct line {
     mbm_tls tls;
     mbm_tls_identity identity;
     mbm_tls_files files;
-    unsigned failed;  /* how often the link was lost or not opened */
-    char reason[160]; /* why it was the last time */
+    mbm_linkCounters losses;
+    unsigned failed;   /* how often the link was lost or not opened */
+    uint8_t is_logged; /* set by the program after line_open: report losses as log lines */
+    uint8_t is_told;   /* a loss was, and is not over */
+    char reason[160];  /* why it was the last time */
     uint8_t incoming[1024], outgoing[1024];
 } line;
 
 /* Opens a place and begins its client, with the settings of options.h. A connection is made later,
  * by line_poll. Returns CODE_DONE, or another exit code after reporting the reason. */
 int line_open(line *l, const place *where);
+
+/* The same for a service: a terminal that is not there yet is opened by line_poll later. */
+int line_open_later(line *l, const place *where);
 void line_close(line *l);
 
 /* Waits until there is a connection. Returns as line_open. */
@@ -43,6 +51,10 @@ void line_rest(line *l, uint32_t milliseconds);
 /* Sleeps until bytes arrive on the line or at the descriptor `fd` (-1 for none), at most for a time
  * in microseconds or a second. */
 void line_wait(line *l, int fd, uint32_t micros);
+
+/* What to poll for the line, with other descriptors. Returns 0 if it has no descriptor. Lowers the
+ * time to sleep, in microseconds, to what the line admits. */
+int line_polls(line *l, struct pollfd *wait, uint32_t *micros);
 
 /* Waits for a request that was queued. Returns its status, MBM_CANCELLED after Ctrl-C. */
 uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued);

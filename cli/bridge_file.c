@@ -1,0 +1,339 @@
+#define _GNU_SOURCE
+#include "bridge_file.h"
+
+#include "numbers.h"
+#include "report.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LONGEST_LINE = 1500, LONGEST_VALUE = 1000, LONGEST_PREFIX = 50 };
+
+const char *const bridge_names[] = {
+    "broker",           "topic", "id",  "user", "ca",    "cert", "key", "keep_alive", "discovery",
+    "discovery_prefix", "plain", "all", "gap",  "lines", NULL};
+
+enum { LINE, THE_FILE, LINE_TOPIC, LINE_KEYS };
+static const char *const LINE_NAMES[] = {"line", "file", "topic", NULL};
+static const char *const ANSWERS[] = {"no", "yes", NULL};
+static const char *const DISCOVERIES[] = {"homeassistant", NULL};
+static const char NO_MEMORY[] = "there is not enough memory";
+
+static char said[LONGEST_LINE + 200];
+
+__attribute__((format(printf, 1, 2))) static const char *say(const char *format, ...)
+{
+    va_list arguments;
+
+    va_start(arguments, format);
+    vsnprintf(said, sizeof said, format, arguments);
+    va_end(arguments);
+    return said;
+}
+
+/* --- settings --- */
+
+/* Reads HOST, HOST:PORT, [IPV6] or [IPV6]:PORT. `host` may be NULL. */
+static const char *read_broker(const char *text, char *host, size_t capacity, int *port)
+{
+    const char *end = *text == '[' ? strchr(text, ']') : NULL;
+    const char *colon = strchr(end ? end : text, ':'), *wrong;
+    size_t length;
+    int64_t number = 0;
+
+    if (strpbrk(text, ", /@") || (colon && (strchr(colon + 1, ':') || (end && colon != end + 1))))
+        return say("\"%s\" is not HOST or HOST:PORT; an IPv6 address needs brackets, such as "
+                   "[::1]:1883",
+                   text);
+    wrong = colon ? number_read(colon + 1, 1, 65535, &number) : NULL;
+    if (wrong)
+        return say("its port %s", wrong);
+    length = end ? (size_t)(end - text - 1) : colon ? (size_t)(colon - text) : strlen(text);
+    if (length == 0)
+        return say("\"%s\" has no host", text);
+    if (host) {
+        snprintf(host, capacity, "%.*s", (int)length, text + (end != NULL));
+        *port = (int)number;
+    }
+    return NULL;
+}
+
+static const char *check_topic(const char *text)
+{
+    if (strlen(text) <= BROKER_TOPIC_BYTES && *text && !strpbrk(text, "+#"))
+        return NULL;
+    return say("\"%s\" is not 1 to %d bytes without + and #", text, BROKER_TOPIC_BYTES);
+}
+
+static const char *check_value(int setting, const char *text)
+{
+    uint32_t milliseconds;
+    int64_t number;
+    int index;
+
+    switch (setting) {
+    case BRIDGE_BROKER: return read_broker(text, NULL, 0, NULL);
+    case BRIDGE_TOPIC: return check_topic(text);
+    case BRIDGE_KEEP_ALIVE: return number_time(text, 5000, 3600000, &milliseconds);
+    case BRIDGE_DISCOVERY: return number_word(text, DISCOVERIES, &index);
+    case BRIDGE_DISCOVERY_PREFIX:
+        if (strlen(text) > LONGEST_PREFIX || !*text || strpbrk(text, "+# "))
+            return say("\"%s\" is not 1 to %d bytes without +, # and space", text, LONGEST_PREFIX);
+        return NULL;
+    case BRIDGE_PLAIN:
+    case BRIDGE_ALL: return number_word(text, ANSWERS, &index);
+    case BRIDGE_GAP: return number_read(text, 0, 123, &number);
+    default: return NULL;
+    }
+}
+
+const char *bridge_setup_value(bridge_setup *to, int setting, const char *text)
+{
+    const char *wrong = check_value(setting, text);
+    char *copy;
+
+    if (wrong)
+        return wrong;
+    copy = strdup(text);
+    if (!copy)
+        return NO_MEMORY;
+    free(to->values[setting]);
+    to->values[setting] = copy;
+    return NULL;
+}
+
+const char *bridge_setup_check(const bridge_setup *of, const char *dash)
+{
+    char *const *values = of->values;
+
+    if (!values[BRIDGE_CA] && (values[BRIDGE_CERT] || values[BRIDGE_KEY]))
+        return say("%scert and %skey need %sca", dash, dash, dash);
+    if (!values[BRIDGE_CERT] != !values[BRIDGE_KEY])
+        return say("%scert and %skey need each other", dash, dash);
+    if (values[BRIDGE_DISCOVERY_PREFIX] && !values[BRIDGE_DISCOVERY])
+        return say("a prefix of discovery needs %sdiscovery", dash);
+    return NULL;
+}
+
+int bridge_setup_options(const bridge_setup *of, broker_options *to)
+{
+    static bridge_setup copy;
+    static char host[256];
+    char *const *values = copy.values;
+    uint32_t milliseconds = 0;
+
+    if (!bridge_setup_copy(&copy, of))
+        return 0;
+    *to = (broker_options){.host = "localhost",
+                           .topic = values[BRIDGE_TOPIC] ? values[BRIDGE_TOPIC] : "modbus",
+                           .id = values[BRIDGE_ID],
+                           .user = values[BRIDGE_USER],
+                           .ca_file = values[BRIDGE_CA],
+                           .cert_file = values[BRIDGE_CERT],
+                           .key_file = values[BRIDGE_KEY]};
+    if (values[BRIDGE_BROKER]) {
+        (void)read_broker(values[BRIDGE_BROKER], host, sizeof host, &to->port);
+        to->host = host;
+    }
+    if (to->port == 0)
+        to->port = to->ca_file ? 8883 : 1883;
+    if (values[BRIDGE_KEEP_ALIVE])
+        (void)number_time(values[BRIDGE_KEEP_ALIVE], 5000, 3600000, &milliseconds);
+    to->keep_alive = (int)(milliseconds / 1000);
+    return 1;
+}
+
+uint8_t bridge_setup_gap(const bridge_setup *of)
+{
+    return of->values[BRIDGE_GAP] ? (uint8_t)strtoul(of->values[BRIDGE_GAP], NULL, 10) : 0;
+}
+
+int bridge_setup_is(const bridge_setup *of, int setting)
+{
+    const char *value = of->values[setting];
+
+    return value && strcmp(value, "no") != 0;
+}
+
+/* --- lines --- */
+
+/* The name of a file without folders and without its end, such as meter of /etc/meter.yaml. */
+static void stem_of(const char *path, char stem[LONGEST_VALUE])
+{
+    const char *slash = strrchr(path, '/');
+    char *dot;
+
+    snprintf(stem, LONGEST_VALUE, "%s", slash ? slash + 1 : path);
+    dot = strrchr(stem, '.');
+    if (dot && dot > stem)
+        *dot = '\0';
+}
+
+/* Whether one topic is the other, or its beginning. */
+static int overlap(const char *one, const char *other)
+{
+    const size_t length = strlen(one) < strlen(other) ? strlen(one) : strlen(other);
+    const char *longer = strlen(one) < strlen(other) ? other : one;
+
+    return strncmp(one, other, length) == 0 && (longer[length] == '\0' || longer[length] == '/');
+}
+
+static const char *check_line_topic(const bridge_setup *of, const char *topic)
+{
+    const char *wrong = broker_check_name(topic);
+    uint8_t i;
+
+    if (wrong)
+        return say("the topic \"%s\" of the line: %s", topic, wrong);
+    if (strlen(topic) > BRIDGE_TOPIC_BYTES)
+        return say("the topic of the line has more than %d bytes", BRIDGE_TOPIC_BYTES);
+    for (i = 0; i < of->line_count; i++)
+        if (overlap(topic, of->lines[i].topic))
+            return say(
+                "the topic \"%s\" of the line is, or begins, or goes on, the topic \"%s\" of "
+                "one before",
+                topic, of->lines[i].topic);
+    return NULL;
+}
+
+const char *bridge_setup_line(bridge_setup *to, const char *text, const char *path,
+                              const char *topic)
+{
+    const uint8_t at = to->line_count;
+    const char *wrong;
+    char stem[LONGEST_VALUE];
+
+    if (at == BRIDGE_LINES)
+        return say("\"%s\" is one line too many: %d are allowed", text, BRIDGE_LINES);
+    if (!topic) {
+        stem_of(path, stem);
+        topic = stem;
+    }
+    wrong = *topic ? check_line_topic(to, topic) : NULL;
+    if (wrong)
+        return wrong;
+    to->lines[at].text = strdup(text);
+    to->lines[at].path = strdup(path);
+    to->lines[at].topic = strdup(topic);
+    to->line_count++;
+    if (!to->lines[at].text || !to->lines[at].path || !to->lines[at].topic)
+        return NO_MEMORY;
+    return place_read(&to->lines[at].place, to->lines[at].text, 0);
+}
+
+/* --- the file --- */
+
+/* The path of a device file: relative to the folder of the file that names it. */
+static void join_path(const char *of, const char *path, char full[2 * LONGEST_VALUE])
+{
+    const char *slash = strrchr(of, '/');
+
+    if (*path == '/' || !slash)
+        snprintf(full, 2 * LONGEST_VALUE, "%s", path);
+    else
+        snprintf(full, 2 * LONGEST_VALUE, "%.*s/%s", (int)(slash - of < 900 ? slash - of : 900), of,
+                 path);
+}
+
+static int read_line(yaml_file *file, const yaml_node_t *node, bridge_setup *into)
+{
+    yaml_node_t *values[LINE_KEYS] = {NULL};
+    const char *text, *path, *topic = NULL, *wrong;
+    char full[2 * LONGEST_VALUE];
+
+    if (!yaml_file_keys(file, "a line", node, LINE_NAMES, values))
+        return 0;
+    if (!values[LINE] || !values[THE_FILE])
+        return yaml_file_refuse(file, node, "the line has no key %s",
+                                values[LINE] ? "file" : "line");
+    text = yaml_file_text(file, "line", values[LINE], LONGEST_LINE);
+    path = text ? yaml_file_text(file, "file", values[THE_FILE], LONGEST_VALUE) : NULL;
+    if (!path)
+        return 0;
+    if (values[LINE_TOPIC]) {
+        topic = yaml_file_text(file, "topic", values[LINE_TOPIC], LONGEST_VALUE);
+        if (!topic)
+            return 0;
+    }
+    join_path(file->path, path, full);
+    wrong = bridge_setup_line(into, text, full, topic);
+    return wrong ? yaml_file_refuse(file, node, "%s", wrong) : 1;
+}
+
+static int read_root(yaml_file *file, const yaml_node_t *root, bridge_setup *into)
+{
+    yaml_node_t *values[BRIDGE_KEYS] = {NULL};
+    const yaml_node_item_t *item;
+    const char *text, *wrong;
+    size_t count;
+    int setting;
+
+    if (!yaml_file_keys(file, "the file", root, bridge_names, values))
+        return 0;
+    for (setting = 0; setting < BRIDGE_SETTINGS; setting++) {
+        if (!values[setting])
+            continue;
+        text = yaml_file_text(file, bridge_names[setting], values[setting], LONGEST_VALUE);
+        if (!text)
+            return 0;
+        wrong = bridge_setup_value(into, setting, text);
+        if (wrong)
+            return yaml_file_refuse(file, values[setting], "%s: %s", bridge_names[setting], wrong);
+    }
+    wrong = bridge_setup_check(into, "");
+    if (wrong)
+        return yaml_file_refuse(file, root, "%s", wrong);
+    if (!values[BRIDGE_THE_LINES])
+        return yaml_file_refuse(file, root, "the file has no key lines");
+    item = yaml_file_list(file, "lines", values[BRIDGE_THE_LINES], BRIDGE_LINES, &count);
+    if (!item)
+        return 0;
+    for (; count > 0; count--, item++)
+        if (!read_line(file, yaml_document_get_node(&file->document, *item), into))
+            return 0;
+    return 1;
+}
+
+int bridge_file_read(bridge_setup *into, const char *path)
+{
+    static yaml_file file;
+    const yaml_node_t *root = yaml_file_open(&file, path);
+
+    if (root)
+        (void)read_root(&file, root, into);
+    yaml_file_close(&file);
+    memcpy(into->wrong, file.wrong, sizeof into->wrong);
+    return file.code;
+}
+
+/* --- memory --- */
+
+int bridge_setup_copy(bridge_setup *to, const bridge_setup *from)
+{
+    int i;
+
+    memset(to, 0, sizeof *to);
+    for (i = 0; i < BRIDGE_SETTINGS; i++)
+        if (from->values[i] && bridge_setup_value(to, i, from->values[i]))
+            return 0;
+    for (i = 0; i < from->line_count; i++)
+        if (bridge_setup_line(to, from->lines[i].text, from->lines[i].path, from->lines[i].topic))
+            return 0;
+    return 1;
+}
+
+void bridge_setup_free(bridge_setup *setup)
+{
+    int i;
+
+    for (i = 0; i < BRIDGE_SETTINGS; i++)
+        free(setup->values[i]);
+    for (i = 0; i < setup->line_count; i++) {
+        free(setup->lines[i].text);
+        free(setup->lines[i].path);
+        free(setup->lines[i].topic);
+    }
+    memset(setup, 0, sizeof *setup);
+}

@@ -1,0 +1,432 @@
+#define _GNU_SOURCE
+#include "bridge_line.h"
+
+#include "discovery.h"
+#include "report.h"
+#include "value_text.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+bridge_settings bridge;
+
+/* --- publishing --- */
+
+static void publish(const bridge_line *l, const char *name, const char *last, const char *text,
+                    int is_retained)
+{
+    char full[BRIDGE_TOPIC_BYTES + BROKER_LONGEST_TOPIC];
+
+    snprintf(full, sizeof full, "%s%s", l->below, name);
+    broker_publish(&bridge.mqtt, full, last, text, is_retained);
+}
+
+/* Whether a status came from the unit itself, and not from a line or gateway that lacks it. */
+static int is_answer(uint8_t status)
+{
+    return status < 0x80 && status != MBM_GATEWAY_PATH_UNAVAILABLE &&
+           status != MBM_GATEWAY_TARGET_FAILED_TO_RESPOND;
+}
+
+static void publish_unit(const bridge_line *l, unsigned unit, const char *text)
+{
+    char name[16];
+
+    snprintf(name, sizeof name, "unit/%u", unit);
+    publish(l, name, "status", text, 1);
+}
+
+static const char *unit_text(const unit_state *unit)
+{
+    return unit->state == UNIT_ONLINE ? "online" : "offline";
+}
+
+/* A unit is online while it answers one of its reads. */
+static void update_unit(bridge_line *l, uint16_t field, uint8_t status)
+{
+    const uint16_t number = l->table->fields.planned[field].unit;
+    unit_state *unit = &l->table->units[number];
+    published *was = &l->table->last[field];
+    const uint8_t answered = (uint8_t)is_answer(status);
+
+    unit->ended = (uint16_t)(unit->ended + !was->has_ended);
+    was->has_ended = 1;
+    unit->answered = (uint16_t)(unit->answered + answered - was->is_answered);
+    was->is_answered = answered;
+    if (unit->answered > 0 ? unit->state == UNIT_ONLINE
+                           : unit->ended < unit->fields || unit->state == UNIT_OFFLINE)
+        return;
+    unit->state = unit->answered > 0 ? UNIT_ONLINE : UNIT_OFFLINE;
+    publish_unit(l, number, unit_text(unit));
+    if (unit->state == UNIT_ONLINE)
+        report_log(REPORT_INFO, "%s: unit %u answers", l->text, number);
+    else
+        report_log(REPORT_WARNING, "%s: unit %u does not answer: %s", l->text, number,
+                   mbm_status_text(status));
+}
+
+/* Publishes the last value of a field, with its status and the time at which it was read. */
+static void publish_value(bridge_line *l, uint16_t field)
+{
+    static char json[VALUE_TEXT_LONGEST + 128];
+    const published *what = &l->table->last[field];
+    const char *value = what->value ? what->value : "null";
+    const char *name = l->table->fields.fields[field].name;
+    struct timespec now;
+    struct tm utc;
+    uint32_t age = 0;
+    char when[32];
+
+    if (bridge.is_plain) {
+        /* Plain text has no place for a status: what failed is not published. */
+        if (what->value && what->status == MBM_OK)
+            publish(l, name, NULL, value, 1);
+        return;
+    }
+    (void)mbm_plan_getStatus(&l->plan, field, &age);
+    clock_gettime(CLOCK_REALTIME, &now);
+    if (what->value) {
+        now.tv_sec -= age / 1000;
+        now.tv_nsec -= (long)(age % 1000) * 1000000;
+        if (now.tv_nsec < 0) {
+            now.tv_nsec += 1000000000;
+            now.tv_sec--;
+        }
+    }
+    gmtime_r(&now.tv_sec, &utc);
+    (void)strftime(when, sizeof when, "%Y-%m-%dT%H:%M:%S", &utc);
+    snprintf(json, sizeof json, "{\"value\":%s,\"status\":\"%s\",\"time\":\"%s.%03ldZ\"}", value,
+             mbm_status_text(what->status), when, now.tv_nsec / 1000000);
+    publish(l, name, NULL, json, 1);
+}
+
+/* Called by the plan for each field whose read has ended. */
+static void on_update(void *context, mbm_plan *ended, uint16_t field)
+{
+    static char text[VALUE_TEXT_LONGEST];
+    bridge_line *l = (bridge_line *)context;
+    published *was = &l->table->last[field];
+    const uint8_t status = mbm_plan_getStatus(ended, field, NULL);
+    int is_new = bridge.is_every || status != was->status || !was->has_ended;
+
+    if (status == MBM_OK && value_text(ended, &l->table->fields, field, !bridge.is_plain, text) &&
+        (!was->value || strcmp(text, was->value) != 0)) {
+        free(was->value);
+        was->value = strdup(text);
+        is_new = 1;
+    }
+    was->status = status;
+    update_unit(l, field, status);
+    if (is_new)
+        publish_value(l, field);
+}
+
+void bridge_line_connected(bridge_line *l)
+{
+    unsigned number;
+    uint16_t field;
+
+    broker_subscribe(&bridge.mqtt, l->below);
+    if (bridge.has_discovery)
+        bridge_line_discover(l);
+    for (number = 1; number < 256; number++)
+        if (l->table->units[number].state != UNIT_UNKNOWN)
+            publish_unit(l, number, unit_text(&l->table->units[number]));
+    for (field = 0; field < l->table->fields.readable; field++)
+        if (l->table->last[field].has_ended)
+            publish_value(l, field);
+}
+
+/* --- discovery, and what is left of fields that are gone --- */
+
+static const discovery_line *discovery_of(const bridge_line *l)
+{
+    static discovery_line as;
+
+    as.topic = bridge.mqtt.topic;
+    as.below = l->below;
+    as.is_plain = bridge.is_plain;
+    return &as;
+}
+
+void bridge_line_discover(bridge_line *l)
+{
+    uint16_t field;
+
+    for (field = 0; field < l->table->fields.count; field++) {
+        char topic[DISCOVERY_TOPIC_BYTES];
+        char *text = discovery_config(discovery_of(l), &l->table->fields, field, topic);
+
+        if (text)
+            broker_publish_at(&bridge.mqtt, topic, text);
+        free(text);
+    }
+}
+
+/* Whether the next table has this field with this topic of discovery. */
+static int is_discovered(const bridge_line *l, const device *next, const char *name,
+                         const char *topic)
+{
+    const int field = next ? device_find(next, name) : -1;
+    char other[DISCOVERY_TOPIC_BYTES];
+
+    if (field < 0)
+        return 0;
+    discovery_topic(discovery_of(l), next, (uint16_t)field, other);
+    return strcmp(topic, other) == 0;
+}
+
+/* Removes what is retained of the table, except what `next` has too. */
+static void remove_retained(bridge_line *l, const bridge_table *next)
+{
+    const device *fields = &l->table->fields, *others = next ? &next->fields : NULL;
+    char topic[DISCOVERY_TOPIC_BYTES];
+    unsigned number;
+    uint16_t field;
+
+    for (field = 0; field < fields->count; field++) {
+        const char *name = fields->fields[field].name;
+        const int other = others ? device_find(others, name) : -1;
+
+        if (field < fields->readable && (other < 0 || other >= others->readable))
+            publish(l, name, NULL, "", 1);
+        if (!bridge.has_discovery)
+            continue;
+        discovery_topic(discovery_of(l), fields, field, topic);
+        if (!is_discovered(l, others, name, topic))
+            broker_publish_at(&bridge.mqtt, topic, "");
+    }
+    for (number = 1; number < 256; number++)
+        if (l->table->units[number].fields > 0 && (!next || next->units[number].fields == 0))
+            publish_unit(l, number, "");
+}
+
+/* --- writes --- */
+
+static void publish_result(const bridge_line *l, const char *name, const char *result)
+{
+    bridge.refused += strcmp(result, "success") != 0;
+    bridge.written += strcmp(result, "success") == 0;
+    publish(l, name, "result", result, 0);
+}
+
+static void on_written(void *context, mbm_clientRequest *request)
+{
+    bridge_write *write = (bridge_write *)context;
+    bridge_line *l = write->line;
+    const int field = device_find(&l->table->fields, write->name);
+    char text[256];
+
+    publish_result(l, write->name, line_status(&l->at, request, text));
+    if (field >= 0 && field < l->table->fields.readable)
+        (void)mbm_plan_refresh(&l->plan, (uint16_t)field);
+    write->is_used = 0;
+}
+
+/* Writes bits of a register, by function 22: the device changes no other bit. */
+static uint8_t write_part(bridge_line *l, bridge_write *write, const mbm_planField *planned,
+                          const broker_event *event, const char **wrong)
+{
+    const value_form form = {.type = planned->count == 1 ? MBM_TYPE_BIT : MBM_TYPE_UINT16,
+                             .order = MBM_ORDER_ABCD};
+    uint16_t bits[VALUE_WORDS] = {0};
+
+    if (payload_parse(&form, event->bytes + event->name_bytes, event->length, bits, wrong) == 0)
+        return MBM_INVALID_ARGUMENT;
+    if (bits[0] >> planned->count) {
+        *wrong = "the number is out of range";
+        return MBM_INVALID_ARGUMENT;
+    }
+    return mbm_client_maskWriteRegister(&l->at.client, &write->request, planned->address,
+                                        (uint16_t)~device_mask(planned),
+                                        device_part(planned, bits[0]));
+}
+
+/* Packs coils, of which each has a word, eight to a byte. */
+static void pack_coils(const uint16_t *bits, uint16_t count, void *bytes)
+{
+    uint8_t *to = (uint8_t *)bytes;
+    uint16_t at;
+
+    memset(to, 0, (size_t)(count + 7) / 8);
+    for (at = 0; at < count; at++)
+        to[at / 8] = (uint8_t)(to[at / 8] | (bits[at] & 1) << at % 8);
+}
+
+static uint8_t write_all(bridge_line *l, bridge_write *write, const value_form *form,
+                         const mbm_planField *planned, const broker_event *event,
+                         const char **wrong)
+{
+    static uint16_t words[PAYLOAD_WORDS];
+    const uint16_t count = payload_parse_all(form, planned->count, event->bytes + event->name_bytes,
+                                             event->length, words, wrong);
+
+    if (count == 0)
+        return MBM_INVALID_ARGUMENT;
+    if (planned->table == MBM_TABLE_COILS && count == 1)
+        return mbm_client_writeSingleCoil(&l->at.client, &write->request, planned->address,
+                                          (uint8_t)words[0]);
+    if (planned->table == MBM_TABLE_COILS) {
+        pack_coils(words, count, write->words);
+        return mbm_client_writeMultipleCoils(&l->at.client, &write->request, planned->address,
+                                             count);
+    }
+    if (count == 1)
+        return mbm_client_writeSingleRegister(&l->at.client, &write->request, planned->address,
+                                              words[0]);
+    memcpy(write->words, words, count * sizeof *words);
+    return mbm_client_writeMultipleRegisters(&l->at.client, &write->request, planned->address,
+                                             count);
+}
+
+/* Returns NULL, or why a field is not written. */
+static const char *check_write(const bridge_line *l, int field, const broker_event *event)
+{
+    if (field < 0)
+        return "there is no such field";
+    if (!(l->table->fields.fields[field].access & DEVICE_WRITE))
+        return device_is_part(&l->table->fields.planned[field])
+                   ? "the field is not writable: bits of a register need \"mask_write: yes\" and an "
+                     "access with write in the device file"
+                   : "the field is not writable";
+    if (event->is_retained)
+        return "a retained write is not carried out: it would be repeated";
+    return event->is_too_long ? "the payload is too long" : NULL;
+}
+
+/* Begins a write. Returns NULL, or why it is refused. */
+static const char *begin_write(bridge_line *l, const char *name, const broker_event *event)
+{
+    const int field = device_find(&l->table->fields, name);
+    const char *wrong = check_write(l, field, event);
+    bridge_write *write = l->writes;
+    const mbm_planField *planned;
+    uint8_t status;
+
+    if (wrong)
+        return wrong;
+    while (write < l->writes + BRIDGE_WRITES && write->is_used)
+        write++;
+    if (write == l->writes + BRIDGE_WRITES)
+        return "too many writes wait";
+    planned = &l->table->fields.planned[field];
+    memset(write, 0, sizeof *write);
+    snprintf(write->name, sizeof write->name, "%s", name);
+    write->line = l;
+    write->request.unit = planned->unit;
+    write->request.data = write->words;
+    write->request.done = on_written;
+    write->request.context = write;
+    status = device_is_part(planned) ? write_part(l, write, planned, event, &wrong)
+                                     : write_all(l, write, &l->table->fields.fields[field].form,
+                                                 planned, event, &wrong);
+    if (wrong)
+        return wrong;
+    if (status != MBM_OK && status != MBM_PENDING)
+        return mbm_status_text(status);
+    write->is_used = 1;
+    return NULL;
+}
+
+void bridge_line_write(bridge_line *l, const char *name, const broker_event *event)
+{
+    const char *wrong = begin_write(l, name, event);
+
+    if (wrong)
+        publish_result(l, name, wrong);
+}
+
+/* --- a line --- */
+
+bridge_line *bridge_line_make(const char *text, const char *path, const char *topic,
+                              const place *where)
+{
+    bridge_line *l = (bridge_line *)calloc(1, sizeof *l);
+
+    if (!l)
+        return NULL;
+    l->text = strdup(text);
+    l->path = strdup(path);
+    l->topic = strdup(topic);
+    if (!l->text || !l->path || !l->topic) {
+        bridge_line_end(l);
+        return NULL;
+    }
+    snprintf(l->below, sizeof l->below, "%s%s", topic, *topic ? "/" : "");
+    l->where = *where;
+    l->where.text = l->text;
+    return l;
+}
+
+/* The table was tried: its plan begins. */
+static void begin_plan(bridge_line *l, bridge_table *table)
+{
+    l->table = table;
+    table->setup.update = on_update;
+    table->setup.context = l;
+    (void)mbm_plan_begin(&l->plan, &l->at.client, &table->setup, NULL);
+}
+
+int bridge_line_begin(bridge_line *l, bridge_table *table, int is_patient)
+{
+    const int code = is_patient ? line_open_later(&l->at, &l->where) : line_open(&l->at, &l->where);
+
+    if (code != CODE_DONE)
+        return code;
+    l->at.is_logged = 1;
+    begin_plan(l, table);
+    return CODE_DONE;
+}
+
+void bridge_line_replace(bridge_line *l, bridge_table *next)
+{
+    bridge_table *before = l->table;
+
+    remove_retained(l, next);
+    (void)mbm_plan_end(&l->plan);
+    begin_plan(l, next);
+    bridge_table_free(before);
+    if (bridge.has_discovery)
+        bridge_line_discover(l);
+}
+
+void bridge_line_clear(bridge_line *l)
+{
+    int i;
+
+    for (i = 0; i < BRIDGE_WRITES; i++)
+        if (l->writes[i].is_used)
+            publish_result(l, l->writes[i].name, "the line was removed from the bridge");
+    remove_retained(l, NULL);
+    broker_unsubscribe(&bridge.mqtt, l->below);
+}
+
+void bridge_line_end(bridge_line *l)
+{
+    if (l->table) {
+        (void)mbm_plan_end(&l->plan);
+        line_close(&l->at);
+    }
+    bridge_table_free(l->table);
+    free(l->text);
+    free(l->path);
+    free(l->topic);
+    free(l);
+}
+
+void bridge_line_poll(bridge_line *l)
+{
+    (void)mbm_plan_poll(&l->plan);
+    line_poll(&l->at);
+}
+
+int bridge_line_polls(bridge_line *l, struct pollfd *wait, uint32_t *micros)
+{
+    const uint32_t delay = mbm_plan_pollDelay(&l->plan);
+
+    if (delay < *micros)
+        *micros = delay;
+    return line_polls(&l->at, wait, micros);
+}

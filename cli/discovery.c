@@ -1,0 +1,275 @@
+#define _GNU_SOURCE
+#include "discovery.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { LONGEST_STATE = 255, TOPIC_BYTES = 512, ID_BYTES = 300 };
+
+const char *discovery_prefix = "homeassistant";
+
+/* --- names --- */
+
+/* Writes a text with the characters of an identifier, [a-zA-Z0-9_-], alone. A number at its end
+ * keeps texts apart of which other characters were replaced. */
+static void write_id(const char *text, char id[ID_BYTES])
+{
+    uint32_t digest = 0x811C9DC5u;
+    int is_changed = 0;
+    size_t at = 0;
+
+    for (; *text && at < ID_BYTES - 16; text++) {
+        const int is_same = (*text >= 'a' && *text <= 'z') || (*text >= 'A' && *text <= 'Z') ||
+                            (*text >= '0' && *text <= '9') || *text == '_' || *text == '-';
+
+        id[at++] = (char)(is_same ? *text : '_');
+        is_changed |= !is_same;
+        digest = (digest ^ (uint8_t)*text) * 0x01000193u;
+    }
+    snprintf(id + at, ID_BYTES - at, is_changed ? "_%08x" : "", digest);
+}
+
+/* The identifier of a line, of which all its topics have the beginning. */
+static void line_id(const discovery_line *line, char id[ID_BYTES])
+{
+    char text[TOPIC_BYTES];
+
+    snprintf(text, sizeof text, "%s%s%s", line->topic, *line->below ? "/" : "", line->below);
+    if (*line->below)
+        text[strlen(text) - 1] = '\0';
+    write_id(text, id);
+}
+
+/* --- which entity a field is --- */
+
+static int is_text(const mbm_planField *planned)
+{
+    return planned->type == MBM_TYPE_TEXT;
+}
+
+/* Whether it is one bit, one number or several values. */
+static int is_bit(const mbm_planField *planned)
+{
+    return planned->type == MBM_TYPE_BIT && planned->count == 1;
+}
+
+static int is_several(const mbm_planField *planned)
+{
+    return !is_text(planned) && !device_is_part(planned) && planned->count > 1;
+}
+
+static const char *component_of(const device *of, uint16_t field)
+{
+    const mbm_planField *planned = &of->planned[field];
+    const int is_written = of->fields[field].access & DEVICE_WRITE;
+
+    /* What is written without a state is a text too: Home Assistant has no list of numbers. */
+    if (is_several(planned))
+        return is_written ? "text" : "sensor";
+    if (is_text(planned))
+        return is_written && planned->count <= LONGEST_STATE ? "text" : "sensor";
+    if (is_bit(planned))
+        return is_written ? "switch" : "binary_sensor";
+    return is_written ? "number" : "sensor";
+}
+
+void discovery_topic(const discovery_line *line, const device *of, uint16_t field,
+                     char topic[DISCOVERY_TOPIC_BYTES])
+{
+    char node[ID_BYTES], object[ID_BYTES];
+
+    line_id(line, node);
+    write_id(of->fields[field].name, object);
+    snprintf(topic, DISCOVERY_TOPIC_BYTES, "%s/%s/%s/%s/config", discovery_prefix,
+             component_of(of, field), node, object);
+}
+
+/* --- its message --- */
+
+/* The greatest numbers that a type holds, as Home Assistant's floats show them exactly. */
+static void range_of(const mbm_planField *planned, double *least, double *most)
+{
+    static const double EXACT = 9007199254740992.0, FLOAT = 3.4028234663852886e38;
+
+    *least = 0;
+    switch (planned->type) {
+    case MBM_TYPE_BIT: *most = (double)((1u << planned->count) - 1); return;
+    case MBM_TYPE_UINT16: *most = UINT16_MAX; return;
+    case MBM_TYPE_UINT32: *most = UINT32_MAX; return;
+    case MBM_TYPE_UINT64: *most = EXACT; return;
+    case MBM_TYPE_INT16:
+        *least = INT16_MIN;
+        *most = INT16_MAX;
+        return;
+    case MBM_TYPE_INT32:
+        *least = INT32_MIN;
+        *most = INT32_MAX;
+        return;
+    case MBM_TYPE_INT64:
+        *least = -EXACT;
+        *most = EXACT;
+        return;
+    default: *least = -FLOAT; *most = FLOAT;
+    }
+}
+
+static void add_range(cJSON *to, const device_field *field, const mbm_planField *planned)
+{
+    const int is_float = planned->type == MBM_TYPE_FLOAT || planned->type == MBM_TYPE_DOUBLE;
+    const double scale = field->form.scale.digits != 0 ? field->form.scale.value : 1;
+    double least, most, step = is_float ? 0.001 : fabs(scale);
+
+    range_of(planned, &least, &most);
+    least *= is_float ? 1 : scale;
+    most *= is_float ? 1 : scale;
+    /* A negative scale turns the range. */
+    cJSON_AddNumberToObject(to, "min", least < most ? least : most);
+    cJSON_AddNumberToObject(to, "max", least < most ? most : least);
+    /* Home Assistant has no smaller step. */
+    cJSON_AddNumberToObject(to, "step", step < 0.001 ? 0.001 : step);
+    cJSON_AddStringToObject(to, "mode", "box");
+}
+
+static void add_topic(cJSON *to, const char *key, const discovery_line *line, const char *name,
+                      const char *last)
+{
+    char topic[TOPIC_BYTES];
+
+    snprintf(topic, sizeof topic, "%s/%s%s%s", line->topic, line->below, name, last);
+    cJSON_AddStringToObject(to, key, topic);
+}
+
+/* Whether the bridge reads a field of the unit, and so knows whether it answers. */
+static int is_read(const device *of, uint16_t unit)
+{
+    uint16_t field;
+
+    for (field = 0; field < of->readable; field++)
+        if (of->planned[field].unit == unit)
+            return 1;
+    return 0;
+}
+
+/* What is online while the bridge is connected and the unit answers. */
+static void add_availability(cJSON *to, const discovery_line *line, const device *of,
+                             const mbm_planField *planned)
+{
+    cJSON *list = cJSON_AddArrayToObject(to, "availability"), *one = cJSON_CreateObject();
+    char topic[TOPIC_BYTES];
+
+    snprintf(topic, sizeof topic, "%s/status", line->topic);
+    cJSON_AddStringToObject(one, "topic", topic);
+    cJSON_AddItemToArray(list, one);
+    if (is_read(of, planned->unit)) {
+        one = cJSON_CreateObject();
+        snprintf(topic, sizeof topic, "%s/%sunit/%u/status", line->topic, line->below,
+                 planned->unit);
+        cJSON_AddStringToObject(one, "topic", topic);
+        cJSON_AddItemToArray(list, one);
+    }
+    cJSON_AddStringToObject(to, "availability_mode", "all");
+}
+
+static void add_device(cJSON *to, const discovery_line *line, const device *of,
+                       const mbm_planField *planned)
+{
+    cJSON *block = cJSON_AddObjectToObject(to, "device"), *ids;
+    char id[ID_BYTES], text[ID_BYTES + 32];
+
+    line_id(line, id);
+    snprintf(text, sizeof text, "mbm_%s_%u", id, planned->unit);
+    ids = cJSON_AddArrayToObject(block, "identifiers");
+    cJSON_AddItemToArray(ids, cJSON_CreateString(text));
+    snprintf(text, sizeof text, "%.250s unit %u", of->name ? of->name : id, planned->unit);
+    cJSON_AddStringToObject(block, "name", text);
+    if (of->name)
+        cJSON_AddStringToObject(block, "model", of->name);
+}
+
+/* What Home Assistant makes of a payload of the bridge. */
+static const char *template_of(const mbm_planField *planned, int is_plain)
+{
+    if (is_plain)
+        return is_several(planned) ? "{{ value[:255] }}" : NULL;
+    if (is_several(planned))
+        return "{{ ((value_json.value or []) | join(','))[:255] }}";
+    if (is_text(planned))
+        return "{{ value_json.value or '' }}";
+    return "{{ value_json.value }}";
+}
+
+static void add_state(cJSON *to, const discovery_line *line, const device *of, uint16_t field,
+                      const char *component)
+{
+    const mbm_planField *planned = &of->planned[field];
+    const char *how = template_of(planned, line->is_plain);
+    const char *on = line->is_plain ? "1" : "True", *off = line->is_plain ? "0" : "False";
+
+    if (field >= of->readable)
+        return;
+    add_topic(to, "state_topic", line, of->fields[field].name, "");
+    if (how)
+        cJSON_AddStringToObject(to, "value_template", how);
+    if (strcmp(component, "switch") == 0) {
+        cJSON_AddStringToObject(to, "state_on", on);
+        cJSON_AddStringToObject(to, "state_off", off);
+    } else if (strcmp(component, "binary_sensor") == 0) {
+        cJSON_AddStringToObject(to, "payload_on", on);
+        cJSON_AddStringToObject(to, "payload_off", off);
+    }
+}
+
+static void add_command(cJSON *to, const discovery_line *line, const device *of, uint16_t field,
+                        const char *component)
+{
+    const device_field *one = &of->fields[field];
+    const mbm_planField *planned = &of->planned[field];
+
+    if (!(one->access & DEVICE_WRITE))
+        return;
+    add_topic(to, "command_topic", line, one->name, "/set");
+    if (strcmp(component, "number") == 0)
+        add_range(to, one, planned);
+    else if (strcmp(component, "switch") == 0) {
+        cJSON_AddStringToObject(to, "payload_on", "ON");
+        cJSON_AddStringToObject(to, "payload_off", "OFF");
+    } else if (is_text(planned)) {
+        cJSON_AddNumberToObject(to, "max", planned->count);
+        /* A JSON string is the text, whatever its first character is. */
+        cJSON_AddStringToObject(to, "command_template", "{{ value | to_json }}");
+    }
+}
+
+char *discovery_config(const discovery_line *line, const device *of, uint16_t field,
+                       char topic[DISCOVERY_TOPIC_BYTES])
+{
+    const device_field *one = &of->fields[field];
+    const char *component = component_of(of, field);
+    cJSON *root = cJSON_CreateObject(), *origin;
+    char node[ID_BYTES], object[ID_BYTES], id[2 * ID_BYTES + 8];
+    char *text;
+
+    discovery_topic(line, of, field, topic);
+    line_id(line, node);
+    write_id(one->name, object);
+    snprintf(id, sizeof id, "mbm_%s_%s", node, object);
+    cJSON_AddStringToObject(root, "name", one->name);
+    cJSON_AddStringToObject(root, "unique_id", id);
+    add_state(root, line, of, field, component);
+    add_command(root, line, of, field, component);
+    if (one->unit_of_measurement &&
+        (strcmp(component, "number") == 0 ||
+         (strcmp(component, "sensor") == 0 && !is_text(&of->planned[field]) &&
+          !is_several(&of->planned[field]))))
+        cJSON_AddStringToObject(root, "unit_of_measurement", one->unit_of_measurement);
+    add_availability(root, line, of, &of->planned[field]);
+    add_device(root, line, of, &of->planned[field]);
+    origin = cJSON_AddObjectToObject(root, "origin");
+    cJSON_AddStringToObject(origin, "name", "mbm bridge");
+    cJSON_AddStringToObject(origin, "sw_version", mbm_version());
+    text = cJSON_PrintUnformatted(root);
+    cJSON_Delete(root);
+    return text;
+}

@@ -1,0 +1,30 @@
+/* Home Assistant's MQTT discovery: a retained message for each field, from which Home Assistant
+ * makes an entity. The keys are those of its documentation of MQTT sensor, binary sensor, number,
+ * switch and text.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef DISCOVERY_H
+#define DISCOVERY_H
+
+#include "device.h"
+
+enum { DISCOVERY_TOPIC_BYTES = 700 };
+
+/* Where the fields are published: at TOPIC/BELOWNAME. */
+typedef struct discovery_line {
+    const char *topic, *below;
+    uint8_t is_plain;
+} discovery_line;
+
+/* The prefix of all topics of discovery: "homeassistant". */
+extern const char *discovery_prefix;
+
+/* Writes the topic of a field's message. */
+void discovery_topic(const discovery_line *line, const device *of, uint16_t field,
+                     char topic[DISCOVERY_TOPIC_BYTES]);
+
+/* Returns the message, which the caller frees, or NULL without memory, and writes its topic. */
+char *discovery_config(const discovery_line *line, const device *of, uint16_t field,
+                       char topic[DISCOVERY_TOPIC_BYTES]);
+
+#endif
