@@ -395,9 +395,9 @@ trace: ## Compare what mbm and examples print with --trace with what tshark read
 
 .PHONY: gateway
 gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients and devices of libmodbus and pymodbus
-	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv tool $(PEERS)
-	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain
+	@scripts/need python3 python3-venv gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev
+	@$(MAKE) --no-print-directory venv tool $(BUILD)/sanitized/mbm $(PEERS)
+	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain $(BUILD)/sanitized/mbm
 
 .PHONY: check-serve
 check-serve: tool ## Check mbm serve, its faults, mbm poll and mbm header with other clients and compilers, also with the sanitizers

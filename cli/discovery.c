@@ -28,7 +28,9 @@ static void write_id(const char *text, char id[ID_BYTES])
         is_changed |= !is_same;
         digest = (digest ^ (uint8_t)*text) * 0x01000193u;
     }
-    snprintf(id + at, ID_BYTES - at, is_changed ? "_%08x" : "", digest);
+    id[at] = '\0';
+    if (is_changed)
+        snprintf(id + at, ID_BYTES - at, "_%08x", digest);
 }
 
 /* The identifier of a line, of which all its topics have the beginning. */

@@ -2,6 +2,7 @@
 #include "trace.h"
 
 #include "pcap_file.h"
+#include "report.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -30,7 +31,8 @@ static void checked(int result)
 {
     if (result == 0)
         return;
-    fprintf(stderr, "%s: %s\n", pcap_path, strerror(errno));
+    report_log(REPORT_ERROR, "%s: %s. No more frames are written to it", pcap_path,
+               strerror(errno));
     (void)fclose(pcap);
     pcap = NULL;
 }
