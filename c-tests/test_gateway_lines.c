@@ -45,6 +45,28 @@ static void a_line_that_is_not_ready_gets_0a(void **state)
     ON_LINE(0, 2, READ);
 }
 
+static void a_changed_route_holds_for_later_requests(void **state)
+{
+    static mbm_gatewayRoute map[2];
+
+    (void)state;
+    map[0] = (mbm_gatewayRoute){1, 9, 0, 0};
+    map[1] = (mbm_gatewayRoute){10, 19, 1, 0};
+    gateway_bench_start(&b, map, COUNT(map));
+    ASK(0, 1, 2, READ);
+    ON_LINE(0, 2, READ);
+    map[0] = (mbm_gatewayRoute){1, 9, 1, 101};
+    map[1] = (mbm_gatewayRoute){1, 0, 0, 0};
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 1, 2, VALUE);
+    ASK(0, 2, 2, READ);
+    ON_LINE(1, 102, READ);
+    REPLY(1, 102, VALUE);
+    EXPECT(0, 2, 2, VALUE);
+    ASK(0, 3, 12, READ);
+    EXPECT(0, 3, 12, NO_PATH);
+}
+
 static void a_line_that_is_lost_gets_0a(void **state)
 {
     (void)state;
@@ -249,6 +271,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         TEST(a_line_that_is_not_ready_gets_0a),
+        TEST(a_changed_route_holds_for_later_requests),
         TEST(a_line_that_is_lost_gets_0a),
         TEST(a_client_whose_queue_is_full_gets_0a),
         TEST(the_program_shares_the_line),

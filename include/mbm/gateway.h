@@ -119,7 +119,9 @@ typedef struct mbm_gatewayRequest {
  * What a gateway consists of. The gateway copies this struct, but not what it points to.
  */
 typedef struct mbm_gatewayConfig {
-    /** The map of units. It may be in flash. */
+    /** The map of units. It may be in flash. A program may also change it between two calls of
+     *  the gateway: then it holds for the requests that are received later. Each route must be
+     *  valid; one whose `last` is below its `first` leads nowhere. */
     const struct mbm_gatewayRoute *routes;
     /** The lines; may be NULL if `lineCount` is 0. */
     struct mbm_gatewayLine *lines;

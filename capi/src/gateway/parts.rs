@@ -87,7 +87,9 @@ pub struct mbm_gatewayRequest {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_gatewayConfig {
-    /// The map of units. It may be in flash.
+    /// The map of units. It may be in flash. A program may also change it between two calls of
+    /// the gateway: then it holds for the requests that are received later. Each route must be
+    /// valid; one whose `last` is below its `first` leads nowhere.
     pub routes: *const mbm_gatewayRoute,
     /// The lines; may be NULL if `lineCount` is 0.
     pub lines: *mut mbm_gatewayLine,
