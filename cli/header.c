@@ -182,6 +182,20 @@ static int begin_plan(header *h, mbm_planSetup *setup)
     return CODE_DONE;
 }
 
+/* Copies the fields that can be read, with their scales. */
+static void scale_fields(const header *h, mbm_planField *fields)
+{
+    uint16_t i;
+
+    for (i = 0; i < meter.readable; i++) {
+        fields[i] = meter.planned[i];
+        if (meter.fields[i].form.scale.digits) {
+            fields[i].multiplier = h->scales[i].multiplier;
+            fields[i].divisor = h->scales[i].divisor;
+        }
+    }
+}
+
 static int count_reads(header *h)
 {
     static mbm_clientRequest request;
@@ -195,8 +209,7 @@ static int count_reads(header *h)
                                h->gap < MBM_MAX_READ_REGISTERS ? h->gap : MBM_MAX_READ_REGISTERS,
                            .requests = &request,
                            .requestCount = 1};
-    int code = CODE_DONE;
-    uint16_t i;
+    int code;
 
     if (count == 0)
         return CODE_DONE;
@@ -204,17 +217,12 @@ static int count_reads(header *h)
     setup.positions = (mbm_planPosition *)calloc(count, sizeof *setup.positions);
     setup.reads = (mbm_planRead *)calloc(count, sizeof *setup.reads);
     setup.data = (uint16_t *)calloc(setup.dataWords, sizeof *setup.data);
-    if (!fields || !setup.positions || !setup.reads || !setup.data)
-        code = report(CODE_SYSTEM, "there is no memory for %u fields", count);
-    for (i = 0; code == CODE_DONE && i < count; i++) {
-        fields[i] = meter.planned[i];
-        if (meter.fields[i].form.scale.digits) {
-            fields[i].multiplier = h->scales[i].multiplier;
-            fields[i].divisor = h->scales[i].divisor;
-        }
-    }
-    if (code == CODE_DONE)
+    if (fields && setup.positions && setup.reads && setup.data) {
+        scale_fields(h, fields);
         code = begin_plan(h, &setup);
+    } else {
+        code = report(CODE_SYSTEM, "there is no memory for %u fields", count);
+    }
     free(fields);
     free(setup.positions);
     free(setup.reads);
