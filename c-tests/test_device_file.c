@@ -554,7 +554,7 @@ static void any_damaged_file_is_read_or_refused(void **state)
         "    unit_of_measurement: V\n    value: 23.5\n"
         "  - {name: model, table: holding, address: 0, type: text, count: 5, value: abc}\n"
         "  - {name: three, table: holding, address: 9, type: int16, count: 3, value: [1, -2, 3],\n"
-        "     access: read-write}\n"
+        "     access: read-write, enumeration: {1: one, -2: minus two}}\n"
         "  - {name: on, table: coils, address: 1, count: 2, value: [on, off], access: write}\n";
     static const char pieces[][8] = {"- ", ": ", "\n", "[", "]",  "{",    "}",      "&a ",
                                      "*a", "0",  "-",  "'", "\"", "\xC3", "text\n", "\n  - "};
