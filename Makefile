@@ -209,7 +209,7 @@ fault-table: need-test ## Generate docs/reports/fault-table.md from the test's r
 .PHONY: certificates
 certificates:
 	@scripts/need openssl
-	@scripts/build/certificates $(BUILD)/certificates
+	@c-tests/certificates $(BUILD)/certificates
 
 .PHONY: corruption
 corruption: ## Compute which damage CRC-16 lets through; writes docs/reliability.md; REPLIES (40000000)

@@ -20,7 +20,7 @@ void tls_identify(mbm_tls_identity *identity, const char *name, const char *auth
     snprintf(key, sizeof key, TLS_FOLDER "%s.key.pem", name);
     snprintf(authorities, sizeof authorities, TLS_FOLDER "%s.pem", authority);
     if (mbm_tls_load(&files, &options, certificate, key, authorities) != 0)
-        fail_msg("%s: run scripts/build/certificates " TLS_FOLDER, certificate);
+        fail_msg("%s: run c-tests/certificates " TLS_FOLDER, certificate);
     assert_int_equal(mbm_tls_begin(identity, &options), 0);
     mbm_tls_forgetKey(&files);
 }

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The folder that scripts/build/certificates fills, seen from the folder that tests run in. */
+/* The folder that c-tests/certificates fills, seen from the folder that tests run in. */
 #define TLS_FOLDER "build/certificates/"
 
 enum { TLS_LANE = 65536, TLS_LOG = 65536 };

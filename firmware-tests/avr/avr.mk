@@ -73,12 +73,12 @@ avr-sketches: library-stamp
 	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(RELAX_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
 # The examples are compiled from their copies in the library.
-SKETCH_SOURCES := scripts/build/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino firmware-tests/avr/libraries/*/src/*)
+SKETCH_SOURCES := firmware-tests/avr/compile-sketch $(wildcard firmware-tests/avr/sketches/*/*.ino firmware-tests/avr/libraries/*/src/*)
 define sketches
 $(AVR_OUT)/$(1)/%.elf: examples/arduino/%/ $(SKETCH_SOURCES) $(LIBRARY_STAMP)
-	@scripts/build/sketch $(1) $(BUILD)/arduino/mbm/examples/$$* $$@
+	@firmware-tests/avr/compile-sketch $(1) $(BUILD)/arduino/mbm/examples/$$* $$@
 $(AVR_OUT)/$(1)/%.elf: firmware-tests/avr/sketches/%/ $(SKETCH_SOURCES) $(LIBRARY_STAMP)
-	@scripts/build/sketch $(1) $$< $$@
+	@firmware-tests/avr/compile-sketch $(1) $$< $$@
 endef
 $(eval $(call sketches,uno))
 $(eval $(call sketches,mega))
@@ -96,8 +96,8 @@ $(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
 UPSTREAM := $(patsubst %,upstream-%,basic-2 phoenix-2 halfduplex-2 basic-09 phoenix-09)
 UPSTREAM_BOARDS := uno mega atmega1284p
 define upstream
-$(AVR_OUT)/$(1)/upstream-%.elf: $(SKETCHES)/upstream-% scripts/build/sketch $(LIBRARY_STAMP)
-	@scripts/build/sketch $(1) $$< $$@
+$(AVR_OUT)/$(1)/upstream-%.elf: $(SKETCHES)/upstream-% firmware-tests/avr/compile-sketch $(LIBRARY_STAMP)
+	@firmware-tests/avr/compile-sketch $(1) $$< $$@
 endef
 $(foreach board,$(UPSTREAM_BOARDS),$(eval $(call upstream,$(board))))
 
