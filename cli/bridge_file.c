@@ -4,7 +4,6 @@
 #include "numbers.h"
 #include "report.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,18 +19,6 @@ static const char *const LINE_NAMES[] = {"line", "file", "topic", NULL};
 static const char *const ANSWERS[] = {"no", "yes", NULL};
 static const char *const DISCOVERIES[] = {"homeassistant", NULL};
 static const char NO_MEMORY[] = "there is not enough memory";
-
-static char said[LONGEST_LINE + 200];
-
-__attribute__((format(printf, 1, 2))) static const char *say(const char *format, ...)
-{
-    va_list arguments;
-
-    va_start(arguments, format);
-    vsnprintf(said, sizeof said, format, arguments);
-    va_end(arguments);
-    return said;
-}
 
 /* --- settings --- */
 

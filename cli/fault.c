@@ -3,7 +3,6 @@
 
 #include "numbers.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -34,19 +33,6 @@ static const struct {
     [FAULT_WRONG_LENGTH] = {"wrong-length", VALUE_NONE, ON_BYTES, 0, ""},
     [FAULT_CLOSE] = {"close", VALUE_NONE, ON_STREAMS, 0, ""},
 };
-
-static char said[700];
-
-static const char *say(const char *format, ...) __attribute__((format(printf, 1, 2)));
-static const char *say(const char *format, ...)
-{
-    va_list arguments;
-
-    va_start(arguments, format);
-    vsnprintf(said, sizeof said, format, arguments);
-    va_end(arguments);
-    return said;
-}
 
 /* Lists the faults that a line can have. */
 static const char *listed(enum place_kind line, char text[200])

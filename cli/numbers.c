@@ -7,17 +7,17 @@
 #include <stdio.h>
 #include <string.h>
 
-static char said[512];
-
-static const char *say(const char *format, ...) __attribute__((format(printf, 1, 2)));
-static const char *say(const char *format, ...)
+const char *say(const char *format, ...)
 {
+    static char said[4][1700];
+    static unsigned next;
+    char *const text = said[next++ % 4];
     va_list arguments;
 
     va_start(arguments, format);
-    vsnprintf(said, sizeof said, format, arguments);
+    vsnprintf(text, sizeof *said, format, arguments);
     va_end(arguments);
-    return said;
+    return text;
 }
 
 /* Reads digits, and returns what follows them, or NULL if there is none. A number that is too large

@@ -1,7 +1,7 @@
 /* Numbers, times and words as people type them, read strictly.
  *
- * Each function returns NULL, or what is wrong with the text, in a buffer that the next call of any
- * of them overwrites: a sentence without its full stop, which begins with the text in quotes.
+ * Each function returns NULL, or what is wrong with the text, as say makes it: a sentence without
+ * its full stop, which begins with the text in quotes.
  *
  * Licence: MIT OR Apache-2.0. */
 #ifndef NUMBERS_H
@@ -9,6 +9,9 @@
 
 #include <stddef.h>
 #include <stdint.h>
+
+/* Formats a sentence, in a buffer that the fourth next call overwrites. */
+const char *say(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /* A whole decimal number: digits, after a minus if `least` is negative. */
 const char *number_read(const char *text, int64_t least, int64_t most, int64_t *number);

@@ -1,23 +1,15 @@
 #define _GNU_SOURCE
 #include "payload.h"
 
+#include "cursor.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* The bytes that have not been read yet. */
-typedef struct cursor {
-    const char *at, *end;
-} cursor;
-
 /* --- JSON (RFC 8259). Each function returns 0 if the next bytes are not what it skips. --- */
 
 static int skip_value(cursor *in);
-
-static int is_digit(const cursor *in)
-{
-    return in->at < in->end && *in->at >= '0' && *in->at <= '9';
-}
 
 static int is_space(char one)
 {
@@ -30,14 +22,6 @@ static void skip_space(cursor *in)
         in->at++;
 }
 
-static int skip_char(cursor *in, char one)
-{
-    if (in->at == in->end || *in->at != one)
-        return 0;
-    in->at++;
-    return 1;
-}
-
 static int skip_word(cursor *in, const char *word)
 {
     const size_t length = strlen(word);
@@ -46,29 +30,6 @@ static int skip_word(cursor *in, const char *word)
         return 0;
     in->at += length;
     return 1;
-}
-
-static int skip_digits(cursor *in)
-{
-    if (!is_digit(in))
-        return 0;
-    while (is_digit(in))
-        in->at++;
-    return 1;
-}
-
-static int skip_number(cursor *in)
-{
-    (void)skip_char(in, '-');
-    if (!skip_char(in, '0') && !skip_digits(in))
-        return 0;
-    if (skip_char(in, '.') && !skip_digits(in))
-        return 0;
-    if (!skip_char(in, 'e') && !skip_char(in, 'E'))
-        return 1;
-    if (!skip_char(in, '-'))
-        (void)skip_char(in, '+');
-    return skip_digits(in);
 }
 
 static int skip_escape(cursor *in)
@@ -88,7 +49,7 @@ static int skip_escape(cursor *in)
 
 static int skip_string(cursor *in)
 {
-    if (!skip_char(in, '"'))
+    if (!cursor_skip_char(in, '"'))
         return 0;
     while (in->at < in->end && *in->at != '"') {
         const unsigned char one = (unsigned char)*in->at++;
@@ -96,7 +57,7 @@ static int skip_string(cursor *in)
         if (one < ' ' || (one == '\\' && !skip_escape(in)))
             return 0;
     }
-    return skip_char(in, '"');
+    return cursor_skip_char(in, '"');
 }
 
 /* After a bracket: skips the items or members up to the bracket that closes them. If `value` is not
@@ -104,7 +65,7 @@ static int skip_string(cursor *in)
 static int skip_rest(cursor *in, char closing, cursor *value)
 {
     skip_space(in);
-    if (skip_char(in, closing))
+    if (cursor_skip_char(in, closing))
         return 1;
     for (;;) {
         cursor name, found;
@@ -117,7 +78,7 @@ static int skip_rest(cursor *in, char closing, cursor *value)
                 return 0;
             name.end = in->at;
             skip_space(in);
-            if (!skip_char(in, ':'))
+            if (!cursor_skip_char(in, ':'))
                 return 0;
             skip_space(in);
         }
@@ -136,9 +97,9 @@ static int skip_rest(cursor *in, char closing, cursor *value)
                 *value = found;
         }
         skip_space(in);
-        if (skip_char(in, closing))
+        if (cursor_skip_char(in, closing))
             return 1;
-        if (!skip_char(in, ','))
+        if (!cursor_skip_char(in, ','))
             return 0;
     }
 }
@@ -146,14 +107,14 @@ static int skip_rest(cursor *in, char closing, cursor *value)
 /* The depth of its calls is limited by the length of the payload. */
 static int skip_value(cursor *in)
 {
-    if (skip_char(in, '{'))
+    if (cursor_skip_char(in, '{'))
         return skip_rest(in, '}', NULL);
-    if (skip_char(in, '['))
+    if (cursor_skip_char(in, '['))
         return skip_rest(in, ']', NULL);
     if (in->at < in->end && *in->at == '"')
         return skip_string(in);
     return skip_word(in, "true") || skip_word(in, "false") || skip_word(in, "null") ||
-           skip_number(in);
+           cursor_skip_number(in);
 }
 
 /* --- payloads --- */
@@ -167,7 +128,7 @@ static cursor find_value(const char *payload, size_t length)
     skip_space(&in);
     while (in.at < in.end && is_space(in.end[-1]))
         in.end--;
-    if (!skip_char(&in, '{'))
+    if (!cursor_skip_char(&in, '{'))
         return in;
     if (!skip_rest(&in, '}', &value) || in.at != in.end)
         value.at = value.end = NULL;
@@ -204,7 +165,7 @@ uint16_t payload_parse(const value_form *form, const char *payload, size_t lengt
         words[0] = (uint16_t)read_truth(value);
         return 1;
     }
-    if (!value.at || !skip_number(&in) || in.at != value.end) {
+    if (!value.at || !cursor_skip_number(&in) || in.at != value.end) {
         *wrong = "the payload is no number";
         return 0;
     }
@@ -312,7 +273,7 @@ static const char *read_values(const value_form *form, uint16_t count, const cha
     const char *wrong = NULL;
     uint16_t at;
 
-    if (in.at && skip_char(&in, '[')) {
+    if (in.at && cursor_skip_char(&in, '[')) {
         if (in.at < in.end && in.end[-1] == ']')
             in.end--;
         else

@@ -3,22 +3,8 @@
 
 #include "numbers.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-static char said[512];
-
-static const char *say(const char *format, ...) __attribute__((format(printf, 1, 2)));
-static const char *say(const char *format, ...)
-{
-    va_list arguments;
-
-    va_start(arguments, format);
-    vsnprintf(said, sizeof said, format, arguments);
-    va_end(arguments);
-    return said;
-}
 
 static const struct {
     const char *scheme;

@@ -1,6 +1,8 @@
 #define _GNU_SOURCE
 #include "value.h"
 
+#include "cursor.h"
+
 #include <cjson/cJSON.h>
 #include <ctype.h>
 #include <float.h>
@@ -23,11 +25,6 @@ const char *const value_order_names[] = {"", "ABCD", "CDAB", "BADC", "DCBA", NUL
 static const char OUT_OF_RANGE[] = "is out of range";
 static const value_scale ONE = {.digits = 1, .value = 1};
 
-/* The bytes that have not been read yet. */
-typedef struct cursor {
-    const char *at, *end;
-} cursor;
-
 /* A number: digits * 10^exponent. The digits neither begin nor end with 0. Zero has none. */
 typedef struct decimal {
     char digits[VALUE_LONGEST];
@@ -43,44 +40,6 @@ uint16_t value_registers(uint8_t type, uint16_t count)
     return type == MBM_TYPE_TEXT ? (uint16_t)((count + 1) / 2) : registers[type];
 }
 
-/* --- numbers. Each function returns 0 if the next bytes are not what it skips. --- */
-
-static int is_digit(const cursor *in)
-{
-    return in->at < in->end && *in->at >= '0' && *in->at <= '9';
-}
-
-static int skip_char(cursor *in, char one)
-{
-    if (in->at == in->end || *in->at != one)
-        return 0;
-    in->at++;
-    return 1;
-}
-
-static int skip_digits(cursor *in)
-{
-    if (!is_digit(in))
-        return 0;
-    while (is_digit(in))
-        in->at++;
-    return 1;
-}
-
-static int skip_number(cursor *in)
-{
-    (void)skip_char(in, '-');
-    if (!skip_char(in, '0') && !skip_digits(in))
-        return 0;
-    if (skip_char(in, '.') && !skip_digits(in))
-        return 0;
-    if (!skip_char(in, 'e') && !skip_char(in, 'E'))
-        return 1;
-    if (!skip_char(in, '-'))
-        (void)skip_char(in, '+');
-    return skip_digits(in);
-}
-
 /* Reads all bytes as one number. */
 static int read_decimal(cursor in, decimal *number)
 {
@@ -89,11 +48,11 @@ static int read_decimal(cursor in, decimal *number)
     int is_fraction = 0;
 
     memset(number, 0, sizeof *number);
-    if (!skip_number(&in) || in.at != in.end || all.end - all.at > VALUE_LONGEST)
+    if (!cursor_skip_number(&in) || in.at != in.end || all.end - all.at > VALUE_LONGEST)
         return 0;
     in = all;
-    number->is_negative = skip_char(&in, '-');
-    for (; is_digit(&in) || (in.at < in.end && *in.at == '.'); in.at++) {
+    number->is_negative = cursor_skip_char(&in, '-');
+    for (; cursor_is_digit(&in) || (in.at < in.end && *in.at == '.'); in.at++) {
         if (*in.at == '.') {
             is_fraction = 1;
             continue;
@@ -110,10 +69,10 @@ static int read_decimal(cursor in, decimal *number)
         int is_negative;
 
         in.at++;
-        is_negative = skip_char(&in, '-');
+        is_negative = cursor_skip_char(&in, '-');
         if (!is_negative)
-            (void)skip_char(&in, '+');
-        while (is_digit(&in)) {
+            (void)cursor_skip_char(&in, '+');
+        while (cursor_is_digit(&in)) {
             if (exponent < FAR)
                 exponent = exponent * 10 + (*in.at - '0');
             in.at++;
