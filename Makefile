@@ -205,6 +205,11 @@ fault-table: need-test ## Generate docs/reports/fault-table.md from the test's r
 	@for table in bad_wire slow_devices; do scripts/fill docs/reports/fault-table.md $$table <$(BUILD)/plain/test_$$table.rows || exit 1; done
 	@scripts/build/pictures
 
+.PHONY: conformance
+conformance: ## Write docs/reports/conformance*.md from conformance.toml: each clause and its tests
+	@scripts/need python3
+	@scripts/check/functions --write
+
 # Certificates for tests and examples, build/certificates.
 .PHONY: certificates
 certificates:
@@ -258,6 +263,7 @@ $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value cursor)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device value cursor numbers report)
+$(BUILD)/$(1)/test_place: $(patsubst %,$(BUILD)/$(1)/cli/%.o,place numbers)
 $(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@

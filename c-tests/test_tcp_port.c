@@ -438,6 +438,26 @@ static void a_master_reads_rtu_through_a_stream(void **state)
     mbm_tcp_closeListener(&listener);
 }
 
+/* The side that closes first keeps its port in TIME_WAIT. */
+static void a_server_listens_again_at_once_after_it_closed_a_connection(void **state)
+{
+    mbm_tcp_listener listener = MBM_INIT;
+    mbm_tcp accepted = MBM_INIT;
+    int client;
+
+    (void)state;
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    snprintf(service, sizeof service, "%u", listener.port);
+    client = tcp_connect(listener.port);
+    assert_int_equal(mbm_tcp_wait(NULL, 0, &listener, -1, PATIENCE), 1);
+    assert_int_equal(mbm_tcp_accept(&listener, &accepted, 1), 0);
+    mbm_tcp_close(&accepted);
+    close(client);
+    mbm_tcp_closeListener(&listener);
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", service), 0);
+    mbm_tcp_closeListener(&listener);
+}
+
 #define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
 
 int main(void)
@@ -457,6 +477,7 @@ int main(void)
         TEST(wait_ends_with_the_time_or_with_any_of_its_sockets),
         TEST(a_connection_without_a_place_is_ended_without_a_reset),
         TEST(listening_at_a_port_in_use_fails),
+        TEST(a_server_listens_again_at_once_after_it_closed_a_connection),
         TEST(a_master_reads_rtu_through_a_stream),
     };
 

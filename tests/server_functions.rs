@@ -134,6 +134,18 @@ fn the_event_log_keeps_64_events() {
 }
 
 #[test]
+fn the_event_log_shows_listen_only_mode_and_the_restart() {
+    let mut device = Device::new();
+    ask(&mut device, &[8, 0, 4, 0, 0]);
+    ask(&mut device, &[3, 0, 100, 0, 1]);
+    ask(&mut device, &[8, 0, 1, 0, 0]);
+    // From the latest on: the request for the log; the restart ended, begun and received; the read
+    // received; listen only mode ended its request, begun and received.
+    let log = ask(&mut device, &[0x0C]);
+    assert_eq!(log[8..], [0x80, 0x40, 0x00, 0xA0, 0xA0, 0x60, 0x04, 0x80]);
+}
+
+#[test]
 fn a_restart_ends_listen_only_mode_and_is_not_answered() {
     let mut device = Device::new();
     assert_eq!(ask(&mut device, &[8, 0, 4, 0, 0]), []);

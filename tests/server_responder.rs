@@ -155,6 +155,15 @@ fn the_greatest_quantities_are_accepted() {
     assert_eq!(table.serve(&mut pdu, 254).exception_code(), 3);
     pdu[..5].copy_from_slice(&[3, 0, 0, 0, 125]);
     assert_eq!(table.serve(&mut pdu, 5).code(), 252);
+
+    let mut bits = [0; 250];
+    let mut coils = mbm::server::storage::Coils(mbm::server::storage::BitArray::new(0, &mut bits));
+    let mut pdu = vec![0x0F, 0, 0, 0x07, 0xB0, 246];
+    pdu.resize(252, 7);
+    assert_eq!(coils.serve(&mut pdu, 252).code(), 5);
+    pdu[..6].copy_from_slice(&[0x0F, 0, 0, 0x07, 0xB1, 247]);
+    pdu.resize(253, 7);
+    assert_eq!(coils.serve(&mut pdu, 253).exception_code(), 3);
 }
 
 #[test]
