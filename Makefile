@@ -294,11 +294,25 @@ $(TESTS:%=$(BUILD)/valgrind/%): $(BUILD)/valgrind/%: $(BUILD)/plain/%
 
 # The same optimisation as that of Debian's libmodbus.
 $(eval $(call variant,bench,gcc,g++,-O2))
-BENCH := $(BUILD)/bench/bench
-$(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux/mbm_tty) $(ARCHIVE)
-	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
+# nanoMODBUS is measured if NANOMODBUS names a clone of its repository; scripts/bench/speed takes the commit that it
+# names from there.
+NANO_SOURCE := $(BUILD)/bench/nanomodbus
+ifneq ($(NANOMODBUS),)
+NANO := $(NANO_SOURCE)/nanomodbus.o $(BUILD)/bench/bench_nano.o
+$(NANO_SOURCE)/nanomodbus.c:
+	@scripts/bench/speed fetch "$(NANOMODBUS)" $(@D)
+$(NANO_SOURCE)/nanomodbus.o: $(NANO_SOURCE)/nanomodbus.c
+	@gcc -O2 -g -c $< -o $@
+$(BUILD)/bench/bench_nano.o: $(NANO_SOURCE)/nanomodbus.c
+$(BUILD)/bench/bench_nano.o $(BUILD)/bench/bench_client.o: MODBUS += -DWITH_NANOMODBUS -isystem $(NANO_SOURCE)
+endif
+# One of two names, so that the bench is compiled anew when nanoMODBUS comes or goes.
+WITH_NANO := $(BUILD)/bench/$(if $(NANOMODBUS),with,without)-nanomodbus
+$(WITH_NANO):
+	@mkdir -p $(@D) && rm -f $(BUILD)/bench/with*-nanomodbus && touch $@
+$(BUILD)/bench/bench_client.o: $(WITH_NANO)
 BENCH_CLIENT := $(BUILD)/bench/bench_client
-$(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client support/pty support/server linux/mbm_tty linux/mbm_tcp) $(ARCHIVE)
+$(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client bench_floor support/pty support/server linux/mbm_tty linux/mbm_tcp) $(NANO) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 BENCH_SERVER := $(BUILD)/bench/bench_server
 $(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server bench_tables bench_loops linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tcp_set linux/mbm_tty) $(ARCHIVE)
@@ -311,12 +325,11 @@ $(BENCH_PLAN): $(BUILD)/bench/bench_plan.o $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
-bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs/reports/*speed.md
+bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone of nanoMODBUS; writes docs/reports/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
-	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER) $(BENCH_PLAN)
-	@scripts/bench/speed master $(BENCH)
+	@$(MAKE) --no-print-directory $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER) $(BENCH_PLAN)
 	@scripts/bench/speed server $(BENCH_SERVER)
-	@scripts/bench/speed client $(BENCH_CLIENT)
+	@CARGO="$(CARGO)" scripts/bench/speed client $(BENCH_CLIENT)
 	@scripts/bench/speed sniffer $(BENCH_SNIFFER)
 	@scripts/bench/speed plan $(BENCH_PLAN)
 	@CARGO="$(CARGO)" scripts/bench/speed frames

@@ -1,6 +1,7 @@
-/* Compares loops of servers with many connections: mbm's and libmodbus's. */
+/* Compares loops of servers with many connections: of mbm, of libmodbus and in straight C. */
 #define _GNU_SOURCE
 #include "bench_server.h"
+#include "clock.h"
 #include "mbm_tcp.h"
 
 #include <netinet/in.h>
@@ -12,7 +13,6 @@
 #include <sys/resource.h>
 #include <sys/select.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 #include <valgrind/callgrind.h>
 
@@ -21,7 +21,7 @@ enum { CLIENTS = 32, ROUNDS = 9, PER_ROUND = 20000, MANY = 1000, ASKING = 16, CO
 static const uint8_t request[] = {0, 1, 0, 0, 0, 6, UNIT, 3, 0, 7, 0, 10};
 static uint8_t expected[29] = {0, 1, 0, 0, 0, 23, UNIT, 3, 20};
 
-/* --- the two servers --- */
+/* --- the servers --- */
 
 static mbm_tcp_set set;
 static mbm_tcp places[MANY];
@@ -29,7 +29,7 @@ static mbm_server servers[MANY];
 static uint8_t buffers[MANY][MBM_MAX_TCP_FRAME];
 
 /* Goes through the loop once. Returns how many connections ended. */
-static int go_round(mbm_tcp_listener *listener)
+static int go_round_by_mbm(mbm_tcp_listener *listener)
 {
     int ended = 0, i;
     mbm_tcp *tcp;
@@ -56,21 +56,12 @@ static void begin_mbm(mbm_tcp_listener *listener)
         fail("set");
 }
 
-static void loop_of_mbm(mbm_tcp_listener *listener)
-{
-    int left = CLIENTS;
-
-    begin_mbm(listener);
-    while (left > 0)
-        left -= go_round(listener);
-}
-
 /* The loop of libmodbus's own example with many connections. */
 static modbus_t *host;
 static fd_set watched;
 static int top;
 
-static void begin_libmodbus(const mbm_tcp_listener *listener)
+static void begin_libmodbus(mbm_tcp_listener *listener)
 {
     host = modbus_new_tcp("127.0.0.1", 1502);
     if (!host)
@@ -81,7 +72,7 @@ static void begin_libmodbus(const mbm_tcp_listener *listener)
 }
 
 /* Goes through the loop once. Returns how many connections ended. */
-static int go_round_by_libmodbus(const mbm_tcp_listener *listener)
+static int go_round_by_libmodbus(mbm_tcp_listener *listener)
 {
     uint8_t query[MODBUS_TCP_MAX_ADU_LENGTH];
     int fd, length, ended = 0;
@@ -114,14 +105,78 @@ static int go_round_by_libmodbus(const mbm_tcp_listener *listener)
     return ended;
 }
 
-static void loop_of_libmodbus(const mbm_tcp_listener *listener)
-{
-    int left = CLIENTS;
+/* Straight C: epoll, a read, a comparison of header, unit, function and range, a write. It answers
+ * 03 alone, and closes a connection that sends anything else or a part of a request. */
+static int watch;
+static uint16_t registers[128];
 
-    begin_libmodbus(listener);
-    while (left > 0)
-        left -= go_round_by_libmodbus(listener);
+static void begin_floor(mbm_tcp_listener *listener)
+{
+    struct epoll_event event = {.events = EPOLLIN, .data = {.fd = listener->fd}};
+    unsigned i;
+
+    for (i = 0; i < 128; i++)
+        registers[i] = pattern(i);
+    watch = epoll_create1(0);
+    if (watch < 0 || epoll_ctl(watch, EPOLL_CTL_ADD, listener->fd, &event) != 0)
+        fail("epoll");
 }
+
+/* Serves one request. Returns 0 if the connection is to be closed. */
+static int serve_request(int fd)
+{
+    uint8_t in[MOST], out[MOST];
+    unsigned address, quantity, i;
+
+    if (read(fd, in, sizeof in) != sizeof request || in[2] || in[3] || in[4] || in[5] != 6 ||
+        in[6] != UNIT || in[7] != 3)
+        return 0;
+    address = (unsigned)(in[8] << 8 | in[9]);
+    quantity = (unsigned)(in[10] << 8 | in[11]);
+    if (quantity < 1 || quantity > 125 || address + quantity > 128)
+        return 0;
+    memcpy(out, in, 8);
+    out[5] = (uint8_t)(3 + 2 * quantity);
+    out[8] = (uint8_t)(2 * quantity);
+    for (i = 0; i < quantity; i++) {
+        out[9 + 2 * i] = (uint8_t)(registers[address + i] >> 8);
+        out[10 + 2 * i] = (uint8_t)registers[address + i];
+    }
+    return write(fd, out, 9 + 2 * quantity) == (ssize_t)(9 + 2 * quantity);
+}
+
+static int go_round_by_floor(mbm_tcp_listener *listener)
+{
+    struct epoll_event events[CLIENTS];
+    int ready = epoll_wait(watch, events, CLIENTS, -1), ended = 0, i;
+
+    for (i = 0; i < ready; i++) {
+        int fd = events[i].data.fd;
+
+        if (fd == listener->fd) {
+            struct epoll_event event = {.events = EPOLLIN};
+
+            event.data.fd = accept(fd, NULL, NULL);
+            if (event.data.fd >= 0)
+                (void)epoll_ctl(watch, EPOLL_CTL_ADD, event.data.fd, &event);
+        } else if (!serve_request(fd)) {
+            close(fd);
+            ended++;
+        }
+    }
+    return ended;
+}
+
+static const struct {
+    const char *name;
+    void (*begin)(mbm_tcp_listener *listener);
+    /* Goes through the loop once. Returns how many connections ended. */
+    int (*go_round)(mbm_tcp_listener *listener);
+} loops[] = {{"mbm", begin_mbm, go_round_by_mbm},
+             {"libmodbus", begin_libmodbus, go_round_by_libmodbus},
+             {"straight C", begin_floor, go_round_by_floor}};
+
+enum { MBM, LIBMODBUS, FLOOR, LOOPS };
 
 /* --- instructions --- */
 
@@ -150,7 +205,7 @@ static void expect(void)
 
 /* Makes rounds in which `asking` of the `connections` clients have sent a request. The
  * server answers in the same process. Callgrind counts only the server's instructions. */
-static void count_rounds(const char *name, int is_mbm, int connections, int asking)
+static void count_rounds(const char *name, int who, int connections, int asking)
 {
     mbm_tcp_listener listener = {0};
     uint8_t answer[MOST];
@@ -159,23 +214,17 @@ static void count_rounds(const char *name, int is_mbm, int connections, int aski
 
     if (mbm_tcp_listen(&listener, "127.0.0.1", "0") != 0)
         fail("listen");
-    if (is_mbm)
-        begin_mbm(&listener);
-    else
-        begin_libmodbus(&listener);
+    loops[who].begin(&listener);
     for (i = 0; i < connections; i++) {
         sockets[i] = connect_to(listener.port);
-        (void)(is_mbm ? go_round(&listener) : go_round_by_libmodbus(&listener));
+        (void)loops[who].go_round(&listener);
     }
     for (round = 0; round < COUNTED; round++) {
         for (i = 0; i < asking; i++)
             if (write(sockets[i * connections / asking], request, sizeof request) != sizeof request)
                 fail("write");
         CALLGRIND_TOGGLE_COLLECT;
-        if (is_mbm)
-            go_round(&listener);
-        else
-            go_round_by_libmodbus(&listener);
+        loops[who].go_round(&listener);
         CALLGRIND_TOGGLE_COLLECT;
         for (i = 0; i < asking; i++)
             if (recv(sockets[i * connections / asking], answer, sizeof answer, MSG_DONTWAIT) !=
@@ -183,14 +232,13 @@ static void count_rounds(const char *name, int is_mbm, int connections, int aski
                 memcmp(answer, expected, sizeof expected) != 0)
                 fail("wrong answer");
     }
-    snprintf(title, sizeof title, "loop\t%s\t%s\t%d", name, is_mbm ? "mbm" : "libmodbus",
-             COUNTED * asking);
+    snprintf(title, sizeof title, "loop\t%s\t%s\t%d", name, loops[who].name, COUNTED * asking);
     CALLGRIND_DUMP_STATS_AT(title);
     CALLGRIND_ZERO_STATS;
     for (i = 0; i < connections; i++)
         close(sockets[i]);
-    for (i = is_mbm ? connections : 0; i > 0;)
-        i -= go_round(&listener);
+    for (i = who == LIBMODBUS ? 0 : connections; i > 0;)
+        i -= loops[who].go_round(&listener);
     mbm_tcp_closeListener(&listener);
     mbm_tcp_closeSet(&set);
     modbus_free(host);
@@ -207,16 +255,19 @@ void count_loops(void)
     if (setrlimit(RLIMIT_NOFILE, &limit) != 0)
         fail("setrlimit");
     expect();
-    count_rounds("32 connections, all of them asking", 1, CLIENTS, CLIENTS);
-    count_rounds("32 connections, all of them asking", 0, CLIENTS, CLIENTS);
-    count_rounds("1000 connections, 16 of them asking", 1, MANY, ASKING);
+    count_rounds("32 connections, all of them asking", MBM, CLIENTS, CLIENTS);
+    count_rounds("32 connections, all of them asking", LIBMODBUS, CLIENTS, CLIENTS);
+    count_rounds("32 connections, all of them asking", FLOOR, CLIENTS, CLIENTS);
+    count_rounds("1000 connections, 16 of them asking", MBM, MANY, ASKING);
+    count_rounds("1000 connections, 16 of them asking", FLOOR, MANY, ASKING);
 }
 
 /* --- requests per second --- */
 
-static pid_t start(int is_mbm, uint16_t *port)
+static pid_t start(int who, uint16_t *port)
 {
     mbm_tcp_listener listener = {0};
+    int left = CLIENTS;
     pid_t child;
 
     if (mbm_tcp_listen(&listener, "127.0.0.1", "0") != 0)
@@ -226,10 +277,9 @@ static pid_t start(int is_mbm, uint16_t *port)
     if (child < 0)
         fail("fork");
     if (child == 0) {
-        if (is_mbm)
-            loop_of_mbm(&listener);
-        else
-            loop_of_libmodbus(&listener);
+        loops[who].begin(&listener);
+        while (left > 0)
+            left -= loops[who].go_round(&listener);
         _exit(0);
     }
     mbm_tcp_closeListener(&listener);
@@ -250,7 +300,8 @@ static void gather(crowd *c, uint16_t port)
     for (i = 0; i < CLIENTS; i++) {
         struct epoll_event event = {.events = EPOLLIN};
 
-        c->fds[i] = event.data.fd = connect_to(port);
+        c->fds[i] = connect_to(port);
+        event.data.fd = i;
         if (epoll_ctl(c->wait, EPOLL_CTL_ADD, c->fds[i], &event) != 0)
             fail("connect");
     }
@@ -265,18 +316,30 @@ static void leave(crowd *c)
     close(c->wait);
 }
 
-/* Returns the requests per second. */
-static double measure(const crowd *c, unsigned long total)
+/* Requests per second, and p50 and p99 of the time of a request in microseconds. */
+typedef struct rates {
+    double per_second, p50, p99;
+} rates;
+
+static int by_size(const void *left, const void *right);
+
+static void ask(const crowd *c, int i, double *since)
 {
+    *since = seconds();
+    if (write(c->fds[i], request, sizeof request) != sizeof request)
+        fail("write");
+}
+
+static rates measure(const crowd *c, unsigned long total)
+{
+    static double taken[PER_ROUND], since[CLIENTS];
     uint8_t answer[MOST];
-    struct timespec from, to;
+    double from = seconds();
     unsigned long sent = 0, done = 0;
     int i;
 
-    clock_gettime(CLOCK_MONOTONIC, &from);
     for (; sent < CLIENTS; sent++)
-        if (write(c->fds[sent], request, sizeof request) != sizeof request)
-            fail("write");
+        ask(c, (int)sent, &since[sent]);
     while (done < total) {
         struct epoll_event events[CLIENTS];
         int ready = epoll_wait(c->wait, events, CLIENTS, 10000);
@@ -284,21 +347,21 @@ static double measure(const crowd *c, unsigned long total)
         if (ready <= 0)
             fail("no answer");
         for (i = 0; i < ready; i++) {
-            ssize_t got = read(events[i].data.fd, answer, sizeof answer);
+            int which = events[i].data.fd;
+            ssize_t got = read(c->fds[which], answer, sizeof answer);
 
             if (got != sizeof expected || memcmp(answer, expected, sizeof expected) != 0)
                 fail("wrong answer");
-            done++;
+            taken[done++] = (seconds() - since[which]) * 1e6;
             if (sent == total)
                 continue;
             sent++;
-            if (write(events[i].data.fd, request, sizeof request) != sizeof request)
-                fail("write");
+            ask(c, which, &since[which]);
         }
     }
-    clock_gettime(CLOCK_MONOTONIC, &to);
-    return (double)total /
-           ((double)(to.tv_sec - from.tv_sec) + (double)(to.tv_nsec - from.tv_nsec) * 1e-9);
+    from = seconds() - from;
+    qsort(taken, total, sizeof *taken, by_size);
+    return (rates){(double)total / from, taken[total / 2], taken[total * 99 / 100]};
 }
 
 static int by_size(const void *left, const void *right)
@@ -324,45 +387,58 @@ static void pin(pid_t process, int cpu)
         fail("sched_setaffinity");
 }
 
-/* Measures both in alternate rounds, so that the load of the machine affects both alike. */
-static void compare(const char *where, const crowd *ours, const crowd *theirs)
+static double median(double *values)
 {
-    double mbm[ROUNDS], libmodbus[ROUNDS];
-    unsigned round;
+    qsort(values, ROUNDS, sizeof *values, by_size);
+    return values[ROUNDS / 2];
+}
 
-    measure(ours, PER_ROUND / 10);
-    measure(theirs, PER_ROUND / 10);
-    for (round = 0; round < ROUNDS; round++) {
-        mbm[round] = measure(ours, PER_ROUND);
-        libmodbus[round] = measure(theirs, PER_ROUND);
-    }
-    qsort(mbm, ROUNDS, sizeof *mbm, by_size);
-    qsort(libmodbus, ROUNDS, sizeof *libmodbus, by_size);
-    printf("%s\t%.0f\t%.0f\t%.2f\n", where, mbm[ROUNDS / 2], libmodbus[ROUNDS / 2],
-           mbm[ROUNDS / 2] / libmodbus[ROUNDS / 2]);
+/* Measures all servers in each round, and begins each round with another one, so that the load of
+ * the machine affects all alike. Prints a line for each: medians of the rounds. */
+static void compare(const char *where, const crowd *crowds)
+{
+    double per_second[LOOPS][ROUNDS], p50[LOOPS][ROUNDS], p99[LOOPS][ROUNDS];
+    int who, turn, round;
+
+    for (who = 0; who < LOOPS; who++)
+        measure(&crowds[who], PER_ROUND / 10);
+    for (round = 0; round < ROUNDS; round++)
+        for (turn = 0; turn < LOOPS; turn++) {
+            rates each;
+
+            who = (round + turn) % LOOPS;
+            each = measure(&crowds[who], PER_ROUND);
+            per_second[who][round] = each.per_second;
+            p50[who][round] = each.p50;
+            p99[who][round] = each.p99;
+        }
+    for (who = 0; who < LOOPS; who++)
+        printf("%s\t%s\t%.0f\t%.0f\t%.0f\n", where, loops[who].name, median(per_second[who]),
+               median(p50[who]), median(p99[who]));
     fflush(stdout);
 }
 
 void compare_loops(void)
 {
-    pid_t children[2];
-    uint16_t ports[2];
-    crowd ours, theirs;
+    pid_t children[LOOPS];
+    uint16_t ports[LOOPS];
+    crowd crowds[LOOPS];
+    int who;
 
     expect();
-    children[0] = start(1, &ports[0]);
-    children[1] = start(0, &ports[1]);
-    gather(&ours, ports[0]);
-    gather(&theirs, ports[1]);
-    pin(children[0], 1);
-    pin(children[1], 1);
-    compare("on CPUs of their own", &ours, &theirs);
-    pin(children[0], 0);
-    pin(children[1], 0);
+    for (who = 0; who < LOOPS; who++)
+        children[who] = start(who, &ports[who]);
+    for (who = 0; who < LOOPS; who++)
+        gather(&crowds[who], ports[who]);
+    for (who = 0; who < LOOPS; who++)
+        pin(children[who], 1);
+    compare("on CPUs of their own", crowds);
+    for (who = 0; who < LOOPS; who++)
+        pin(children[who], 0);
     pin(0, 0);
-    compare("clients and server on one CPU", &ours, &theirs);
-    leave(&ours);
-    leave(&theirs);
-    waitpid(children[0], NULL, 0);
-    waitpid(children[1], NULL, 0);
+    compare("clients and server on one CPU", crowds);
+    for (who = 0; who < LOOPS; who++)
+        leave(&crowds[who]);
+    for (who = 0; who < LOOPS; who++)
+        waitpid(children[who], NULL, 0);
 }

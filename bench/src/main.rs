@@ -2,8 +2,7 @@
 //! and libmodbus, where each can do the same work.
 //!
 //! `bench instructions` is for callgrind: it dumps one count for each row and
-//! library. `bench table FILE` measures time and writes the table, with those
-//! counts from FILE.
+//! library. `bench table FILE` writes the table of those counts from FILE.
 
 mod cases;
 mod libmodbus;
@@ -13,7 +12,6 @@ mod table;
 
 use std::ffi::CString;
 use std::hint::black_box;
-use std::time::Instant;
 
 /// Something to measure, done once by each call.
 pub type Work = Box<dyn FnMut()>;
@@ -37,6 +35,9 @@ impl Row {
 
 /// How often callgrind sees each work.
 const TIMES: u32 = 20;
+
+/// Bytes over which the CRC is measured.
+const CRC_LENGTHS: [usize; 4] = [8, 25, 255, 4096];
 
 extern "C" {
     fn callgrind_toggle();
@@ -70,6 +71,9 @@ fn instructions() {
         black_box(());
     });
     count("nothing|||", &mut nothing);
+    for length in CRC_LENGTHS {
+        count(&format!("CRC|{length}||"), &mut crc(length));
+    }
     for mut row in cases::rows() {
         let names = ["mbm", "rmodbus", "libmodbus"].map(|library| row.name(library));
         count(&names[0], &mut row.mbm);
@@ -85,36 +89,12 @@ fn instructions() {
     }
 }
 
-/// Nanoseconds of each work: the least of several rounds, which take turns, so
-/// that all meet the same weather.
-fn nanoseconds(works: &mut [&mut Work]) -> Vec<f64> {
-    let mut best = vec![f64::MAX; works.len()];
-    let mut calls = 64u32;
-    let start = Instant::now();
-    while start.elapsed().as_micros() < 500 {
-        (works[0])();
-        calls += 1;
-    }
-    for _ in 0..60 {
-        for (work, best) in works.iter_mut().zip(&mut best) {
-            let start = Instant::now();
-            for _ in 0..calls {
-                work();
-            }
-            let each = start.elapsed().as_secs_f64() * 1e9 / f64::from(calls);
-            *best = best.min(each);
-        }
-    }
-    best
-}
-
-/// Gigabytes a second of the CRC over this many bytes.
-fn crc(length: usize) -> f64 {
+/// The CRC over this many bytes.
+fn crc(length: usize) -> Work {
     let bytes: Vec<u8> = (0..length).map(|index| (index * 7 + 3) as u8).collect();
-    let mut work: Work = Box::new(move || {
+    Box::new(move || {
         black_box(mbm::frame::checksum::crc16(black_box(&bytes)));
-    });
-    length as f64 / nanoseconds(&mut [&mut work])[0]
+    })
 }
 
 fn main() {

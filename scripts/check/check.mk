@@ -5,7 +5,7 @@
 # processor Debian's clang 14 knows.
 TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(SERVE) $(PEERS) $(BUILD)/plain/mbm $(EXAMPLES:%=$(BUILD)/plain/linux/%) \
                 $(AVR_TESTS) $(TIMING) $(UPSTREAM_TEST) \
-                $(BENCH) $(BENCH_CLIENT) $(BENCH_SERVER) $(BENCH_SNIFFER)
+                $(BENCH_CLIENT) $(BENCH_SERVER) $(BENCH_SNIFFER)
 TIDY_MACHINES = $(filter-out lx106 dc233c,$(MACHINES)) $(VARIANTS)
 # Not the sketches that use an AVR's own registers or libraries.
 SKETCHES_OF_MBM := $(filter-out $(wildcard firmware-tests/avr/sketches/Time*/*.ino firmware-tests/avr/sketches/Soft/*.ino), \
