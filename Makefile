@@ -306,11 +306,6 @@ $(NANO_SOURCE)/nanomodbus.o: $(NANO_SOURCE)/nanomodbus.c
 $(BUILD)/bench/bench_nano.o: $(NANO_SOURCE)/nanomodbus.c
 $(BUILD)/bench/bench_nano.o $(BUILD)/bench/bench_client.o: MODBUS += -DWITH_NANOMODBUS -isystem $(NANO_SOURCE)
 endif
-# One of two names, so that the bench is compiled anew when nanoMODBUS comes or goes.
-WITH_NANO := $(BUILD)/bench/$(if $(NANOMODBUS),with,without)-nanomodbus
-$(WITH_NANO):
-	@mkdir -p $(@D) && rm -f $(BUILD)/bench/with*-nanomodbus && touch $@
-$(BUILD)/bench/bench_client.o: $(WITH_NANO)
 BENCH_CLIENT := $(BUILD)/bench/bench_client
 $(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client bench_floor support/pty support/server linux/mbm_tty linux/mbm_tcp) $(NANO) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
@@ -327,6 +322,7 @@ $(BENCH_PLAN): $(BUILD)/bench/bench_plan.o $(ARCHIVE)
 .PHONY: bench
 bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone of nanoMODBUS; writes docs/reports/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
+	@rm -rf $(BUILD)/bench/bench_client.o $(NANO_SOURCE)
 	@$(MAKE) --no-print-directory $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER) $(BENCH_PLAN)
 	@scripts/bench/speed server $(BENCH_SERVER)
 	@CARGO="$(CARGO)" scripts/bench/speed client $(BENCH_CLIENT)

@@ -127,6 +127,7 @@ static int serve_request(int fd)
 {
     uint8_t in[MOST], out[MOST];
     unsigned address, quantity, i;
+    ssize_t length;
 
     if (read(fd, in, sizeof in) != sizeof request || in[2] || in[3] || in[4] || in[5] != 6 ||
         in[6] != UNIT || in[7] != 3)
@@ -142,7 +143,8 @@ static int serve_request(int fd)
         out[9 + 2 * i] = (uint8_t)(registers[address + i] >> 8);
         out[10 + 2 * i] = (uint8_t)registers[address + i];
     }
-    return write(fd, out, 9 + 2 * quantity) == (ssize_t)(9 + 2 * quantity);
+    length = 9 + 2 * (ssize_t)quantity;
+    return write(fd, out, (size_t)length) == length;
 }
 
 static int go_round_by_floor(mbm_tcp_listener *listener)

@@ -33,14 +33,14 @@ check-sketches: need-avr library ## Sketches in the folder SKETCHES against the 
 # --- sketches, each for the boards that a test runs it on
 
 AVR_OUT := $(BUILD)/avr
-EXAMPLES := $(notdir $(wildcard examples/arduino/*))
+ARDUINO_EXAMPLES := $(notdir $(wildcard examples/arduino/*))
 # These need more flash or RAM than an Uno or a Leonardo has.
 LARGE_EXAMPLES := Sniffer TcpToRtuGateway
-SMALL_EXAMPLES := $(filter-out $(LARGE_EXAMPLES),$(EXAMPLES))
+SMALL_EXAMPLES := $(filter-out $(LARGE_EXAMPLES),$(ARDUINO_EXAMPLES))
 # These need more than one UART.
 MEGA_SKETCHES := TwoPorts OlderCalls
 TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
-AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
+AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(ARDUINO_EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
             $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
             $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
             $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf)
