@@ -1,4 +1,5 @@
-/* Compares loops of servers with many connections: of mbm, of libmodbus and in straight C. */
+/* Compares loops of servers with many connections: of mbm, of libmodbus, in straight C, and another
+ * program. */
 #define _GNU_SOURCE
 #include "bench_server.h"
 #include "clock.h"
@@ -6,6 +7,7 @@
 
 #include <netinet/in.h>
 #include <sched.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -178,7 +180,7 @@ static const struct {
              {"libmodbus", begin_libmodbus, go_round_by_libmodbus},
              {"straight C", begin_floor, go_round_by_floor}};
 
-enum { MBM, LIBMODBUS, FLOOR, LOOPS };
+enum { MBM, LIBMODBUS, FLOOR, LOOPS, OTHER = LOOPS, SERVERS };
 
 /* --- instructions --- */
 
@@ -285,6 +287,33 @@ static pid_t start(int who, uint16_t *port)
         _exit(0);
     }
     mbm_tcp_closeListener(&listener);
+    return child;
+}
+
+/* Starts a program that prints its port. */
+static pid_t start_other(const char *program, uint16_t *port)
+{
+    char words[16] = {0};
+    int ends[2];
+    pid_t child;
+
+    if (pipe(ends) != 0)
+        fail("pipe");
+    child = fork();
+    if (child < 0)
+        fail("fork");
+    if (child == 0) {
+        dup2(ends[1], STDOUT_FILENO);
+        close(ends[0]);
+        close(ends[1]);
+        execl(program, program, (char *)NULL);
+        _exit(127);
+    }
+    close(ends[1]);
+    if (read(ends[0], words, sizeof words - 1) <= 0)
+        fail(program);
+    close(ends[0]);
+    *port = (uint16_t)atoi(words);
     return child;
 }
 
@@ -399,48 +428,63 @@ static double median(double *values)
  * the machine affects all alike. Prints a line for each: medians of the rounds. */
 static void compare(const char *where, const crowd *crowds)
 {
-    double per_second[LOOPS][ROUNDS], p50[LOOPS][ROUNDS], p99[LOOPS][ROUNDS];
+    double per_second[SERVERS][ROUNDS], p50[SERVERS][ROUNDS], p99[SERVERS][ROUNDS];
     int who, turn, round;
 
-    for (who = 0; who < LOOPS; who++)
+    for (who = 0; who < SERVERS; who++)
         measure(&crowds[who], PER_ROUND / 10);
     for (round = 0; round < ROUNDS; round++)
-        for (turn = 0; turn < LOOPS; turn++) {
+        for (turn = 0; turn < SERVERS; turn++) {
             rates each;
 
-            who = (round + turn) % LOOPS;
+            who = (round + turn) % SERVERS;
             each = measure(&crowds[who], PER_ROUND);
             per_second[who][round] = each.per_second;
             p50[who][round] = each.p50;
             p99[who][round] = each.p99;
         }
-    for (who = 0; who < LOOPS; who++)
-        printf("%s\t%s\t%.0f\t%.0f\t%.0f\n", where, loops[who].name, median(per_second[who]),
-               median(p50[who]), median(p99[who]));
+    for (who = 0; who < SERVERS; who++)
+        printf("%s\t%s\t%.0f\t%.0f\t%.0f\n", where, who == OTHER ? "tokio-modbus" : loops[who].name,
+               median(per_second[who]), median(p50[who]), median(p99[who]));
     fflush(stdout);
 }
 
-void compare_loops(void)
+void compare_loops(const char *other)
 {
-    pid_t children[LOOPS];
-    uint16_t ports[LOOPS];
-    crowd crowds[LOOPS];
+    pid_t children[SERVERS];
+    uint16_t ports[SERVERS];
+    crowd crowds[SERVERS];
     int who;
 
     expect();
     for (who = 0; who < LOOPS; who++)
         children[who] = start(who, &ports[who]);
-    for (who = 0; who < LOOPS; who++)
+    children[OTHER] = start_other(other, &ports[OTHER]);
+    for (who = 0; who < SERVERS; who++)
         gather(&crowds[who], ports[who]);
-    for (who = 0; who < LOOPS; who++)
+    for (who = 0; who < SERVERS; who++)
         pin(children[who], 1);
     compare("on CPUs of their own", crowds);
-    for (who = 0; who < LOOPS; who++)
+    for (who = 0; who < SERVERS; who++)
         pin(children[who], 0);
     pin(0, 0);
     compare("clients and server on one CPU", crowds);
-    for (who = 0; who < LOOPS; who++)
+    for (who = 0; who < SERVERS; who++)
         leave(&crowds[who]);
-    for (who = 0; who < LOOPS; who++)
+    kill(children[OTHER], SIGKILL);
+    for (who = 0; who < SERVERS; who++)
         waitpid(children[who], NULL, 0);
+}
+
+void make_requests(const char *port, const char *total)
+{
+    unsigned long left = strtoul(total, NULL, 10);
+    crowd all;
+
+    expect();
+    gather(&all, (uint16_t)atoi(port));
+    for (; left > PER_ROUND; left -= PER_ROUND)
+        measure(&all, PER_ROUND);
+    measure(&all, left);
+    leave(&all);
 }

@@ -1,9 +1,9 @@
-/* Compares mbm's server with libmodbus's for the same requests.
+/* Compares mbm's server with others for the same requests.
  *
- *     bench_server          requests per second of two server loops with 32 connections
- *     bench_server count    each request by itself, for callgrind
- *     bench_server loops    loops of whole programs, for callgrind, which must start with
- *                           collection off */
+ *     bench_server OTHER    requests per second of the server loops with 32 connections, and of the
+ * program OTHER bench_server crowd PORT COUNT     makes requests with 32 connections bench_server
+ * count    each request by itself, for callgrind bench_server loops    loops of whole programs, for
+ * callgrind, which must start with collection off */
 #define _GNU_SOURCE
 #include "bench_server.h"
 #include "crc.h"
@@ -171,8 +171,8 @@ int main(int argc, char **argv)
 
     (void)signal(SIGPIPE, SIG_IGN);
     prepare_tables();
-    if (argc == 1) {
-        compare_loops();
+    if (argc == 4 && strcmp(argv[1], "crowd") == 0) {
+        make_requests(argv[2], argv[3]);
     } else if (argc == 2 && strcmp(argv[1], "count") == 0) {
         for (is_rtu = 0; is_rtu < 2; is_rtu++) {
             begin(is_rtu);
@@ -181,8 +181,10 @@ int main(int argc, char **argv)
         }
     } else if (argc == 2 && strcmp(argv[1], "loops") == 0) {
         count_loops();
+    } else if (argc == 2) {
+        compare_loops(argv[1]);
     } else {
-        fprintf(stderr, "usage: bench_server [count | loops]\n");
+        fprintf(stderr, "usage: bench_server count | loops | crowd PORT COUNT | OTHER\n");
         return 2;
     }
     modbus_mapping_free(mapping);

@@ -18,8 +18,12 @@ void fail(const char *what);
 /* Fills the tables of both servers. */
 void prepare_tables(void);
 
-/* Measures the requests per second of two server loops with 32 connections. */
-void compare_loops(void);
+/* Measures the requests per second of the server loops with 32 connections, and of the program
+ * `other`, which prints the port on which it serves. */
+void compare_loops(const char *other);
+
+/* Makes `total` requests with 32 connections to a server. */
+void make_requests(const char *port, const char *total);
 
 /* Runs the loops for callgrind, which counts the instructions of each request. */
 void count_loops(void);
