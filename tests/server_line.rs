@@ -140,6 +140,26 @@ fn a_frame_longer_than_the_buffer_is_dropped_and_the_next_is_answered() {
 }
 
 #[test]
+fn a_frame_longer_than_the_buffer_counts_as_an_overrun() {
+    let mut line = Line::new(Framing::Rtu);
+    line.arrive(0, &sealed(&vec![17; 1_000]));
+    line.arrive(2 * SILENCE, &sealed(&[17, 8, 0, 0x12, 0, 0]));
+    let answers = line.frames(1_020 * CHARACTER + 10 * SILENCE, 50);
+    assert_eq!(answers, [sealed(&[17, 8, 0, 0x12, 0, 1])]);
+}
+
+#[test]
+fn a_unit_may_have_a_reserved_address() {
+    for id in [1, 247, 248, 255] {
+        let mut line = Line::new(Framing::Rtu);
+        line.device.id = id;
+        line.arrive(0, &sealed(&[&[id][..], &READ[1..]].concat()));
+        let answer = sealed(&[&[id][..], &ANSWER[1..]].concat());
+        assert_eq!(line.frames(50_000, 50), [answer], "{id}");
+    }
+}
+
+#[test]
 fn the_longest_frame_fits_into_a_buffer_of_its_length() {
     let tap = common::line::Tap::default();
     let wire = tap.0.clone();
@@ -267,6 +287,16 @@ fn an_ascii_request_is_answered_when_its_end_arrives() {
     }
     let pieces = vec![(10_000, request); 3];
     assert_eq!(sent(Framing::Ascii, &pieces), vec![answer; 3]);
+}
+
+#[test]
+fn a_colon_begins_an_ascii_frame_anew() {
+    let request = ascii(&READ[1..], b'\n');
+    for before in [&b":1103"[..], b":", b":110300640001"] {
+        let pieces = [(0, [before, &request[..]].concat())];
+        let answer = ascii(&ANSWER[1..], b'\n');
+        assert_eq!(sent(Framing::Ascii, &pieces), [answer]);
+    }
 }
 
 #[test]

@@ -281,6 +281,15 @@ fn exception_status_and_server_id_are_read() {
 }
 
 #[test]
+fn the_run_indicator_is_ff_or_00() {
+    for (running, indicator) in [(true, 0xFF), (false, 0)] {
+        let mut pdu = [0x11, 0, 0, 0];
+        let reply = mbm::server::identity::serve_server_id(b"a", running, b"", &mut pdu, 1);
+        assert_eq!((reply.code(), pdu), (4, [0x11, 2, b'a', indicator]));
+    }
+}
+
+#[test]
 fn file_records_are_read_in_groups() {
     let request = [0x14, 0x0E, 6, 0, 4, 0, 1, 0, 2, 6, 0, 3, 0, 9, 0, 1];
     let answered = [0x14, 10, 5, 6, 4, 1, 4, 2, 3, 6, 3, 9];
