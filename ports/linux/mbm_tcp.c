@@ -124,10 +124,14 @@ static inline void report_again(mbm_tcp *tcp)
     tcp->readiness &= (uint8_t)~MBM_TCP_REPORTED;
 }
 
-/* Bytes were moved. In a set the time of the last wait is accurate enough. */
+/* Bytes were moved. An object reads the port's clock in each poll, and that time is accurate
+ * enough; else in a set that of the last wait is. */
 static inline void note_activity(mbm_tcp *tcp)
 {
-    tcp->lastActivity = tcp->set ? tcp->set->now : mbm_tcp_milliseconds();
+    if (tcp->clock != 0)
+        tcp->lastActivity = tcp->clock;
+    else
+        tcp->lastActivity = (tcp->set ? tcp->set->now : mbm_tcp_milliseconds()) * 1000;
 }
 
 static void set(int fd, int level, int option, int value)
@@ -265,7 +269,7 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd)
         return -1;
     memset(tcp, 0, sizeof *tcp);
     tcp->fd = fd;
-    tcp->lastActivity = mbm_tcp_milliseconds();
+    tcp->lastActivity = mbm_tcp_milliseconds() * 1000;
     enter(tcp, CONNECTED);
     return 0;
 }
@@ -277,7 +281,13 @@ int mbm_tcp_isInUse(const mbm_tcp *tcp)
 
 int64_t mbm_tcp_idleFor(const mbm_tcp *tcp)
 {
-    return tcp->state == CONNECTED ? mbm_tcp_milliseconds() - tcp->lastActivity : -1;
+    int64_t idle;
+
+    if (tcp->state != CONNECTED)
+        return -1;
+    /* The clock of the port is finer, and so a little ahead. */
+    idle = mbm_tcp_milliseconds() - tcp->lastActivity / 1000;
+    return idle > 0 ? idle : 0;
 }
 
 void mbm_tcp_close(mbm_tcp *tcp)
@@ -419,6 +429,7 @@ COLD static int16_t finish_write(mbm_tcp *tcp, ssize_t length, ssize_t count)
     if (count <= 0)
         return 0;
     note_activity(tcp);
+    tcp->clock = 0;
     return (int16_t)count;
 }
 
@@ -446,16 +457,19 @@ static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
         return finish_write(tcp, all, count);
     report_again(tcp);
     note_activity(tcp);
+    /* If the next read or write comes without a look at the clock, this time is too old for it. */
+    tcp->clock = 0;
     return (int16_t)count;
 }
 
 static uint32_t tcp_micros(void *context)
 {
+    mbm_tcp *tcp = (mbm_tcp *)context;
     struct timespec now;
 
-    (void)context;
     clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
+    tcp->clock = (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+    return (uint32_t)tcp->clock;
 }
 
 static void tcp_idle(void *context, mbm_node *node)

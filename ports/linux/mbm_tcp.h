@@ -78,6 +78,7 @@ typedef struct mbm_tcp {
     uint8_t events;  /**< what to poll it for: POLLIN, and POLLOUT while it accepts no more bytes */
     uint8_t readiness;            /**< private */
     int64_t lastActivity;         /**< private */
+    int64_t clock;                /**< private */
     mbm_tcp_addresses *addresses; /**< private */
     struct mbm_tcp_set *set;      /**< private */
     struct mbm_tcp *next;         /**< private */
