@@ -290,6 +290,18 @@ int64_t mbm_tcp_idleFor(const mbm_tcp *tcp)
     return idle > 0 ? idle : 0;
 }
 
+void mbm_tcp_remove(mbm_tcp *tcp)
+{
+    const uint8_t events = tcp->events;
+
+    mbm_tcp_setEvents(tcp, 0);
+    remove_from_ready(tcp);
+    tcp->set = NULL;
+    /* Those that the set has dropped, because the port was not used, count again. */
+    if (has_socket(tcp))
+        tcp->events = (uint8_t)(events | (tcp->state == CONNECTING ? POLLOUT : POLLIN));
+}
+
 void mbm_tcp_close(mbm_tcp *tcp)
 {
     leave_socket(tcp, FREE, tcp->error);

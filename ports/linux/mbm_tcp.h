@@ -82,6 +82,7 @@ typedef struct mbm_tcp {
     mbm_tcp_addresses *addresses; /**< private */
     struct mbm_tcp_set *set;      /**< private */
     struct mbm_tcp *next;         /**< private */
+    void *owner;                  /**< private */
 } mbm_tcp;
 
 /** A socket that listens for connections. Initialise it with MBM_INIT. It takes two descriptors,
@@ -342,6 +343,13 @@ int mbm_tcp_openSet(mbm_tcp_set *set);
 int mbm_tcp_add(mbm_tcp_set *set, mbm_tcp *tcp);
 
 /**
+ * Takes a socket out of its set and leaves it open. Does nothing if it is in no set.
+ *
+ * @param tcp  the socket
+ */
+void mbm_tcp_remove(mbm_tcp *tcp);
+
+/**
  * Adds a listener to a set, and with it each connection that mbm_tcp_accept will accept.
  * The listener stays there until mbm_tcp_closeListener.
  *
@@ -394,6 +402,7 @@ int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addr
                    int *error);
 int64_t mbm_tcp_milliseconds(void);
 void mbm_tcp_markReady(mbm_tcp *tcp);
+void mbm_tcp_noteEvents(mbm_tcp *tcp, uint32_t events);
 void mbm_tcp_setEvents(mbm_tcp *tcp, uint8_t events);
 
 #ifdef __cplusplus

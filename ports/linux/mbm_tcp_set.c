@@ -37,7 +37,7 @@ int mbm_tcp_add(mbm_tcp_set *set, mbm_tcp *tcp)
         return refuse(EBADF);
     if (tcp->set)
         return refuse(EBUSY);
-    if (tcp->events != 0 && watch(set, tcp->fd, tcp, 0, tcp->events) < 0)
+    if (tcp->events != 0 && set->watch(set, tcp->fd, tcp, 0, tcp->events) < 0)
         return -1;
     tcp->set = set;
     return 0;
@@ -74,7 +74,7 @@ int mbm_tcp_addListener(mbm_tcp_set *set, mbm_tcp_listener *listener)
         return refuse(EBADF);
     if (listener->set || set->listener)
         return refuse(EBUSY);
-    if (listener->events != 0 && watch(set, listener->fd, listener, 0, listener->events) < 0)
+    if (listener->events != 0 && set->watch(set, listener->fd, listener, 0, listener->events) < 0)
         return -1;
     listener->set = set;
     set->listener = listener;
@@ -82,7 +82,7 @@ int mbm_tcp_addListener(mbm_tcp_set *set, mbm_tcp_listener *listener)
 }
 
 /* Notes what epoll has found for a socket. The simple case, new bytes, is in wait_once. */
-__attribute__((cold, noinline)) static void note_events(mbm_tcp *tcp, uint32_t events)
+__attribute__((cold, noinline)) void mbm_tcp_noteEvents(mbm_tcp *tcp, uint32_t events)
 {
     if (events & ~(uint32_t)EPOLLOUT) {
         if ((tcp->readiness & MBM_TCP_REPORTED) && !(tcp->readiness & MBM_TCP_LISTED)) {
@@ -140,7 +140,7 @@ static int wait_once(mbm_tcp_set *set, int64_t time)
             *set->end = tcp;
             set->end = &tcp->next;
         } else {
-            note_events(tcp, events[i].events);
+            mbm_tcp_noteEvents(tcp, events[i].events);
         }
     }
     (void)until_retry(set);

@@ -262,6 +262,8 @@ int mbm_tty_attach(mbm_tty *tty, int fd)
 /* Restores the settings of the descriptor, also if opening failed. */
 static void release(mbm_tty *tty)
 {
+    if (tty->watch)
+        (void)tty->watch(tty->owner, tty->fd, 0);
     if (tty->has_before)
         tcsetattr(tty->fd, TCSADRAIN, &tty->before);
     if (tty->is_rs485)
@@ -353,7 +355,8 @@ static int open_noted(mbm_tty *tty, const char *path)
     tty->flags_before = O_RDWR;
     /* Locks first, so that the settings of another program's terminal stay as they are. */
     if ((options->exclusive && lock(tty) < 0) || take_over(tty) < 0 || set(tty, options) < 0 ||
-        (options->rs485 && begin_rs485(tty, options) < 0)) {
+        (options->rs485 && begin_rs485(tty, options) < 0) ||
+        (tty->watch && tty->watch(tty->owner, fd, 1) < 0)) {
         error = errno;
         release(tty);
         close(fd);
@@ -396,6 +399,8 @@ uint8_t mbm_tty_connect(void *context)
     }
     mbm_tty_disconnect(tty);
     note(tty, before.path, &before.options);
+    tty->watch = before.watch;
+    tty->owner = before.owner;
     if (open_noted(tty, before.path) == 0)
         return MBM_OK;
     tty->error = errno;

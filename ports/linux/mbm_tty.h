@@ -55,6 +55,9 @@ typedef struct mbm_tty {
     struct termios before;         /**< private */
     mbm_tty_options options;       /**< private */
     char path[MBM_TTY_PATH_BYTES]; /**< private */
+    /** Private: called with 1 when the terminal was opened, with 0 before it is closed. */
+    int (*watch)(void *owner, int fd, uint8_t isOpen);
+    void *owner; /**< private */
 } mbm_tty;
 
 /**

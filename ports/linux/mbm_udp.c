@@ -105,8 +105,11 @@ int mbm_udp_listen(mbm_udp *udp, const char *host, const char *service)
 
 void mbm_udp_close(mbm_udp *udp)
 {
+    if (udp->port != 0 && udp->watch)
+        (void)udp->watch(udp->owner, udp->fd, 0);
     if (udp->port != 0)
         close(udp->fd);
+    udp->watch = NULL;
     udp->fd = -1;
     udp->port = 0;
     udp->from = udp->to = udp->collected = 0;
@@ -194,6 +197,7 @@ static int16_t udp_read(void *context, uint8_t *bytes, uint16_t capacity)
 
     if (udp->port == 0 || udp->isLost)
         return -1;
+    udp->isUsed = 1;
     for (drops = 0; udp->from == udp->to && result == 2; drops++) {
         if (drops == MBM_UDP_DROPS)
             return 0;

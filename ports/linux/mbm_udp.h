@@ -53,12 +53,15 @@ typedef struct mbm_udp {
     uint8_t isServer; /**< private */
     uint8_t isFull;   /**< private */
     uint8_t isLost;   /**< private */
-    uint8_t incoming[MBM_MAX_TCP_FRAME + 1]; /**< private */
-    uint8_t outgoing[MBM_MAX_TCP_FRAME];     /**< private */
-    uint16_t from, to;                       /**< private */
-    uint16_t collected;                      /**< private */
-    socklen_t peerLength;                    /**< private */
-    struct sockaddr_storage peer;            /**< private */
+    uint8_t isUsed;   /**< private */
+    uint8_t incoming[MBM_MAX_TCP_FRAME + 1];           /**< private */
+    uint8_t outgoing[MBM_MAX_TCP_FRAME];               /**< private */
+    uint16_t from, to;                                 /**< private */
+    uint16_t collected;                                /**< private */
+    socklen_t peerLength;                              /**< private */
+    struct sockaddr_storage peer;                      /**< private */
+    int (*watch)(void *owner, int fd, uint8_t isOpen); /**< private */
+    void *owner;                                       /**< private */
 } mbm_udp;
 
 /**
