@@ -312,6 +312,9 @@ $(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client bench_floor suppor
 BENCH_SERVER := $(BUILD)/bench/bench_server
 $(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server bench_tables bench_loops linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tcp_set linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -o $@
+BENCH_LOOP := $(BUILD)/bench/bench_loop
+$(BENCH_LOOP): $(patsubst %,$(BUILD)/bench/%.o,bench_loop linux/mbm_loop linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tcp_set linux/mbm_tty linux/mbm_udp) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 BENCH_SNIFFER := $(BUILD)/bench/bench_sniffer
 $(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@

@@ -262,6 +262,8 @@ static void poll_entry(mbm_loop *loop, mbm_loop_entry *entry)
     int64_t now = loop->now;
     uint32_t delay;
 
+    if (entry->awake.next)
+        unlink_one(&entry->awake);
     loop->current = entry;
     loop->polled++;
     delay = entry->poll(entry);
@@ -326,12 +328,8 @@ static void poll_awake(mbm_loop *loop)
     mbm_loop_link round;
 
     move_all(&round, &loop->awake);
-    while (!is_empty(&round)) {
-        mbm_loop_entry *entry = entry_of(round.next);
-
-        unlink_one(&entry->awake);
-        poll_entry(loop, entry);
-    }
+    while (!is_empty(&round))
+        poll_entry(loop, entry_of(round.next));
 }
 
 static void poll_due(mbm_loop *loop)
@@ -346,20 +344,17 @@ static void poll_due(mbm_loop *loop)
     }
 }
 
-static void poll_ready(mbm_loop *loop, struct epoll_event *events, int count)
+static void poll_ready(mbm_loop *loop)
 {
     int i;
 
-    loop->ready = events;
-    loop->readyCount = count;
-    for (i = 0; i < count; i++) {
-        mbm_loop_entry *entry = (mbm_loop_entry *)events[i].data.ptr;
+    for (i = 0; i < loop->readyCount; i++) {
+        mbm_loop_entry *entry = (mbm_loop_entry *)loop->ready[i].data.ptr;
 
         /* mbm_loop_remove sets those to NULL that it has removed. */
-        if (entry && is_ready(entry, events[i].events))
+        if (entry && is_ready(entry, loop->ready[i].events))
             poll_entry(loop, entry);
     }
-    loop->readyCount = 0;
 }
 
 /* Polls the sockets of which more than new bytes was reported. */
@@ -419,12 +414,15 @@ int mbm_loop_wait(mbm_loop *loop, uint32_t timeoutUs)
             return -1;
         loop->now = clock_now();
         loop->set.now = loop->now / 1000;
+        loop->ready = events;
+        loop->readyCount = count;
         loop->isPolling = 1;
         poll_awake(loop);
         poll_due(loop);
-        poll_ready(loop, events, count);
+        poll_ready(loop);
         poll_listed(loop);
         loop->isPolling = 0;
+        loop->readyCount = 0;
     } while (loop->polled == 0 && count >= 0 && loop->now < end);
     return (int)(loop->polled < INT32_MAX ? loop->polled : INT32_MAX);
 }
