@@ -27,7 +27,7 @@ TLS_TESTS := $(filter test_tls%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_server guarded_server
 # The short programs of examples/linux. Each is one file over the ports.
-EXAMPLES := basic calls custom_client custom_server guarded_server keep_link udp
+EXAMPLES := basic calls custom_client custom_server guarded_server keep_link many_devices udp
 PORTS := $(patsubst ports/%.c,%,$(filter-out $(TLS),$(wildcard ports/linux/mbm_*.c)))
 # The command line tool.
 TOOL := $(wildcard cli/*.c)
@@ -368,6 +368,18 @@ keep-link: ## Show a client whose connection opens itself again, while a libmodb
 sniff: tool ## Check the command that watches a bus, `mbm sniff`
 	@scripts/need python3
 	@scripts/check/sniff $(BUILD)/plain
+
+DEVICES ?= 1000
+MANY_SECONDS ?= 20
+SERVE_MANY := $(BUILD)/plain/serve_many
+$(SERVE_MANY): $(patsubst %,$(BUILD)/plain/%.o,serve_many support/server support/pty) $(ARCHIVE)
+	@gcc $(filter %.o,$^) -lmodbus -lpthread -o $@
+
+.PHONY: many-devices
+many-devices: ## Poll DEVICES (1000) for MANY_SECONDS (20) in one process, while a third of their libmodbus servers goes and comes
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
+	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/many_devices $(SERVE_MANY)
+	@scripts/check/examples many_devices $(BUILD)/plain $(DEVICES) $(MANY_SECONDS)
 
 PEERS := $(BUILD)/plain/serve_libmodbus
 $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support/tcp_server support/pty) $(ARCHIVE)
