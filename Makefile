@@ -326,9 +326,10 @@ $(BENCH_PLAN): $(BUILD)/bench/bench_plan.o $(ARCHIVE)
 bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone of nanoMODBUS; writes docs/reports/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@rm -rf $(BUILD)/bench/bench_client.o $(NANO_SOURCE)
-	@$(MAKE) --no-print-directory $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER) $(BENCH_PLAN)
+	@$(MAKE) --no-print-directory $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_LOOP) $(BENCH_SNIFFER) $(BENCH_PLAN)
 	@scripts/bench/speed server $(BENCH_SERVER)
 	@CARGO="$(CARGO)" scripts/bench/speed client $(BENCH_CLIENT)
+	@scripts/bench/speed loop $(BENCH_LOOP)
 	@scripts/bench/speed sniffer $(BENCH_SNIFFER)
 	@scripts/bench/speed plan $(BENCH_PLAN)
 	@CARGO="$(CARGO)" scripts/bench/speed frames

@@ -28,14 +28,21 @@ static const char *const names[PROGRAMS] = {"without timeouts", "asking each", "
 
 typedef struct device {
     mbm_tcp tcp;
+    mbm_tcp_addresses addresses;
     mbm_client client;
     mbm_link link;
     mbm_clientRequest request;
     mbm_loop_entry entry;
+    mbm_plan plan;
+    mbm_planSetup setup;
+    mbm_planField field;
+    mbm_planPosition position;
+    mbm_planRead read;
+    mbm_loop_planned planned;
     uint16_t words[WORDS];
     uint8_t incoming[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME];
-    int fd;                         /* the server's end; of a simulated one -1 */
-    uint8_t sent[12], waiting, got; /* of a simulated one */
+    int fd;                    /* the server's end; of a simulated one -1 */
+    uint8_t sent[12], waiting; /* of a simulated one */
     uint8_t answer[9 + 2 * WORDS];
 } device;
 
@@ -159,38 +166,84 @@ static void begin_device(device *d, int simulated)
         fail("begin");
 }
 
-/* Waits once, and polls the clients that are ready or, except WITH_SET, due. */
-static void go_round(program which, unsigned count)
+static void updated(void *context, mbm_plan *plan, uint16_t field)
 {
-    uint32_t least = MBM_TCP_FOREVER;
+    device *d = (device *)context;
+
+    if (mbm_plan_getStatus(plan, field, NULL) != MBM_OK ||
+        d->words[WORDS - 1] != pattern(FIRST + WORDS - 1))
+        fail("wrong answer to a plan");
+    ended++;
+}
+
+/* A busy one reads every millisecond, which under callgrind is always over; another once a day. */
+static void begin_plan(device *d, int is_busy)
+{
+    d->field = (mbm_planField){.unit = UNIT,
+                               .table = MBM_TABLE_HOLDING_REGISTERS,
+                               .type = MBM_TYPE_UINT16,
+                               .address = FIRST,
+                               .count = WORDS,
+                               .intervalMs = is_busy ? 1 : MBM_PLAN_LONGEST_INTERVAL};
+    d->setup = (mbm_planSetup){.fields = &d->field,
+                               .positions = &d->position,
+                               .reads = &d->read,
+                               .data = d->words,
+                               .requests = &d->request,
+                               .update = updated,
+                               .context = d,
+                               .fieldCount = 1,
+                               .readCount = 1,
+                               .dataWords = WORDS,
+                               .requestCount = 1};
+    d->request = (mbm_clientRequest){.unit = 0};
+    d->planned = (mbm_loop_planned){&d->client, &d->plan};
+    d->entry.poll = mbm_loop_pollPlan;
+    d->entry.context = &d->planned;
+    if (mbm_plan_begin(&d->plan, &d->client, &d->setup, NULL) != MBM_OK)
+        fail("plan");
+}
+
+/* Waits once, and polls the clients that are ready or, except WITH_SET, due. */
+static void go_round(program which, unsigned count, uint32_t timeout)
+{
+    uint32_t least = timeout;
     unsigned i;
     mbm_tcp *tcp;
 
     if (which == WITH_LOOP) {
-        mbm_loop_wait(&loop, MBM_LOOP_FOREVER);
+        mbm_loop_wait(&loop, timeout);
         return;
     }
-    if (which == ASKING_EACH)
-        for (i = 0; i < count; i++) {
-            const uint32_t delay = mbm_client_pollDelay(&devices[i].client);
+    for (i = 0; which == ASKING_EACH && i < count; i++) {
+        device *d = &devices[i];
+        uint32_t delay = mbm_client_pollDelay(&d->client);
 
-            if (delay == 0)
-                mbm_client_poll(&devices[i].client);
-            if (delay < least)
-                least = delay;
-        }
+        if (d->planned.plan && mbm_plan_pollDelay(&d->plan) < delay)
+            delay = mbm_plan_pollDelay(&d->plan);
+        if (delay == 0 && d->planned.plan)
+            mbm_plan_poll(&d->plan);
+        if (delay == 0)
+            mbm_client_poll(&d->client);
+        if (delay < least)
+            least = delay;
+    }
     mbm_tcp_waitSet(&set, least);
-    while ((tcp = mbm_tcp_nextReady(&set)))
-        mbm_client_poll(&((device *)(void *)((char *)tcp - offsetof(device, tcp)))->client);
+    while ((tcp = mbm_tcp_nextReady(&set))) {
+        device *d = (device *)(void *)((char *)tcp - offsetof(device, tcp));
+
+        mbm_client_poll(&d->client);
+        if (d->planned.plan)
+            mbm_plan_poll(&d->plan);
+    }
 }
 
-static void count_program(program which, unsigned count)
+static void begin_program(program which, unsigned count, int has_plans)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
     int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     socklen_t length = sizeof at;
-    unsigned i, round;
-    char title[100];
+    unsigned i;
 
     memset(devices, 0, sizeof devices);
     if (bind(listener, (struct sockaddr *)&at, sizeof at) != 0 || listen(listener, 64) != 0 ||
@@ -199,47 +252,92 @@ static void count_program(program which, unsigned count)
     if (which == WITH_LOOP ? mbm_loop_open(&loop, places, count) != 0 : mbm_tcp_openSet(&set) != 0)
         fail("open");
     for (i = 0; i < count; i++) {
+        const int is_busy = i % (count / BUSY) == 0;
+
         connect_device(&devices[i], listener, &at);
         begin_device(&devices[i], 0);
+        if (has_plans)
+            begin_plan(&devices[i], is_busy);
         if (which == WITH_LOOP ? mbm_loop_addTcp(&loop, &devices[i].entry, &devices[i].tcp) != 0
                                : mbm_tcp_add(&set, &devices[i].tcp) != 0)
             fail("add");
         mbm_client_poll(&devices[i].client);
-    }
-    for (i = 0; i < count; i += count / BUSY) {
-        ask(&devices[i]);
+        if (is_busy && !has_plans)
+            ask(&devices[i]);
         if (which != WITH_LOOP)
             mbm_client_poll(&devices[i].client);
     }
-    if (which == WITH_LOOP)
-        mbm_loop_wait(&loop, 0);
+    go_round(which, count, 0);
     ended = 0;
-    for (round = 1; round <= ROUNDS; round++) {
-        for (i = 0; i < count; i += count / BUSY)
-            answer(&devices[i]);
-        CALLGRIND_TOGGLE_COLLECT;
-        while (ended < (unsigned long)round * BUSY)
-            go_round(which, count);
-        CALLGRIND_TOGGLE_COLLECT;
-    }
-    snprintf(title, sizeof title, "many\t%s\t%u\t%lu", names[which], count, ended);
+    close(listener);
+}
+
+static void end_program(const char *kind, const char *name, unsigned count)
+{
+    char title[100];
+    unsigned i;
+
+    snprintf(title, sizeof title, "%s\t%s\t%u\t%lu", kind, name, count, ended);
     CALLGRIND_DUMP_STATS_AT(title);
     CALLGRIND_ZERO_STATS;
     for (i = 0; i < count; i++) {
         mbm_loop_remove(&devices[i].entry);
         mbm_tcp_close(&devices[i].tcp);
-        close(devices[i].fd);
+        if (devices[i].fd > 0)
+            close(devices[i].fd);
     }
-    close(listener);
     mbm_tcp_closeSet(&set);
     mbm_loop_close(&loop);
+}
+
+/* Each client has one request under way, and queues the next one when it ends. */
+static void count_requests(program which, unsigned count)
+{
+    unsigned i, round;
+
+    begin_program(which, count, 0);
+    for (round = 1; round <= ROUNDS; round++) {
+        for (i = 0; i < count; i += count / BUSY)
+            answer(&devices[i]);
+        CALLGRIND_TOGGLE_COLLECT;
+        while (ended < (unsigned long)round * BUSY)
+            go_round(which, count, MBM_LOOP_FOREVER);
+        CALLGRIND_TOGGLE_COLLECT;
+    }
+    end_program("requests", names[which], count);
+}
+
+/* Each plan reads when its time has come. */
+static void count_plans(program which, unsigned count)
+{
+    unsigned i, round;
+
+    begin_program(which, count, 1);
+    /* All plans read once when they begin. */
+    for (i = 0; i < count; i++)
+        answer(&devices[i]);
+    while (ended < count)
+        go_round(which, count, MBM_LOOP_FOREVER);
+    ended = 0;
+    for (round = 1; round <= ROUNDS; round++) {
+        usleep(2000);
+        CALLGRIND_TOGGLE_COLLECT;
+        go_round(which, count, 0);
+        CALLGRIND_TOGGLE_COLLECT;
+        for (i = 0; i < count; i += count / BUSY)
+            answer(&devices[i]);
+        CALLGRIND_TOGGLE_COLLECT;
+        while (ended < (unsigned long)round * BUSY)
+            go_round(which, count, MBM_LOOP_FOREVER);
+        CALLGRIND_TOGGLE_COLLECT;
+    }
+    end_program("plans", names[which], count);
 }
 
 /* The same with simulated sockets: the program wakes the entries of those that got an answer. */
 static void count_simulated(unsigned count)
 {
     unsigned i, round;
-    char title[100];
 
     memset(devices, 0, sizeof devices);
     if (mbm_loop_open(&loop, places, count) != 0)
@@ -248,11 +346,11 @@ static void count_simulated(unsigned count)
         begin_device(&devices[i], 1);
         if (mbm_loop_addFd(&loop, &devices[i].entry, -1) != 0)
             fail("add");
+        if (i % (count / BUSY) == 0)
+            ask(&devices[i]);
     }
-    mbm_loop_wait(&loop, 0);
-    for (i = 0; i < count; i += count / BUSY)
-        ask(&devices[i]), mbm_loop_wake(&devices[i].entry);
-    mbm_loop_wait(&loop, 0);
+    mbm_loop_wait(&loop, 0); /* opens the links */
+    mbm_loop_wait(&loop, 0); /* sends the requests */
     ended = 0;
     for (round = 1; round <= ROUNDS; round++) {
         for (i = 0; i < count; i += count / BUSY) {
@@ -265,24 +363,22 @@ static void count_simulated(unsigned count)
         mbm_loop_wait(&loop, 0);
         CALLGRIND_TOGGLE_COLLECT;
     }
-    snprintf(title, sizeof title, "many\tmbm_loop, simulated\t%u\t%lu", count, ended);
-    CALLGRIND_DUMP_STATS_AT(title);
-    CALLGRIND_ZERO_STATS;
-    for (i = 0; i < count; i++)
-        mbm_loop_remove(&devices[i].entry);
-    mbm_loop_close(&loop);
+    end_program("simulated", names[WITH_LOOP], count);
 }
 
 int main(int argc, char **argv)
 {
+    const device *d = devices;
     struct rlimit limit;
     unsigned which;
 
     if (argc == 2 && strcmp(argv[1], "memory") == 0) {
-        printf(
-            "entry\t%zu\nplace\t%zu\ntcp\t%zu\naddresses\t%zu\nclient\t%zu\nlink\t%zu\nloop\t%zu\n",
-            sizeof(mbm_loop_entry), sizeof(mbm_loop_place), sizeof(mbm_tcp),
-            sizeof(mbm_tcp_addresses), sizeof(mbm_client), sizeof(mbm_link), sizeof(mbm_loop));
+        printf("entry\t%zu\nplace\t%zu\ntcp\t%zu\naddresses\t%zu\nclient\t%zu\nlink\t%zu\n",
+               sizeof d->entry, sizeof *places, sizeof d->tcp, sizeof d->addresses,
+               sizeof d->client, sizeof d->link);
+        printf("buffers\t%zu\nplan\t%zu\n", sizeof d->incoming + sizeof d->outgoing,
+               sizeof d->plan + sizeof d->setup + sizeof d->field + sizeof d->position +
+                   sizeof d->read + sizeof d->request);
         return 0;
     }
     if (getrlimit(RLIMIT_NOFILE, &limit) != 0)
@@ -291,8 +387,11 @@ int main(int argc, char **argv)
     if (setrlimit(RLIMIT_NOFILE, &limit) != 0)
         fail("setrlimit");
     for (which = 0; which < PROGRAMS; which++)
-        count_program((program)which, MANY);
-    count_program(WITH_LOOP, BUSY);
+        count_requests((program)which, MANY);
+    count_requests(WITH_LOOP, BUSY);
+    count_plans(ASKING_EACH, MANY);
+    count_plans(WITH_LOOP, MANY);
+    count_plans(WITH_LOOP, BUSY);
     count_simulated(MANY);
     count_simulated(MOST);
     return 0;

@@ -657,16 +657,18 @@ uint32_t mbm_loop_pollClient(mbm_loop_entry *entry)
 uint32_t mbm_loop_pollPlan(mbm_loop_entry *entry)
 {
     const mbm_loop_planned *own = (const mbm_loop_planned *)entry->context;
+    const int isIdle = mbm_client_pending(own->client) == 0;
     uint32_t delay, next;
+    uint8_t pending;
 
-    (void)mbm_client_poll(own->client);
-    (void)mbm_plan_poll(own->plan);
-    delay = mbm_client_pollDelay(own->client);
-    if (delay == 0) {
-        /* The plan has queued a request. */
+    /* Replies come before the plan, and what the plan has queued is sent at once. */
+    if (!isIdle)
         (void)mbm_client_poll(own->client);
-        delay = mbm_client_pollDelay(own->client);
-    }
+    pending = mbm_client_pending(own->client);
+    (void)mbm_plan_poll(own->plan);
+    if (isIdle || mbm_client_pending(own->client) > pending)
+        (void)mbm_client_poll(own->client);
+    delay = mbm_client_pollDelay(own->client);
     next = mbm_plan_pollDelay(own->plan);
     return next < delay ? next : delay;
 }
