@@ -144,12 +144,12 @@ static void connect_device(device *d, int listener, const struct sockaddr_in *at
         fail("connect");
 }
 
-static void begin_device(device *d, int simulated)
+static void begin_device(device *d, int is_simulated, int has_link)
 {
     mbm_linkHooks hooks = mbm_tcp_link(&d->tcp);
     mbm_port port = mbm_tcp_port(&d->tcp);
 
-    if (simulated) {
+    if (is_simulated) {
         port.context = d;
         port.read = simulated_read;
         port.write = simulated_write;
@@ -162,7 +162,7 @@ static void begin_device(device *d, int simulated)
     d->entry.context = &d->client;
     if (mbm_client_beginTcp(&d->client, &port, d->incoming, sizeof d->incoming, d->outgoing,
                             sizeof d->outgoing) != MBM_OK ||
-        mbm_link_begin(&d->link, &d->client, &hooks) != MBM_OK)
+        (has_link && mbm_link_begin(&d->link, &d->client, &hooks) != MBM_OK))
         fail("begin");
 }
 
@@ -238,7 +238,7 @@ static void go_round(program which, unsigned count, uint32_t timeout)
     }
 }
 
-static void begin_program(program which, unsigned count, int has_plans)
+static void begin_program(program which, unsigned count, int has_links, int has_plans)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
     int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
@@ -255,7 +255,7 @@ static void begin_program(program which, unsigned count, int has_plans)
         const int is_busy = i % (count / BUSY) == 0;
 
         connect_device(&devices[i], listener, &at);
-        begin_device(&devices[i], 0);
+        begin_device(&devices[i], 0, has_links);
         if (has_plans)
             begin_plan(&devices[i], is_busy);
         if (which == WITH_LOOP ? mbm_loop_addTcp(&loop, &devices[i].entry, &devices[i].tcp) != 0
@@ -291,11 +291,11 @@ static void end_program(const char *kind, const char *name, unsigned count)
 }
 
 /* Each client has one request under way, and queues the next one when it ends. */
-static void count_requests(program which, unsigned count)
+static void count_requests(program which, unsigned count, int has_links)
 {
     unsigned i, round;
 
-    begin_program(which, count, 0);
+    begin_program(which, count, has_links, 0);
     for (round = 1; round <= ROUNDS; round++) {
         for (i = 0; i < count; i += count / BUSY)
             answer(&devices[i]);
@@ -304,7 +304,7 @@ static void count_requests(program which, unsigned count)
             go_round(which, count, MBM_LOOP_FOREVER);
         CALLGRIND_TOGGLE_COLLECT;
     }
-    end_program("requests", names[which], count);
+    end_program(has_links ? "requests" : "no links", names[which], count);
 }
 
 /* Each plan reads when its time has come. */
@@ -312,7 +312,7 @@ static void count_plans(program which, unsigned count)
 {
     unsigned i, round;
 
-    begin_program(which, count, 1);
+    begin_program(which, count, 1, 1);
     /* All plans read once when they begin. */
     for (i = 0; i < count; i++)
         answer(&devices[i]);
@@ -343,7 +343,7 @@ static void count_simulated(unsigned count)
     if (mbm_loop_open(&loop, places, count) != 0)
         fail("open");
     for (i = 0; i < count; i++) {
-        begin_device(&devices[i], 1);
+        begin_device(&devices[i], 1, 1);
         if (mbm_loop_addFd(&loop, &devices[i].entry, -1) != 0)
             fail("add");
         if (i % (count / BUSY) == 0)
@@ -387,8 +387,10 @@ int main(int argc, char **argv)
     if (setrlimit(RLIMIT_NOFILE, &limit) != 0)
         fail("setrlimit");
     for (which = 0; which < PROGRAMS; which++)
-        count_requests((program)which, MANY);
-    count_requests(WITH_LOOP, BUSY);
+        count_requests((program)which, MANY, 0);
+    for (which = 0; which < PROGRAMS; which++)
+        count_requests((program)which, MANY, 1);
+    count_requests(WITH_LOOP, BUSY, 1);
     count_plans(ASKING_EACH, MANY);
     count_plans(WITH_LOOP, MANY);
     count_plans(WITH_LOOP, BUSY);

@@ -480,7 +480,7 @@ static uint32_t tcp_micros(void *context)
     struct timespec now;
 
     clock_gettime(CLOCK_MONOTONIC, &now);
-    tcp->clock = (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+    tcp->clock = (int64_t)now.tv_sec * 1000000 + (uint32_t)now.tv_nsec / 1000u;
     return (uint32_t)tcp->clock;
 }
 
