@@ -457,8 +457,8 @@ static void the_wait_ends_when_its_time_is_over(void **state)
     assert_int_equal(mbm_loop_wait(&loop, 3 * MS), 0);
     assert_int_equal(mbm_loop_wait(&loop, 120 * MS), 0);
     clock_gettime(CLOCK_MONOTONIC, &to);
-    assert_true((to.tv_sec - from.tv_sec) * 1000000000ll + (to.tv_nsec - from.tv_nsec) >=
-                123 * 1000000ll);
+    assert_true((to.tv_sec - from.tv_sec) * 1000000000LL + (to.tv_nsec - from.tv_nsec) >=
+                123 * 1000000LL);
 }
 
 static void another_loop_can_wait_for_this_one(void **state)

@@ -243,7 +243,7 @@ static void after_a_jump_of_the_clock_no_timeout_is_missing(void **state)
     for (i = 0; i < SOME; i++)
         ask(&devices[i], 1000 + i);
     assert_int_equal(mbm_loop_wait(&loop, 0), SOME);
-    now += 30ll * 60 * 1000000;
+    now += 30LL * 60 * 1000000;
     assert_int_equal(mbm_loop_wait(&loop, 0), SOME);
     for (i = 0; i < SOME; i++)
         IS(MBM_RESPONSE_TIMED_OUT, devices[i].request.status);
@@ -441,7 +441,7 @@ static void a_plan_reads_at_its_intervals(void **state)
     for (i = 1; i <= 20; i++) {
         while (devices[0].sent < i)
             assert_true(step());
-        assert_in_range(now, from + (i - 1) * 1000ll * MS, from + (i - 1) * 1000ll * MS + 2 * MS);
+        assert_in_range(now, from + (i - 1) * 1000LL * MS, from + (i - 1) * 1000LL * MS + 2 * MS);
         now += 3 * MS;
         answer(&devices[0]);
         mbm_loop_wake(&devices[0].entry);

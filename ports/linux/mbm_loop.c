@@ -97,22 +97,25 @@ static void rise(mbm_loop *loop, uint32_t at, mbm_loop_place place)
     put(loop, at, place);
 }
 
+/* Returns the place below `at` whose time comes first; 0 if there is none. */
+static inline uint32_t first_below(const mbm_loop *loop, uint32_t at)
+{
+    const uint32_t one = 2 * at;
+
+    if (one >= loop->timed)
+        return one == loop->timed ? one : 0;
+    return loop->places[one].time < loop->places[one - 1].time ? one + 1 : one;
+}
+
 /* Puts a place, of which the one at `at` is free, at `at` or further down. */
 static void sink(mbm_loop *loop, uint32_t at, mbm_loop_place place)
 {
-    const mbm_loop_place *places = loop->places;
+    uint32_t next = first_below(loop, at);
 
-    for (;;) {
-        uint32_t next = 2 * at;
-
-        if (next > loop->timed)
-            break;
-        if (next < loop->timed && places[next].time < places[next - 1].time)
-            next++;
-        if (places[next - 1].time >= place.time)
-            break;
-        put(loop, at, places[next - 1]);
+    while (next != 0 && loop->places[next - 1].time < place.time) {
+        put(loop, at, loop->places[next - 1]);
         at = next;
+        next = first_below(loop, at);
     }
     put(loop, at, place);
 }
@@ -447,7 +450,7 @@ int mbm_loop_open(mbm_loop *loop, mbm_loop_place *places, uint32_t count)
 {
     if (loop->set.isOpen)
         return refuse(EBUSY);
-    if (!places || count == 0)
+    if (!places || count == 0 || count > INT32_MAX)
         return refuse(EINVAL);
     if (mbm_tcp_openSet(&loop->set) < 0)
         return -1;
@@ -656,7 +659,7 @@ uint32_t mbm_loop_pollClient(mbm_loop_entry *entry)
 
 uint32_t mbm_loop_pollPlan(mbm_loop_entry *entry)
 {
-    const mbm_loop_planned *own = (const mbm_loop_planned *)entry->context;
+    mbm_loop_planned *own = (mbm_loop_planned *)entry->context;
     const int isIdle = mbm_client_pending(own->client) == 0;
     uint32_t delay, next;
     uint8_t pending;

@@ -110,9 +110,9 @@ typedef struct mbm_loop {
  *
  * @param loop    initialised with MBM_INIT, or closed before
  * @param places  storage, the loop's alone until mbm_loop_close
- * @param count   number of places, 1 to 2^32 - 1: the most entries that the loop can have
- * @return 0, or -1 with errno set: EBUSY if the loop is open, EINVAL for no place, or an error of
- *         epoll_create1
+ * @param count   number of places, 1 to 2^31 - 1: the most entries that the loop can have
+ * @return 0, or -1 with errno set: EBUSY if the loop is open, EINVAL for a count out of range, or
+ * an error of epoll_create1
  */
 int mbm_loop_open(mbm_loop *loop, mbm_loop_place *places, uint32_t count);
 
