@@ -2,6 +2,7 @@
  * answers. */
 #define _GNU_SOURCE
 #include "await.h"
+#include "mbm_loop.h"
 #include "tcp_server.h"
 #include "test.h"
 #include "tls_pair.h"
@@ -217,11 +218,106 @@ static void a_peer_that_never_answers_is_a_timeout_of_the_connection(void **stat
 
 #define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
 
+/* --- in a loop --- */
+
+static mbm_loop loop;
+static mbm_loop_place in_loop[PLACES + 2];
+static mbm_loop_entry accepting, served[PLACES], asking;
+
+static uint32_t lesser(uint32_t one, uint32_t other)
+{
+    return one < other ? one : other;
+}
+
+static uint32_t poll_secure_client(mbm_loop_entry *entry)
+{
+    asker *a = (asker *)entry->context;
+
+    (void)mbm_client_poll(&a->client);
+    return lesser(mbm_client_pollDelay(&a->client), mbm_tls_pollDelay(&a->tls));
+}
+
+static uint32_t poll_secure_server(mbm_loop_entry *entry)
+{
+    const size_t place = (size_t)(entry - served);
+
+    if (mbm_server_poll(&servers[place]) != MBM_OK) {
+        mbm_loop_remove(entry);
+        leave((unsigned)place);
+        return MBM_LOOP_FOREVER;
+    }
+    return lesser(mbm_server_pollDelay(&servers[place]), mbm_tls_pollDelay(&tlss[place]));
+}
+
+static uint32_t accept_one(mbm_loop_entry *entry)
+{
+    const int place = mbm_tls_accept(&listener, &identity, tlss, tcps, PLACES);
+
+    (void)entry;
+    if (place >= 0) {
+        const mbm_port port = mbm_tls_port(&tlss[place]);
+
+        OK(mbm_server_beginTcp(&servers[place], &port, &unit, 1, frames[place], MBM_MAX_TCP_FRAME));
+        served[place].poll = poll_secure_server;
+        assert_int_equal(mbm_loop_addTcp(&loop, &served[place], &tcps[place]), 0);
+    }
+    return MBM_LOOP_FOREVER;
+}
+
+#define UNTIL_IN_LOOP(condition)                                                                   \
+    do {                                                                                           \
+        while (!(condition))                                                                       \
+            assert_true(mbm_loop_wait(&loop, MBM_LOOP_FOREVER) >= 0);                              \
+    } while (0)
+
+static void a_loop_polls_client_and_server_and_a_lost_session_comes_back(void **state)
+{
+    static linked l;
+    mbm_tls_identity own = {0};
+    unsigned round, i;
+
+    (void)state;
+    assert_int_equal(mbm_tls_listen(&listener, "127.0.0.1", "0"), 0);
+    tls_identify(&own, "operator", "authority", 0);
+    keep(&l, &own, listener.port);
+    memset(&loop, 0, sizeof loop);
+    assert_int_equal(mbm_loop_open(&loop, in_loop, COUNT(in_loop)), 0);
+    accepting.poll = accept_one;
+    assert_int_equal(mbm_loop_addListener(&loop, &accepting, &listener), 0);
+    asking.poll = poll_secure_client;
+    asking.context = &l.a;
+    assert_int_equal(mbm_loop_addTcp(&loop, &asking, &l.a.tcp), 0);
+    for (round = 1; round <= 3; round++) {
+        UNTIL_IN_LOOP(l.counters.connected == round);
+        l.a.request =
+            (mbm_clientRequest){.unit = 17, .reply = l.a.words, .replyBytes = sizeof l.a.words};
+        IS(MBM_PENDING, mbm_client_readHoldingRegisters(&l.a.client, &l.a.request, FIRST, 3));
+        mbm_loop_wake(&asking);
+        UNTIL_IN_LOOP(l.a.request.status != MBM_PENDING);
+        IS(MBM_OK, l.a.request.status);
+        assert_memory_equal(l.a.words, words, sizeof words);
+        for (i = 0; i < PLACES; i++) {
+            mbm_loop_remove(&served[i]);
+            leave(i);
+        }
+        UNTIL_IN_LOOP(l.counters.lost == round);
+    }
+    for (i = 0; i < PLACES; i++)
+        mbm_loop_remove(&served[i]);
+    mbm_loop_remove(&asking);
+    mbm_loop_remove(&accepting);
+    mbm_tls_close(&l.a.tls);
+    mbm_tcp_close(&l.a.tcp);
+    mbm_loop_close(&loop);
+    mbm_tls_end(&own);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         TEST(a_link_opens_a_session_anew_when_it_was_lost),
         TEST(a_peer_that_never_answers_is_a_timeout_of_the_connection),
+        TEST(a_loop_polls_client_and_server_and_a_lost_session_comes_back),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
