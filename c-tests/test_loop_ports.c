@@ -195,8 +195,11 @@ static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
 {
     const struct sockaddr_in none = {.sin_family = AF_INET};
     const mbm_port serial = mbm_tty_port(&tty), datagrams = mbm_udp_port(&udp_server);
+    const mbm_port sockets = mbm_tcp_port(&tcp);
     mbm_loop_entry line = {.poll = poll_nothing}, udp = {.poll = poll_nothing};
-    unsigned line_polls = 0, udp_polls = 0;
+    mbm_loop_entry stream = {.poll = poll_nothing};
+    unsigned line_polls = 0, udp_polls = 0, stream_polls = 0;
+    int pair[2];
     struct sockaddr_in to = none;
     uint8_t bytes[16];
     int sender;
@@ -206,17 +209,22 @@ static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
     pty_open(&ends);
     assert_int_equal(mbm_tty_attach(&tty, dup(ends.ours)), 0);
     assert_int_equal(mbm_udp_listen(&udp_server, "127.0.0.1", "0"), 0);
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
+    assert_int_equal(mbm_tcp_attach(&tcp, pair[0]), 0);
     line.context = &line_polls;
     udp.context = &udp_polls;
+    stream.context = &stream_polls;
+    assert_int_equal(mbm_loop_addTcp(&loop, &stream, &tcp), 0);
     assert_int_equal(mbm_loop_addTty(&loop, &line, &tty), 0);
     assert_int_equal(mbm_loop_addUdp(&loop, &udp, &udp_server), 0);
-    assert_int_equal(mbm_loop_wait(&loop, 0), 2);
+    assert_int_equal(mbm_loop_wait(&loop, 0), 3);
+    assert_int_equal(write(pair[1], "abcd", 4), 4);
     assert_int_equal(write(ends.theirs, "abcd", 4), 4);
     sender = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     to.sin_port = htons(udp_server.port);
     to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     assert_int_equal(sendto(sender, "x", 1, 0, (struct sockaddr *)&to, sizeof to), 1);
-    UNTIL(line_polls == 2 && udp_polls == 2);
+    UNTIL(line_polls == 2 && udp_polls == 2 && stream_polls == 2);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     /* Once the program has used the port, and polled the entry, the rest is reported. */
@@ -227,6 +235,12 @@ static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
     UNTIL(line_polls == 4);
     assert_int_equal(udp_polls, 3);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
+    assert_int_equal(stream_polls, 2);
+    assert_int_equal(sockets.read(sockets.context, bytes, 2), 2);
+    UNTIL(stream_polls == 3);
+    assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
+    mbm_loop_remove(&stream);
+    close(pair[1]);
     mbm_loop_remove(&line);
     mbm_loop_remove(&udp);
     close(sender);
@@ -429,11 +443,12 @@ static void a_server_on_a_serial_line_takes_part(void **state)
     end_far_end();
 }
 
-/* The adapter is unplugged and plugged in again. The same number may become its descriptor. */
+/* The adapter is unplugged and plugged in again, and gets another descriptor. */
 static void a_terminal_that_comes_back_is_waited_for_again(void **state)
 {
     char folder[] = "/tmp/mbm-loop-XXXXXX", path[64];
     unsigned round;
+    int taken[3];
 
     (void)state;
     begin_unit();
@@ -445,6 +460,7 @@ static void a_terminal_that_comes_back_is_waited_for_again(void **state)
         begin_far_end();
         assert_int_equal(symlink(line.path, path), 0);
         UNTIL(by_line.counters.connected == round);
+        assert_int_equal(by_line.entry.fd, tty.fd);
         by_line.left = 3;
         by_line.right = 0;
         ask(&by_line);
@@ -453,7 +469,10 @@ static void a_terminal_that_comes_back_is_waited_for_again(void **state)
         unlink(path);
         end_far_end();
         UNTIL(by_line.counters.lost == round);
+        taken[round - 1] = dup(0);
     }
+    for (round = 0; round < 3; round++)
+        close(taken[round]);
     rmdir(folder);
 }
 

@@ -7,7 +7,9 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <time.h>
+#include <unistd.h>
 #include <valgrind/valgrind.h>
 
 enum { MANY = 10000, SOME = 300, UNIT = 7, MS = 1000 };
@@ -406,6 +408,41 @@ static void an_entry_that_always_has_something_to_do_is_polled_once_in_a_wait(vo
     mbm_loop_remove(&calm);
 }
 
+/* --- a socket --- */
+
+static uint32_t poll_in_20_ms(mbm_loop_entry *entry)
+{
+    ++*(unsigned *)entry->context;
+    return 20 * MS;
+}
+
+/* Its `poll` does not look at the clock of the port, which others did long ago. */
+static void a_delay_counts_from_its_poll(void **state)
+{
+    mbm_loop_entry entry = {.poll = poll_in_20_ms};
+    unsigned count = 0, i;
+    mbm_tcp tcp = {0};
+    int pair[2];
+
+    (void)state;
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
+    assert_int_equal(mbm_tcp_attach(&tcp, pair[0]), 0);
+    (void)mbm_tcp_port(&tcp).micros(&tcp);
+    entry.context = &count;
+    now += 1000 * MS;
+    assert_int_equal(mbm_loop_addTcp(&loop, &entry, &tcp), 0);
+    for (i = 1; i <= 5; i++) {
+        assert_int_equal(mbm_loop_wait(&loop, 0), 1);
+        assert_int_equal(mbm_loop_pollDelay(&loop), 20 * MS);
+        assert_int_equal(mbm_loop_wait(&loop, 0), 0);
+        now += 20 * MS;
+    }
+    assert_int_equal(count, 5);
+    mbm_loop_remove(&entry);
+    mbm_tcp_close(&tcp);
+    close(pair[1]);
+}
+
 /* --- plans --- */
 
 static void a_plan_reads_at_its_intervals(void **state)
@@ -464,6 +501,7 @@ int main(void)
         TEST(a_clock_that_steps_back_only_delays),
         TEST(entries_are_polled_when_they_are_due_and_never_else),
         TEST(an_entry_that_always_has_something_to_do_is_polled_once_in_a_wait),
+        TEST(a_delay_counts_from_its_poll),
         TEST(a_plan_reads_at_its_intervals),
     };
 

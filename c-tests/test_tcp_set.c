@@ -298,6 +298,56 @@ static void a_failed_add_to_a_set_sets_errno(void **state)
     FAILS(EBUSY, mbm_tcp_addListener(&set, &listener));
 }
 
+static void a_socket_that_has_left_its_set_is_waited_for_alone(void **state)
+{
+    (void)state;
+    fill(2);
+    peer_sends(0, "abc");
+    expect_ready(&tcps[0]);
+    expect_silence();
+    mbm_tcp_remove(&tcps[0]);
+    mbm_tcp_remove(&tcps[0]);
+    assert_int_equal(mbm_tcp_wait(&tcps[0], 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_int_equal(read_some(0, 16), 3);
+    peer_sends(0, "d");
+    peer_sends(1, "e");
+    expect_ready(&tcps[1]);
+    assert_int_equal(mbm_tcp_add(&set, &tcps[0]), 0);
+    expect_ready(&tcps[0]);
+    /* It is not reported any more, though it was ready. */
+    assert_int_equal(read_some(1, 16), 1);
+    assert_int_equal(read_some(0, 16), 1);
+    peer_sends(0, "f");
+    peer_sends(1, "g");
+    assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
+    mbm_tcp_remove(&tcps[0]);
+    assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[1]);
+    assert_null(mbm_tcp_nextReady(&set));
+}
+
+/* An object looks at the clock in each poll; a program need not. */
+static void the_idle_time_counts_from_the_last_byte(void **state)
+{
+    const mbm_port port = mbm_tcp_port(&tcps[0]);
+    unsigned i;
+
+    (void)state;
+    fill(1);
+    mbm_tcp_remove(&tcps[0]);
+    for (i = 0; i < 300; i++) {
+        peer_sends(0, "x");
+        (void)port.micros(port.context);
+        assert_int_equal(read_some(0, 1), 1);
+        assert_in_range(mbm_tcp_idleFor(&tcps[0]), 0, MINUTE_MS);
+    }
+    assert_int_equal(port.write(port.context, (const uint8_t *)"y", 1), 1);
+    ahead += 61;
+    assert_in_range(mbm_tcp_idleFor(&tcps[0]), MINUTE_MS, 2 * MINUTE_MS);
+    peer_sends(0, "x");
+    assert_int_equal(read_some(0, 1), 1);
+    assert_in_range(mbm_tcp_idleFor(&tcps[0]), 0, MINUTE_MS);
+}
+
 /* --- with a listener --- */
 
 static void begin_to_listen(void)
@@ -470,6 +520,8 @@ int main(void)
         TEST(a_full_socket_is_ready_once_it_accepts_bytes_again),
         TEST(a_closed_socket_is_not_reported),
         TEST(a_connection_is_reported_when_it_is_made_and_made_anew),
+        TEST(a_socket_that_has_left_its_set_is_waited_for_alone),
+        TEST(the_idle_time_counts_from_the_last_byte),
         TEST(a_failed_add_to_a_set_sets_errno),
         TEST(an_accepted_connection_is_in_the_set_of_its_listener),
         TEST(accept_looks_only_once_the_set_knows_of_a_connection),

@@ -304,22 +304,9 @@ static int is_ready(mbm_loop_entry *entry, uint32_t events)
         mbm_tcp_noteEvents(tcp, events);
         return 0; /* poll_listed polls it, if it is to be polled */
     }
-    case OF_TTY: {
-        mbm_tty *tty = (mbm_tty *)entry->port;
-
-        if (wanted_of(entry) == 0)
-            return set_events(entry, 0);
-        tty->events = 0;
-        return 1;
-    }
-    case OF_UDP: {
-        mbm_udp *udp = (mbm_udp *)entry->port;
-
-        if (!udp->isUsed && !(events & EPOLLOUT))
-            return set_events(entry, wanted_of(entry));
-        udp->isUsed = 0;
-        return 1;
-    }
+    /* Bytes are reported again once the port is used: follow_port sees to that. */
+    case OF_TTY: ((mbm_tty *)entry->port)->events = 0; return 1;
+    case OF_UDP: ((mbm_udp *)entry->port)->isUsed = 0; return 1;
     case OF_LISTENER: ((mbm_tcp_listener *)entry->port)->nothingToAccept = 0; return 1;
     default: return 1;
     }

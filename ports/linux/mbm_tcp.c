@@ -441,7 +441,6 @@ COLD static int16_t finish_write(mbm_tcp *tcp, ssize_t length, ssize_t count)
     if (count <= 0)
         return 0;
     note_activity(tcp);
-    tcp->clock = 0;
     return (int16_t)count;
 }
 
