@@ -181,14 +181,14 @@ impl ClientRequest for RequestPtr {
 
     fn store(&mut self, data: &[u8], mask: u8) {
         let fields = self.fields_mut();
-        let words = fields.state.header.takes_words();
+        let (flip, reply) = (place(0, fields.state.header.takes_words()), fields.reply);
         // SAFETY: the reply is not NULL and holds `capacity` bytes, and the data are not longer.
         // Of words, the client receives an even number of bytes.
         unsafe {
             for (index, byte) in data.iter().enumerate() {
                 let is_last = index + 1 == data.len();
                 let byte = if is_last { *byte & mask } else { *byte };
-                *fields.reply.add(place(index, words)) = byte;
+                *reply.add(index ^ flip) = byte;
             }
         }
     }
