@@ -334,7 +334,7 @@ static void take_value(const struct argp_state *state, int setting, const char *
         options_wrong(state, "%s %s", option, wrong);
 }
 
-static const char *pending; /* the LINE whose FILE follows */
+static const char *given_line; /* the LINE whose FILE follows */
 
 /* Reads a word that is no option: FILE of a bridge, or LINE and FILE by turns. */
 static void read_word(const struct argp_state *state, char *text)
@@ -349,10 +349,12 @@ static void read_word(const struct argp_state *state, char *text)
         options_wrong(state, "\"%s\" is one word too many: the lines are in the file", text);
     } else if (state->arg_num % 2 == 0) {
         options_place(state, &where, text, 0);
-        pending = text;
+        given_line = text;
     } else {
-        wrong = bridge_setup_line(&given, pending, text, NULL);
-        pending = NULL;
+        const char *const file = text;
+
+        wrong = bridge_setup_line(&given, given_line, file, NULL);
+        given_line = NULL;
     }
     if (wrong)
         options_wrong(state, "%s", wrong);
@@ -362,7 +364,7 @@ static void check_options(const struct argp_state *state)
 {
     const char *wrong = bridge_setup_check(&given, "--");
 
-    if (!path && (given.line_count == 0 || pending))
+    if (!path && (given.line_count == 0 || given_line))
         options_wrong(state, "a bridge needs LINE and FILE, or a FILE of a bridge");
     if (wrong && !path)
         options_wrong(state, "%s", wrong);

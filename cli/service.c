@@ -194,9 +194,9 @@ static void write_stats(void)
 
 /* --- the life of a service --- */
 
-int service_begin(void (*with)(stats *numbers))
+int service_begin(void (*get)(stats *numbers))
 {
-    fill = with;
+    fill = get;
     catch_signals();
     if (metrics_place) {
         const int port = metrics_listen(metrics_place);
