@@ -452,9 +452,9 @@ plan: tool ## A plan of ten fields at work against a libmodbus server
 
 .PHONY: mqtt
 mqtt: ## Show and check the bridge to MQTT, `mbm bridge`, on a libmodbus server and a mosquitto broker
-	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3 mosquitto mosquitto-clients openssl
-	@$(MAKE) --no-print-directory tool $(PEERS)
-	@scripts/check/mqtt $(BUILD)/plain
+	@scripts/need gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev python3 mosquitto mosquitto-clients openssl
+	@$(MAKE) --no-print-directory tool $(BUILD)/sanitized/mbm $(PEERS)
+	@scripts/check/mqtt $(BUILD)/plain $(BUILD)/sanitized/mbm
 
 # The tests in C as programs for AArch64, run by QEMU's user mode. The machine stays as it is: the
 # libraries for AArch64 are unpacked below build.

@@ -133,10 +133,11 @@ bridge_table *bridge_table_read(const char *path, uint8_t register_gap, int *cod
 {
     bridge_table *table = (bridge_table *)calloc(1, sizeof *table);
 
-    *code = CODE_SYSTEM;
-    snprintf(wrong, DEVICE_WRONG_BYTES, "%s: not enough memory", path);
-    if (!table)
+    if (!table) {
+        snprintf(wrong, DEVICE_WRONG_BYTES, "%s: not enough memory", path);
+        *code = CODE_SYSTEM;
         return NULL;
+    }
     table->digest = digest_of(path);
     *code = device_read(&table->fields, path);
     if (*code != CODE_DONE)

@@ -326,7 +326,7 @@ def check_log(mbm, files):
 
 
 class Serial:
-    """A device in RTU on a pseudo terminal, which answers, is silent, answers with damage, or is pulled out."""
+    """A device in RTU on a pseudo terminal, whose registers are all 7. It answers, is silent, answers with damage, or is pulled out."""
 
     def __init__(self, folder):
         self.path, self.mood = os.path.join(folder, "tty"), "right"
@@ -358,7 +358,8 @@ class Serial:
                 time.sleep(0.01)
             if len(request) < 8:
                 continue
-            reply = request[:1] + number(7)
+            words = request[5]
+            reply = request[:1] + bytes([3, 2 * words]) + bytes([0, 7]) * words
             request, checksum = b"", crc(reply)
             if self.mood == "damaged":
                 checksum = bytes([checksum[0] ^ 1, checksum[1]])
