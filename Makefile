@@ -400,11 +400,14 @@ $(INSTALLED_TOOL): linux $(TOOL) $(wildcard cli/*.h)
 	@gcc -std=c11 $(HARDENED) -Iinclude -Iports/linux $(TOOL) $(BUILD)/linux/libmbm-tls.a $(LIBRARY) $(TOOL_LIBS) -o $@
 
 .PHONY: install-tool
-install-tool: $(INSTALLED_TOOL) man ## Install that tool, its man pages and completion below PREFIX
+install-tool: $(INSTALLED_TOOL) man ## Install that tool, its man pages, completion, units of systemd and examples below PREFIX
 	@install -D -m 755 $(INSTALLED_TOOL) "$(DESTDIR)$(or $(PREFIX),/usr/local)/bin/mbm"
 	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/man/man1" $(BUILD)/man/*.1
 	@install -D -m 644 cli/completion/mbm.bash "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/bash-completion/completions/mbm"
 	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/zsh/vendor-completions" cli/completion/_mbm
+	@packaging/systemd/write "$(or $(PREFIX),/usr/local)/bin" "$(DESTDIR)$(or $(PREFIX),/usr/local)/lib/systemd/system"
+	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/doc/mbm/examples/services" examples/services/*.yaml
+	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/doc/mbm/examples/devices" examples/devices/*.yaml
 	@echo "install-tool: mbm $$(scripts/version) is in $(DESTDIR)$(or $(PREFIX),/usr/local)/bin"
 
 .PHONY: man
