@@ -70,6 +70,20 @@ void broker_unsubscribe(broker *of, const char *below)
     for_levels(of, below, unsubscribe_topic);
 }
 
+/* An error in words, without the full stop of some of libmosquitto's. Each thread has its own. */
+static const char *text_of(int error)
+{
+    static _Thread_local char text[200];
+    size_t length;
+
+    snprintf(text, sizeof text, "%s",
+             error == MOSQ_ERR_ERRNO ? strerror(errno) : mosquitto_strerror(error));
+    length = strlen(text);
+    if (length > 0 && text[length - 1] == '.')
+        text[length - 1] = '\0';
+    return text;
+}
+
 static void on_connect(struct mosquitto *mosquitto, void *context, int refused)
 {
     broker *of = (broker *)context;
@@ -96,7 +110,7 @@ static void on_disconnect(struct mosquitto *mosquitto, void *context, int reason
     (void)mosquitto;
     if (atomic_exchange(&of->is_connected, 0) && reason != MOSQ_ERR_SUCCESS)
         report_log(REPORT_WARNING, "the broker %s is lost: %s. The bridge connects again",
-                   of->address, mosquitto_strerror(reason));
+                   of->address, text_of(reason));
 }
 
 static void on_message(struct mosquitto *mosquitto, void *context,
@@ -159,11 +173,6 @@ static int set_options(struct mosquitto *mosquitto, const broker_options *option
         error = mosquitto_tls_set(mosquitto, options->ca_file, NULL, options->cert_file,
                                   options->key_file, NULL);
     return error;
-}
-
-static const char *text_of(int error)
-{
-    return error == MOSQ_ERR_ERRNO ? strerror(errno) : mosquitto_strerror(error);
 }
 
 int broker_begin(broker *of, const broker_options *options)

@@ -12,7 +12,7 @@ import threading
 import time
 import tty
 
-from peers import TcpDevice, crc
+from peers import ROOT, TcpDevice, crc
 from services import PATIENCE, Notified, Service, expect, http, metrics, wait
 
 READY = r"ready (\d+)"
@@ -412,8 +412,33 @@ def check_drill(mbm, files):
     other.go()
 
 
+def check_crowd(mbm, files):
+    """A client that finds no place."""
+    files.write(files.line("rtu:/dev/no-such-line", "1"), head="listen: tcp://127.0.0.1:0\nconnections: 1\n")
+    gateway = Service(mbm, "gateway", files.path, "--metrics", "127.0.0.1:0", ready=READY)
+    port = int(gateway.await_line(r"metrics are at port (\d+)").split()[-2].rstrip(","))
+    first = Client(gateway.port)
+    first.ask(1)
+    expect("a client without a place is disconnected", Client(gateway.port).socket.recv(1) == b"")
+    expect("the first one stays", first.ask(1) == NO_PATH)
+    expect("and it is counted", metrics(port)["mbm_gateway_refused_connections_total", None] == 1)
+    gateway.end()
+
+
+def check_example(mbm, files):
+    """The example that is installed."""
+    with open(os.path.join(ROOT, "examples/services/gateway.yaml")) as file:
+        text = file.read().replace("tcp://:502 ", "tcp://127.0.0.1:0 ")
+    with open(files.path, "w") as file:
+        file.write(text)
+    gateway = Service(mbm, "gateway", files.path, ready=READY)
+    expect("the example maps units", Client(gateway.port).ask(255) == NO_PATH)
+    gateway.end()
+
+
 def check_service(mbm):
     with tempfile.TemporaryDirectory() as folder:
         files = Files(folder)
-        for check in (check_wrong_files, check_reload, check_stats, check_metrics, check_log, check_drill):
+        for check in (check_wrong_files, check_reload, check_stats, check_metrics, check_log, check_drill, check_crowd,
+                      check_example):
             check(mbm, files)

@@ -12,19 +12,19 @@ import threading
 import time
 
 from gateway_service import Serial
-from peers import TcpDevice
+from peers import ROOT, TcpDevice
 from services import PATIENCE, Notified, Service, expect, metrics, wait
 
 
 class Broker:
     """A mosquitto broker, which can go, come back and stop to read."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, anonymous="true"):
         with socket.create_server(("127.0.0.1", 0)) as one:
             self.port = one.getsockname()[1]
         self.file = os.path.join(folder, f"mosquitto-{self.port}.conf")
         with open(self.file, "w") as file:
-            file.write(f"listener {self.port} 127.0.0.1\nallow_anonymous true\n")
+            file.write(f"listener {self.port} 127.0.0.1\nallow_anonymous {anonymous}\n")
 
     def come(self):
         self.process = subprocess.Popen(["mosquitto", "-c", self.file], stderr=subprocess.DEVNULL)
@@ -586,12 +586,33 @@ def check_drill(bench):
     bridge.end()
     subscriber.expect_last("hall/status", "offline")
     subscriber.end()
+
+    strict = Broker(bench.folder, "false")
+    strict.come()
+    bridge = Service(bench.mbm, "bridge", "-b", f"127.0.0.1:{strict.port}", model.line, bench.path("pump.yaml"))
+    bridge.expect_line("a broker that refuses", r"^error: the broker .* refuses: Connection Refused: not authorised\.$")
+    bridge.end()
+    strict.go()
     model.device.go()
+
+
+def check_example(bench):
+    """The example that is installed."""
+    folder = os.path.join(ROOT, "examples/services")
+    with open(os.path.join(folder, "pump.yaml")) as file:
+        bench.write("pump.yaml", file.read())
+    with open(os.path.join(folder, "bridge.yaml")) as file:
+        text = file.read()
+    text = text.replace("broker.local", f"127.0.0.1:{bench.broker.port}").replace("192.168.0.7", "127.0.0.1:1")
+    bridge = Service(bench.mbm, "bridge", bench.write("bridge.yaml", text))
+    bridge.expect_line("the example", "is connected")
+    bridge.end()
 
 
 def check_service(mbm):
     with tempfile.TemporaryDirectory() as folder:
-        for check in (check_values, check_several_lines, check_wrong_files, check_reload, check_discovery, check_drill):
+        for check in (check_values, check_several_lines, check_wrong_files, check_reload, check_discovery, check_drill,
+                      check_example):
             # Each has a broker of its own, which retains nothing.
             bench = Bench(mbm, folder)
             check(bench)
