@@ -25,6 +25,7 @@ static unsigned line_count;
 static unsigned long reloads, refused_reloads;
 static uint32_t alone_since; /* since when there is no broker */
 static int is_alone;         /* and that was reported */
+static int is_check;
 
 /* --- the files again --- */
 
@@ -323,7 +324,20 @@ static void fill_stats(stats *numbers)
 
 /* --- the command line --- */
 
-enum { ALL = 0x100, CA, CERT, DISCOVERY, DISCOVERY_PREFIX, GAP, ID, KEEP_ALIVE, KEY, PLAIN, USER };
+enum {
+    ALL = 0x100,
+    CA,
+    CERT,
+    CHECK,
+    DISCOVERY,
+    DISCOVERY_PREFIX,
+    GAP,
+    ID,
+    KEEP_ALIVE,
+    KEY,
+    PLAIN,
+    USER
+};
 
 static void take_value(const struct argp_state *state, int setting, const char *option,
                        const char *text)
@@ -334,7 +348,7 @@ static void take_value(const struct argp_state *state, int setting, const char *
         options_wrong(state, "%s %s", option, wrong);
 }
 
-static const char *given_line; /* the LINE whose FILE follows */
+static const char *last_line; /* whose FILE follows; NULL: it was there */
 
 /* Reads a word that is no option: FILE of a bridge, or LINE and FILE by turns. */
 static void read_word(const struct argp_state *state, char *text)
@@ -349,12 +363,10 @@ static void read_word(const struct argp_state *state, char *text)
         options_wrong(state, "\"%s\" is one word too many: the lines are in the file", text);
     } else if (state->arg_num % 2 == 0) {
         options_place(state, &where, text, 0);
-        given_line = text;
+        last_line = text;
     } else {
-        const char *const file = text;
-
-        wrong = bridge_setup_line(&given, given_line, file, NULL);
-        given_line = NULL;
+        wrong = bridge_setup_line(&given, last_line, text, NULL);
+        last_line = NULL;
     }
     if (wrong)
         options_wrong(state, "%s", wrong);
@@ -364,7 +376,7 @@ static void check_options(const struct argp_state *state)
 {
     const char *wrong = bridge_setup_check(&given, "--");
 
-    if (!path && (given.line_count == 0 || given_line))
+    if (!path && (given.line_count == 0 || last_line))
         options_wrong(state, "a bridge needs LINE and FILE, or a FILE of a bridge");
     if (wrong && !path)
         options_wrong(state, "%s", wrong);
@@ -392,6 +404,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case ALL: take_value(state, BRIDGE_ALL, "--all", "yes"); return 0;
     case GAP: take_value(state, BRIDGE_GAP, "--gap", text); return 0;
     case 'q': options.is_quiet = 1; return 0;
+    case CHECK: is_check = 1; return 0;
     case ARGP_KEY_ARG: read_word(state, text); return 0;
     case ARGP_KEY_END: check_options(state); return 0;
     default: return ARGP_ERR_UNKNOWN;
@@ -417,6 +430,7 @@ static const struct argp_option texts[] = {
      "The beginning of the topics of discovery (homeassistant)", 2},
     {"gap", GAP, "N", 0, "Registers between two fields that one request may read too, 0 to 123 (0)",
      3},
+    {"check", CHECK, NULL, 0, "Only check the command line and the files", 4},
     {"quiet", 'q', NULL, 0, "Print no summary to stderr", 4},
     {NULL, 0, NULL, 0, NULL, 0}};
 
@@ -451,7 +465,9 @@ static int begin_lines(void)
 
     if (code != CODE_DONE)
         return report(code, "%s", wrong);
-    for (i = 0; i < setup.line_count; i++) {
+    if (is_check)
+        forget(next, setup.line_count);
+    for (i = 0; !is_check && i < setup.line_count; i++) {
         code = bridge_line_begin(next[i].line, next[i].table, path != NULL);
         if (code != CODE_DONE) {
             forget(next + i, setup.line_count - i);
@@ -477,6 +493,8 @@ static int begin(void)
     if (setup.values[BRIDGE_DISCOVERY_PREFIX])
         discovery_prefix = strdup(setup.values[BRIDGE_DISCOVERY_PREFIX]);
     code = begin_lines();
+    if (is_check)
+        return code;
     if (code == CODE_DONE)
         code = service_begin(fill_stats);
     if (code == CODE_DONE)
@@ -491,7 +509,7 @@ int bridge_command(int argc, char **argv)
 
     argp_parse(&parser, argc, argv, 0, NULL, NULL);
     code = begin();
-    if (code == CODE_DONE) {
+    if (code == CODE_DONE && !is_check) {
         service_is_ready();
         while (!report_stopped)
             work();

@@ -185,7 +185,7 @@ static const char *check_line_topic(const bridge_setup *of, const char *topic)
     return NULL;
 }
 
-const char *bridge_setup_line(bridge_setup *to, const char *text, const char *path,
+const char *bridge_setup_line(bridge_setup *to, const char *name, const char *path,
                               const char *topic)
 {
     const uint8_t at = to->line_count;
@@ -193,7 +193,7 @@ const char *bridge_setup_line(bridge_setup *to, const char *text, const char *pa
     char stem[LONGEST_VALUE];
 
     if (at == BRIDGE_LINES)
-        return say("\"%s\" is one line too many: %d are allowed", text, BRIDGE_LINES);
+        return say("\"%s\" is one line too many: %d are allowed", name, BRIDGE_LINES);
     if (!topic) {
         stem_of(path, stem);
         topic = stem;
@@ -201,7 +201,7 @@ const char *bridge_setup_line(bridge_setup *to, const char *text, const char *pa
     wrong = *topic ? check_line_topic(to, topic) : NULL;
     if (wrong)
         return wrong;
-    to->lines[at].text = strdup(text);
+    to->lines[at].text = strdup(name);
     to->lines[at].path = strdup(path);
     to->lines[at].topic = strdup(topic);
     to->line_count++;

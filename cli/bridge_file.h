@@ -53,7 +53,7 @@ typedef struct bridge_setup {
 const char *bridge_setup_value(bridge_setup *to, int setting, const char *text);
 
 /* Adds a line. `topic` NULL: that of the file's name. Returns as bridge_setup_value. */
-const char *bridge_setup_line(bridge_setup *to, const char *text, const char *path,
+const char *bridge_setup_line(bridge_setup *to, const char *name, const char *path,
                               const char *topic);
 
 /* Checks what settings say of each other. `dash` is before their names: "--", or nothing in a file.

@@ -53,7 +53,7 @@ static gateway_setup given = {.idleMs = 60000,
 static gateway_setup setup;
 static const char *path;                /* of the file; NULL: the command line has the lines */
 static uint8_t place_of[GATEWAY_LINES]; /* the index in `lines` of each line of the setup */
-static int is_quiet;
+static int is_quiet, is_check;
 
 /* --- lines and routes --- */
 
@@ -386,7 +386,7 @@ static void print_summary(void)
 
 /* --- the command line --- */
 
-enum { IDLE = 0x100, IN_FLIGHT, QUEUE_TIME, QUIET_TIME, REQUESTS, TIMEOUT };
+enum { CHECK = 0x100, IDLE, IN_FLIGHT, QUEUE_TIME, QUIET_TIME, REQUESTS, TIMEOUT };
 
 /* Reads a word that is no option: FILE, or LISTEN and then LINE and UNITS by turns. */
 static void read_word(const struct argp_state *state, char *text)
@@ -417,6 +417,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
             (uint32_t)options_number(state, "--connections", text, 1, GATEWAY_CONNECTIONS);
         return 0;
     case 'q': is_quiet = 1; return 0;
+    case CHECK: is_check = 1; return 0;
     case REQUESTS:
         given.requests = (uint32_t)options_number(state, "--requests", text, 1, GATEWAY_REQUESTS);
         return 0;
@@ -465,6 +466,7 @@ static const struct argp_option texts[] = {
      "How long a line is left alone after a request without a right reply (100ms)", 2},
     {"queue-time", QUEUE_TIME, "TIME", 0,
      "How long a request may wait for its line; then it gets exception 0A (0s, for any time)", 2},
+    {"check", CHECK, NULL, 0, "Only check the command line and the file", 3},
     {"quiet", 'q', NULL, 0, "Print no summary to stderr", 3},
     {NULL, 0, NULL, 0, NULL, 0}};
 
@@ -502,6 +504,8 @@ int gateway_command(int argc, char **argv)
         code = gateway_file_read(&setup, path);
     if (code != CODE_DONE)
         return report(code, "%s", setup.wrong);
+    if (is_check)
+        return CODE_DONE;
     if (begin() != CODE_DONE)
         return CODE_SYSTEM;
     if (mbm_tcp_listen(&listener, place_host(&setup.listen), setup.listen.service) != 0)

@@ -20,8 +20,7 @@
 static const char *stats_path, *metrics_place;
 static uint32_t every; /* milliseconds; 0: only at the end and when SIGUSR1 comes */
 static int64_t next_time;
-static void (*fill)(stats *numbers);
-static stats numbers;
+static void (*fill_numbers)(stats *numbers);
 static sigset_t awake; /* the signal mask during a sleep */
 static int had_terminal, stats_failed;
 static volatile sig_atomic_t reload_wanted, stats_wanted;
@@ -123,8 +122,10 @@ static int64_t milliseconds(void)
 
 static char *take(char *(*as_text)(const stats *from))
 {
+    static stats numbers;
+
     memset(&numbers, 0, sizeof numbers);
-    fill(&numbers);
+    fill_numbers(&numbers);
     return as_text(&numbers);
 }
 
@@ -194,9 +195,9 @@ static void write_stats(void)
 
 /* --- the life of a service --- */
 
-int service_begin(void (*get)(stats *numbers))
+int service_begin(void (*fill)(stats *numbers))
 {
-    fill = get;
+    fill_numbers = fill;
     catch_signals();
     if (metrics_place) {
         const int port = metrics_listen(metrics_place);

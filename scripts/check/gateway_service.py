@@ -109,6 +109,9 @@ def check_wrong_files(mbm, files):
         expect(f"{text!r}: {reason}", found.returncode == 2 and reason in found.stderr, found.stderr)
     found = subprocess.run([mbm, "gateway", f"{files.folder}/none.yaml"], capture_output=True, text=True)
     expect("a file that is not there", found.returncode == 1 and "No such file" in found.stderr, found.stderr)
+    files.write(files.line("rtu:/dev/no-such-line", "1"))
+    found = subprocess.run([mbm, "gateway", "--check", files.path], capture_output=True, text=True, timeout=PATIENCE)
+    expect("--check ends without a word", (found.returncode, found.stdout, found.stderr) == (0, "", ""), found)
     for option, reason in (
         (["--metrics", "0.0.0.0:9100"], '"0.0.0.0:9100" is not an address of this machine'),
         (["--metrics", "192.168.0.1:9100"], "is not an address of this machine"),

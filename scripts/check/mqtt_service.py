@@ -181,7 +181,7 @@ def check_values(bench):
     bridge, subscriber = bench.bridge(model.line, fields), Subscriber(bench.broker)
     subscriber.expect_last("hall/status", "online")
     for topic, payload, value, words in (
-        ("text", "caf\u00e9 1", "caf\u00e9 1", {0: 0x6361, 1: 0x66E9, 2: 0x2031, 3: 0}),
+        ("text", "na\u00efve", "na\u00efve", {0: 0x6E61, 1: 0xEF76, 2: 0x6500, 3: 0}),
         ("text", '{"value":"a\\"b"}', 'a"b', {0: 0x6122, 1: 0x6200}),
         ("swapped", "AB", "AB", {10: 0x4241, 11: 0}),
         ("list", "[1.5,-0.1,0]", [1.5, -0.1, 0], {20: 15, 21: 0xFFFF, 22: 0}),
@@ -265,6 +265,8 @@ def check_several_lines(bench):
     meter, pump = bench.write("meter.yaml", FIELDS % ("meter", 1)), bench.write("pump.yaml", FIELDS % ("pump", 1))
     bridge = bench.bridge(one.line, meter, two.line, pump, "--metrics", "127.0.0.1:0")
     subscriber = Subscriber(bench.broker)
+    # The bridge takes writes from then on.
+    subscriber.expect_last("hall/status", "online")
     for topic, value in (("meter/level", 1), ("meter/speed", 2), ("pump/level", 3), ("pump/speed", 4)):
         subscriber.expect_value(f"hall/{topic}", value)
     subscriber.expect_last("hall/meter/unit/1/status", "online")
@@ -322,8 +324,12 @@ def check_wrong_files(bench):
     bench.write("wrong.yaml", "wrong: 1\n")
     for text, reason in WRONG:
         path = bench.write("bridge.yaml", text)
-        found = subprocess.run([bench.mbm, "bridge", path], capture_output=True, text=True, timeout=PATIENCE)
-        expect(f"{text!r}: {reason}", found.returncode in (1, 2) and reason in found.stderr, found.stderr)
+        for options in ([], ["--check"]):
+            found = subprocess.run([bench.mbm, "bridge", *options, path], capture_output=True, text=True, timeout=PATIENCE)
+            expect(f"{text!r}: {reason}", found.returncode in (1, 2) and reason in found.stderr, found.stderr)
+    path = bridge_file(bench, ("rtu:/dev/no-such-line", "file: meter.yaml"))
+    found = subprocess.run([bench.mbm, "bridge", "--check", path], capture_output=True, text=True, timeout=PATIENCE)
+    expect("--check ends without a word", (found.returncode, found.stdout, found.stderr) == (0, "", ""), found)
 
 
 def bridge_file(bench, *lines, head=""):
@@ -343,6 +349,7 @@ def check_reload(bench):
                      env={"NOTIFY_SOCKET": notified.path})
     notified.expect("READY=1")
     subscriber = Subscriber(bench.broker)
+    subscriber.expect_last("hall/status", "online")
     subscriber.expect_value("hall/meter/level", 1)
     subscriber.expect_value("hall/north/pump/speed", 4)
     connections = len(one.device.peers), len(two.device.peers)
@@ -540,6 +547,7 @@ def check_drill(bench):
     bench.broker.come()
     bridge.expect_line("the broker", rf"^info: {broker} is connected\.$")
     subscriber = Subscriber(bench.broker)
+    subscriber.expect_last("hall/status", "online")
     subscriber.expect_value("hall/meter/level", 7)
     subscriber.expect_value("hall/pump/level", 1)
 
