@@ -22,7 +22,7 @@
 
 enum {
     CONNECTIONS = 16,
-    SPARE_LINES = 8,    /* places for lines that a reload may add */
+    SPARE_LINES = 4,    /* places for lines that a reload may add */
     NAP_MICROS = 10000, /* the sleep if the system refuses to poll */
     ROUTES = UINT8_MAX
 };

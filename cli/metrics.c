@@ -30,7 +30,7 @@ typedef struct visitor {
 } visitor;
 
 static visitor visitors[METRICS_PLACES];
-static int listener = -1;
+static int listener = -1, is_ready;
 static char *rendered;
 static int64_t rendered_at, tired_until; /* no connection is accepted before that time */
 
@@ -250,12 +250,24 @@ static void write_reply(visitor *one)
         drop(one);
 }
 
+void metrics_polled(const struct pollfd *waits, nfds_t count)
+{
+    nfds_t i;
+
+    for (i = 0; i < count; i++)
+        is_ready |= waits[i].revents != 0;
+}
+
 void metrics_work(char *(*render)(void))
 {
     int i;
 
-    if (listener < 0)
+    /* A visitor may be overdue. */
+    for (i = 0; i < METRICS_PLACES; i++)
+        is_ready |= visitors[i].fd > 0;
+    if (listener < 0 || !is_ready)
         return;
+    is_ready = 0;
     take_visitor();
     for (i = 0; i < METRICS_PLACES; i++) {
         visitor *one = &visitors[i];

@@ -22,7 +22,11 @@ int metrics_listen(const char *text);
 nfds_t metrics_wait(struct pollfd *waits);
 uint32_t metrics_delay(void);
 
-/* Accepts, reads and answers. `render` returns the text of a reply, which is freed then. */
+/* Notes what a poll of those `count` waits has found. */
+void metrics_polled(const struct pollfd *waits, nfds_t count);
+
+/* Accepts, reads and answers, if the last poll has found something. `render` returns the text of a
+ * reply, which is freed then. */
 void metrics_work(char *(*render)(void));
 
 void metrics_close(void);

@@ -214,7 +214,11 @@ int service_wait(struct pollfd *polls, nfds_t count, uint32_t micros)
 {
     const uint32_t delay = metrics_delay();
     struct timespec time;
+    nfds_t added;
+    int found;
 
+    if (report_stopped)
+        return 0;
     if (delay < micros)
         micros = delay;
     if (every > 0) {
@@ -225,9 +229,12 @@ int service_wait(struct pollfd *polls, nfds_t count, uint32_t micros)
         else if (left * 1000 < micros)
             micros = (uint32_t)(left * 1000);
     }
-    count += metrics_wait(polls + count);
+    added = metrics_wait(polls + count);
     time = (struct timespec){(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
-    return ppoll(polls, count, micros == UINT32_MAX ? NULL : &time, &awake);
+    found = ppoll(polls, count + added, micros == UINT32_MAX ? NULL : &time, &awake);
+    if (found > 0)
+        metrics_polled(polls + count, added);
+    return found;
 }
 
 void service_work(void)

@@ -3,6 +3,7 @@ docs/gateway.md."""
 
 import json
 import os
+import pty
 import select
 import signal
 import socket
@@ -321,11 +322,27 @@ def check_log(mbm, files):
     expect("the line gets 0A", Client(gateway.port).ask(1) == NO_PATH)
     gateway.end()
     expect("--log-level error leaves warnings out", gateway.log == [], gateway.log)
+    gateway = Service(mbm, "gateway", "tcp://127.0.0.1:0", "rtu:/dev/no-such-line", "1", ready=READY)
+    gateway.reload("^warning: SIGHUP reads the file of the gateway, and this one was begun without a file")
+    gateway.end()
     gateway = Service(mbm, "gateway", files.path, "--log-level", "debug", ready=READY)
     Client(gateway.port).socket.close()
     gateway.expect_line("debug", "^debug: client 0 is connected")
     gateway.expect_line("debug", "^debug: client 0 is disconnected")
     gateway.end()
+
+
+def check_terminal(mbm, files):
+    """SIGHUP ends a program whose terminal is gone."""
+    files.write(files.line("rtu:/dev/no-such-line", "1"))
+    process, master = pty.fork()
+    if process == 0:
+        os.execv(mbm, [mbm, "gateway", files.path])
+    said = b""
+    while b"ready" not in said:
+        said += os.read(master, 100)
+    os.close(master)
+    expect("the gateway ends with its terminal", wait(lambda: os.waitpid(process, os.WNOHANG)[0] == process))
 
 
 class Serial:
@@ -442,6 +459,6 @@ def check_example(mbm, files):
 def check_service(mbm):
     with tempfile.TemporaryDirectory() as folder:
         files = Files(folder)
-        for check in (check_wrong_files, check_reload, check_stats, check_metrics, check_log, check_drill, check_crowd,
-                      check_example):
+        for check in (check_wrong_files, check_reload, check_stats, check_metrics, check_log, check_terminal, check_drill,
+                      check_crowd, check_example):
             check(mbm, files)
