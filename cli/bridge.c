@@ -449,7 +449,8 @@ static const struct argp parser = {
     "SIGHUP reads the files again: broker, and lines that stay the same, stay connected.\n\n"
     "Examples:\n\n"
     "  mbm bridge --broker broker.local tcp://192.168.0.7 meter.yaml\n"
-    "  mbm bridge --discovery homeassistant rtu:/dev/ttyUSB0 meter.yaml tcp://192.168.0.7 pump.yaml\n"
+    "  mbm bridge rtu:/dev/ttyUSB0 meter.yaml tcp://192.168.0.7 pump.yaml\n"
+    "  mbm bridge --discovery homeassistant tcp://192.168.0.7 pump.yaml\n"
     "  mbm bridge bridge.yaml --metrics 127.0.0.1:9100\n\n" SERVICE_HELP PLACE_HELP,
     children,
     NULL,

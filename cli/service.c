@@ -289,7 +289,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
 static const struct argp_option texts[] = {
     {"stats", STATS, "FILE", 0,
      "Write statistics as JSON at the end and after SIGUSR1; - is standard output", 7},
-    {"stats-every", STATS_EVERY, "TIME", 0, "Write them again and again too, such as each 10s", 7},
+    {"stats-every", STATS_EVERY, "TIME", 0, "How often to write them too, such as 10s", 7},
     {"metrics", METRICS, "ADDRESS:PORT", 0,
      "Serve the statistics to Prometheus at an address of this machine, such as 127.0.0.1:9100", 7},
     {"log-level", LOG_LEVEL, "LEVEL", 0,

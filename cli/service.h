@@ -16,9 +16,9 @@ enum { SERVICE_WAITS = METRICS_WAITS };
 /* --stats, --stats-every, --metrics and --log-level. */
 extern const struct argp options_service;
 
-#define SERVICE_HELP                                                                               \
-    "SIGHUP reads the files again, and SIGUSR1 writes the statistics. systemd learns when the "    \
-    "service is ready and when it reads its files (Type=notify).\n\n"
+#define SERVICE_HELP                                                                                  \
+    "SIGUSR1 writes the statistics. systemd learns when the service is ready, and when it reads its " \
+    "files again (Type=notify).\n\n"
 
 /* Begins: `get` is called for the numbers when they are wanted. The signals that end or wake the
  * program are blocked from now on, except in service_wait. Returns an exit code after reporting the
