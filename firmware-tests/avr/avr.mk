@@ -28,7 +28,7 @@ need-avr:
 .PHONY: check-sketches
 check-sketches: need-avr library ## Sketches in the folder SKETCHES against the library in MODBUSMASTER and mbm
 	@scripts/need g++
-	@scripts/check/sketches "$(MODBUSMASTER)" "$(SKETCHES)" docs/reports/sketches.md
+	@firmware-tests/avr/check-sketches "$(MODBUSMASTER)" "$(SKETCHES)" docs/reports/sketches.md
 
 # --- sketches, each for the boards that a test runs it on
 

@@ -1,5 +1,6 @@
-/* What sketches for an ESP use of its Arduino core, as declarations: scripts/check/sketches
- * compiles sketches against it where their own core is not to be had. Nothing links it. */
+/* What sketches for an ESP use of its Arduino core, as declarations:
+ * firmware-tests/avr/check-sketches compiles sketches against it where their own core is not to be
+ * had. Nothing links it. */
 #ifndef ESP_ARDUINO_H
 #define ESP_ARDUINO_H
 

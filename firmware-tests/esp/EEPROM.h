@@ -1,4 +1,4 @@
-/* The EEPROM that an ESP keeps in flash, as declarations for scripts/check/sketches. */
+/* The EEPROM that an ESP keeps in flash, as declarations for firmware-tests/avr/check-sketches. */
 #ifndef ESP_EEPROM_H
 #define ESP_EEPROM_H
 

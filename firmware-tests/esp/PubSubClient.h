@@ -1,4 +1,4 @@
-/* The MQTT client PubSubClient, as declarations for scripts/check/sketches. */
+/* The MQTT client PubSubClient, as declarations for firmware-tests/avr/check-sketches. */
 #ifndef ESP_PUB_SUB_CLIENT_H
 #define ESP_PUB_SUB_CLIENT_H
 

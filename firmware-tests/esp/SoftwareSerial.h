@@ -1,4 +1,4 @@
-/* EspSoftwareSerial, as declarations for scripts/check/sketches. */
+/* EspSoftwareSerial, as declarations for firmware-tests/avr/check-sketches. */
 #ifndef ESP_SOFTWARE_SERIAL_H
 #define ESP_SOFTWARE_SERIAL_H
 

@@ -1,4 +1,4 @@
-/* Wi-Fi and its TCP client, as declarations for scripts/check/sketches. */
+/* Wi-Fi and its TCP client, as declarations for firmware-tests/avr/check-sketches. */
 #ifndef ESP_WIFI_H
 #define ESP_WIFI_H
 
