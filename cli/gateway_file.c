@@ -1,9 +1,8 @@
 #define _GNU_SOURCE
 #include "gateway_file.h"
 
-#include "report.h"
+#include "numbers.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -70,7 +69,6 @@ static const char *add_route(gateway_setup *to, const char *text)
 
 const char *gateway_setup_units(gateway_setup *to, const char *text)
 {
-    static char said[LONGEST_UNITS + 100];
     char copy[LONGEST_UNITS + 1], *rest = NULL, *range;
     const char *wrong = NULL;
 
@@ -79,30 +77,21 @@ const char *gateway_setup_units(gateway_setup *to, const char *text)
     snprintf(copy, sizeof copy, "%s", text);
     for (range = strtok_r(copy, ",", &rest); range && !wrong; range = strtok_r(NULL, ",", &rest))
         wrong = add_route(to, range);
-    if (!wrong)
-        return NULL;
-    snprintf(said, sizeof said, "\"%s\": %s", text, wrong);
-    return said;
+    return wrong ? say("\"%s\": %s", text, wrong) : NULL;
 }
 
 /* --- lines --- */
 
 const char *gateway_setup_line(gateway_setup *to, const char *text)
 {
-    static char said[LONGEST_LINE + 100];
     const char *wrong;
     uint8_t i;
 
-    if (to->line_count == GATEWAY_LINES) {
-        snprintf(said, sizeof said, "\"%s\" is one line too many: %d are allowed", text,
-                 GATEWAY_LINES);
-        return said;
-    }
+    if (to->line_count == GATEWAY_LINES)
+        return say("\"%s\" is one line too many: %d are allowed", text, GATEWAY_LINES);
     for (i = 0; i < to->line_count; i++)
-        if (strcmp(to->lines[i].text, text) == 0) {
-            snprintf(said, sizeof said, "the line %s is there twice", text);
-            return said;
-        }
+        if (strcmp(to->lines[i].text, text) == 0)
+            return say("the line %s is there twice", text);
     to->lines[i].text = strdup(text);
     if (!to->lines[i].text)
         return "there is not enough memory";
@@ -116,7 +105,6 @@ const char *gateway_setup_line(gateway_setup *to, const char *text)
 
 const char *gateway_setup_listen(gateway_setup *to, const char *text)
 {
-    static char said[LONGEST_LINE + 100];
     const char *wrong;
 
     to->listen_text = strdup(text);
@@ -125,8 +113,7 @@ const char *gateway_setup_listen(gateway_setup *to, const char *text)
     wrong = place_read(&to->listen, to->listen_text, 1);
     if (wrong || to->listen.kind == PLACE_TCP)
         return wrong;
-    snprintf(said, sizeof said, "\"%s\": a gateway listens at tcp://, such as tcp://:502", text);
-    return said;
+    return say("\"%s\": a gateway listens at tcp://, such as tcp://:502", text);
 }
 
 /* --- the file --- */
