@@ -116,7 +116,7 @@ static void done(void *context, mbm_clientRequest *request)
     ask(d);
 }
 
-/* A client with a link to a port of this machine, which makes so many requests. */
+/* Adds a client with a link to a port of this machine. The client makes `requests` requests. */
 static void begin_device(device *d, uint16_t at, unsigned requests)
 {
     const mbm_linkHooks hooks = mbm_tcp_link(&d->tcp);

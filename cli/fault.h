@@ -45,7 +45,7 @@ enum { FAULT_MOST = 32 };
 typedef struct fault {
     enum fault_kind kind;
     uint32_t value;        /* milliseconds, or a number */
-    uint32_t first, every; /* the first request, and each so many after it; 0: none after it */
+    uint32_t first, every; /* the first request, and every nth after it; 0: only it */
 } fault;
 
 /* The faults of the command line, and how many requests have been counted. */

@@ -16,7 +16,7 @@
 /* A lookup of a host may block the gateway, so there is a longer pause between two of them. */
 enum { REOPEN_MS = 1000, LOOKUP_MS = 10000 };
 
-/* After so many requests in a row without a right reply a line is reported. */
+/* The gateway reports a line after this number of requests in a row without a right reply. */
 enum { SILENT_AFTER = 5 };
 
 static uint32_t micros(void)

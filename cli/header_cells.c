@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-/* A hole of so many registers or bits takes more memory than a table of its own. */
+/* From this size on, in registers or bits, a hole takes more memory than a second table. */
 enum { HOLE = 32, BIT_HOLE = 512 };
 
 static const char *const NAMES[] = {"", "coils", "discrete", "holding", "input"};

@@ -162,7 +162,7 @@ void serve_line_close(void)
     if (at.kind == PLACE_PTY && tty.isOpen) {
         const int near_end = tty.fd;
 
-        /* Nobody may read what was sent last, so nothing waits for that. */
+        /* The other end may never read the last answers, so they are discarded. */
         (void)tcflush(near_end, TCIOFLUSH);
         mbm_tty_detach(&tty);
         (void)close(near_end);

@@ -93,7 +93,7 @@ static void feed(const uint8_t *bytes, uint16_t length)
     }
 }
 
-/* Watches a line until Ctrl-C, or until nobody reads the output any more. Returns an exit code. */
+/* Watches a line until Ctrl-C, or until the reader of the output has gone. Returns an exit code. */
 static int watch(void)
 {
     static line at;
