@@ -257,9 +257,9 @@ fn check_no_reply_missed<const SINGLE: bool>(
         bytes: engine.port.received.clone(),
         at: 0,
     };
-    assert_eq!(search.search(false), None, "the engine missed a reply");
+    assert_eq!(search.missed(false), None, "the engine missed a reply");
     assert_eq!(
-        search.search(true),
+        search.missed(true),
         None,
         "the engine missed a reply after noise"
     );

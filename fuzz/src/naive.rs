@@ -3,18 +3,20 @@
 
 /// The CRC-16, computed bit by bit, in the order in which it is sent.
 pub fn crc(bytes: &[u8]) -> [u8; 2] {
-    let mut crc = 0xFFFFu16;
-    for byte in bytes {
-        crc ^= u16::from(*byte);
-        for _ in 0..8 {
-            let out = crc & 1;
-            crc >>= 1;
-            if out == 1 {
-                crc ^= 0xA001;
-            }
+    bytes.iter().fold(0xFFFF, crc_after).to_le_bytes()
+}
+
+/// The CRC-16 after one more byte.
+fn crc_after(mut crc: u16, byte: &u8) -> u16 {
+    crc ^= u16::from(*byte);
+    for _ in 0..8 {
+        let out = crc & 1;
+        crc >>= 1;
+        if out == 1 {
+            crc ^= 0xA001;
         }
     }
-    crc.to_le_bytes()
+    crc
 }
 
 /// The bytes followed by their CRC.
@@ -25,6 +27,16 @@ pub fn with_crc(bytes: &[u8]) -> Vec<u8> {
 /// True if the last two bytes are the CRC of the others.
 pub fn has_crc(frame: &[u8]) -> bool {
     frame.len() >= 2 && crc(&frame[..frame.len() - 2]) == frame[frame.len() - 2..]
+}
+
+/// The lengths, from 4 on, of the frames with a right CRC that begin with the first byte.
+pub fn frame_lengths(bytes: &[u8]) -> impl Iterator<Item = usize> + '_ {
+    // The CRC of a frame with its CRC is 0.
+    let mut crc = 0xFFFF;
+    (1..).zip(bytes).filter_map(move |(length, byte)| {
+        crc = crc_after(crc, byte);
+        (crc == 0 && length >= 4).then_some(length)
+    })
 }
 
 /// The unit and the PDU of an ASCII frame that ends with CR and `end`.
