@@ -114,6 +114,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@scripts/check/functions
 	@scripts/check/packages
 	@scripts/build/pictures --check
+	@scripts/build/project.py --check
 	@CARGO="$(CARGO)" scripts/check/dependencies
 	@$(MAKE) --no-print-directory spell
 	@$(MAKE) --no-print-directory check-pages

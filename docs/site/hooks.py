@@ -1,5 +1,5 @@
-"""What MkDocs does beside its own: the pages of the API in the navigation, the anchors of a forge,
-and no file with the time of the build."""
+"""What MkDocs does beside its own: the pages of the API in the navigation, the anchors of a forge, words of code
+that stay whole, and no file with the time of the build."""
 
 import json
 import pathlib
@@ -29,3 +29,21 @@ def on_config(config):
     # A sitemap needs an address and has the day of the build.
     config.theme.static_templates -= {"sitemap.xml"}
     return config
+
+
+# The most letters of a word that fits a line of a phone.
+WORD = 44
+
+
+def whole(block):
+    """A block of code whose words with a hyphen stay in one line: a browser would break `--option` after a hyphen."""
+    def word(found):
+        return f'<span class="whole">{found[0]}</span>' if len(found[0]) <= WORD else found[0]
+
+    parts = re.split(r"(<[^>]*>)", block[0])
+    parts[::2] = [re.sub(r"[^\s<>]*-[^\s<>]*", word, part) for part in parts[::2]]
+    return "".join(parts)
+
+
+def on_page_content(html, **_):
+    return re.sub(r"<pre\b.*?</pre>", whole, html, flags=re.S)

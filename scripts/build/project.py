@@ -1,8 +1,15 @@
+#!/usr/bin/env python3
 """Facts about the project, for the scripts that write packages and pages: its version, its licence,
-the entries of packaging/project.toml, and the instruction sets for which the library has assembler source."""
+the entries of packaging/project.toml, and the instruction sets for which the library has assembler source.
+
+  project.py           writes the project's address into the links to its releases and into Cargo.toml
+  project.py --check   fails if another address stands there, or if a page that must begin with a link has none
+"""
 
 import pathlib
+import re
 import subprocess
+import sys
 import tomllib
 from typing import NamedTuple
 
@@ -60,3 +67,45 @@ SETS = {
     "esp32": Set("esp32", "bytes", "defined(__XTENSA__) && defined(__XTENSA_WINDOWED_ABI__)",
                  "ESP32, ESP32-S2 and ESP32-S3"),
 }
+
+
+# --- the address of the project, of which packaging/project.toml is the one setting
+
+ADDRESS = [(re.compile(r"https?://[^\s()]+(?=/releases/latest\b)"), ["README.md", "docs/*.md"]),
+           (re.compile(r'(?<=^repository = ")[^"]+', re.M), ["Cargo.toml"])]
+# Pages that a user begins with: each has the link before its first heading of a part.
+BEGIN_WITH_LINK = ["README.md", "docs/index.md", "docs/guide-*.md"]
+
+
+def found(root: pathlib.Path, patterns: list) -> list:
+    return [path for pattern in patterns for path in sorted(root.glob(pattern))]
+
+
+def addresses(root: pathlib.Path, address: str, write: bool) -> list:
+    """Writes the address everywhere if `write` says so. Returns what is wrong."""
+    wrong = []
+    for place, patterns in ADDRESS:
+        for path in found(root, patterns):
+            text = path.read_text(encoding="utf-8")
+            new = place.sub(address, text)
+            if new != text and write:
+                path.write_text(new, encoding="utf-8")
+            elif new != text:
+                wrong.append(f"{path.relative_to(root)} has another address than packaging/project.toml: run `make address`")
+    link = f"]({address}/releases/latest)"
+    return wrong + [f"{path.relative_to(root)} does not begin with a link to {address}/releases/latest"
+                    for path in found(root, BEGIN_WITH_LINK)
+                    if link not in path.read_text(encoding="utf-8").partition("\n## ")[0]]
+
+
+def main() -> None:
+    if sys.argv[1:] not in ([], ["--check"]):
+        sys.exit(__doc__)
+    wrong = addresses(ROOT, fact("repository"), not sys.argv[1:])
+    if wrong:
+        sys.exit("\n".join(f"address: {what}" for what in wrong))
+    print(f"address: pages and Cargo.toml have {fact('repository')}")
+
+
+if __name__ == "__main__":
+    main()

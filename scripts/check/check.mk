@@ -112,6 +112,11 @@ pictures: ## Draw the pictures and charts of the pages, docs/pictures, and write
 	@scripts/need python3
 	@scripts/build/pictures
 
+.PHONY: address
+address: ## Write the address of packaging/project.toml into the links to releases and into Cargo.toml
+	@scripts/need python3
+	@scripts/build/project.py
+
 # The programs that the commands in the pages run.
 PAGE_PROGRAMS := $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(BUILD)/plain/mbm $(SERVE)
 .PHONY: check-pages

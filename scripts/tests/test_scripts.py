@@ -1,5 +1,5 @@
-"""Tests of scripts that write or judge texts: scripts/check/dependencies, packaging/debian/changelog, and
-packaging/sbom. `make test-scripts` has the library for the SBOM."""
+"""Tests of scripts that write or judge texts: scripts/check/dependencies, packaging/debian/changelog,
+scripts/build/project.py, and packaging/sbom. `make test-scripts` has the library for the SBOM."""
 import copy
 import importlib.machinery
 import importlib.util
@@ -148,6 +148,35 @@ class DebianChangelog(unittest.TestCase):
     def test_a_version_newer_than_the_packed_one_is_left_out(self):
         text = changelog(TWO_RELEASES, "70.2.0")
         self.assertEqual([line for line in text.splitlines() if line.startswith("mbm")], ["mbm (70.2.0-1) unstable; urgency=medium"])
+
+
+# --- the address of the project, which stands in one setting
+
+project = load("scripts/build/project.py")
+
+
+class Address(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        (self.root / "docs").mkdir()
+        self.guide = self.root / "docs/guide-a.md"
+        self.guide.write_text("# A\n\n[Get it](https://old.example/a/releases/latest).\n\n## B\n")
+        (self.root / "Cargo.toml").write_text('[package]\nrepository = "https://old.example/a"\n')
+
+    def test_another_address_is_found_and_then_replaced(self):
+        wrong = project.addresses(self.root, "https://new.example", write=False)
+        self.assertEqual(["docs/guide-a.md has", "Cargo.toml has", "docs/guide-a.md does"],
+                         [" ".join(what.split()[:2]) for what in wrong])
+        self.assertEqual(project.addresses(self.root, "https://new.example", write=True), [])
+        self.assertIn("(https://new.example/releases/latest)", self.guide.read_text())
+        self.assertEqual(project.addresses(self.root, "https://new.example", write=False), [])
+
+    def test_a_guide_that_does_not_begin_with_the_link_is_refused(self):
+        self.guide.write_text("# A\n\n## B\n\n[Get it](https://old.example/a/releases/latest).\n")
+        wrong = project.addresses(self.root, "https://old.example/a", write=False)
+        self.assertEqual(wrong, ["docs/guide-a.md does not begin with a link to https://old.example/a/releases/latest"])
 
 
 # --- the SBOM

@@ -1,4 +1,4 @@
-"""The layers of mbm: for docs/architecture.md and the first page."""
+"""The layers of mbm: in full for docs/architecture.md, in short for the README and the first page."""
 
 from drawing import LINE, MARGIN, WIDTH, Drawing, text_width
 
@@ -65,3 +65,28 @@ def draw():
     y += 18
     drawing.box(MARGIN, y, INNER, 48, lines=["your port", "read, write, clock, driver on and off, flush"])
     return drawing
+
+
+def in_short():
+    drawing = Drawing(
+        "The layers of mbm in short, from a sketch to the port",
+        "Sketches use C++ classes, which use the C interface mbm.h. C and C++ programs use mbm.h. Rust firmware uses the "
+        "core: master, client, plan, server, gateway and sniffer. The core calls functions of yours: read, write, clock.")
+    third, box, step = (INNER - 2 * GAP) / 3, 25, 10
+    left, middle, right = (MARGIN + index * (third + GAP) for index in range(3))
+    classes, interface, core = (MARGIN + index * (box + step) for index in (1, 2, 3))
+    for x, what, end in ((left, "sketch", classes), (middle, "C or C++", interface), (right, "Rust", core)):
+        drawing.box(x, MARGIN, third, box, lines=[what])
+        drawing.line((x + third / 2, MARGIN + box), (x + third / 2, end), arrow="end")
+    drawing.box(left, classes, third, box, "good", ["C++ classes"])
+    drawing.line((left + third / 2, classes + box), (left + third / 2, interface), arrow="end")
+    drawing.box(left, interface, 2 * third + GAP, box, "theirs", ["C: mbm.h and libmbm.a"])
+    drawing.line((left + third + GAP / 2, interface + box), (left + third + GAP / 2, core), arrow="end")
+    drawing.box(MARGIN, core, INNER, 44, "ours", ["core, no_std Rust", "master, client, plan, server, gateway, sniffer"])
+    drawing.line((WIDTH / 2, core + 44), (WIDTH / 2, core + 44 + step), arrow="end")
+    drawing.box(MARGIN, core + 44 + step, INNER, box, lines=["your port: read, write, clock"])
+    return drawing
+
+
+def draw_all():
+    return {"layers-short": in_short()}
