@@ -24,6 +24,9 @@
 // shown, and in every other function.
 #![allow(clippy::missing_safety_doc)]
 
+#[cfg(feature = "capi")]
+extern crate std;
+
 mod bits;
 mod client;
 mod frame;
