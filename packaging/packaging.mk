@@ -26,6 +26,12 @@ check-reproducible: ## Write all packages again from a clone in another folder, 
 	@scripts/need git
 	@CARGO="$(CARGO)" scripts/release/dist --again
 
+.PHONY: publish
+publish: ## Upload dist/ to the registries whose secrets are set, with MBM_PUBLISH=yes; else try all but the upload
+	@scripts/need python3 python3-venv git unzip
+	@cd dist && sha256sum --quiet --check SHA256SUMS
+	@set -e; for publish in packaging/*/publish; do CARGO="$(CARGO)" $$publish dist; done
+
 # What a release builds and checks. RELEASE_TARGETS= leaves it out, for a rehearsal in seconds.
 RELEASE_TARGETS ?= check test dist check-dist
 .PHONY: release check-release

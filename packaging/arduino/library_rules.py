@@ -18,7 +18,6 @@ NOT_HELD = {
     "LP022": "for libraries that are in that index",
     "LP042": "needs the network",
     "LP048": "needs the index of the Library Manager",
-    "LP056": "the project has no web page, and the IDE needs the line, so it is empty",
     "SD001": "for sketches outside a library",
     "SD002": "for sketches outside a library",
 }
@@ -190,7 +189,7 @@ def file_of_properties(library):
 MISSING = {"name": "LP007", "version": "LP019", "author": "LP023", "maintainer": "LP025", "sentence": "LP031",
            "paragraph": "LP034", "category": "LP037", "url": "LP040", "architectures": "LP043"}
 EMPTY = {"name": "LP008", "author": "LP024", "maintainer": "LP026", "email": "LP029", "sentence": "LP032",
-         "architectures": "LP044", "includes": "LP051", "ldflags": "LP055"}
+         "url": "LP056", "architectures": "LP044", "includes": "LP051", "ldflags": "LP055"}
 
 
 @rule(*MISSING.values())
