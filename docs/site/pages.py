@@ -82,7 +82,9 @@ class Site:
             place = self.place(file)
             if place is None:
                 raise SystemExit(f"site: {path} links to {found[2]}, which the site does not have")
-            return f"{found[1]}({relative(place, page)}{anchor or ''})"
+            # A forge shows names of files; readers of the site know pages by their titles.
+            words = f"[{self.titles[file]}]" if file in self.titles and found[1].endswith(".md]") else found[1]
+            return f"{words}({relative(place, page)}{anchor or ''})"
 
         # Code, links and the rest in turn, so that code in the text of a link gets no link of its own.
         parts = re.split(r"(!?\[(?:`[^`]*`|[^\]`])*\]\([^)\s]+\)|`[^`]+`)", line)
