@@ -14,6 +14,11 @@ enum { BITS = 11 };
 static uint32_t line_micros(void *context)
 {
     (void)context;
+#ifdef CONFIG_ARCH_POSIX
+    /* The clock of native_sim stands still while a program runs, and the master asks for the time
+     * until a silence is over. */
+    k_busy_wait(10);
+#endif
     /* The cycle counter times a factor would not wrap at 2^32. */
     return (uint32_t)k_ticks_to_us_floor64((uint64_t)k_uptime_ticks());
 }
@@ -25,8 +30,12 @@ static void receive(mbm_zephyrLine *line)
     uint8_t bytes[16];
     int count;
 
-    while ((count = uart_fifo_read(line->uart, bytes, sizeof bytes)) > 0)
-        mbm_ring_write(&line->ring, bytes, (uint16_t)count);
+    /* uart_fifo_read may wait for a byte if none is there, as that of native_sim does. */
+    do {
+        count = uart_fifo_read(line->uart, bytes, sizeof bytes);
+        if (count > 0)
+            mbm_ring_write(&line->ring, bytes, (uint16_t)count);
+    } while (count > 0 && uart_irq_rx_ready(line->uart));
     k_sem_give(&line->received);
 }
 

@@ -150,6 +150,7 @@ void uart_irq_tx_disable(const struct device *dev)
 int uart_fifo_read(const struct device *dev, uint8_t *bytes, const int size)
 {
     expect(dev == &stand_in_uart && is_inside, "the FIFO is read outside of the handler");
+    expect(line_received() > 0, "the FIFO is read while it is empty: some drivers wait for a byte");
     return line_read(bytes, (uint16_t)size);
 }
 

@@ -47,8 +47,9 @@ def options(stand_in: pathlib.Path, kconfig: pathlib.Path, application: pathlib.
 def devicetree(stand_in: pathlib.Path, application: pathlib.Path, out: pathlib.Path) -> None:
     both = out / "zephyr.dts"
     source = f'#include "{stand_in}/board.dts"\n#include "{application}/app.overlay"\n'
-    both.write_text(subprocess.run(["cpp", "-P", "-undef", "-x", "assembler-with-cpp", "-"], input=source, text=True,
-                                   check=True, stdout=subprocess.PIPE).stdout)
+    both.write_text(subprocess.run(
+        ["cpp", "-P", "-undef", "-nostdinc", "-I", stand_in / "include", "-x", "assembler-with-cpp", "-"],
+        input=source, text=True, check=True, stdout=subprocess.PIPE).stdout)
     tree = dtlib.DT(str(both))
     uart = tree.alias2node["modbus-line"]
     if uart.props["status"].to_string() != "okay":
