@@ -42,12 +42,14 @@ static uint32_t line_micros(void *context)
     return (uint32_t)rt_tick_get() * MICROS_OF_A_TICK;
 }
 
-/* Waits for what the UART still holds. A tick may be longer than the pause before the reply. */
+/* Waits for what the UART still holds. A tick may be longer than the pause before the reply.
+ * RT-Thread prints a warning at each call of rt_hw_us_delay if the BSP has no such function. */
 static uint8_t line_flush(void *context)
 {
     mbm_rtThreadLine *line = context;
 
-    rt_hw_us_delay(line->held * BITS * 1000000u / line->baud);
+    if (line->held > 0)
+        rt_hw_us_delay(line->held * BITS * 1000000u / line->baud);
     line->held = 0;
     return 1;
 }

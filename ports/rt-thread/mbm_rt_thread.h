@@ -31,7 +31,8 @@ typedef struct mbm_rtThreadLine {
     rt_uint32_t parity;  /**< PARITY_EVEN, Modbus's default, PARITY_ODD or PARITY_NONE */
     rt_uint8_t tail;     /**< how many characters the UART may still hold when rt_device_write
                               returns: 0 if its driver waits for the last bit, as that of the
-                              STM32 does, 2 without a FIFO, else the bytes of the FIFO and 1 */
+                              STM32 does, 2 without a FIFO, else the bytes of the FIFO and 1. Above
+                              0 the BSP needs rt_hw_us_delay */
     rt_uint8_t held;     /**< private */
     rt_device_t device;  /**< private; NULL while the line is not open */
 } mbm_rtThreadLine;

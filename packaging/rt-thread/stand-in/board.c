@@ -118,8 +118,11 @@ rt_err_t rt_thread_mdelay(rt_int32_t milliseconds)
     return RT_EOK;
 }
 
+/* A BSP without this function has RT-Thread's own, which prints a warning and does not wait. */
 void rt_hw_us_delay(rt_uint32_t micros)
 {
+    if (micros == 0)
+        printf("rt_hw_us_delay is called for nothing\n");
     line_sleep(micros);
 }
 
