@@ -1,5 +1,6 @@
-"""Tests of scripts that write or judge texts: scripts/check/dependencies, packaging/debian/changelog,
-scripts/build/project.py, and packaging/sbom. `make test-scripts` has the library for the SBOM."""
+"""Tests of scripts that write or judge texts: scripts/check/dependencies, scripts/check/real,
+packaging/debian/changelog, scripts/build/project.py, and packaging/sbom. `make test-scripts` has the
+library for the SBOM."""
 import copy
 import importlib.machinery
 import importlib.util
@@ -7,6 +8,7 @@ import pathlib
 import sys
 import tempfile
 import unittest
+import unittest.mock
 
 ROOT = pathlib.Path(__file__).parents[2]
 
@@ -277,6 +279,55 @@ class Shipped(unittest.TestCase):
             {"id": "random", "deps": []},
         ]
         self.assertEqual(sbom.shipped({"nodes": nodes}, "archive"), {"archive", "core", "vec"})
+
+
+# --- scripts/check/real judges a program by what it prints and by what a device heard
+
+real = load("scripts/check/real")
+REQUEST = "06:00:00.000000  pty:line  received  unit 17  request    03 read holding registers " + real.REQUEST
+REPLY = "06:00:00.004000  pty:line  sent      unit 17  reply      03 read holding registers: 2301 50 " + real.REPLY
+STRAY = "06:00:00.000000  pty:line  received  incomplete frame, 1 bytes [00]"
+
+
+def wrong(printed=real.REGISTERS, trace=(REQUEST, REPLY), stray=""):
+    return real.judge("board", printed, "\n".join(trace), [real.REGISTERS], stray)
+
+
+class Real(unittest.TestCase):
+    def test_the_registers_and_only_requests_are_right(self):
+        self.assertEqual(wrong(), "")
+        self.assertEqual(wrong(trace=(STRAY, REQUEST, REPLY), stray="1 bytes [00]"), "")
+
+    def test_other_registers_or_none_in_between_are_wrong(self):
+        self.assertIn("prints something else", wrong(printed="registers 100 and 101: 2301 51"))
+        self.assertIn("prints something else", wrong(printed=f"no registers: late\n{real.REGISTERS}"))
+
+    def test_a_byte_that_is_no_request_is_wrong(self):
+        self.assertIn("sends other bytes", wrong(trace=(STRAY, REQUEST, REPLY)))
+        self.assertIn("sends other bytes", wrong(trace=(REQUEST, STRAY, REPLY)))
+
+    def test_a_byte_that_is_expected_and_does_not_come_is_wrong(self):
+        self.assertIn("does not begin with", wrong(stray="1 bytes [00]"))
+
+    def test_a_program_that_asks_nothing_or_is_not_answered_is_wrong(self):
+        self.assertIn("sends other bytes", wrong(trace=()))
+        self.assertIn("sends other bytes", wrong(trace=(REQUEST,)))
+
+    def test_a_warning_counts_only_in_a_file_of_mbm(self):
+        with tempfile.TemporaryDirectory() as folder:
+            log = pathlib.Path(folder) / "log"
+            log.write_text("kernel/sched.c:3:1: warning: theirs\n")
+            real.no_warning(log)
+            log.write_text("modules/mbm/src/mbm_zephyr.c:3:1: warning: ours\n")
+            with self.assertRaises(SystemExit):
+                real.no_warning(log)
+
+    def test_a_kit_a_board_or_a_folder_that_is_not_there_is_refused(self):
+        with self.assertRaisesRegex(SystemExit, "is missing"):
+            real.there(pathlib.Path("/nowhere/zephyr"))
+        for arguments in ([], ["linux", "."], ["zephyr", ".", "uno"]):
+            with self.subTest(arguments), unittest.mock.patch.object(sys, "argv", ["real", *arguments]):
+                self.assertRaises(SystemExit, real.main)
 
 
 if __name__ == "__main__":
