@@ -40,8 +40,6 @@ static const mbm_planSetup setup = {.fields = NAME(LOWER, fields),
                                     .fieldCount = FIELDS,
                                     .readCount = READS,
                                     .dataWords = WORDS,
-                                    .bitGap = NAME(UPPER, BIT_GAP),
-                                    .registerGap = NAME(UPPER, REGISTER_GAP),
                                     .requestCount = 1};
 
 static int is_every_field_read(void)
@@ -89,11 +87,11 @@ static int is_storage_exact(void)
     mbm_plan other = MBM_INIT;
 
     less.readCount--;
-    if (mbm_plan_begin(&other, &client, &less, NULL) == MBM_OK)
+    if (mbm_plan_beginGrouped(&other, &client, &less, NAME(LOWER, counts), NULL) == MBM_OK)
         return 0;
     less = setup;
     less.dataWords--;
-    return mbm_plan_begin(&other, &client, &less, NULL) != MBM_OK;
+    return mbm_plan_beginGrouped(&other, &client, &less, NAME(LOWER, counts), NULL) != MBM_OK;
 }
 
 static int poll_device(const char *host, const char *service)
@@ -110,7 +108,8 @@ static int poll_device(const char *host, const char *service)
     }
     if (mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing, sizeof outgoing) !=
             MBM_OK ||
-        !is_storage_exact() || mbm_plan_begin(&plan, &client, &setup, &wrong) != MBM_OK) {
+        !is_storage_exact() ||
+        mbm_plan_beginGrouped(&plan, &client, &setup, NAME(LOWER, counts), &wrong) != MBM_OK) {
         fprintf(stderr, "field %u is refused\n", wrong);
         return 1;
     }

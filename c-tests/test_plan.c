@@ -42,6 +42,30 @@ static void fields_that_fit_together_are_one_request(void **state)
     assert_int_equal(plan_device_integer(&d, 2, 0), d.registers[15]);
 }
 
+static void fields_that_were_grouped_before_are_read_as_they_were_grouped(void **state)
+{
+    static const uint16_t counts[] = {3, 1};
+
+    (void)state;
+    add(1, 10, SECOND);
+    add(1, 15, SECOND);
+    add(1, 12, SECOND);
+    add(2, 30, SECOND);
+    d.setup.readCount = 2;
+    OK(mbm_plan_beginGrouped(&d.plan, &d.client, &d.setup, counts, NULL));
+    plan_device_run(&d, 2500);
+    assert_int_equal(plan_device_requests(&d, 1), 3);
+    assert_int_equal(plan_device_requests(&d, 2), 3);
+    assert_int_equal(d.log[0].address, 10);
+    assert_int_equal(d.log[0].quantity, 6);
+    assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[10]);
+    assert_int_equal(plan_device_integer(&d, 1, 0), d.registers[15]);
+    assert_int_equal(plan_device_integer(&d, 2, 0), d.registers[12]);
+    assert_int_equal(plan_device_integer(&d, 3, 0), d.registers[30]);
+    assert_int_equal(plan_device_updates(&d, 2), 3);
+    assert_int_equal(plan_device_updates(&d, 3), 3);
+}
+
 static void limits_above_255_are_not_reduced(void **state)
 {
     mbm_planUnitLimits own = {.registersPerRead = 260, .unit = 2};
@@ -293,6 +317,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(every_table_is_read_with_its_function, rtu),
         cmocka_unit_test_setup(fields_that_fit_together_are_one_request, rtu),
+        cmocka_unit_test_setup(fields_that_were_grouped_before_are_read_as_they_were_grouped, rtu),
         cmocka_unit_test_setup(limits_above_255_are_not_reduced, rtu),
         cmocka_unit_test_setup(each_read_keeps_its_interval, rtu),
         cmocka_unit_test_setup(reads_of_one_interval_are_spread_over_it, rtu),

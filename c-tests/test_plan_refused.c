@@ -244,10 +244,41 @@ static void a_plan_may_begin_again_in_its_update(void **state)
     assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[0]);
 }
 
+static void a_table_that_is_not_grouped_as_the_counts_say_is_refused(void **state)
+{
+    static const uint16_t counts[] = {1, 2};
+    uint16_t field = 77;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 0);
+    add(MBM_TYPE_UINT16, 20);
+    add(MBM_TYPE_UINT16, 145);
+    d.setup.readCount = 2;
+#define TRY(counts) mbm_plan_beginGrouped(&d.plan, &d.client, &d.setup, (counts), &field)
+    REFUSED(MBM_INVALID_ARGUMENT, d.plan, TRY(counts));
+    assert_int_equal(field, 2); /* 126 registers */
+    d.fields[2].address = 19;
+    REFUSED(MBM_INVALID_ARGUMENT, d.plan, TRY(counts));
+    assert_int_equal(field, 2);
+    d.fields[2].address = 144;
+    d.setup.readCount = 1;
+    REFUSED(MBM_INVALID_ARGUMENT, d.plan, TRY(counts));
+    assert_int_equal(field, 0xFFFF);
+    d.setup.readCount = 2;
+    d.setup.dataWords = 125;
+    REFUSED(MBM_BUFFER_TOO_SMALL, d.plan, TRY(counts));
+    assert_int_equal(field, 1);
+    d.setup.dataWords = 126;
+    OK(TRY(counts));
+    assert_int_equal(field, 0xFFFF);
+#undef TRY
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(a_wrong_field_is_named, rtu),
+        cmocka_unit_test_setup(a_table_that_is_not_grouped_as_the_counts_say_is_refused, rtu),
         cmocka_unit_test_setup(a_setup_that_is_not_complete_is_refused, rtu),
         cmocka_unit_test_setup(limits_and_ranges_of_a_unit_above_255_are_refused, rtu),
         cmocka_unit_test_setup(what_was_never_begun_is_refused, rtu),

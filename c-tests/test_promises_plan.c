@@ -123,6 +123,8 @@ static void a_field_that_does_not_exist_is_refused(void **state)
 
 static void what_was_never_begun_is_refused(void **state)
 {
+    static const uint16_t count = 1;
+
     (void)state;
     every_call_returns(MBM_INVALID_ARGUMENT, NULL, 0);
     every_call_returns(MBM_NOT_INITIALISED, &none, 0);
@@ -135,6 +137,13 @@ static void what_was_never_begun_is_refused(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(NULL, &d.client, &d.setup, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, none, mbm_plan_begin(&none, NULL, &d.setup, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, none, mbm_plan_begin(&none, &d.client, NULL, NULL));
+#define GROUPED(plan, client, setup, counts)                                                       \
+    mbm_plan_beginGrouped((plan), (client), (setup), (counts), NULL)
+    IS(MBM_INVALID_ARGUMENT, GROUPED(NULL, &d.client, &d.setup, &count));
+    REFUSED(MBM_INVALID_ARGUMENT, none, GROUPED(&none, NULL, &d.setup, &count));
+    REFUSED(MBM_INVALID_ARGUMENT, none, GROUPED(&none, &d.client, NULL, &count));
+    REFUSED(MBM_INVALID_ARGUMENT, none, GROUPED(&none, &d.client, &d.setup, NULL));
+#undef GROUPED
 }
 
 static void a_value_is_pending_before_the_first_reply_and_ages_after_it(void **state)

@@ -128,7 +128,7 @@ static int find_scales(header *h)
     return CODE_DONE;
 }
 
-/* --- what a plan of the fields needs --- */
+/* --- the plan --- */
 
 static int16_t read_nothing(void *context, uint8_t *bytes, uint16_t capacity)
 {
@@ -151,18 +151,74 @@ static uint32_t no_time(void *context)
     return 0;
 }
 
-/* Begins a plan, as firmware does, and counts its reads and their words. Returns CODE_DONE, or
- * another exit code after reporting the reason. */
+/* Whether a read covers a field, and nothing of it is elsewhere. */
+static int covers(const mbm_planReadInfo *read, const mbm_planField *field)
+{
+    return read->unit == field->unit && read->table == field->table &&
+           read->intervalMs == field->intervalMs && read->address <= field->address &&
+           (uint32_t)read->address + read->quantity >= field->address + device_size(field);
+}
+
+/* Puts the fields that a read covers, of those that no read had before, behind the others of
+ * `order`, sorted by address. Returns the new number of fields there. */
+static uint16_t take_fields(const mbm_planReadInfo *read, uint16_t *order, uint16_t taken,
+                            uint8_t *is_taken)
+{
+    const uint16_t first = taken;
+    uint16_t i, place;
+
+    for (i = 0; i < meter.readable; i++) {
+        if (is_taken[i] || !covers(read, &meter.planned[i]))
+            continue;
+        is_taken[i] = 1;
+        for (place = taken++; place > first; place--) {
+            if (meter.planned[order[place - 1]].address <= meter.planned[i].address)
+                break;
+            order[place] = order[place - 1];
+        }
+        order[place] = i;
+    }
+    return taken;
+}
+
+/* Notes the reads of a plan, with their fields. Returns 0 without memory. */
+static int note_reads(header *h, const mbm_plan *plan)
+{
+    uint8_t *is_taken = (uint8_t *)calloc(meter.readable, 1);
+    mbm_planReadInfo read;
+    uint16_t taken = 0;
+    uint32_t words = 0;
+
+    h->order = (uint16_t *)calloc(meter.readable, sizeof *h->order);
+    h->counts = (uint16_t *)calloc(meter.readable, sizeof *h->counts);
+    if (!is_taken || !h->order || !h->counts) {
+        free(is_taken);
+        return 0;
+    }
+    for (h->reads = 0; mbm_plan_getRead(plan, h->reads, &read) == MBM_OK; h->reads++) {
+        const uint16_t before = taken;
+
+        taken = take_fields(&read, h->order, taken, is_taken);
+        h->counts[h->reads] = (uint16_t)(taken - before);
+        words +=
+            read.table <= MBM_TABLE_DISCRETE_INPUTS ? (read.quantity + 15u) / 16 : read.quantity;
+    }
+    h->words = (uint16_t)words;
+    free(is_taken);
+    return 1;
+}
+
+/* Begins a plan, as firmware does, and notes its reads. Returns CODE_DONE, or another exit code
+ * after reporting the reason. */
 static int begin_plan(header *h, mbm_planSetup *setup)
 {
     static const mbm_port port = {.read = read_nothing, .write = write_nothing, .micros = no_time};
     static uint8_t frame[MBM_MAX_FRAME];
     static mbm_client client;
     static mbm_plan plan;
-    mbm_planReadInfo read;
     uint16_t wrong = 0xFFFF;
-    uint32_t words = 0;
     uint8_t status = mbm_client_beginRtu(&client, &port, frame, sizeof frame);
+    int is_noted;
 
     if (status == MBM_OK)
         status = mbm_plan_begin(&plan, &client, setup, &wrong);
@@ -174,12 +230,9 @@ static int begin_plan(header *h, mbm_planSetup *setup)
                       mbm_status_text(status));
     if (status != MBM_OK)
         return report(CODE_WRONG, "%s: %s", h->path, mbm_status_text(status));
-    for (h->reads = 0; mbm_plan_getRead(&plan, h->reads, &read) == MBM_OK; h->reads++)
-        words +=
-            read.table <= MBM_TABLE_DISCRETE_INPUTS ? (read.quantity + 15u) / 16 : read.quantity;
-    h->words = (uint16_t)words;
+    is_noted = note_reads(h, &plan);
     (void)mbm_plan_end(&plan);
-    return CODE_DONE;
+    return is_noted ? CODE_DONE : report(CODE_SYSTEM, "there is no memory");
 }
 
 /* Copies the fields that can be read, with their scales. */
@@ -196,7 +249,9 @@ static void scale_fields(const header *h, mbm_planField *fields)
     }
 }
 
-static int count_reads(header *h)
+/* Groups the fields that can be read. Returns CODE_DONE, or another exit code after reporting the
+ * reason. */
+static int group_fields(header *h)
 {
     static mbm_clientRequest request;
     const uint16_t count = meter.readable;
@@ -318,11 +373,13 @@ int header_command(int argc, char **argv)
     h.unit = find_unit();
     code = header_choose_names(&h, wanted.name) ? find_scales(&h) : report_code;
     if (code == CODE_DONE)
-        code = count_reads(&h);
+        code = group_fields(&h);
     if (code == CODE_DONE)
         code = make(&h);
     header_free_names(&h);
     free(h.scales);
+    free(h.order);
+    free(h.counts);
     device_free(&meter);
     return code;
 }

@@ -25,7 +25,9 @@ typedef struct header {
     header_scale *scales;
     void *names;   /* that the header defines: a tree of tsearch */
     uint16_t unit; /* of all fields; 0 if they have several */
-    /* What a plan of the fields needs. */
+    /* The plan: its fields in the order of their reads, as indexes of the device's fields, how many
+     * fields each read has, and the words of data. */
+    uint16_t *order, *counts;
     uint16_t gap, reads, words;
 } header;
 

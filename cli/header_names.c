@@ -152,8 +152,8 @@ static int choose_device(header *h, const char *name)
 
 int header_choose_names(header *h, const char *name)
 {
-    static const char *const OWN[] = {"H",          "PLAN",         "SERVER",  "FIELDS", "READS",
-                                      "DATA_WORDS", "REGISTER_GAP", "BIT_GAP", "UNIT"};
+    static const char *const OWN[] = {"H",     "PLAN",       "SERVER", "FIELDS",
+                                      "READS", "DATA_WORDS", "UNIT"};
     uint16_t i;
 
     h->fields = (char **)calloc(h->of->count, sizeof *h->fields);

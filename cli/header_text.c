@@ -239,7 +239,7 @@ int header_write_fields(header *h)
 
 /* --- the plan --- */
 
-static void write_row(header *h, uint16_t at)
+static void write_row(header *h, uint16_t at, int is_last)
 {
     static const char *const TABLES[] = {"", "COILS", "DISCRETE_INPUTS", "HOLDING_REGISTERS",
                                          "INPUT_REGISTERS"};
@@ -256,7 +256,7 @@ static void write_row(header *h, uint16_t at)
             planned->unit, TABLES[planned->table], TYPES[planned->type],
             value_order_names[planned->order], planned->bit, planned->address, planned->count,
             planned->intervalMs, is_scaled ? scale->multiplier : 0, is_scaled ? scale->divisor : 0,
-            at + 1 < h->of->readable ? "," : "");
+            is_last ? "" : ",");
 }
 
 int header_write_plan(header *h)
@@ -267,27 +267,30 @@ int header_write_plan(header *h)
     if (count == 0)
         return 1;
     fprintf(h->out,
-            "\n/* ==== The plan: the fields that can be read ==== */\n\n"
+            "\n/* ==== The plan: the fields that can be read, grouped into requests ==== */\n\n"
             "#ifdef %s_PLAN\n#include \"mbm.h\"\n\n"
             "/* The fields of the plan, for mbm_plan_getInt32 and the like. */\n"
             "enum %s_field {\n",
             h->upper, h->lower);
     for (i = 0; i < count; i++)
-        fprintf(h->out, "    %s_%s%s\n", h->upper, h->fields[i], i + 1 < count ? "," : "");
-    fprintf(
-        h->out,
-        "};\n\n"
-        "/* What the plan needs with these gaps: mbm_planPosition, mbm_planRead, words of data. "
-        "*/\n"
-        "#define %s_FIELDS %uu\n#define %s_READS %uu\n#define %s_DATA_WORDS %uu\n"
-        "#define %s_REGISTER_GAP %uu\n#define %s_BIT_GAP %uu\n\n"
-        "/* The members of mbm_planField in their order. */\n"
-        "static const mbm_planField %s_fields[%s_FIELDS] = {\n",
-        h->upper, count, h->upper, h->reads, h->upper, h->words, h->upper,
-        h->gap < MBM_MAX_READ_REGISTERS ? h->gap : MBM_MAX_READ_REGISTERS, h->upper, h->gap,
-        h->lower, h->upper);
+        fprintf(h->out, "    %s_%s%s\n", h->upper, h->fields[h->order[i]],
+                i + 1 < count ? "," : "");
+    fprintf(h->out,
+            "};\n\n"
+            "/* What the plan needs: mbm_planPosition, mbm_planRead, words of data. */\n"
+            "#define %s_FIELDS %uu\n#define %s_READS %uu\n#define %s_DATA_WORDS %uu\n\n"
+            "/* The members of mbm_planField in their order. */\n"
+            "static const mbm_planField %s_fields[%s_FIELDS] = {\n",
+            h->upper, count, h->upper, h->reads, h->upper, h->words, h->lower, h->upper);
     for (i = 0; i < count; i++)
-        write_row(h, i);
+        write_row(h, h->order[i], i + 1 == count);
+    fprintf(h->out,
+            "};\n\n"
+            "/* How many of them each request reads, for mbm_plan_beginGrouped. */\n"
+            "static const uint16_t %s_counts[%s_READS] = {",
+            h->lower, h->upper);
+    for (i = 0; i < h->reads; i++)
+        fprintf(h->out, "%s%uu", i == 0 ? "" : i % 16 == 0 ? ",\n    " : ", ", h->counts[i]);
     fprintf(h->out, "};\n#endif\n");
     return 1;
 }

@@ -4,8 +4,10 @@
 mod plan;
 
 use mbm::error::Status;
-use mbm::plan::field::{BIT, COILS, DOUBLE, FLOAT, HOLDING_REGISTERS, TEXT, UINT32};
-use mbm::plan::group::{group, Refusal, MAX_FIELDS};
+use mbm::plan::field::{
+    BIT, COILS, DOUBLE, FLOAT, HOLDING_REGISTERS, INPUT_REGISTERS, TEXT, UINT32,
+};
+use mbm::plan::group::{group, take_groups, Refusal, MAX_FIELDS};
 use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, UnitLimits};
 use plan::{field, grouped, plain, LIMITS};
 
@@ -143,4 +145,87 @@ fn no_field_and_too_many_fields_are_refused() {
     refused(Status::INVALID_ARGUMENT, usize::MAX, &[], &LIMITS);
     let fields = vec![field(0); MAX_FIELDS + 1];
     refused(Status::INVALID_ARGUMENT, usize::MAX, &fields, &LIMITS);
+}
+
+/// Takes groups of fields, with the storage for `reads` reads and `words` words.
+fn taken(fields: &[Field], counts: &[u16], reads: usize, words: u16) -> Result<usize, Refusal> {
+    let mut positions = vec![Position::NONE; fields.len()];
+    let mut reads = vec![Read::default(); reads];
+    take_groups(fields, counts, &mut positions, &mut reads, words)
+}
+
+#[test]
+fn a_field_that_does_not_fit_into_its_read_is_refused_with_its_index() {
+    let wrong = |change: fn(&mut Field)| {
+        let mut last = field(101);
+        change(&mut last);
+        let fields = [field(0), field(100), last];
+        taken(&fields, &[1, 2], 2, u16::MAX)
+    };
+    assert_eq!(wrong(|_| ()), Ok(2));
+    assert_eq!(wrong(|field| field.address = 224), Ok(2));
+    let changes: [fn(&mut Field); 7] = [
+        |field| field.address = 225,
+        |field| field.address = 99,
+        |field| (field.address, field.value_type) = (99, DOUBLE),
+        |field| (field.address, field.value_type) = (223, UINT32 + 2),
+        |field| field.interval_ms = 999,
+        |field| field.unit = 2,
+        |field| field.table = INPUT_REGISTERS,
+    ];
+    for change in changes {
+        let refusal = wrong(change).expect_err("a refusal");
+        assert_eq!(
+            (refusal.status, refusal.field),
+            (Status::INVALID_ARGUMENT, 2)
+        );
+    }
+}
+
+#[test]
+fn a_field_longer_than_a_read_is_refused_in_groups_too() {
+    let long = Field {
+        value_type: DOUBLE,
+        count: u16::MAX,
+        ..field(0)
+    };
+    let refusal = taken(&[field(0), long], &[1, 1], 2, u16::MAX).expect_err("a refusal");
+    assert_eq!(
+        (refusal.status, refusal.field),
+        (Status::INVALID_ARGUMENT, 1)
+    );
+}
+
+#[test]
+fn counts_that_do_not_add_up_to_the_fields_are_refused() {
+    let fields = [field(0), field(1), field(2)];
+    for counts in [
+        &[1, 1][..],
+        &[4],
+        &[1, 0, 2],
+        &[3, 1],
+        &[0],
+        &[u16::MAX, 4],
+        &[],
+    ] {
+        let refusal = taken(&fields, counts, counts.len(), u16::MAX).expect_err("a refusal");
+        let none = (Status::INVALID_ARGUMENT, usize::MAX);
+        assert_eq!((refusal.status, refusal.field), none, "{counts:?}");
+    }
+    assert!(taken(&[], &[], 0, u16::MAX).is_err());
+}
+
+#[test]
+fn groups_without_storage_are_refused() {
+    let fields = [field(0), field(1), field(20)];
+    let small = |field| {
+        Err(Refusal {
+            status: Status::BUFFER_TOO_SMALL,
+            field,
+        })
+    };
+    assert_eq!(taken(&fields, &[2, 1], 1, 3), small(usize::MAX));
+    assert_eq!(taken(&fields, &[2, 1], 2, 1), small(0));
+    assert_eq!(taken(&fields, &[2, 1], 2, 2), small(2));
+    assert_eq!(taken(&fields, &[2, 1], 2, 3), Ok(2));
 }

@@ -1,4 +1,5 @@
 /* Written by main.go, from go-modbus-client. */
+/* clang-format off */
 {183, 8701},
 {2, 19},
 {3, 123},

@@ -76,7 +76,7 @@ func typed(field modbus.Field, shape, characters uint32, isBits bool) modbus.Fie
 }
 
 func main() {
-	fmt.Println("/* Written by main.go, from go-modbus-client. */")
+	fmt.Println("/* Written by main.go, from go-modbus-client. */\n/* clang-format off */")
 	for number := uint32(0); number < tables; number++ {
 		requests, err := modbus.DefaultSplitter{}.Split(fields(number), 0, 0)
 		if err != nil {

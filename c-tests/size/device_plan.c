@@ -5,16 +5,16 @@
 #include "mbm.h"
 
 enum {
+    DEVICE_RELAY,
+    DEVICE_ALARM,
+    DEVICE_SETPOINT,
+    DEVICE_MODE,
     DEVICE_VOLTAGE_1,
     DEVICE_VOLTAGE_2,
     DEVICE_POWER,
-    DEVICE_ENERGY,
     DEVICE_FREQUENCY,
-    DEVICE_SETPOINT,
-    DEVICE_MODE,
     DEVICE_VERSION,
-    DEVICE_RELAY,
-    DEVICE_ALARM,
+    DEVICE_ENERGY,
     DEVICE_FIELDS,
     DEVICE_READS = 7,
     DEVICE_DATA_WORDS = 13,
@@ -50,6 +50,8 @@ static const mbm_planField device_fields[DEVICE_FIELDS] = {
                       .type = MBM_TYPE_BIT,
                       .intervalMs = 1000},
 };
+
+static const uint16_t device_counts[DEVICE_READS] = {1, 1, 2, 3, 1, 1, 1};
 #else
 #include "device.h"
 #endif
@@ -79,7 +81,7 @@ int main(void)
     begin_port();
     USED(&setup);
     (void)mbm_client_beginRtu(&client, &port, frame, sizeof frame);
-    uart = mbm_plan_begin(&plan, &client, &setup, NULL);
+    uart = mbm_plan_beginGrouped(&plan, &client, &setup, device_counts, NULL);
     for (;;) {
         (void)mbm_plan_poll(&plan);
         (void)mbm_client_poll(&client);

@@ -1,5 +1,6 @@
 /* A plan of ten fields above the client of an RTU line with every function: WITHOUT_MBM leaves
- * out the plan alone. Its table and its storage are not counted. */
+ * out the plan alone, GROUPED the code that groups the fields. Its table and its storage are not
+ * counted. */
 #ifdef WITHOUT_MBM
 #define PLAN(call) 0
 #undef WITHOUT_MBM
@@ -46,10 +47,22 @@ static const mbm_planSetup setup = {.fields = fields,
                                     .requests = &request,
                                     .update = update,
                                     .fieldCount = 10,
+#ifdef GROUPED
+                                    .readCount = 4,
+#else
                                     .readCount = 10,
+#endif
                                     .dataWords = WORDS,
                                     .registerGap = 8,
                                     .requestCount = 1};
+
+#ifdef GROUPED
+static const uint16_t counts[] = {6, 2, 1, 1};
+
+#define BEGIN(plan) mbm_plan_beginGrouped((plan), &client, &setup, counts, NULL)
+#else
+#define BEGIN(plan) mbm_plan_begin((plan), &client, &setup, NULL)
+#endif
 
 int main(void)
 {
@@ -59,7 +72,7 @@ int main(void)
     USED(&setup);
     USED(&plan);
     (void)CALL(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
-    (void)PLAN(mbm_plan_begin(&plan, &client, &setup, NULL));
+    (void)PLAN(BEGIN(&plan));
     for (;;) {
         (void)PLAN(mbm_plan_poll(&plan));
         every_function();

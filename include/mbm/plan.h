@@ -251,6 +251,32 @@ uint8_t mbm_plan_begin(struct mbm_plan *plan,
                        uint16_t *field);
 
 /**
+ * As mbm_plan_begin, for fields that were grouped before: `mbm header` writes such a table. A
+ * program that calls only this function does not contain the code that groups fields, half of
+ * a plan.
+ *
+ * The fields of a read stand side by side in `setup->fields`, the one with the lowest address
+ * first, and have the same unit, table and interval. `setup->readCount` is the number of reads.
+ * The limits, gaps and excluded ranges of `setup` have no meaning.
+ *
+ * @param plan    the object; initialised with MBM_INIT before the first call
+ * @param client  as for mbm_plan_begin
+ * @param setup   table and storage; it stays valid and as it is until the plan ends
+ * @param counts  how many fields each read has: `setup->readCount` numbers, each at least 1,
+ *                `setup->fieldCount` in total; used during the call
+ * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
+ * @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not belong to the
+ *         first one of its read, and for counts with another total;
+ *         MBM_ILLEGAL_DATA_VALUE for a field with which its read is longer than 125 registers or
+ *         2000 bits
+ */
+uint8_t mbm_plan_beginGrouped(struct mbm_plan *plan,
+                              struct mbm_client *client,
+                              const struct mbm_planSetup *setup,
+                              const uint16_t *counts,
+                              uint16_t *field);
+
+/**
  * Ends a plan: gives its requests up and lets go of its storage.
  *
  * @param plan  the object

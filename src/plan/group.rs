@@ -1,7 +1,7 @@
 //! Grouping fields into reads: the fewest reads, and of these the fewest bits and registers.
 
 use super::field::Field;
-use super::limits::{ExcludedRange, ReadLimits};
+use super::limits::{standard_limit, ExcludedRange, ReadLimits};
 use super::read::{Position, Read};
 use crate::error::Status;
 
@@ -62,6 +62,63 @@ pub fn group<L: ReadLimits>(
         status: Status::BUFFER_TOO_SMALL,
         field: table.positions.get(position).map_or(0, Position::field),
     })
+}
+
+/// As [`group`], for fields that were grouped before: the fields of a read stand side by side in
+/// `fields`, the one with the lowest address first, and `counts` says how many each read has.
+/// Only the standard limits what a read requests. The fields are not checked by themselves:
+/// [`group`] has accepted them. Returns the number of reads.
+///
+/// # Errors
+/// [`Status::INVALID_ARGUMENT`] for a field that does not fit into its read: it differs from the
+/// first one in unit, table or interval, has a lower address, or makes the read too long; without
+/// a field at fault if a count is 0 or the counts do not add up to the fields.
+/// [`Status::BUFFER_TOO_SMALL`] as [`group`], and without a field at fault for fewer `reads` than
+/// counts.
+pub fn take_groups(
+    fields: &[Field],
+    counts: &[u16],
+    positions: &mut [Position],
+    reads: &mut [Read],
+    words: u16,
+) -> Result<usize, Refusal> {
+    let refused = |status, field: usize| Err(Refusal { status, field });
+    let Some(reads) = reads.get_mut(..counts.len()) else {
+        return refused(Status::BUFFER_TOO_SMALL, usize::MAX);
+    };
+    let (mut start, mut offset) = (0usize, 0);
+    for (index, (read, count)) in reads.iter_mut().zip(counts).enumerate() {
+        let end = start.wrapping_add((*count).into());
+        let (Some(own @ [first, ..]), Some(places)) =
+            (fields.get(start..end), positions.get_mut(start..end))
+        else {
+            return refused(Status::INVALID_ARGUMENT, usize::MAX);
+        };
+        let mut quantity = 0;
+        for (place, (field, position)) in (start..).zip(own.iter().zip(places)) {
+            // Another unit or table, and a lower address, are further away than any read is long.
+            let distance = field.place().wrapping_sub(first.place());
+            let length = distance.wrapping_add(field.length());
+            let longest = standard_limit(first).into();
+            if field.interval_ms != first.interval_ms || distance > longest || length > longest {
+                return refused(Status::INVALID_ARGUMENT, place);
+            }
+            quantity = quantity.max(length as u16);
+            position.field = place as u16;
+            position.sum_or_read = index as i32;
+        }
+        read.set_up(first, start..end, quantity, offset);
+        let own = read.words();
+        if own > words.wrapping_sub(offset) {
+            return refused(Status::BUFFER_TOO_SMALL, start);
+        }
+        offset += own;
+        start = end;
+    }
+    if start == 0 || start != fields.len() {
+        return refused(Status::INVALID_ARGUMENT, usize::MAX);
+    }
+    Ok(counts.len())
 }
 
 /// The fields, sorted by interval, unit, table and address.
@@ -232,29 +289,15 @@ impl<'a, L: ReadLimits> Table<'a, L> {
                 return Err(start);
             };
             let first = self.field(start);
-            // Field by field: firmware has no other use for memcpy.
-            read.not_before.set(0);
-            read.read_at.set(0);
-            read.interval_ms = first.interval_ms;
-            read.first = start as u16;
-            read.last = last;
-            read.address = first.address;
-            read.offset = offset;
-            read.unit = first.unit as u8;
-            read.table = first.table;
-            read.status.set(Status::PENDING.code());
-            read.doublings.set(0);
-            read.flags.set(0);
             let mut quantity = 0;
-            for position in read.positions() {
+            for position in start..=last.into() {
                 let field = self.field(position);
                 quantity = quantity.max(field.end() - u32::from(first.address));
-                let field = self.positions.get(position).map_or(0, Position::field);
-                if let Some(own) = self.positions.get_mut(field) {
-                    own.sum_or_read = count as i32;
-                }
+                let field = self.field_index(position).into();
+                self.set_sum(field, count as i32);
             }
-            read.quantity = quantity as u16;
+            let positions = start..usize::from(last) + 1;
+            read.set_up(first, positions, quantity as u16, offset);
             let own = read.words();
             if own > words.wrapping_sub(offset) {
                 return Err(start);

@@ -16,6 +16,15 @@ pub struct UnitLimits {
     pub unit: u16,
 }
 
+/// The most bits or registers that the standard lets one read of a field's table request.
+pub(super) const fn standard_limit(field: &Field) -> u16 {
+    if field.is_in_bits() {
+        MAX_READ_BITS
+    } else {
+        MAX_READ_REGISTERS
+    }
+}
+
 /// Addresses that no read may touch.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,14 +87,13 @@ pub trait ReadLimits {
     /// The most bits or registers of one read from the table of a field.
     fn longest_read(&self, field: &Field) -> u32 {
         let own = self.units().iter().find(|limits| limits.unit == field.unit);
-        let (most, all, own): (u16, u16, u16) = if field.is_in_bits() {
-            (MAX_READ_BITS, self.bits(), own.map_or(0, |own| own.bits))
+        let (all, own) = if field.is_in_bits() {
+            (self.bits(), own.map_or(0, |own| own.bits))
         } else {
-            let own = own.map_or(0, |own| own.registers);
-            (MAX_READ_REGISTERS, self.registers(), own)
+            (self.registers(), own.map_or(0, |own| own.registers))
         };
         let limit = if own > 0 { own } else { all };
-        (limit.wrapping_sub(1).min(most - 1) + 1).into()
+        (limit.wrapping_sub(1).min(standard_limit(field) - 1) + 1).into()
     }
 
     /// The widest gap that a read from the table of a field may cover.

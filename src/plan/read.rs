@@ -1,5 +1,6 @@
 //! The storage of a plan: one [`Position`] for each field, and one [`Read`] for each read.
 
+use super::field::Field;
 use crate::error::Status;
 use core::cell::Cell;
 use core::ops::Range;
@@ -85,6 +86,31 @@ pub struct Read {
 }
 
 impl Read {
+    /// Makes it a read of the fields at `positions`, of which `first` has the lowest address.
+    #[inline(always)]
+    pub(super) fn set_up(
+        &mut self,
+        first: &Field,
+        positions: Range<usize>,
+        quantity: u16,
+        offset: u16,
+    ) {
+        // Field by field: firmware has no other use for memcpy.
+        self.not_before.set(0);
+        self.read_at.set(0);
+        self.interval_ms = first.interval_ms;
+        self.first = positions.start as u16;
+        self.last = positions.end.wrapping_sub(1) as u16;
+        self.address = first.address;
+        self.quantity = quantity;
+        self.offset = offset;
+        self.unit = first.unit as u8;
+        self.table = first.table;
+        self.status.set(Status::PENDING.code());
+        self.doublings.set(0);
+        self.flags.set(0);
+    }
+
     /// True if the read requests bits.
     pub const fn is_of_bits(&self) -> bool {
         self.table <= super::field::DISCRETE_INPUTS

@@ -2,7 +2,7 @@
 #![allow(dead_code)] // Not every test uses everything.
 
 use mbm::plan::field::{HOLDING_REGISTERS, UINT16};
-use mbm::plan::group::{group, Refusal};
+use mbm::plan::group::{group, take_groups, Refusal};
 use mbm::plan::{Field, Limits, Position, Read};
 
 /// No limits but those of the standard, and no gaps.
@@ -35,7 +35,26 @@ pub fn grouped(fields: &[Field], limits: &Limits) -> Result<Vec<Read>, Refusal> 
     let count = group(fields, limits, &mut positions, &mut reads, u16::MAX)?;
     reads.truncate(count);
     check_positions(fields, &positions, &reads);
+    check_groups(fields, &positions, &reads);
     Ok(reads)
+}
+
+/// The same fields in the order of their reads, with the number of fields of each read, are the
+/// same reads.
+fn check_groups(fields: &[Field], positions: &[Position], reads: &[Read]) {
+    let order = reads.iter().flat_map(|read| read.fields(positions));
+    let sorted: Vec<Field> = order.map(|own| fields[own]).collect();
+    let counts: Vec<u16> = reads
+        .iter()
+        .map(|read| read.positions().len() as u16)
+        .collect();
+    let mut taken_positions = vec![Position::NONE; fields.len()];
+    let mut taken = vec![Read::default(); reads.len()];
+    let (positions, words) = (&mut taken_positions[..], u16::MAX);
+    let count = take_groups(&sorted, &counts, positions, &mut taken, words);
+    assert_eq!(count, Ok(reads.len()));
+    assert_eq!(taken, reads);
+    check_positions(&sorted, &taken_positions, &taken);
 }
 
 /// Every field is in one read, all of it, and no read has anything else's fields.

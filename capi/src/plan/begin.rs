@@ -5,9 +5,10 @@ use super::storage::mbm_plan;
 use crate::client::{self, mbm_client, mbm_client_cancel};
 use crate::pointers;
 use core::ptr::null_mut;
-use core::slice::from_raw_parts_mut;
+use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::Status;
-use mbm::plan::{group, schedule};
+use mbm::plan::group::{self, Refusal};
+use mbm::plan::{schedule, Position, Read};
 
 /// Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
 ///
@@ -43,25 +44,68 @@ pub unsafe extern "C" fn mbm_plan_begin(
     setup: *const mbm_planSetup,
     field: *mut u16,
 ) -> u8 {
+    let group = |setup: &mbm_planSetup, positions: &mut [Position], reads: &mut [Read]| {
+        // SAFETY: the setup is complete.
+        let fields = unsafe { setup.fields() };
+        group::group(fields, setup, positions, reads, setup.dataWords)
+    };
     // SAFETY: as the header demands: each is NULL or what it says.
     unsafe {
-        let mut wrong = u16::MAX;
-        let status = begin(plan, client, setup, &mut wrong);
-        pointers::put(field, wrong);
-        status.code()
+        let has_limits = setup.as_ref().is_some_and(mbm_planSetup::has_limits);
+        begin(plan, client, setup, field, has_limits, group)
     }
 }
 
+/// As mbm_plan_begin, for fields that were grouped before: `mbm header` writes such a table. A
+/// program that calls only this function does not contain the code that groups fields, half of
+/// a plan.
+///
+/// The fields of a read stand side by side in `setup->fields`, the one with the lowest address
+/// first, and have the same unit, table and interval. `setup->readCount` is the number of reads.
+/// The limits, gaps and excluded ranges of `setup` have no meaning.
+///
+/// @param plan    the object; initialised with MBM_INIT before the first call
+/// @param client  as for mbm_plan_begin
+/// @param setup   table and storage; it stays valid and as it is until the plan ends
+/// @param counts  how many fields each read has: `setup->readCount` numbers, each at least 1,
+///                `setup->fieldCount` in total; used during the call
+/// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
+/// @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not belong to the
+///         first one of its read, and for counts with another total;
+///         MBM_ILLEGAL_DATA_VALUE for a field with which its read is longer than 125 registers or
+///         2000 bits
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_beginGrouped(
+    plan: *mut mbm_plan,
+    client: *mut mbm_client,
+    setup: *const mbm_planSetup,
+    counts: *const u16,
+    field: *mut u16,
+) -> u8 {
+    let group = |setup: &mbm_planSetup, positions: &mut [Position], reads: &mut [Read]| {
+        // SAFETY: the setup is complete, and `counts` is an array, as the header demands.
+        let (fields, counts) = unsafe { (setup.fields(), from_raw_parts(counts, reads.len())) };
+        group::take_groups(fields, counts, positions, reads, setup.dataWords)
+    };
+    // SAFETY: as the header demands: each is NULL or what it says.
+    unsafe { begin(plan, client, setup, field, !counts.is_null(), group) }
+}
+
+/// Begins a plan with the reads that `group` makes. It is refused if `is_usable` is false.
+///
 /// # Safety
 /// As the header demands of mbm_plan_begin.
 unsafe fn begin(
     plan: *mut mbm_plan,
     client: *mut mbm_client,
     setup: *const mbm_planSetup,
-    wrong: &mut u16,
-) -> Status {
+    field: *mut u16,
+    is_usable: bool,
+    group: impl FnOnce(&mbm_planSetup, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
+) -> u8 {
+    let mut wrong = u16::MAX;
     // SAFETY: as the caller promises. Nothing uses the storage of a plan that is not begun.
-    unsafe {
+    let begin = || unsafe {
         if plan.is_null() {
             return Status::INVALID_ARGUMENT;
         }
@@ -69,7 +113,10 @@ unsafe fn begin(
         if usable != Status::OK {
             return usable;
         }
-        let Some(given) = setup.as_ref().filter(|setup| setup.is_complete()) else {
+        let Some(given) = setup
+            .as_ref()
+            .filter(|setup| is_usable && setup.is_complete())
+        else {
             return Status::INVALID_ARGUMENT;
         };
         if mbm_plan_end(plan) == Status::BUSY.code() {
@@ -78,10 +125,10 @@ unsafe fn begin(
         let count = usize::from(given.fieldCount);
         let positions = from_raw_parts_mut(given.positions.cast(), count);
         let reads = from_raw_parts_mut(given.reads.cast(), given.readCount.into());
-        let count = match group::group(given.fields(), given, positions, reads, given.dataWords) {
+        let count = match group(given, positions, reads) {
             Ok(count) => count as u16,
             Err(refusal) => {
-                *wrong = refusal.field as u16;
+                wrong = refusal.field as u16;
                 return refusal.status;
             }
         };
@@ -99,6 +146,12 @@ unsafe fn begin(
         (*object).mark = pointers::BEGUN;
         schedule::start((*object).reads(), 0);
         Status::OK
+    };
+    // SAFETY: `field` is NULL or what the header says.
+    unsafe {
+        let status = begin();
+        pointers::put(field, wrong);
+        status.code()
     }
 }
 

@@ -96,14 +96,11 @@ pub(super) unsafe fn time(object: *mut Object) -> u32 {
     unsafe {
         let client = (*object).client;
         if pointers::check(client) == Status::OK {
-            let mut passed = mbm::time::elapsed(client::clock(client), (*object).micros);
-            // Without a division, which a Cortex-M0+ lacks.
-            for shift in [20, 10, 0] {
-                while passed >= 1000 << shift {
-                    passed -= 1000 << shift;
-                    (*object).micros = (*object).micros.wrapping_add(1000 << shift);
-                    (*object).millis = (*object).millis.wrapping_add(1 << shift);
-                }
+            let passed = mbm::time::elapsed(client::clock(client), (*object).micros);
+            if passed >= 1000 {
+                let millis = schedule::millis(passed);
+                (*object).micros = (*object).micros.wrapping_add(millis * 1000);
+                (*object).millis = (*object).millis.wrapping_add(millis);
             }
         }
         (*object).millis

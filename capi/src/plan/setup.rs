@@ -157,7 +157,7 @@ fn is_unit(unit: u16) -> bool {
 }
 
 impl mbm_planSetup {
-    /// True if every pointer that must be there is, and counts and units are in range.
+    /// True if every pointer that must be there is, and the number of requests is in range.
     pub(super) fn is_complete(&self) -> bool {
         !self.fields.is_null()
             && !self.positions.is_null()
@@ -165,7 +165,11 @@ impl mbm_planSetup {
             && !self.data.is_null()
             && !self.requests.is_null()
             && self.requestCount.wrapping_sub(1) < crate::client::MBM_CLIENT_DEPTH
-            && (!self.units.is_null() || self.unitCount == 0)
+    }
+
+    /// True if the limits are there, and each is of a unit that may exist.
+    pub(super) fn has_limits(&self) -> bool {
+        (!self.units.is_null() || self.unitCount == 0)
             && (!self.excluded.is_null() || self.excludedCount == 0)
             && self.units().iter().all(|limits| is_unit(limits.unit))
             && self.excluded().iter().all(|range| is_unit(range.unit))

@@ -106,7 +106,27 @@ pub fn begin(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
     } else {
         w.unset::<u16>()
     };
-    let begin = || call!(w, plan, mbm_plan_begin(plan, client, setup, wrong));
+    // How many fields each read has: one, and the last the rest.
+    let mut counts = vec![1; reads.into()];
+    if let Some(last) = counts.last_mut() {
+        *last = match w.byte() {
+            0 => w.word(),
+            _ => (count as u16).wrapping_sub(u16::from(reads) - 1),
+        };
+    }
+    let counts = w.array(&counts);
+    let is_grouped = w.byte() & 1 == 0;
+    let begin = || {
+        if is_grouped {
+            call!(
+                w,
+                plan,
+                mbm_plan_beginGrouped(plan, client, setup, counts, wrong)
+            )
+        } else {
+            call!(w, plan, mbm_plan_begin(plan, client, setup, wrong))
+        }
+    };
     // A plan that runs ends before its new table is checked.
     let runs = super::check::bytes(span(plan))
         .first()
