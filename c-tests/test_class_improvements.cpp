@@ -184,14 +184,15 @@ static void a_request_on_a_port_that_accepts_no_bytes_times_out(void **)
 }
 
 /* Returns the silence before a request that follows a successful one. */
-static uint32_t silence_before(ModbusMaster &first, ModbusMaster &second)
+static uint32_t silence_before(ModbusMaster &first, ModbusMaster &second,
+                               HardwareSerial &port = Serial)
 {
-    Serial.reply(adu({1, 3, 2, 0, 7}));
+    port.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(first.readHoldingRegisters(0, 1), 0);
     uint32_t end = board().now;
-    Serial.reply(adu({1, 3, 2, 0, 7}));
+    port.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(second.readHoldingRegisters(0, 1), 0);
-    return Serial.startedAt - end;
+    return port.startedAt - end;
 }
 
 static void a_silence_is_kept_before_each_request(void **)
@@ -207,6 +208,62 @@ static void a_silence_is_kept_before_each_request(void **)
     node.begin(9600);
     assert_in_range(silence_before(node, node), 3911, 4111);
 }
+
+#if !defined(MODBUSMASTER_SHARE_LINE)
+/* A port that tells its rate, as those of the ESP8266 and the ESP32. */
+class RatedSerial : public HardwareSerial {
+public:
+    int baudRate() { return static_cast<int>(baud); }
+};
+
+static void the_silence_follows_the_rate_that_the_port_tells(void **)
+{
+    RatedSerial port;
+    ModbusMaster node;
+    node.begin(1, port);
+    assert_in_range(silence_before(node, node, port), gap_without_baud_rate - 100,
+                    gap_without_baud_rate + 100); /* it is closed */
+    port.begin(19200);
+    node.begin(1, port);
+    assert_in_range(silence_before(node, node, port), 1950, 2100);
+    ModbusMaster copy(node);
+    assert_in_range(silence_before(copy, copy, port), 1950, 2100);
+    port.begin(115200);
+    node.begin(1, port);
+    assert_in_range(silence_before(node, node, port), 1700, 1850);
+    /* The rate of another port is not known. */
+    node.begin(1, Serial);
+    assert_in_range(silence_before(node, node), gap_without_baud_rate - 100,
+                    gap_without_baud_rate + 100);
+}
+
+static void a_rate_or_gap_that_the_sketch_sets_stays_whatever_the_port_tells(void **)
+{
+    RatedSerial port;
+    ModbusMaster paced, slow;
+    port.begin(115200);
+    paced.setGap(9000);
+    paced.begin(1, port);
+    assert_in_range(silence_before(paced, paced, port), 8900, 9100);
+    slow.begin(1, port);
+    slow.setBaudRate(2400);
+    slow.begin(1, port);
+    assert_in_range(silence_before(slow, slow, port), 15900, 16200);
+    slow.begin(1, Serial);
+    assert_in_range(silence_before(slow, slow), 15900, 16200);
+}
+
+static void a_hook_cannot_change_the_rate_by_begin(void **)
+{
+    static RatedSerial port;
+    static ModbusMaster node;
+    port.begin(19200);
+    node.begin(1, port);
+    port.begin(115200);
+    node.preTransmission([] { node.begin(1, port); });
+    assert_in_range(silence_before(node, node, port), 1950, 2100);
+}
+#endif
 
 static void the_silence_counts_from_another_objects_last_use(void **)
 {
@@ -470,6 +527,11 @@ int main()
         TEST(a_request_on_a_line_that_is_never_silent_times_out),
         TEST(a_request_on_a_port_that_accepts_no_bytes_times_out),
         TEST(a_silence_is_kept_before_each_request),
+#if !defined(MODBUSMASTER_SHARE_LINE)
+        TEST(the_silence_follows_the_rate_that_the_port_tells),
+        TEST(a_rate_or_gap_that_the_sketch_sets_stays_whatever_the_port_tells),
+        TEST(a_hook_cannot_change_the_rate_by_begin),
+#endif
         TEST(the_silence_counts_from_another_objects_last_use),
         TEST(a_line_that_was_silent_for_long_enough_needs_no_wait),
         TEST(a_pause_between_two_objects_counts_as_silence),

@@ -108,8 +108,24 @@ public:
         if (attach(slave) == MBM_OK) {
             state.stream = &stream;
             beginLine();
+            state.forgetRate();
         }
     }
+
+#if !defined(MODBUSMASTER_SHARE_LINE)
+    /**
+     * As begin(slave, stream), for a port whose class has baudRate(), as those of the ESP8266 and
+     * the ESP32. The silence before a request is t3.5 of that rate then, as if you had called
+     * setBaudRate, unless you have called setBaudRate, setGap or begin(baud) for this
+     * object. Open the port first; call begin again after you have changed its rate.
+     */
+    template <typename Port, typename = decltype(static_cast<Port *>(nullptr)->baudRate())>
+    void begin(uint8_t slave, Port &port)
+    {
+        begin(slave, static_cast<Stream &>(port));
+        state.own.takeRate(port);
+    }
+#endif
 
 #if defined(MODBUSMASTER_SERIAL0)
     /**
@@ -291,9 +307,17 @@ public:
     // They are static only where objects share a line.
     // NOLINTBEGIN(readability-convert-member-functions-to-static)
     /** Bits per second, from which t3.5 follows; 0: unknown, a silence of 4 ms. The Stream stays as it is. */
-    void setBaudRate(uint32_t baud) { mbm_line_setBaudRate(line(), baud); }
+    void setBaudRate(uint32_t baud)
+    {
+        if (mbm_line_setBaudRate(line(), baud) == MBM_OK)
+            state.keepRate();
+    }
     /** Microseconds of silence before a request, instead of t3.5. */
-    void setGap(uint32_t us) { mbm_line_setGap(line(), us); }
+    void setGap(uint32_t us)
+    {
+        if (mbm_line_setGap(line(), us) == MBM_OK)
+            state.keepRate();
+    }
     /** Milliseconds from a broadcast to the next request; 100 at first. */
     void setTurnaroundDelay(uint32_t ms) { mbm_line_setTurnaroundDelay(line(), ms); }
     /** Milliseconds after a failed request before the next one is sent; 100 at first. */
@@ -374,8 +398,15 @@ private:
         mbm_node node;
         uint16_t response[responseWords];
         uint16_t transmit[transmitWords];
-#if !defined(MODBUSMASTER_SHARE_LINE)
+#if defined(MODBUSMASTER_SHARE_LINE)
+        // Several ports may share the line, so that of one object says nothing of its rate.
+        static void keepRate() {}
+        static void forgetRate() {}
+#else
         Line own;
+
+        void keepRate() { own.keepRate(); }
+        void forgetRate() { own.forgetRate(); }
 #endif
     };
 

@@ -112,6 +112,32 @@ public:
     static void keep() {}
     static void giveUp(mbm_node &node) { mbm_node_cancel(&node); }
     static void used() { ModbusMasterUse<void>::note(); }
+
+    // The sketch has set the gap, so no port changes it.
+    void keepRate()
+    {
+        isRateKept = true;
+        forget = nullptr;
+    }
+
+    // Takes over the bit rate that the open port tells; 0 if it is closed.
+    template <typename Port> void takeRate(Port &serial)
+    {
+        if (!isRateKept && mbm_line_setBaudRate(&wire.line, uint32_t(serial.baudRate())) == MBM_OK)
+            forget = mbm_line_setBaudRate;
+    }
+
+    // Forgets the rate of the port before.
+    void forgetRate()
+    {
+        if (forget != nullptr)
+            forget(&wire.line, 0);
+        forget = nullptr;
+    }
+
+private:
+    bool isRateKept;
+    uint8_t (*forget)(mbm_line *, uint32_t); // nullptr: no port has told a rate
 };
 #endif
 /** @endcond */
