@@ -75,9 +75,9 @@ misra: ## Run cppcheck, for C with its addon for MISRA C; docs/misra.md lists th
 	@scripts/check/misra
 
 .PHONY: spell
-spell: ## Look for misspelled and American words with codespell; scripts/check/spelling.txt has the exceptions
+spell: ## Look for misspelled and American words with codespell; .github/lint/spelling.txt has the exceptions
 	@scripts/need python3 python3-venv
-	@scripts/venv build/codespell scripts/check/spelling-requirements.txt
+	@scripts/venv build/codespell .github/lint/spelling-requirements.txt
 	@build/codespell/bin/python scripts/check/spell
 
 DENY = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cargo-deny 0.20.2 --no-default-features)
