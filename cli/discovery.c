@@ -4,6 +4,7 @@
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { LONGEST_STATE = 255, TOPIC_BYTES = 512, ID_BYTES = 300 };
@@ -62,6 +63,17 @@ static int is_several(const mbm_planField *planned)
     return !is_text(planned) && !device_is_part(planned) && planned->count > 1;
 }
 
+/* Whether its numbers have names, which Home Assistant shows. The numbers of an enumeration have no
+ * scale. */
+static int has_names(const device *of, uint16_t field)
+{
+    const device_field *one = &of->fields[field];
+    const mbm_planField *planned = &of->planned[field];
+
+    return one->label_count > 0 && one->form.scale.digits == 0 && !is_bit(planned) &&
+           !is_several(planned);
+}
+
 static const char *component_of(const device *of, uint16_t field)
 {
     const mbm_planField *planned = &of->planned[field];
@@ -74,6 +86,8 @@ static const char *component_of(const device *of, uint16_t field)
         return is_written && planned->count <= LONGEST_STATE ? "text" : "sensor";
     if (is_bit(planned))
         return is_written ? "switch" : "binary_sensor";
+    if (is_written && has_names(of, field))
+        return "select";
     return is_written ? "number" : "sensor";
 }
 
@@ -202,6 +216,64 @@ static const char *template_of(const mbm_planField *planned, int is_plain)
     return "{{ value_json.value }}";
 }
 
+/* --- the names of numbers --- */
+
+/* Writes a text as a literal of Jinja, which the literals of JSON are. */
+static void write_literal(FILE *out, const char *text)
+{
+    cJSON *string = cJSON_CreateString(text);
+    char *literal = cJSON_PrintUnformatted(string);
+
+    fputs(literal ? literal : "\"\"", out);
+    cJSON_free(literal);
+    cJSON_Delete(string);
+}
+
+/* Adds a template that finds the name of the number in a payload, or the number of a name. */
+static void add_names(cJSON *to, const char *key, const device_field *one, const char *before,
+                      const char *after, int is_by_name, int is_plain)
+{
+    char *text = NULL;
+    size_t length = 0;
+    FILE *out = open_memstream(&text, &length);
+    uint16_t i;
+
+    if (!out)
+        return;
+    fputs(before, out);
+    for (i = 0; i < one->label_count; i++) {
+        const device_label *label = &one->labels[i];
+
+        fputs(i == 0 ? "{" : ", ", out);
+        if (is_by_name)
+            write_literal(out, label->name);
+        else
+            fprintf(out, is_plain ? "\"%s\"" : "%s", label->number);
+        fputs(": ", out);
+        if (is_by_name)
+            fputs(label->number, out);
+        else
+            write_literal(out, label->name);
+    }
+    fputs(after, out);
+    if (fclose(out) == 0)
+        cJSON_AddStringToObject(to, key, text);
+    free(text);
+}
+
+static void add_options(cJSON *to, const device_field *one, const char *component)
+{
+    cJSON *list = cJSON_AddArrayToObject(to, "options");
+    uint16_t i;
+
+    for (i = 0; i < one->label_count; i++)
+        cJSON_AddItemToArray(list, cJSON_CreateString(one->labels[i].name));
+    if (strcmp(component, "sensor") == 0)
+        cJSON_AddStringToObject(to, "device_class", "enum");
+}
+
+/* --- state and command --- */
+
 static void add_state(cJSON *to, const discovery_line *line, const device *of, uint16_t field,
                       const char *component)
 {
@@ -212,7 +284,12 @@ static void add_state(cJSON *to, const discovery_line *line, const device *of, u
     if (field >= of->readable)
         return;
     add_topic(to, "state_topic", line, of->fields[field].name, "");
-    if (how)
+    if (has_names(of, field))
+        /* Home Assistant shows a number without a name as unknown. */
+        add_names(to, "value_template", &of->fields[field], "{{ ",
+                  line->is_plain ? "}.get(value) }}" : "}.get(value_json.value) }}", 0,
+                  line->is_plain);
+    else if (how)
         cJSON_AddStringToObject(to, "value_template", how);
     if (strcmp(component, "switch") == 0) {
         cJSON_AddStringToObject(to, "state_on", on);
@@ -234,6 +311,8 @@ static void add_command(cJSON *to, const discovery_line *line, const device *of,
     add_topic(to, "command_topic", line, one->name, "/set");
     if (strcmp(component, "number") == 0)
         add_range(to, one, planned);
+    else if (strcmp(component, "select") == 0)
+        add_names(to, "command_template", one, "{{ ", "}[value] }}", 1, 0);
     else if (strcmp(component, "switch") == 0) {
         cJSON_AddStringToObject(to, "payload_on", "ON");
         cJSON_AddStringToObject(to, "payload_off", "OFF");
@@ -261,10 +340,12 @@ char *discovery_config(const discovery_line *line, const device *of, uint16_t fi
     cJSON_AddStringToObject(root, "unique_id", id);
     add_state(root, line, of, field, component);
     add_command(root, line, of, field, component);
-    if (one->unit_of_measurement &&
-        (strcmp(component, "number") == 0 ||
-         (strcmp(component, "sensor") == 0 && !is_text(&of->planned[field]) &&
-          !is_several(&of->planned[field]))))
+    if (has_names(of, field))
+        add_options(root, one, component);
+    else if (one->unit_of_measurement &&
+             (strcmp(component, "number") == 0 ||
+              (strcmp(component, "sensor") == 0 && !is_text(&of->planned[field]) &&
+               !is_several(&of->planned[field]))))
         cJSON_AddStringToObject(root, "unit_of_measurement", one->unit_of_measurement);
     add_availability(root, line, of, &of->planned[field]);
     add_device(root, line, of, &of->planned[field]);

@@ -428,6 +428,8 @@ fields:
 - {name: serial, table: holding, address: 30, type: text, count: 16}
 - {name: phases, table: holding, address: 40, type: uint16, count: 3, unit_of_measurement: V}
 - {name: curve, table: holding, address: 50, type: uint16, count: 3, access: read-write}
+- {name: state, table: input, address: 60, type: uint16, unit_of_measurement: "-", enumeration: {0: off, 1: on, 7: "5\\" \u00bd"}}
+- {name: program, table: holding, address: 61, type: int16, enumeration: {-1: auto, 3: party}, access: read-write}
 - {name: reset, table: coils, address: 1, access: write}
 - {name: other, unit: 4, table: holding, address: 0, type: double, access: write}
 """
@@ -436,7 +438,8 @@ fields:
 COMMON = {"name": str, "unique_id": str, "availability": list, "availability_mode": str, "device": dict, "origin": dict,
           "state_topic": str, "value_template": str}
 SCHEMAS = {
-    "sensor": ({"unit_of_measurement": str}, {"state_topic"}),
+    "sensor": ({"unit_of_measurement": str, "device_class": str, "options": list}, {"state_topic"}),
+    "select": ({"command_topic": str, "command_template": str, "options": list}, {"command_topic", "options"}),
     "binary_sensor": ({"payload_on": str, "payload_off": str}, {"state_topic"}),
     "switch": ({"command_topic": str, "payload_on": str, "payload_off": str, "state_on": str, "state_off": str},
                {"command_topic"}),
@@ -487,7 +490,7 @@ def check_discovery(bench):
     expect("each field is there", {name: one[0] for name, one in components.items()} == {
         "flow": "sensor", "setpoint": "number", "energy": "number", "alarm": "binary_sensor", "pump/runs": "switch",
         "eco": "switch", "mode": "number", "label": "text", "serial": "sensor", "phases": "sensor", "curve": "text",
-        "reset": "switch", "other": "number"}, components)
+        "state": "sensor", "program": "select", "reset": "switch", "other": "number"}, components)
     expect("no identifier is there twice", len({config["unique_id"] for config in configs.values()}) == len(configs))
     get = lambda name, *keys: tuple(components[name][1].get(key) for key in keys)
     for found, wanted in (
@@ -503,13 +506,17 @@ def check_discovery(bench):
         (get("serial", "value_template"), ("{{ value_json.value or '' }}",)),
         (get("label", "max", "command_template"), (16, "{{ value | to_json }}")),
         (get("phases", "unit_of_measurement"), (None,)),
+        (get("state", "device_class", "options", "unit_of_measurement"), ("enum", ["off", "on", "5\" \u00bd"], None)),
+        (get("state", "value_template"), ('{{ {0: "off", 1: "on", 7: "5\\" \u00bd"}.get(value_json.value) }}',)),
+        (get("program", "options", "value_template", "command_template"),
+         (["auto", "party"], '{{ {-1: "auto", 3: "party"}.get(value_json.value) }}', '{{ {"auto": -1, "party": 3}[value] }}')),
         (get("flow", "availability"), ([{"topic": "hall/status"}, {"topic": "hall/unit/3/status"}],)),
         (get("other", "availability"), ([{"topic": "hall/status"}],)),
         (get("flow", "device"), ({"identifiers": ["mbm_hall_3"], "name": "heat pump unit 3", "model": "heat pump"},)),
     ):
         expect(f"{wanted}", found == wanted, found)
     # What Home Assistant publishes as these configs say is taken.
-    for topic, payload in (("pump/runs", "ON"), ("eco", "OFF"), ("setpoint", "21.5"), ("mode", "5"), ("label", '"hall 1"')):
+    for topic, payload in (("pump/runs", "ON"), ("eco", "OFF"), ("setpoint", "21.5"), ("mode", "5"), ("program", "-1"), ("label", '"hall 1"')):
         result(bench, subscriber, components[topic][1]["command_topic"].removesuffix("/set"), payload, "success")
     subscriber.expect_value("hall/label", "hall 1")
 
@@ -525,6 +532,8 @@ def check_discovery(bench):
     expect("what leaves is removed, and the rest stays", kept == wanted | {"homeassistant/sensor/hall/mode/config"}, kept)
     bridge.end()
     bridge = bench.bridge("--discovery", "homeassistant", "--discovery-prefix", "ha", "--plain", model.line, fields)
+    expect("the name of a number in a plain payload",
+           wait(lambda: '{\\"0\\": \\"off\\", ' in subscriber.last.get("ha/sensor/hall/state/config", "")))
     expect("another prefix, and plain payloads",
            wait(lambda: "state_on\":\"1\"" in subscriber.last.get("ha/switch/hall/pump_runs_%08x/config" % fnv("pump/runs"), "")))
     bridge.end()
