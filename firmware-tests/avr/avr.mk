@@ -30,6 +30,13 @@ check-sketches: need-avr library ## Sketches in the folder SKETCHES against the 
 	@scripts/need g++
 	@firmware-tests/avr/check-sketches "$(MODBUSMASTER)" "$(SKETCHES)" docs/reports/sketches.md
 
+# Not part of `make test` either, because the cores are not in the repository. docs/boards.md says which were tried.
+.PHONY: check-core
+check-core: library ## Examples with a real Arduino core: CORE, its tree in FOLDER; LIBRARIES, PROPERTIES as NAME=VALUE
+	@scripts/need python3 arduino-builder arduino-ctags gcc-avr avr-libc gcc-arm-none-eabi libnewlib-arm-none-eabi \
+	    libstdc++-arm-none-eabi-newlib gcc-xtensa-lx106
+	@scripts/check/core "$(CORE)" "$(FOLDER)" $(LIBRARIES) $(PROPERTIES)
+
 # --- sketches, each for the boards that a test runs it on
 
 AVR_OUT := $(BUILD)/avr
