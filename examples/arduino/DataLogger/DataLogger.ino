@@ -3,8 +3,9 @@
 // also prints each entry: seconds, mean, number of replies, number of failures.
 #include <ModbusClient.h>
 
-#if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
-#define BUS Serial // the only UART: disconnect the bus from it to upload
+#if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266) || \
+    defined(ARDUINO_ARCH_STM32)
+#define BUS Serial // there may be no other UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #define MESSAGES

@@ -4,7 +4,7 @@
 
 // The RS-485 module: DE and /RE at pin 2; RO (receives) and DI (sends) as below. Serial stays
 // free for messages.
-#if defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)
+#if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ARDUINO_ARCH_STM32)
 #include <SoftwareSerial.h>
 SoftwareSerial bus(10, 11); // RO, DI
 #elif defined(ESP8266)

@@ -2,8 +2,9 @@
 // transceiver drives the line only while the sketch sends a request.
 #include <ModbusMaster.h>
 
-#if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
-#define BUS Serial // the only UART: disconnect the bus from it to upload
+#if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266) || \
+    defined(ARDUINO_ARCH_STM32)
+#define BUS Serial // there may be no other UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #endif
