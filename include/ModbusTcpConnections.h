@@ -90,9 +90,21 @@ protected:
 private:
     static_assert(Connections >= 1 && Connections <= 16, "a server keeps 1 to 16 connections");
 
+    // accept returns each connection once. If a library lacks it, available returns each
+    // connection once, or any connection that has bytes to read.
+    template <typename Server> static auto next(Server &server, int) -> decltype(server.accept())
+    {
+        return server.accept();
+    }
+    template <typename Server>
+    static auto next(Server &server, long) -> decltype(server.available())
+    {
+        return server.available();
+    }
+
     // Declares the class of a connection. Never called.
     static Listener &someListener();
-    typedef decltype(someListener().available()) Link;
+    typedef decltype(next(someListener(), 0)) Link;
 
     struct Place {
         Link link;
@@ -116,17 +128,6 @@ private:
         derived().closed(index);
     }
 
-    // accept returns each connection once. If a library lacks it, available returns each
-    // connection once, or any connection that has bytes to read.
-    template <typename Server> static auto next(Server &server, int) -> decltype(server.accept())
-    {
-        return server.accept();
-    }
-    template <typename Server>
-    static auto next(Server &server, long) -> decltype(server.available())
-    {
-        return server.available();
-    }
     template <typename Server>
     static auto isKnown(Server &server, Place &, Link &, int) -> decltype(server.accept(), false)
     {

@@ -20,7 +20,8 @@ public:
         int fd = acceptFd();
         return fd >= 0 ? WiFiClient(fd) : WiFiClient();
     }
-    WiFiClient available() { return accept(); }
+    // As the real one: it is the old name of accept.
+    __attribute__((deprecated)) WiFiClient available() { return accept(); }
 };
 
 class WiFiClass {
