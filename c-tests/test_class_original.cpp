@@ -57,6 +57,45 @@ static void members_have_the_originals_types(void **)
     assert_int_equal(node.readInputRegisters(0, 258), ModbusMaster::ku8MBIllegalDataValue);
 }
 
+/* Found in sketches: a class that hides begin and getSlaveID, and a function that takes the object
+ * by value and has its constants as labels. */
+class Meter : public ModbusMaster {
+public:
+    Meter() : slave(0) {}
+    void begin(uint8_t which, Stream &stream)
+    {
+        slave = which;
+        ModbusMaster::begin(which, stream);
+    }
+    uint8_t getSlaveID() const { return slave; }
+
+private:
+    uint8_t slave;
+};
+
+static const char *said(ModbusMaster node, uint8_t result)
+{
+    switch (result) {
+    case node.ku8MBSuccess: return "success";
+    case node.ku8MBResponseTimedOut: return "late";
+    default: return "failure";
+    }
+}
+
+static void a_class_of_a_sketch_derives_from_the_class(void **)
+{
+    Meter meters[2];
+    meters[0].begin(4, Serial);
+    meters[1].begin(9, Serial);
+    meters[0].setResponseTimeout(1);
+    assert_string_equal(said(meters[0], meters[0].readInputRegisters(0, 1)), "late");
+    assert_sent(Serial, {4, 4, 0, 0, 0, 1});
+    assert_int_equal(meters[1].getSlaveID(), 9);
+    Serial.reply(adu({9, 4, 2, 0, 7}));
+    assert_string_equal(said(meters[1], meters[1].readInputRegisters(0, 1)), "success");
+    assert_int_equal(meters[1].getResponseBuffer(0), 7);
+}
+
 static void the_debug_pins_show_reads_and_idle_calls(void **)
 {
     static unsigned idles;
@@ -180,6 +219,7 @@ int main()
         TEST(crc16_update_computes_the_crc_of_a_frame),
         TEST(the_helpers_split_and_join_words),
         TEST(members_have_the_originals_types),
+        TEST(a_class_of_a_sketch_derives_from_the_class),
         TEST(the_debug_pins_show_reads_and_idle_calls),
         TEST(a_stream_that_returns_no_count_sends_each_request_once),
         TEST(a_stream_that_returns_no_count_sends_the_longest_request),
