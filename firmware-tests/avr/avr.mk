@@ -26,8 +26,8 @@ need-avr:
 
 # Not part of `make test`, because the sketches and that library are not in the repository.
 .PHONY: check-sketches
-check-sketches: need-avr library ## Sketches in the folder SKETCHES against the library in MODBUSMASTER and mbm
-	@scripts/need g++
+check-sketches: need-avr library ## Compile the sketches in the folder SKETCHES with the library in MODBUSMASTER and with mbm
+	@scripts/need gcc-xtensa-lx106 gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
 	@firmware-tests/avr/check-sketches "$(MODBUSMASTER)" "$(SKETCHES)" docs/reports/sketches.md
 
 # Not part of `make test` either, because the cores are not in the repository. docs/boards.md says which were tried.
