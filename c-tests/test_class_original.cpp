@@ -73,6 +73,7 @@ private:
     uint8_t slave;
 };
 
+// NOLINTNEXTLINE(performance-unnecessary-value-param): found sketches pass a copy
 static const char *said(ModbusMaster node, uint8_t result)
 {
     switch (result) {

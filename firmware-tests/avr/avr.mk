@@ -107,6 +107,15 @@ $(AVR_OUT)/$(1)/upstream-%.elf: $(SKETCHES)/upstream-% firmware-tests/avr/compil
 	@firmware-tests/avr/compile-sketch $(1) $$< $$@
 endef
 $(foreach board,$(UPSTREAM_BOARDS),$(eval $(call upstream,$(board))))
+# The same with ModbusMaster itself. Those of the manual for 0.9 need the release that they are of.
+define upstream-peer
+$(AVR_OUT)/$(1)/upstream-%-09.elf: $(SKETCHES)/upstream-%-09 firmware-tests/avr/compile-sketch
+	@MODBUSMASTER=$(MODBUSMASTER_09) firmware-tests/avr/compile-sketch $(1) $$< $$@
+$(AVR_OUT)/$(1)/upstream-%.elf: $(SKETCHES)/upstream-% firmware-tests/avr/compile-sketch
+	@firmware-tests/avr/compile-sketch $(1) $$< $$@
+endef
+$(eval $(call upstream-peer,uno-peer))
+$(eval $(call upstream-peer,mega-peer))
 
 # The code for avrxmega3 in a program for another chip, because no simulator has an avrxmega3.
 BARE := $(AVR_OUT)/avrxmega3/Bare.elf
@@ -144,13 +153,25 @@ firmware-test-avr: need-avr
 	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(AVR_TESTS)
 
 UPSTREAM_TEST := $(BUILD)/avr-tests/upstream
-$(UPSTREAM_TEST): $(BUILD)/avr-tests/upstream.o $(AVR_SUPPORT)
+UPSTREAM_WIRE := $(BUILD)/avr-tests/upstream_wire
+$(UPSTREAM_TEST) $(UPSTREAM_WIRE): %: %.o $(BUILD)/avr-tests/upstream_device.o $(AVR_SUPPORT)
 	@gcc $^ -lsimavr -lelf -lmodbus -lcmocka -lpthread -o $@
 .PHONY: firmware-test-upstream
 firmware-test-upstream: need-avr library-stamp ## The examples of ModbusMaster, in the folder SKETCHES, on simulated boards
 	@$(MAKE) -s --no-print-directory $(UPSTREAM_TEST) \
 		$(foreach board,$(UPSTREAM_BOARDS),$(UPSTREAM:%=$(AVR_OUT)/$(board)/%.elf))
 	@MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(UPSTREAM_TEST)
+
+.PHONY: compare-upstream
+compare-upstream: need-avr library-stamp ## The wire of ModbusMaster's examples, in SKETCHES, with MODBUSMASTER and MODBUSMASTER_09 and with mbm; writes docs/reports/timing.md
+	@$(MAKE) -s --no-print-directory $(UPSTREAM_WIRE) \
+		$(foreach board,uno mega uno-peer mega-peer,$(UPSTREAM:%=$(AVR_OUT)/$(board)/%.elf))
+	@for example in basic-2:2 phoenix-2:1 halfduplex-2:1 basic-09:2 phoenix-09:1; do \
+		$(UPSTREAM_WIRE) $${example%:*} $${example#*:} || exit 1; \
+	done >$(BUILD)/avr-tests/upstream.rows
+	@{ echo "| example | board | frames | bytes, the same | ms from one frame to the next, mbm | ModbusMaster |"; \
+		echo "|---|---|---|---|---|---|"; cat $(BUILD)/avr-tests/upstream.rows; } | scripts/fill docs/reports/timing.md upstream
+	@echo "compare-upstream: ten sketches put the same bytes on the wire with both libraries; docs/reports/timing.md has the times"
 
 .PHONY: timing
 timing: need-avr ## Measure bus timing, RAM and flash on a simulated Uno; writes docs/reports/timing.md

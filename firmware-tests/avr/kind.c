@@ -15,6 +15,9 @@ const kind atmega1284p = {"atmega1284p", "atmega1284p", '1', {'B', 5}, {'D', 2},
 const kind atmega328 = {"atmega328", "atmega328", '0', {'B', 5}, {'D', 2}, {'D', 4}};
 const kind atmega644 = {"atmega644", "atmega644", '0', {'B', 5}, {'D', 2}, {'D', 4}};
 
+const kind uno_peer = {"uno-peer", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
+const kind mega_peer = {"mega-peer", "atmega2560", '1', {'B', 7}, {'E', 4}, {'G', 5}};
+
 board *kind_start(const kind *k, const char *sketch)
 {
     char path[200];

@@ -18,6 +18,7 @@ typedef struct kind {
 
 extern const kind uno, minimal, relaxed, mega, relaxed_mega, older_mega, atmega644p, atmega1284p;
 extern const kind atmega328, atmega644; /* with one UART */
+extern const kind uno_peer, mega_peer;  /* sketches with the library ModbusMaster */
 
 /* Starts a board of this kind with a sketch. */
 board *kind_start(const kind *k, const char *sketch);

@@ -1,80 +1,23 @@
 /* The examples of ModbusMaster 2.0.1 and those of its manual for 0.9, as they are, on simulated
  * boards against a real libmodbus server. They are not part of this repository:
  * `make firmware-test-upstream` compiles them from a folder. */
-#include "crc.h"
 #include "kind.h"
-#include "peer.h"
 #include "test.h"
+#include "upstream_device.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 static const kind *const boards[] = {&uno, &mega, &atmega1284p};
-enum { BOARDS = COUNT(boards), ROUND = 13, EVERYTHING = 30000 };
-
-/* A server that has every address which the examples use, and what the board sent. */
-typedef struct device {
-    server peer;
-    uint8_t functions[ROUND], quantities[ROUND];
-    unsigned count; /* requests so far */
-    char text[500]; /* sent bytes that are no frame */
-    int driver;     /* the pin that switches the line's driver */
-    unsigned driven;
-} device;
-
-static void device_start(device *d, int unit)
-{
-    memset(d, 0, sizeof *d);
-    server_start(&d->peer, unit);
-    /* The server's thread looks at it with the first request. */
-    modbus_mapping_free(d->peer.mapping);
-    d->peer.mapping = modbus_mapping_new(EVERYTHING, EVERYTHING, EVERYTHING, EVERYTHING);
-    assert_non_null(d->peer.mapping);
-    for (unsigned i = 0; i < EVERYTHING; i++)
-        d->peer.mapping->tab_registers[i] = server_pattern(i);
-}
-
-/* Refuses 66 registers, as the controller does that the example is for. */
-static void refuse(wire *w, const uint8_t *frame)
-{
-    uint8_t reply[5] = {frame[0], (uint8_t)(frame[1] | 0x80), 2};
-
-    wire_play(w, MS, reply, seal(reply, 3));
-}
-
-static void hear(wire *w, const uint8_t *frame, size_t length)
-{
-    device *d = w->context;
-    size_t have = strlen(d->text);
-
-    if (length < 4 || crc16(frame, length) != 0) {
-        if (have + length < sizeof d->text)
-            memcpy(d->text + have, frame, length);
-        return;
-    }
-    if (d->count < ROUND) {
-        d->functions[d->count] = frame[1];
-        d->quantities[d->count] = frame[5];
-    }
-    d->count++;
-    d->driven += !d->driver;
-    if (frame[1] == 3 && frame[5] == 66) {
-        refuse(w, frame);
-        return;
-    }
-    w->context = &d->peer;
-    peer_libmodbus(w, frame, length);
-    w->context = d;
-}
+enum { BOARDS = COUNT(boards) };
 
 static void basic(const kind *k, const char *sketch)
 {
     board *b = kind_start(k, sketch);
-    device d;
+    upstream_device d;
     unsigned rounds;
 
-    device_start(&d, 2);
-    board_uart(b, '0', hear, &d);
+    upstream_device_start(&d, 2);
+    board_uart(b, '0', upstream_hear, &d);
     assert_true(board_run(b, 700 * MS));
     rounds = d.count / 2;
     /* Any round that failed would have taken two seconds. */
@@ -89,16 +32,17 @@ static void basic(const kind *k, const char *sketch)
 
 static void phoenix_contact(const kind *k, const char *sketch)
 {
-    static const uint8_t functions[ROUND] = {0x17, 6, 6, 16, 1, 3, 3, 3, 3, 3, 3, 3, 4};
-    static const uint8_t quantities[ROUND] = {4, 1, 0, 2, 17, 66, 64, 8, 64, 64, 64, 64, 8};
+    static const uint8_t functions[UPSTREAM_ROUND] = {0x17, 6, 6, 16, 1, 3, 3, 3, 3, 3, 3, 3, 4};
+    static const uint8_t quantities[UPSTREAM_ROUND] = {4, 1,  0,  2,  17, 66, 64,
+                                                       8, 64, 64, 64, 64, 8};
     board *b = kind_start(k, sketch);
-    device d;
+    upstream_device d;
 
-    device_start(&d, 1);
-    board_uart(b, '0', hear, &d);
-    while (d.count < ROUND)
+    upstream_device_start(&d, 1);
+    board_uart(b, '0', upstream_hear, &d);
+    while (d.count < UPSTREAM_ROUND)
         assert_true(board_run(b, MS));
-    for (unsigned i = 0; i < ROUND; i++) {
+    for (unsigned i = 0; i < UPSTREAM_ROUND; i++) {
         assert_int_equal(d.functions[i], functions[i]);
         assert_int_equal(d.quantities[i], quantities[i]);
     }
@@ -115,7 +59,7 @@ static void phoenix_contact(const kind *k, const char *sketch)
 
 static void driver_switched(void *context, int level, uint64_t cycle)
 {
-    device *d = context;
+    upstream_device *d = context;
 
     (void)cycle;
     d->driver = level;
@@ -124,12 +68,12 @@ static void driver_switched(void *context, int level, uint64_t cycle)
 static void half_duplex(const kind *k, const char *sketch)
 {
     board *b = kind_start(k, sketch);
-    device d;
+    upstream_device d;
 
-    device_start(&d, 1);
+    upstream_device_start(&d, 1);
     d.peer.mapping->tab_input_registers[0x3104] = 1345;
     board_watch_pin(b, k->pin2.port, k->pin2.bit, driver_switched, &d);
-    board_uart(b, '0', hear, &d);
+    board_uart(b, '0', upstream_hear, &d);
     assert_true(board_run(b, 500 * MS));
     assert_int_equal(d.count, 2);
     assert_int_equal(d.peer.mapping->tab_bits[2], 1);
