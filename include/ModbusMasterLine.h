@@ -108,6 +108,8 @@ public:
     ModbusMasterWire<User> wire;
     mbm_port port;
     uint8_t frame[Bytes];
+    bool isRateKept;
+    uint8_t (*forget)(mbm_line *, uint32_t); // nullptr: no port has told a rate
 
     static void keep() {}
     static void giveUp(mbm_node &node) { mbm_node_cancel(&node); }
@@ -134,10 +136,6 @@ public:
             forget(&wire.line, 0);
         forget = nullptr;
     }
-
-private:
-    bool isRateKept;
-    uint8_t (*forget)(mbm_line *, uint32_t); // nullptr: no port has told a rate
 };
 #endif
 /** @endcond */
