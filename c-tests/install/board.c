@@ -1,23 +1,18 @@
-/* A board for the README's program. Unit 17 is a part of the board's memory and has 0x1234
- * in register 2. The board checks what the program sends, byte by byte. */
+/* A board for the README's program. Unit 17 is a part of the board's memory and has two registers
+ * from 107 on. The board checks what the program sends, byte by byte. */
 #include "crc.h"
+#include "mbm.h"
 
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 
-int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity);
-int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length);
-uint32_t clock_micros(void *context);
-void show(uint16_t value);
-void setup(void);
-void loop(void);
+uint8_t read_meter(void);
 
-static uint8_t asked[8], reply[17];
+static uint8_t asked[8], reply[9];
 static size_t asked_length, sent;
-static int shown;
 
-int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
+static int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     uint16_t taken = 0;
 
@@ -27,16 +22,16 @@ int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
     return (int16_t)taken;
 }
 
-int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
+static int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    static const uint8_t expected[6] = {17, 3, 0, 2, 0, 6};
+    static const uint8_t expected[6] = {17, 3, 0, 107, 0, 2};
 
     (void)context;
     if (asked_length < sizeof asked || memcmp(asked, expected, sizeof expected) != 0 ||
         crc16(asked, sizeof asked) != 0 || sent == sizeof reply || capacity == 0)
         return 0;
     if (sent == 0) {
-        static const uint8_t head[5] = {17, 3, 12, 0x12, 0x34};
+        static const uint8_t head[5] = {17, 3, 4, 0x12, 0x34};
 
         memcpy(reply, head, sizeof head);
         seal(reply, sizeof reply - 2);
@@ -45,7 +40,7 @@ int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
     return 1;
 }
 
-uint32_t clock_micros(void *context)
+static uint32_t clock_micros(void *context)
 {
     struct timespec now;
 
@@ -54,15 +49,13 @@ uint32_t clock_micros(void *context)
     return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
 }
 
-void show(uint16_t value)
-{
-    shown = value == 0x1234;
-    printf("register 2: 0x%04X\n", value);
-}
+const mbm_port uart = {.read = uart_read, .write = uart_write, .micros = clock_micros};
 
 int main(void)
 {
-    setup();
-    loop();
-    return shown ? 0 : 1;
+    const uint8_t status = read_meter();
+
+    printf("%u bytes asked, %u answered: %s\n", (unsigned)asked_length, (unsigned)sent,
+           mbm_status_text(status));
+    return status == MBM_OK ? 0 : 1;
 }

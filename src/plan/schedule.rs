@@ -112,7 +112,6 @@ fn is_silence(status: Status) -> bool {
 /// A read without an answer waits as `backoff` says. After two reads of one unit in a row
 /// without an answer all its reads wait, with this status, and then it is tried with one read
 /// at a time. The first answer lifts that.
-#[cfg_attr(target_os = "none", inline(never))]
 pub fn end(reads: &[Read], read: &Read, status: Status, now: u32, backoff: &Backoff) {
     let mut flags = read.flags.get() & !QUEUED | NEWS;
     if status == Status::OK {

@@ -41,6 +41,7 @@ struct Found<'a> {
 ///
 /// # Safety
 /// `plan` is NULL or storage of a plan.
+#[inline(always)]
 unsafe fn find(plan: *const mbm_plan, field: u16, found: &mut MaybeUninit<Found>) -> Status {
     // SAFETY: as the caller promises. Every field has a position and a read.
     unsafe {
