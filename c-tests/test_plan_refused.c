@@ -274,11 +274,47 @@ static void a_table_that_is_not_grouped_as_the_counts_say_is_refused(void **stat
 #undef TRY
 }
 
+static void a_wrong_field_of_a_grouped_table_is_named(void **state)
+{
+    static const uint16_t counts[] = {1, 2};
+    uint16_t field = 77;
+    mbm_planField *last;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 0);
+    add(MBM_TYPE_UINT16, 20);
+    last = add(MBM_TYPE_UINT16, 21);
+    d.setup.readCount = 2;
+#define NAMES(status)                                                                              \
+    do {                                                                                           \
+        REFUSED(status, d.plan,                                                                    \
+                mbm_plan_beginGrouped(&d.plan, &d.client, &d.setup, counts, &field));              \
+        assert_int_equal(field, 2);                                                                \
+    } while (0)
+    last->unit = 0;
+    NAMES(MBM_BROADCAST_NOT_ALLOWED);
+    last->unit = 257; /* not 1 */
+    NAMES(MBM_INVALID_ARGUMENT);
+    last->unit = 2;
+    NAMES(MBM_INVALID_ARGUMENT);
+    last->unit = 1;
+    last->table = 5;
+    NAMES(MBM_INVALID_ARGUMENT);
+    last->table = HOLDING;
+    last->type = 99;
+    NAMES(MBM_INVALID_ARGUMENT);
+    last->type = MBM_TYPE_UINT32;
+    last->address = 0xFFFF;
+    NAMES(MBM_ILLEGAL_DATA_ADDRESS);
+#undef NAMES
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(a_wrong_field_is_named, rtu),
         cmocka_unit_test_setup(a_table_that_is_not_grouped_as_the_counts_say_is_refused, rtu),
+        cmocka_unit_test_setup(a_wrong_field_of_a_grouped_table_is_named, rtu),
         cmocka_unit_test_setup(a_setup_that_is_not_complete_is_refused, rtu),
         cmocka_unit_test_setup(limits_and_ranges_of_a_unit_above_255_are_refused, rtu),
         cmocka_unit_test_setup(what_was_never_begun_is_refused, rtu),

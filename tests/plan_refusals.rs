@@ -168,7 +168,7 @@ fn a_field_that_does_not_fit_into_its_read_is_refused_with_its_index() {
         |field| field.address = 225,
         |field| field.address = 99,
         |field| (field.address, field.value_type) = (99, DOUBLE),
-        |field| (field.address, field.value_type) = (223, UINT32 + 2),
+        |field| (field.address, field.value_type) = (223, DOUBLE),
         |field| field.interval_ms = 999,
         |field| field.unit = 2,
         |field| field.table = INPUT_REGISTERS,
@@ -186,7 +186,7 @@ fn a_field_that_does_not_fit_into_its_read_is_refused_with_its_index() {
 fn a_field_longer_than_a_read_is_refused_in_groups_too() {
     let long = Field {
         value_type: DOUBLE,
-        count: u16::MAX,
+        count: 32,
         ..field(0)
     };
     let refusal = taken(&[field(0), long], &[1, 1], 2, u16::MAX).expect_err("a refusal");

@@ -1,5 +1,7 @@
 //! A field of the table, and what is wrong with it.
 
+use crate::error::Status;
+
 /// The tables of the data model (V1.1b3, 4.3). Each number is the function that reads it.
 pub const COILS: u8 = 1;
 /// The discrete inputs.
@@ -75,6 +77,32 @@ impl Field {
         multiplier: 0,
         divisor: 0,
     };
+
+    /// Checks the field by itself: [`Status::OK`]; [`Status::INVALID_ARGUMENT`] for an unknown
+    /// table, type or order, a type that the table does not have, bits beyond those of a register,
+    /// a unit above 255, an interval out of range, a negative divisor, or a scale of a text;
+    /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
+    /// field goes beyond address 65535.
+    pub(super) fn check(&self) -> Status {
+        let known = self.table.wrapping_sub(1) < INPUT_REGISTERS
+            && self.value_type.wrapping_sub(1) < TEXT
+            && (self.value_type == BIT || !self.is_in_bits())
+            && u32::from(self.bit) + self.bits() <= u16::BITS
+            && self.order <= 4
+            && self.unit <= u8::MAX.into()
+            && self.divisor >= 0
+            && (self.value_type != TEXT || self.multiplier | self.divisor == 0)
+            && self.interval_ms.wrapping_sub(1) < LONGEST_INTERVAL_MS;
+        if !known {
+            Status::INVALID_ARGUMENT
+        } else if self.unit == 0 {
+            Status::BROADCAST_NOT_ALLOWED
+        } else if self.end() > 0x1_0000 {
+            Status::ILLEGAL_DATA_ADDRESS
+        } else {
+            Status::OK
+        }
+    }
 
     /// The number of values, of a text of characters, of bits of a register of these; at least 1.
     pub const fn count(&self) -> u16 {

@@ -66,15 +66,14 @@ pub fn group<L: ReadLimits>(
 
 /// As [`group`], for fields that were grouped before: the fields of a read stand side by side in
 /// `fields`, the one with the lowest address first, and `counts` says how many each read has.
-/// Only the standard limits what a read requests. The fields are not checked by themselves:
-/// [`group`] has accepted them. Returns the number of reads.
+/// Only the standard limits what a read requests. Returns the number of reads.
 ///
 /// # Errors
-/// [`Status::INVALID_ARGUMENT`] for a field that does not fit into its read: it differs from the
-/// first one in unit, table or interval, has a lower address, or makes the read too long; without
+/// Those of a field by itself and [`Status::BUFFER_TOO_SMALL`] as [`group`].
+/// [`Status::INVALID_ARGUMENT`] also for a field that does not fit into its read: it differs from
+/// the first one in unit, table or interval, has a lower address, or makes the read too long; without
 /// a field at fault if a count is 0 or the counts do not add up to the fields.
-/// [`Status::BUFFER_TOO_SMALL`] as [`group`], and without a field at fault for fewer `reads` than
-/// counts.
+/// [`Status::BUFFER_TOO_SMALL`] without a field at fault for fewer `reads` than counts.
 pub fn take_groups(
     fields: &[Field],
     counts: &[u16],
@@ -96,6 +95,10 @@ pub fn take_groups(
         };
         let mut quantity = 0;
         for (place, (field, position)) in (start..).zip(own.iter().zip(places)) {
+            let status = field.check();
+            if status != Status::OK {
+                return refused(status, place);
+            }
             // Another unit or table, and a lower address, are further away than any read is long.
             let distance = field.place().wrapping_sub(first.place());
             let length = distance.wrapping_add(field.length());

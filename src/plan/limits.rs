@@ -1,6 +1,6 @@
 //! What a read may be: how long, over which gaps, and where not.
 
-use super::field::{place, Field, BIT, INPUT_REGISTERS, LONGEST_INTERVAL_MS, TEXT};
+use super::field::{place, Field};
 use crate::error::Status;
 use crate::pdu::limits::{MAX_READ_BITS, MAX_READ_REGISTERS};
 
@@ -54,30 +54,15 @@ pub trait ReadLimits {
     /// Addresses that no read may touch.
     fn excluded(&self) -> &[ExcludedRange];
 
-    /// Checks a field by itself: [`Status::OK`]; [`Status::INVALID_ARGUMENT`] for an unknown
-    /// table, type or order, a type that the table does not have, bits beyond those of a register,
-    /// a unit above 255, an interval out of range, a negative divisor, or a scale of a text;
-    /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
-    /// field goes beyond address 65535 or into an excluded range;
-    /// [`Status::ILLEGAL_DATA_VALUE`] if one read cannot hold it.
+    /// As [`Field::check`]; [`Status::ILLEGAL_DATA_ADDRESS`] also if the field goes into an excluded
+    /// range; [`Status::ILLEGAL_DATA_VALUE`] if one read cannot hold it.
     fn check(&self, field: &Field) -> Status {
-        let length = field.length();
-        let known = field.table.wrapping_sub(1) < INPUT_REGISTERS
-            && field.value_type.wrapping_sub(1) < TEXT
-            && (field.value_type == BIT || !field.is_in_bits())
-            && u32::from(field.bit) + field.bits() <= u16::BITS
-            && field.order <= 4
-            && field.unit <= u8::MAX.into()
-            && field.divisor >= 0
-            && (field.value_type != TEXT || field.multiplier | field.divisor == 0)
-            && field.interval_ms.wrapping_sub(1) < LONGEST_INTERVAL_MS;
-        if !known {
-            Status::INVALID_ARGUMENT
-        } else if field.unit == 0 {
-            Status::BROADCAST_NOT_ALLOWED
-        } else if field.end() > 0x1_0000 || self.excludes(field.place(), field.end_place()) {
+        let status = field.check();
+        if status != Status::OK {
+            status
+        } else if self.excludes(field.place(), field.end_place()) {
             Status::ILLEGAL_DATA_ADDRESS
-        } else if length > self.longest_read(field) {
+        } else if field.length() > self.longest_read(field) {
             Status::ILLEGAL_DATA_VALUE
         } else {
             Status::OK

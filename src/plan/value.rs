@@ -65,8 +65,7 @@ impl Words<'_> {
             raw = raw.swap_bytes().rotate_left(16);
         }
         if field.value_type == BIT {
-            let mask = 1u32.wrapping_shl(field.count().into()).wrapping_sub(1);
-            (raw >> 16).wrapping_shr(field.bit.into()) & mask
+            raw >> (16 + field.bit) & ((1 << field.count()) - 1)
         } else if field.value_shift() == 0 {
             raw >> 16
         } else if self.low_word_first() {

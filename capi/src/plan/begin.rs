@@ -57,7 +57,7 @@ pub unsafe extern "C" fn mbm_plan_begin(
 }
 
 /// As mbm_plan_begin, for fields that were grouped before: `mbm header` writes such a table. A
-/// program that calls only this function does not contain the code that groups fields, half of
+/// program that calls only this function does not contain the code that groups fields, a quarter of
 /// a plan.
 ///
 /// The fields of a read stand side by side in `setup->fields`, the one with the lowest address
@@ -70,10 +70,10 @@ pub unsafe extern "C" fn mbm_plan_begin(
 /// @param counts  how many fields each read has: `setup->readCount` numbers, each at least 1,
 ///                `setup->fieldCount` in total; used during the call
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
-/// @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not belong to the
-///         first one of its read, and for counts with another total;
-///         MBM_ILLEGAL_DATA_VALUE for a field with which its read is longer than 125 registers or
-///         2000 bits
+/// @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not fit into its read:
+///         it differs from the first one in unit, table or interval, has a lower address, or makes
+///         the read longer than 125 registers or 2000 bits; and for counts of 0 or with another
+///         total
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_beginGrouped(
     plan: *mut mbm_plan,
