@@ -83,7 +83,7 @@ impl Field {
     /// a unit above 255, an interval out of range, a negative divisor, or a scale of a text;
     /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
     /// field goes beyond address 65535.
-    pub(super) fn check(&self) -> Status {
+    pub fn check(&self) -> Status {
         let known = self.table.wrapping_sub(1) < INPUT_REGISTERS
             && self.value_type.wrapping_sub(1) < TEXT
             && (self.value_type == BIT || !self.is_in_bits())
