@@ -1,7 +1,7 @@
 //! Division for processors without: a Cortex-M0+ lacks it, and so does the client.
 
 /// Divides, rounded down.
-pub(super) fn quotient(mut dividend: u32, divisor: u32) -> u32 {
+pub fn quotient(mut dividend: u32, divisor: u32) -> u32 {
     let mut result = 0;
     for shift in (0..u32::BITS).rev() {
         if dividend >> shift >= divisor {

@@ -110,12 +110,10 @@ pub fn take_groups(
             position.field = place as u16;
             position.sum_or_read = index as i32;
         }
-        read.set_up(first, start..end, quantity, offset);
-        let own = read.words();
-        if own > words.wrapping_sub(offset) {
+        let Some(next) = read.set_up(first, (start, end - 1), quantity, offset, words) else {
             return refused(Status::BUFFER_TOO_SMALL, start);
-        }
-        offset += own;
+        };
+        offset = next;
         start = end;
     }
     if start == 0 || start != fields.len() {
@@ -299,13 +297,10 @@ impl<'a, L: ReadLimits> Table<'a, L> {
                 let field = self.field_index(position).into();
                 self.set_sum(field, count as i32);
             }
-            let positions = start..usize::from(last) + 1;
-            read.set_up(first, positions, quantity as u16, offset);
-            let own = read.words();
-            if own > words.wrapping_sub(offset) {
-                return Err(start);
-            }
-            offset = offset.wrapping_add(own);
+            let positions = (start, last.into());
+            offset = read
+                .set_up(first, positions, quantity as u16, offset, words)
+                .ok_or(start)?;
             start = usize::from(last) + 1;
             count += 1;
         }

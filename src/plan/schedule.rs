@@ -28,11 +28,6 @@ pub fn until(time: u32, now: u32) -> u32 {
     time.wrapping_sub(now).cast_signed().max(0).cast_unsigned()
 }
 
-/// Whole milliseconds in `micros` microseconds.
-pub fn millis(micros: u32) -> u32 {
-    quotient(micros, 1000)
-}
-
 /// Makes every read due at once, and spreads the following rounds: the reads of one interval
 /// are due one after the other, at equal distances.
 pub fn start(reads: &[Read], now: u32) {

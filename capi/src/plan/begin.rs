@@ -105,7 +105,7 @@ unsafe fn begin(
 ) -> u8 {
     let mut wrong = u16::MAX;
     // SAFETY: as the caller promises. Nothing uses the storage of a plan that is not begun.
-    let begin = || unsafe {
+    let attempt = || unsafe {
         if plan.is_null() {
             return Status::INVALID_ARGUMENT;
         }
@@ -149,7 +149,7 @@ unsafe fn begin(
     };
     // SAFETY: `field` is NULL or what the header says.
     unsafe {
-        let status = begin();
+        let status = attempt();
         pointers::put(field, wrong);
         status.code()
     }

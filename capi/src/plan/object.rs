@@ -6,6 +6,7 @@ use crate::client::{self, mbm_client};
 use crate::pointers::{self, CObject};
 use core::slice::from_raw_parts;
 use mbm::error::Status;
+use mbm::plan::divide::quotient;
 use mbm::plan::{schedule, Read};
 
 /// What lies behind an `mbm_plan`.
@@ -98,7 +99,7 @@ pub(super) unsafe fn time(object: *mut Object) -> u32 {
         if pointers::check(client) == Status::OK {
             let passed = mbm::time::elapsed(client::clock(client), (*object).micros);
             if passed >= 1000 {
-                let millis = schedule::millis(passed);
+                let millis = quotient(passed, 1000);
                 (*object).micros = (*object).micros.wrapping_add(millis * 1000);
                 (*object).millis = (*object).millis.wrapping_add(millis);
             }
