@@ -2,6 +2,7 @@
  * That library sorts the fields of a unit by address and begins a request where the limit or an
  * excluded range demands it, whatever lies between the fields. */
 #include "mbm.h"
+#include "memory_port.h"
 #include "test.h"
 
 enum { MOST = 1000, FIRST_EXCLUDED = 300, LAST_EXCLUDED = 319, NEAR_EXCLUDED = 280 };
@@ -14,29 +15,6 @@ static const struct {
 };
 
 static uint32_t state;
-
-/* No request is sent. */
-static int16_t no_bytes(void *context, uint8_t *bytes, uint16_t count)
-{
-    (void)context;
-    (void)bytes;
-    (void)count;
-    return 0;
-}
-
-static int16_t no_room(void *context, const uint8_t *bytes, uint16_t count)
-{
-    (void)context;
-    (void)bytes;
-    (void)count;
-    return 0;
-}
-
-static uint32_t no_time(void *context)
-{
-    (void)context;
-    return 0;
-}
 
 /* As `below` in grouping/main.go. */
 static uint32_t below(uint32_t limit)
@@ -115,7 +93,8 @@ static void a_plan_needs_no_request_more_than_go_modbus_client(void **unused)
                                .registerGap = 0xFFFF,
                                .bitGap = 0xFFFF};
         uint8_t frame[MBM_MAX_TCP_FRAME], reply[MBM_MAX_TCP_FRAME];
-        const mbm_port port = {.read = no_bytes, .write = no_room, .micros = no_time};
+        memory_port memory = {0};
+        const mbm_port port = memory_port_of(&memory);
         mbm_clientRequest request = MBM_INIT;
         mbm_client client = MBM_INIT;
         mbm_plan plan = MBM_INIT;

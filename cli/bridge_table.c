@@ -3,6 +3,7 @@
 
 #include "broker.h"
 #include "report.h"
+#include "trial.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -83,40 +84,13 @@ static int make_storage(bridge_table *table, uint8_t register_gap)
     return table->last && setup->positions && setup->reads && setup->data && setup->requests;
 }
 
-static uint32_t no_micros(void *context)
-{
-    (void)context;
-    return 0;
-}
-
-static int16_t no_read(void *context, uint8_t *bytes, uint16_t capacity)
-{
-    (void)context;
-    (void)bytes;
-    (void)capacity;
-    return 0;
-}
-
-static int16_t no_write(void *context, const uint8_t *bytes, uint16_t length)
-{
-    (void)context;
-    (void)bytes;
-    (void)length;
-    return 0;
-}
-
-/* Tries the plan on a client without a line. Returns an exit code. */
+/* Tries the plan. Returns an exit code. */
 static int try_plan(const bridge_table *table, const char *path, char wrong[DEVICE_WRONG_BYTES])
 {
-    static const mbm_port nowhere = {.read = no_read, .write = no_write, .micros = no_micros};
-    static mbm_client client = MBM_INIT;
-    static uint8_t frame[MBM_MAX_FRAME];
     static mbm_plan plan = MBM_INIT;
     uint16_t field;
-    uint8_t status;
+    const uint8_t status = trial_begin(&plan, &table->setup, &field);
 
-    (void)mbm_client_beginRtuOverTcp(&client, &nowhere, frame, sizeof frame);
-    status = mbm_plan_begin(&plan, &client, &table->setup, &field);
     (void)mbm_plan_end(&plan);
     if (status == MBM_OK)
         return CODE_DONE;

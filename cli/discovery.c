@@ -229,9 +229,12 @@ static void write_literal(FILE *out, const char *text)
     cJSON_Delete(string);
 }
 
-/* Adds a template that finds the name of the number in a payload, or the number of a name. */
-static void add_names(cJSON *to, const char *key, const device_field *one, const char *before,
-                      const char *after, int is_by_name, int is_plain)
+/* Which of the two a template looks up: a number, as JSON or as a text, or a name. */
+typedef enum lookup { BY_NUMBER, BY_TEXT, BY_NAME } lookup;
+
+/* Adds a template that looks up the other one, from a table of both and the `end` that uses it. */
+static void add_names(cJSON *to, const char *key, const device_field *one, lookup by,
+                      const char *end)
 {
     char *text = NULL;
     size_t length = 0;
@@ -240,22 +243,20 @@ static void add_names(cJSON *to, const char *key, const device_field *one, const
 
     if (!out)
         return;
-    fputs(before, out);
+    fputs("{{ {", out);
     for (i = 0; i < one->label_count; i++) {
         const device_label *label = &one->labels[i];
 
-        fputs(i == 0 ? "{" : ", ", out);
-        if (is_by_name)
+        fputs(i == 0 ? "" : ", ", out);
+        if (by == BY_NAME) {
             write_literal(out, label->name);
-        else
-            fprintf(out, is_plain ? "\"%s\"" : "%s", label->number);
-        fputs(": ", out);
-        if (is_by_name)
-            fputs(label->number, out);
-        else
+            fprintf(out, ": %s", label->number);
+        } else {
+            fprintf(out, by == BY_TEXT ? "\"%s\": " : "%s: ", label->number);
             write_literal(out, label->name);
+        }
     }
-    fputs(after, out);
+    fprintf(out, "}%s }}", end);
     if (fclose(out) == 0)
         cJSON_AddStringToObject(to, key, text);
     free(text);
@@ -286,9 +287,8 @@ static void add_state(cJSON *to, const discovery_line *line, const device *of, u
     add_topic(to, "state_topic", line, of->fields[field].name, "");
     if (has_names(of, field))
         /* Home Assistant shows a number without a name as unknown. */
-        add_names(to, "value_template", &of->fields[field], "{{ ",
-                  line->is_plain ? "}.get(value) }}" : "}.get(value_json.value) }}", 0,
-                  line->is_plain);
+        add_names(to, "value_template", &of->fields[field], line->is_plain ? BY_TEXT : BY_NUMBER,
+                  line->is_plain ? ".get(value)" : ".get(value_json.value)");
     else if (how)
         cJSON_AddStringToObject(to, "value_template", how);
     if (strcmp(component, "switch") == 0) {
@@ -312,7 +312,7 @@ static void add_command(cJSON *to, const discovery_line *line, const device *of,
     if (strcmp(component, "number") == 0)
         add_range(to, one, planned);
     else if (strcmp(component, "select") == 0)
-        add_names(to, "command_template", one, "{{ ", "}[value] }}", 1, 0);
+        add_names(to, "command_template", one, BY_NAME, "[value]");
     else if (strcmp(component, "switch") == 0) {
         cJSON_AddStringToObject(to, "payload_on", "ON");
         cJSON_AddStringToObject(to, "payload_off", "OFF");

@@ -7,6 +7,7 @@
 #include "commands.h"
 #include "options.h"
 #include "report.h"
+#include "trial.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -130,27 +131,6 @@ static int find_scales(header *h)
 
 /* --- the plan --- */
 
-static int16_t read_nothing(void *context, uint8_t *bytes, uint16_t capacity)
-{
-    (void)context;
-    (void)bytes;
-    (void)capacity;
-    return 0;
-}
-
-static int16_t write_nothing(void *context, const uint8_t *bytes, uint16_t length)
-{
-    (void)context;
-    (void)bytes;
-    return (int16_t)length;
-}
-
-static uint32_t no_time(void *context)
-{
-    (void)context;
-    return 0;
-}
-
 /* Whether a read covers a field, and nothing of it is elsewhere. */
 static int covers(const mbm_planReadInfo *read, const mbm_planField *field)
 {
@@ -210,18 +190,13 @@ static int note_reads(header *h, const mbm_plan *plan)
 
 /* Begins a plan, as firmware does, and notes its reads. Returns CODE_DONE, or another exit code
  * after reporting the reason. */
-static int begin_plan(header *h, mbm_planSetup *setup)
+static int begin_plan(header *h, const mbm_planSetup *setup)
 {
-    static const mbm_port port = {.read = read_nothing, .write = write_nothing, .micros = no_time};
-    static uint8_t frame[MBM_MAX_FRAME];
-    static mbm_client client;
     static mbm_plan plan;
-    uint16_t wrong = 0xFFFF;
-    uint8_t status = mbm_client_beginRtu(&client, &port, frame, sizeof frame);
+    uint16_t wrong;
+    const uint8_t status = trial_begin(&plan, setup, &wrong);
     int is_noted;
 
-    if (status == MBM_OK)
-        status = mbm_plan_begin(&plan, &client, setup, &wrong);
     if (status == MBM_BUFFER_TOO_SMALL && wrong < meter.readable)
         return report(CODE_WRONG, "%s:%d: the fields up to here take more than 65535 words of data",
                       h->path, meter.fields[wrong].line);
