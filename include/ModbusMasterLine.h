@@ -109,7 +109,9 @@ public:
     mbm_port port;
     uint8_t frame[Bytes];
     bool isRateKept;
-    uint8_t (*forget)(mbm_line *, uint32_t); // nullptr: no port has told a rate
+    // mbm_line_setBaudRate once a port has told its rate, else nullptr. A program whose ports tell
+    // none does not contain that function.
+    uint8_t (*forget)(mbm_line *, uint32_t);
 
     static void keep() {}
     static void giveUp(mbm_node &node) { mbm_node_cancel(&node); }

@@ -9,6 +9,18 @@
 #endif
 #include "client.h"
 
+#ifdef GROUPED
+enum { READS = 4 };
+
+static const uint16_t counts[READS] = {6, 2, 1, 1};
+
+#define BEGIN(plan) mbm_plan_beginGrouped((plan), &client, &setup, counts, NULL)
+#else
+enum { READS = 10 };
+
+#define BEGIN(plan) mbm_plan_begin((plan), &client, &setup, NULL)
+#endif
+
 #define FIELD(address_, type_, interval)                                                           \
     {                                                                                              \
         .unit = 1, .table = MBM_TABLE_HOLDING_REGISTERS, .type = (type_), .address = (address_),   \
@@ -23,7 +35,7 @@ static const mbm_planField fields[10] = {
     FIELD(40, MBM_TYPE_UINT32, 5000), FIELD(50, MBM_TYPE_UINT16, 5000),
 };
 static mbm_planPosition positions[10];
-static mbm_planRead reads[10];
+static mbm_planRead reads[READS];
 static uint16_t data[WORDS];
 
 static void update(void *context, mbm_plan *plan, uint16_t field)
@@ -47,22 +59,10 @@ static const mbm_planSetup setup = {.fields = fields,
                                     .requests = &request,
                                     .update = update,
                                     .fieldCount = 10,
-#ifdef GROUPED
-                                    .readCount = 4,
-#else
-                                    .readCount = 10,
-#endif
+                                    .readCount = READS,
                                     .dataWords = WORDS,
                                     .registerGap = 8,
                                     .requestCount = 1};
-
-#ifdef GROUPED
-static const uint16_t counts[] = {6, 2, 1, 1};
-
-#define BEGIN(plan) mbm_plan_beginGrouped((plan), &client, &setup, counts, NULL)
-#else
-#define BEGIN(plan) mbm_plan_begin((plan), &client, &setup, NULL)
-#endif
 
 int main(void)
 {

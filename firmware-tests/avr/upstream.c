@@ -71,7 +71,6 @@ static void half_duplex(const kind *k, const char *sketch)
     upstream_device d;
 
     upstream_device_start(&d, 1);
-    d.peer.mapping->tab_input_registers[0x3104] = 1345;
     board_watch_pin(b, k->pin2.port, k->pin2.bit, driver_switched, &d);
     board_uart(b, '0', upstream_hear, &d);
     assert_true(board_run(b, 500 * MS));

@@ -19,6 +19,7 @@ void upstream_device_start(upstream_device *d, int unit)
     assert_non_null(d->peer.mapping);
     for (unsigned i = 0; i < EVERYTHING; i++)
         d->peer.mapping->tab_registers[i] = server_pattern(i);
+    d->peer.mapping->tab_input_registers[0x3104] = 1345; /* the half-duplex example's battery */
 }
 
 /* Refuses 66 registers, as the controller does that the example is for. */

@@ -11,8 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* So many frames are compared, or as many as are sent in three seconds. What a sketch prints is a
- * frame too. */
+/* The program compares 26 frames, or those that the board sends in three seconds. What a sketch
+ * prints is a frame too. */
 enum { MOST = 26, SECONDS = 3 };
 
 typedef struct traffic {
@@ -43,8 +43,6 @@ static void run(const kind *k, const char *sketch, int unit, traffic *t)
     upstream_device_start(&d, unit);
     d.heard = record;
     d.context = t;
-    if (unit == 1)
-        d.peer.mapping->tab_input_registers[0x3104] = 1345;
     board_uart(b, '0', upstream_hear, &d);
     for (i = 0; i < SECONDS * 1000 && t->count < MOST; i++)
         if (!board_run(b, MS)) {
