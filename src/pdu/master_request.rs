@@ -56,8 +56,8 @@ pub struct MasterRequest {
     sends: u8,
     /// Bytes of data in the response; 0: it repeats the head.
     reads: u8,
-    /// Bits that are used in the last byte of data; 0: all.
-    last_bits: u8,
+    /// A mask of the bits that are used in the last byte of data.
+    mask: u8,
     /// The data are bits, of which the low byte of 16 travels first.
     has_bits: bool,
     head: [u8; HEAD],
@@ -69,7 +69,7 @@ impl MasterRequest {
         head_length: 0,
         sends: 0,
         reads: 0,
-        last_bits: 0,
+        mask: 0xFF,
         has_bits: false,
         head: [0; HEAD],
     };
@@ -94,36 +94,30 @@ impl MasterRequest {
         *at_0 = function & FUNCTION;
         (*at_1, *at_2, *at_3, *at_4) = (a, b, c, d);
         self.head_length = 5;
-        // A greater quantity is refused below, so the lost high bits do no harm.
-        let mut words = word;
-        let mut bytes = (word << 1) as u8;
-        self.has_bits = function & HAS_BITS != 0;
-        self.last_bits = 0;
-        if self.has_bits {
-            words = (word >> 4) + u16::from(word & 15 != 0);
-            bytes = (word.wrapping_add(7) >> 3) as u8;
-            self.last_bits = d & 7;
-        }
         self.sends = 0;
-        self.reads = bytes;
-        let mut most = MAX_READ_REGISTERS;
-        if function & WRITES != 0 {
-            self.reads = 0;
-            most = MAX_WRITE_REGISTERS;
-        }
+        self.reads = 0;
         if function & HAS_QUANTITY == 0 {
             return Status::OK;
         }
+        // A greater quantity is refused below, so the lost high bits do no harm.
+        let mut bytes = d << 1;
+        let mut most = MAX_READ_REGISTERS;
+        if function & WRITES != 0 {
+            most = MAX_WRITE_REGISTERS;
+        }
+        self.mask = 0xFF;
+        self.has_bits = function & HAS_BITS != 0;
+        if self.has_bits {
+            bytes = (word.wrapping_add(7) >> 3) as u8;
+            most <<= 4;
+            self.mask = 0xFF >> (d.wrapping_neg() & 7);
+        }
         if function & WRITES != 0 {
             self.sends = bytes;
+        } else {
+            self.reads = bytes;
         }
-        if words == 0 || words > most {
-            return Status::ILLEGAL_DATA_VALUE;
-        }
-        if address.checked_add(word - 1).is_none() {
-            return Status::ILLEGAL_DATA_ADDRESS;
-        }
-        Status::OK
+        check_range(address, word, most)
     }
 
     /// 16 (hex): the register becomes `(register & and_mask) | (or_mask & !and_mask)`.
@@ -221,16 +215,12 @@ impl MasterRequest {
     /// Sets the bytes of data in the response to `bytes`. All bits of them are used.
     pub fn set_reads(&mut self, bytes: u8) {
         self.reads = bytes;
-        self.last_bits = 0;
+        self.mask = 0xFF;
     }
 
     /// Bits of data in a successful response.
     pub const fn bits(&self) -> u16 {
-        let bits = self.reads as u16 * 8;
-        match self.last_bits {
-            0 => bits,
-            used => bits + used as u16 - 8,
-        }
+        self.reads as u16 * 8 - self.mask.leading_zeros() as u16
     }
 
     /// Bytes of the caller's words that are sent.
@@ -240,10 +230,7 @@ impl MasterRequest {
 
     /// A mask of the bits that are used in the last byte of data.
     pub const fn mask(&self) -> u8 {
-        match self.last_bits {
-            0 => 0xFF,
-            bits => (1 << bits) - 1,
-        }
+        self.mask
     }
 
     /// Length of the PDU.
