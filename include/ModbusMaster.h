@@ -46,7 +46,11 @@ class ModbusMaster : public ModbusMasterStatics<void>,
                      public ModbusTransmissionHooks<ModbusMaster> {
 public:
     /** For slave 1, with begin(baud) opening Serial. Uses neither clock nor port. */
-    ModbusMaster() : state() { attach(1); }
+    ModbusMaster() : state()
+    {
+        attach(1);
+        beginLine();
+    }
 
     /** As ModbusMaster(), for `slave` (1 to 247; 0 is broadcast). */
     ModbusMaster(uint8_t slave) : ModbusMaster() { setSlaveID(slave); }
@@ -107,7 +111,6 @@ public:
         Line::giveUp(state.node);
         if (attach(slave) == MBM_OK) {
             state.stream = &stream;
-            beginLine();
             state.forgetRate();
         }
     }
@@ -486,8 +489,7 @@ private:
         cancel();
         mbm_line_cancel(line());
         attach(getSlaveID());
-        if (state.stream != nullptr)
-            beginLine();
+        beginLine();
     }
 
     // Makes a request by calling `function`.
@@ -495,6 +497,8 @@ private:
     uint8_t request(uint16_t, uint8_t (*function)(mbm_node *, Parameters...),
                     Parameters... arguments)
     {
+        if (state.stream == nullptr)
+            return ku8MBNotInitialised;
         ModbusMasterUse<void>::tell(*line());
         state.own.wire.sent = false;
         return function(&state.node, arguments...);

@@ -102,8 +102,6 @@ pub unsafe extern "C" fn mbm_node_begin(
         if (*node.cast::<Object>()).core.is_pending() {
             return Status::BUSY.code();
         }
-        // A line whose request is under way may get a further node.
-        line::prepare(line);
         let object = pointers::object(node);
         object.core.begin(unit);
         object.line = line;
