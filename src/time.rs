@@ -97,21 +97,6 @@ pub const fn character(baud: u32) -> u16 {
     }
 }
 
-/// The length of `count` characters, if one lasts `character` microseconds.
-#[cfg_attr(target_arch = "avr", inline(never))]
-#[cfg_attr(not(target_arch = "avr"), inline(always))]
-pub const fn characters(character: u16, count: u8) -> u32 {
-    if cfg!(any(test, target_arch = "avr")) {
-        // An AVR multiplies bytes in hardware. A 32-bit product would need 84 bytes of
-        // libgcc.
-        let [low, high] = character.to_le_bytes();
-        let (low, high) = (low as u16 * count as u16, high as u16 * count as u16);
-        ((high as u32) << 8) + low as u32
-    } else {
-        character as u32 * count as u32
-    }
-}
-
 /// The silence t3.5 that separates two frames, in microseconds. [`DEFAULT_SILENCE`] if
 /// `baud` is 0.
 pub const fn silence(baud: u32) -> u32 {
@@ -152,16 +137,6 @@ mod tests {
     fn a_character_is_eleven_bits() {
         assert_eq!(character(9_600), 1_146);
         assert_eq!(character(1), 0xFFFF);
-    }
-
-    #[test]
-    fn characters_last_their_number_times_one_character() {
-        for character in [0, 1, 255, 256, 1_146, 0xFF00, 0xFFFF] {
-            for count in 0..=255 {
-                let time = u32::from(character) * u32::from(count);
-                assert_eq!(characters(character, count), time);
-            }
-        }
     }
 
     #[test]

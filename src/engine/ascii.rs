@@ -111,7 +111,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         let whole = content + rtu::CRC.into();
         let kind = if self.storage.byte(front) != self.unit {
             Outcome::OTHER_UNIT
-        } else if function & !EXCEPTION != self.request.function() {
+        } else if function & !EXCEPTION != self.function {
             Outcome::OTHER_FUNCTION
         } else if function & EXCEPTION != 0 {
             let code = self.storage.byte(front + 2u8.into());

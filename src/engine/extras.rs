@@ -6,7 +6,6 @@
 use super::{Count, Engine, Moment, Outcome, Phase, Storage, Transaction};
 use crate::error::Status;
 use crate::port::Port;
-use crate::time::characters;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Makes the settings `retries`, `echo_discard` and `post_flush_hold` effective.
@@ -26,7 +25,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// True if the last byte ends the echo of the request.
     fn ends_echo(&mut self) -> bool {
         let length = self.outgoing;
-        if !self.ends_with(length, self.request.function()) || !Q::is_echo(self, self.end - length)
+        if length == S::Count::ZERO
+            || !self.ends_with(length, self.function)
+            || !Q::is_echo(self, self.end - length)
         {
             return false;
         }
@@ -43,18 +44,20 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             return !self.has_expired();
         }
         if hold > 0 {
-            let time = characters(self.settings.any_character(), hold);
-            self.enter(Phase::PostFlush, time);
+            self.enter(Phase::PostFlush);
+            self.wait = 0;
+            self.wait_for_characters(self.settings.any_character(), hold.into());
         }
         hold > 0
     }
 
     /// True if the request is begun again.
     fn is_repeated(&mut self) -> bool {
-        if !Q::HAS_FIXED_REPLY || self.retries == 0 || self.seen == Outcome::TOO_LONG {
+        let retries = self.settings.retries;
+        if !Q::HAS_FIXED_REPLY || self.retries >= retries || self.seen == Outcome::TOO_LONG {
             return false;
         }
-        self.retries -= 1;
+        self.retries += 1;
         self.tally(self.seen.status());
         // The damaged reply may have been noise, so the right reply may still come.
         self.expect_late_reply();

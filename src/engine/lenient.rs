@@ -53,7 +53,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         if self.awaits_end || self.is_held() {
             return;
         }
-        let function = self.request.function();
+        let function = self.function;
         if !self.request.is_read() {
             // The search has found that it is not the reply.
             if self.ends_with(self.length, function) {

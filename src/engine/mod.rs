@@ -77,11 +77,16 @@ enum Probation {
 #[derive(Clone, Hash, Debug)]
 #[repr(C)]
 pub struct Engine<P, S: Storage, Q> {
+    /// The last request got no right reply. Its reply may still come.
+    is_late: bool,
     phase: Phase,
     /// The phase began in the last poll. Its time starts with the next look at the clock.
     phase_begins: bool,
     /// The unit that the request is sent to.
     pub(crate) unit: u8,
+    /// The function code of the request.
+    function: u8,
+    /// How often the request was repeated.
     retries: u8,
     /// The exception code of the last reply; 0 if the reply was no exception.
     pub(crate) exception: u8,
@@ -92,8 +97,6 @@ pub struct Engine<P, S: Storage, Q> {
     is_early: bool,
     /// Whether the reply may be a late one, which is held.
     probation: Probation,
-    /// The last request got no right reply. Its reply may still come.
-    is_late: bool,
     /// One of the late units sent no reply, not only a damaged one.
     has_slow_unit: bool,
     /// A reply may have arrived that counts only once the bytes end: one of unknown length, or a
@@ -101,9 +104,8 @@ pub struct Engine<P, S: Storage, Q> {
     awaits_end: bool,
     /// The last poll may have left bytes unread.
     has_more: bool,
-    /// The frame that is being received begins as the reply to a read does.
-    is_begun: bool,
-    /// What the frame that is being received is if it ends with a right CRC.
+    /// What the frame that is being received is if it ends with a right CRC, from its third byte
+    /// on: see `kind_of_frame`.
     run_kind: Outcome,
     /// How many bytes have arrived since the last frame ended.
     run_length: S::Count,
@@ -123,6 +125,8 @@ pub struct Engine<P, S: Storage, Q> {
     sent: S::Count,
     /// How many frames with a right CRC were skipped that were not counted yet.
     foreign_frames: u8,
+    /// The request that is on the line was counted.
+    is_counted: bool,
     /// CRC of the bytes that have arrived since the last frame ended.
     run: Crc16,
     /// The CRC since the last frame of the bytes that were dropped from the frame buffer.

@@ -49,10 +49,9 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Enters a phase that may last `wait` microseconds from the next look at the clock on.
-    pub(super) fn enter(&mut self, phase: Phase, wait: u32) {
+    /// Enters a phase, whose wait begins with the next look at the clock.
+    pub(super) fn enter(&mut self, phase: Phase) {
         self.phase = phase;
-        self.wait = wait;
         self.phase_begins = true;
     }
 
@@ -83,6 +82,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             phase: Phase::Idle,
             phase_begins: false,
             unit: 0,
+            function: 0,
             retries: 0,
             exception: 0,
             seen: Outcome::OK,
@@ -92,7 +92,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             has_slow_unit: false,
             awaits_end: false,
             has_more: false,
-            is_begun: false,
             run_kind: Outcome::MALFORMED,
             run_length: S::Count::ZERO,
             length: S::Count::ZERO,
@@ -102,6 +101,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             outgoing: S::Count::ZERO,
             sent: S::Count::ZERO,
             foreign_frames: 0,
+            is_counted: false,
             run: Crc16::START,
             before: Crc16::START,
             weight: Crc16::RESIDUE,
@@ -139,6 +139,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Does what the request has to do at the time `now`, without waiting. Returns
     /// [`Status::PENDING`] until the request has ended, then its status.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn poll(&mut self, now: u32) -> Status {
         self.look_at_clock(now);
         let status = match self.phase {
@@ -148,10 +149,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             Phase::Turnaround => Status::PENDING,
             _ => self.send(),
         };
-        // So many bytes are fewer than 256 foreign frames, which the engine counts in 8 bits.
-        if status != Status::PENDING || self.received >= 0x200 {
-            self.tally(status);
-        }
+        self.tally(status);
         if status != Status::PENDING {
             if status.is_failure() {
                 self.end_on_line();
@@ -213,17 +211,13 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 // They overwrite the request.
                 self.outgoing = S::Count::ZERO;
             }
-            let ends = Q::search(self, first, received);
-            if self.phase == Phase::Gap {
-                if ends {
+            if Q::search(self, first, received) {
+                if self.phase == Phase::Gap {
                     self.note_unexpected();
+                } else {
+                    self.since = self.now;
+                    return self.settle();
                 }
-                self.since = self.now;
-            } else if ends {
-                self.since = self.now;
-                return self.settle();
-            } else {
-                self.wait_for_silence();
             }
             if budget < received {
                 budget = S::Count::ZERO;
@@ -232,14 +226,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             budget -= received;
         }
         self.has_more = budget == S::Count::ZERO;
-        // The search may have taken long. The silence begins after it.
-        let restarts = self.phase == Phase::Gap
-            || self.is_held()
-            || self.is_early
-            || self.may_end_in_silence();
         let mut is_old = false;
         if budget < MOST.into() {
-            if restarts {
+            if self.phase == Phase::Gap || self.waits_for_silence() {
+                // The search may have taken long. The silence begins after it.
                 self.now = self.port.micros();
                 self.since = self.now;
             }
@@ -275,16 +265,17 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         has_elapsed(limit, self.now, since)
     }
 
-    /// Lets silence end the wait for the reply, if it is known what the request ends with then.
-    fn wait_for_silence(&mut self) {
+    /// True if silence ends the wait for the reply, because it is known what the request ends with
+    /// then. Sets how long the silence must last.
+    fn waits_for_silence(&mut self) -> bool {
         if self.is_held() {
             self.wait = self.hold();
         } else if self.is_early || self.may_end_in_silence() {
             self.wait = self.settings.silence.get();
         } else {
-            return;
+            return false;
         }
-        self.since = self.now;
+        true
     }
 
     /// True if bytes have arrived that may be a reply of unknown length, which silence ends.

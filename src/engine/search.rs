@@ -62,7 +62,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// replies in this way, and save 2000 instructions for ten registers.
     fn is_reply_alone(&mut self, received: S::Count) -> bool {
         let frame = self.storage.slice(S::Count::ZERO, received);
-        let start = [self.unit, self.request.function()];
+        let start = [self.unit, self.function];
         if self.is_on_probation()
             || self.outgoing > S::Count::ZERO
             || !frame.starts_with(&start)
@@ -85,9 +85,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     fn take_in(&mut self) -> bool {
         let byte = self.storage.byte(self.end);
         self.end += 1u8.into();
-        let is_whole = self.continue_frame(byte);
-        let function = self.request.function();
-        if self.outgoing > S::Count::ZERO && self.has_extra(Moment::Byte) {
+        let is_whole = self.continue_frame();
+        let function = self.function;
+        if self.has_extra(Moment::Byte) {
             return false;
         }
         let is_response = if self.ends_with(EXCEPTION_FRAME.into(), function | EXCEPTION) {
@@ -135,29 +135,36 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
             return Q::ending_reply(self, false);
         }
-        if self.ends_with(self.length, self.request.function()) {
+        if self.ends_with(self.length, self.function) {
             return self.length;
         }
-        if self.length > self.storage.capacity() {
-            self.note_too_long();
+        if self.length > self.storage.capacity() && self.kind_of_frame() == Outcome::TOO_LONG {
+            self.note(Outcome::TOO_LONG);
+            self.is_early = true;
         }
         S::Count::ZERO
     }
 
-    /// Notes that the reply to a read begins with the last three bytes, if the frame buffer
-    /// cannot hold that reply.
-    #[cold]
-    fn note_too_long(&mut self) {
+    /// What a frame is that begins with the last three bytes, if it is not the reply:
+    /// [`Outcome::TOO_LONG`] if it begins as the reply to a read does.
+    fn kind_of_frame(&self) -> Outcome {
+        // Bytes that were dropped were not of our unit.
         if self.end < 3u8.into() {
-            return;
+            return Outcome::OTHER_UNIT;
         }
         let front = self.end - 3u8.into();
-        if self.storage.byte(front) == self.unit
-            && self.storage.byte(front + 1u8.into()) == self.request.function()
-            && self.storage.byte(front + 2u8.into()) == self.data_length()
-        {
-            self.note(Outcome::TOO_LONG);
-            self.is_early = true;
+        let function = self.storage.byte(front + 1u8.into());
+        if self.storage.byte(front) != self.unit {
+            Outcome::OTHER_UNIT
+        } else if function == self.function {
+            match self.storage.byte(front + 2u8.into()) == self.data_length() {
+                true => Outcome::TOO_LONG,
+                false => Outcome::MALFORMED,
+            }
+        } else if function & !EXCEPTION == self.function {
+            Outcome::MALFORMED
+        } else {
+            Outcome::OTHER_FUNCTION
         }
     }
 
@@ -257,8 +264,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.run_length = S::Count::ZERO;
         if cfg!(feature = "diagnosis") {
             self.run = Crc16::START;
-            self.run_kind = Outcome::MALFORMED;
-            self.is_begun = false;
         }
         if Self::DERIVES_CRC {
             self.before = Crc16::START;
@@ -268,24 +273,13 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Counts the byte as one of the frame that is being received. True if all bytes since the
     /// last frame form a frame.
     #[inline(always)]
-    fn continue_frame(&mut self, byte: u8) -> bool {
+    fn continue_frame(&mut self) -> bool {
         self.run_length = self.run_length.next();
         if !cfg!(feature = "diagnosis") {
             return false;
         }
-        if self.run_length == 1u8.into() && byte != self.unit {
-            self.run_kind = Outcome::OTHER_UNIT;
-        }
-        if self.run_kind == Outcome::MALFORMED {
-            if self.run_length == 2u8.into() {
-                self.is_begun = byte == self.request.function();
-                if byte & !EXCEPTION != self.request.function() {
-                    self.run_kind = Outcome::OTHER_FUNCTION;
-                }
-            }
-            if self.run_length == 3u8.into() {
-                self.is_begun &= byte == self.data_length();
-            }
+        if self.run_length == 3u8.into() {
+            self.run_kind = self.kind_of_frame();
         }
         let last = self.storage.slice(self.end - 1u8.into(), 1u8.into());
         self.run = self.run.with(last);
@@ -293,15 +287,18 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             return false;
         }
         // By chance, the CRC may be right before the end of the reply.
-        !(self.is_begun && self.run_length < self.length)
+        self.run_kind != Outcome::TOO_LONG || self.run_length >= self.length
     }
 
     /// Skips a whole frame that is not the reply. True if it is the reply but the frame buffer
     /// cannot hold it, which ends the request.
     fn skip_frame(&mut self) -> bool {
-        let kind = self.run_kind;
-        if kind == Outcome::MALFORMED && self.seen == Outcome::TOO_LONG {
-            return true;
+        let mut kind = self.run_kind;
+        if kind == Outcome::TOO_LONG {
+            if self.seen == kind {
+                return true;
+            }
+            kind = Outcome::MALFORMED;
         }
         self.note_foreign_frame();
         self.begin_frame();

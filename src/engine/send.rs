@@ -5,7 +5,6 @@ use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;
 use crate::port::Port;
-use crate::time::characters;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Starts the request to `unit`; the calls of `poll` send it. A refused request sends
@@ -25,8 +24,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             return Status::BUFFER_TOO_SMALL;
         }
         self.unit = unit;
+        self.function = self.request.function();
         if Q::HAS_FIXED_REPLY {
-            self.retries = self.settings.retries;
+            self.retries = 0;
         }
         self.begin()
     }
@@ -36,8 +36,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     pub(super) fn begin(&mut self) -> Status {
         Q::write(self);
         self.begin_search();
-        let silence = self.required_silence();
-        self.enter(Phase::Gap, silence);
+        self.wait = self.required_silence();
+        self.enter(Phase::Gap);
         Status::PENDING
     }
 
@@ -82,7 +82,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.is_late = false;
         self.since = self.now;
         self.phase = Phase::Send;
-        self.tally(Status::PENDING);
         self.port.pre_transmission();
         self.send()
     }
@@ -106,10 +105,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 return Status::PENDING;
             }
             self.phase = Phase::Flush;
-            // The longest frame takes 256 characters.
-            self.wait = self
-                .wait
-                .wrapping_add(u32::from(self.settings.any_character()) << 8);
+            self.wait_for_characters(self.settings.any_character(), self.sent);
         }
         if self.phase == Phase::Flush && !self.port.flush() {
             return self.stalled();
@@ -129,7 +125,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         } else {
             Phase::Reply
         };
-        self.enter(phase, 0);
+        self.enter(phase);
         self.wait_for_reply();
         Status::PENDING
     }
@@ -153,13 +149,18 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             Q::response_timeout(self)
         };
         if !self.port.knows_when_sent() {
-            let sent: u16 = self.sent.into();
-            let [low, high] = sent.to_le_bytes();
-            let character = self.settings.character;
-            self.wait += characters(character, low);
-            if high > 0 {
-                self.wait += characters(character, high) << 8;
-            }
+            self.wait_for_characters(self.settings.character, self.sent);
+        }
+    }
+
+    /// Extends the wait by `count` characters of `character` microseconds. (An AVR would need 84
+    /// bytes of libgcc for a product of 32 bits.)
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn wait_for_characters(&mut self, character: u16, count: S::Count) {
+        let mut left = count;
+        while left > S::Count::ZERO {
+            self.wait = self.wait.wrapping_add(character.into());
+            left -= 1u8.into();
         }
     }
 }

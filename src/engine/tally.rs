@@ -9,8 +9,8 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
         self.tally = Some(Engine::count);
     }
 
-    /// Counts what has happened, if the engine counts: an attempt that ends with `status`; or, if
-    /// that is [`Status::PENDING`], one that begins to send, or bytes that have arrived.
+    /// Counts what has happened since it last did, if the engine counts: the request, bytes that
+    /// have arrived, and an attempt that ends with `status`, if that is not [`Status::PENDING`].
     pub(super) fn tally(&mut self, status: Status) {
         if let Some(tally) = self.tally {
             tally(self, status);
@@ -24,11 +24,15 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
         self.received = 0;
         storage.count(Counter::ForeignFrames, self.foreign_frames.into());
         self.foreign_frames = 0;
+        let was_sent = self.phase > Phase::Gap;
+        if was_sent && !self.is_counted {
+            storage.count(Counter::Requests, 1);
+        }
+        self.is_counted = was_sent && status == Status::PENDING;
         if status == Status::PENDING {
-            storage.count(Counter::Requests, u32::from(self.phase == Phase::Send));
             return;
         }
-        if self.phase > Phase::Gap {
+        if was_sent {
             let sent: u16 = self.sent.into();
             storage.count(Counter::BytesSent, sent.into());
         }
