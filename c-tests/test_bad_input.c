@@ -318,6 +318,17 @@ static void a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing
     }
 }
 
+static void a_frame_that_contains_how_a_longer_reply_begins_is_malformed(void **state)
+{
+    buffers b;
+    NODE;
+
+    b = give_buffers(s, 4, 4, 12);
+    sim_answer(s, 1, 500, "11 03 04 11 03 08 00 +");
+    IS(MBM_MALFORMED_REPLY, mbm_node_readHoldingRegisters(n, 0, 4));
+    free_buffers(s, b);
+}
+
 static void a_reply_longer_than_the_frame_buffer_is_too_long_behind_noise_too(void **state)
 {
     buffers b;
@@ -431,6 +442,7 @@ int main(void)
         SIM_TEST(a_frame_buffer_below_8_bytes_is_refused),
         SIM_TEST(a_request_is_sent_whole_or_not_at_all),
         SIM_TEST(a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing),
+        SIM_TEST(a_frame_that_contains_how_a_longer_reply_begins_is_malformed),
         SIM_TEST(a_reply_longer_than_the_frame_buffer_is_too_long_behind_noise_too),
         SIM_TEST(a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception),
         SIM_TEST(a_reply_longer_than_the_response_words_changes_none),
