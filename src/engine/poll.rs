@@ -320,6 +320,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// True if the engine has extras, and they replace what follows at this moment.
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn has_extra(&mut self, moment: Moment) -> bool {
         self.extras.is_some_and(|extras| extras(self, moment))
     }
