@@ -259,7 +259,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// The next byte begins a frame.
-    #[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
     pub(super) fn begin_frame(&mut self) {
         self.run_length = S::Count::ZERO;
         if cfg!(feature = "diagnosis") {
