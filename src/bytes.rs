@@ -56,6 +56,11 @@ impl<'a> Reader<'a> {
         core::mem::take(&mut self.rest)
     }
 
+    /// How many bytes remain.
+    pub const fn length(&self) -> usize {
+        self.rest.len()
+    }
+
     /// True if no bytes remain.
     pub const fn is_empty(&self) -> bool {
         self.rest.is_empty()

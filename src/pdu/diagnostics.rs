@@ -1,7 +1,6 @@
 //! The sub-functions of 08, Diagnostics.
 
-use super::fields::word;
-use crate::bytes::Reader;
+use super::fields::expect;
 use crate::error::Error;
 
 /// The sub-functions of 08 (clause 6.8.1).
@@ -46,16 +45,11 @@ const fn is_known(sub_function: u16) -> bool {
     matches!(sub_function, 0x00..=0x04 | 0x0A..=0x12 | 0x14)
 }
 
-/// Reads a sub-function and its data: one word, or any number of words for Return Query Data.
-pub(super) fn sub_function_and_data<'a>(reader: &mut Reader<'a>) -> Result<(u16, &'a [u8]), Error> {
-    let sub_function = word(reader)?;
+/// Checks a sub-function and its data: one word, or any number of words for Return Query Data.
+pub(super) fn check_sub_function(sub_function: u16, data: &[u8]) -> Result<(), Error> {
     if !is_known(sub_function) {
         return Err(Error::ILLEGAL_FUNCTION);
     }
-    let data = reader.rest();
-    let one = sub_function != sub_function::RETURN_QUERY_DATA;
-    if data.is_empty() || !data.len().is_multiple_of(2) || (one && data.len() != 2) {
-        return Err(Error::ILLEGAL_DATA_VALUE);
-    }
-    Ok((sub_function, data))
+    let any = sub_function == sub_function::RETURN_QUERY_DATA;
+    expect(!data.is_empty() && data.len().is_multiple_of(2) && (any || data.len() == 2))
 }

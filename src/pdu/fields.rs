@@ -1,9 +1,240 @@
-//! Functions that read and write parts of requests and responses. An error is the exception that a
-//! server answers to such a request; [`super::response`] converts it to the error of a response.
+//! The fields of requests and responses, and functions that read and check parts of PDUs. An error is
+//! the exception that a server answers to such a request; [`super::response`] converts it to the error
+//! of a response.
 
-use super::functions::{self, coil_value, COIL_ON};
+use super::functions::COIL_ON;
+use super::limits::MORE;
 use crate::bytes::{Reader, Writer};
 use crate::error::{Error, Status};
+
+/// A field of one byte.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Byte {
+    /// The code of an exception.
+    ExceptionCode,
+    /// 07: the eight outputs.
+    ExceptionStatus,
+    /// 11: the byte count, which may be less than the data have.
+    ByteCount,
+    /// 2B: the MEI type.
+    MeiType,
+    /// 2B/0E: the read device id code.
+    ReadDeviceIdCode,
+    /// 2B/0E: the first object to read.
+    ObjectId,
+    /// 2B/0E: the conformity level.
+    Conformity,
+    /// 2B/0E: the object to request next.
+    NextObjectId,
+    /// 2B/0E: the number of objects in the data.
+    ObjectCount,
+}
+
+/// A field of two bytes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Word {
+    /// The first coil, input or register.
+    Address,
+    /// How many coils, inputs or registers.
+    Quantity,
+    /// 17: the first register to read.
+    ReadAddress,
+    /// 17: the first register to write.
+    WriteAddress,
+    /// 17: how many registers to write.
+    WriteQuantity,
+    /// 06: the value of the register.
+    Value,
+    /// 16: the bits that keep their value.
+    AndMask,
+    /// 16: the new values of the other bits.
+    OrMask,
+    /// 08: the sub-function.
+    SubFunction,
+    /// 0B, 0C: the status word.
+    Status,
+    /// 0B, 0C: the count of events.
+    Events,
+    /// 0C: the count of messages.
+    Messages,
+}
+
+/// A field that is yes or no.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Flag {
+    /// 05, one word: FF00 is on.
+    Coil,
+    /// 2B/0E, one byte: FF if more objects follow.
+    MoreFollows,
+}
+
+impl Flag {
+    /// The value on the wire.
+    const fn value(self, yes: bool) -> u16 {
+        match self {
+            _ if !yes => 0,
+            Flag::Coil => COIL_ON,
+            Flag::MoreFollows => MORE as u16,
+        }
+    }
+}
+
+/// What data consist of.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Data {
+    /// Bits, the first one in the lowest bit of the first byte.
+    Bits,
+    /// Registers, the high byte first.
+    Registers,
+    /// Bytes whose meaning the function or the device defines.
+    Bytes,
+    /// Bytes of which some are characters.
+    Characters,
+}
+
+/// A count of what follows up to the end of a PDU.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Count {
+    /// One byte counts bytes.
+    Byte,
+    /// Two bytes count bytes.
+    Bytes,
+    /// Two bytes count registers.
+    Registers,
+}
+
+/// Where the fields of a PDU come from, or where they go: its bytes, a packet of C, a description in
+/// words. Each request and response passes its fields through one of these in the order of the wire.
+/// What takes the fields leaves them as they are.
+pub trait Fields<'a> {
+    /// True if the fields come from here.
+    const IS_SOURCE: bool;
+
+    /// Passes a byte.
+    fn byte(&mut self, field: Byte, value: &mut u8);
+
+    /// Passes a word.
+    fn word(&mut self, field: Word, value: &mut u16);
+
+    /// Passes a yes or no.
+    fn flag(&mut self, field: Flag, value: &mut bool);
+
+    /// Passes data after a byte that counts them.
+    fn counted(&mut self, kind: Data, data: &mut &'a [u8]);
+
+    /// Passes data up to the end of the PDU.
+    fn rest(&mut self, kind: Data, data: &mut &'a [u8]);
+
+    /// Passes a count of the `bytes` bytes up to the end of the PDU. Only bytes on the wire have it.
+    fn count(&mut self, _kind: Count, _bytes: usize) {}
+}
+
+/// Takes the fields from the bytes of a PDU.
+pub(super) struct Parser<'a> {
+    pub(super) reader: Reader<'a>,
+    /// The PDU ended too early, or a count or flag in it is wrong.
+    pub(super) is_wrong: bool,
+}
+
+impl<'a> Parser<'a> {
+    fn get<T: Default>(&mut self, found: Result<T, Error>) -> T {
+        self.is_wrong |= found.is_err();
+        found.unwrap_or_default()
+    }
+
+    /// True if the PDU had all fields, and nothing follows.
+    pub(super) fn is_right(&self) -> bool {
+        !self.is_wrong && self.reader.is_empty()
+    }
+}
+
+impl<'a> Fields<'a> for Parser<'a> {
+    const IS_SOURCE: bool = true;
+
+    fn byte(&mut self, _: Byte, value: &mut u8) {
+        let found = byte(&mut self.reader);
+        *value = self.get(found);
+    }
+
+    fn word(&mut self, _: Word, value: &mut u16) {
+        let found = word(&mut self.reader);
+        *value = self.get(found);
+    }
+
+    fn flag(&mut self, field: Flag, value: &mut bool) {
+        let found = match field {
+            Flag::Coil => word(&mut self.reader),
+            Flag::MoreFollows => byte(&mut self.reader).map(u16::from),
+        };
+        let found = self.get(found);
+        *value = found != 0;
+        self.is_wrong |= found != field.value(*value);
+    }
+
+    fn counted(&mut self, _: Data, data: &mut &'a [u8]) {
+        let found = counted(&mut self.reader);
+        *data = self.get(found);
+    }
+
+    fn rest(&mut self, _: Data, data: &mut &'a [u8]) {
+        *data = self.reader.rest();
+    }
+
+    fn count(&mut self, kind: Count, _: usize) {
+        let found = match kind {
+            Count::Byte => byte(&mut self.reader).map(usize::from),
+            Count::Bytes => word(&mut self.reader).map(usize::from),
+            Count::Registers => word(&mut self.reader).map(|count| 2 * usize::from(count)),
+        };
+        self.is_wrong |= found != Ok(self.reader.length());
+    }
+}
+
+/// Writes the fields as bytes of a PDU.
+impl<'a> Fields<'a> for Writer<'_> {
+    const IS_SOURCE: bool = false;
+
+    fn byte(&mut self, _: Byte, value: &mut u8) {
+        self.u8(*value);
+    }
+
+    fn word(&mut self, _: Word, value: &mut u16) {
+        self.u16(*value);
+    }
+
+    fn flag(&mut self, field: Flag, value: &mut bool) {
+        let value = field.value(*value);
+        match field {
+            Flag::Coil => self.u16(value),
+            Flag::MoreFollows => self.u8(value as u8),
+        }
+    }
+
+    fn counted(&mut self, _: Data, data: &mut &'a [u8]) {
+        Writer::counted(self, data);
+    }
+
+    fn rest(&mut self, _: Data, data: &mut &'a [u8]) {
+        self.put(data);
+    }
+
+    fn count(&mut self, kind: Count, bytes: usize) {
+        match kind {
+            Count::Byte => self.u8(bytes as u8),
+            Count::Bytes => self.u16(bytes as u16),
+            Count::Registers => self.u16(bytes as u16 / 2),
+        }
+    }
+}
+
+/// The error of a wrong length, count or value, unless `is_right`.
+pub(super) fn expect(is_right: bool) -> Result<(), Error> {
+    if is_right {
+        Ok(())
+    } else {
+        Err(Error::ILLEGAL_DATA_VALUE)
+    }
+}
 
 /// Reads a byte; an error if the PDU has ended.
 pub(super) fn byte(reader: &mut Reader) -> Result<u8, Error> {
@@ -33,87 +264,12 @@ pub(super) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
     }
 }
 
-/// As [`check_range`], after checking that the PDU ends here. A server checks lengths and
-/// quantities before addresses (figures 11 and following).
-pub(super) fn check_end_and_range(
-    reader: &Reader,
-    address: u16,
-    quantity: u16,
-    most: u16,
-) -> Result<(), Error> {
-    expect_end(reader)?;
-    check_range(address, quantity, most).result()
-}
-
-/// Reads the address and the quantity of a range, with which the PDU ends.
-pub(super) fn last_range(reader: &mut Reader, most: u16) -> Result<(u16, u16), Error> {
-    let (address, quantity) = (word(reader)?, word(reader)?);
-    check_end_and_range(reader, address, quantity, most)?;
-    Ok((address, quantity))
-}
-
-/// Checks that the PDU ends here.
-pub(super) fn expect_end(reader: &Reader) -> Result<(), Error> {
-    if reader.is_empty() {
-        Ok(())
-    } else {
-        Err(Error::ILLEGAL_DATA_VALUE)
-    }
-}
-
 /// Checks that `count` is within `limits`, the least and the greatest value.
 pub(super) fn check_within(count: usize, limits: (usize, usize)) -> Result<(), Error> {
-    if (limits.0..=limits.1).contains(&count) {
-        Ok(())
-    } else {
-        Err(Error::ILLEGAL_DATA_VALUE)
-    }
-}
-
-/// True if the value of a single coil is on, false if it is off.
-pub(super) fn is_on(value: u16) -> Result<bool, Error> {
-    match value {
-        COIL_ON => Ok(true),
-        0 => Ok(false),
-        _ => Err(Error::ILLEGAL_DATA_VALUE),
-    }
+    expect((limits.0..=limits.1).contains(&count))
 }
 
 /// The number of data bytes that `quantity` bits take.
 pub(super) const fn byte_count(quantity: u16) -> u8 {
     quantity.div_ceil(8) as u8
-}
-
-/// Writes a request or response of 05.
-pub(super) fn emit_write_single_coil(writer: &mut Writer, address: u16, on: bool) {
-    writer.u8(functions::WRITE_SINGLE_COIL);
-    writer.u16(address);
-    writer.u16(coil_value(on));
-}
-
-/// Writes a request or response of 16 (hex).
-pub(super) fn emit_mask_write_register(
-    writer: &mut Writer,
-    address: u16,
-    and_mask: u16,
-    or_mask: u16,
-) {
-    writer.u8(functions::MASK_WRITE_REGISTER);
-    writer.u16(address);
-    writer.u16(and_mask);
-    writer.u16(or_mask);
-}
-
-/// Writes a request or response of 08.
-pub(super) fn emit_diagnostics(writer: &mut Writer, sub_function: u16, data: &[u8]) {
-    writer.u8(functions::DIAGNOSTICS);
-    writer.u16(sub_function);
-    writer.put(data);
-}
-
-/// Writes a request or response of any MEI type.
-pub(super) fn emit_encapsulated(writer: &mut Writer, mei_type: u8, data: &[u8]) {
-    writer.u8(functions::ENCAPSULATED_INTERFACE_TRANSPORT);
-    writer.u8(mei_type);
-    writer.put(data);
 }

@@ -277,6 +277,16 @@ impl FunctionSpec {
         self.0 & flag != 0
     }
 
+    /// True if the first word of the request is an address.
+    pub const fn has_address(self) -> bool {
+        self.number(HEAD_LENGTH) >= 3
+    }
+
+    /// True if the second word of the request is a quantity, counted from the address.
+    pub const fn has_range(self) -> bool {
+        self.has(RANGE)
+    }
+
     /// The function code.
     pub(super) const fn function(self) -> u8 {
         self.0 as u8

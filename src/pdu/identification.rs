@@ -1,7 +1,8 @@
 //! Encapsulated interface transport, and device identification, which it contains: function
 //! 2B.
 
-use super::fields::{byte, counted};
+use super::fields::{byte, counted, expect};
+use super::limits::MORE;
 use crate::bytes::Reader;
 use crate::error::Error;
 
@@ -18,9 +19,6 @@ pub const REGULAR: u8 = 2;
 pub const EXTENDED: u8 = 3;
 /// Read device id code: one object.
 pub const INDIVIDUAL: u8 = 4;
-
-/// The value of the field "more follows" in a response if more objects follow; else it is 0.
-pub(super) const MORE: u8 = 0xFF;
 
 /// What a response to Read Device Identification has after its code.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -47,26 +45,27 @@ impl<'a> IdentificationReply<'a> {
     }
 }
 
+/// Checks the code, more follows and the number of objects of a response. The conformity level is
+/// not checked, nor the next object if none follows: some devices send wrong values there, and
+/// nothing depends on them.
+pub(super) fn check_head(code: u8, more: bool, count: u8) -> Result<(), Error> {
+    expect(match (code, more) {
+        (BASIC..=EXTENDED, _) => true,
+        (INDIVIDUAL, false) => count == 1,
+        _ => false,
+    })
+}
+
 /// Parses what follows the code of a response to Read Device Identification.
-pub(super) fn read_reply<'a>(
-    code: u8,
-    reader: &mut Reader<'a>,
-) -> Result<IdentificationReply<'a>, Error> {
+fn read_reply<'a>(code: u8, reader: &mut Reader<'a>) -> Result<IdentificationReply<'a>, Error> {
     let conformity = byte(reader)?;
     let (more, next_object, count) = (byte(reader)?, byte(reader)?, byte(reader)?);
-    // The conformity level is not checked, nor the next object if none follows: some devices
-    // send wrong values there, and nothing depends on them.
-    let is_right = match (code, more) {
-        (BASIC..=EXTENDED, 0 | MORE) => true,
-        (INDIVIDUAL, 0) => count == 1,
-        _ => false,
-    };
-    if !is_right {
-        return Err(Error::ILLEGAL_DATA_VALUE);
-    }
+    let more_follows = more == MORE;
+    expect(more_follows || more == 0)?;
+    check_head(code, more_follows, count)?;
     Ok(IdentificationReply {
         conformity,
-        more_follows: more == MORE,
+        more_follows,
         next_object,
         objects: ObjectList::new(count, reader.rest())?,
     })

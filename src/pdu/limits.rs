@@ -25,3 +25,7 @@ pub const READ_FILE_BYTES: (usize, usize) = (0x07, 0xF5);
 pub const FILE_DATA_BYTES: (usize, usize) = (0x07, 0xF5);
 /// Least and greatest byte count of 15 (6.15).
 pub const WRITE_FILE_BYTES: (usize, usize) = (0x09, 0xFB);
+
+/// The value of the field "more follows" in a response to 2B/0E if more objects follow; else it is 0
+/// (6.21).
+pub(super) const MORE: u8 = 0xFF;

@@ -2,12 +2,12 @@
 //! protocol V1.1b3, clause 6).
 //!
 //! [`functions`] is the table of the functions. [`request`] and [`response`] take PDUs apart and
-//! write them. [`header`] and [`master_request`] are what a client and a master keep of a request
+//! write them, from [`fields`]. [`header`] and [`master_request`] are what a client and a master keep of a request
 //! that they send.
 
 pub mod custom;
 pub mod diagnostics;
-mod fields;
+pub mod fields;
 pub mod files;
 pub mod functions;
 pub mod header;

@@ -2,11 +2,9 @@
 //! borrow from its bytes.
 
 use super::custom;
-use super::diagnostics::{sub_function, sub_function_and_data};
+use super::diagnostics::{check_sub_function, sub_function};
 use super::fields::{
-    byte, byte_count, check_end_and_range, check_within, counted, emit_diagnostics,
-    emit_encapsulated, emit_mask_write_register, emit_write_single_coil, expect_end, is_on,
-    last_range, word,
+    byte_count, check_range, check_within, expect, Byte, Data, Fields, Flag, Parser, Word,
 };
 use super::files::{Reads, Writes};
 use super::functions;
@@ -114,47 +112,262 @@ impl<'a> Request<'a> {
     /// # Errors
     /// As [`Request::parse`].
     pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Error> {
-        let mut reader = Reader::new(pdu);
-        // The variable is changed in place: moving it would cost as much time as parsing.
-        let mut request = Request::read(pdu, &mut reader, functions);
-        if (request.is_ok() && !reader.is_empty()) || pdu.len() > MAX_PDU {
-            request = Err(Error::ILLEGAL_DATA_VALUE);
-        }
-        request
+        let (&function, fields) = pdu.split_first().ok_or(Error::ILLEGAL_FUNCTION)?;
+        let mut parser = Parser {
+            reader: Reader::new(fields),
+            is_wrong: false,
+        };
+        let mut request = Request::of(function);
+        request.pass(&mut parser);
+        expect(parser.is_right() && pdu.len() <= MAX_PDU)?;
+        request.check(pdu, functions)?;
+        Ok(request)
     }
 
-    fn read(
-        pdu: &[u8],
-        reader: &mut Reader<'a>,
-        functions: &[custom::Function],
-    ) -> Result<Self, Error> {
-        let function = reader.u8().ok_or(Error::ILLEGAL_FUNCTION)?;
+    /// The request of a function whose fields are those of `source`. It may be one that
+    /// [`Request::emit`] refuses.
+    ///
+    /// # Errors
+    /// The exception that a server answers to records of a file that are not valid.
+    pub fn take(function: u8, source: &mut impl Fields<'a>) -> Result<Self, Error> {
+        let mut request = Request::of(function);
+        request.pass(source);
+        request.check_records()?;
+        Ok(request)
+    }
+
+    /// Gives all fields to `sink`, in the order of the wire.
+    pub fn give(&self, sink: &mut impl Fields<'a>) {
+        // A sink changes no field.
+        Request::pass(&mut { *self }, sink);
+    }
+
+    /// A request of a function, with all fields 0.
+    fn of(function: u8) -> Self {
+        let (address, quantity, data) = (0, 0, &[][..]);
         match function {
-            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => read_bits(function, reader),
+            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => Request::ReadBits {
+                function,
+                address,
+                quantity,
+            },
             functions::READ_HOLDING_REGISTERS | functions::READ_INPUT_REGISTERS => {
-                read_registers(function, reader)
+                Request::ReadRegisters {
+                    function,
+                    address,
+                    quantity,
+                }
             }
-            functions::WRITE_SINGLE_COIL => write_single_coil(reader),
-            functions::WRITE_SINGLE_REGISTER => write_single_register(reader),
-            functions::READ_EXCEPTION_STATUS => Ok(Request::ReadExceptionStatus),
-            functions::DIAGNOSTICS => diagnostics(reader),
-            functions::GET_COMM_EVENT_COUNTER => Ok(Request::GetCommEventCounter),
-            functions::GET_COMM_EVENT_LOG => Ok(Request::GetCommEventLog),
-            functions::WRITE_MULTIPLE_COILS => write_multiple_coils(reader),
-            functions::WRITE_MULTIPLE_REGISTERS => write_multiple_registers(reader),
-            functions::REPORT_SERVER_ID => Ok(Request::ReportServerId),
-            functions::READ_FILE_RECORD => read_file_record(reader),
-            functions::WRITE_FILE_RECORD => write_file_record(reader),
-            functions::MASK_WRITE_REGISTER => mask_write_register(reader),
-            functions::READ_WRITE_MULTIPLE_REGISTERS => read_write_registers(reader),
-            functions::READ_FIFO_QUEUE => read_fifo_queue(reader),
-            functions::ENCAPSULATED_INTERFACE_TRANSPORT => encapsulated(reader),
-            function => {
+            functions::WRITE_SINGLE_COIL => Request::WriteSingleCoil { address, on: false },
+            functions::WRITE_SINGLE_REGISTER => Request::WriteSingleRegister { address, value: 0 },
+            functions::READ_EXCEPTION_STATUS => Request::ReadExceptionStatus,
+            functions::DIAGNOSTICS => Request::Diagnostics {
+                sub_function: 0,
+                data,
+            },
+            functions::GET_COMM_EVENT_COUNTER => Request::GetCommEventCounter,
+            functions::GET_COMM_EVENT_LOG => Request::GetCommEventLog,
+            functions::WRITE_MULTIPLE_COILS => Request::WriteMultipleCoils {
+                address,
+                quantity,
+                data,
+            },
+            functions::WRITE_MULTIPLE_REGISTERS => Request::WriteMultipleRegisters {
+                address,
+                quantity,
+                data,
+            },
+            functions::REPORT_SERVER_ID => Request::ReportServerId,
+            functions::READ_FILE_RECORD => Request::ReadFileRecord(Reads(data)),
+            functions::WRITE_FILE_RECORD => Request::WriteFileRecord(Writes(data)),
+            functions::MASK_WRITE_REGISTER => Request::MaskWriteRegister {
+                address,
+                and_mask: 0,
+                or_mask: 0,
+            },
+            functions::READ_WRITE_MULTIPLE_REGISTERS => Request::ReadWriteMultipleRegisters {
+                read_address: 0,
+                read_quantity: 0,
+                write_address: 0,
+                write_quantity: 0,
+                data,
+            },
+            functions::READ_FIFO_QUEUE => Request::ReadFifoQueue { address },
+            functions::ENCAPSULATED_INTERFACE_TRANSPORT => {
+                Request::EncapsulatedInterface { mei_type: 0, data }
+            }
+            function => Request::Custom { function, data },
+        }
+    }
+
+    /// Passes all fields, in the order of the wire.
+    fn pass(&mut self, fields: &mut impl Fields<'a>) {
+        self.pass_mei_type(fields);
+        match self {
+            Request::ReadBits {
+                address, quantity, ..
+            }
+            | Request::ReadRegisters {
+                address, quantity, ..
+            } => {
+                fields.word(Word::Address, address);
+                fields.word(Word::Quantity, quantity)
+            }
+            Request::WriteSingleCoil { address, on } => {
+                fields.word(Word::Address, address);
+                fields.flag(Flag::Coil, on);
+            }
+            Request::WriteSingleRegister { address, value } => {
+                fields.word(Word::Address, address);
+                fields.word(Word::Value, value)
+            }
+            Request::ReadExceptionStatus
+            | Request::GetCommEventCounter
+            | Request::GetCommEventLog
+            | Request::ReportServerId => {}
+            Request::Diagnostics { sub_function, data } => {
+                fields.word(Word::SubFunction, sub_function);
+                fields.rest(Data::Registers, data);
+            }
+            Request::WriteMultipleCoils {
+                address,
+                quantity,
+                data,
+            } => {
+                fields.word(Word::Address, address);
+                fields.word(Word::Quantity, quantity);
+                fields.counted(Data::Bits, data)
+            }
+            Request::WriteMultipleRegisters {
+                address,
+                quantity,
+                data,
+            } => {
+                fields.word(Word::Address, address);
+                fields.word(Word::Quantity, quantity);
+                fields.counted(Data::Registers, data)
+            }
+            Request::ReadFileRecord(Reads(bytes)) | Request::WriteFileRecord(Writes(bytes)) => {
+                fields.counted(Data::Bytes, bytes)
+            }
+            Request::MaskWriteRegister {
+                address,
+                and_mask,
+                or_mask,
+            } => {
+                fields.word(Word::Address, address);
+                fields.word(Word::AndMask, and_mask);
+                fields.word(Word::OrMask, or_mask)
+            }
+            Request::ReadWriteMultipleRegisters {
+                read_address,
+                read_quantity,
+                write_address,
+                write_quantity,
+                data,
+            } => {
+                fields.word(Word::ReadAddress, read_address);
+                fields.word(Word::Quantity, read_quantity);
+                fields.word(Word::WriteAddress, write_address);
+                fields.word(Word::WriteQuantity, write_quantity);
+                fields.counted(Data::Registers, data)
+            }
+            Request::ReadFifoQueue { address } => fields.word(Word::Address, address),
+            Request::ReadDeviceIdentification { code, object } => {
+                fields.byte(Byte::ReadDeviceIdCode, code);
+                fields.byte(Byte::ObjectId, object)
+            }
+            Request::EncapsulatedInterface { data, .. } | Request::Custom { data, .. } => {
+                fields.rest(Data::Bytes, data);
+            }
+        }
+    }
+
+    /// Passes the MEI type of a request of 2B, which decides what follows it.
+    fn pass_mei_type<F: Fields<'a>>(&mut self, fields: &mut F) {
+        let mut mei_type = match *self {
+            Request::EncapsulatedInterface { mei_type, .. } => mei_type,
+            Request::ReadDeviceIdentification { .. } => MEI_READ_DEVICE_IDENTIFICATION,
+            _ => return,
+        };
+        fields.byte(Byte::MeiType, &mut mei_type);
+        if F::IS_SOURCE {
+            let data = &[][..];
+            *self = match mei_type {
+                MEI_READ_DEVICE_IDENTIFICATION => {
+                    Request::ReadDeviceIdentification { code: 0, object: 0 }
+                }
+                mei_type => Request::EncapsulatedInterface { mei_type, data },
+            };
+        }
+    }
+
+    /// Checks the records of a file.
+    fn check_records(&self) -> Result<(), Error> {
+        match *self {
+            Request::ReadFileRecord(Reads(bytes)) => Reads::new(bytes).map(drop),
+            Request::WriteFileRecord(Writes(bytes)) => Writes::new(bytes).map(drop),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks what the standard says of the fields. The PDU has all of them, and nothing follows.
+    /// A server checks lengths and quantities before addresses (figures 11 and following).
+    fn check(&self, pdu: &[u8], functions: &[custom::Function]) -> Result<(), Error> {
+        match *self {
+            Request::ReadBits {
+                address, quantity, ..
+            } => check_range(address, quantity, MAX_READ_BITS).result(),
+            Request::ReadRegisters {
+                address, quantity, ..
+            } => check_range(address, quantity, MAX_READ_REGISTERS).result(),
+            Request::WriteMultipleCoils {
+                address,
+                quantity,
+                data,
+            } => {
+                expect(data.len() == usize::from(byte_count(quantity)))?;
+                check_range(address, quantity, MAX_WRITE_BITS).result()
+            }
+            Request::WriteMultipleRegisters {
+                address,
+                quantity,
+                data,
+            } => {
+                expect(data.len() == 2 * usize::from(quantity))?;
+                check_range(address, quantity, MAX_WRITE_REGISTERS).result()
+            }
+            Request::ReadWriteMultipleRegisters {
+                read_address,
+                read_quantity,
+                write_address,
+                write_quantity,
+                data,
+            } => {
+                expect(data.len() == 2 * usize::from(write_quantity))?;
+                let most = MAX_READ_WRITE_REGISTERS;
+                // Both quantities are checked before both ranges of addresses.
+                check_within(usize::from(write_quantity), (1, most.into()))?;
+                check_range(read_address, read_quantity, MAX_READ_REGISTERS).result()?;
+                check_range(write_address, write_quantity, most).result()
+            }
+            Request::Diagnostics { sub_function, data } => {
+                check_sub_function(sub_function, data)?;
+                expect(match (sub_function, data) {
+                    (sub_function::RETURN_QUERY_DATA, _)
+                    | (sub_function::RESTART_COMMUNICATIONS, [0x00 | 0xFF, 0])
+                    | (sub_function::CHANGE_ASCII_INPUT_DELIMITER, [_, 0]) => true,
+                    (_, data) => matches!(data, [0, 0]),
+                })
+            }
+            Request::ReadDeviceIdentification { code, .. } => {
+                expect((BASIC..=INDIVIDUAL).contains(&code))
+            }
+            Request::Custom { function, .. } => {
                 let declared = custom::find(functions, function);
-                length::check(pdu, function, declared.map(|it| it.request))?;
-                let data = reader.rest();
-                Ok(Request::Custom { function, data })
+                length::check(pdu, function, declared.map(|it| it.request))
             }
+            _ => self.check_records(),
         }
     }
 
@@ -191,7 +404,8 @@ impl<'a> Request<'a> {
     /// request is sent; [`Error::BUFFER_TOO_SMALL`] if it does not fit.
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Error> {
         let mut writer = Writer::new(pdu);
-        self.write(&mut writer);
+        writer.u8(self.function());
+        self.give(&mut writer);
         if writer.length() > MAX_PDU {
             return Err(Error::ILLEGAL_DATA_VALUE);
         }
@@ -207,92 +421,6 @@ impl<'a> Request<'a> {
             Ok(length)
         } else {
             Err(Error::ILLEGAL_FUNCTION)
-        }
-    }
-
-    fn write(&self, writer: &mut Writer) {
-        match *self {
-            Request::ReadBits {
-                function,
-                address,
-                quantity,
-            }
-            | Request::ReadRegisters {
-                function,
-                address,
-                quantity,
-            } => {
-                writer.u8(function);
-                writer.u16(address);
-                writer.u16(quantity);
-            }
-            Request::WriteSingleCoil { address, on } => {
-                emit_write_single_coil(writer, address, on);
-            }
-            Request::WriteSingleRegister { address, value } => {
-                writer.u8(functions::WRITE_SINGLE_REGISTER);
-                writer.u16(address);
-                writer.u16(value);
-            }
-            Request::ReadExceptionStatus
-            | Request::GetCommEventCounter
-            | Request::GetCommEventLog
-            | Request::ReportServerId => writer.u8(self.function()),
-            Request::Diagnostics { sub_function, data } => {
-                emit_diagnostics(writer, sub_function, data);
-            }
-            Request::WriteMultipleCoils {
-                address,
-                quantity,
-                data,
-            }
-            | Request::WriteMultipleRegisters {
-                address,
-                quantity,
-                data,
-            } => {
-                writer.u8(self.function());
-                writer.u16(address);
-                writer.u16(quantity);
-                writer.counted(data);
-            }
-            Request::ReadFileRecord(Reads(groups)) | Request::WriteFileRecord(Writes(groups)) => {
-                writer.u8(self.function());
-                writer.counted(groups);
-            }
-            Request::MaskWriteRegister {
-                address,
-                and_mask,
-                or_mask,
-            } => emit_mask_write_register(writer, address, and_mask, or_mask),
-            Request::ReadWriteMultipleRegisters {
-                read_address,
-                read_quantity,
-                write_address,
-                write_quantity,
-                data,
-            } => {
-                writer.u8(functions::READ_WRITE_MULTIPLE_REGISTERS);
-                writer.u16(read_address);
-                writer.u16(read_quantity);
-                writer.u16(write_address);
-                writer.u16(write_quantity);
-                writer.counted(data);
-            }
-            Request::ReadFifoQueue { address } => {
-                writer.u8(functions::READ_FIFO_QUEUE);
-                writer.u16(address);
-            }
-            Request::ReadDeviceIdentification { code, object } => {
-                emit_encapsulated(writer, MEI_READ_DEVICE_IDENTIFICATION, &[code, object]);
-            }
-            Request::EncapsulatedInterface { mei_type, data } => {
-                emit_encapsulated(writer, mei_type, data);
-            }
-            Request::Custom { function, data } => {
-                writer.u8(function);
-                writer.put(data);
-            }
         }
     }
 
@@ -323,146 +451,4 @@ impl<'a> Request<'a> {
             _ => length::response(&[self.function()], functions),
         }
     }
-}
-
-fn read_bits<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Error> {
-    let (address, quantity) = last_range(reader, MAX_READ_BITS)?;
-    Ok(Request::ReadBits {
-        function,
-        address,
-        quantity,
-    })
-}
-
-fn write_single_coil<'a>(reader: &mut Reader) -> Result<Request<'a>, Error> {
-    let (address, value) = (word(reader)?, word(reader)?);
-    let on = is_on(value)?;
-    Ok(Request::WriteSingleCoil { address, on })
-}
-
-fn write_multiple_coils<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
-    let (address, quantity) = (word(reader)?, word(reader)?);
-    let data = counted(reader)?;
-    if data.len() != usize::from(byte_count(quantity)) {
-        return Err(Error::ILLEGAL_DATA_VALUE);
-    }
-    check_end_and_range(reader, address, quantity, MAX_WRITE_BITS)?;
-    Ok(Request::WriteMultipleCoils {
-        address,
-        quantity,
-        data,
-    })
-}
-
-fn read_registers<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Error> {
-    let (address, quantity) = last_range(reader, MAX_READ_REGISTERS)?;
-    Ok(Request::ReadRegisters {
-        function,
-        address,
-        quantity,
-    })
-}
-
-fn write_single_register<'a>(reader: &mut Reader) -> Result<Request<'a>, Error> {
-    Ok(Request::WriteSingleRegister {
-        address: word(reader)?,
-        value: word(reader)?,
-    })
-}
-
-fn write_multiple_registers<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
-    let (address, quantity) = (word(reader)?, word(reader)?);
-    let data = values(reader, quantity)?;
-    check_end_and_range(reader, address, quantity, MAX_WRITE_REGISTERS)?;
-    Ok(Request::WriteMultipleRegisters {
-        address,
-        quantity,
-        data,
-    })
-}
-
-fn mask_write_register<'a>(reader: &mut Reader) -> Result<Request<'a>, Error> {
-    Ok(Request::MaskWriteRegister {
-        address: word(reader)?,
-        and_mask: word(reader)?,
-        or_mask: word(reader)?,
-    })
-}
-
-fn read_write_registers<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
-    let (read_address, read_quantity) = (word(reader)?, word(reader)?);
-    let (write_address, write_quantity) = (word(reader)?, word(reader)?);
-    let data = values(reader, write_quantity)?;
-    // Both quantities are checked before both ranges of addresses.
-    let most = usize::from(MAX_READ_WRITE_REGISTERS);
-    check_within(usize::from(write_quantity), (1, most))?;
-    check_end_and_range(reader, read_address, read_quantity, MAX_READ_REGISTERS)?;
-    check_end_and_range(
-        reader,
-        write_address,
-        write_quantity,
-        MAX_READ_WRITE_REGISTERS,
-    )?;
-    Ok(Request::ReadWriteMultipleRegisters {
-        read_address,
-        read_quantity,
-        write_address,
-        write_quantity,
-        data,
-    })
-}
-
-/// Reads a byte count and the data of `quantity` registers.
-fn values<'a>(reader: &mut Reader<'a>, quantity: u16) -> Result<&'a [u8], Error> {
-    let data = counted(reader)?;
-    if data.len().is_multiple_of(2) && data.len() / 2 == usize::from(quantity) {
-        Ok(data)
-    } else {
-        Err(Error::ILLEGAL_DATA_VALUE)
-    }
-}
-
-fn diagnostics<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
-    let (sub_function, data) = sub_function_and_data(reader)?;
-    let allowed = match (sub_function, data) {
-        (sub_function::RETURN_QUERY_DATA, _) => true,
-        (sub_function::RESTART_COMMUNICATIONS, [0x00 | 0xFF, 0]) => true,
-        (sub_function::CHANGE_ASCII_INPUT_DELIMITER, [_, 0]) => true,
-        (_, data) => matches!(data, [0, 0]),
-    };
-    if allowed {
-        Ok(Request::Diagnostics { sub_function, data })
-    } else {
-        Err(Error::ILLEGAL_DATA_VALUE)
-    }
-}
-
-fn read_file_record<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
-    let bytes = counted(reader)?;
-    expect_end(reader)?;
-    Ok(Request::ReadFileRecord(Reads::new(bytes)?))
-}
-
-fn write_file_record<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
-    let bytes = counted(reader)?;
-    expect_end(reader)?;
-    Ok(Request::WriteFileRecord(Writes::new(bytes)?))
-}
-
-fn read_fifo_queue<'a>(reader: &mut Reader) -> Result<Request<'a>, Error> {
-    let address = word(reader)?;
-    Ok(Request::ReadFifoQueue { address })
-}
-
-fn encapsulated<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Error> {
-    let mei_type = byte(reader)?;
-    if mei_type != MEI_READ_DEVICE_IDENTIFICATION {
-        let data = reader.rest();
-        return Ok(Request::EncapsulatedInterface { mei_type, data });
-    }
-    let (code, object) = (byte(reader)?, byte(reader)?);
-    if !(BASIC..=INDIVIDUAL).contains(&code) {
-        return Err(Error::ILLEGAL_DATA_VALUE);
-    }
-    Ok(Request::ReadDeviceIdentification { code, object })
 }

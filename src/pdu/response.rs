@@ -1,13 +1,12 @@
 //! A response PDU, taken apart: [`Response::parse`] and [`Response::emit`]. The data of a parsed
 //! response borrow from its bytes.
 
-use super::diagnostics::{sub_function, sub_function_and_data};
+use super::diagnostics::{check_sub_function, sub_function};
 use super::fields::{
-    byte, byte_count, counted, emit_diagnostics, emit_encapsulated, emit_mask_write_register,
-    emit_write_single_coil, is_on, last_range, word,
+    byte_count, check_range, expect, Byte, Count, Data, Fields, Flag, Parser, Word,
 };
 use super::files::{Records, Writes};
-use super::identification::{read_reply, ObjectList, MEI_READ_DEVICE_IDENTIFICATION, MORE};
+use super::identification::{check_head, ObjectList, MEI_READ_DEVICE_IDENTIFICATION};
 use super::limits::{
     MAX_EVENTS, MAX_FIFO, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,
@@ -123,57 +122,274 @@ impl<'a> Response<'a> {
     /// # Errors
     /// As [`Response::parse`].
     pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Error> {
-        let mut reader = Reader::new(pdu);
-        // The variable is changed in place: moving it would cost as much time as parsing.
-        let mut response = Response::read(pdu, &mut reader, functions);
-        let in_order = match response {
-            Ok(_) => reader.is_empty() && pdu.len() <= MAX_PDU,
-            Err(status) => status == Status::INVALID_FUNCTION && pdu.len() <= MAX_PDU,
+        let (&function, fields) = pdu.split_first().ok_or(Error::MALFORMED_REPLY)?;
+        let mut parser = Parser {
+            reader: Reader::new(fields),
+            is_wrong: false,
         };
-        if !in_order {
-            response = Err(Error::MALFORMED_REPLY);
+        let mut response = Response::of(function);
+        response.pass(&mut parser);
+        let mut found = expect(parser.is_right());
+        if found.is_ok() {
+            found = response.check(pdu, functions);
         }
-        response
+        match found {
+            Ok(()) if pdu.len() <= MAX_PDU => Ok(response),
+            Err(Error::INVALID_FUNCTION) if pdu.len() <= MAX_PDU => Err(Error::INVALID_FUNCTION),
+            _ => Err(Error::MALFORMED_REPLY),
+        }
     }
 
-    fn read(
-        pdu: &[u8],
-        reader: &mut Reader<'a>,
-        functions: &[custom::Function],
-    ) -> Result<Self, Error> {
-        let function = reader.u8().ok_or(Error::MALFORMED_REPLY)?;
+    /// The response of a function, no exception, whose fields are those of `source`. It may be
+    /// one that [`Response::emit`] refuses.
+    ///
+    /// # Errors
+    /// [`Error::MALFORMED_REPLY`] for records of a file or objects that are not valid.
+    pub fn take(function: u8, source: &mut impl Fields<'a>) -> Result<Self, Error> {
+        let mut response = match Response::of(function) {
+            Response::Exception { .. } => return Err(Error::INVALID_FUNCTION),
+            response => response,
+        };
+        response.pass(source);
+        let checked = response.check_groups();
+        checked.map_or(Err(Error::MALFORMED_REPLY), |()| Ok(response))
+    }
+
+    /// Gives all fields to `sink`, in the order of the wire.
+    pub fn give(&self, sink: &mut impl Fields<'a>) {
+        // A sink changes no field.
+        Response::pass(&mut { *self }, sink);
+    }
+
+    /// A response of a function, with all fields 0.
+    fn of(function: u8) -> Self {
+        let (address, quantity, data) = (0, 0, &[][..]);
         match function {
-            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => read_bits(function, reader),
+            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => {
+                Response::ReadBits { function, data }
+            }
             functions::READ_HOLDING_REGISTERS
             | functions::READ_INPUT_REGISTERS
-            | functions::READ_WRITE_MULTIPLE_REGISTERS => read_registers(function, reader),
-            functions::WRITE_SINGLE_COIL => write_single_coil(reader),
-            functions::WRITE_SINGLE_REGISTER => write_single_register(reader),
-            functions::READ_EXCEPTION_STATUS => exception_status(reader),
-            functions::DIAGNOSTICS => diagnostics(reader),
-            functions::GET_COMM_EVENT_COUNTER => event_counter(reader),
-            functions::GET_COMM_EVENT_LOG => event_log(reader),
-            functions::WRITE_MULTIPLE_COILS => write_multiple(function, MAX_WRITE_BITS, reader),
-            functions::WRITE_MULTIPLE_REGISTERS => {
-                write_multiple(function, MAX_WRITE_REGISTERS, reader)
+            | functions::READ_WRITE_MULTIPLE_REGISTERS => {
+                Response::ReadRegisters { function, data }
             }
-            functions::REPORT_SERVER_ID => server_id(reader),
-            functions::READ_FILE_RECORD => read_file_record(reader),
-            functions::WRITE_FILE_RECORD => write_file_record(reader),
-            functions::MASK_WRITE_REGISTER => mask_write_register(reader),
-            functions::READ_FIFO_QUEUE => fifo_queue(reader),
-            functions::ENCAPSULATED_INTERFACE_TRANSPORT => encapsulated(reader),
-            function if function & EXCEPTION != 0 => parse_exception(function, reader),
-            function => {
+            functions::WRITE_SINGLE_COIL => Response::WriteSingleCoil { address, on: false },
+            functions::WRITE_SINGLE_REGISTER => Response::WriteSingleRegister { address, value: 0 },
+            functions::READ_EXCEPTION_STATUS => Response::ExceptionStatus { outputs: 0 },
+            functions::DIAGNOSTICS => Response::Diagnostics {
+                sub_function: 0,
+                data,
+            },
+            functions::GET_COMM_EVENT_COUNTER => Response::CommEventCounter {
+                status: 0,
+                events: 0,
+            },
+            functions::GET_COMM_EVENT_LOG => Response::CommEventLog {
+                status: 0,
+                events: 0,
+                messages: 0,
+                log: data,
+            },
+            functions::WRITE_MULTIPLE_COILS | functions::WRITE_MULTIPLE_REGISTERS => {
+                Response::WriteMultiple {
+                    function,
+                    address,
+                    quantity,
+                }
+            }
+            functions::REPORT_SERVER_ID => Response::ServerId { count: 0, data },
+            functions::READ_FILE_RECORD => Response::ReadFileRecord(Records(data)),
+            functions::WRITE_FILE_RECORD => Response::WriteFileRecord(Writes(data)),
+            functions::MASK_WRITE_REGISTER => Response::MaskWriteRegister {
+                address,
+                and_mask: 0,
+                or_mask: 0,
+            },
+            functions::READ_FIFO_QUEUE => Response::FifoQueue { data },
+            functions::ENCAPSULATED_INTERFACE_TRANSPORT => {
+                Response::EncapsulatedInterface { mei_type: 0, data }
+            }
+            function if function & EXCEPTION != 0 => Response::Exception {
+                function: function & !EXCEPTION,
+                code: 0,
+            },
+            function => Response::Custom { function, data },
+        }
+    }
+
+    /// Passes all fields, in the order of the wire.
+    fn pass(&mut self, fields: &mut impl Fields<'a>) {
+        self.pass_mei_type(fields);
+        match self {
+            Response::ReadBits { data, .. } => fields.counted(Data::Bits, data),
+            Response::ReadRegisters { data, .. } => fields.counted(Data::Registers, data),
+            Response::WriteSingleCoil { address, on } => {
+                fields.word(Word::Address, address);
+                fields.flag(Flag::Coil, on);
+            }
+            Response::WriteSingleRegister { address, value } => {
+                fields.word(Word::Address, address);
+                fields.word(Word::Value, value)
+            }
+            Response::ExceptionStatus { outputs } => fields.byte(Byte::ExceptionStatus, outputs),
+            Response::Diagnostics { sub_function, data } => {
+                fields.word(Word::SubFunction, sub_function);
+                fields.rest(Data::Registers, data);
+            }
+            Response::CommEventCounter { status, events } => {
+                fields.word(Word::Status, status);
+                fields.word(Word::Events, events)
+            }
+            Response::CommEventLog {
+                status,
+                events,
+                messages,
+                log,
+            } => {
+                fields.count(Count::Byte, 6 + log.len());
+                fields.word(Word::Status, status);
+                fields.word(Word::Events, events);
+                fields.word(Word::Messages, messages);
+                fields.rest(Data::Bytes, log);
+            }
+            Response::WriteMultiple {
+                address, quantity, ..
+            } => {
+                fields.word(Word::Address, address);
+                fields.word(Word::Quantity, quantity)
+            }
+            // In some devices the byte count covers only the id, and more bytes follow. So the
+            // result contains the count and all bytes after it.
+            Response::ServerId { count, data } => {
+                fields.byte(Byte::ByteCount, count);
+                fields.rest(Data::Characters, data);
+            }
+            Response::ReadFileRecord(Records(bytes)) | Response::WriteFileRecord(Writes(bytes)) => {
+                fields.counted(Data::Bytes, bytes)
+            }
+            Response::MaskWriteRegister {
+                address,
+                and_mask,
+                or_mask,
+            } => {
+                fields.word(Word::Address, address);
+                fields.word(Word::AndMask, and_mask);
+                fields.word(Word::OrMask, or_mask)
+            }
+            Response::FifoQueue { data } => {
+                fields.count(Count::Bytes, 2 + data.len());
+                fields.count(Count::Registers, data.len());
+                fields.rest(Data::Registers, data);
+            }
+            Response::DeviceIdentification {
+                code,
+                conformity,
+                more_follows,
+                next_object,
+                objects: ObjectList { count, bytes },
+            } => {
+                fields.byte(Byte::ReadDeviceIdCode, code);
+                fields.byte(Byte::Conformity, conformity);
+                fields.flag(Flag::MoreFollows, more_follows);
+                fields.byte(Byte::NextObjectId, next_object);
+                fields.byte(Byte::ObjectCount, count);
+                fields.rest(Data::Bytes, bytes);
+            }
+            Response::Exception { code, .. } => fields.byte(Byte::ExceptionCode, code),
+            Response::EncapsulatedInterface { data, .. } | Response::Custom { data, .. } => {
+                fields.rest(Data::Bytes, data);
+            }
+        }
+    }
+
+    /// Passes the MEI type of a response of 2B, which decides what follows it.
+    fn pass_mei_type<F: Fields<'a>>(&mut self, fields: &mut F) {
+        let mut mei_type = match *self {
+            Response::EncapsulatedInterface { mei_type, .. } => mei_type,
+            Response::DeviceIdentification { .. } => MEI_READ_DEVICE_IDENTIFICATION,
+            _ => return,
+        };
+        fields.byte(Byte::MeiType, &mut mei_type);
+        if F::IS_SOURCE {
+            let data = &[][..];
+            *self = match mei_type {
+                MEI_READ_DEVICE_IDENTIFICATION => Response::DeviceIdentification {
+                    code: 0,
+                    conformity: 0,
+                    more_follows: false,
+                    next_object: 0,
+                    objects: ObjectList {
+                        count: 0,
+                        bytes: data,
+                    },
+                },
+                mei_type => Response::EncapsulatedInterface { mei_type, data },
+            };
+        }
+    }
+
+    /// Checks the records of a file, and the objects of a device identification.
+    fn check_groups(&self) -> Result<(), Error> {
+        match *self {
+            Response::ReadFileRecord(Records(bytes)) => Records::new(bytes).map(drop),
+            Response::WriteFileRecord(Writes(bytes)) => Writes::new(bytes).map(drop),
+            Response::DeviceIdentification { objects, .. } => {
+                ObjectList::new(objects.count, objects.bytes).map(drop)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks what the standard says of the fields. The PDU has all of them, and nothing follows.
+    fn check(&self, pdu: &[u8], functions: &[custom::Function]) -> Result<(), Error> {
+        match *self {
+            Response::ReadBits { data, .. } => {
+                let most = usize::from(byte_count(MAX_READ_BITS));
+                expect(!data.is_empty() && data.len() <= most)
+            }
+            Response::ReadRegisters { data, .. } => {
+                let most = 2 * usize::from(MAX_READ_REGISTERS);
+                let is_right = data.len() <= most && data.len().is_multiple_of(2);
+                expect(!data.is_empty() && is_right)
+            }
+            Response::WriteMultiple {
+                function,
+                address,
+                quantity,
+            } => {
+                let most = match function {
+                    functions::WRITE_MULTIPLE_COILS => MAX_WRITE_BITS,
+                    _ => MAX_WRITE_REGISTERS,
+                };
+                check_range(address, quantity, most).result()
+            }
+            Response::Diagnostics { sub_function, data } => {
+                check_sub_function(sub_function, data)?;
+                expect(sub_function != sub_function::FORCE_LISTEN_ONLY)
+            }
+            Response::CommEventLog { log, .. } => expect(log.len() <= MAX_EVENTS),
+            Response::ServerId { count, data } => expect(usize::from(count) <= data.len()),
+            Response::FifoQueue { data } => expect(data.len() <= 2 * usize::from(MAX_FIFO)),
+            Response::DeviceIdentification {
+                code,
+                more_follows,
+                objects,
+                ..
+            } => {
+                check_head(code, more_follows, objects.count)?;
+                self.check_groups()
+            }
+            Response::Exception { code, .. } => {
+                expect(Status::exception(code) != Status::MALFORMED_REPLY)
+            }
+            Response::Custom { function, .. } => {
                 let declared = custom::find(functions, function);
                 match length::check(pdu, function, declared.map(|it| it.response)) {
                     Err(Error::ILLEGAL_FUNCTION) => Err(Error::INVALID_FUNCTION),
-                    checked => checked.map(|()| {
-                        let data = reader.rest();
-                        Response::Custom { function, data }
-                    }),
+                    checked => checked,
                 }
             }
+            _ => self.check_groups(),
         }
     }
 
@@ -209,7 +425,11 @@ impl<'a> Response<'a> {
     /// response is sent; [`Error::BUFFER_TOO_SMALL`] if it does not fit.
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Error> {
         let mut writer = Writer::new(pdu);
-        self.write(&mut writer);
+        writer.u8(match self {
+            Response::Exception { function, .. } => function | EXCEPTION,
+            _ => self.function(),
+        });
+        self.give(&mut writer);
         if writer.length() > MAX_PDU {
             return Err(Error::MALFORMED_REPLY);
         }
@@ -228,259 +448,4 @@ impl<'a> Response<'a> {
             Err(Error::INVALID_FUNCTION)
         }
     }
-
-    fn write(&self, writer: &mut Writer) {
-        match *self {
-            Response::ReadBits { function, data } | Response::ReadRegisters { function, data } => {
-                writer.u8(function);
-                writer.counted(data);
-            }
-            Response::WriteSingleCoil { address, on } => {
-                emit_write_single_coil(writer, address, on);
-            }
-            Response::WriteSingleRegister { address, value } => {
-                writer.u8(functions::WRITE_SINGLE_REGISTER);
-                writer.u16(address);
-                writer.u16(value);
-            }
-            Response::ExceptionStatus { outputs } => {
-                writer.u8(functions::READ_EXCEPTION_STATUS);
-                writer.u8(outputs);
-            }
-            Response::Diagnostics { sub_function, data } => {
-                emit_diagnostics(writer, sub_function, data);
-            }
-            Response::CommEventCounter { status, events } => {
-                writer.u8(functions::GET_COMM_EVENT_COUNTER);
-                writer.u16(status);
-                writer.u16(events);
-            }
-            Response::CommEventLog {
-                status,
-                events,
-                messages,
-                log,
-            } => emit_event_log(writer, [status, events, messages], log),
-            Response::WriteMultiple {
-                function,
-                address,
-                quantity,
-            } => {
-                writer.u8(function);
-                writer.u16(address);
-                writer.u16(quantity);
-            }
-            Response::ServerId { count, data } => {
-                writer.u8(functions::REPORT_SERVER_ID);
-                writer.u8(count);
-                writer.put(data);
-            }
-            Response::ReadFileRecord(Records(groups))
-            | Response::WriteFileRecord(Writes(groups)) => {
-                writer.u8(self.function());
-                writer.counted(groups);
-            }
-            Response::MaskWriteRegister {
-                address,
-                and_mask,
-                or_mask,
-            } => emit_mask_write_register(writer, address, and_mask, or_mask),
-            Response::FifoQueue { data } => emit_fifo_queue(writer, data),
-            Response::DeviceIdentification {
-                code,
-                conformity,
-                more_follows,
-                next_object,
-                objects,
-            } => emit_device_identification(
-                writer,
-                [code, conformity],
-                more_follows,
-                next_object,
-                objects,
-            ),
-            Response::EncapsulatedInterface { mei_type, data } => {
-                emit_encapsulated(writer, mei_type, data);
-            }
-            Response::Exception { function, code } => {
-                writer.u8(function | EXCEPTION);
-                writer.u8(code);
-            }
-            Response::Custom { function, data } => {
-                writer.u8(function);
-                writer.put(data);
-            }
-        }
-    }
-}
-
-fn parse_exception<'a>(function: u8, reader: &mut Reader) -> Result<Response<'a>, Error> {
-    let code = reader.u8().ok_or(Error::MALFORMED_REPLY)?;
-    if Status::exception(code) == Status::MALFORMED_REPLY {
-        return Err(Error::MALFORMED_REPLY);
-    }
-    Ok(Response::Exception {
-        function: function & !EXCEPTION,
-        code,
-    })
-}
-
-fn read_bits<'a>(function: u8, reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
-    let data = counted(reader)?;
-    if data.is_empty() || data.len() > usize::from(byte_count(MAX_READ_BITS)) {
-        return Err(Error::MALFORMED_REPLY);
-    }
-    Ok(Response::ReadBits { function, data })
-}
-
-fn write_single_coil<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
-    let (address, value) = (word(reader)?, word(reader)?);
-    let on = is_on(value)?;
-    Ok(Response::WriteSingleCoil { address, on })
-}
-
-fn read_registers<'a>(function: u8, reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
-    let data = counted(reader)?;
-    let most = 2 * usize::from(MAX_READ_REGISTERS);
-    if data.is_empty() || data.len() > most || !data.len().is_multiple_of(2) {
-        return Err(Error::MALFORMED_REPLY);
-    }
-    Ok(Response::ReadRegisters { function, data })
-}
-
-fn write_single_register<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
-    Ok(Response::WriteSingleRegister {
-        address: word(reader)?,
-        value: word(reader)?,
-    })
-}
-
-/// Parses a response of 0F or 10, which writes at most `most` coils or registers.
-fn write_multiple<'a>(function: u8, most: u16, reader: &mut Reader) -> Result<Response<'a>, Error> {
-    let (address, quantity) = last_range(reader, most)?;
-    Ok(Response::WriteMultiple {
-        function,
-        address,
-        quantity,
-    })
-}
-
-fn mask_write_register<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
-    Ok(Response::MaskWriteRegister {
-        address: word(reader)?,
-        and_mask: word(reader)?,
-        or_mask: word(reader)?,
-    })
-}
-
-fn exception_status<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
-    let outputs = byte(reader)?;
-    Ok(Response::ExceptionStatus { outputs })
-}
-
-fn diagnostics<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
-    let (sub_function, data) = sub_function_and_data(reader)?;
-    if sub_function == sub_function::FORCE_LISTEN_ONLY {
-        return Err(Error::MALFORMED_REPLY);
-    }
-    Ok(Response::Diagnostics { sub_function, data })
-}
-
-fn event_counter<'a>(reader: &mut Reader) -> Result<Response<'a>, Error> {
-    Ok(Response::CommEventCounter {
-        status: word(reader)?,
-        events: word(reader)?,
-    })
-}
-
-fn event_log<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
-    let mut reader = Reader::new(counted(reader)?);
-    let (status, events) = (word(&mut reader)?, word(&mut reader)?);
-    let messages = word(&mut reader)?;
-    let log = reader.rest();
-    if log.len() > MAX_EVENTS {
-        return Err(Error::ILLEGAL_DATA_VALUE);
-    }
-    Ok(Response::CommEventLog {
-        status,
-        events,
-        messages,
-        log,
-    })
-}
-
-fn emit_event_log(writer: &mut Writer, words: [u16; 3], log: &[u8]) {
-    writer.u8(functions::GET_COMM_EVENT_LOG);
-    writer.u8((log.len() as u8).wrapping_add(6));
-    for word in words {
-        writer.u16(word);
-    }
-    writer.put(log);
-}
-
-/// In some devices the byte count covers only the id, and more bytes follow. So the result
-/// contains the count and all bytes after it.
-fn server_id<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
-    let count = byte(reader)?;
-    let data = reader.rest();
-    if usize::from(count) > data.len() {
-        return Err(Error::ILLEGAL_DATA_VALUE);
-    }
-    Ok(Response::ServerId { count, data })
-}
-
-fn read_file_record<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
-    Ok(Response::ReadFileRecord(Records::new(counted(reader)?)?))
-}
-
-fn write_file_record<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
-    Ok(Response::WriteFileRecord(Writes::new(counted(reader)?)?))
-}
-
-fn fifo_queue<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
-    let (bytes, count) = (word(reader)?, word(reader)?);
-    let data = reader.rest();
-    let agree = count <= MAX_FIFO && bytes == 2 + 2 * count && data.len() == 2 * usize::from(count);
-    if !agree {
-        return Err(Error::ILLEGAL_DATA_VALUE);
-    }
-    Ok(Response::FifoQueue { data })
-}
-
-fn emit_fifo_queue(writer: &mut Writer, data: &[u8]) {
-    writer.u8(functions::READ_FIFO_QUEUE);
-    writer.u16((data.len() as u16).wrapping_add(2));
-    writer.u16(data.len() as u16 / 2);
-    writer.put(data);
-}
-
-fn encapsulated<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Error> {
-    let mei_type = byte(reader)?;
-    if mei_type != MEI_READ_DEVICE_IDENTIFICATION {
-        let data = reader.rest();
-        return Ok(Response::EncapsulatedInterface { mei_type, data });
-    }
-    let code = byte(reader)?;
-    let reply = read_reply(code, reader)?;
-    Ok(Response::DeviceIdentification {
-        code,
-        conformity: reply.conformity,
-        more_follows: reply.more_follows,
-        next_object: reply.next_object,
-        objects: reply.objects,
-    })
-}
-
-fn emit_device_identification(
-    writer: &mut Writer,
-    head: [u8; 2],
-    more_follows: bool,
-    next_object: u8,
-    objects: ObjectList,
-) {
-    let [code, conformity] = head;
-    let more = if more_follows { MORE } else { 0 };
-    let head = [code, conformity, more, next_object, objects.count];
-    emit_encapsulated(writer, MEI_READ_DEVICE_IDENTIFICATION, &head);
-    writer.put(objects.bytes);
 }

@@ -5,14 +5,15 @@ mod writer;
 
 pub use writer::TextWriter;
 
-use crate::bytes::Reader;
 use crate::error::Error;
 use crate::frame::{ascii, rtu, tcp, Adu, Framing};
 use crate::packet::PduKind;
 use crate::pdu::diagnostics::sub_function as sub;
 use crate::pdu::diagnostics::CLEAR_LOG;
+use crate::pdu::fields::{Byte, Data, Fields, Flag, Word};
 use crate::pdu::files::{Reads, Record, Writes};
-use crate::pdu::functions;
+use crate::pdu::functions::{self, FunctionSpec, READ_FILE_RECORD, READ_WRITE_MULTIPLE_REGISTERS};
+use crate::pdu::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 use crate::pdu::EXCEPTION;
@@ -102,6 +103,11 @@ fn function(line: &mut TextWriter, code: u8) {
 /// because the request may be wrong.
 fn range(line: &mut TextWriter, address: u16, quantity: u16) {
     line.number(address.into());
+    to_last(line, address, quantity);
+}
+
+/// Writes the last of `quantity` addresses, if there are several.
+fn to_last(line: &mut TextWriter, address: u16, quantity: u16) {
     if quantity != 1 {
         line.put("..");
         line.number((u32::from(address) + u32::from(quantity)).saturating_sub(1));
@@ -128,14 +134,6 @@ fn writes(line: &mut TextWriter, writes: &Writes) {
         line.byte(b':');
         line.registers(data);
     }
-}
-
-fn masks(line: &mut TextWriter, address: u16, and_mask: u16, or_mask: u16) {
-    line.number(address.into());
-    line.put(": and ");
-    line.hex_word(and_mask);
-    line.put(" or ");
-    line.hex_word(or_mask);
 }
 
 fn diagnostics(line: &mut TextWriter, code: u16, data: &[u8], is_response: bool) {
@@ -207,43 +205,8 @@ pub fn request(line: &mut TextWriter, pdu: &[u8]) {
     };
     function(line, request.function());
     match request {
-        Request::ReadBits {
-            address, quantity, ..
-        }
-        | Request::ReadRegisters {
-            address, quantity, ..
-        } => {
-            line.put("  ");
-            range(line, address, quantity);
-        }
-        Request::WriteSingleCoil { address, on } => single_coil(line, address, on),
-        Request::WriteSingleRegister { address, value } => single_register(line, address, value),
-        Request::ReadExceptionStatus
-        | Request::GetCommEventCounter
-        | Request::GetCommEventLog
-        | Request::ReportServerId => (),
         Request::Diagnostics { sub_function, data } => {
             diagnostics(line, sub_function, data, false);
-        }
-        Request::WriteMultipleCoils {
-            address,
-            quantity,
-            data,
-        } => {
-            line.put("  ");
-            range(line, address, quantity);
-            line.byte(b':');
-            line.bits(data, quantity.into());
-        }
-        Request::WriteMultipleRegisters {
-            address,
-            quantity,
-            data,
-        } => {
-            line.put("  ");
-            range(line, address, quantity);
-            line.byte(b':');
-            line.registers(data);
         }
         Request::ReadFileRecord(reads) => {
             let mut first = true;
@@ -254,98 +217,179 @@ pub fn request(line: &mut TextWriter, pdu: &[u8]) {
             }
         }
         Request::WriteFileRecord(groups) => writes(line, &groups),
-        Request::MaskWriteRegister {
-            address,
-            and_mask,
-            or_mask,
-        } => {
-            line.put("  ");
-            masks(line, address, and_mask, or_mask);
-        }
-        Request::ReadWriteMultipleRegisters {
-            read_address,
-            read_quantity,
-            write_address,
-            write_quantity,
-            data,
-        } => {
-            line.put("  read ");
-            range(line, read_address, read_quantity);
-            line.put(", write ");
-            range(line, write_address, write_quantity);
-            line.byte(b':');
-            line.registers(data);
-        }
-        Request::ReadFifoQueue { address } => {
-            line.put("  ");
-            line.number(address.into());
-        }
-        Request::ReadDeviceIdentification { code, object } => {
-            line.put(", device identification, ");
-            line.put(names::device_id(code));
-            line.put(", object ");
-            line.number(object.into());
-        }
-        Request::EncapsulatedInterface { mei_type, data } => {
-            line.put(", MEI type ");
-            line.hex(mei_type);
-            raw(line, data);
-        }
-        Request::Custom { data, .. } => raw(line, data),
+        request => request.give(&mut Words::new(line, Asked::NOTHING)),
     }
 }
 
-fn single_coil(line: &mut TextWriter, address: u16, on: bool) {
-    line.put("  ");
-    line.number(address.into());
-    line.put(if on { ": on" } else { ": off" });
-}
-
-fn single_register(line: &mut TextWriter, address: u16, value: u16) {
-    line.put("  ");
-    line.number(address.into());
-    line.put(": ");
-    line.number(value.into());
-}
-
-/// The arguments of a request that its reply does not repeat, read from the first bytes of
-/// the request.
+/// The arguments of a request that its reply does not repeat, from the first bytes of the request.
 #[derive(Clone, Copy)]
-enum Arguments {
-    Nothing,
-    Range(u16, u16),
-    Queue(u16),
-    Record(Record),
+struct Asked {
+    address: Option<u16>,
+    quantity: Option<u16>,
 }
 
-/// Reads the arguments from the head of a request PDU.
-fn arguments(head: &[u8]) -> Arguments {
-    let mut reader = Reader::new(head);
-    match reader.u8() {
-        Some(
-            functions::READ_COILS
-            | functions::READ_DISCRETE_INPUTS
-            | functions::WRITE_MULTIPLE_COILS
-            | functions::READ_HOLDING_REGISTERS
-            | functions::READ_INPUT_REGISTERS
-            | functions::WRITE_MULTIPLE_REGISTERS
-            | functions::READ_WRITE_MULTIPLE_REGISTERS,
-        ) => match (reader.u16(), reader.u16()) {
-            (Some(address), Some(quantity)) => Arguments::Range(address, quantity),
-            _ => Arguments::Nothing,
-        },
-        Some(functions::READ_FIFO_QUEUE) => {
-            reader.u16().map_or(Arguments::Nothing, Arguments::Queue)
+impl Asked {
+    const NOTHING: Asked = Asked {
+        address: None,
+        quantity: None,
+    };
+
+    /// The arguments in the head of a request PDU.
+    fn new(head: &[u8]) -> Asked {
+        let Some((function, body)) = head.split_first() else {
+            return Asked::NOTHING;
+        };
+        let spec = match *function {
+            READ_WRITE_MULTIPLE_REGISTERS => FunctionSpec::READ_WRITE_REGISTERS,
+            function => FunctionSpec::of(function),
+        };
+        let words = body.as_chunks().0;
+        let word = |index, is_there| match words.get(index) {
+            Some(word) if is_there => Some(u16::from_be_bytes(*word)),
+            _ => None,
+        };
+        Asked {
+            address: word(0, spec.has_address()),
+            quantity: word(1, spec.has_range()),
         }
-        Some(functions::READ_FILE_RECORD) => {
-            // The head contains only the first sub-request. Of the records of others, only
-            // the data are written.
-            let _ = reader.u8();
-            let first = Reads::new(reader.rest()).ok();
-            let record = first.and_then(|reads| reads.iter().next());
-            record.map_or(Arguments::Nothing, Arguments::Record)
+    }
+}
+
+/// The first record of a request of 14. Of the records of others, only the data are written.
+fn first_record(head: &[u8]) -> Option<Record> {
+    match head {
+        [READ_FILE_RECORD, _, groups @ ..] => Reads::new(groups).ok()?.iter().next(),
+        _ => None,
+    }
+}
+
+/// Describes the fields of a request or response in words.
+struct Words<'a, 'b> {
+    line: &'a mut TextWriter<'b>,
+    /// The request of a response.
+    asked: Asked,
+    /// The address that was last written.
+    address: Option<u16>,
+    /// The quantity of the request or response, or of the request of a response.
+    quantity: Option<u16>,
+}
+
+impl<'a, 'b> Words<'a, 'b> {
+    fn new(line: &'a mut TextWriter<'b>, asked: Asked) -> Self {
+        Words {
+            line,
+            asked,
+            address: None,
+            quantity: asked.quantity,
         }
-        _ => Arguments::Nothing,
+    }
+
+    fn address(&mut self, before: &str, address: u16) {
+        self.line.put(before);
+        self.line.number(address.into());
+        self.address = Some(address);
+    }
+
+    fn masked(&mut self, before: &str, mask: u16) {
+        self.line.put(before);
+        self.line.hex_word(mask);
+    }
+
+    fn number(&mut self, before: &str, number: u16) {
+        self.line.put(before);
+        self.line.number(number.into());
+    }
+
+    /// Writes the address and the quantity of the request, unless the response has an address.
+    fn range_asked(&mut self) {
+        if let (None, Some(address)) = (self.address, self.asked.address) {
+            self.line.put("  ");
+            range(self.line, address, self.asked.quantity.unwrap_or(1));
+        }
+    }
+}
+
+impl<'a> Fields<'a> for Words<'_, '_> {
+    const IS_SOURCE: bool = false;
+
+    fn byte(&mut self, field: Byte, value: &mut u8) {
+        let line = &mut *self.line;
+        match (field, *value) {
+            (Byte::ExceptionStatus, outputs) => {
+                line.byte(b':');
+                line.bits(&[outputs], 8);
+            }
+            (Byte::ExceptionCode, code) => {
+                line.put(": exception ");
+                line.hex(code);
+                line.byte(b' ');
+                line.put(names::exception(code));
+            }
+            // The read device id code follows.
+            (Byte::MeiType, MEI_READ_DEVICE_IDENTIFICATION) => (),
+            (Byte::MeiType, mei_type) => {
+                line.put(", MEI type ");
+                line.hex(mei_type);
+            }
+            (Byte::ReadDeviceIdCode, code) => {
+                line.put(", device identification, ");
+                line.put(names::device_id(code));
+            }
+            (Byte::ObjectId, object) => self.number(", object ", object.into()),
+            _ => (),
+        }
+    }
+
+    fn word(&mut self, field: Word, value: &mut u16) {
+        let value = *value;
+        match field {
+            Word::Address => self.address("  ", value),
+            Word::ReadAddress => self.address("  read ", value),
+            Word::WriteAddress => self.address(", write ", value),
+            Word::Quantity | Word::WriteQuantity => {
+                self.quantity = Some(value);
+                to_last(self.line, self.address.unwrap_or_default(), value);
+            }
+            Word::Value => self.number(": ", value),
+            Word::AndMask => self.masked(": and ", value),
+            Word::OrMask => self.masked(" or ", value),
+            Word::Status => self.masked(": status ", value),
+            Word::Events => self.number(", events ", value),
+            Word::Messages => self.number(", messages ", value),
+            Word::SubFunction => (),
+        }
+    }
+
+    fn flag(&mut self, field: Flag, value: &mut bool) {
+        if field == Flag::Coil {
+            self.line.put(if *value { ": on" } else { ": off" });
+        }
+    }
+
+    fn counted(&mut self, kind: Data, data: &mut &'a [u8]) {
+        Fields::rest(self, kind, data);
+    }
+
+    fn rest(&mut self, kind: Data, data: &mut &'a [u8]) {
+        match kind {
+            Data::Bits => {
+                self.range_asked();
+                let count = self.quantity.map_or(8 * data.len(), usize::from);
+                self.line.byte(b':');
+                self.line.bits(data, count);
+            }
+            Data::Registers => {
+                self.range_asked();
+                self.line.byte(b':');
+                self.line.registers(data);
+            }
+            Data::Bytes => raw(self.line, data),
+            Data::Characters => {
+                raw(self.line, data);
+                self.line.byte(b' ');
+                self.line.quoted(data);
+            }
+        }
     }
 }
 
@@ -354,14 +398,14 @@ pub fn head(line: &mut TextWriter, head: &[u8]) {
     let Some(code) = head.first() else {
         return;
     };
-    match arguments(head) {
-        _ if Request::parse(head).is_ok() => request(line, head),
-        Arguments::Range(address, quantity) => {
-            function(line, *code);
-            line.put("  ");
-            range(line, address, quantity);
-        }
-        _ => function(line, *code),
+    if Request::parse(head).is_ok() {
+        return request(line, head);
+    }
+    function(line, *code);
+    let asked = Asked::new(head);
+    if let (Some(address), Some(quantity)) = (asked.address, asked.quantity) {
+        line.put("  ");
+        range(line, address, quantity);
     }
 }
 
@@ -376,63 +420,13 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
         return malformed(line, pdu);
     };
     function(line, response.function());
-    let asked = arguments(head);
-    if let (
-        Arguments::Range(address, quantity),
-        Response::ReadBits { .. } | Response::ReadRegisters { .. },
-    ) = (asked, response)
-    {
-        line.put("  ");
-        range(line, address, quantity);
-    }
     match response {
-        Response::ReadBits { data, .. } => {
-            let count = match asked {
-                Arguments::Range(_, quantity) => quantity.into(),
-                _ => 8 * data.len(),
-            };
-            line.byte(b':');
-            line.bits(data, count);
-        }
-        Response::ReadRegisters { data, .. } => {
-            line.byte(b':');
-            line.registers(data);
-        }
-        Response::WriteSingleCoil { address, on } => single_coil(line, address, on),
-        Response::WriteSingleRegister { address, value } => single_register(line, address, value),
-        Response::ExceptionStatus { outputs } => {
-            line.byte(b':');
-            line.bits(&[outputs], 8);
-        }
         Response::Diagnostics { sub_function, data } => diagnostics(line, sub_function, data, true),
-        Response::CommEventCounter { status, events } => event_counter(line, status, events),
-        Response::CommEventLog {
-            status,
-            events,
-            messages,
-            log,
-        } => {
-            event_counter(line, status, events);
-            line.put(", messages ");
-            line.number(messages.into());
-            raw(line, log);
-        }
-        Response::WriteMultiple {
-            address, quantity, ..
-        } => {
-            line.put("  ");
-            range(line, address, quantity);
-        }
-        Response::ServerId { data, .. } => {
-            raw(line, data);
-            line.byte(b' ');
-            line.quoted(data);
-        }
         Response::ReadFileRecord(groups) => {
             let mut separator = " ";
             for data in groups.iter() {
                 line.put(separator);
-                if let (Arguments::Record(record), " ") = (asked, separator) {
+                if let (Some(record), " ") = (first_record(head), separator) {
                     records(line, record);
                     line.byte(b':');
                 }
@@ -441,22 +435,6 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
             }
         }
         Response::WriteFileRecord(groups) => writes(line, &groups),
-        Response::MaskWriteRegister {
-            address,
-            and_mask,
-            or_mask,
-        } => {
-            line.put("  ");
-            masks(line, address, and_mask, or_mask);
-        }
-        Response::FifoQueue { data } => {
-            if let Arguments::Queue(address) = asked {
-                line.put("  ");
-                line.number(address.into());
-            }
-            line.byte(b':');
-            line.registers(data);
-        }
         Response::DeviceIdentification {
             code,
             more_follows,
@@ -478,24 +456,6 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
                 line.number(next_object.into());
             }
         }
-        Response::EncapsulatedInterface { mei_type, data } => {
-            line.put(", MEI type ");
-            line.hex(mei_type);
-            raw(line, data);
-        }
-        Response::Exception { code, .. } => {
-            line.put(": exception ");
-            line.hex(code);
-            line.byte(b' ');
-            line.put(names::exception(code));
-        }
-        Response::Custom { data, .. } => raw(line, data),
+        response => response.give(&mut Words::new(line, Asked::new(head))),
     }
-}
-
-fn event_counter(line: &mut TextWriter, status: u16, events: u16) {
-    line.put(": status ");
-    line.hex_word(status);
-    line.put(", events ");
-    line.number(events.into());
 }

@@ -1,12 +1,9 @@
-//! The fields of the flat packet that each request or response uses.
+//! The fields of the flat packet, taken from a request or response, or given to one.
 
 use super::{mbm_packet, MBM_PACKET_EXCEPTION, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
-use crate::functions::*;
 use mbm::error::Error;
 use mbm::packet::refusal::Head;
-use mbm::pdu::files::{Reads, Records, Writes};
-use mbm::pdu::functions;
-use mbm::pdu::identification::ObjectList;
+use mbm::pdu::fields::{Byte, Data, Fields, Flag, Word};
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use mbm::pdu::EXCEPTION;
@@ -62,330 +59,137 @@ impl mbm_packet {
         })
     }
 
-    fn set_data(&mut self, data: &[u8]) {
-        self.data = data.as_ptr();
-        self.dataLength = data.len() as u16;
-    }
-
     /// Sets the fields that a request has.
     pub(crate) fn take_request(&mut self, request: &Request) {
         self.kind = MBM_PACKET_REQUEST;
         self.function = request.function();
-        match *request {
-            Request::ReadBits {
-                address, quantity, ..
-            }
-            | Request::ReadRegisters {
-                address, quantity, ..
-            } => {
-                self.address = address;
-                self.quantity = quantity;
-            }
-            Request::WriteSingleCoil { address, on } => {
-                self.address = address;
-                self.value = on.into();
-            }
-            Request::WriteSingleRegister { address, value } => {
-                self.address = address;
-                self.value = value;
-            }
-            Request::ReadExceptionStatus
-            | Request::GetCommEventCounter
-            | Request::GetCommEventLog
-            | Request::ReportServerId => {}
-            Request::Diagnostics { sub_function, data } => {
-                self.subFunction = sub_function;
-                self.set_data(data);
-            }
-            Request::WriteMultipleCoils {
-                address,
-                quantity,
-                data,
-            }
-            | Request::WriteMultipleRegisters {
-                address,
-                quantity,
-                data,
-            } => {
-                self.address = address;
-                self.quantity = quantity;
-                self.set_data(data);
-            }
-            Request::ReadFileRecord(reads) => self.set_data(reads.bytes()),
-            Request::WriteFileRecord(writes) => self.set_data(writes.bytes()),
-            Request::MaskWriteRegister {
-                address,
-                and_mask,
-                or_mask,
-            } => {
-                self.address = address;
-                self.andMask = and_mask;
-                self.orMask = or_mask;
-            }
-            Request::ReadWriteMultipleRegisters {
-                read_address,
-                read_quantity,
-                write_address,
-                write_quantity,
-                data,
-            } => {
-                self.address = read_address;
-                self.quantity = read_quantity;
-                self.writeAddress = write_address;
-                self.writeQuantity = write_quantity;
-                self.set_data(data);
-            }
-            Request::ReadFifoQueue { address } => self.address = address,
-            Request::ReadDeviceIdentification { code, object } => {
-                self.meiType = MBM_MEI_READ_DEVICE_IDENTIFICATION;
-                self.readDeviceIdCode = code;
-                self.objectId = object;
-            }
-            Request::EncapsulatedInterface { mei_type, data } => {
-                self.meiType = mei_type;
-                self.set_data(data);
-            }
-            Request::Custom { data, .. } => self.set_data(data),
-        }
+        request.give(self);
     }
 
     /// Sets the fields that a response has.
     pub(crate) fn take_response(&mut self, response: &Response) {
-        self.kind = MBM_PACKET_RESPONSE;
+        self.kind = match response {
+            Response::Exception { .. } => MBM_PACKET_EXCEPTION,
+            _ => MBM_PACKET_RESPONSE,
+        };
         self.function = response.function();
-        match *response {
-            Response::ReadBits { data, .. }
-            | Response::ReadRegisters { data, .. }
-            | Response::FifoQueue { data }
-            | Response::Custom { data, .. } => self.set_data(data),
-            Response::WriteSingleCoil { address, on } => {
-                self.address = address;
-                self.value = on.into();
-            }
-            Response::WriteSingleRegister { address, value } => {
-                self.address = address;
-                self.value = value;
-            }
-            Response::ExceptionStatus { outputs } => self.exceptionStatus = outputs,
-            Response::Diagnostics { sub_function, data } => {
-                self.subFunction = sub_function;
-                self.set_data(data);
-            }
-            Response::CommEventCounter { status, events } => {
-                self.commStatus = status;
-                self.eventCount = events;
-            }
-            Response::CommEventLog {
-                status,
-                events,
-                messages,
-                log,
-            } => {
-                self.commStatus = status;
-                self.eventCount = events;
-                self.messageCount = messages;
-                self.set_data(log);
-            }
-            Response::WriteMultiple {
-                address, quantity, ..
-            } => {
-                self.address = address;
-                self.quantity = quantity;
-            }
-            Response::ServerId { count, data } => {
-                self.byteCount = count;
-                self.set_data(data);
-            }
-            Response::ReadFileRecord(records) => self.set_data(records.bytes()),
-            Response::WriteFileRecord(writes) => self.set_data(writes.bytes()),
-            Response::MaskWriteRegister {
-                address,
-                and_mask,
-                or_mask,
-            } => {
-                self.address = address;
-                self.andMask = and_mask;
-                self.orMask = or_mask;
-            }
-            Response::DeviceIdentification {
-                code,
-                conformity,
-                more_follows,
-                next_object,
-                objects,
-            } => {
-                self.meiType = MBM_MEI_READ_DEVICE_IDENTIFICATION;
-                self.readDeviceIdCode = code;
-                self.conformity = conformity;
-                self.moreFollows = more_follows.into();
-                self.nextObjectId = next_object;
-                self.objectCount = objects.count();
-                self.set_data(objects.bytes());
-            }
-            Response::EncapsulatedInterface { mei_type, data } => {
-                self.meiType = mei_type;
-                self.set_data(data);
-            }
-            Response::Exception { code, .. } => {
-                self.kind = MBM_PACKET_EXCEPTION;
-                self.exceptionCode = code;
-            }
-        }
+        response.give(self);
     }
 
     /// The request that the fields describe, with `data` as its data.
     pub(crate) fn request<'a>(&self, data: &'a [u8]) -> Result<Request<'a>, Error> {
-        let (function, address, quantity) = (self.function, self.address, self.quantity);
-        Ok(match function {
-            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => Request::ReadBits {
-                function,
-                address,
-                quantity,
-            },
-            functions::READ_HOLDING_REGISTERS | functions::READ_INPUT_REGISTERS => {
-                Request::ReadRegisters {
-                    function,
-                    address,
-                    quantity,
-                }
-            }
-            functions::WRITE_SINGLE_COIL => Request::WriteSingleCoil {
-                address,
-                on: self.value != 0,
-            },
-            functions::WRITE_SINGLE_REGISTER => Request::WriteSingleRegister {
-                address,
-                value: self.value,
-            },
-            functions::READ_EXCEPTION_STATUS => Request::ReadExceptionStatus,
-            functions::DIAGNOSTICS => Request::Diagnostics {
-                sub_function: self.subFunction,
-                data,
-            },
-            functions::GET_COMM_EVENT_COUNTER => Request::GetCommEventCounter,
-            functions::GET_COMM_EVENT_LOG => Request::GetCommEventLog,
-            functions::WRITE_MULTIPLE_COILS => Request::WriteMultipleCoils {
-                address,
-                quantity,
-                data,
-            },
-            functions::WRITE_MULTIPLE_REGISTERS => Request::WriteMultipleRegisters {
-                address,
-                quantity,
-                data,
-            },
-            functions::REPORT_SERVER_ID => Request::ReportServerId,
-            functions::READ_FILE_RECORD => Request::ReadFileRecord(Reads::new(data)?),
-            functions::WRITE_FILE_RECORD => Request::WriteFileRecord(Writes::new(data)?),
-            functions::MASK_WRITE_REGISTER => Request::MaskWriteRegister {
-                address,
-                and_mask: self.andMask,
-                or_mask: self.orMask,
-            },
-            functions::READ_WRITE_MULTIPLE_REGISTERS => Request::ReadWriteMultipleRegisters {
-                read_address: address,
-                read_quantity: quantity,
-                write_address: self.writeAddress,
-                write_quantity: self.writeQuantity,
-                data,
-            },
-            functions::READ_FIFO_QUEUE => Request::ReadFifoQueue { address },
-            functions::ENCAPSULATED_INTERFACE_TRANSPORT => match self.meiType {
-                MBM_MEI_READ_DEVICE_IDENTIFICATION => Request::ReadDeviceIdentification {
-                    code: self.readDeviceIdCode,
-                    object: self.objectId,
-                },
-                mei_type => Request::EncapsulatedInterface { mei_type, data },
-            },
-            _ => Request::Custom { function, data },
-        })
+        Request::take(self.function, &mut self.with(data))
     }
 
     /// The response or exception that the fields describe, with `data` as its data.
     pub(crate) fn response<'a>(&self, data: &'a [u8]) -> Result<Response<'a>, Error> {
-        let (function, address, quantity) = (self.function, self.address, self.quantity);
+        let function = self.function;
         match self.kind {
-            MBM_PACKET_EXCEPTION if function & EXCEPTION != 0 => {
-                return Err(Error::INVALID_FUNCTION)
-            }
-            MBM_PACKET_EXCEPTION => {
-                return Ok(Response::Exception {
-                    function,
-                    code: self.exceptionCode,
-                })
-            }
-            MBM_PACKET_RESPONSE => {}
-            _ => return Err(Error::INVALID_ARGUMENT),
+            MBM_PACKET_RESPONSE => Response::take(function, &mut self.with(data)),
+            MBM_PACKET_EXCEPTION if function & EXCEPTION != 0 => Err(Error::INVALID_FUNCTION),
+            MBM_PACKET_EXCEPTION => Ok(Response::Exception {
+                function,
+                code: self.exceptionCode,
+            }),
+            _ => Err(Error::INVALID_ARGUMENT),
         }
-        let malformed = |_| Error::MALFORMED_REPLY;
-        Ok(match function {
-            functions::READ_COILS | functions::READ_DISCRETE_INPUTS => {
-                Response::ReadBits { function, data }
-            }
-            functions::READ_HOLDING_REGISTERS
-            | functions::READ_INPUT_REGISTERS
-            | functions::READ_WRITE_MULTIPLE_REGISTERS => {
-                Response::ReadRegisters { function, data }
-            }
-            functions::WRITE_SINGLE_COIL => Response::WriteSingleCoil {
-                address,
-                on: self.value != 0,
-            },
-            functions::WRITE_SINGLE_REGISTER => Response::WriteSingleRegister {
-                address,
-                value: self.value,
-            },
-            functions::READ_EXCEPTION_STATUS => Response::ExceptionStatus {
-                outputs: self.exceptionStatus,
-            },
-            functions::DIAGNOSTICS => Response::Diagnostics {
-                sub_function: self.subFunction,
-                data,
-            },
-            functions::GET_COMM_EVENT_COUNTER => Response::CommEventCounter {
-                status: self.commStatus,
-                events: self.eventCount,
-            },
-            functions::GET_COMM_EVENT_LOG => Response::CommEventLog {
-                status: self.commStatus,
-                events: self.eventCount,
-                messages: self.messageCount,
-                log: data,
-            },
-            functions::WRITE_MULTIPLE_COILS | functions::WRITE_MULTIPLE_REGISTERS => {
-                Response::WriteMultiple {
-                    function,
-                    address,
-                    quantity,
-                }
-            }
-            functions::REPORT_SERVER_ID => Response::ServerId {
-                count: self.byteCount,
-                data,
-            },
-            functions::READ_FILE_RECORD => {
-                Response::ReadFileRecord(Records::new(data).map_err(malformed)?)
-            }
-            functions::WRITE_FILE_RECORD => {
-                Response::WriteFileRecord(Writes::new(data).map_err(malformed)?)
-            }
-            functions::MASK_WRITE_REGISTER => Response::MaskWriteRegister {
-                address,
-                and_mask: self.andMask,
-                or_mask: self.orMask,
-            },
-            functions::READ_FIFO_QUEUE => Response::FifoQueue { data },
-            functions::ENCAPSULATED_INTERFACE_TRANSPORT => match self.meiType {
-                MBM_MEI_READ_DEVICE_IDENTIFICATION => Response::DeviceIdentification {
-                    code: self.readDeviceIdCode,
-                    conformity: self.conformity,
-                    more_follows: self.moreFollows != 0,
-                    next_object: self.nextObjectId,
-                    objects: ObjectList::new(self.objectCount, data).map_err(malformed)?,
-                },
-                mei_type => Response::EncapsulatedInterface { mei_type, data },
-            },
-            _ => Response::Custom { function, data },
-        })
+    }
+
+    fn with<'a>(&self, data: &'a [u8]) -> PacketWithData<'a> {
+        let packet = *self;
+        PacketWithData { packet, data }
+    }
+
+    fn byte_at(&mut self, field: Byte) -> &mut u8 {
+        match field {
+            Byte::ExceptionCode => &mut self.exceptionCode,
+            Byte::ExceptionStatus => &mut self.exceptionStatus,
+            Byte::ByteCount => &mut self.byteCount,
+            Byte::MeiType => &mut self.meiType,
+            Byte::ReadDeviceIdCode => &mut self.readDeviceIdCode,
+            Byte::ObjectId => &mut self.objectId,
+            Byte::Conformity => &mut self.conformity,
+            Byte::NextObjectId => &mut self.nextObjectId,
+            Byte::ObjectCount => &mut self.objectCount,
+        }
+    }
+
+    fn word_at(&mut self, field: Word) -> &mut u16 {
+        match field {
+            Word::Address | Word::ReadAddress => &mut self.address,
+            Word::Quantity => &mut self.quantity,
+            Word::WriteAddress => &mut self.writeAddress,
+            Word::WriteQuantity => &mut self.writeQuantity,
+            Word::Value => &mut self.value,
+            Word::AndMask => &mut self.andMask,
+            Word::OrMask => &mut self.orMask,
+            Word::SubFunction => &mut self.subFunction,
+            Word::Status => &mut self.commStatus,
+            Word::Events => &mut self.eventCount,
+            Word::Messages => &mut self.messageCount,
+        }
+    }
+}
+
+/// Takes the fields of a request or response.
+impl<'a> Fields<'a> for mbm_packet {
+    const IS_SOURCE: bool = false;
+
+    fn byte(&mut self, field: Byte, value: &mut u8) {
+        *self.byte_at(field) = *value;
+    }
+
+    fn word(&mut self, field: Word, value: &mut u16) {
+        *self.word_at(field) = *value;
+    }
+
+    fn flag(&mut self, field: Flag, value: &mut bool) {
+        match field {
+            Flag::Coil => self.value = (*value).into(),
+            Flag::MoreFollows => self.moreFollows = (*value).into(),
+        }
+    }
+
+    fn counted(&mut self, kind: Data, data: &mut &'a [u8]) {
+        self.rest(kind, data);
+    }
+
+    fn rest(&mut self, _: Data, data: &mut &'a [u8]) {
+        self.data = data.as_ptr();
+        self.dataLength = data.len() as u16;
+    }
+}
+
+/// A packet, and the data to which it points.
+struct PacketWithData<'a> {
+    packet: mbm_packet,
+    data: &'a [u8],
+}
+
+/// Gives the fields of a request or response.
+impl<'a> Fields<'a> for PacketWithData<'a> {
+    const IS_SOURCE: bool = true;
+
+    fn byte(&mut self, field: Byte, value: &mut u8) {
+        *value = *self.packet.byte_at(field);
+    }
+
+    fn word(&mut self, field: Word, value: &mut u16) {
+        *value = *self.packet.word_at(field);
+    }
+
+    fn flag(&mut self, field: Flag, value: &mut bool) {
+        *value = match field {
+            Flag::Coil => self.packet.value != 0,
+            Flag::MoreFollows => self.packet.moreFollows != 0,
+        };
+    }
+
+    fn counted(&mut self, kind: Data, data: &mut &'a [u8]) {
+        self.rest(kind, data);
+    }
+
+    fn rest(&mut self, _: Data, data: &mut &'a [u8]) {
+        *data = self.data;
     }
 }
