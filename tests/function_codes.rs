@@ -7,6 +7,7 @@ mod exchanges;
 #[path = "common/vectors.rs"]
 mod vectors;
 
+use mbm::pdu::fields::{Byte, Data, Fields, Flag, Word};
 use mbm::pdu::functions;
 use mbm::pdu::header::RequestHeader;
 use mbm::pdu::is_public;
@@ -35,7 +36,7 @@ fn every_public_function_is_named_in_texts() {
         assert_eq!(
             is_named,
             is_public(code),
-            "{code:02X}: `is_public` in src/pdu/mod.rs and `function` in src/text/names.rs differ"
+            "{code:02X}: `is_public` and `name` of src/pdu/functions.rs differ"
         );
     }
 }
@@ -62,8 +63,79 @@ fn every_public_function_has_a_vector_that_is_parsed_as_its_own_variant() {
             };
             assert!(
                 !is_custom,
-                "{code:02X}: `read` in src/pdu/{file}.rs has no arm for this function"
+                "{code:02X}: `of` in src/pdu/{file}.rs has no arm for this function"
             );
+        }
+    }
+}
+
+/// The names of the fields that a request or response gives.
+#[derive(Default)]
+struct Names(Vec<String>);
+
+impl Names {
+    fn add(&mut self, field: impl std::fmt::Debug) {
+        let name = format!("{field:?}");
+        self.0.push(name[..1].to_lowercase() + &name[1..]);
+    }
+}
+
+impl<'a> Fields<'a> for Names {
+    const IS_SOURCE: bool = false;
+
+    fn byte(&mut self, field: Byte, _: &mut u8) {
+        self.add(field);
+    }
+
+    fn word(&mut self, field: Word, _: &mut u16) {
+        match field {
+            Word::ReadAddress => self.add(Word::Address),
+            field => self.add(field),
+        }
+    }
+
+    fn flag(&mut self, field: Flag, _: &mut bool) {
+        match field {
+            Flag::Coil => self.add(Word::Value),
+            field => self.add(field),
+        }
+    }
+
+    fn counted(&mut self, kind: Data, data: &mut &'a [u8]) {
+        self.rest(kind, data);
+    }
+
+    fn rest(&mut self, _: Data, _: &mut &'a [u8]) {
+        self.0.push("data".into());
+    }
+}
+
+#[test]
+fn the_table_of_functions_names_the_fields_that_requests_and_responses_have() {
+    // Device identification has other fields than the rest of its function.
+    let other = |vector: &Vector| vector.bytes.starts_with(&[0x2B, 0x0E]);
+    for (code, request, response) in functions::FIELDS {
+        for (direction, fields) in [
+            (Direction::Request, request),
+            (Direction::Response, response),
+        ] {
+            let vectors = vectors_of(direction);
+            let vectors = vectors.iter().filter(|vector| vector.bytes[0] == *code);
+            let mut count = 0;
+            for vector in vectors.filter(|vector| !other(vector)) {
+                let mut names = Names::default();
+                match direction {
+                    Direction::Request => Request::parse(&vector.bytes).unwrap().give(&mut names),
+                    Direction::Response => Response::parse(&vector.bytes).unwrap().give(&mut names),
+                }
+                assert_eq!(
+                    names.0.join(", "),
+                    **fields,
+                    "{code:02X}: src/pdu/functions.rs"
+                );
+                count += 1;
+            }
+            assert!(count > 0, "{code:02X}: tests/vectors.txt has none");
         }
     }
 }

@@ -52,11 +52,11 @@ pub enum Word {
     /// 08: the sub-function.
     SubFunction,
     /// 0B, 0C: the status word.
-    Status,
+    CommStatus,
     /// 0B, 0C: the count of events.
-    Events,
+    EventCount,
     /// 0C: the count of messages.
-    Messages,
+    MessageCount,
 }
 
 /// A field that is yes or no.

@@ -1,6 +1,7 @@
 //! The table of the functions of the standard (application protocol V1.1b3, clause 6): the code, the
-//! name, the lengths of request and response, and whether a function reads or writes. The parts of
-//! this crate, the C API, the fuzzers and the tests take these facts from here.
+//! name, the fields and the lengths of request and response, and whether a function reads or writes.
+//! The parts of this crate, the C API, the header, the pages, the fuzzers and the tests take these
+//! facts from here.
 //!
 //! Lengths that depend on more than one byte are `None` here: [`super::length`] has them.
 
@@ -20,11 +21,16 @@ pub enum Direction {
 
 macro_rules! functions {
     ($($(#[$clause:meta])* $constant:ident = $code:literal, $name:literal,
+        $request_fields:literal, $response_fields:literal,
         $request:expr, $response:expr, $direction:ident, $spec:ident;)*) => {
         $($(#[$clause])* pub const $constant: u8 = $code;)*
 
         /// The codes of all functions.
         pub const CODES: &[u8] = &[$($constant),*];
+
+        /// The fields of the requests and of the responses of each function, in the order of the wire, by
+        /// the names that the packet of C has for them.
+        pub const FIELDS: &[(u8, &str, &str)] = &[$(($constant, $request_fields, $response_fields)),*];
 
         /// True for the function codes that the standard defines.
         pub const fn is_public(function: u8) -> bool {
@@ -82,78 +88,97 @@ macro_rules! functions {
 functions! {
     /// Read Coils (clause 6.1).
     READ_COILS = 0x01, "read coils",
+        "address, quantity", "data",
         Some(Fixed(5)), Some(Counted(1, 0)), Reads,
         READ_COILS;
     /// Read Discrete Inputs (clause 6.2).
     READ_DISCRETE_INPUTS = 0x02, "read discrete inputs",
+        "address, quantity", "data",
         Some(Fixed(5)), Some(Counted(1, 0)), Reads,
         READ_DISCRETE_INPUTS;
     /// Read Holding Registers (clause 6.3).
     READ_HOLDING_REGISTERS = 0x03, "read holding registers",
+        "address, quantity", "data",
         Some(Fixed(5)), Some(Counted(1, 0)), Reads,
         READ_HOLDING_REGISTERS;
     /// Read Input Registers (clause 6.4).
     READ_INPUT_REGISTERS = 0x04, "read input registers",
+        "address, quantity", "data",
         Some(Fixed(5)), Some(Counted(1, 0)), Reads,
         READ_INPUT_REGISTERS;
     /// Write Single Coil (clause 6.5).
     WRITE_SINGLE_COIL = 0x05, "write single coil",
+        "address, value", "address, value",
         Some(Fixed(5)), Some(Fixed(5)), Writes,
         WRITE_SINGLE_COIL;
     /// Write Single Register (clause 6.6).
     WRITE_SINGLE_REGISTER = 0x06, "write single register",
+        "address, value", "address, value",
         Some(Fixed(5)), Some(Fixed(5)), Writes,
         WRITE_SINGLE_REGISTER;
     /// Read Exception Status (clause 6.7).
     READ_EXCEPTION_STATUS = 0x07, "read exception status",
+        "", "exceptionStatus",
         Some(Fixed(1)), Some(Fixed(2)), Reads,
         READ_EXCEPTION_STATUS;
     /// Diagnostics (clause 6.8).
     DIAGNOSTICS = 0x08, "diagnostics",
+        "subFunction, data", "subFunction, data",
         None, None, Either,
         NONE;
     /// Get Comm Event Counter (clause 6.9).
     GET_COMM_EVENT_COUNTER = 0x0B, "get comm event counter",
+        "", "commStatus, eventCount",
         Some(Fixed(1)), Some(Fixed(5)), Reads,
         GET_COMM_EVENT_COUNTER;
     /// Get Comm Event Log (clause 6.10).
     GET_COMM_EVENT_LOG = 0x0C, "get comm event log",
+        "", "commStatus, eventCount, messageCount, data",
         Some(Fixed(1)), Some(Counted(1, 0)), Reads,
         GET_COMM_EVENT_LOG;
     /// Write Multiple Coils (clause 6.11).
     WRITE_MULTIPLE_COILS = 0x0F, "write multiple coils",
+        "address, quantity, data", "address, quantity",
         Some(Counted(5, 0)), Some(Fixed(5)), Writes,
         WRITE_MULTIPLE_COILS;
     /// Write Multiple Registers (clause 6.12).
     WRITE_MULTIPLE_REGISTERS = 0x10, "write multiple registers",
+        "address, quantity, data", "address, quantity",
         Some(Counted(5, 0)), Some(Fixed(5)), Writes,
         WRITE_MULTIPLE_REGISTERS;
     /// Report Server ID (clause 6.13). The response may be longer than its byte count says.
     REPORT_SERVER_ID = 0x11, "report server id",
+        "", "byteCount, data",
         Some(Fixed(1)), Some(Counted(1, 0)), Reads,
         REPORT_SERVER_ID;
     /// Read File Record (clause 6.14).
     READ_FILE_RECORD = 0x14, "read file record",
+        "data", "data",
         Some(Counted(1, 0)), Some(Counted(1, 0)), Reads,
         NONE;
     /// Write File Record (clause 6.15).
     WRITE_FILE_RECORD = 0x15, "write file record",
+        "data", "data",
         Some(Counted(1, 0)), Some(Counted(1, 0)), Writes,
         NONE;
     /// Mask Write Register (clause 6.16).
     MASK_WRITE_REGISTER = 0x16, "mask write register",
+        "address, andMask, orMask", "address, andMask, orMask",
         Some(Fixed(7)), Some(Fixed(7)), Writes,
         NONE;
     /// Read/Write Multiple Registers (clause 6.17).
     READ_WRITE_MULTIPLE_REGISTERS = 0x17, "read/write multiple registers",
+        "address, quantity, writeAddress, writeQuantity, data", "data",
         Some(Counted(9, 0)), Some(Counted(1, 0)), Either,
         NONE;
     /// Read FIFO Queue (clause 6.18).
     READ_FIFO_QUEUE = 0x18, "read FIFO queue",
+        "address", "data",
         Some(Fixed(3)), None, Reads,
         READ_FIFO_QUEUE;
     /// Encapsulated Interface Transport (clause 6.19).
     ENCAPSULATED_INTERFACE_TRANSPORT = 0x2B, "encapsulated interface transport",
+        "meiType, data", "meiType, data",
         None, None, Either,
         NONE;
 }

@@ -237,8 +237,8 @@ impl<'a> Response<'a> {
                 fields.rest(Data::Registers, data);
             }
             Response::CommEventCounter { status, events } => {
-                fields.word(Word::Status, status);
-                fields.word(Word::Events, events)
+                fields.word(Word::CommStatus, status);
+                fields.word(Word::EventCount, events)
             }
             Response::CommEventLog {
                 status,
@@ -247,9 +247,9 @@ impl<'a> Response<'a> {
                 log,
             } => {
                 fields.count(Count::Byte, 6 + log.len());
-                fields.word(Word::Status, status);
-                fields.word(Word::Events, events);
-                fields.word(Word::Messages, messages);
+                fields.word(Word::CommStatus, status);
+                fields.word(Word::EventCount, events);
+                fields.word(Word::MessageCount, messages);
                 fields.rest(Data::Bytes, log);
             }
             Response::WriteMultiple {

@@ -353,9 +353,9 @@ impl<'a> Fields<'a> for Words<'_, '_> {
             Word::Value => self.number(": ", value),
             Word::AndMask => self.masked(": and ", value),
             Word::OrMask => self.masked(" or ", value),
-            Word::Status => self.masked(": status ", value),
-            Word::Events => self.number(", events ", value),
-            Word::Messages => self.number(", messages ", value),
+            Word::CommStatus => self.masked(": status ", value),
+            Word::EventCount => self.number(", events ", value),
+            Word::MessageCount => self.number(", messages ", value),
             Word::SubFunction => (),
         }
     }

@@ -124,9 +124,9 @@ impl mbm_packet {
             Word::AndMask => &mut self.andMask,
             Word::OrMask => &mut self.orMask,
             Word::SubFunction => &mut self.subFunction,
-            Word::Status => &mut self.commStatus,
-            Word::Events => &mut self.eventCount,
-            Word::Messages => &mut self.messageCount,
+            Word::CommStatus => &mut self.commStatus,
+            Word::EventCount => &mut self.eventCount,
+            Word::MessageCount => &mut self.messageCount,
         }
     }
 }

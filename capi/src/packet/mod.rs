@@ -68,25 +68,11 @@ impl From<Length> for mbm_length {
 ///
 /// function | request | response
 /// ---------|---------|---------
-/// 01, 02, 03, 04 | address, quantity | data
-/// 05 | address, value | address, value
-/// 06 | address, value | address, value
-/// 07 | | exceptionStatus
-/// 08 | subFunction, data | subFunction, data
-/// 0B | | commStatus, eventCount
-/// 0C | | commStatus, eventCount, messageCount, data (events, the latest first)
-/// 0F, 10 | address, quantity, data | address, quantity
-/// 11 | | byteCount, data
-/// 14 | data (records) | data (records)
-/// 15 | data (records) | data (records)
-/// 16 | address, andMask, orMask | address, andMask, orMask
-/// 17 | address, quantity, writeAddress, writeQuantity, data | data
-/// 18 | address | data (registers)
 /// 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | see below
-/// 2B, others | meiType, data | meiType, data
 /// your own | data | data
 ///
-/// A response of 2B with MEI type 0E has meiType, readDeviceIdCode, conformity, moreFollows,
+/// The data of 0C are the events, the latest first; those of 14 and 15 are records. A response
+/// of 2B with MEI type 0E has meiType, readDeviceIdCode, conformity, moreFollows,
 /// nextObjectId, objectCount and data (objects).
 ///
 /// An exception has exceptionCode, and the function code of the request. Register data are
