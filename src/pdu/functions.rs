@@ -183,6 +183,26 @@ functions! {
         NONE;
 }
 
+/// The first address and the quantity in the request that begins with `head`; of 17 (hex) those to
+/// read, of a function that writes one register or coil a quantity of 1. `None` if the function has
+/// none, or if `head` ends before.
+pub fn range(head: &[u8]) -> (Option<u16>, Option<u16>) {
+    let Some((function, body)) = head.split_first() else {
+        return (None, None);
+    };
+    let spec = FunctionSpec::of_head(*function);
+    let words = body.as_chunks().0;
+    let word = |index: usize| words.get(index).map(|word| u16::from_be_bytes(*word));
+    match word(0) {
+        Some(address) if spec.number(HEAD_LENGTH) >= 3 => {
+            let one = if spec.repeated() > 0 { Some(1) } else { None };
+            let quantity = if spec.has(RANGE) { word(1) } else { one };
+            (Some(address), quantity)
+        }
+        _ => (None, None),
+    }
+}
+
 /// The value that switches a single coil on in a request of 05; 0 switches it off (clause 6.5).
 pub const COIL_ON: u16 = 0xFF00;
 
@@ -240,6 +260,15 @@ pub(super) const REPEATED: u32 = 25;
 pub(super) const DATA: u32 = 28;
 
 impl FunctionSpec {
+    /// As [`FunctionSpec::of`], also for 16 and 17 (hex), which have more words.
+    pub const fn of_head(function: u8) -> FunctionSpec {
+        match function {
+            MASK_WRITE_REGISTER => FunctionSpec::MASK_WRITE_REGISTER,
+            READ_WRITE_MULTIPLE_REGISTERS => FunctionSpec::READ_WRITE_REGISTERS,
+            function => FunctionSpec::of(function),
+        }
+    }
+
     pub(super) const fn new(
         function: u8,
         flags: u32,
@@ -300,16 +329,6 @@ impl FunctionSpec {
 
     pub(super) const fn has(self, flag: u32) -> bool {
         self.0 & flag != 0
-    }
-
-    /// True if the first word of the request is an address.
-    pub const fn has_address(self) -> bool {
-        self.number(HEAD_LENGTH) >= 3
-    }
-
-    /// True if the second word of the request is a quantity, counted from the address.
-    pub const fn has_range(self) -> bool {
-        self.has(RANGE)
     }
 
     /// The function code.

@@ -38,13 +38,6 @@ impl RequestStart {
         self.head.get(..self.length.into()).unwrap_or_default()
     }
 
-    fn word(&self, at: usize) -> u16 {
-        match self.head().get(at..at + 2) {
-            Some([high, low]) => u16::from_be_bytes([*high, *low]),
-            _ => 0,
-        }
-    }
-
     /// The function code.
     pub const fn function(&self) -> u8 {
         let [function, ..] = self.head;
@@ -54,19 +47,12 @@ impl RequestStart {
     /// The first address, of function 17 the first address to read; 0 if the function has no
     /// address.
     pub fn address(&self) -> u16 {
-        match self.function() {
-            1..=6 | 0x0F | 0x10 | 0x16..=0x18 => self.word(1),
-            _ => 0,
-        }
+        functions::range(self.head()).0.unwrap_or(0)
     }
 
     /// The quantity, of function 17 the quantity to read; 0 if the function has no quantity.
     pub fn quantity(&self) -> u16 {
-        match self.function() {
-            1..=4 | 0x0F | 0x10 | 0x17 => self.word(3),
-            5 | 6 | 0x16 => 1,
-            _ => 0,
-        }
+        functions::range(self.head()).1.unwrap_or(0)
     }
 }
 
@@ -122,7 +108,6 @@ impl OpenRequest {
         let function = self.asked.function();
         let repeated = match function {
             functions::WRITE_FILE_RECORD => HEAD,
-            functions::MASK_WRITE_REGISTER => 7,
             functions::DIAGNOSTICS => 3,
             functions::ENCAPSULATED_INTERFACE_TRANSPORT => match head.get(1) {
                 Some(&identification::MEI_READ_DEVICE_IDENTIFICATION) => 3,
@@ -131,7 +116,7 @@ impl OpenRequest {
             // A reply with three bytes of coils is as long as the request. An equal PDU is the
             // request again.
             functions::READ_COILS | functions::READ_DISCRETE_INPUTS if pdu == head => return false,
-            _ => usize::from(FunctionSpec::of(function).repeated()).max(1),
+            _ => usize::from(FunctionSpec::of_head(function).repeated()).max(1),
         };
         let repeats = head.iter().zip(pdu).take(repeated).all(|(a, b)| a == b);
         repeats && (self.reply == 0 || usize::from(self.reply) == pdu.len())

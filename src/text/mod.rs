@@ -12,7 +12,7 @@ use crate::pdu::diagnostics::sub_function as sub;
 use crate::pdu::diagnostics::CLEAR_LOG;
 use crate::pdu::fields::{Byte, Data, Fields, Flag, Word};
 use crate::pdu::files::{Reads, Record, Writes};
-use crate::pdu::functions::{self, FunctionSpec, READ_FILE_RECORD, READ_WRITE_MULTIPLE_REGISTERS};
+use crate::pdu::functions::{self, READ_FILE_RECORD};
 use crate::pdu::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
@@ -217,41 +217,7 @@ pub fn request(line: &mut TextWriter, pdu: &[u8]) {
             }
         }
         Request::WriteFileRecord(groups) => writes(line, &groups),
-        request => request.give(&mut Words::new(line, Asked::NOTHING)),
-    }
-}
-
-/// The arguments of a request that its reply does not repeat, from the first bytes of the request.
-#[derive(Clone, Copy)]
-struct Asked {
-    address: Option<u16>,
-    quantity: Option<u16>,
-}
-
-impl Asked {
-    const NOTHING: Asked = Asked {
-        address: None,
-        quantity: None,
-    };
-
-    /// The arguments in the head of a request PDU.
-    fn new(head: &[u8]) -> Asked {
-        let Some((function, body)) = head.split_first() else {
-            return Asked::NOTHING;
-        };
-        let spec = match *function {
-            READ_WRITE_MULTIPLE_REGISTERS => FunctionSpec::READ_WRITE_REGISTERS,
-            function => FunctionSpec::of(function),
-        };
-        let words = body.as_chunks().0;
-        let word = |index, is_there| match words.get(index) {
-            Some(word) if is_there => Some(u16::from_be_bytes(*word)),
-            _ => None,
-        };
-        Asked {
-            address: word(0, spec.has_address()),
-            quantity: word(1, spec.has_range()),
-        }
+        request => request.give(&mut Words::new(line, &[])),
     }
 }
 
@@ -266,8 +232,8 @@ fn first_record(head: &[u8]) -> Option<Record> {
 /// Describes the fields of a request or response in words.
 struct Words<'a, 'b> {
     line: &'a mut TextWriter<'b>,
-    /// The request of a response.
-    asked: Asked,
+    /// The first address and the quantity of the request of a response.
+    asked: (Option<u16>, Option<u16>),
     /// The address that was last written.
     address: Option<u16>,
     /// The quantity of the request or response, or of the request of a response.
@@ -275,12 +241,14 @@ struct Words<'a, 'b> {
 }
 
 impl<'a, 'b> Words<'a, 'b> {
-    fn new(line: &'a mut TextWriter<'b>, asked: Asked) -> Self {
+    /// `head` is the head of the request of a response; it is empty for a request.
+    fn new(line: &'a mut TextWriter<'b>, head: &[u8]) -> Self {
+        let asked = functions::range(head);
         Words {
             line,
             asked,
             address: None,
-            quantity: asked.quantity,
+            quantity: asked.1,
         }
     }
 
@@ -302,9 +270,9 @@ impl<'a, 'b> Words<'a, 'b> {
 
     /// Writes the address and the quantity of the request, unless the response has an address.
     fn range_asked(&mut self) {
-        if let (None, Some(address)) = (self.address, self.asked.address) {
+        if let (None, (Some(address), quantity)) = (self.address, self.asked) {
             self.line.put("  ");
-            range(self.line, address, self.asked.quantity.unwrap_or(1));
+            range(self.line, address, quantity.unwrap_or(1));
         }
     }
 }
@@ -402,8 +370,7 @@ pub fn head(line: &mut TextWriter, head: &[u8]) {
         return request(line, head);
     }
     function(line, *code);
-    let asked = Asked::new(head);
-    if let (Some(address), Some(quantity)) = (asked.address, asked.quantity) {
+    if let (Some(address), Some(quantity)) = functions::range(head) {
         line.put("  ");
         range(line, address, quantity);
     }
@@ -456,6 +423,6 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
                 line.number(next_object.into());
             }
         }
-        response => response.give(&mut Words::new(line, Asked::new(head))),
+        response => response.give(&mut Words::new(line, head)),
     }
 }

@@ -41,7 +41,7 @@ fn every_public_function_has_an_exchange() {
         assert!(
             EXCHANGES.iter().any(|(request, ..)| request[0] == code),
             "{code:02X}: tests/sniffer/exchanges.rs has no exchange of this function; its texts come \
-             from src/text/mod.rs, the address and quantity of its events from src/sniffer/pairing.rs"
+             from src/text/mod.rs"
         );
     }
 }

@@ -172,7 +172,7 @@ pub fn assert_exchanges(bench: &Bench, exchanges: &[(&[u8], &[u8], &str, &str)])
         assert_eq!(
             events[1].asked,
             Some(address_and_quantity(request)),
-            "{:02X}: `address` or `quantity` in src/sniffer/pairing.rs is wrong for this function",
+            "{:02X}: `range` in src/pdu/functions.rs is wrong for this function",
             request[0]
         );
     }
