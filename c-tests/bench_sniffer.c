@@ -121,12 +121,10 @@ static void collect_events(events *seen, uint32_t now)
 /* Feeds the line in pieces of `piece` bytes. 0 means frame by frame. */
 static events feed(uint8_t framing, size_t piece)
 {
-    static uint8_t (*const begin[])(mbm_sniffer *, uint8_t *, uint16_t) = {
-        mbm_sniffer_beginRtu, mbm_sniffer_beginAscii, mbm_sniffer_beginTcp};
     events seen = {{0}, 0};
     size_t at = 0, count;
 
-    if (begin[framing](&sniffer, buffer, sizeof buffer) != MBM_OK ||
+    if (mbm_sniffer_begin(&sniffer, framing, buffer, sizeof buffer) != MBM_OK ||
         mbm_sniffer_setBaudRate(&sniffer, 115200) != MBM_OK)
         exit(1);
     CALLGRIND_TOGGLE_COLLECT;

@@ -279,13 +279,13 @@ static void a_sniffer_forgets_bytes_and_requests(void **state)
 
     (void)state;
     hooked_port_arrive_rtu(&wire, 17, "\x03\x00\x00\x00\x01", 5);
-    OK(mbm_sniffer_beginRtu(&sniffer, frame, sizeof frame));
+    OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, frame, sizeof frame));
     OK(mbm_sniffer_setResponseTimeout(&sniffer, 1));
     assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, wire.arriving, 8, 0), 8);
     assert_int_equal(mbm_sniffer_next(&sniffer, 10000, &event), 1);
     assert_int_equal(event.kind, MBM_EVENT_REQUEST);
     assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, wire.arriving, 4, 20000), 4);
-    OK(mbm_sniffer_beginTcp(&sniffer, other_frame, sizeof other_frame));
+    OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_TCP, other_frame, sizeof other_frame));
     assert_int_equal(mbm_sniffer_next(&sniffer, 60000000, &event), 0);
 }
 

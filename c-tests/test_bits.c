@@ -66,19 +66,20 @@ static void coils_are_packed_lowest_bit_first(void **state)
     /* The request of 6.11. */
     static const uint8_t coils[] = {1, 0, 0xFF, 1, 0, 0, 2, 1, 1, 0};
     uint8_t bytes[] = {0xFF, 0xFF, 0xFF};
-    uint16_t words[] = {0xFFFF, 0xFFFF};
+    uint16_t words[] = {0, 0xFFFF};
+    unsigned i;
 
     (void)state;
     OK(mbm_bits_pack(coils, 10, bytes, 3));
     assert_int_equal(bytes[0], 0xCD);
     assert_int_equal(bytes[1], 0x01);
     assert_int_equal(bytes[2], 0xFF);
-    OK(mbm_bits_packWords(coils, 10, words, 2));
+    for (i = 0; i < COUNT(coils); i++)
+        OK(mbm_bits_setInWords(words, 0, 10, (uint16_t)i, coils[i]));
     assert_int_equal(words[0], 0x01CD);
     assert_int_equal(words[1], 0xFFFF);
     OK(mbm_bits_pack(coils, 0, bytes, 0));
     IS(MBM_BUFFER_TOO_SMALL, mbm_bits_pack(coils, 10, bytes + 2, 1));
-    IS(MBM_BUFFER_TOO_SMALL, mbm_bits_packWords(coils, 10, words, 0));
     assert_int_equal(bytes[2], 0xFF);
 }
 
@@ -89,11 +90,8 @@ static void coils_are_unpacked_to_one_byte_each(void **state)
     (void)state;
     OK(mbm_bits_unpack(coils_19, 3, coils, 19));
     assert_memory_equal(coils, on_19, 19);
-    OK(mbm_bits_unpackWords(words_19, 2, coils, 19));
-    assert_memory_equal(coils, on_19, 19);
     coils[24] = 7;
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_unpack(coils_19, 3, coils, 25));
-    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_unpackWords(words_19, 1, coils, 17));
     assert_memory_equal(coils, on_19, 19);
     assert_int_equal(coils[24], 7);
 }
@@ -106,10 +104,8 @@ static void null_is_an_invalid_argument(void **state)
     (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_bits_pack(NULL, 1, &byte, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_pack(&byte, 1, NULL, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_packWords(&byte, 1, NULL, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_unpack(NULL, 1, &byte, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_unpack(&byte, 1, NULL, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_unpackWords(NULL, 1, &byte, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_isSet(NULL, 0, 1, 0, &byte));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_isSet(&byte, 0, 1, 0, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_isSetInWords(&word, 0, 1, 0, NULL));

@@ -233,7 +233,7 @@ static uint8_t use_gateway(void *object)
 
 static uint8_t use_sniffer(void *object)
 {
-    const uint8_t begun = mbm_sniffer_beginRtu(object, frame, sizeof frame);
+    const uint8_t begun = mbm_sniffer_begin(object, MBM_FRAMING_RTU, frame, sizeof frame);
     mbm_event event;
 
     if (begun != MBM_OK)
@@ -256,8 +256,8 @@ static uint8_t use_trace(void *object)
     mbm_framing framing = MBM_INIT;
     mbm_line line = MBM_INIT;
     unsigned records = 0;
-    const uint8_t begun = mbm_trace_beginClient(object, &port, &framing, outgoing, sizeof outgoing,
-                                                count_record, &records);
+    const uint8_t begun = mbm_trace_begin(object, MBM_PACKET_REQUEST, &port, &framing, outgoing,
+                                          sizeof outgoing, count_record, &records);
 
     if (begun != MBM_OK)
         return begun;

@@ -461,7 +461,7 @@ static void the_longest_text_of_an_event_fits_too(void **state)
     mbm_event event;
 
     (void)state;
-    OK(mbm_sniffer_beginRtu(&sniffer, buffer, sizeof buffer));
+    OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, buffer, sizeof buffer));
     mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, frame, (uint16_t)seal(frame, 6), 0);
     assert_int_equal(mbm_sniffer_next(&sniffer, 10000, &event), 1);
     shape_pdu(frame + 1, 252, 1);

@@ -29,7 +29,6 @@ static void a_ring_that_was_never_begun_is_empty_and_takes_nothing(void **state)
         assert_int_equal(mbm_ring_read(rings[i], bytes, 4), 0);
         assert_int_equal(mbm_ring_available(rings[i]), 0);
         assert_int_equal(mbm_ring_lost(rings[i]), 0);
-        mbm_ring_clear(rings[i]);
     }
     assert_int_equal(bytes[0], 1);
 }
@@ -85,7 +84,7 @@ static void no_bytes_may_be_null(void **state)
     assert_int_equal(mbm_ring_lost(&ring), 0);
 }
 
-static void a_cleared_ring_is_empty_and_goes_on_counting(void **state)
+static void a_ring_that_was_read_empty_goes_on_counting(void **state)
 {
     uint8_t byte = 0;
 
@@ -93,7 +92,8 @@ static void a_cleared_ring_is_empty_and_goes_on_counting(void **state)
     OK(mbm_ring_begin(&ring, storage, 2));
     mbm_ring_put(&ring, 1);
     mbm_ring_put(&ring, 2);
-    mbm_ring_clear(&ring);
+    while (mbm_ring_read(&ring, &byte, 1) > 0)
+        continue;
     assert_int_equal(mbm_ring_available(&ring), 0);
     assert_int_equal(mbm_ring_lost(&ring), 1);
     assert_int_equal(mbm_ring_put(&ring, 3), 1);
@@ -126,7 +126,7 @@ int main(void)
         TEST(a_refused_begin_changes_nothing),
         TEST(a_ring_holds_one_byte_less_than_its_storage),
         TEST(no_bytes_may_be_null),
-        TEST(a_cleared_ring_is_empty_and_goes_on_counting),
+        TEST(a_ring_that_was_read_empty_goes_on_counting),
         TEST(the_count_of_lost_bytes_wraps_at_65536),
     };
 

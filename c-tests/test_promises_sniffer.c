@@ -28,17 +28,14 @@ static int setup(void **state)
 
 /* --- sniffer --- */
 
-typedef uint8_t (*begins_sniffer)(mbm_sniffer *sniffer, uint8_t *bytes, uint16_t size);
-
-/* The begin functions, with the frame timeout by default in milliseconds. */
+/* The framings, with the frame timeout by default in milliseconds. */
 static const struct {
-    begins_sniffer begin;
     uint8_t kind;
     uint32_t frameTimeout;
-} sniffers[] = {{mbm_sniffer_beginRtu, MBM_FRAMING_RTU, 50},
-                {mbm_sniffer_beginAscii, MBM_FRAMING_ASCII, 1000},
-                {mbm_sniffer_beginTcp, MBM_FRAMING_TCP, 1000},
-                {mbm_sniffer_beginRtuOverTcp, MBM_FRAMING_RTU_OVER_TCP, 50}};
+} sniffers[] = {{MBM_FRAMING_RTU, 50},
+                {MBM_FRAMING_ASCII, 1000},
+                {MBM_FRAMING_TCP, 1000},
+                {MBM_FRAMING_RTU_OVER_TCP, 50}};
 
 static uint32_t now; /* of the sniffer */
 
@@ -82,18 +79,21 @@ static void a_sniffer_begins_in_every_framing_or_changes_nothing(void **state)
 
     for (i = 0; i < COUNT(sniffers); i++) {
         setup(state);
-        OK(sniffers[i].begin(&s, buffer, MBM_MIN_SNIFFER_BUFFER));
-        IS(MBM_INVALID_ARGUMENT, sniffers[i].begin(NULL, buffer, 300));
-        REFUSED(MBM_INVALID_ARGUMENT, s, sniffers[i].begin(&s, NULL, 300));
-        REFUSED(MBM_BUFFER_TOO_SMALL, s, sniffers[i].begin(&s, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
-        OK(sniffers[i].begin(&s, buffer, 300));
+        OK(mbm_sniffer_begin(&s, sniffers[i].kind, buffer, MBM_MIN_SNIFFER_BUFFER));
+        IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(NULL, sniffers[i].kind, buffer, 300));
+        REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_begin(&s, sniffers[i].kind, NULL, 300));
+        REFUSED(MBM_BUFFER_TOO_SMALL, s,
+                mbm_sniffer_begin(&s, sniffers[i].kind, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
+        REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_begin(&s, MBM_FRAMING_NONE, buffer, 300));
+        REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_begin(&s, 255, buffer, 300));
+        OK(mbm_sniffer_begin(&s, sniffers[i].kind, buffer, 300));
         assert_int_equal(response_timeout(sniffers[i].kind), 1000);
         assert_int_equal(frame_timeout(sniffers[i].kind), sniffers[i].frameTimeout);
         OK(mbm_sniffer_setResponseTimeout(&s, 5));
         OK(mbm_sniffer_setFrameTimeout(&s, 200));
         assert_int_equal(response_timeout(sniffers[i].kind), 5);
         assert_int_equal(frame_timeout(sniffers[i].kind), 200);
-        OK(sniffers[i].begin(&s, buffer, 300));
+        OK(mbm_sniffer_begin(&s, sniffers[i].kind, buffer, 300));
         assert_int_equal(response_timeout(sniffers[i].kind), 1000);
         assert_int_equal(frame_timeout(sniffers[i].kind), sniffers[i].frameTimeout);
     }
@@ -109,7 +109,7 @@ static void times_and_declarations_of_a_sniffer_have_limits(void **state)
     memset(right, 0, sizeof right);
     for (i = 0; i < COUNT(right); i++)
         right[i].code = (uint8_t)(65 + i);
-    OK(mbm_sniffer_beginRtu(&s, buffer, 300));
+    OK(mbm_sniffer_begin(&s, MBM_FRAMING_RTU, buffer, 300));
     REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setResponseTimeout(&s, 0));
     REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setResponseTimeout(&s, 65536));
     REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setFrameTimeout(&s, 0));
@@ -130,7 +130,7 @@ static void times_and_declarations_of_a_sniffer_have_limits(void **state)
     for (i = 0; i < 256; i++) {
         int is_digit = (i >= '0' && i <= '9') || (i >= 'A' && i <= 'F') || (i >= 'a' && i <= 'f');
 
-        OK(mbm_sniffer_beginAscii(&s, buffer, 300));
+        OK(mbm_sniffer_begin(&s, MBM_FRAMING_ASCII, buffer, 300));
         IS(i == 0 || i > 127 || i == '\r' || i == ':' || is_digit ? MBM_INVALID_ARGUMENT : MBM_OK,
            mbm_sniffer_setDelimiter(&s, (uint8_t)i));
     }
@@ -155,7 +155,7 @@ static void a_sniffer_that_was_never_begun_reports_nothing(void **state)
         memset(&event, 0x77, sizeof event);
         REFUSED(0, event, mbm_sniffer_next(both[i], 0, &event));
     }
-    OK(mbm_sniffer_beginRtu(&s, buffer, 300));
+    OK(mbm_sniffer_begin(&s, MBM_FRAMING_RTU, buffer, 300));
     REFUSED(0, event, mbm_sniffer_next(&s, 0, &event));
     assert_int_equal(mbm_sniffer_next(&s, 0, NULL), 0);
     assert_int_equal(mbm_sniffer_feed(&s, 0, NULL, 0, 0), 0);
@@ -187,45 +187,48 @@ static uint32_t trace_timeout(void)
     return ms - 1;
 }
 
-typedef uint8_t (*begins_trace)(mbm_trace *trace, const mbm_port *on, const mbm_framing *framing,
-                                uint8_t *bytes, uint16_t size,
-                                void (*called)(void *context, const mbm_traceRecord *record),
-                                void *context);
-
 static void a_trace_begins_or_changes_nothing(void **state)
 {
-    static const begins_trace begins[] = {mbm_trace_beginClient, mbm_trace_beginServer};
+    static const uint8_t kinds[] = {MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
     static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = MBM_FRAMING_NONE};
     mbm_port lacking;
     unsigned i;
 
-    for (i = 0; i < COUNT(begins); i++) {
-        begins_trace begin = begins[i];
+    for (i = 0; i < COUNT(kinds); i++) {
+        const uint8_t kind = kinds[i];
 
         setup(state);
-        OK(begin(&t, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER, hook, NULL));
-        IS(MBM_INVALID_ARGUMENT, begin(NULL, &port, &rtu, buffer, 600, hook, NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, NULL, &rtu, buffer, 600, hook, NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &port, NULL, buffer, 600, hook, NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &port, &none, buffer, 600, hook, NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &port, &rtu, NULL, 600, hook, NULL));
-        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &port, &rtu, buffer, 600, NULL, NULL));
-        REFUSED(MBM_BUFFER_TOO_SMALL, t,
-                begin(&t, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER - 1, hook, NULL));
+        OK(mbm_trace_begin(&t, kind, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER, hook, NULL));
+        IS(MBM_INVALID_ARGUMENT, mbm_trace_begin(NULL, kind, &port, &rtu, buffer, 600, hook, NULL));
         REFUSED(MBM_INVALID_ARGUMENT, t,
-                begin(&t, mbm_trace_port(&t), &rtu, buffer, 600, hook, NULL));
+                mbm_trace_begin(&t, kind, NULL, &rtu, buffer, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t,
+                mbm_trace_begin(&t, kind, &port, NULL, buffer, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t,
+                mbm_trace_begin(&t, kind, &port, &none, buffer, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t,
+                mbm_trace_begin(&t, kind, &port, &rtu, NULL, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t,
+                mbm_trace_begin(&t, kind, &port, &rtu, buffer, 600, NULL, NULL));
+        REFUSED(
+            MBM_BUFFER_TOO_SMALL, t,
+            mbm_trace_begin(&t, kind, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER - 1, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t,
+                mbm_trace_begin(&t, kind, mbm_trace_port(&t), &rtu, buffer, 600, hook, NULL));
         lacking = port;
         lacking.write = NULL;
-        REFUSED(MBM_INVALID_ARGUMENT, t, begin(&t, &lacking, &rtu, buffer, 600, hook, NULL));
+        REFUSED(MBM_INVALID_ARGUMENT, t,
+                mbm_trace_begin(&t, kind, &lacking, &rtu, buffer, 600, hook, NULL));
         assert_non_null(mbm_trace_port(&t));
-        assert_ptr_equal(mbm_trace_innerPort(&t)->context, &wire);
+        REFUSED(MBM_INVALID_ARGUMENT, t,
+                mbm_trace_begin(&t, MBM_PACKET_EXCEPTION, &port, &rtu, buffer, 600, hook, NULL));
         assert_int_equal(trace_timeout(), 50);
         OK(mbm_trace_setFrameTimeout(&t, 65535));
         assert_int_equal(trace_timeout(), 65535);
         REFUSED(MBM_INVALID_ARGUMENT, t, mbm_trace_setFrameTimeout(&t, 0));
         REFUSED(MBM_INVALID_ARGUMENT, t, mbm_trace_setFrameTimeout(&t, 65536));
         OK(mbm_trace_flush(&t));
-        OK(begin(&t, &port, FRAMING(MBM_FRAMING_TCP), buffer, 600, hook, NULL));
+        OK(mbm_trace_begin(&t, kind, &port, FRAMING(MBM_FRAMING_TCP), buffer, 600, hook, NULL));
         assert_int_equal(trace_timeout(), 1000);
     }
 }
@@ -242,7 +245,6 @@ static void a_trace_that_was_never_begun_has_no_port(void **state)
         uint8_t status = both[i] == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
 
         assert_null(mbm_trace_port(both[i]));
-        assert_null(mbm_trace_innerPort(both[i]));
         IS(status, mbm_trace_setFrameTimeout(both[i], 1));
         IS(status, mbm_trace_flush(both[i]));
     }

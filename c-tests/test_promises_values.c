@@ -240,8 +240,6 @@ static void data_of_no_length_may_be_null(void **state)
     EMPTY(mbm_registers_intoBytes(&r, NULL, 0, 5));
     OK(mbm_bits_pack(NULL, 0, NULL, 0));
     OK(mbm_bits_unpack(NULL, 0, NULL, 0));
-    OK(mbm_bits_packWords(NULL, 0, NULL, 0));
-    OK(mbm_bits_unpackWords(NULL, 0, NULL, 0));
 }
 
 static void a_view_ends_at_address_65535(void **state)
@@ -283,7 +281,6 @@ static void bits_are_packed_from_the_lowest_on(void **state)
 {
     static const uint8_t coils[] = {1, 0, 200, 0, 0, 0, 0, 0, 0, 1};
     uint8_t bytes[3] = {0xEE, 0xEE, 0xEE}, back[10];
-    uint16_t wide[2] = {0xEEEE, 0xEEEE};
 
     (void)state;
     REFUSED(MBM_BUFFER_TOO_SMALL, bytes, mbm_bits_pack(coils, 10, bytes, 1));
@@ -296,17 +293,6 @@ static void bits_are_packed_from_the_lowest_on(void **state)
     REFUSED(MBM_INVALID_ARGUMENT, back, mbm_bits_unpack(NULL, 2, back, 10));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_unpack(bytes, 2, NULL, 10));
     OK(mbm_bits_unpack(bytes, 2, back, 10));
-    assert_true(back[0] == 1 && back[1] == 0 && back[2] == 1 && back[9] == 1);
-    REFUSED(MBM_BUFFER_TOO_SMALL, wide, mbm_bits_packWords(coils, 10, wide, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, wide, mbm_bits_packWords(NULL, 10, wide, 2));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_packWords(coils, 10, NULL, 2));
-    OK(mbm_bits_packWords(coils, 10, wide, 2));
-    assert_true(wide[0] == 0x0205 && wide[1] == 0xEEEE);
-    memset(back, 0xEE, sizeof back);
-    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, back, mbm_bits_unpackWords(wide, 0, back, 10));
-    REFUSED(MBM_INVALID_ARGUMENT, back, mbm_bits_unpackWords(NULL, 1, back, 10));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_unpackWords(wide, 1, NULL, 10));
-    OK(mbm_bits_unpackWords(wide, 1, back, 10));
     assert_true(back[0] == 1 && back[1] == 0 && back[2] == 1 && back[9] == 1);
 }
 

@@ -238,12 +238,12 @@ static void a_sniffer_goes_on_after_refused_calls(void **state)
 
     (void)state;
     memset(&sniffer, 0, sizeof sniffer);
-    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_beginRtu(&sniffer, small, 31));
-    OK(mbm_sniffer_beginRtu(&sniffer, buffer, MBM_MAX_FRAME));
+    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, small, 31));
+    OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, buffer, MBM_MAX_FRAME));
     hooked_port_arrive_rtu(&wire, 17, "\3\0\0\0\1", 5);
     assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, wire.arriving, 4, 0), 4);
-    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_beginRtu(&sniffer, small, 31));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_beginRtu(&sniffer, NULL, 256));
+    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, small, 31));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, NULL, 256));
     REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setFunctions(&sniffer, NULL, 1));
     REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setDelimiter(&sniffer, '\r'));
     REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setResponseTimeout(&sniffer, 0));

@@ -14,12 +14,8 @@ static const uint8_t request[] = {3, 0, 107, 0, 3}, reply[] = {3, 6, 2, 0x2B, 0,
 
 static void begin(uint8_t framing)
 {
-    uint8_t (*const begin[])(mbm_sniffer *, uint8_t *,
-                             uint16_t) = {mbm_sniffer_beginRtu, mbm_sniffer_beginAscii,
-                                          mbm_sniffer_beginTcp, mbm_sniffer_beginRtuOverTcp};
-
     now = 0;
-    OK(begin[framing](&sniffer, buffer, sizeof buffer));
+    OK(mbm_sniffer_begin(&sniffer, framing, buffer, sizeof buffer));
 }
 
 /* Builds the frame of a PDU of unit 17. */
@@ -181,7 +177,7 @@ static void more_bytes_than_the_buffer_holds_are_fed_in_parts(void **state)
         memcpy(traffic + length, frame, size);
         length = (uint16_t)(length + size);
     }
-    OK(mbm_sniffer_beginRtu(&sniffer, small, sizeof small));
+    OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, small, sizeof small));
     while (fed < length) {
         uint16_t taken = mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, traffic + fed,
                                           (uint16_t)(length - fed), 0);
@@ -210,7 +206,7 @@ static void user_defined_functions_are_reported(void **state)
     (void)state;
     framing.functions = own;
     framing.functionCount = 1;
-    OK(mbm_sniffer_beginRtu(&sniffer, buffer, sizeof buffer));
+    OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, buffer, sizeof buffer));
     OK(mbm_sniffer_setFunctions(&sniffer, own, 1));
     packet.unit = 17;
     packet.function = 0x55;
@@ -256,9 +252,11 @@ static void a_sniffer_that_was_not_begun_or_has_bad_arguments_is_refused(void **
     mbm_event event;
 
     (void)state;
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_beginRtu(NULL, buffer, sizeof buffer));
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_beginAscii(&zeroed, NULL, 64));
-    IS(MBM_BUFFER_TOO_SMALL, mbm_sniffer_beginTcp(&zeroed, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(NULL, MBM_FRAMING_RTU, buffer, sizeof buffer));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, MBM_FRAMING_ASCII, NULL, 64));
+    IS(MBM_BUFFER_TOO_SMALL,
+       mbm_sniffer_begin(&zeroed, MBM_FRAMING_TCP, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, MBM_FRAMING_NONE, buffer, sizeof buffer));
     IS(MBM_NOT_INITIALISED, mbm_sniffer_setFunctions(&zeroed, NULL, 0));
     IS(MBM_NOT_INITIALISED, mbm_sniffer_setDelimiter(&zeroed, '!'));
     IS(MBM_NOT_INITIALISED, mbm_sniffer_setBaudRate(&zeroed, 9600));

@@ -96,9 +96,9 @@ static void listen_between(int client, int far_end, uint8_t framing, uint8_t apa
 {
     memset(&line, 0, sizeof line);
     if (framing == MBM_FRAMING_TCP)
-        OK(mbm_sniffer_beginTcp(&line.sniffer, line.buffer, sizeof line.buffer));
+        OK(mbm_sniffer_begin(&line.sniffer, MBM_FRAMING_TCP, line.buffer, sizeof line.buffer));
     else
-        OK(mbm_sniffer_beginRtu(&line.sniffer, line.buffer, sizeof line.buffer));
+        OK(mbm_sniffer_begin(&line.sniffer, MBM_FRAMING_RTU, line.buffer, sizeof line.buffer));
     OK(mbm_sniffer_setResponseTimeout(&line.sniffer, PATIENCE_MS));
     line.begun = micros();
     line.client = client;

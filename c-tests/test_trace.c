@@ -77,8 +77,8 @@ static void is_record(size_t index, uint8_t direction, uint8_t kind, uint8_t sta
 
 static void begin_master(void)
 {
-    OK(mbm_trace_beginClient(&trace, &port, FRAMING(MBM_FRAMING_RTU), buffer, sizeof buffer, keep,
-                             "line"));
+    OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, FRAMING(MBM_FRAMING_RTU), buffer,
+                       sizeof buffer, keep, "line"));
     OK(mbm_line_beginRtu(&line, mbm_trace_port(&trace), frame, sizeof frame));
     OK(mbm_node_begin(&master, &line, 17, words, 8, words, 8));
 }
@@ -126,7 +126,8 @@ static void optional_hooks_are_passed_on_only_where_the_port_has_them(void **sta
             port.preTransmission = port.postTransmission = NULL;
             port.idle = NULL;
         }
-        OK(mbm_trace_beginServer(&trace, &port, FRAMING(MBM_FRAMING_RTU), buffer, 32, keep, NULL));
+        OK(mbm_trace_begin(&trace, MBM_PACKET_RESPONSE, &port, FRAMING(MBM_FRAMING_RTU), buffer, 32,
+                           keep, NULL));
         traced = mbm_trace_port(&trace);
         assert_int_equal(traced->flush == NULL, i);
         assert_int_equal(traced->preTransmission == NULL, i);
@@ -148,7 +149,8 @@ static void a_client_of_each_framing_works_through_a_trace(void **state)
         uint16_t length;
 
         reset(state);
-        OK(mbm_trace_beginClient(&trace, &port, framing, buffer, sizeof buffer, keep, NULL));
+        OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, framing, buffer, sizeof buffer, keep,
+                           NULL));
         traced = mbm_trace_port(&trace);
         switch (kind) {
         case MBM_FRAMING_RTU: OK(mbm_client_beginRtu(&client, traced, frame, 256)); break;
@@ -187,8 +189,8 @@ static void a_server_works_through_a_trace(void **state)
     table.words = words;
     table.size = 8;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
-    OK(mbm_trace_beginServer(&trace, &port, FRAMING(MBM_FRAMING_RTU), buffer, sizeof buffer, keep,
-                             NULL));
+    OK(mbm_trace_begin(&trace, MBM_PACKET_RESPONSE, &port, FRAMING(MBM_FRAMING_RTU), buffer,
+                       sizeof buffer, keep, NULL));
     OK(mbm_server_beginRtu(&server, mbm_trace_port(&trace), &unit, 1, frame, 256));
     hooked_port_arrive_rtu(&wire, 17, READ + 1, sizeof READ - 1);
     while (wire.length == 0)
@@ -228,8 +230,8 @@ static void two_links_are_told_apart_by_their_contexts(void **state)
     memset(&second, 0, sizeof second);
     begin_master();
     /* A trace before a trace: both hand the frame out. */
-    OK(mbm_trace_beginClient(&second, mbm_trace_port(&trace), FRAMING(MBM_FRAMING_RTU), more,
-                             sizeof more, keep, "outer"));
+    OK(mbm_trace_begin(&second, MBM_PACKET_REQUEST, mbm_trace_port(&trace),
+                       FRAMING(MBM_FRAMING_RTU), more, sizeof more, keep, "outer"));
     OK(mbm_line_beginRtu(&line, mbm_trace_port(&second), frame, sizeof frame));
     OK(mbm_node_setResponseTimeout(&master, 10));
     IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleCoil(&master, 1, 1));
@@ -321,7 +323,8 @@ static void a_trace_goes_on_after_refused_calls(void **state)
     assert_null(mbm_trace_port(NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_flush(NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_setFrameTimeout(NULL, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_trace_beginClient(NULL, &port, &rtu, buffer, 64, keep, NULL));
+    IS(MBM_INVALID_ARGUMENT,
+       mbm_trace_begin(NULL, MBM_PACKET_REQUEST, &port, &rtu, buffer, 64, keep, NULL));
     begin_master();
     hooked_port_arrive_rtu(&wire, 17, REPLY + 1, sizeof REPLY - 1);
     wire.last = 4;
@@ -329,20 +332,21 @@ static void a_trace_goes_on_after_refused_calls(void **state)
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 4);
     for (i = 0; i < COUNT(framings); i++)
         REFUSED(MBM_INVALID_ARGUMENT, trace,
-                mbm_trace_beginServer(&trace, &port, framings[i], buffer, 64, keep, NULL));
+                mbm_trace_begin(&trace, MBM_PACKET_RESPONSE, &port, framings[i], buffer, 64, keep,
+                                NULL));
     REFUSED(MBM_INVALID_ARGUMENT, trace,
-            mbm_trace_beginClient(&trace, NULL, &rtu, buffer, 64, keep, NULL));
+            mbm_trace_begin(&trace, MBM_PACKET_REQUEST, NULL, &rtu, buffer, 64, keep, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, trace,
-            mbm_trace_beginClient(&trace, &incomplete, &rtu, buffer, 64, keep, NULL));
+            mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &incomplete, &rtu, buffer, 64, keep, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, trace,
-            mbm_trace_beginClient(&trace, traced, &rtu, buffer, 64, keep, NULL));
+            mbm_trace_begin(&trace, MBM_PACKET_REQUEST, traced, &rtu, buffer, 64, keep, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, trace,
-            mbm_trace_beginClient(&trace, &port, &rtu, NULL, 64, keep, NULL));
+            mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, NULL, 64, keep, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, trace,
-            mbm_trace_beginClient(&trace, &port, &rtu, buffer, 64, NULL, NULL));
-    REFUSED(
-        MBM_BUFFER_TOO_SMALL, trace,
-        mbm_trace_beginClient(&trace, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER - 1, keep, NULL));
+            mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, buffer, 64, NULL, NULL));
+    REFUSED(MBM_BUFFER_TOO_SMALL, trace,
+            mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, buffer,
+                            MBM_MIN_TRACE_BUFFER - 1, keep, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, trace, mbm_trace_setFrameTimeout(&trace, 0));
     wire.last = sizeof REPLY + 2;
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
@@ -358,7 +362,8 @@ static void try_everything(void)
     REFUSED(MBM_BUSY, trace, mbm_trace_flush(&trace));
     REFUSED(MBM_BUSY, trace, mbm_trace_setFrameTimeout(&trace, 1));
     REFUSED(MBM_BUSY, trace,
-            mbm_trace_beginClient(&trace, &port, FRAMING(MBM_FRAMING_RTU), buffer, 64, keep, NULL));
+            mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, FRAMING(MBM_FRAMING_RTU), buffer, 64,
+                            keep, NULL));
     assert_null(mbm_trace_port(&trace));
     IS(MBM_BUSY, mbm_node_poll(&master));
     IS(MBM_BUSY, mbm_node_cancel(&master));
@@ -414,7 +419,7 @@ static void the_port_of_a_trace_neither_reads_nor_writes_within_the_hook(void **
     uint16_t crc;
 
     (void)state;
-    OK(mbm_trace_beginClient(&trace, &port, &rtu, buffer, 64, keep, NULL));
+    OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, buffer, 64, keep, NULL));
     traced_port = traced = mbm_trace_port(&trace);
     crc = mbm_frame_crc16(sent, 6);
     sent[6] = (uint8_t)crc;
@@ -440,7 +445,7 @@ static void an_event_of_a_sniffer_becomes_a_record(void **state)
 
     (void)state;
     memset(&sniffer, 0, sizeof sniffer);
-    OK(mbm_sniffer_beginRtu(&sniffer, frame, sizeof frame));
+    OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, frame, sizeof frame));
     for (piece = 0; piece < 5; piece++) {
         hooked_port_arrive_rtu(&wire, 17, piece == 1 ? REPLY + 1 : READ + 1, piece == 1 ? 6 : 5);
         memcpy(bytes, wire.arriving, wire.last);

@@ -1,4 +1,4 @@
-/* A server behind a trace: its hooks find their connection, and mbm_trace_innerPort the port. */
+/* A server behind a trace: its hooks find their connection in the struct that the trace begins. */
 #include "test.h"
 
 #include "mbm.h"
@@ -10,9 +10,15 @@ typedef struct connection {
     uint16_t arrived, sent;
 } connection;
 
+/* A hook gets the trace as its connection, which is the first member here. */
+typedef struct traced {
+    mbm_trace trace;
+    connection *wire;
+} traced;
+
 static connection wire;
-static mbm_trace trace;
-static const void *accessed;
+static traced server_trace = {.wire = &wire};
+static const connection *accessed;
 static uint32_t now;
 
 static int16_t read_wire(void *context, uint8_t *bytes, uint16_t capacity)
@@ -41,17 +47,17 @@ static uint32_t micros(void *context)
 static void on_record(void *context, const mbm_traceRecord *record)
 {
     (void)record;
-    assert_null(mbm_trace_innerPort((const mbm_trace *)context));
+    assert_null(mbm_trace_port((mbm_trace *)context));
 }
 
 static uint8_t before_read(void *context, const mbm_access *access)
 {
     (void)context;
-    accessed = mbm_trace_innerPort((const mbm_trace *)access->connection)->context;
+    accessed = ((const traced *)access->connection)->wire;
     return 0;
 }
 
-static void a_hook_finds_the_context_of_the_port_before_the_trace(void **state)
+static void a_hook_finds_its_connection_behind_a_trace(void **state)
 {
     static const uint8_t request[8] = {17, 3, 0, 0, 0, 1, 0x86, 0x9A};
     static const mbm_accessHooks hooks = {.beforeRead = before_read};
@@ -66,12 +72,12 @@ static void a_hook_finds_the_context_of_the_port_before_the_trace(void **state)
     int polls;
 
     (void)state;
-    assert_null(mbm_trace_innerPort(NULL));
-    assert_null(mbm_trace_innerPort(&trace));
     OK(mbm_registerTable_setHooks(&table, &hooks));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
-    OK(mbm_trace_beginServer(&trace, &port, &rtu, buffer, sizeof buffer, on_record, &trace));
-    OK(mbm_server_beginRtu(&server, mbm_trace_port(&trace), &unit, 1, frame, sizeof frame));
+    OK(mbm_trace_begin(&server_trace.trace, MBM_PACKET_RESPONSE, &port, &rtu, buffer, sizeof buffer,
+                       on_record, &server_trace.trace));
+    OK(mbm_server_beginRtu(&server, mbm_trace_port(&server_trace.trace), &unit, 1, frame,
+                           sizeof frame));
     memcpy(wire.request, request, sizeof request);
     wire.arrived = sizeof request;
     for (polls = 0; polls < 100 && wire.sent == 0; polls++)
@@ -83,7 +89,7 @@ static void a_hook_finds_the_context_of_the_port_before_the_trace(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_hook_finds_the_context_of_the_port_before_the_trace),
+        cmocka_unit_test(a_hook_finds_its_connection_behind_a_trace),
     };
 
     return cmocka_run_group_tests_name("trace of a server", tests, NULL, NULL);

@@ -157,14 +157,7 @@ static int replay(void)
 
 static void begin(void)
 {
-    switch (where.framing) {
-    case MBM_FRAMING_TCP: mbm_sniffer_beginTcp(&sniffer, buffer, sizeof buffer); break;
-    case MBM_FRAMING_ASCII: mbm_sniffer_beginAscii(&sniffer, buffer, sizeof buffer); break;
-    case MBM_FRAMING_RTU_OVER_TCP:
-        mbm_sniffer_beginRtuOverTcp(&sniffer, buffer, sizeof buffer);
-        break;
-    default: mbm_sniffer_beginRtu(&sniffer, buffer, sizeof buffer);
-    }
+    mbm_sniffer_begin(&sniffer, where.framing, buffer, sizeof buffer);
     mbm_sniffer_setBaudRate(&sniffer, where.tty.baud);
     mbm_sniffer_setResponseTimeout(&sniffer, (uint16_t)timeoutMs);
 }

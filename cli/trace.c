@@ -152,12 +152,9 @@ static mbm_port trace(mbm_port port, uint8_t framing, const char *name, int is_s
         return port;
     if (mbm_trace_flush(&link->trace) == MBM_OK)
         pcap_reconnect(&link->pcap);
-    if (is_server)
-        status = mbm_trace_beginServer(&link->trace, &port, &link->framing, link->buffer,
-                                       sizeof link->buffer, take_frame, link);
-    else
-        status = mbm_trace_beginClient(&link->trace, &port, &link->framing, link->buffer,
-                                       sizeof link->buffer, take_frame, link);
+    status =
+        mbm_trace_begin(&link->trace, is_server ? MBM_PACKET_RESPONSE : MBM_PACKET_REQUEST, &port,
+                        &link->framing, link->buffer, sizeof link->buffer, take_frame, link);
     return status == MBM_OK ? *mbm_trace_port(&link->trace) : port;
 }
 

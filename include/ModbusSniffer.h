@@ -67,8 +67,7 @@ public:
      */
     uint8_t begin(Stream &line, uint32_t baud = 0)
     {
-        const uint8_t status =
-            attach(line, mbm_sniffer_beginRtu(&sniffer, buffer, MODBUSSNIFFER_BUFFER_BYTES));
+        const uint8_t status = beginAs(line, MBM_FRAMING_RTU);
         if (status == MBM_OK && baud != 0)
             mbm_sniffer_setBaudRate(&sniffer, baud);
         return status;
@@ -76,7 +75,7 @@ public:
     /** As begin, for ASCII frames. */
     uint8_t beginAscii(Stream &line)
     {
-        return attach(line, mbm_sniffer_beginAscii(&sniffer, buffer, MODBUSSNIFFER_BUFFER_BYTES));
+        return beginAs(line, MBM_FRAMING_ASCII);
     }
 
     /** Prints each event as a line; see modbusPrintEvent. */
@@ -135,8 +134,10 @@ private:
     mbm_sniffer sniffer;
     uint8_t buffer[MODBUSSNIFFER_BUFFER_BYTES];
 
-    uint8_t attach(Stream &line, uint8_t status)
+    uint8_t beginAs(Stream &line, uint8_t framing)
     {
+        const uint8_t status =
+            mbm_sniffer_begin(&sniffer, framing, buffer, MODBUSSNIFFER_BUFFER_BYTES);
         if (status == MBM_OK)
             stream = &line;
         return status;

@@ -23,7 +23,8 @@ int main(void)
     USED(&take);
     USED(buffer);
     begin();
-    (void)CALL(mbm_trace_beginClient(&trace, &port, &rtu, buffer, sizeof buffer, take, NULL));
+    (void)CALL(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, buffer, sizeof buffer, take,
+                               NULL));
     (void)CALL(mbm_line_beginRtu(&line, mbm_trace_port(&trace), frame, sizeof frame));
     for (;;) {
         uart = CALL(mbm_node_readHoldingRegisters(&node, 2, 10));

@@ -16,24 +16,24 @@ fn units<T: Packed>(quantity: u16) -> usize {
 
 /// # Safety
 /// As [`slice`] demands of both.
-unsafe fn pack<T: Packed>(coils: *const u8, quantity: u16, units: *mut T, length: u16) -> u8 {
+unsafe fn pack(coils: *const u8, quantity: u16, bytes: *mut u8, length: u16) -> u8 {
     // SAFETY: as the caller promises.
     code(unsafe {
         slice(coils, quantity.into()).and_then(|coils| {
             let on = coils.iter().map(|coil| *coil != 0);
-            bits::pack(slice_mut(units, length.into())?, on)
+            bits::pack(slice_mut(bytes, length.into())?, on)
         })
     })
 }
 
 /// # Safety
 /// As [`slice`] demands of both.
-unsafe fn unpack<T: Packed>(units: *const T, length: u16, coils: *mut u8, quantity: u16) -> u8 {
+unsafe fn unpack(bytes: *const u8, length: u16, coils: *mut u8, quantity: u16) -> u8 {
     // SAFETY: as the caller promises.
     code(unsafe {
-        slice(units, length.into()).and_then(|units| {
+        slice(bytes, length.into()).and_then(|bytes| {
             let coils = slice_mut(coils, quantity.into())?;
-            for (coil, on) in coils.iter_mut().zip(bits::unpack(units, quantity.into())?) {
+            for (coil, on) in coils.iter_mut().zip(bits::unpack(bytes, quantity.into())?) {
                 *coil = on.into();
             }
             Ok(())
@@ -145,41 +145,6 @@ pub unsafe extern "C" fn mbm_bits_set(
     on: u8,
 ) -> u8 {
     set(bytes, first, quantity, address, on)
-}
-
-/// As mbm_bits_pack, but into words, 16 bits in each word; for example the transmit words
-/// of a node.
-///
-/// @param coils     one byte for each coil: 0 is off, any other value is on
-/// @param quantity  the number of coils, 0 to 65535
-/// @param words     receives the bits, 16 in each word
-/// @param length    the number of words that `words` can hold
-/// @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
-#[no_mangle]
-pub unsafe extern "C" fn mbm_bits_packWords(
-    coils: *const u8,
-    quantity: u16,
-    words: *mut u16,
-    length: u16,
-) -> u8 {
-    pack(coils, quantity, words, length)
-}
-
-/// As mbm_bits_unpack, but from words, for example the response words of a node.
-///
-/// @param words     the bits, 16 in each word; the first coil is the lowest bit
-/// @param length    the number of words
-/// @param coils     receives one byte for each coil, 0 or 1
-/// @param quantity  the number of coils, 0 to 65535
-/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if `words` has fewer bits than `quantity`
-#[no_mangle]
-pub unsafe extern "C" fn mbm_bits_unpackWords(
-    words: *const u16,
-    length: u16,
-    coils: *mut u8,
-    quantity: u16,
-) -> u8 {
-    unpack(words, length, coils, quantity)
 }
 
 /// As mbm_bits_isSet, but in words, for example the response words of a node.

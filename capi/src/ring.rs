@@ -130,16 +130,6 @@ pub unsafe extern "C" fn mbm_ring_available(ring: *const mbm_ring) -> u16 {
     self::ring(ring).map_or(0, |ring| ring.available())
 }
 
-/// Discards all bytes in the ring. The reader calls it.
-///
-/// @param ring  the object
-#[no_mangle]
-pub unsafe extern "C" fn mbm_ring_clear(ring: *mut mbm_ring) {
-    if let Some(ring) = self::ring(ring) {
-        ring.clear();
-    }
-}
-
 /// Returns how many bytes were lost because the ring was full, since mbm_ring_begin.
 /// Writer and reader may call it.
 ///

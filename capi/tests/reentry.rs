@@ -159,7 +159,16 @@ fn hooks_use_the_trace_that_called_them() {
         let port = port(state.cast());
         let place = buffer.cast();
         let hook = Some(traced as unsafe extern "C" fn(_, _));
-        let status = mbm_trace_beginClient(trace, &port, framing, place, 64, hook, state.cast());
+        let status = mbm_trace_begin(
+            trace,
+            MBM_PACKET_REQUEST,
+            &port,
+            framing,
+            place,
+            64,
+            hook,
+            state.cast(),
+        );
         assert_eq!(status, MBM_OK);
         let line = LineOfTwo::begin(state, mbm_trace_port(trace));
         (*state).received = vec![17, 3];

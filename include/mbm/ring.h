@@ -84,13 +84,6 @@ uint16_t mbm_ring_read(struct mbm_ring *ring, uint8_t *bytes, uint16_t capacity)
 uint16_t mbm_ring_available(const struct mbm_ring *ring);
 
 /**
- * Discards all bytes in the ring. The reader calls it.
- *
- * @param ring  the object
- */
-void mbm_ring_clear(struct mbm_ring *ring);
-
-/**
  * Returns how many bytes were lost because the ring was full, since mbm_ring_begin.
  * Writer and reader may call it.
  *

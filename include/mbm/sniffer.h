@@ -48,9 +48,9 @@ extern "C" {
  * A sniffer: finds the frames on a bus that others use, and pairs requests with replies.
  * It never sends and has no port: you pass it the bytes that you receive.
  *
- * You provide the storage. Initialise it with MBM_INIT. Call one of the mbm_sniffer_begin
- * functions first. Not re-entrant: use one object from one thread, and never from an
- * interrupt; pass bytes from an interrupt through an mbm_ring.
+ * You provide the storage. Initialise it with MBM_INIT. Call mbm_sniffer_begin first. Not
+ * re-entrant: use one object from one thread, and never from an interrupt; pass bytes from an
+ * interrupt through an mbm_ring.
  */
 typedef struct mbm_sniffer {
     /** Private. */
@@ -113,54 +113,27 @@ typedef struct mbm_event {
 } mbm_event;
 
 /**
- * Begins a sniffer for RTU frames on a serial line.
+ * Begins a sniffer for the frames on a serial line, or in a TCP stream.
  *
  * You may call it again at any time. The sniffer then discards received bytes and
  * unanswered requests without an event, and its settings return to their defaults.
  *
  * @param sniffer  the object; initialised with MBM_INIT before the first call
+ * @param framing  MBM_FRAMING_RTU or MBM_FRAMING_ASCII for a serial line, MBM_FRAMING_TCP or
+ *                 MBM_FRAMING_RTU_OVER_TCP for a stream
  * @param buffer   holds received bytes until the sniffer has reported them; must stay valid for
  *                 as long as the sniffer is used
- * @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER. MBM_MAX_FRAME
- *                 holds every frame; with separate directions use twice as much. A longer frame
- *                 becomes an event of kind MBM_EVENT_NOISE
- * @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small
+ * @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER. MBM_MAX_FRAME,
+ *                 MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every frame; with separate
+ *                 directions use twice as much. A longer frame becomes an event of kind
+ *                 MBM_EVENT_NOISE
+ * @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for
+ *         another framing
  */
-uint8_t mbm_sniffer_beginRtu(struct mbm_sniffer *sniffer, uint8_t *buffer, uint16_t size);
-
-/**
- * Begins a sniffer for ASCII frames on a serial line.
- *
- * @param sniffer  see mbm_sniffer_beginRtu
- * @param buffer   see mbm_sniffer_beginRtu
- * @param size     see mbm_sniffer_beginRtu; MBM_MAX_ASCII_FRAME holds every frame
- * @return a status; see mbm_sniffer_beginRtu
- */
-uint8_t mbm_sniffer_beginAscii(struct mbm_sniffer *sniffer,
-                               uint8_t *buffer,
-                               uint16_t size);
-
-/**
- * Begins a sniffer for a TCP stream of frames with the MBAP header.
- *
- * @param sniffer  see mbm_sniffer_beginRtu
- * @param buffer   see mbm_sniffer_beginRtu
- * @param size     see mbm_sniffer_beginRtu; MBM_MAX_TCP_FRAME holds every frame
- * @return a status; see mbm_sniffer_beginRtu
- */
-uint8_t mbm_sniffer_beginTcp(struct mbm_sniffer *sniffer, uint8_t *buffer, uint16_t size);
-
-/**
- * Begins a sniffer for a TCP stream of RTU frames.
- *
- * @param sniffer  see mbm_sniffer_beginRtu
- * @param buffer   see mbm_sniffer_beginRtu
- * @param size     see mbm_sniffer_beginRtu; MBM_MAX_FRAME holds every frame
- * @return a status; see mbm_sniffer_beginRtu
- */
-uint8_t mbm_sniffer_beginRtuOverTcp(struct mbm_sniffer *sniffer,
-                                    uint8_t *buffer,
-                                    uint16_t size);
+uint8_t mbm_sniffer_begin(struct mbm_sniffer *sniffer,
+                          uint8_t framing,
+                          uint8_t *buffer,
+                          uint16_t size);
 
 /**
  * Declares functions that the standard does not define, in place of those declared

@@ -30,11 +30,10 @@ struct mbm_event;
  * A trace: stands between a port and the line, client or server that uses it, passes
  * everything on, and calls your hook for each frame that is sent or received.
  *
- * You provide the storage. Initialise it with MBM_INIT. Call mbm_trace_beginClient or
- * mbm_trace_beginServer, then begin the line, client or server with mbm_trace_port instead
- * of your port. The object must not move while its port is in use. A program that begins no
- * trace contains no part of it. Not re-entrant: use it from the thread of the object that
- * uses its port.
+ * You provide the storage. Initialise it with MBM_INIT. Call mbm_trace_begin, then begin the
+ * line, client or server with mbm_trace_port instead of your port. The object must not move
+ * while its port is in use. A program that begins no trace contains no part of it. Not
+ * re-entrant: use it from the thread of the object that uses its port.
  */
 typedef struct mbm_trace {
     /** Private. */
@@ -70,10 +69,10 @@ typedef struct mbm_traceRecord {
 } mbm_traceRecord;
 
 /**
- * Begins the trace of a line or client. Then begin that line or client with
+ * Begins the trace of a line, client or server. Then begin that line, client or server with
  * mbm_trace_port.
  *
- * The hook is called from within the functions of the node or client, when the last byte
+ * The hook is called from within the functions of the node, client or server, when the last byte
  * of a frame was sent or read. Bytes that are not followed by the rest of a frame are handed
  * out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a serial
  * line when the next frame is sent, when the link is lost, or by mbm_trace_flush. `record`
@@ -85,6 +84,8 @@ typedef struct mbm_traceRecord {
  * drops the bytes that it has not handed out, and its frame timeout is the default.
  *
  * @param trace    the object; initialised with MBM_INIT before the first call
+ * @param sends    what the object that will use the port sends: MBM_PACKET_REQUEST for a line or
+ *                 client, MBM_PACKET_RESPONSE for a server
  * @param port     is copied; its hooks read, write and micros are required. Its optional hooks
  *                 are passed on. It must not be the port of this trace, nor that of a trace
  *                 that passes everything on to this one
@@ -99,37 +100,16 @@ typedef struct mbm_traceRecord {
  * @param hook     is called for each frame
  * @param context  your pointer, passed to `hook`: for example the link or its name
  * @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for
- *         a framing that is not valid
+ *         a framing or `sends` that is not valid
  */
-uint8_t mbm_trace_beginClient(struct mbm_trace *trace,
-                              const struct mbm_port *port,
-                              const struct mbm_framing *framing,
-                              uint8_t *buffer,
-                              uint16_t size,
-                              void (*hook)(void *context,
-                                           const struct mbm_traceRecord *record),
-                              void *context);
-
-/**
- * Begins the trace of a server. Then begin that server with mbm_trace_port.
- *
- * @param trace    see mbm_trace_beginClient
- * @param port     see mbm_trace_beginClient
- * @param framing  see mbm_trace_beginClient
- * @param buffer   see mbm_trace_beginClient
- * @param size     see mbm_trace_beginClient
- * @param hook     see mbm_trace_beginClient
- * @param context  see mbm_trace_beginClient
- * @return a status; see mbm_trace_beginClient
- */
-uint8_t mbm_trace_beginServer(struct mbm_trace *trace,
-                              const struct mbm_port *port,
-                              const struct mbm_framing *framing,
-                              uint8_t *buffer,
-                              uint16_t size,
-                              void (*hook)(void *context,
-                                           const struct mbm_traceRecord *record),
-                              void *context);
+uint8_t mbm_trace_begin(struct mbm_trace *trace,
+                        uint8_t sends,
+                        const struct mbm_port *port,
+                        const struct mbm_framing *framing,
+                        uint8_t *buffer,
+                        uint16_t size,
+                        void (*hook)(void *context, const struct mbm_traceRecord *record),
+                        void *context);
 
 /**
  * Returns the port that passes everything on to the port of the trace. Pass it to the begin
@@ -140,17 +120,6 @@ uint8_t mbm_trace_beginServer(struct mbm_trace *trace,
  *         never begun, and from within its hook: the begin functions refuse it
  */
 const struct mbm_port *mbm_trace_port(struct mbm_trace *trace);
-
-/**
- * Returns your port, to which the trace passes everything on. Hooks and functions of a server
- * get the context of the server's port as their `connection`, which is the trace: the context
- * of your port is `mbm_trace_innerPort(access->connection)->context`.
- *
- * @param trace  the object
- * @return a copy of your port, valid for as long as the trace is used. NULL for a trace that
- *         was never begun, and from within its hook
- */
-const struct mbm_port *mbm_trace_innerPort(const struct mbm_trace *trace);
 
 /**
  * Sets how long the trace waits for the rest of an incomplete frame. At first it is 50 ms in

@@ -134,35 +134,6 @@ uint8_t mbm_bits_set(uint8_t *bytes,
                      uint8_t on);
 
 /**
- * As mbm_bits_pack, but into words, 16 bits in each word; for example the transmit words
- * of a node.
- *
- * @param coils     one byte for each coil: 0 is off, any other value is on
- * @param quantity  the number of coils, 0 to 65535
- * @param words     receives the bits, 16 in each word
- * @param length    the number of words that `words` can hold
- * @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
- */
-uint8_t mbm_bits_packWords(const uint8_t *coils,
-                           uint16_t quantity,
-                           uint16_t *words,
-                           uint16_t length);
-
-/**
- * As mbm_bits_unpack, but from words, for example the response words of a node.
- *
- * @param words     the bits, 16 in each word; the first coil is the lowest bit
- * @param length    the number of words
- * @param coils     receives one byte for each coil, 0 or 1
- * @param quantity  the number of coils, 0 to 65535
- * @return a status; MBM_ILLEGAL_DATA_ADDRESS if `words` has fewer bits than `quantity`
- */
-uint8_t mbm_bits_unpackWords(const uint16_t *words,
-                             uint16_t length,
-                             uint8_t *coils,
-                             uint16_t quantity);
-
-/**
  * As mbm_bits_isSet, but in words, for example the response words of a node.
  *
  * @param words     the bits of the read, 16 in each word; the first coil is the lowest bit

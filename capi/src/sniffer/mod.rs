@@ -35,9 +35,9 @@ const _: () = {
 /// A sniffer: finds the frames on a bus that others use, and pairs requests with replies.
 /// It never sends and has no port: you pass it the bytes that you receive.
 ///
-/// You provide the storage. Initialise it with MBM_INIT. Call one of the mbm_sniffer_begin
-/// functions first. Not re-entrant: use one object from one thread, and never from an
-/// interrupt; pass bytes from an interrupt through an mbm_ring.
+/// You provide the storage. Initialise it with MBM_INIT. Call mbm_sniffer_begin first. Not
+/// re-entrant: use one object from one thread, and never from an interrupt; pass bytes from an
+/// interrupt through an mbm_ring.
 #[repr(C)]
 pub struct mbm_sniffer {
     /// Private.
@@ -115,11 +115,32 @@ fn convert(functions: &[mbm_function]) -> Result<[Function; FUNCTIONS], Error> {
     Ok(converted)
 }
 
-/// Writes a new sniffer to the storage.
+/// Begins a sniffer for the frames on a serial line, or in a TCP stream.
 ///
-/// # Safety
-/// As the header requires for the begin functions.
-unsafe fn begin(sniffer: *mut mbm_sniffer, buffer: *mut u8, size: u16, framing: Framing) -> u8 {
+/// You may call it again at any time. The sniffer then discards received bytes and
+/// unanswered requests without an event, and its settings return to their defaults.
+///
+/// @param sniffer  the object; initialised with MBM_INIT before the first call
+/// @param framing  MBM_FRAMING_RTU or MBM_FRAMING_ASCII for a serial line, MBM_FRAMING_TCP or
+///                 MBM_FRAMING_RTU_OVER_TCP for a stream
+/// @param buffer   holds received bytes until the sniffer has reported them; must stay valid for
+///                 as long as the sniffer is used
+/// @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER. MBM_MAX_FRAME,
+///                 MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every frame; with separate
+///                 directions use twice as much. A longer frame becomes an event of kind
+///                 MBM_EVENT_NOISE
+/// @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for
+///         another framing
+#[no_mangle]
+pub unsafe extern "C" fn mbm_sniffer_begin(
+    sniffer: *mut mbm_sniffer,
+    framing: u8,
+    buffer: *mut u8,
+    size: u16,
+) -> u8 {
+    let Some(framing) = Framing::from_code(framing) else {
+        return Status::INVALID_ARGUMENT.code();
+    };
     if sniffer.is_null() || buffer.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
@@ -134,74 +155,7 @@ unsafe fn begin(sniffer: *mut mbm_sniffer, buffer: *mut u8, size: u16, framing: 
         functions: [NO_FUNCTION; FUNCTIONS],
         core: Sniffer::new(framing),
     };
-    // SAFETY: the storage of a sniffer is large enough for an object.
-    unsafe { put(sniffer.cast(), object) }
-}
-
-/// Begins a sniffer for RTU frames on a serial line.
-///
-/// You may call it again at any time. The sniffer then discards received bytes and
-/// unanswered requests without an event, and its settings return to their defaults.
-///
-/// @param sniffer  the object; initialised with MBM_INIT before the first call
-/// @param buffer   holds received bytes until the sniffer has reported them; must stay valid for
-///                 as long as the sniffer is used
-/// @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER. MBM_MAX_FRAME
-///                 holds every frame; with separate directions use twice as much. A longer frame
-///                 becomes an event of kind MBM_EVENT_NOISE
-/// @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small
-#[no_mangle]
-pub unsafe extern "C" fn mbm_sniffer_beginRtu(
-    sniffer: *mut mbm_sniffer,
-    buffer: *mut u8,
-    size: u16,
-) -> u8 {
-    begin(sniffer, buffer, size, Framing::Rtu)
-}
-
-/// Begins a sniffer for ASCII frames on a serial line.
-///
-/// @param sniffer  see mbm_sniffer_beginRtu
-/// @param buffer   see mbm_sniffer_beginRtu
-/// @param size     see mbm_sniffer_beginRtu; MBM_MAX_ASCII_FRAME holds every frame
-/// @return a status; see mbm_sniffer_beginRtu
-#[no_mangle]
-pub unsafe extern "C" fn mbm_sniffer_beginAscii(
-    sniffer: *mut mbm_sniffer,
-    buffer: *mut u8,
-    size: u16,
-) -> u8 {
-    begin(sniffer, buffer, size, Framing::Ascii)
-}
-
-/// Begins a sniffer for a TCP stream of frames with the MBAP header.
-///
-/// @param sniffer  see mbm_sniffer_beginRtu
-/// @param buffer   see mbm_sniffer_beginRtu
-/// @param size     see mbm_sniffer_beginRtu; MBM_MAX_TCP_FRAME holds every frame
-/// @return a status; see mbm_sniffer_beginRtu
-#[no_mangle]
-pub unsafe extern "C" fn mbm_sniffer_beginTcp(
-    sniffer: *mut mbm_sniffer,
-    buffer: *mut u8,
-    size: u16,
-) -> u8 {
-    begin(sniffer, buffer, size, Framing::Tcp)
-}
-
-/// Begins a sniffer for a TCP stream of RTU frames.
-///
-/// @param sniffer  see mbm_sniffer_beginRtu
-/// @param buffer   see mbm_sniffer_beginRtu
-/// @param size     see mbm_sniffer_beginRtu; MBM_MAX_FRAME holds every frame
-/// @return a status; see mbm_sniffer_beginRtu
-#[no_mangle]
-pub unsafe extern "C" fn mbm_sniffer_beginRtuOverTcp(
-    sniffer: *mut mbm_sniffer,
-    buffer: *mut u8,
-    size: u16,
-) -> u8 {
-    begin(sniffer, buffer, size, Framing::RtuOverTcp)
+    put(sniffer.cast(), object)
 }
 
 /// Declares functions that the standard does not define, in place of those declared

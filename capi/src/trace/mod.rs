@@ -7,6 +7,7 @@ pub use record::{mbm_traceRecord, mbm_trace_ofEvent, MBM_TRACE_RECEIVED, MBM_TRA
 use crate::framing::{is_delimiter, mbm_framing};
 use crate::functions::declared;
 use crate::node::mbm_node;
+use crate::packet::side;
 use crate::pointers::{
     array_or_empty, check, get, object, with, with_hooks, CObject, BEGUN, IN_HOOK,
 };
@@ -16,7 +17,6 @@ use core::ptr::null;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::{Error, Status};
 use mbm::frame::Framing;
-use mbm::packet::PduKind;
 use mbm::port::Port;
 use mbm::time::millis;
 use mbm::trace::{Trace, MIN_BUFFER};
@@ -30,11 +30,10 @@ const _: () = assert!(MBM_MIN_TRACE_BUFFER as usize == MIN_BUFFER);
 /// A trace: stands between a port and the line, client or server that uses it, passes
 /// everything on, and calls your hook for each frame that is sent or received.
 ///
-/// You provide the storage. Initialise it with MBM_INIT. Call mbm_trace_beginClient or
-/// mbm_trace_beginServer, then begin the line, client or server with mbm_trace_port instead
-/// of your port. The object must not move while its port is in use. A program that begins no
-/// trace contains no part of it. Not re-entrant: use it from the thread of the object that
-/// uses its port.
+/// You provide the storage. Initialise it with MBM_INIT. Call mbm_trace_begin, then begin the
+/// line, client or server with mbm_trace_port instead of your port. The object must not move
+/// while its port is in use. A program that begins no trace contains no part of it. Not
+/// re-entrant: use it from the thread of the object that uses its port.
 #[repr(C)]
 pub struct mbm_trace {
     /// Private.
@@ -200,14 +199,14 @@ unsafe extern "C" fn idle(context: *mut c_void, node: *mut mbm_node) {
     }
 }
 
-/// Begins a trace of an object that sends PDUs of the kind `sends`.
+/// Begins a trace; see [`mbm_trace_begin`].
 ///
 /// # Safety
 /// Each argument is as the header requires.
 #[allow(clippy::too_many_arguments)]
 unsafe fn begin(
     trace: *mut mbm_trace,
-    sends: PduKind,
+    sends: u8,
     port: *const mbm_port,
     framing: *const mbm_framing,
     buffer: *mut u8,
@@ -216,6 +215,7 @@ unsafe fn begin(
     context: *mut c_void,
 ) -> Result<(), Error> {
     let (described, kind) = described(framing)?;
+    let sends = side(sends)?;
     let port = get(port).filter(mbm_port::is_complete);
     let port = port.ok_or(Error::INVALID_ARGUMENT)?;
     // A trace that passes its own bytes on to itself would never end.
@@ -283,10 +283,10 @@ fn code(result: Result<(), Error>) -> u8 {
     Status::from(result).code()
 }
 
-/// Begins the trace of a line or client. Then begin that line or client with
+/// Begins the trace of a line, client or server. Then begin that line, client or server with
 /// mbm_trace_port.
 ///
-/// The hook is called from within the functions of the node or client, when the last byte
+/// The hook is called from within the functions of the node, client or server, when the last byte
 /// of a frame was sent or read. Bytes that are not followed by the rest of a frame are handed
 /// out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a serial
 /// line when the next frame is sent, when the link is lost, or by mbm_trace_flush. `record`
@@ -298,6 +298,8 @@ fn code(result: Result<(), Error>) -> u8 {
 /// drops the bytes that it has not handed out, and its frame timeout is the default.
 ///
 /// @param trace    the object; initialised with MBM_INIT before the first call
+/// @param sends    what the object that will use the port sends: MBM_PACKET_REQUEST for a line or
+///                 client, MBM_PACKET_RESPONSE for a server
 /// @param port     is copied; its hooks read, write and micros are required. Its optional hooks
 ///                 are passed on. It must not be the port of this trace, nor that of a trace
 ///                 that passes everything on to this one
@@ -312,10 +314,11 @@ fn code(result: Result<(), Error>) -> u8 {
 /// @param hook     is called for each frame
 /// @param context  your pointer, passed to `hook`: for example the link or its name
 /// @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for
-///         a framing that is not valid
+///         a framing or `sends` that is not valid
 #[no_mangle]
-pub unsafe extern "C" fn mbm_trace_beginClient(
+pub unsafe extern "C" fn mbm_trace_begin(
     trace: *mut mbm_trace,
+    sends: u8,
     port: *const mbm_port,
     framing: *const mbm_framing,
     buffer: *mut u8,
@@ -323,33 +326,6 @@ pub unsafe extern "C" fn mbm_trace_beginClient(
     hook: Option<unsafe extern "C" fn(context: *mut c_void, record: *const mbm_traceRecord)>,
     context: *mut c_void,
 ) -> u8 {
-    let sends = PduKind::Request;
-    code(begin(
-        trace, sends, port, framing, buffer, size, hook, context,
-    ))
-}
-
-/// Begins the trace of a server. Then begin that server with mbm_trace_port.
-///
-/// @param trace    see mbm_trace_beginClient
-/// @param port     see mbm_trace_beginClient
-/// @param framing  see mbm_trace_beginClient
-/// @param buffer   see mbm_trace_beginClient
-/// @param size     see mbm_trace_beginClient
-/// @param hook     see mbm_trace_beginClient
-/// @param context  see mbm_trace_beginClient
-/// @return a status; see mbm_trace_beginClient
-#[no_mangle]
-pub unsafe extern "C" fn mbm_trace_beginServer(
-    trace: *mut mbm_trace,
-    port: *const mbm_port,
-    framing: *const mbm_framing,
-    buffer: *mut u8,
-    size: u16,
-    hook: Option<unsafe extern "C" fn(context: *mut c_void, record: *const mbm_traceRecord)>,
-    context: *mut c_void,
-) -> u8 {
-    let sends = PduKind::Response;
     code(begin(
         trace, sends, port, framing, buffer, size, hook, context,
     ))
@@ -365,21 +341,6 @@ pub unsafe extern "C" fn mbm_trace_beginServer(
 pub unsafe extern "C" fn mbm_trace_port(trace: *mut mbm_trace) -> *const mbm_port {
     match check(trace) {
         Status::OK => &raw const (*trace.cast::<Object>()).outer,
-        _ => null(),
-    }
-}
-
-/// Returns your port, to which the trace passes everything on. Hooks and functions of a server
-/// get the context of the server's port as their `connection`, which is the trace: the context
-/// of your port is `mbm_trace_innerPort(access->connection)->context`.
-///
-/// @param trace  the object
-/// @return a copy of your port, valid for as long as the trace is used. NULL for a trace that
-///         was never begun, and from within its hook
-#[no_mangle]
-pub unsafe extern "C" fn mbm_trace_innerPort(trace: *const mbm_trace) -> *const mbm_port {
-    match check(trace) {
-        Status::OK => &raw const (*trace.cast::<Object>()).inner,
         _ => null(),
     }
 }

@@ -13,16 +13,10 @@ pub fn step(w: &World) {
         w.unset_bytes(quantity.into())
     };
     let null = w.rarely(32);
-    // The buffers for bytes and for words hold exactly `length` of them.
     let bytes = if null {
         null_mut()
     } else {
         w.unset_bytes(length.into())
-    };
-    let words: *mut u16 = if null {
-        null_mut()
-    } else {
-        w.unset_bytes(2 * usize::from(length)).cast()
     };
     let held = usize::from(quantity).div_ceil(8);
     let bits = if null {
@@ -40,15 +34,11 @@ pub fn step(w: &World) {
     } else {
         w.unset::<u8>()
     };
-    let choice = w.byte() % 8;
+    let choice = w.byte() % 6;
     let size = |null: bool, size: usize| if null { 0 } else { size };
     let spans = [
         (coils.cast_const(), size(coils.is_null(), quantity.into())),
         (bytes.cast_const(), size(null, length.into())),
-        (
-            words.cast_const().cast(),
-            size(null, 2 * usize::from(length)),
-        ),
         (bits.cast_const(), size(null, held)),
         span(on),
     ];
@@ -57,13 +47,7 @@ pub fn step(w: &World) {
         1 => call!(w, bytes, mbm_bits_unpack(bytes, length, coils, quantity)),
         2 => call!(w, bits, mbm_bits_isSet(bits, first, quantity, at, on)),
         3 => call!(w, bits, mbm_bits_set(bits, first, quantity, at, 1)),
-        4 => call!(w, words, mbm_bits_packWords(coils, quantity, words, length)),
-        5 => call!(
-            w,
-            words,
-            mbm_bits_unpackWords(words, length, coils, quantity)
-        ),
-        6 => call!(
+        4 => call!(
             w,
             more,
             mbm_bits_isSetInWords(more, first, quantity, at, on)

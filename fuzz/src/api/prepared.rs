@@ -6,7 +6,6 @@ use super::gateway;
 use super::plan;
 use super::ports;
 use super::records;
-use super::sniffer;
 use super::world::World;
 use mbm_c::*;
 
@@ -33,7 +32,8 @@ pub fn prepare(w: &World) {
     if what & 8 == 0 {
         let sniffer = w.sniffers.make(w);
         let buffer = w.buffer(300);
-        sniffer::begin_as(w, sniffer, what >> 4, buffer, 300);
+        let framing = what >> 4 & 3;
+        call!(w, sniffer, mbm_sniffer_begin(sniffer, framing, buffer, 300));
     }
 }
 

@@ -7,7 +7,8 @@ use mbm_c::*;
 use std::ptr::null;
 
 fn begin(w: &World, sniffer: *mut mbm_sniffer) {
-    let framing = w.byte();
+    let kind = w.byte();
+    let framing = if kind >= 0xF0 { kind } else { kind % 4 };
     let size = match w.byte() {
         0..0x80 => 260,
         byte @ 0x80..0xC0 => u16::from(byte) % 64,
@@ -15,28 +16,12 @@ fn begin(w: &World, sniffer: *mut mbm_sniffer) {
     };
     let buffer = w.buffer(size.into());
     refused_changes_nothing(w, &[span(sniffer)], "a sniffer that begins", || {
-        begin_as(w, sniffer, framing, buffer, size)
-    });
-}
-
-/// Begins a sniffer of the framing that a number chooses.
-pub fn begin_as(
-    w: &World,
-    sniffer: *mut mbm_sniffer,
-    framing: u8,
-    buffer: *mut u8,
-    size: u16,
-) -> u8 {
-    match framing % 4 {
-        MBM_FRAMING_RTU => call!(w, sniffer, mbm_sniffer_beginRtu(sniffer, buffer, size)),
-        MBM_FRAMING_ASCII => call!(w, sniffer, mbm_sniffer_beginAscii(sniffer, buffer, size)),
-        MBM_FRAMING_TCP => call!(w, sniffer, mbm_sniffer_beginTcp(sniffer, buffer, size)),
-        _ => call!(
+        call!(
             w,
             sniffer,
-            mbm_sniffer_beginRtuOverTcp(sniffer, buffer, size)
-        ),
-    }
+            mbm_sniffer_begin(sniffer, framing, buffer, size)
+        )
+    });
 }
 
 fn set(w: &World, sniffer: *mut mbm_sniffer) {

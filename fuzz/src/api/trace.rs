@@ -43,22 +43,15 @@ fn begin(w: &World, trace: *mut mbm_trace) {
         delimiter: if w.rarely(8) { w.byte() } else { 0 },
     });
     let take = (!w.rarely(64)).then_some(hook as unsafe extern "C" fn(_, _));
-    let is_server = w.byte() & 1 != 0;
+    let sends = w.byte();
+    let sends = if sends >= 0xF0 { sends } else { sends & 1 };
     refused_changes_nothing(w, &[span(trace)], "mbm_trace_begin", || {
         let context = null_mut();
-        if is_server {
-            call!(
-                w,
-                trace,
-                mbm_trace_beginServer(trace, port, framing, buffer, size, take, context)
-            )
-        } else {
-            call!(
-                w,
-                trace,
-                mbm_trace_beginClient(trace, port, framing, buffer, size, take, context)
-            )
-        }
+        call!(
+            w,
+            trace,
+            mbm_trace_begin(trace, sends, port, framing, buffer, size, take, context)
+        )
     });
 }
 
@@ -81,7 +74,6 @@ pub fn step(w: &World) {
             refused_changes_nothing(w, &[span(trace)], "mbm_trace_flush", || {
                 call!(w, trace, mbm_trace_flush(trace))
             });
-            call!(w, trace, mbm_trace_innerPort(trace));
         }
     }
     let event = w.events.any();

@@ -63,10 +63,13 @@ static void members() {
 
 static void coils() {
   const uint8_t each[10] = {1, 0, 1, 1, 0, 0, 1, 1, 1, 0};
-  uint16_t words[1];
+  uint16_t words[1] = {0};
   uint8_t on = 0;
 
-  CHECK(mbm_bits_packWords(each, 10, words, 1) == MBM_OK && words[0] == 0x01CD);
+  for (uint8_t i = 0; i < 10; i++) {
+    CHECK(mbm_bits_setInWords(words, 0, 10, i, each[i]) == MBM_OK);
+  }
+  CHECK(words[0] == 0x01CD);
   CHECK(mbm_bits_isSetInWords(words, 19, 10, 27, &on) == MBM_OK && on == 1);
   CHECK(mbm_bits_isSetInWords(words, 19, 10, 29, &on) == MBM_ILLEGAL_DATA_ADDRESS);
 }

@@ -16,7 +16,9 @@ impl Wire {
     pub fn reset(&self, life: &Life) {
         self.replies.borrow_mut().clear();
         self.partial.borrow_mut().clear();
-        call!(&life.w, self.ring, mbm_ring_clear(self.ring));
+        let left = call!(&life.w, self.ring, mbm_ring_available(self.ring));
+        let bytes = life.w.unset_bytes(left.into());
+        call!(&life.w, self.ring, mbm_ring_read(self.ring, bytes, left));
     }
 
     /// Microseconds until the device sends something.
