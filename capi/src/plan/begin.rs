@@ -104,8 +104,29 @@ unsafe fn begin(
     group: impl FnOnce(&mbm_planSetup, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
 ) -> u8 {
     let mut wrong = u16::MAX;
+    // SAFETY: as the caller promises; `field` is NULL or what the header says.
+    unsafe {
+        let status = attempt(plan, client, setup, is_usable, group, &mut wrong);
+        pointers::put(field, wrong);
+        status.code()
+    }
+}
+
+/// As [`begin`]; writes the index of the field that is wrong, if it is one.
+///
+/// # Safety
+/// As [`begin`] demands.
+#[inline(always)]
+unsafe fn attempt(
+    plan: *mut mbm_plan,
+    client: *mut mbm_client,
+    setup: *const mbm_planSetup,
+    is_usable: bool,
+    group: impl FnOnce(&mbm_planSetup, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
+    wrong: &mut u16,
+) -> Status {
     // SAFETY: as the caller promises. Nothing uses the storage of a plan that is not begun.
-    let attempt = || unsafe {
+    unsafe {
         if plan.is_null() {
             return Status::INVALID_ARGUMENT;
         }
@@ -128,7 +149,7 @@ unsafe fn begin(
         let count = match group(given, positions, reads) {
             Ok(count) => count as u16,
             Err(refusal) => {
-                wrong = refusal.field as u16;
+                *wrong = refusal.field as u16;
                 return refusal.status;
             }
         };
@@ -146,12 +167,6 @@ unsafe fn begin(
         (*object).mark = pointers::BEGUN;
         schedule::start((*object).reads(), 0);
         Status::OK
-    };
-    // SAFETY: `field` is NULL or what the header says.
-    unsafe {
-        let status = attempt();
-        pointers::put(field, wrong);
-        status.code()
     }
 }
 
