@@ -147,6 +147,19 @@ fn no_field_and_too_many_fields_are_refused() {
     refused(Status::INVALID_ARGUMENT, usize::MAX, &fields, &LIMITS);
 }
 
+#[test]
+fn too_many_grouped_fields_are_refused_as_too_many_fields_are() {
+    let counts = [1; MAX_FIELDS + 1];
+    let fields = vec![field(0); counts.len()];
+    let take = |count| taken(&fields[..count], &counts[..count], count, u16::MAX);
+    let too_many = Refusal {
+        status: Status::INVALID_ARGUMENT,
+        field: usize::MAX,
+    };
+    assert_eq!(take(MAX_FIELDS), Ok(MAX_FIELDS));
+    assert_eq!(take(MAX_FIELDS + 1), Err(too_many));
+}
+
 /// Takes groups of fields, with the storage for `reads` reads and `words` words.
 fn taken(fields: &[Field], counts: &[u16], reads: usize, words: u16) -> Result<usize, Refusal> {
     let mut positions = vec![Position::NONE; fields.len()];

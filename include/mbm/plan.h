@@ -267,8 +267,8 @@ uint8_t mbm_plan_begin(struct mbm_plan *plan,
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
  * @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not fit into its read:
  *         it differs from the first one in unit, table or interval, has a lower address, or makes
- *         the read longer than 125 registers or 2000 bits; and for counts of 0 or with another
- *         total
+ *         the read longer than 125 registers or 2000 bits; for counts of 0 or with another
+ *         total; and for more fields than MBM_PLAN_MAX_FIELDS
  */
 uint8_t mbm_plan_beginGrouped(struct mbm_plan *plan,
                               struct mbm_client *client,

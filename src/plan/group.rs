@@ -72,7 +72,8 @@ pub fn group<L: ReadLimits>(
 /// Those of a field by itself and [`Status::BUFFER_TOO_SMALL`] as [`group`].
 /// [`Status::INVALID_ARGUMENT`] also for a field that does not fit into its read: it differs from
 /// the first one in unit, table or interval, has a lower address, or makes the read too long; without
-/// a field at fault if a count is 0 or the counts do not add up to the fields.
+/// a field at fault for more than [`MAX_FIELDS`], if a count is 0, or if the counts do not add up to
+/// the fields.
 /// [`Status::BUFFER_TOO_SMALL`] without a field at fault for fewer `reads` than counts.
 pub fn take_groups(
     fields: &[Field],
@@ -82,6 +83,9 @@ pub fn take_groups(
     words: u16,
 ) -> Result<usize, Refusal> {
     let refused = |status, field: usize| Err(Refusal { status, field });
+    if fields.len() > MAX_FIELDS {
+        return refused(Status::INVALID_ARGUMENT, usize::MAX);
+    }
     let Some(reads) = reads.get_mut(..counts.len()) else {
         return refused(Status::BUFFER_TOO_SMALL, usize::MAX);
     };

@@ -72,8 +72,8 @@ pub unsafe extern "C" fn mbm_plan_begin(
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
 /// @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not fit into its read:
 ///         it differs from the first one in unit, table or interval, has a lower address, or makes
-///         the read longer than 125 registers or 2000 bits; and for counts of 0 or with another
-///         total
+///         the read longer than 125 registers or 2000 bits; for counts of 0 or with another
+///         total; and for more fields than MBM_PLAN_MAX_FIELDS
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_beginGrouped(
     plan: *mut mbm_plan,
