@@ -224,8 +224,9 @@ static void join_path(const char *of, const char *path, char full[2 * LONGEST_VA
                  path);
 }
 
-static int read_line(yaml_file *file, const yaml_node_t *node, bridge_setup *into)
+static int read_line(yaml_file *file, const yaml_node_t *node, void *setup)
 {
+    bridge_setup *into = (bridge_setup *)setup;
     yaml_node_t *values[LINE_KEYS] = {NULL};
     const char *text, *path, *topic = NULL, *wrong;
     char full[2 * LONGEST_VALUE];
@@ -249,12 +250,11 @@ static int read_line(yaml_file *file, const yaml_node_t *node, bridge_setup *int
     return wrong ? yaml_file_refuse(file, node, "%s", wrong) : 1;
 }
 
-static int read_root(yaml_file *file, const yaml_node_t *root, bridge_setup *into)
+static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
 {
+    bridge_setup *into = (bridge_setup *)setup;
     yaml_node_t *values[BRIDGE_KEYS] = {NULL};
-    const yaml_node_item_t *item;
     const char *text, *wrong;
-    size_t count;
     int setting;
 
     if (!yaml_file_keys(file, "the file", root, bridge_names, values))
@@ -274,25 +274,12 @@ static int read_root(yaml_file *file, const yaml_node_t *root, bridge_setup *int
         return yaml_file_refuse(file, root, "%s", wrong);
     if (!values[BRIDGE_THE_LINES])
         return yaml_file_refuse(file, root, "the file has no key lines");
-    item = yaml_file_list(file, "lines", values[BRIDGE_THE_LINES], BRIDGE_LINES, &count);
-    if (!item)
-        return 0;
-    for (; count > 0; count--, item++)
-        if (!read_line(file, yaml_document_get_node(&file->document, *item), into))
-            return 0;
-    return 1;
+    return yaml_file_list(file, "lines", values[BRIDGE_THE_LINES], BRIDGE_LINES, read_line, into);
 }
 
 int bridge_file_read(bridge_setup *into, const char *path)
 {
-    static yaml_file file;
-    const yaml_node_t *root = yaml_file_open(&file, path);
-
-    if (root)
-        (void)read_root(&file, root, into);
-    yaml_file_close(&file);
-    memcpy(into->wrong, file.wrong, sizeof into->wrong);
-    return file.code;
+    return yaml_file_read(path, read_root, into, into->wrong);
 }
 
 /* --- memory --- */

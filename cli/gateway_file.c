@@ -126,8 +126,9 @@ static int read_pace(yaml_file *file, yaml_node_t *const *values, gateway_pace *
            yaml_file_number(file, "in_flight", values[2], 1, MBM_CLIENT_DEPTH, &pace->in_flight);
 }
 
-static int read_line(yaml_file *file, const yaml_node_t *node, gateway_setup *into)
+static int read_line(yaml_file *file, const yaml_node_t *node, void *setup)
 {
+    gateway_setup *into = (gateway_setup *)setup;
     yaml_node_t *values[LINE_KEYS] = {NULL};
     const char *text, *wrong;
 
@@ -153,12 +154,11 @@ static int read_line(yaml_file *file, const yaml_node_t *node, gateway_setup *in
     return read_pace(file, &values[LINE_TIMEOUT], &into->lines[into->line_count - 1].pace);
 }
 
-static int read_root(yaml_file *file, const yaml_node_t *root, gateway_setup *into)
+static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
 {
+    gateway_setup *into = (gateway_setup *)setup;
     yaml_node_t *values[GATEWAY_KEYS] = {NULL};
-    const yaml_node_item_t *item;
     const char *text, *wrong;
-    size_t count;
 
     if (!yaml_file_keys(file, "the file", root, GATEWAY_NAMES, values))
         return 0;
@@ -179,25 +179,12 @@ static int read_root(yaml_file *file, const yaml_node_t *root, gateway_setup *in
         !yaml_file_time(file, "queue_time", values[QUEUE_TIME], 0, UINT16_MAX, &into->queueMs) ||
         !read_pace(file, &values[TIMEOUT], &into->pace))
         return 0;
-    item = yaml_file_list(file, "lines", values[THE_LINES], GATEWAY_LINES, &count);
-    if (!item)
-        return 0;
-    for (; count > 0; count--, item++)
-        if (!read_line(file, yaml_document_get_node(&file->document, *item), into))
-            return 0;
-    return 1;
+    return yaml_file_list(file, "lines", values[THE_LINES], GATEWAY_LINES, read_line, into);
 }
 
 int gateway_file_read(gateway_setup *into, const char *path)
 {
-    static yaml_file file;
-    const yaml_node_t *root = yaml_file_open(&file, path);
-
-    if (root)
-        (void)read_root(&file, root, into);
-    yaml_file_close(&file);
-    memcpy(into->wrong, file.wrong, sizeof into->wrong);
-    return file.code;
+    return yaml_file_read(path, read_root, into, into->wrong);
 }
 
 void gateway_setup_free(gateway_setup *setup)

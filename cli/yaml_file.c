@@ -95,7 +95,8 @@ static void read_document(yaml_file *file, yaml_parser_t *parser, FILE *from)
     yaml_document_delete(&second);
 }
 
-yaml_node_t *yaml_file_open(yaml_file *file, const char *path)
+/* Reads a file. Returns its root, or NULL after a refusal. */
+static yaml_node_t *open_file(yaml_file *file, const char *path)
 {
     yaml_parser_t parser;
     yaml_node_t *root;
@@ -120,10 +121,17 @@ yaml_node_t *yaml_file_open(yaml_file *file, const char *path)
     return root;
 }
 
-void yaml_file_close(yaml_file *file)
+int yaml_file_read(const char *path, yaml_file_reader read, void *into,
+                   char wrong[YAML_FILE_WRONG_BYTES])
 {
-    yaml_document_delete(&file->document);
-    memset(&file->document, 0, sizeof file->document);
+    static yaml_file file;
+    const yaml_node_t *root = open_file(&file, path);
+
+    if (root)
+        (void)read(&file, root, into);
+    yaml_document_delete(&file.document);
+    memcpy(wrong, file.wrong, sizeof file.wrong);
+    return file.code;
 }
 
 const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *node, size_t most)
@@ -202,17 +210,21 @@ int yaml_file_keys(yaml_file *file, const char *what, const yaml_node_t *mapping
     return 1;
 }
 
-const yaml_node_item_t *yaml_file_list(yaml_file *file, const char *key, const yaml_node_t *node,
-                                       size_t most, size_t *count)
+int yaml_file_list(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
+                   yaml_file_reader read, void *into)
 {
+    const yaml_node_item_t *item;
+    size_t count;
+
     if (node->type != YAML_SEQUENCE_NODE)
-        return yaml_file_refuse(file, node, "%s must be a list: each item begins with \"-\"", key),
-               NULL;
-    *count = (size_t)(node->data.sequence.items.top - node->data.sequence.items.start);
-    if (*count == 0)
-        return yaml_file_refuse(file, node, "%s is empty", key), NULL;
-    if (*count > most)
-        return yaml_file_refuse(file, node, "%s has %zu items: %zu are allowed", key, *count, most),
-               NULL;
-    return node->data.sequence.items.start;
+        return yaml_file_refuse(file, node, "%s must be a list: each item begins with \"-\"", key);
+    count = (size_t)(node->data.sequence.items.top - node->data.sequence.items.start);
+    if (count == 0)
+        return yaml_file_refuse(file, node, "%s is empty", key);
+    if (count > most)
+        return yaml_file_refuse(file, node, "%s has %zu items: %zu are allowed", key, count, most);
+    for (item = node->data.sequence.items.start; item < node->data.sequence.items.top; item++)
+        if (!read(file, yaml_document_get_node(&file->document, *item), into))
+            return 0;
+    return 1;
 }

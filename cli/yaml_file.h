@@ -17,10 +17,13 @@ typedef struct yaml_file {
     char wrong[YAML_FILE_WRONG_BYTES]; /* a sentence without its full stop: "FILE:12: ..." */
 } yaml_file;
 
-/* Reads a file, which must be one mapping. Returns its root, or NULL after a refusal. Close it in
- * both cases. */
-yaml_node_t *yaml_file_open(yaml_file *file, const char *path);
-void yaml_file_close(yaml_file *file);
+/* Reads a part of a file into `into`. Returns 0 after a refusal. */
+typedef int (*yaml_file_reader)(yaml_file *file, const yaml_node_t *node, void *into);
+
+/* Reads a file into `into`: `read` gets its root. Returns CODE_DONE; CODE_SYSTEM or CODE_WRONG with
+ * what is wrong. */
+int yaml_file_read(const char *path, yaml_file_reader read, void *into,
+                   char wrong[YAML_FILE_WRONG_BYTES]);
 
 /* Notes what is wrong, if it is the first. `node` says the line; NULL for none. Returns 0. */
 int yaml_file_refuse(yaml_file *file, const yaml_node_t *node, const char *format, ...)
@@ -39,8 +42,8 @@ int yaml_file_number(yaml_file *file, const char *key, const yaml_node_t *node, 
 int yaml_file_time(yaml_file *file, const char *key, const yaml_node_t *node, uint32_t least,
                    uint32_t most, uint32_t *value);
 
-/* The items of a list of 1 to `most`: sets `count`. Returns the first, or NULL after a refusal. */
-const yaml_node_item_t *yaml_file_list(yaml_file *file, const char *key, const yaml_node_t *node,
-                                       size_t most, size_t *count);
+/* Reads each item of a list of 1 to `most`. Returns 0 after a refusal. */
+int yaml_file_list(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
+                   yaml_file_reader read, void *into);
 
 #endif
