@@ -4,6 +4,7 @@
 #include "await.h"
 #include "descriptors.h"
 #include "fails.h"
+#include "loop_until.h"
 #include "mbm_loop.h"
 #include "server.h"
 #include "tcp_peer.h"
@@ -75,13 +76,6 @@ static int end(void **state)
     alarm(0);
     return 0;
 }
-
-/* Waits until a condition holds. */
-#define UNTIL(condition)                                                                           \
-    do {                                                                                           \
-        while (!(condition))                                                                       \
-            assert_true(mbm_loop_wait(&loop, MBM_LOOP_FOREVER) >= 0);                              \
-    } while (0)
 
 static void start_peers(unsigned count)
 {
@@ -169,7 +163,7 @@ static void many_clients_are_served_by_one_wait(void **state)
     (void)state;
     start_peers(PEERS);
     begin_devices(CLIENTS, REQUESTS);
-    UNTIL(all_are_right(CLIENTS, REQUESTS));
+    UNTIL(&loop, all_are_right(CLIENTS, REQUESTS));
     for (i = 0; i < CLIENTS; i++) {
         assert_int_equal(devices[i].right, REQUESTS);
         assert_int_equal(devices[i].failed, 0);
@@ -191,7 +185,7 @@ static void a_client_that_gets_no_answer_ends_while_others_are_busy(void **state
     silent->request.timeoutMs = 0;
     OK(mbm_client_setResponseTimeout(&silent->client, 150));
     from = mbm_tcp_port(&silent->tcp).micros(&silent->tcp);
-    UNTIL(silent->failed == 1);
+    UNTIL(&loop, silent->failed == 1);
     IS(MBM_RESPONSE_TIMED_OUT, silent->request.status);
     assert_true(mbm_tcp_port(&silent->tcp).micros(&silent->tcp) - from >= 150 * MS);
     assert_true(devices[0].right > 0 && devices[0].failed == 0);
@@ -205,24 +199,24 @@ static void a_link_that_is_lost_is_opened_and_waited_for_again(void **state)
     (void)state;
     start_peers(1);
     begin_devices(4, 5);
-    UNTIL(all_are_right(4, 5));
+    UNTIL(&loop, all_are_right(4, 5));
     for (round = 2; round <= 4; round++) {
         if (round % 2 == 0) {
             tcp_peer_hang_up(peers[0]);
         } else {
             tcp_peer_halt(peers[0]);
-            UNTIL(devices[0].counters.failed > 2 && devices[3].counters.failed > 2);
+            UNTIL(&loop, devices[0].counters.failed > 2 && devices[3].counters.failed > 2);
             assert_int_equal(tcp_peer_start(peers[0], ports[0]), ports[0]);
         }
         for (i = 0; i < 4; i++)
-            UNTIL(devices[i].counters.connected >= round);
+            UNTIL(&loop, devices[i].counters.connected >= round);
         for (i = 0; i < 4; i++) {
             devices[i].right = devices[i].failed = 0;
             devices[i].left = 5;
             ask(&devices[i]);
             mbm_loop_wake(&devices[i].entry);
         }
-        UNTIL(all_are_right(4, 5));
+        UNTIL(&loop, all_are_right(4, 5));
     }
     for (i = 0; i < 4; i++)
         assert_true(devices[i].counters.lost >= 3);
@@ -233,13 +227,13 @@ static void a_request_that_is_queued_outside_needs_a_wake(void **state)
     (void)state;
     start_peers(1);
     begin_devices(1, 0);
-    UNTIL(devices[0].counters.connected == 1);
+    UNTIL(&loop, devices[0].counters.connected == 1);
     devices[0].left = 2;
     ask(&devices[0]);
     mbm_loop_wake(&devices[0].entry);
     mbm_loop_wake(&devices[0].entry);
     assert_int_equal(mbm_loop_pollDelay(&loop), 0);
-    UNTIL(devices[0].right == 2);
+    UNTIL(&loop, devices[0].right == 2);
 }
 
 static void without_a_descriptor_links_wait_and_connect_later(void **state)
@@ -261,7 +255,7 @@ static void without_a_descriptor_links_wait_and_connect_later(void **state)
     assert_true(devices[3].counters.failed > 0);
     assert_int_equal(devices[3].tcp.error, EMFILE);
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
-    UNTIL(all_are_right(4, 5));
+    UNTIL(&loop, all_are_right(4, 5));
 }
 
 /* --- entries that come and go --- */

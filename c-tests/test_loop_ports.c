@@ -4,6 +4,7 @@
 #include "await.h"
 #include "descriptors.h"
 #include "fails.h"
+#include "loop_until.h"
 #include "mbm_loop.h"
 #include "server.h"
 #include "tcp_peer.h"
@@ -75,12 +76,6 @@ static int end(void **state)
     alarm(0);
     return 0;
 }
-
-#define UNTIL(condition)                                                                           \
-    do {                                                                                           \
-        while (!(condition))                                                                       \
-            assert_true(mbm_loop_wait(&loop, MBM_LOOP_FOREVER) >= 0);                              \
-    } while (0)
 
 static uint32_t poll_client(mbm_loop_entry *entry)
 {
@@ -172,7 +167,7 @@ static void a_serial_line_takes_part_beside_tcp(void **state)
     prepare(&by_line, 20);
     assert_int_equal(mbm_loop_addTty(&loop, &by_line.entry, &tty), 0);
     begin_tcp(tcp_peer_start(peer, 0), 100);
-    UNTIL(by_line.right == 20 && by_tcp.right == 100);
+    UNTIL(&loop, by_line.right == 20 && by_tcp.right == 100);
     for (i = 0; i < WORDS; i++) {
         assert_int_equal(by_line.words[i], server_pattern(i));
         assert_int_equal(by_tcp.words[i], tcp_peer_word(i));
@@ -224,7 +219,7 @@ static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
     to.sin_port = htons(udp_server.port);
     to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     assert_int_equal(sendto(sender, "x", 1, 0, (struct sockaddr *)&to, sizeof to), 1);
-    UNTIL(line_polls == 2 && udp_polls == 2 && stream_polls == 2);
+    UNTIL(&loop, line_polls == 2 && udp_polls == 2 && stream_polls == 2);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     /* Once the program has used the port, and polled the entry, the rest is reported. */
@@ -232,12 +227,12 @@ static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
     assert_int_equal(datagrams.read(datagrams.context, bytes, 2), 0);
     mbm_loop_wake(&line);
     mbm_loop_wake(&udp);
-    UNTIL(line_polls == 4);
+    UNTIL(&loop, line_polls == 4);
     assert_int_equal(udp_polls, 3);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     assert_int_equal(stream_polls, 2);
     assert_int_equal(sockets.read(sockets.context, bytes, 2), 2);
-    UNTIL(stream_polls == 3);
+    UNTIL(&loop, stream_polls == 3);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     mbm_loop_remove(&stream);
     close(pair[1]);
@@ -349,16 +344,16 @@ static void servers_and_clients_share_a_loop(void **state)
     (void)state;
     begin_to_listen();
     begin_tcp(listener.port, 50);
-    UNTIL(by_tcp.right == 50);
+    UNTIL(&loop, by_tcp.right == 50);
     assert_memory_equal(by_tcp.words, words, sizeof words);
     assert_int_equal(places_in_use(), 1);
     /* The client goes: its place is free. */
     mbm_loop_remove(&by_tcp.entry);
     mbm_tcp_close(&tcp);
-    UNTIL(places_in_use() == 0);
+    UNTIL(&loop, places_in_use() == 0);
     assert_int_equal(loop.count, 1);
     begin_tcp(listener.port, 0);
-    UNTIL(by_tcp.counters.connected == 2 && places_in_use() == 1);
+    UNTIL(&loop, by_tcp.counters.connected == 2 && places_in_use() == 1);
     end_listening();
 }
 
@@ -369,9 +364,9 @@ static void bytes_that_are_no_modbus_end_the_connection_of_a_server(void **state
     (void)state;
     begin_to_listen();
     peer = tcp_connect(listener.port);
-    UNTIL(places_in_use() == 1);
+    UNTIL(&loop, places_in_use() == 1);
     assert_int_equal(write(peer, "GET / HTTP/1.1\r\n\r\n", 18), 18);
-    UNTIL(places_in_use() == 0);
+    UNTIL(&loop, places_in_use() == 0);
     close(peer);
     end_listening();
 }
@@ -385,7 +380,7 @@ static void without_a_descriptor_connections_wait_and_are_accepted_later(void **
     SKIP_WITHOUT_LIMITS();
     begin_to_listen();
     peers[0] = tcp_connect(listener.port);
-    UNTIL(places_in_use() == 1);
+    UNTIL(&loop, places_in_use() == 1);
     for (i = 1; i < 3; i++)
         peers[i] = tcp_connect(listener.port);
     /* The spare descriptor is gone too, so the connections cannot even be closed. */
@@ -399,10 +394,10 @@ static void without_a_descriptor_connections_wait_and_are_accepted_later(void **
     assert_int_equal(places_in_use(), 1);
     assert_int_equal(listener.refused, 0);
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
-    UNTIL(places_in_use() == 3);
+    UNTIL(&loop, places_in_use() == 3);
     for (i = 0; i < 3; i++)
         close(peers[i]);
-    UNTIL(places_in_use() == 0);
+    UNTIL(&loop, places_in_use() == 0);
     close(next);
     end_listening();
 }
@@ -438,7 +433,7 @@ static void a_server_on_a_serial_line_takes_part(void **state)
     begin_unit();
     begin_far_end();
     begin_line(line.path, 20);
-    UNTIL(by_line.right == 20);
+    UNTIL(&loop, by_line.right == 20);
     assert_memory_equal(by_line.words, words, sizeof words);
     end_far_end();
 }
@@ -456,19 +451,19 @@ static void a_terminal_that_comes_back_is_waited_for_again(void **state)
     snprintf(path, sizeof path, "%s/tty", folder);
     begin_line(path, 0);
     for (round = 1; round <= 3; round++) {
-        UNTIL(by_line.counters.failed >= 2 * round);
+        UNTIL(&loop, by_line.counters.failed >= 2 * round);
         begin_far_end();
         assert_int_equal(symlink(line.path, path), 0);
-        UNTIL(by_line.counters.connected == round);
+        UNTIL(&loop, by_line.counters.connected == round);
         assert_int_equal(by_line.entry.fd, tty.fd);
         by_line.left = 3;
         by_line.right = 0;
         ask(&by_line);
         mbm_loop_wake(&by_line.entry);
-        UNTIL(by_line.right == 3);
+        UNTIL(&loop, by_line.right == 3);
         unlink(path);
         end_far_end();
-        UNTIL(by_line.counters.lost == round);
+        UNTIL(&loop, by_line.counters.lost == round);
         taken[round - 1] = dup(0);
     }
     for (round = 0; round < 3; round++)
@@ -496,7 +491,7 @@ static void a_client_and_a_server_over_udp_take_part(void **state)
                            by_udp.outgoing, sizeof by_udp.outgoing));
     prepare(&by_udp, 50);
     assert_int_equal(mbm_loop_addUdp(&loop, &by_udp.entry, &udp_client), 0);
-    UNTIL(by_udp.right == 50);
+    UNTIL(&loop, by_udp.right == 50);
     assert_memory_equal(by_udp.words, words, sizeof words);
     /* No poll more than the requests need: one to begin, one for each reply. */
     assert_in_range(by_udp.polls, 50, 60);
