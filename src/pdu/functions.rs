@@ -220,8 +220,6 @@ pub const fn coil_value(on: bool) -> u16 {
 #[repr(transparent)]
 pub struct FunctionSpec(pub(super) u32);
 
-/// A byte count stands between the head and the data.
-pub(super) const COUNTED: u32 = 1 << 8;
 /// The data to send are words.
 pub(super) const SENDS_WORDS: u32 = 1 << 9;
 /// The data received are words.
@@ -372,10 +370,10 @@ impl FunctionSpec {
     pub const GET_COMM_EVENT_LOG: FunctionSpec = FunctionSpec::bare(GET_COMM_EVENT_LOG, 0, 2);
     /// 0F: address and quantity.
     pub const WRITE_MULTIPLE_COILS: FunctionSpec =
-        FunctionSpec::echoed(WRITE_MULTIPLE_COILS, RANGE | BITS | COUNTED);
+        FunctionSpec::echoed(WRITE_MULTIPLE_COILS, RANGE | BITS);
     /// 10: address and quantity.
     pub const WRITE_MULTIPLE_REGISTERS: FunctionSpec =
-        FunctionSpec::echoed(WRITE_MULTIPLE_REGISTERS, RANGE | COUNTED | SENDS_WORDS);
+        FunctionSpec::echoed(WRITE_MULTIPLE_REGISTERS, RANGE | SENDS_WORDS);
     /// 11. Its response may be longer than its byte count says.
     pub const REPORT_SERVER_ID: FunctionSpec = FunctionSpec::new(REPORT_SERVER_ID, OWN, 1, 0, 0, 2);
     /// 16: address and AND mask; the OR mask is added later.
@@ -386,9 +384,8 @@ impl FunctionSpec {
         FunctionSpec::new(READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
 
     /// 17: address and quantity to read; the range to write is added later.
-    pub const READ_WRITE_REGISTERS: FunctionSpec = FunctionSpec(
-        FunctionSpec::registers(READ_WRITE_MULTIPLE_REGISTERS).0 | COUNTED | SENDS_WORDS,
-    );
+    pub const READ_WRITE_REGISTERS: FunctionSpec =
+        FunctionSpec(FunctionSpec::registers(READ_WRITE_MULTIPLE_REGISTERS).0 | SENDS_WORDS);
 
     /// 08: a sub-function; the data are added later.
     pub const DIAGNOSTICS: FunctionSpec =
@@ -407,16 +404,10 @@ impl FunctionSpec {
     );
     /// 14: the caller supplies the groups.
     pub const READ_FILE_RECORDS: FunctionSpec =
-        FunctionSpec::new(READ_FILE_RECORD, COUNTS | GROUPS | COUNTED, 1, 1, 0, 2);
+        FunctionSpec::new(READ_FILE_RECORD, COUNTS | GROUPS, 1, 1, 0, 2);
     /// 15: the caller supplies the groups.
-    pub const WRITE_FILE_RECORDS: FunctionSpec = FunctionSpec::new(
-        WRITE_FILE_RECORD,
-        FIXED | COUNTED | REPEATS_DATA,
-        1,
-        0,
-        1,
-        0,
-    );
+    pub const WRITE_FILE_RECORDS: FunctionSpec =
+        FunctionSpec::new(WRITE_FILE_RECORD, FIXED | REPEATS_DATA, 1, 0, 1, 0);
     /// 2B: the MEI type; the data are added later.
     pub const ENCAPSULATED: FunctionSpec =
         FunctionSpec::new(ENCAPSULATED_INTERFACE_TRANSPORT, OWN, 2, 0, 2, 2);

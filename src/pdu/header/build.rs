@@ -4,7 +4,7 @@ use super::super::custom::Rule;
 use super::super::diagnostics::sub_function;
 use super::super::fields::check_range;
 use super::super::functions::{
-    FunctionSpec, BITS, BROADCAST, COUNTS, FIXED, HEAD_LENGTH, LENGTH, OWN, RANGE, READ, REPEATED,
+    FunctionSpec, BITS, BROADCAST, COUNTS, FIXED, HEAD_LENGTH, LENGTH, OWN, RANGE, READ,
     REPEATS_DATA, UNANSWERED,
 };
 use super::super::identification::MEI_READ_DEVICE_IDENTIFICATION;
@@ -13,12 +13,15 @@ use super::super::limits::{
     MAX_RECORD, MAX_WRITE_BITS, MAX_WRITE_REGISTERS, READ_FILE_BYTES, WRITE_FILE_BYTES,
 };
 use super::super::{files, EXCEPTION};
-use super::{RequestHeader, HEAD};
+use super::RequestHeader;
 use crate::error::Status;
 
 /// The first word of a group of records: the byte count, which is set later, and the
 /// reference type.
 pub const GROUP: usize = files::REFERENCE_TYPE as usize;
+
+/// Bytes of the four words and the function code.
+const FOUR_WORDS: u8 = 9;
 
 // `add_…` and `follow` are functions of their own because all functions of the C API call
 // `set` in one common place first, which is smaller.
@@ -43,7 +46,6 @@ impl RequestHeader {
         }
         self.head_length = spec.number(HEAD_LENGTH);
         self.length = spec.number(LENGTH);
-        self.repeated = spec.number(REPEATED);
         self.data_length = 0;
         self.more = 0;
         if !spec.has(RANGE) {
@@ -58,10 +60,20 @@ impl RequestHeader {
             self.length = (bytes as u8).wrapping_add(2);
             read
         } else {
-            self.data_length = bytes as u8;
+            self.count(bytes as u8);
             write
         };
         check_range(first, second, most)
+    }
+
+    /// Ends the head with the byte count of the data.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn count(&mut self, bytes: u8) {
+        self.data_length = bytes;
+        if let Some(count) = self.head.get_mut(usize::from(self.head_length)) {
+            *count = bytes;
+        }
+        self.head_length += 1;
     }
 
     /// 16 (hex): the register becomes `(register & and_mask) | (or_mask & !and_mask)`.
@@ -91,8 +103,8 @@ impl RequestHeader {
     /// Adds the range that 17 (hex) writes, after [`RequestHeader::set_all`].
     #[inline(always)]
     pub fn add_write(&mut self, address: u16, quantity: u16) -> Status {
-        self.head_length = HEAD as u8;
-        self.data_length = (quantity << 1) as u8;
+        self.head_length = FOUR_WORDS;
+        self.count((quantity << 1) as u8);
         check_range(address, quantity, MAX_READ_WRITE_REGISTERS)
     }
 
@@ -124,10 +136,10 @@ impl RequestHeader {
     /// [`RequestHeader::set_all`].
     pub fn add_group(&mut self, file: u16, record: u16, length: u16) -> Status {
         let bytes = (length << 1) as u8;
-        self.head_length = HEAD as u8;
+        self.head_length = FOUR_WORDS;
         let (count, most) = if self.spec.has(REPEATS_DATA) {
             self.data_length = bytes;
-            self.length = bytes.wrapping_add(HEAD as u8);
+            self.length = bytes.wrapping_add(FOUR_WORDS);
             (bytes.wrapping_add(7), (WRITE_FILE_BYTES.1 - 7) / 2)
         } else {
             self.length = bytes.wrapping_add(4);
@@ -165,7 +177,7 @@ impl RequestHeader {
     /// 14 (hex) with several groups: the caller supplies the groups as `bytes` bytes of data.
     pub fn read_file_records(&mut self, bytes: u16) -> Status {
         self.set(FunctionSpec::READ_FILE_RECORDS, 0, 0);
-        self.data_length = bytes as u8;
+        self.count(bytes as u8);
         let bytes = usize::from(bytes);
         value(bytes >= READ_FILE_BYTES.0 && bytes <= READ_FILE_BYTES.1 && bytes.is_multiple_of(7))
     }
@@ -173,7 +185,7 @@ impl RequestHeader {
     /// 15 (hex) with several groups: the caller supplies the groups as `bytes` bytes of data.
     pub fn write_file_records(&mut self, bytes: u16) -> Status {
         self.set(FunctionSpec::WRITE_FILE_RECORDS, 0, 0);
-        self.data_length = bytes as u8;
+        self.count(bytes as u8);
         self.length = (bytes as u8).wrapping_add(2);
         let bytes = usize::from(bytes);
         value(bytes >= WRITE_FILE_BYTES.0 && bytes <= WRITE_FILE_BYTES.1)

@@ -12,7 +12,7 @@ pub use build::GROUP;
 
 use super::functions::{self, Direction};
 use super::functions::{
-    FunctionSpec, BITS, BROADCAST, COUNTED, COUNTS, DATA, FIXED, GROUPS, KIND, READ, REPEATS_DATA,
+    FunctionSpec, BITS, BROADCAST, COUNTS, DATA, FIXED, GROUPS, KIND, READ, REPEATS_DATA,
     SENDS_WORDS, TAKES_WORDS, UNANSWERED,
 };
 use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
@@ -22,14 +22,15 @@ use super::{diagnostics, files, length, EXCEPTION};
 use crate::error::Status;
 use core::num::NonZeroU8;
 
-/// Bytes of the longest head: that of 17, and that of 14 and 15 with one group (hex).
-const HEAD: usize = 9;
+/// Bytes of the longest head: that of 17 (hex), with the byte count of its data.
+const HEAD: usize = 10;
 
 /// The header of a request.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct RequestHeader {
     spec: FunctionSpec,
+    /// What precedes the caller's data, with their byte count if the function has one.
     head: [u8; HEAD],
     head_length: u8,
     /// Bytes of the caller's data.
@@ -38,8 +39,6 @@ pub struct RequestHeader {
     length: u8,
     /// Bytes after the counted ones.
     more: u8,
-    /// Bytes of the request that the response repeats, unless it repeats all.
-    repeated: u8,
 }
 
 impl RequestHeader {
@@ -51,7 +50,6 @@ impl RequestHeader {
         data_length: 0,
         length: 0,
         more: 0,
-        repeated: 0,
     };
 
     /// The head as sent.
@@ -130,12 +128,7 @@ impl RequestHeader {
 
     /// Length of the request PDU.
     pub const fn request_length(&self) -> u8 {
-        let length = self.head_length + self.data_length;
-        if self.spec.has(COUNTED) {
-            length + 1
-        } else {
-            length
-        }
+        self.head_length + self.data_length
     }
 
     /// A mask of the bits that are used in the last byte of data.
@@ -153,18 +146,10 @@ impl RequestHeader {
     /// The byte of the request PDU at `index`. `byte` returns a byte of the data.
     #[cfg_attr(target_os = "none", inline(never))]
     fn byte_at(&self, index: usize, byte: &impl Fn(usize) -> u8) -> u8 {
-        let mut after_head = index.wrapping_sub(usize::from(self.head_length));
         match self.head.get(index) {
-            Some(byte) if index < usize::from(self.head_length) => return *byte,
-            _ => {}
+            Some(byte) if index < usize::from(self.head_length) => *byte,
+            _ => byte(index.wrapping_sub(usize::from(self.head_length))),
         }
-        if self.spec.has(COUNTED) {
-            if after_head == 0 {
-                return self.data_length;
-            }
-            after_head -= 1;
-        }
-        byte(after_head)
     }
 
     /// Writes the request PDU into `pdu`, which has [`RequestHeader::request_length`] bytes.
@@ -174,8 +159,8 @@ impl RequestHeader {
         for (index, place) in pdu.iter_mut().enumerate() {
             *place = self.byte_at(index, &byte);
         }
-        // The last byte of a request that writes bits is a byte of data.
-        if self.spec.has(COUNTED) {
+        // Of bits to write, the last byte may be used in part.
+        if self.data_length > 0 {
             if let Some(last) = pdu.last_mut() {
                 *last &= self.mask();
             }
@@ -271,7 +256,7 @@ impl RequestHeader {
         let repeated = if self.spec.has(REPEATS_DATA) {
             pdu.len()
         } else {
-            usize::from(self.repeated)
+            usize::from(self.spec.repeated())
         };
         // A response holds at least the bytes that it repeats and those before its data.
         if pdu.len() >= repeated.max(self.data_at().into())

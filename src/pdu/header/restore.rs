@@ -51,7 +51,7 @@ impl RequestHeader {
         } else if self.repeats_data() {
             self.request_length().into()
         } else {
-            self.repeated.into()
+            self.spec.repeated().into()
         };
         let place = pdu.get_mut(..length).ok_or(Error::BUFFER_TOO_SMALL)?;
         let before = self.before_data(stored);
