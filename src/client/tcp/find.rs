@@ -151,18 +151,14 @@ fn validate<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
     if function & 0x7F != header.function() {
         return Status::INVALID_FUNCTION;
     }
-    let expected = header.expected(pdu, pdu.len());
-    if expected.map(|length| length.get().into()) != Some(pdu.len()) {
-        return Status::MALFORMED_REPLY;
-    }
     let status = header.validate(pdu, data_of(request));
-    if let [function, code, ..] = *pdu {
+    if status == Status::OK {
+        return store_response(request, pdu);
+    }
+    if let [function, code] = *pdu {
         if function & 0x80 != 0 {
             request.state_mut().exception = code;
         }
     }
-    match status {
-        Status::OK => store_response(request, pdu),
-        other => other,
-    }
+    status
 }

@@ -244,15 +244,29 @@ impl RequestHeader {
         }
     }
 
-    /// The status of a complete response, which has the length
-    /// [`RequestHeader::expected`]: [`Status::OK`], an exception, or
-    /// [`Status::MALFORMED_REPLY`]. `byte` returns a byte of the data that were sent.
+    /// The status of a response: [`Status::OK`], an exception, or [`Status::MALFORMED_REPLY`] if
+    /// `pdu` is no whole response to this request. `byte` returns a byte of the data that were
+    /// sent.
     pub fn validate(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
-        if let [function, code, ..] = pdu {
+        let expected = self.expected(pdu, pdu.len());
+        if expected.map_or(0, |length| length.get().into()) != pdu.len() {
+            return Status::MALFORMED_REPLY;
+        }
+        if let [function, code] = pdu {
             if function & EXCEPTION != 0 {
                 return Status::exception(*code);
             }
         }
+        if self.spec.0 & (KIND | GROUPS) == READ {
+            return Status::OK;
+        }
+        self.validate_content(pdu, byte)
+    }
+
+    /// As [`RequestHeader::validate`], of a response with the right length that is no exception,
+    /// unless its length and byte count are all that the request determines.
+    #[cfg_attr(not(target_os = "none"), inline(never))]
+    fn validate_content(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
         let repeated = if self.spec.has(REPEATS_DATA) {
             pdu.len()
         } else {
