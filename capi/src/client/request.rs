@@ -185,10 +185,13 @@ impl ClientRequest for RequestPtr {
         // SAFETY: the reply is not NULL and holds `capacity` bytes, and the data are not longer.
         // Of words, the client receives an even number of bytes.
         unsafe {
+            let mut last = reply;
             for (index, byte) in data.iter().enumerate() {
-                let is_last = index + 1 == data.len();
-                let byte = if is_last { *byte & mask } else { *byte };
-                *reply.add(index ^ flip) = byte;
+                last = reply.add(index ^ flip);
+                *last = *byte;
+            }
+            if !data.is_empty() {
+                *last &= mask;
             }
         }
     }
