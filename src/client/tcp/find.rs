@@ -81,10 +81,8 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             };
             let mut status = Status::BUFFER_TOO_SMALL;
             if is_whole {
-                status = validate(
-                    request,
-                    rest.get(tcp::PDU..header.total).unwrap_or_default(),
-                );
+                let pdu = rest.get(tcp::PDU..header.total);
+                status = validate(request, pdu.unwrap_or_default());
                 if self.resyncing && !is_answer(status) && status != Status::BUFFER_TOO_SMALL {
                     // These bytes only look like a header.
                     self.start += 1;
@@ -93,6 +91,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             }
             // Bytes of the frame that did not fit are skipped as they arrive.
             self.skip = header.total as u16;
+            self.skip_frame();
             if let Some(request) = self.answered(queue, at, status, now) {
                 return Some(request);
             }
@@ -100,6 +99,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     }
 
     /// Skips the received bytes of a frame that is finished with.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn skip_frame(&mut self) {
         let skipped = self.skip.min(self.end - self.start);
         self.start += skipped;
