@@ -79,7 +79,7 @@ pub unsafe extern "C" fn mbm_frame_build(
     unsafe {
         let build = || {
             let packet = get(packet).filter(|packet| !packet.lies_in(frame, capacity));
-            let packet = packet.ok_or(Error::INVALID_ARGUMENT)?;
+            let mut packet = packet.ok_or(Error::INVALID_ARGUMENT)?;
             let format = format(framing, |_| Some(packet.function))?;
             let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
             let buffer = buffer.ok_or(Error::INVALID_ARGUMENT)?;
@@ -272,11 +272,11 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
     expected: *mut mbm_length,
 ) -> u8 {
     let measure = || {
-        let packet = get(request).ok_or(Error::INVALID_ARGUMENT)?;
+        let mut packet = get(request).ok_or(Error::INVALID_ARGUMENT)?;
         let format = format(framing, |_| Some(packet.function))?;
         let own = format.own.as_slice();
         let unit = packet.head()?.unit;
-        reply_length(&packet, own, |request| match format.framing {
+        reply_length(&mut packet, own, |request| match format.framing {
             Some(framing) => length::of_reply(framing, unit, request, own),
             None => request.response_length(own),
         })

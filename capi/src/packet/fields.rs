@@ -77,15 +77,18 @@ impl mbm_packet {
     }
 
     /// The request that the fields describe, with `data` as its data.
-    pub(crate) fn request<'a>(&self, data: &'a [u8]) -> Result<Request<'a>, Error> {
-        Request::take(self.function, &mut self.with(data))
+    pub(crate) fn request<'a>(&mut self, data: &'a [u8]) -> Result<Request<'a>, Error> {
+        let function = self.function;
+        Request::take(function, &mut PacketWithData { packet: self, data })
     }
 
     /// The response or exception that the fields describe, with `data` as its data.
-    pub(crate) fn response<'a>(&self, data: &'a [u8]) -> Result<Response<'a>, Error> {
+    pub(crate) fn response<'a>(&mut self, data: &'a [u8]) -> Result<Response<'a>, Error> {
         let function = self.function;
         match self.kind {
-            MBM_PACKET_RESPONSE => Response::take(function, &mut self.with(data)),
+            MBM_PACKET_RESPONSE => {
+                Response::take(function, &mut PacketWithData { packet: self, data })
+            }
             MBM_PACKET_EXCEPTION if function & EXCEPTION != 0 => Err(Error::INVALID_FUNCTION),
             MBM_PACKET_EXCEPTION => Ok(Response::Exception {
                 function,
@@ -93,11 +96,6 @@ impl mbm_packet {
             }),
             _ => Err(Error::INVALID_ARGUMENT),
         }
-    }
-
-    fn with<'a>(&self, data: &'a [u8]) -> PacketWithData<'a> {
-        let packet = *self;
-        PacketWithData { packet, data }
     }
 
     fn byte_at(&mut self, field: Byte) -> &mut u8 {
@@ -161,13 +159,13 @@ impl<'a> Fields<'a> for mbm_packet {
 }
 
 /// A packet, and the data to which it points.
-struct PacketWithData<'a> {
-    packet: mbm_packet,
+struct PacketWithData<'p, 'a> {
+    packet: &'p mut mbm_packet,
     data: &'a [u8],
 }
 
 /// Gives the fields of a request or response.
-impl<'a> Fields<'a> for PacketWithData<'a> {
+impl<'a> Fields<'a> for PacketWithData<'_, 'a> {
     const IS_SOURCE: bool = true;
 
     fn byte(&mut self, field: Byte, value: &mut u8) {

@@ -174,15 +174,38 @@ impl mbm_packet {
 
     /// Writes the PDU of this packet, with `data` as its data.
     pub(super) fn emit(
-        &self,
+        &mut self,
         data: &[u8],
         functions: &[Function],
         place: &mut [u8],
     ) -> Result<usize, Error> {
         match self.kind {
-            MBM_PACKET_REQUEST => packet::emit_request(&self.request(data)?, functions, place),
-            _ => packet::emit_response(&self.response(data)?, functions, place),
+            MBM_PACKET_REQUEST => self.emit_request(data, functions, place),
+            _ => self.emit_response(data, functions, place),
         }
+    }
+
+    /// As [`mbm_packet::emit`], for a request. (Not inlined, so that request and response do not
+    /// both lie on the stack.)
+    #[inline(never)]
+    fn emit_request(
+        &mut self,
+        data: &[u8],
+        functions: &[Function],
+        place: &mut [u8],
+    ) -> Result<usize, Error> {
+        packet::emit_request(&self.request(data)?, functions, place)
+    }
+
+    /// As [`mbm_packet::emit_request`], for a response.
+    #[inline(never)]
+    fn emit_response(
+        &mut self,
+        data: &[u8],
+        functions: &[Function],
+        place: &mut [u8],
+    ) -> Result<usize, Error> {
+        packet::emit_response(&self.response(data)?, functions, place)
     }
 
     /// Sets the fields from a PDU.
@@ -219,7 +242,7 @@ pub(super) unsafe fn own(
 /// # Safety
 /// As for [`mbm_packet::data`].
 pub(super) unsafe fn reply_length(
-    packet: &mbm_packet,
+    packet: &mut mbm_packet,
     functions: &[Function],
     measure: impl FnOnce(&Request) -> Length,
 ) -> Result<Length, Error> {
