@@ -202,7 +202,6 @@ impl<'a> Request<'a> {
 
     /// Passes all fields, in the order of the wire.
     fn pass(&mut self, fields: &mut impl Fields<'a>) {
-        self.pass_mei_type(fields);
         match self {
             Request::ReadBits {
                 address, quantity, ..
@@ -273,18 +272,15 @@ impl<'a> Request<'a> {
                 fields.counted(Data::Registers, data)
             }
             Request::ReadFifoQueue { address } => fields.word(Word::Address, address),
-            Request::ReadDeviceIdentification { code, object } => {
-                fields.byte(Byte::ReadDeviceIdCode, code);
-                fields.byte(Byte::ObjectId, object)
+            Request::ReadDeviceIdentification { .. } | Request::EncapsulatedInterface { .. } => {
+                self.pass_encapsulated(fields);
             }
-            Request::EncapsulatedInterface { data, .. } | Request::Custom { data, .. } => {
-                fields.rest(Data::Bytes, data);
-            }
+            Request::Custom { data, .. } => fields.rest(Data::Bytes, data),
         }
     }
 
-    /// Passes the MEI type of a request of 2B, which decides what follows it.
-    fn pass_mei_type<F: Fields<'a>>(&mut self, fields: &mut F) {
+    /// Passes the MEI type of a request of 2B, and what follows it.
+    fn pass_encapsulated<F: Fields<'a>>(&mut self, fields: &mut F) {
         let mut mei_type = match *self {
             Request::EncapsulatedInterface { mei_type, .. } => mei_type,
             Request::ReadDeviceIdentification { .. } => MEI_READ_DEVICE_IDENTIFICATION,
@@ -299,6 +295,14 @@ impl<'a> Request<'a> {
                 }
                 mei_type => Request::EncapsulatedInterface { mei_type, data },
             };
+        }
+        match self {
+            Request::ReadDeviceIdentification { code, object } => {
+                fields.byte(Byte::ReadDeviceIdCode, code);
+                fields.byte(Byte::ObjectId, object)
+            }
+            Request::EncapsulatedInterface { data, .. } => fields.rest(Data::Bytes, data),
+            _ => {}
         }
     }
 

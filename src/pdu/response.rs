@@ -219,7 +219,6 @@ impl<'a> Response<'a> {
 
     /// Passes all fields, in the order of the wire.
     fn pass(&mut self, fields: &mut impl Fields<'a>) {
-        self.pass_mei_type(fields);
         match self {
             Response::ReadBits { data, .. } => fields.counted(Data::Bits, data),
             Response::ReadRegisters { data, .. } => fields.counted(Data::Registers, data),
@@ -281,29 +280,16 @@ impl<'a> Response<'a> {
                 fields.count(Count::Registers, data.len());
                 fields.rest(Data::Registers, data);
             }
-            Response::DeviceIdentification {
-                code,
-                conformity,
-                more_follows,
-                next_object,
-                objects: ObjectList { count, bytes },
-            } => {
-                fields.byte(Byte::ReadDeviceIdCode, code);
-                fields.byte(Byte::Conformity, conformity);
-                fields.flag(Flag::MoreFollows, more_follows);
-                fields.byte(Byte::NextObjectId, next_object);
-                fields.byte(Byte::ObjectCount, count);
-                fields.rest(Data::Bytes, bytes);
+            Response::DeviceIdentification { .. } | Response::EncapsulatedInterface { .. } => {
+                self.pass_encapsulated(fields);
             }
             Response::Exception { code, .. } => fields.byte(Byte::ExceptionCode, code),
-            Response::EncapsulatedInterface { data, .. } | Response::Custom { data, .. } => {
-                fields.rest(Data::Bytes, data);
-            }
+            Response::Custom { data, .. } => fields.rest(Data::Bytes, data),
         }
     }
 
-    /// Passes the MEI type of a response of 2B, which decides what follows it.
-    fn pass_mei_type<F: Fields<'a>>(&mut self, fields: &mut F) {
+    /// Passes the MEI type of a response of 2B, and what follows it.
+    fn pass_encapsulated<F: Fields<'a>>(&mut self, fields: &mut F) {
         let mut mei_type = match *self {
             Response::EncapsulatedInterface { mei_type, .. } => mei_type,
             Response::DeviceIdentification { .. } => MEI_READ_DEVICE_IDENTIFICATION,
@@ -325,6 +311,24 @@ impl<'a> Response<'a> {
                 },
                 mei_type => Response::EncapsulatedInterface { mei_type, data },
             };
+        }
+        match self {
+            Response::DeviceIdentification {
+                code,
+                conformity,
+                more_follows,
+                next_object,
+                objects: ObjectList { count, bytes },
+            } => {
+                fields.byte(Byte::ReadDeviceIdCode, code);
+                fields.byte(Byte::Conformity, conformity);
+                fields.flag(Flag::MoreFollows, more_follows);
+                fields.byte(Byte::NextObjectId, next_object);
+                fields.byte(Byte::ObjectCount, count);
+                fields.rest(Data::Bytes, bytes);
+            }
+            Response::EncapsulatedInterface { data, .. } => fields.rest(Data::Bytes, data),
+            _ => {}
         }
     }
 
