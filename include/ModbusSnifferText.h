@@ -13,19 +13,32 @@
 
 #include "mbm/sniffer.h"
 
-/** @cond a case of modbusFunctionText */
-#define MODBUS_FUNCTION_TEXT(code, name)                                                           \
-    case code: return F(" " name);
-/** @endcond */
-
 /** The name of a function of the standard; an empty text for others. */
 inline const __FlashStringHelper *modbusFunctionText(uint8_t function)
 {
     switch (function) {
-        MBM_FUNCTION_NAMES(MODBUS_FUNCTION_TEXT)
+    // `make header` writes these cases.
+    case MBM_FC_READ_COILS: return F(" read coils");
+    case MBM_FC_READ_DISCRETE_INPUTS: return F(" read discrete inputs");
+    case MBM_FC_READ_HOLDING_REGISTERS: return F(" read holding registers");
+    case MBM_FC_READ_INPUT_REGISTERS: return F(" read input registers");
+    case MBM_FC_WRITE_SINGLE_COIL: return F(" write single coil");
+    case MBM_FC_WRITE_SINGLE_REGISTER: return F(" write single register");
+    case MBM_FC_READ_EXCEPTION_STATUS: return F(" read exception status");
+    case MBM_FC_DIAGNOSTICS: return F(" diagnostics");
+    case MBM_FC_GET_COMM_EVENT_COUNTER: return F(" get comm event counter");
+    case MBM_FC_GET_COMM_EVENT_LOG: return F(" get comm event log");
+    case MBM_FC_WRITE_MULTIPLE_COILS: return F(" write multiple coils");
+    case MBM_FC_WRITE_MULTIPLE_REGISTERS: return F(" write multiple registers");
+    case MBM_FC_REPORT_SERVER_ID: return F(" report server id");
+    case MBM_FC_READ_FILE_RECORD: return F(" read file record");
+    case MBM_FC_WRITE_FILE_RECORD: return F(" write file record");
+    case MBM_FC_MASK_WRITE_REGISTER: return F(" mask write register");
+    case MBM_FC_READ_WRITE_MULTIPLE_REGISTERS: return F(" read/write multiple registers");
+    case MBM_FC_READ_FIFO_QUEUE: return F(" read FIFO queue");
+    case MBM_FC_ENCAPSULATED_INTERFACE_TRANSPORT: return F(" encapsulated interface transport");
     default: return F("");
     }
-#undef MODBUS_FUNCTION_TEXT
 }
 
 /** @cond parts of modbusPrintEvent */

@@ -11,28 +11,6 @@
 
 #include "base.h"
 
-/** Expands X(code, name) for each function of the standard. */
-#define MBM_FUNCTION_NAMES(X) \
-    X(MBM_FC_READ_COILS, "read coils") \
-    X(MBM_FC_READ_DISCRETE_INPUTS, "read discrete inputs") \
-    X(MBM_FC_READ_HOLDING_REGISTERS, "read holding registers") \
-    X(MBM_FC_READ_INPUT_REGISTERS, "read input registers") \
-    X(MBM_FC_WRITE_SINGLE_COIL, "write single coil") \
-    X(MBM_FC_WRITE_SINGLE_REGISTER, "write single register") \
-    X(MBM_FC_READ_EXCEPTION_STATUS, "read exception status") \
-    X(MBM_FC_DIAGNOSTICS, "diagnostics") \
-    X(MBM_FC_GET_COMM_EVENT_COUNTER, "get comm event counter") \
-    X(MBM_FC_GET_COMM_EVENT_LOG, "get comm event log") \
-    X(MBM_FC_WRITE_MULTIPLE_COILS, "write multiple coils") \
-    X(MBM_FC_WRITE_MULTIPLE_REGISTERS, "write multiple registers") \
-    X(MBM_FC_REPORT_SERVER_ID, "report server id") \
-    X(MBM_FC_READ_FILE_RECORD, "read file record") \
-    X(MBM_FC_WRITE_FILE_RECORD, "write file record") \
-    X(MBM_FC_MASK_WRITE_REGISTER, "mask write register") \
-    X(MBM_FC_READ_WRITE_MULTIPLE_REGISTERS, "read/write multiple registers") \
-    X(MBM_FC_READ_FIFO_QUEUE, "read FIFO queue") \
-    X(MBM_FC_ENCAPSULATED_INTERFACE_TRANSPORT, "encapsulated interface transport")
-
 #ifdef __cplusplus
 extern "C" {
 #endif
