@@ -244,6 +244,20 @@ static void the_gap_counts_from_the_reported_use_of_the_line(void **state)
     sim_assert_time(s->frames[2].silence, 4000);
 }
 
+static void a_reported_use_counts_also_after_40_minutes_without_one(void **state)
+{
+    uint64_t asked;
+    SIM;
+
+    sim_reads(s, 500);
+    s->now += 40ull * 60 * 1000000;
+    s->limit = s->now + 1000000;
+    asked = s->now;
+    OK(mbm_line_usedAt(&s->line, (uint32_t)s->now - 3000));
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].begin - asked, 1000);
+}
+
 /* Two objects that know nothing of each other, each with a line. */
 static void several_lines_share_a_stream(void **state)
 {
@@ -289,6 +303,7 @@ int main(void)
         SIM_TEST(no_gap_is_waited_for_after_begin_on_a_silent_line),
         SIM_TEST(bytes_that_arrive_after_begin_start_the_gap),
         SIM_TEST(the_gap_counts_from_the_reported_use_of_the_line),
+        SIM_TEST(a_reported_use_counts_also_after_40_minutes_without_one),
         SIM_TEST(several_lines_share_a_stream),
     };
 

@@ -6,7 +6,7 @@ use super::{
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::port::Port;
-use crate::time::{elapsed, has_elapsed, LONGEST};
+use crate::time::{elapsed, has_elapsed};
 
 impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// True while a request is pending.
@@ -132,8 +132,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Notes that the line was in use at `time`, by the clock of the port. The gap counts from
     /// `time`, unless the line was in use later. Nothing changes while a request is on the line.
     pub fn line_used_at(&mut self, time: u32) {
-        if self.phase <= Phase::Gap && time.wrapping_sub(self.since) < LONGEST {
-            self.since = time;
+        if self.phase <= Phase::Gap {
+            let now = self.port.micros();
+            if elapsed(now, time) < elapsed(now, self.since) {
+                self.since = time;
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! The settings of a line, and who else uses it.
 
-use super::{mbm_line, with_hooks};
+use super::{mbm_line, with_hooks, Core};
 use crate::pointers::{check, with};
 use crate::storage::mbm_counters;
 use mbm::error::Status;
@@ -156,10 +156,7 @@ pub unsafe extern "C" fn mbm_line_setCounters(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_usedAt(line: *mut mbm_line, timeUs: u32) -> u8 {
-    with(line, |line| {
-        line.line_used_at(timeUs);
-        Status::OK
-    })
+    note_use(line, |core| core.line_used_at(timeUs))
 }
 
 /// Reports that another user of the wire has just used it: as mbm_line_usedAt with the
@@ -169,13 +166,24 @@ pub unsafe extern "C" fn mbm_line_usedAt(line: *mut mbm_line, timeUs: u32) -> u8
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_used(line: *mut mbm_line) -> u8 {
-    let status = check(line);
-    if status == Status::OK {
-        with_hooks(line, |core| {
-            if core.port.is_ready() {
-                core.line_used();
-            }
-        });
+    note_use(line, |core| core.line_used())
+}
+
+/// Notes a use of the line, which asks the clock of its port.
+///
+/// # Safety
+/// As for [`crate::pointers::with`].
+unsafe fn note_use(line: *mut mbm_line, note: impl FnOnce(&mut Core)) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let status = check(line);
+        if status == Status::OK {
+            with_hooks(line, |core| {
+                if core.port.is_ready() {
+                    note(core);
+                }
+            });
+        }
+        status.code()
     }
-    status.code()
 }
