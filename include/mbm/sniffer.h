@@ -239,7 +239,7 @@ uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
  * "unit 17  reply      03 read holding registers  107..109: 555 0 100".
  *
  * Any thread may call it while the event is valid.
- * On a Cortex-M it takes 570 bytes of stack.
+ * On a Cortex-M it takes 590 bytes of stack.
  *
  * @param event  an event that mbm_sniffer_next returned
  * @param text   receives the line; always ends with a NUL

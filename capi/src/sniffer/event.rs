@@ -178,7 +178,7 @@ impl mbm_event {
 /// "unit 17  reply      03 read holding registers  107..109: 555 0 100".
 ///
 /// Any thread may call it while the event is valid.
-/// On a Cortex-M it takes 570 bytes of stack.
+/// On a Cortex-M it takes 590 bytes of stack.
 ///
 /// @param event  an event that mbm_sniffer_next returned
 /// @param text   receives the line; always ends with a NUL
