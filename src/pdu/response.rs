@@ -156,6 +156,7 @@ impl<'a> Response<'a> {
     }
 
     /// Gives all fields to `sink`, in the order of the wire.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn give(&self, sink: &mut impl Fields<'a>) {
         // A sink changes no field.
         Response::pass(&mut { *self }, sink);
