@@ -318,26 +318,29 @@ static void a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing
     }
 }
 
+/* Asks for 4 words with a frame buffer that holds 3, and has the device send `reply`. */
+static void ends_in_12_bytes(sim *s, mbm_node *n, uint8_t status, const char *reply)
+{
+    buffers b = give_buffers(s, 4, 4, 12);
+
+    sim_answer(s, 1, 500, reply);
+    IS(status, mbm_node_readHoldingRegisters(n, 0, 4));
+    free_buffers(s, b);
+}
+
 static void a_frame_that_contains_how_a_longer_reply_begins_is_malformed(void **state)
 {
-    buffers b;
     NODE;
 
-    b = give_buffers(s, 4, 4, 12);
-    sim_answer(s, 1, 500, "11 03 04 11 03 08 00 +");
-    IS(MBM_MALFORMED_REPLY, mbm_node_readHoldingRegisters(n, 0, 4));
-    free_buffers(s, b);
+    ends_in_12_bytes(s, n, MBM_MALFORMED_REPLY, "11 03 04 11 03 08 00 +");
 }
 
 static void a_reply_longer_than_the_frame_buffer_is_too_long_behind_noise_too(void **state)
 {
-    buffers b;
     NODE;
 
-    b = give_buffers(s, 4, 4, 12);
-    sim_answer(s, 1, 500, "21 90 1C 04 / 11 03 08 11 11 22 22 33 33 44 44 +");
-    IS(MBM_BUFFER_TOO_SMALL, mbm_node_readHoldingRegisters(n, 0, 4));
-    free_buffers(s, b);
+    ends_in_12_bytes(s, n, MBM_BUFFER_TOO_SMALL,
+                     "21 90 1C 04 / 11 03 08 11 11 22 22 33 33 44 44 +");
 }
 
 static void a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception(void **state)
