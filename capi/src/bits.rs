@@ -15,33 +15,6 @@ fn units<T: Packed>(quantity: u16) -> usize {
 }
 
 /// # Safety
-/// As [`slice`] demands of both.
-unsafe fn pack(coils: *const u8, quantity: u16, bytes: *mut u8, length: u16) -> u8 {
-    // SAFETY: as the caller promises.
-    code(unsafe {
-        slice(coils, quantity.into()).and_then(|coils| {
-            let on = coils.iter().map(|coil| *coil != 0);
-            bits::pack(slice_mut(bytes, length.into())?, on)
-        })
-    })
-}
-
-/// # Safety
-/// As [`slice`] demands of both.
-unsafe fn unpack(bytes: *const u8, length: u16, coils: *mut u8, quantity: u16) -> u8 {
-    // SAFETY: as the caller promises.
-    code(unsafe {
-        slice(bytes, length.into()).and_then(|bytes| {
-            let coils = slice_mut(coils, quantity.into())?;
-            for (coil, on) in coils.iter_mut().zip(bits::unpack(bytes, quantity.into())?) {
-                *coil = on.into();
-            }
-            Ok(())
-        })
-    })
-}
-
-/// # Safety
 /// As [`slice`] demands of `units`, which hold `quantity` bits; `on` is NULL or
 /// points to a byte.
 unsafe fn is_set<T: Packed>(
@@ -87,7 +60,10 @@ pub unsafe extern "C" fn mbm_bits_pack(
     bytes: *mut u8,
     length: u16,
 ) -> u8 {
-    pack(coils, quantity, bytes, length)
+    code(slice(coils, quantity.into()).and_then(|coils| {
+        let on = coils.iter().map(|coil| *coil != 0);
+        bits::pack(slice_mut(bytes, length.into())?, on)
+    }))
 }
 
 /// Unpacks the coils or discrete inputs that a read returned in bytes (V1.1b3, 6.1).
@@ -104,7 +80,13 @@ pub unsafe extern "C" fn mbm_bits_unpack(
     coils: *mut u8,
     quantity: u16,
 ) -> u8 {
-    unpack(bytes, length, coils, quantity)
+    code(slice(bytes, length.into()).and_then(|bytes| {
+        let coils = slice_mut(coils, quantity.into())?;
+        for (coil, on) in coils.iter_mut().zip(bits::unpack(bytes, quantity.into())?) {
+            *coil = on.into();
+        }
+        Ok(())
+    }))
 }
 
 /// Gets the state of one coil or discrete input of a read, by its address in the device.

@@ -180,7 +180,7 @@ pub type Extras<P, S, Q> = fn(&mut Engine<P, S, Q>, Moment) -> bool;
 /// When [`Extras`] are called.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Moment {
-    /// A byte has arrived, and the echo of the request may. `true` if the byte ends it.
+    /// A byte has arrived. `true` if it ends the echo of the request.
     Byte,
     /// The port has sent the last bit. `true` if the driver must stay on.
     Sent,

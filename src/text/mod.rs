@@ -391,9 +391,10 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
         Response::Diagnostics { sub_function, data } => diagnostics(line, sub_function, data, true),
         Response::ReadFileRecord(groups) => {
             let mut separator = " ";
+            let mut first = first_record(head);
             for data in groups.iter() {
                 line.put(separator);
-                if let (Some(record), " ") = (first_record(head), separator) {
+                if let Some(record) = first.take() {
                     records(line, record);
                     line.byte(b':');
                 }
