@@ -328,19 +328,24 @@ static void ends_in_12_bytes(sim *s, mbm_node *n, uint8_t status, const char *re
     free_buffers(s, b);
 }
 
-static void a_frame_that_contains_how_a_longer_reply_begins_is_malformed(void **state)
+static void a_read_that_the_frame_buffer_is_too_small_for_ends_so_or_with_an_exception(void **state)
 {
     NODE;
 
-    ends_in_12_bytes(s, n, MBM_MALFORMED_REPLY, "11 03 04 11 03 08 00 +");
-}
-
-static void a_reply_longer_than_the_frame_buffer_is_too_long_behind_noise_too(void **state)
-{
-    NODE;
-
+    mbm_line_setQuietTime(&s->line, 0);
+    ends_in_12_bytes(s, n, MBM_BUFFER_TOO_SMALL, "");
     ends_in_12_bytes(s, n, MBM_BUFFER_TOO_SMALL,
                      "21 90 1C 04 / 11 03 08 11 11 22 22 33 33 44 44 +");
+    ends_in_12_bytes(s, n, MBM_BUFFER_TOO_SMALL, "12 03 04 11 03 08 00 +");
+    ends_in_12_bytes(s, n, MBM_ILLEGAL_DATA_ADDRESS, "12 03 04 11 03 08 00 + / 11 83 02 +");
+}
+
+static void a_whole_reply_longer_than_the_frame_buffer_ends_the_request_at_once(void **state)
+{
+    NODE;
+
+    ends_in_12_bytes(s, n, MBM_BUFFER_TOO_SMALL, "11 03 08 11 11 22 22 33 33 44 44 +");
+    assert_true(s->now < 100000);
 }
 
 static void a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception(void **state)
@@ -445,8 +450,8 @@ int main(void)
         SIM_TEST(a_frame_buffer_below_8_bytes_is_refused),
         SIM_TEST(a_request_is_sent_whole_or_not_at_all),
         SIM_TEST(a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing),
-        SIM_TEST(a_frame_that_contains_how_a_longer_reply_begins_is_malformed),
-        SIM_TEST(a_reply_longer_than_the_frame_buffer_is_too_long_behind_noise_too),
+        SIM_TEST(a_read_that_the_frame_buffer_is_too_small_for_ends_so_or_with_an_exception),
+        SIM_TEST(a_whole_reply_longer_than_the_frame_buffer_ends_the_request_at_once),
         SIM_TEST(a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception),
         SIM_TEST(a_reply_longer_than_the_response_words_changes_none),
         SIM_TEST(writes_beyond_the_transmit_words_return_3_and_nothing_is_sent),

@@ -218,6 +218,9 @@ fn run<const SINGLE: bool>(
         assert!(polls < 100_000, "the request never ends");
     };
     validate(engine, asked, status);
+    // The frame of the reply to a read, with unit, function, byte count and CRC.
+    let reply_fits = asked.data.is_none_or(|data| data + 5 <= space);
+    assert!(status != Status::BUFFER_TOO_SMALL || !reply_fits);
     let port = &engine.port;
     // Without a request on the line, all bytes arrived before it.
     let unexpected = match port.requests.is_empty() {

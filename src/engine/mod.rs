@@ -104,7 +104,7 @@ pub struct Engine<P, S: Storage, Q> {
     awaits_end: bool,
     /// The last poll may have left bytes unread.
     has_more: bool,
-    /// What the frame that is being received is if it ends with a right CRC, from its third byte
+    /// What the frame that is being received is if it ends with a right CRC, from its second byte
     /// on: see `kind_of_frame`.
     run_kind: Outcome,
     /// How many bytes have arrived since the last frame ended.

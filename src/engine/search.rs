@@ -17,9 +17,6 @@ use crate::frame::rtu::{self, MIN_FRAME};
 use crate::pdu::EXCEPTION;
 use crate::port::Port;
 
-/// Bytes of the frame of the reply to a read beside its data: unit, function, byte count, CRC.
-const AROUND_DATA: u8 = rtu::OVERHEAD as u8 + 2;
-
 /// Length of the frame of an exception: unit, function, code, CRC.
 const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 
@@ -135,43 +132,27 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
             return Q::ending_reply(self, false);
         }
-        if self.ends_with(self.length, self.function) {
-            return self.length;
+        match self.ends_with(self.length, self.function) {
+            true => self.length,
+            false => S::Count::ZERO,
         }
-        if self.length > self.storage.capacity() && self.kind_of_frame() == Outcome::TOO_LONG {
-            self.note(Outcome::TOO_LONG);
-            self.is_early = true;
-        }
-        S::Count::ZERO
     }
 
-    /// What a frame is that begins with the last three bytes, if it is not the reply:
-    /// [`Outcome::TOO_LONG`] if it begins as the reply to a read does.
+    /// What a frame is that begins with the last two bytes, if it is not the reply.
     fn kind_of_frame(&self) -> Outcome {
         // Bytes that were dropped were not of our unit.
-        if self.end < 3u8.into() {
+        if self.end < 2u8.into() {
             return Outcome::OTHER_UNIT;
         }
-        let front = self.end - 3u8.into();
+        let front = self.end - 2u8.into();
         let function = self.storage.byte(front + 1u8.into());
         if self.storage.byte(front) != self.unit {
             Outcome::OTHER_UNIT
-        } else if function == self.function {
-            match self.storage.byte(front + 2u8.into()) == self.data_length() {
-                true => Outcome::TOO_LONG,
-                false => Outcome::MALFORMED,
-            }
         } else if function & !EXCEPTION == self.function {
             Outcome::MALFORMED
         } else {
             Outcome::OTHER_FUNCTION
         }
-    }
-
-    /// The byte count with which the reply to a read begins.
-    fn data_length(&self) -> u8 {
-        let length: u16 = self.length.into();
-        length.wrapping_sub(AROUND_DATA.into()) as u8
     }
 
     /// Moves the frame of `length` bytes at the end of the buffer to its front, and makes it the
@@ -277,27 +258,20 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if !cfg!(feature = "diagnosis") {
             return false;
         }
-        if self.run_length == 3u8.into() {
+        if self.run_length == 2u8.into() {
             self.run_kind = self.kind_of_frame();
         }
         let last = self.storage.slice(self.end - 1u8.into(), 1u8.into());
         self.run = self.run.with(last);
-        if !self.run.is_residue() || self.run_length < MIN_FRAME.into() {
-            return false;
-        }
-        // By chance, the CRC may be right before the end of the reply.
-        self.run_kind != Outcome::TOO_LONG || self.run_length >= self.length
+        self.run.is_residue() && self.run_length >= MIN_FRAME.into()
     }
 
-    /// Skips a whole frame that is not the reply. True if it is the reply but the frame buffer
-    /// cannot hold it, which ends the request.
+    /// Skips a whole frame that is not the reply. True if the frame buffer cannot hold the reply,
+    /// and the frame may be the reply: that ends the request.
     fn skip_frame(&mut self) -> bool {
-        let mut kind = self.run_kind;
-        if kind == Outcome::TOO_LONG {
-            if self.seen == kind {
-                return true;
-            }
-            kind = Outcome::MALFORMED;
+        let kind = self.run_kind;
+        if self.seen == Outcome::TOO_LONG && kind == Outcome::MALFORMED {
+            return true;
         }
         self.note_foreign_frame();
         self.begin_frame();
@@ -319,11 +293,21 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     pub(super) fn forget(&mut self) {
         self.is_early = false;
         self.exception = 0;
-        self.seen = Outcome::NOTHING;
+        self.see_nothing();
         if self.phase == Phase::Reply {
             self.since = self.begun;
             self.wait_for_reply();
         }
+    }
+
+    /// Makes the outcome what the request ends with if no bytes arrive. Of a reply that the frame
+    /// buffer cannot hold, nothing is seen.
+    pub(super) fn see_nothing(&mut self) {
+        self.seen = if Q::HAS_FIXED_REPLY && self.length > self.storage.capacity() {
+            Outcome::TOO_LONG
+        } else {
+            Outcome::NOTHING
+        };
     }
 
     /// Notes a frame with a right CRC that does not answer the request.

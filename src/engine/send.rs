@@ -1,6 +1,6 @@
 //! Sends one request: writes the frame, waits until its last bit has left.
 
-use super::{Count, Engine, Moment, Outcome, Phase, Probation, Storage, Transaction, BROADCAST};
+use super::{Count, Engine, Moment, Phase, Probation, Storage, Transaction, BROADCAST};
 use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;
@@ -51,7 +51,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if Self::DERIVES_CRC {
             self.weight = Crc16::RESIDUE;
         }
-        self.seen = Outcome::NOTHING;
+        self.see_nothing();
         self.is_early = false;
         self.has_more = false;
         self.probation = if self.may_be_late() {
