@@ -11,14 +11,18 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Makes the settings `retries`, `echo_discard` and `post_flush_hold` effective.
     pub fn use_extras(&mut self) {
         self.extras = Some(Engine::extras);
+        if self.extension.is_none() {
+            self.extension = self.extras;
+        }
     }
 
-    /// See [`super::Extras`].
+    /// See [`super::Extension`].
     pub(super) fn extras(&mut self, moment: Moment) -> bool {
         match moment {
             Moment::Byte => self.ends_echo(),
             Moment::Sent => self.holds_driver(),
-            Moment::Failed => self.is_repeated(),
+            Moment::End => self.is_repeated(),
+            Moment::Missed => false,
         }
     }
 
@@ -51,10 +55,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         hold > 0
     }
 
-    /// True if the request is begun again.
+    /// True if the request has failed and is begun again.
     fn is_repeated(&mut self) -> bool {
         let retries = self.settings.retries;
-        if !Q::HAS_FIXED_REPLY || self.retries >= retries || self.seen == Outcome::TOO_LONG {
+        let is_final = self.seen.is_response() || self.seen == Outcome::TOO_LONG;
+        if !Q::HAS_FIXED_REPLY || self.retries >= retries || is_final {
             return false;
         }
         self.retries += 1;

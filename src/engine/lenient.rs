@@ -11,7 +11,7 @@
 //! Only [`Engine::lenient`] names this module. A program that does not call that function
 //! contains none of this code.
 
-use super::{Engine, Event, Observer, Outcome, Storage, Words};
+use super::{Engine, Extension, Moment, Outcome, Storage, Words};
 use crate::frame::rtu;
 use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
@@ -26,30 +26,37 @@ const LEFT_FREE: u8 = 8;
 impl<P, S: Storage, Q> Engine<P, S, Q> {
     /// True if deviating replies are accepted.
     pub fn is_lenient(&self) -> bool {
-        self.observer.is_some()
+        let address = |extension: Option<Extension<P, S, Q>>| extension.map_or(0, |f| f as usize);
+        address(self.extension) != address(self.extras)
     }
 
-    /// Sets the function that sees the received bytes of later requests. Call it only while no
-    /// request is pending.
-    pub fn set_observer(&mut self, observer: Option<Observer<P, S, Q>>) {
-        self.observer = observer;
+    /// Sets what [`Engine::lenient`] returns, for later requests. Call it only while no request
+    /// is pending.
+    pub fn set_lenient(&mut self, lenient: Option<Extension<P, S, Q>>) {
+        self.extension = if lenient.is_some() {
+            lenient
+        } else {
+            self.extras
+        };
     }
 }
 
 impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
-    /// What [`Engine::set_observer`] takes so that a deviating reply is accepted, if `on`. A read
+    /// What [`Engine::set_lenient`] takes so that a deviating reply is accepted, if `on`. A read
     /// may then be sent to unit 0, which has to reply.
-    pub const fn lenient(on: bool) -> Option<Observer<P, S, MasterRequest>> {
+    pub const fn lenient(on: bool) -> Option<Extension<P, S, MasterRequest>> {
         if on {
-            Some(observe)
+            Some(extend)
         } else {
             None
         }
     }
 
-    /// Keeps the byte if it may belong to a deviating response to a read. Notes a deviating
+    /// Keeps the last byte if it may belong to a deviating response to a read. Notes a deviating
     /// reply that ends with it.
-    fn keep(&mut self, byte: u8, is_whole: bool) {
+    fn keep(&mut self) {
+        let byte = self.storage.byte(self.end - 1);
+        let is_whole = self.is_whole_frame();
         if self.awaits_end || self.is_held() {
             return;
         }
@@ -159,9 +166,13 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     }
 }
 
-fn observe<P: Port, S: Words>(engine: &mut Engine<P, S, MasterRequest>, event: Event) {
-    match event {
-        Event::Byte(byte, is_whole) => engine.keep(byte, is_whole),
-        Event::End => engine.accept_deviating(),
+/// See [`Extension`]. The end of the frame buffer is used, so `Missed` must follow each byte before
+/// the next one is read.
+fn extend<P: Port, S: Words>(engine: &mut Engine<P, S, MasterRequest>, moment: Moment) -> bool {
+    match moment {
+        Moment::Missed => engine.keep(),
+        Moment::End => engine.accept_deviating(),
+        Moment::Sent | Moment::Byte => {}
     }
+    engine.extras.is_some_and(|extras| extras(engine, moment))
 }

@@ -156,34 +156,25 @@ pub struct Engine<P, S: Storage, Q> {
     /// The units that did not answer their last request. Each bit stands for the units whose
     /// numbers are equal modulo 32.
     late_units: [u8; 4],
+    /// What the engine calls at the moments of a request: `extras`, or `lenient`, which calls
+    /// `extras` in turn.
+    extension: Option<Extension<P, S, Q>>,
     /// Retries, echo discarding and the post-flush hold (see `extras`).
-    extras: Option<Extras<P, S, Q>>,
-    /// Sees every received byte if deviating replies are accepted (see `lenient`).
-    observer: Option<Observer<P, S, Q>>,
+    extras: Option<Extension<P, S, Q>>,
 }
-
-/// What an observer is called for.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Event {
-    /// A byte has arrived, and the search has not ended with it. `true` if it ends a frame.
-    Byte(u8, bool),
-    /// The request ends.
-    End,
-}
-
-/// A function that sees the bytes beside the search, and the end of the request.
-pub type Observer<P, S, Q> = fn(&mut Engine<P, S, Q>, Event);
 
 /// A function that does something at a moment of a request. `true` if that replaces what follows.
-pub type Extras<P, S, Q> = fn(&mut Engine<P, S, Q>, Moment) -> bool;
+pub type Extension<P, S, Q> = fn(&mut Engine<P, S, Q>, Moment) -> bool;
 
-/// When [`Extras`] are called.
+/// When an [`Extension`] is called.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Moment {
-    /// A byte has arrived. `true` if it ends the echo of the request.
-    Byte,
     /// The port has sent the last bit. `true` if the driver must stay on.
     Sent,
-    /// The request has failed. `true` if it is repeated.
-    Failed,
+    /// A byte has arrived. `true` if it ends the echo of the request.
+    Byte,
+    /// The search has not ended with the byte that has arrived.
+    Missed,
+    /// The request ends with what was seen. `true` if it is repeated.
+    End,
 }

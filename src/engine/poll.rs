@@ -1,8 +1,6 @@
 //! Moves a request on, from its start to its end.
 
-use super::{
-    Count, Engine, Event, Moment, Outcome, Phase, Probation, Settings, Storage, Transaction,
-};
+use super::{Count, Engine, Moment, Outcome, Phase, Probation, Settings, Storage, Transaction};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::port::Port;
@@ -115,8 +113,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             port,
             request: Q::NONE,
             tally: Some(Engine::count),
+            extension: Some(Engine::extras),
             extras: Some(Engine::extras),
-            observer: None,
             settings: Settings::DEFAULT,
         }
     }
@@ -194,8 +192,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             if self.end == self.space() {
                 self.make_space();
             }
-            // The observer uses the end of the buffer, so it must see each byte before the next
-            // one.
             let first = self.end;
             let space = if P::READS_SINGLE_BYTES || self.is_lenient() {
                 1u8.into()
@@ -308,24 +304,20 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Ends the request with what was seen.
     fn settle(&mut self) -> Status {
-        if let Some(observe) = self.observer {
-            observe(self, Event::End);
-        }
-        let status = self.seen.status();
-        if self.seen.is_response() {
-            self.expect_no_late_reply();
-            return status;
-        }
-        if self.has_extra(Moment::Failed) {
+        if self.has_extra(Moment::End) {
             return Status::PENDING;
         }
-        status
+        if self.seen.is_response() {
+            self.expect_no_late_reply();
+        }
+        self.seen.status()
     }
 
-    /// True if the engine has extras, and they replace what follows at this moment.
+    /// True if the engine has an extension, and it replaces what follows at this moment.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn has_extra(&mut self, moment: Moment) -> bool {
-        self.extras.is_some_and(|extras| extras(self, moment))
+        self.extension
+            .is_some_and(|extension| extension(self, moment))
     }
 
     /// Cancels the request and switches the driver off. If the request was sent completely,

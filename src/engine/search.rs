@@ -10,7 +10,7 @@
 //! right, these bytes were a whole frame. If that frame is not the reply, it is skipped, and an
 //! exception or a damaged reply that seemed to lie in it is forgotten.
 
-use super::{Count, Engine, Event, Moment, Outcome, Phase, Storage, Transaction};
+use super::{Count, Engine, Moment, Outcome, Phase, Storage, Transaction};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::frame::rtu::{self, MIN_FRAME};
@@ -80,7 +80,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Takes in the byte at the end of the frame buffer. True if the request ends with it.
     #[cfg_attr(target_os = "none", inline(never))]
     fn take_in(&mut self) -> bool {
-        let byte = self.storage.byte(self.end);
         self.end += 1u8.into();
         let is_whole = self.continue_frame();
         let function = self.function;
@@ -102,9 +101,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 return true;
             }
         }
-        if let Some(observe) = self.observer {
-            observe(self, Event::Byte(byte, is_whole));
-        }
+        self.has_extra(Moment::Missed);
         is_whole && self.skip_frame()
     }
 
@@ -263,6 +260,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
         let last = self.storage.slice(self.end - 1u8.into(), 1u8.into());
         self.run = self.run.with(last);
+        self.is_whole_frame()
+    }
+
+    /// True if all bytes since the last frame form a frame.
+    pub(super) fn is_whole_frame(&self) -> bool {
         self.run.is_residue() && self.run_length >= MIN_FRAME.into()
     }
 

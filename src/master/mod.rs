@@ -128,7 +128,7 @@ impl<P: Port, S: Words> Master<P, S> {
     /// comes, and whether reads are sent to unit 0: see
     /// [`crate::engine::Engine::lenient`].
     pub fn set_lenient(&mut self, on: bool) {
-        self.line.set_observer(Line::<P, S>::lenient(on));
+        self.line.set_lenient(Line::<P, S>::lenient(on));
     }
 
     /// Cancels the request in progress, if there is one. Its status becomes

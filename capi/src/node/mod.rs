@@ -14,7 +14,7 @@ use super::line::{self, mbm_line};
 use super::pointers::{self, CObject};
 use super::port::PortRef;
 use super::storage::{LineStorage, NodeWords};
-use mbm::engine::Observer;
+use mbm::engine::Extension;
 use mbm::error::Status;
 use mbm::node::Node;
 use mbm::pdu::master_request::MasterRequest;
@@ -29,7 +29,7 @@ pub(super) struct Object {
     line: *mut mbm_line,
     words: NodeWords,
     /// What the line's engine gets: a function if deviating replies are accepted.
-    observer: Option<Observer<PortRef, LineStorage, MasterRequest>>,
+    lenient: Option<Extension<PortRef, LineStorage, MasterRequest>>,
 }
 
 const _: () = {
@@ -306,7 +306,7 @@ unsafe fn take_line(node: *mut mbm_node) -> Status {
             }
             if status == Status::OK {
                 line.storage.words = &raw mut (*object).words;
-                line.set_observer((*object).observer);
+                line.set_lenient((*object).lenient);
             }
         }
         status

@@ -77,7 +77,7 @@ pub unsafe extern "C" fn mbm_node_setLenient(node: *mut mbm_node, on: u8) -> u8 
         if node.core.is_pending() {
             return Status::BUSY;
         }
-        node.observer = Core::lenient(on != 0);
+        node.lenient = Core::lenient(on != 0);
         Status::OK
     })
 }
