@@ -342,8 +342,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             keep -= 1u8.into();
         }
         if Q::HAS_FIXED_REPLY {
-            let longest = self.length.max(self.outgoing).max(EXCEPTION_FRAME.into());
-            keep = keep.min(longest - 1u8.into());
+            // An exception is shorter than any reply.
+            keep = keep.min(self.length.max(self.outgoing) - 1u8.into());
         }
         while keep > S::Count::ZERO && self.storage.byte(self.end - keep) != self.unit {
             keep -= 1u8.into();
