@@ -205,7 +205,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
         let before = self.before.with(self.storage.slice(known, front - known));
         if before != Crc16::START && self.weight == Crc16::RESIDUE {
-            self.weight = Crc16::weight(self.storage.slice(front, length));
+            self.weight = Crc16::weight(length.into());
         }
         before.since_start(self.weight) == self.run
     }
