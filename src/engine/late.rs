@@ -64,11 +64,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// How long the line must be silent before a held reply is accepted.
     pub(super) fn hold(&mut self) -> u32 {
-        let quiet_time = self.settings.quiet_time.get();
         if self.has_slow_unit {
-            quiet_time.max(Q::response_timeout(self))
+            Q::response_timeout(self)
         } else {
-            quiet_time
+            self.settings.quiet_time.get()
         }
     }
 
