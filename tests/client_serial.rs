@@ -324,6 +324,32 @@ fn a_reply_longer_than_the_capacity_of_the_request_ends_with_buffer_too_small() 
     assert_eq!((task.state.length, task.reply[0]), (0, 0xEE));
 }
 
+#[test]
+fn a_request_longer_than_the_frame_buffer_has_no_exception_of_the_request_before() {
+    let end = End::default();
+    let storage = Lent {
+        frame: Frame::new(vec![0; 8]),
+        ..Lent::default()
+    };
+    let mut client: Transport = Client::new(Serial::new(end.clone(), storage));
+    let read = Task::new(1, 1, &[], |header| {
+        header.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0)
+    });
+    assert!(client.queue(read).is_ok());
+    sent(&end, &mut client);
+    end.deliver(0, &frame(1, &[0x87, 4]));
+    assert_eq!(run(&end, &mut client).state.exception, 4);
+    let write = Task::new(1, 1, &[0; 4], |header| {
+        header.set(FunctionSpec::WRITE_MULTIPLE_REGISTERS, 0, 2)
+    });
+    assert!(client.queue(write).is_ok());
+    let task = run(&end, &mut client);
+    assert_eq!(
+        (task.state.status, task.state.exception),
+        (Status::BUFFER_TOO_SMALL, 0)
+    );
+}
+
 /// The device answers in order, but its first reply arrives after the timeout. That late
 /// reply looks like the reply to the next request.
 fn a_late_reply_is_passed_over(line: (End, Transport), encode: fn(u8, &[u8]) -> Vec<u8>) {

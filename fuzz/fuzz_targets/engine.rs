@@ -184,7 +184,6 @@ fn run<const SINGLE: bool>(
     step: u32,
     is_early: &mut bool,
 ) {
-    engine.clear_outcome();
     *engine.request() = asked.request;
     engine.port.requests.clear();
     engine.port.received.clear();

@@ -74,7 +74,8 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// Passes a request to the engine and starts it.
     fn start(&mut self, request: J) -> Status {
         let unit = request.state().unit();
-        self.engine.clear_outcome();
+        // A refused request begins no search, which would clear it.
+        self.engine.exception = 0;
         self.engine.request().begin(request);
         self.engine.start(unit)
     }

@@ -33,11 +33,6 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.exception
     }
 
-    /// Clears the outcome of the last request.
-    pub fn clear_outcome(&mut self) {
-        self.exception = 0;
-    }
-
     /// Makes `now` the zero of the clock. Times before `now - longest` become `now - longest`.
     /// For model checkers: two engines that will behave alike become equal.
     #[doc(hidden)]

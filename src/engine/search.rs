@@ -293,8 +293,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Forgets what was seen, because it lies within another frame, and waits for the reply again.
     pub(super) fn forget(&mut self) {
-        self.is_early = false;
-        self.exception = 0;
         self.see_nothing();
         if self.phase == Phase::Reply {
             self.since = self.begun;
@@ -305,6 +303,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Makes the outcome what the request ends with if no bytes arrive. Of a reply that the frame
     /// buffer cannot hold, nothing is seen.
     pub(super) fn see_nothing(&mut self) {
+        self.is_early = false;
+        self.exception = 0;
         self.seen = if Q::HAS_FIXED_REPLY && self.length > self.storage.capacity() {
             Outcome::TOO_LONG
         } else {

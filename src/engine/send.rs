@@ -52,7 +52,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             self.weight = Crc16::RESIDUE;
         }
         self.see_nothing();
-        self.is_early = false;
         self.has_more = false;
         self.probation = if self.may_be_late() {
             Probation::Yes
@@ -66,7 +65,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// so more late replies may come.
     #[cold]
     pub(super) fn note_unexpected(&mut self) {
-        self.exception = 0;
         if self.unit != BROADCAST {
             self.expect_late_reply();
         }

@@ -144,7 +144,6 @@ impl Node {
     fn start<P: Port, S: Words>(&mut self, line: &mut Line<P, S>, built: Status) -> Status {
         self.transmit_bits = 0;
         self.response_index = 0;
-        line.clear_outcome();
         self.exception = 0;
         self.status = built;
         if built == Status::OK {
