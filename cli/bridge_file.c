@@ -224,18 +224,14 @@ static void join_path(const char *of, const char *path, char full[2 * LONGEST_VA
                  path);
 }
 
-static int read_line(yaml_file *file, const yaml_node_t *node, void *setup)
+static int read_line(yaml_file *file, const yaml_node_t *node, bridge_setup *into)
 {
-    bridge_setup *into = (bridge_setup *)setup;
-    yaml_node_t *values[LINE_KEYS] = {NULL};
+    const yaml_node_t *values[LINE_KEYS] = {NULL};
     const char *text, *path, *topic = NULL, *wrong;
     char full[2 * LONGEST_VALUE];
 
-    if (!yaml_file_keys(file, "a line", node, LINE_NAMES, values))
+    if (!yaml_file_keys(file, "the line", node, LINE_NAMES, 1u << LINE | 1u << THE_FILE, values))
         return 0;
-    if (!values[LINE] || !values[THE_FILE])
-        return yaml_file_refuse(file, node, "the line has no key %s",
-                                values[LINE] ? "file" : "line");
     text = yaml_file_text(file, "line", values[LINE], LONGEST_LINE);
     path = text ? yaml_file_text(file, "file", values[THE_FILE], LONGEST_VALUE) : NULL;
     if (!path)
@@ -253,11 +249,12 @@ static int read_line(yaml_file *file, const yaml_node_t *node, void *setup)
 static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
 {
     bridge_setup *into = (bridge_setup *)setup;
-    yaml_node_t *values[BRIDGE_KEYS] = {NULL};
+    const yaml_node_t *values[BRIDGE_KEYS] = {NULL};
     const char *text, *wrong;
+    size_t count, at;
     int setting;
 
-    if (!yaml_file_keys(file, "the file", root, bridge_names, values))
+    if (!yaml_file_keys(file, "the file", root, bridge_names, 1u << BRIDGE_THE_LINES, values))
         return 0;
     for (setting = 0; setting < BRIDGE_SETTINGS; setting++) {
         if (!values[setting])
@@ -272,9 +269,11 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
     wrong = bridge_setup_check(into, "");
     if (wrong)
         return yaml_file_refuse(file, root, "%s", wrong);
-    if (!values[BRIDGE_THE_LINES])
-        return yaml_file_refuse(file, root, "the file has no key lines");
-    return yaml_file_list(file, "lines", values[BRIDGE_THE_LINES], BRIDGE_LINES, read_line, into);
+    count = yaml_file_items(file, "lines", values[BRIDGE_THE_LINES], BRIDGE_LINES);
+    for (at = 0; at < count; at++)
+        if (!read_line(file, yaml_file_item(file, values[BRIDGE_THE_LINES], at), into))
+            return 0;
+    return count > 0;
 }
 
 int bridge_file_read(bridge_setup *into, const char *path)

@@ -119,25 +119,20 @@ const char *gateway_setup_listen(gateway_setup *to, const char *text)
 /* --- the file --- */
 
 /* Reads the settings that a line may have of its own. The keys follow each other. */
-static int read_pace(yaml_file *file, yaml_node_t *const *values, gateway_pace *pace)
+static int read_pace(yaml_file *file, const yaml_node_t *const *values, gateway_pace *pace)
 {
     return yaml_file_time(file, "timeout", values[0], 1, UINT16_MAX, &pace->timeoutMs) &&
            yaml_file_time(file, "quiet_time", values[1], 0, UINT16_MAX, &pace->quietMs) &&
            yaml_file_number(file, "in_flight", values[2], 1, MBM_CLIENT_DEPTH, &pace->in_flight);
 }
 
-static int read_line(yaml_file *file, const yaml_node_t *node, void *setup)
+static int read_line(yaml_file *file, const yaml_node_t *node, gateway_setup *into)
 {
-    gateway_setup *into = (gateway_setup *)setup;
-    yaml_node_t *values[LINE_KEYS] = {NULL};
+    const yaml_node_t *values[LINE_KEYS] = {NULL};
     const char *text, *wrong;
 
-    if (!yaml_file_keys(file, "a line", node, LINE_NAMES, values))
+    if (!yaml_file_keys(file, "the line", node, LINE_NAMES, 1u << LINE | 1u << UNITS, values))
         return 0;
-    if (!values[LINE])
-        return yaml_file_refuse(file, node, "the line has no key line");
-    if (!values[UNITS])
-        return yaml_file_refuse(file, node, "the line has no units, such as \"units: 1-31\"");
     text = yaml_file_text(file, "line", values[LINE], LONGEST_LINE);
     if (!text)
         return 0;
@@ -157,14 +152,13 @@ static int read_line(yaml_file *file, const yaml_node_t *node, void *setup)
 static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
 {
     gateway_setup *into = (gateway_setup *)setup;
-    yaml_node_t *values[GATEWAY_KEYS] = {NULL};
+    const yaml_node_t *values[GATEWAY_KEYS] = {NULL};
     const char *text, *wrong;
+    size_t count, at;
 
-    if (!yaml_file_keys(file, "the file", root, GATEWAY_NAMES, values))
+    if (!yaml_file_keys(file, "the file", root, GATEWAY_NAMES, 1u << LISTEN | 1u << THE_LINES,
+                        values))
         return 0;
-    if (!values[LISTEN] || !values[THE_LINES])
-        return yaml_file_refuse(file, root, "the file has no key %s",
-                                values[LISTEN] ? "lines" : "listen");
     text = yaml_file_text(file, "listen", values[LISTEN], LONGEST_LINE);
     if (!text)
         return 0;
@@ -179,7 +173,11 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
         !yaml_file_time(file, "queue_time", values[QUEUE_TIME], 0, UINT16_MAX, &into->queueMs) ||
         !read_pace(file, &values[TIMEOUT], &into->pace))
         return 0;
-    return yaml_file_list(file, "lines", values[THE_LINES], GATEWAY_LINES, read_line, into);
+    count = yaml_file_items(file, "lines", values[THE_LINES], GATEWAY_LINES);
+    for (at = 0; at < count; at++)
+        if (!read_line(file, yaml_file_item(file, values[THE_LINES], at), into))
+            return 0;
+    return count > 0;
 }
 
 int gateway_file_read(gateway_setup *into, const char *path)

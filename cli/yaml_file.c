@@ -11,7 +11,7 @@
 
 enum { MOST_WORD = 100 };
 
-static size_t line_of(const yaml_node_t *node)
+size_t yaml_file_line(const yaml_node_t *node)
 {
     return node->start_mark.line + 1;
 }
@@ -38,7 +38,7 @@ int yaml_file_refuse(yaml_file *file, const yaml_node_t *node, const char *forma
     va_list values;
 
     va_start(values, format);
-    (void)refuse_at(file, node ? line_of(node) : 0, format, values);
+    (void)refuse_at(file, node ? yaml_file_line(node) : 0, format, values);
     va_end(values);
     return 0;
 }
@@ -53,18 +53,21 @@ __attribute__((format(printf, 3, 4))) static void refuse_line(yaml_file *file, s
     va_end(values);
 }
 
-static void fail(yaml_file *file, int error)
+int yaml_file_fail(yaml_file *file, int error)
 {
+    if (file->code != CODE_DONE)
+        return 0;
     refuse_line(file, 0, "%s", strerror(error));
     file->code = CODE_SYSTEM;
+    return 0;
 }
 
 static void refuse_syntax(yaml_file *file, const yaml_parser_t *parser, FILE *from)
 {
     if (parser->error == YAML_MEMORY_ERROR)
-        fail(file, ENOMEM);
+        (void)yaml_file_fail(file, ENOMEM);
     else if (ferror(from))
-        fail(file, errno);
+        (void)yaml_file_fail(file, errno);
     else if (parser->error == YAML_READER_ERROR)
         refuse_line(file, 0, "this is not YAML: %s, at byte %zu", parser->problem,
                     parser->problem_offset);
@@ -106,13 +109,13 @@ static yaml_node_t *open_file(yaml_file *file, const char *path)
     file->path = path;
     from = fopen(path, "rb");
     if (!from)
-        return fail(file, errno), NULL;
+        return yaml_file_fail(file, errno), NULL;
     if (yaml_parser_initialize(&parser)) {
         yaml_parser_set_input_file(&parser, from);
         read_document(file, &parser, from);
         yaml_parser_delete(&parser);
     } else {
-        fail(file, ENOMEM);
+        (void)yaml_file_fail(file, ENOMEM);
     }
     (void)fclose(from);
     root = file->code == CODE_DONE ? yaml_document_get_root_node(&file->document) : NULL;
@@ -139,7 +142,8 @@ const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *
     const unsigned char *at;
 
     if (node->type != YAML_SCALAR_NODE)
-        return yaml_file_refuse(file, node, "%s is a list or a mapping: it must be one word", key),
+        return yaml_file_refuse(file, node, "%s is a %s: it must be one word", key,
+                                node->type == YAML_SEQUENCE_NODE ? "list" : "mapping"),
                NULL;
     if (node->data.scalar.length == 0)
         return yaml_file_refuse(file, node, "%s is empty", key), NULL;
@@ -152,18 +156,58 @@ const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *
     return (const char *)node->data.scalar.value;
 }
 
+int yaml_file_copy(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
+                   char **copy)
+{
+    const char *text;
+
+    if (!node)
+        return 1;
+    text = yaml_file_text(file, key, node, most);
+    if (!text)
+        return 0;
+    *copy = strdup(text);
+    return *copy ? 1 : yaml_file_fail(file, ENOMEM);
+}
+
+int yaml_file_word(yaml_file *file, const char *key, const yaml_node_t *node,
+                   const char *const *words, int *index)
+{
+    const char *text, *wrong;
+
+    if (!node)
+        return 1;
+    text = yaml_file_text(file, key, node, MOST_WORD);
+    if (!text)
+        return 0;
+    wrong = number_word(text, words, index);
+    return wrong ? yaml_file_refuse(file, node, "%s: %s", key, wrong) : 1;
+}
+
+const char *yaml_file_decimal(yaml_file *file, const char *key, const yaml_node_t *node)
+{
+    const char *text = yaml_file_text(file, key, node, MOST_WORD);
+
+    /* Other programs read such a number as octal. */
+    if (text && ((text[0] == '0' && text[1]) || (text[0] == '-' && text[1] == '0')))
+        return yaml_file_refuse(file, node, "%s: \"%s\" begins with 0: write a decimal number", key,
+                                text),
+               NULL;
+    return text;
+}
+
 int yaml_file_number(yaml_file *file, const char *key, const yaml_node_t *node, uint32_t least,
                      uint32_t most, uint32_t *value)
 {
-    const char *word, *wrong;
+    const char *text, *wrong;
     int64_t number;
 
     if (!node)
         return 1;
-    word = yaml_file_text(file, key, node, MOST_WORD);
-    if (!word)
+    text = yaml_file_decimal(file, key, node);
+    if (!text)
         return 0;
-    wrong = number_read(word, least, most, &number);
+    wrong = number_read(text, least, most, &number);
     if (wrong)
         return yaml_file_refuse(file, node, "%s: %s", key, wrong);
     *value = (uint32_t)number;
@@ -173,58 +217,91 @@ int yaml_file_number(yaml_file *file, const char *key, const yaml_node_t *node, 
 int yaml_file_time(yaml_file *file, const char *key, const yaml_node_t *node, uint32_t least,
                    uint32_t most, uint32_t *value)
 {
-    const char *word, *wrong;
+    const char *text, *wrong;
 
     if (!node)
         return 1;
-    word = yaml_file_text(file, key, node, MOST_WORD);
-    if (!word)
+    text = yaml_file_text(file, key, node, MOST_WORD);
+    if (!text)
         return 0;
-    wrong = number_time(word, least, most, value);
+    wrong = number_time(text, least, most, value);
     return wrong ? yaml_file_refuse(file, node, "%s: %s", key, wrong) : 1;
 }
 
-int yaml_file_keys(yaml_file *file, const char *what, const yaml_node_t *mapping,
-                   const char *const *names, yaml_node_t **values)
+size_t yaml_file_size(const yaml_node_t *node)
 {
-    yaml_node_pair_t *pair;
+    switch (node->type) {
+    case YAML_SEQUENCE_NODE:
+        return (size_t)(node->data.sequence.items.top - node->data.sequence.items.start);
+    case YAML_MAPPING_NODE:
+        return (size_t)(node->data.mapping.pairs.top - node->data.mapping.pairs.start);
+    default: return 0;
+    }
+}
+
+/* The size of a list or a mapping, which must be 1 to `most`. Returns 0 after a refusal. */
+static size_t check_size(yaml_file *file, const char *key, const yaml_node_t *node, size_t most)
+{
+    const size_t size = yaml_file_size(node);
+
+    if (size == 0)
+        (void)yaml_file_refuse(file, node, "%s is empty", key);
+    if (size > most)
+        (void)yaml_file_refuse(file, node, "%s has %zu items: %zu are allowed", key, size, most);
+    return size <= most ? size : 0;
+}
+
+size_t yaml_file_items(yaml_file *file, const char *key, const yaml_node_t *node, size_t most)
+{
+    if (node->type == YAML_SEQUENCE_NODE)
+        return check_size(file, key, node, most);
+    (void)yaml_file_refuse(file, node, "%s must be a list: each item begins with \"-\"", key);
+    return 0;
+}
+
+size_t yaml_file_pairs(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
+                       const char *of)
+{
+    if (node->type == YAML_MAPPING_NODE)
+        return check_size(file, key, node, most);
+    (void)yaml_file_refuse(file, node, "%s must be a mapping of %s", key, of);
+    return 0;
+}
+
+const yaml_node_t *yaml_file_item(yaml_file *file, const yaml_node_t *list, size_t at)
+{
+    return yaml_document_get_node(&file->document, list->data.sequence.items.start[at]);
+}
+
+yaml_file_pair yaml_file_pair_at(yaml_file *file, const yaml_node_t *mapping, size_t at)
+{
+    const yaml_node_pair_t *pair = &mapping->data.mapping.pairs.start[at];
+
+    return (yaml_file_pair){yaml_document_get_node(&file->document, pair->key),
+                            yaml_document_get_node(&file->document, pair->value)};
+}
+
+int yaml_file_keys(yaml_file *file, const char *what, const yaml_node_t *mapping,
+                   const char *const *names, uint32_t needed, const yaml_node_t **values)
+{
+    size_t at;
+    int index = 0;
 
     if (mapping->type != YAML_MAPPING_NODE)
         return yaml_file_refuse(file, mapping, "%s must be a mapping of keys, such as \"%s:\"",
                                 what, names[0]);
-    for (pair = mapping->data.mapping.pairs.start; pair < mapping->data.mapping.pairs.top; pair++) {
-        const yaml_node_t *key = yaml_document_get_node(&file->document, pair->key);
-        const char *word = yaml_file_text(file, "a key", key, MOST_WORD), *wrong;
-        int index;
+    for (at = 0; at < yaml_file_size(mapping); at++) {
+        const yaml_file_pair pair = yaml_file_pair_at(file, mapping, at);
 
-        if (!word)
+        if (!yaml_file_word(file, "key", pair.key, names, &index))
             return 0;
-        wrong = number_word(word, names, &index);
-        if (wrong)
-            return yaml_file_refuse(file, key, "key: %s", wrong);
         if (values[index])
-            return yaml_file_refuse(file, key, "%s is there twice, first in line %zu", names[index],
-                                    line_of(values[index]));
-        values[index] = yaml_document_get_node(&file->document, pair->value);
+            return yaml_file_refuse(file, pair.key, "%s is there twice, first in line %zu",
+                                    names[index], yaml_file_line(values[index]));
+        values[index] = pair.value;
     }
-    return 1;
-}
-
-int yaml_file_list(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
-                   yaml_file_reader read, void *into)
-{
-    const yaml_node_item_t *item;
-    size_t count;
-
-    if (node->type != YAML_SEQUENCE_NODE)
-        return yaml_file_refuse(file, node, "%s must be a list: each item begins with \"-\"", key);
-    count = (size_t)(node->data.sequence.items.top - node->data.sequence.items.start);
-    if (count == 0)
-        return yaml_file_refuse(file, node, "%s is empty", key);
-    if (count > most)
-        return yaml_file_refuse(file, node, "%s has %zu items: %zu are allowed", key, count, most);
-    for (item = node->data.sequence.items.start; item < node->data.sequence.items.top; item++)
-        if (!read(file, yaml_document_get_node(&file->document, *item), into))
-            return 0;
+    for (index = 0; names[index]; index++)
+        if ((needed >> index & 1) && !values[index])
+            return yaml_file_refuse(file, mapping, "%s has no key %s", what, names[index]);
     return 1;
 }

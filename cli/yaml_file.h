@@ -17,7 +17,7 @@ typedef struct yaml_file {
     char wrong[YAML_FILE_WRONG_BYTES]; /* a sentence without its full stop: "FILE:12: ..." */
 } yaml_file;
 
-/* Reads a part of a file into `into`. Returns 0 after a refusal. */
+/* Reads the root of a file into `into`. Returns 0 after a refusal. */
 typedef int (*yaml_file_reader)(yaml_file *file, const yaml_node_t *node, void *into);
 
 /* Reads a file into `into`: `read` gets its root. Returns CODE_DONE; CODE_SYSTEM or CODE_WRONG with
@@ -25,25 +25,60 @@ typedef int (*yaml_file_reader)(yaml_file *file, const yaml_node_t *node, void *
 int yaml_file_read(const char *path, yaml_file_reader read, void *into,
                    char wrong[YAML_FILE_WRONG_BYTES]);
 
+/* The line of the file in which a node begins, from 1 on. */
+size_t yaml_file_line(const yaml_node_t *node);
+
 /* Notes what is wrong, if it is the first. `node` says the line; NULL for none. Returns 0. */
 int yaml_file_refuse(yaml_file *file, const yaml_node_t *node, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* Sorts the values of a mapping by their keys: values[i] is that of names[i], NULL without one. The
- * names end with NULL. Returns 0 after a refusal: `what` names the mapping there. */
-int yaml_file_keys(yaml_file *file, const char *what, const yaml_node_t *mapping,
-                   const char *const *names, yaml_node_t **values);
+/* Notes a failure of the system, an errno, if it is the first. Returns 0. */
+int yaml_file_fail(yaml_file *file, int error);
 
-/* The text of a node of at most `most` bytes and without control characters, the number or the time
- * in milliseconds that it is. They return NULL or 0 after a refusal; a number of no node stays. */
+/* Sorts the values of a mapping by their keys: values[i] is that of names[i], NULL without one. The
+ * names end with NULL. If bit i of `needed` is set, the key names[i] must be there. Returns 0 after
+ * a refusal: `what` names the mapping there, such as "the line". */
+int yaml_file_keys(yaml_file *file, const char *what, const yaml_node_t *mapping,
+                   const char *const *names, uint32_t needed, const yaml_node_t **values);
+
+/* --- one word --- */
+
+/* The text of a node of at most `most` bytes and without control characters. Returns NULL after a
+ * refusal. */
 const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *node, size_t most);
+
+/* The same of a number, which must not begin with 0. */
+const char *yaml_file_decimal(yaml_file *file, const char *key, const yaml_node_t *node);
+
+/* Read a copy of the text, for free(); the place of the word in a list that NULL ends, from 0 on;
+ * the number; the time in milliseconds. Of a node that is NULL the value stays. They return 0 after
+ * a refusal. */
+int yaml_file_copy(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
+                   char **copy);
+int yaml_file_word(yaml_file *file, const char *key, const yaml_node_t *node,
+                   const char *const *words, int *index);
 int yaml_file_number(yaml_file *file, const char *key, const yaml_node_t *node, uint32_t least,
                      uint32_t most, uint32_t *value);
 int yaml_file_time(yaml_file *file, const char *key, const yaml_node_t *node, uint32_t least,
                    uint32_t most, uint32_t *value);
 
-/* Reads each item of a list of 1 to `most`. Returns 0 after a refusal. */
-int yaml_file_list(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
-                   yaml_file_reader read, void *into);
+/* --- lists and mappings --- */
+
+/* How many items a list or pairs a mapping has; 0 of a word. */
+size_t yaml_file_size(const yaml_node_t *node);
+
+/* The size of a node that must be a list, or a mapping with keys that the user chooses, of 1 to
+ * `most`. `of` says what a mapping consists of, such as "numbers to names". Return 0 after a
+ * refusal. */
+size_t yaml_file_items(yaml_file *file, const char *key, const yaml_node_t *node, size_t most);
+size_t yaml_file_pairs(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
+                       const char *of);
+
+/* An item of a list, or a pair of a mapping. `at` is less than its size. */
+typedef struct yaml_file_pair {
+    const yaml_node_t *key, *value;
+} yaml_file_pair;
+const yaml_node_t *yaml_file_item(yaml_file *file, const yaml_node_t *list, size_t at);
+yaml_file_pair yaml_file_pair_at(yaml_file *file, const yaml_node_t *mapping, size_t at);
 
 #endif

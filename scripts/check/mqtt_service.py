@@ -297,7 +297,7 @@ WRONG = [
     ("", "the file is empty"),
     ("topic: hall\n", ":1: the file has no key lines"),
     ("lines: []\n", ":1: lines is empty"),
-    ("broker: [1]\nlines: []\n", ":1: broker is a list or a mapping"),
+    ("broker: [1]\nlines: []\n", ":1: broker is a list: it must be one word"),
     ("broker: a:b:c\nlines: []\n", ':1: broker: "a:b:c" is not HOST or HOST:PORT'),
     ("broker: host:0\nlines: []\n", ":1: broker: its port"),
     ("topic: a/#\nlines: []\n", ':1: topic: "a/#" is not 1 to 200 bytes'),
