@@ -263,7 +263,7 @@ $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsu
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value cursor)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
-$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device value cursor numbers report)
+$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device device_file device_value yaml_file value cursor numbers report)
 $(BUILD)/$(1)/test_place: $(patsubst %,$(BUILD)/$(1)/cli/%.o,place numbers)
 $(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))

@@ -1,6 +1,6 @@
 /* The device file: what is read from it, and each refusal with the line and the reason. */
 #define _GNU_SOURCE
-#include "device.h"
+#include "device_file.h"
 #include "report.h"
 #include "test.h"
 
@@ -11,6 +11,7 @@
 
 static char path[] = "/tmp/mbm-device-XXXXXX";
 static device meter;
+static char wrong[YAML_FILE_WRONG_BYTES];
 
 static int make_file(void **state)
 {
@@ -33,22 +34,22 @@ static int read_bytes(const char *text, size_t length)
     assert_non_null(file);
     assert_int_equal(fwrite(text, 1, length, file), length);
     assert_int_equal(fclose(file), 0);
-    return device_read(&meter, path);
+    return device_file_read(&meter, path, wrong);
 }
 
 static void read_text(const char *text)
 {
     if (read_bytes(text, strlen(text)) != CODE_DONE)
-        fail_msg("%s", meter.wrong);
+        fail_msg("%s", wrong);
 }
 
 static void expect_reason(const char *text, size_t length, const char *reason)
 {
-    char wanted[DEVICE_WRONG_BYTES + sizeof path];
+    char wanted[YAML_FILE_WRONG_BYTES + sizeof path];
 
     assert_int_equal(read_bytes(text, length), CODE_WRONG);
     snprintf(wanted, sizeof wanted, "%s:%s", path, reason);
-    assert_string_equal(meter.wrong, wanted);
+    assert_string_equal(wrong, wanted);
     assert_null(meter.fields);
     assert_null(meter.planned);
     assert_int_equal(meter.count, 0);
@@ -277,28 +278,29 @@ static void a_wrong_key_is_refused_with_its_line(void **state)
         {UINT16("unit: 1\nunit: 2\n"), "7: unit is there twice, first in line 6"},
         {UINT16("    [a]: 1\n"), "6: key is a list: it must be one word"},
         {UINT16("    \"\": 1\n"), "6: key is empty"},
-        {"fields:\n- table: holding\n  address: 0\n  type: uint16\n", "2: the field has no name"},
-        {"fields:\n- name: a\n  address: 0\n  type: uint16\n", "2: the field has no table"},
-        {"fields:\n- name: a\n  table: input\n  type: uint16\n", "2: the field has no address"},
-        {"fields:\n- name: a\n  table: input\n  address: 0\n", "2: the field has no type"},
+        {"fields:\n- table: holding\n  address: 0\n  type: uint16\n",
+         "2: the field has no key name"},
+        {"fields:\n- name: a\n  address: 0\n  type: uint16\n", "2: the field has no key table"},
+        {"fields:\n- name: a\n  table: input\n  type: uint16\n", "2: the field has no key address"},
+        {"fields:\n- name: a\n  table: input\n  address: 0\n", "2: the field has no key type"},
         {FIELD("    type: text\n"), "2: a text needs its number of characters as count"},
         {"unit: 1\n", "1: the file has no key fields"},
-        {"- a\n", "1: the file has no key fields"},
-        {"meter\n", "1: the file has no key fields"},
+        {"- a\n", "1: the file must be a mapping of keys, such as \"device:\""},
+        {"meter\n", "1: the file must be a mapping of keys, such as \"device:\""},
         {"", " the file is empty"},
         {"# nothing\n", " the file is empty"},
         {"fields: []\n", "1: fields is empty"},
-        {"fields:\n", "1: fields must be a list: each field begins with \"-\""},
-        {"fields:\n  name: a\n", "2: fields must be a list: each field begins with \"-\""},
-        {"fields:\n  - a\n", "2: a field is a mapping that begins with \"- name:\""},
-        {"fields:\n  - [a]\n", "2: a field is a mapping that begins with \"- name:\""},
+        {"fields:\n", "1: fields must be a list: each item begins with \"-\""},
+        {"fields:\n  name: a\n", "2: fields must be a list: each item begins with \"-\""},
+        {"fields:\n  - a\n", "2: the field must be a mapping of keys, such as \"name:\""},
+        {"fields:\n  - [a]\n", "2: the field must be a mapping of keys, such as \"name:\""},
         {UINT16("    unit: [1, 2]\n"), "6: unit is a list: it must be one word"},
         {UINT16("    unit: {a: b}\n"), "6: unit is a mapping: it must be one word"},
         {UINT16("    unit:\n"), "6: unit is empty"},
         {UINT16("    description: \"a\\0b\"\n"), "6: description has a control character"},
         {UINT16("    description: \"a\\nb\"\n"), "6: description has a control character"},
         {"device: \"\"\n" UINT16(""), "1: device is empty"},
-        {UINT16("---\n") UINT16(""), "7: a second document begins: a file has one device"},
+        {UINT16("---\n") UINT16(""), "7: a second document begins: the file has one"},
     };
     unsigned i;
 
@@ -455,7 +457,9 @@ static void a_wrong_enumeration_is_refused_with_its_line(void **state)
         {FIELD("    type: bit\n    bit: 4\n    count: 3\n    enumeration: {8: on}\n"),
          "8: enumeration: \"8\" is out of range: from 0 to 7 is allowed"},
         {UINT16("    enumeration: {0x10: off}\n"),
-         "6: enumeration: \"0x10\" is not a whole decimal number"},
+         "6: enumeration: \"0x10\" begins with 0: write a decimal number"},
+        {UINT16("    enumeration: {-0: off}\n"),
+         "6: enumeration: \"-0\" begins with 0: write a decimal number"},
         {UINT16("    enumeration: {1.5: off}\n"),
          "6: enumeration: \"1.5\" is not a whole decimal number"},
         {UINT16("    enumeration: {off: 1}\n"),
@@ -503,17 +507,18 @@ static void what_is_not_yaml_is_refused(void **state)
 static void an_anchor_that_holds_itself_is_refused(void **state)
 {
     (void)state;
-    expect_refused("fields: &a [*a]\n", "1: a field is a mapping that begins with \"- name:\"");
-    expect_refused("&a {fields: *a}\n", "1: fields must be a list: each field begins with \"-\"");
+    expect_refused("fields: &a [*a]\n",
+                   "1: the field must be a mapping of keys, such as \"name:\"");
+    expect_refused("&a {fields: *a}\n", "1: fields must be a list: each item begins with \"-\"");
 }
 
 static void a_file_that_cannot_be_read_is_a_failure_of_the_system(void **state)
 {
     (void)state;
-    assert_int_equal(device_read(&meter, "/nowhere/meter.yaml"), CODE_SYSTEM);
-    assert_string_equal(meter.wrong, "/nowhere/meter.yaml: No such file or directory");
-    assert_int_equal(device_read(&meter, "/tmp"), CODE_SYSTEM);
-    assert_string_equal(meter.wrong, "/tmp: Is a directory");
+    assert_int_equal(device_file_read(&meter, "/nowhere/meter.yaml", wrong), CODE_SYSTEM);
+    assert_string_equal(wrong, "/nowhere/meter.yaml: No such file or directory");
+    assert_int_equal(device_file_read(&meter, "/tmp", wrong), CODE_SYSTEM);
+    assert_string_equal(wrong, "/tmp: Is a directory");
 }
 
 static void a_file_has_at_most_as_many_fields_as_a_plan(void **state)
@@ -529,7 +534,7 @@ static void a_file_has_at_most_as_many_fields_as_a_plan(void **state)
     for (i = 0; i <= MBM_PLAN_MAX_FIELDS; i++)
         length += (size_t)snprintf(text + length, size - length,
                                    "- {name: n%d, table: coils, address: %d}\n", i, i);
-    snprintf(reason, sizeof reason, "2: the file has %d fields: %d are allowed",
+    snprintf(reason, sizeof reason, "2: fields has %d items: %d are allowed",
              MBM_PLAN_MAX_FIELDS + 1, MBM_PLAN_MAX_FIELDS);
     expect_reason(text, length, reason);
     free(text);
@@ -593,7 +598,7 @@ static void any_damaged_file_is_read_or_refused(void **state)
             right++;
             device_free(&meter);
         } else {
-            assert_int_equal(memcmp(meter.wrong, path, strlen(path)), 0);
+            assert_int_equal(memcmp(wrong, path, strlen(path)), 0);
         }
     }
     assert_in_range(right, 100, 19900);

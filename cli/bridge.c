@@ -48,7 +48,7 @@ static bridge_line *find_line(const char *text, const char *topic)
 
 /* Prepares a line of a setup. Returns an exit code, with the reason in `wrong`. */
 static int prepare(const bridge_setup *from, unsigned index, next_line *next,
-                   char wrong[DEVICE_WRONG_BYTES])
+                   char wrong[YAML_FILE_WRONG_BYTES])
 {
     const char *file = from->lines[index].path;
     int code;
@@ -62,7 +62,7 @@ static int prepare(const bridge_setup *from, unsigned index, next_line *next,
         next->line = bridge_line_make(from->lines[index].text, file, from->lines[index].topic,
                                       &from->lines[index].place);
     if (!next->line) {
-        snprintf(wrong, DEVICE_WRONG_BYTES, "not enough memory");
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "not enough memory");
         return CODE_SYSTEM;
     }
     if (!next->is_new && strcmp(next->line->path, file) == 0 &&
@@ -87,7 +87,7 @@ static void forget(next_line *next, unsigned count)
 /* Prepares all lines of a setup. Returns an exit code, with the reason in `wrong`; nothing is left
  * then. */
 static int prepare_all(const bridge_setup *from, next_line next[BRIDGE_LINES],
-                       char wrong[DEVICE_WRONG_BYTES])
+                       char wrong[YAML_FILE_WRONG_BYTES])
 {
     unsigned i;
     int code = CODE_DONE;
@@ -180,7 +180,7 @@ static void reload(void)
 {
     static next_line next_lines[BRIDGE_LINES];
     static bridge_setup next;
-    char wrong[DEVICE_WRONG_BYTES] = "";
+    char wrong[YAML_FILE_WRONG_BYTES] = "";
     const char *differs;
 
     service_is_reloading();
@@ -460,7 +460,7 @@ static const struct argp parser = {
 static int begin_lines(void)
 {
     static next_line next[BRIDGE_LINES];
-    char wrong[DEVICE_WRONG_BYTES];
+    char wrong[YAML_FILE_WRONG_BYTES];
     unsigned i;
     int code = prepare_all(&setup, next, wrong);
 

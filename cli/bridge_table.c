@@ -2,6 +2,7 @@
 #include "bridge_table.h"
 
 #include "broker.h"
+#include "device_file.h"
 #include "report.h"
 #include "trial.h"
 
@@ -43,7 +44,7 @@ static const char *check_field(const device_field *field, const mbm_planField *p
 }
 
 /* Returns an exit code; with the reason in `wrong` if it is not CODE_DONE. */
-static int check_fields(const device *of, const char *path, char wrong[DEVICE_WRONG_BYTES])
+static int check_fields(const device *of, const char *path, char wrong[YAML_FILE_WRONG_BYTES])
 {
     uint16_t field;
 
@@ -52,13 +53,13 @@ static int check_fields(const device *of, const char *path, char wrong[DEVICE_WR
 
         if (!why)
             continue;
-        snprintf(wrong, DEVICE_WRONG_BYTES, "%s:%d: %s: %s", path, of->fields[field].line,
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s:%d: %s: %s", path, of->fields[field].line,
                  of->fields[field].name, why);
         return CODE_WRONG;
     }
     if (of->readable > 0)
         return CODE_DONE;
-    snprintf(wrong, DEVICE_WRONG_BYTES, "%s: no field can be read", path);
+    snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: no field can be read", path);
     return CODE_WRONG;
 }
 
@@ -85,7 +86,7 @@ static int make_storage(bridge_table *table, uint8_t register_gap)
 }
 
 /* Tries the plan. Returns an exit code. */
-static int try_plan(const bridge_table *table, const char *path, char wrong[DEVICE_WRONG_BYTES])
+static int try_plan(const bridge_table *table, const char *path, char wrong[YAML_FILE_WRONG_BYTES])
 {
     static mbm_plan plan = MBM_INIT;
     uint16_t field;
@@ -95,32 +96,30 @@ static int try_plan(const bridge_table *table, const char *path, char wrong[DEVI
     if (status == MBM_OK)
         return CODE_DONE;
     if (field < table->fields.readable)
-        snprintf(wrong, DEVICE_WRONG_BYTES, "%s:%d: %s", path, table->fields.fields[field].line,
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s:%d: %s", path, table->fields.fields[field].line,
                  mbm_status_text(status));
     else
-        snprintf(wrong, DEVICE_WRONG_BYTES, "%s: %s", path, mbm_status_text(status));
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: %s", path, mbm_status_text(status));
     return CODE_WRONG;
 }
 
 bridge_table *bridge_table_read(const char *path, uint8_t register_gap, int *code,
-                                char wrong[DEVICE_WRONG_BYTES])
+                                char wrong[YAML_FILE_WRONG_BYTES])
 {
     bridge_table *table = (bridge_table *)calloc(1, sizeof *table);
 
     if (!table) {
-        snprintf(wrong, DEVICE_WRONG_BYTES, "%s: not enough memory", path);
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: not enough memory", path);
         *code = CODE_SYSTEM;
         return NULL;
     }
     table->digest = digest_of(path);
-    *code = device_read(&table->fields, path);
-    if (*code != CODE_DONE)
-        snprintf(wrong, DEVICE_WRONG_BYTES, "%s", table->fields.wrong);
-    else
+    *code = device_file_read(&table->fields, path, wrong);
+    if (*code == CODE_DONE)
         *code = check_fields(&table->fields, path, wrong);
     if (*code == CODE_DONE && !make_storage(table, register_gap)) {
         *code = CODE_SYSTEM;
-        snprintf(wrong, DEVICE_WRONG_BYTES, "%s: not enough memory", path);
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: not enough memory", path);
     }
     if (*code == CODE_DONE)
         *code = try_plan(table, path, wrong);

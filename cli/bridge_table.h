@@ -6,6 +6,7 @@
 #define BRIDGE_TABLE_H
 
 #include "device.h"
+#include "yaml_file.h"
 
 enum { BRIDGE_REQUESTS = 4 /* reads in the client's queue at once */ };
 
@@ -34,7 +35,7 @@ typedef struct bridge_table {
 /* Reads a device file for the bridge, and checks that a plan can read it. Returns NULL after a
  * failure; `code` has its exit code and `wrong` the reason, a sentence without its full stop. */
 bridge_table *bridge_table_read(const char *path, uint8_t register_gap, int *code,
-                                char wrong[DEVICE_WRONG_BYTES]);
+                                char wrong[YAML_FILE_WRONG_BYTES]);
 void bridge_table_free(bridge_table *table);
 
 #endif

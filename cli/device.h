@@ -1,15 +1,4 @@
-/* The device file: the fields of a device, as mbm poll, mbm serve, mbm bridge and mbm header read
- * them.
- *
- *     device: SDM120
- *     unit: 1
- *     fields:
- *       - name: voltage
- *         table: input
- *         address: 0
- *         type: float
- *
- * docs/serve.md describes every key.
+/* A device: its fields and what each of them is, as a device file says.
  *
  * Licence: MIT OR Apache-2.0. */
 #ifndef DEVICE_H
@@ -20,8 +9,8 @@
 /* What a field allows. */
 enum { DEVICE_READ = 1, DEVICE_WRITE = 2 };
 
-/* Bytes of the longest name of a field, and of the longest reason why a file is refused. */
-enum { DEVICE_NAME_BYTES = 200, DEVICE_WRONG_BYTES = 600 };
+/* Bytes of the longest name. */
+enum { DEVICE_NAME_BYTES = 200 };
 
 /* A number of an enumeration and its name. */
 typedef struct device_label {
@@ -50,14 +39,9 @@ typedef struct device {
     uint8_t writes_masks; /* the device has function 22, by which bits of a register are written */
     device_field *fields;
     mbm_planField *planned; /* the same fields for mbm_plan_begin */
-    char wrong[DEVICE_WRONG_BYTES];
 } device;
 
-/* Reads a file. Returns CODE_DONE; or CODE_SYSTEM or CODE_WRONG with the reason in `wrong`, a
- * sentence without its full stop: "meter.yaml:12: ...". Then nothing is to be freed. */
-int device_read(device *into, const char *path);
-
-/* Frees what device_read allocated. */
+/* Frees all that a device has. */
 void device_free(device *into);
 
 /* Returns the index of the field with this name, or -1. */

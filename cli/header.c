@@ -5,6 +5,7 @@
 #include "header.h"
 
 #include "commands.h"
+#include "device_file.h"
 #include "options.h"
 #include "report.h"
 #include "trial.h"
@@ -336,12 +337,13 @@ static int make(header *h)
 int header_command(int argc, char **argv)
 {
     header h = {.of = &meter};
+    char wrong[YAML_FILE_WRONG_BYTES];
     int code;
 
     argp_parse(&arguments, argc, argv, 0, NULL, NULL);
-    code = device_read(&meter, wanted.file);
+    code = device_file_read(&meter, wanted.file, wrong);
     if (code != CODE_DONE)
-        return report(code, "%s", meter.wrong);
+        return report(code, "%s", wrong);
     h.path = wanted.file;
     h.file = strrchr(wanted.file, '/') ? strrchr(wanted.file, '/') + 1 : wanted.file;
     h.gap = wanted.gap;

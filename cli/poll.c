@@ -1,6 +1,7 @@
 /* mbm poll: reads the fields of a device file again and again. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "commands.h"
+#include "device_file.h"
 #include "line.h"
 #include "numbers.h"
 #include "options.h"
@@ -415,12 +416,13 @@ static void poll_rounds(void)
 
 int poll_command(int argc, char **argv)
 {
+    char wrong[YAML_FILE_WRONG_BYTES];
     int code;
 
     argp_parse(&arguments, argc, argv, 0, NULL, NULL);
-    code = device_read(&meter, wanted.file);
+    code = device_file_read(&meter, wanted.file, wrong);
     if (code != CODE_DONE)
-        return report(code, "%s", meter.wrong);
+        return report(code, "%s", wrong);
     code = line_open(&at, &where);
     if (code == CODE_DONE) {
         if (wanted.rounds == 1)

@@ -3,6 +3,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "commands.h"
+#include "device_file.h"
 #include "numbers.h"
 #include "options.h"
 #include "report.h"
@@ -174,13 +175,14 @@ int serve_command(int argc, char **argv)
     static served_units units;
     served_hook hook = {.before = serve_line_before, .context = &faults};
     device from = {0};
+    char wrong[YAML_FILE_WRONG_BYTES] = "";
     int code = CODE_DONE;
 
     argp_parse(&parser, argc, argv, 0, NULL, NULL);
     if (wanted.file)
-        code = device_read(&from, wanted.file);
+        code = device_file_read(&from, wanted.file, wrong);
     if (code != CODE_DONE)
-        return report(code, "%s", from.wrong);
+        return report(code, "%s", wrong);
     code = make_units(&units, &from, &hook);
     if (code == CODE_DONE)
         code = serve(&units);

@@ -1,0 +1,316 @@
+#include "device_file.h"
+
+#include "device_value.h"
+#include "report.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_REGISTERS = 125, MOST_BITS = 2000, MOST_DESCRIPTION = 10000 };
+
+/* The keys of the file and of a field. The numbers count from 0 here. */
+enum { DEVICE, DEVICE_UNIT, DEVICE_INTERVAL, DEVICE_ORDER, MASK_WRITE, FIELDS, DEVICE_KEYS };
+static const char *const DEVICE_NAMES[] = {"device",     "unit",   "interval", "order",
+                                           "mask_write", "fields", NULL};
+enum {
+    NAME,
+    TABLE,
+    ADDRESS,
+    TYPE,
+    BIT,
+    COUNT,
+    SCALE,
+    MEASURE,
+    ACCESS,
+    INTERVAL,
+    VALUE,
+    FIELD_UNIT,
+    ORDER,
+    DESCRIPTION,
+    ENUMERATION,
+    FIELD_KEYS
+};
+static const char *const FIELD_NAMES[] = {
+    "name",   "table",       "address",     "type",
+    "bit",    "count",       "scale",       "unit_of_measurement",
+    "access", "interval",    "value",       "unit",
+    "order",  "description", "enumeration", NULL};
+
+#define NEEDED_OF_FIELD (1u << NAME | 1u << TABLE | 1u << ADDRESS)
+
+/* Words whose numbers are their places: of access from 1 on, as of the words of value.h. */
+static const char *const ACCESS_NAMES[] = {"", "read", "write", "read-write", NULL};
+static const char *const ANSWERS[] = {"no", "yes", NULL};
+
+/* Reads a word as its number, from 1 on. Of no node the number stays. Returns 0 after a refusal. */
+static int read_word(yaml_file *file, const char *key, const yaml_node_t *node,
+                     const char *const *names, uint8_t *number)
+{
+    int index = *number - 1;
+
+    if (!yaml_file_word(file, key, node, names + 1, &index))
+        return 0;
+    *number = (uint8_t)(index + 1);
+    return 1;
+}
+
+/* --- a field --- */
+
+/* Whether table and type are known and go together. Returns 0 after a refusal. */
+static int read_type(yaml_file *file, const yaml_node_t *field, const yaml_node_t *const *values,
+                     mbm_planField *planned)
+{
+    int is_bits;
+
+    if (!read_word(file, "table", values[TABLE], value_table_names, &planned->table))
+        return 0;
+    is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
+    if (!values[TYPE] && !is_bits)
+        return yaml_file_refuse(file, field, "the field has no key type");
+    planned->type = MBM_TYPE_BIT;
+    if (!read_word(file, "type", values[TYPE], value_type_names, &planned->type))
+        return 0;
+    if (is_bits && planned->type != MBM_TYPE_BIT)
+        return yaml_file_refuse(file, values[TYPE],
+                                "type is %s: the type of coils and discrete inputs is bit",
+                                value_type_names[planned->type]);
+    if (values[BIT] && !device_is_part(planned))
+        return yaml_file_refuse(file, values[BIT],
+                                "bit is for fields of the type bit in the tables holding and "
+                                "input");
+    return 1;
+}
+
+/* Reads address and count, which must not reach beyond a request or the table. */
+static int read_place(yaml_file *file, const yaml_node_t *field, const yaml_node_t *const *values,
+                      mbm_planField *planned)
+{
+    uint32_t address = 0, bit = 0, count = 1, size;
+    const int is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
+
+    if (planned->type == MBM_TYPE_TEXT && !values[COUNT])
+        return yaml_file_refuse(file, field, "a text needs its number of characters as count");
+    if (!yaml_file_number(file, "address", values[ADDRESS], 0, 65535, &address) ||
+        !yaml_file_number(file, "bit", values[BIT], 0, 15, &bit) ||
+        !yaml_file_number(file, "count", values[COUNT], 1, MOST_BITS, &count))
+        return 0;
+    planned->address = (uint16_t)address;
+    planned->count = (uint16_t)count;
+    planned->bit = (uint8_t)bit;
+    if (device_is_part(planned) && bit + count > 16)
+        return yaml_file_refuse(
+            file, values[COUNT] ? values[COUNT] : field,
+            "the field has %u bits from bit %u on: a register has the bits 0 to 15", count, bit);
+    size = device_size(planned);
+    if (size > (is_bits ? MOST_BITS : MOST_REGISTERS))
+        return yaml_file_refuse(
+            file, values[COUNT] ? values[COUNT] : field,
+            "count is %u: these are %u registers, and one request reads at most %d", count, size,
+            MOST_REGISTERS);
+    if (address + size > 65536)
+        return yaml_file_refuse(file, values[ADDRESS],
+                                "the field has %u %s from address %u on: addresses end at 65535",
+                                size, is_bits ? "bits" : "registers", address);
+    return 1;
+}
+
+/* Reads what a field takes from the device unless it has its own. */
+static int read_shared(yaml_file *file, const yaml_node_t *unit, const yaml_node_t *interval,
+                       const yaml_node_t *order, mbm_planField *planned)
+{
+    uint32_t number = planned->unit;
+
+    if (!yaml_file_number(file, "unit", unit, 1, 255, &number) ||
+        !yaml_file_time(file, "interval", interval, 1, MBM_PLAN_LONGEST_INTERVAL,
+                        &planned->intervalMs) ||
+        !read_word(file, "order", order, value_order_names, &planned->order))
+        return 0;
+    planned->unit = (uint16_t)number;
+    return 1;
+}
+
+static int read_access(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
+                       int writes_masks, device_field *field)
+{
+    const int is_input =
+        planned->table == MBM_TABLE_DISCRETE_INPUTS || planned->table == MBM_TABLE_INPUT_REGISTERS;
+
+    field->access = DEVICE_READ;
+    if (!read_word(file, "access", node, ACCESS_NAMES, &field->access))
+        return 0;
+    if (field->access > DEVICE_READ && is_input)
+        return yaml_file_refuse(file, node,
+                                "access is %s: only coils and holding registers can be written",
+                                ACCESS_NAMES[field->access]);
+    if (field->access > DEVICE_READ && device_is_part(planned) && !writes_masks)
+        return yaml_file_refuse(file, node,
+                                "access is %s: bits of a register cannot be written, unless the "
+                                "device has function 22 and the file says \"mask_write: yes\"",
+                                ACCESS_NAMES[field->access]);
+    return 1;
+}
+
+static int read_scale(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
+                      device_field *field)
+{
+    const char *text;
+
+    field->form.type = planned->type;
+    field->form.order = planned->order;
+    if (!node)
+        return 1;
+    field->scale_line = (int)yaml_file_line(node);
+    text = yaml_file_text(file, "scale", node, VALUE_LONGEST);
+    if (!text)
+        return 0;
+    if (planned->type == MBM_TYPE_BIT || planned->type == MBM_TYPE_TEXT)
+        return yaml_file_refuse(file, node, "a %s has no scale", value_type_names[planned->type]);
+    if (!value_scale_read(text, &field->form.scale))
+        return yaml_file_refuse(
+            file, node, "scale: \"%s\" is not a decimal number of up to 18 digits other than 0",
+            text);
+    return 1;
+}
+
+/* Returns whether two fields have an address in common for which the file gives other values. */
+static int is_contradiction(const device *of, uint16_t one, uint16_t other)
+{
+    const mbm_planField *a = &of->planned[one], *b = &of->planned[other];
+    const uint16_t mask = device_mask(a) & device_mask(b);
+    const uint32_t end_a = a->address + device_size(a), end_b = b->address + device_size(b);
+    uint32_t at = a->address > b->address ? a->address : b->address;
+
+    if (a->unit != b->unit || a->table != b->table || !of->fields[one].words ||
+        !of->fields[other].words)
+        return 0;
+    for (; at < end_a && at < end_b; at++)
+        if ((of->fields[one].words[at - a->address] ^ of->fields[other].words[at - b->address]) &
+            mask)
+            return 1;
+    return 0;
+}
+
+/* Whether the last field goes with those before it. Returns 0 after a refusal. */
+static int check_others(yaml_file *file, const yaml_node_t *node, const device *of)
+{
+    const uint16_t last = (uint16_t)(of->count - 1);
+    const device_field *fields = of->fields;
+    uint16_t i;
+
+    for (i = 0; i < last; i++) {
+        if (strcmp(fields[i].name, fields[last].name) == 0)
+            return yaml_file_refuse(file, node, "the field in line %d has the name %s too",
+                                    fields[i].line, fields[i].name);
+        if (is_contradiction(of, i, last))
+            return yaml_file_refuse(file, node,
+                                    "%s shares an address with %s of line %d, and has another "
+                                    "value",
+                                    fields[last].name, fields[i].name, fields[i].line);
+    }
+    return 1;
+}
+
+/* Reads the next field. `shared` has what a field takes from the device. */
+static int read_field(yaml_file *file, const yaml_node_t *node, const mbm_planField *shared,
+                      device *into)
+{
+    device_field *field = &into->fields[into->count];
+    mbm_planField *planned = &into->planned[into->count];
+    const yaml_node_t *values[FIELD_KEYS] = {NULL};
+
+    field->line = (int)yaml_file_line(node);
+    *planned = *shared;
+    into->count++;
+    return yaml_file_keys(file, "the field", node, FIELD_NAMES, NEEDED_OF_FIELD, values) &&
+           yaml_file_copy(file, "name", values[NAME], DEVICE_NAME_BYTES, &field->name) &&
+           yaml_file_copy(file, "unit_of_measurement", values[MEASURE], DEVICE_NAME_BYTES,
+                          &field->unit_of_measurement) &&
+           yaml_file_copy(file, "description", values[DESCRIPTION], MOST_DESCRIPTION,
+                          &field->description) &&
+           read_type(file, node, values, planned) && read_place(file, node, values, planned) &&
+           read_shared(file, values[FIELD_UNIT], values[INTERVAL], values[ORDER], planned) &&
+           read_access(file, values[ACCESS], planned, into->writes_masks, field) &&
+           read_scale(file, values[SCALE], planned, field) &&
+           device_value_read(file, values[VALUE], planned, field) &&
+           device_enumeration_read(file, values[ENUMERATION], planned, field) &&
+           check_others(file, node, into);
+}
+
+/* --- the file --- */
+
+static int read_fields(yaml_file *file, const yaml_node_t *list, const mbm_planField *shared,
+                       device *into)
+{
+    const size_t count = yaml_file_items(file, "fields", list, MBM_PLAN_MAX_FIELDS);
+    size_t at;
+
+    if (count == 0)
+        return 0;
+    into->fields = (device_field *)calloc(count, sizeof *into->fields);
+    into->planned = (mbm_planField *)calloc(count, sizeof *into->planned);
+    if (!into->fields || !into->planned)
+        return yaml_file_fail(file, ENOMEM);
+    for (at = 0; at < count; at++)
+        if (!read_field(file, yaml_file_item(file, list, at), shared, into))
+            return 0;
+    return 1;
+}
+
+/* Moves the fields that can be read before those that cannot. Returns 0 after a failure. */
+static int sort_fields(yaml_file *file, device *into)
+{
+    const uint16_t count = into->count;
+    device_field *fields = (device_field *)calloc(count, sizeof *fields);
+    mbm_planField *planned = (mbm_planField *)calloc(count, sizeof *planned);
+    uint16_t i, to = 0;
+    int turn;
+
+    if (!fields || !planned) {
+        free(fields);
+        free(planned);
+        return yaml_file_fail(file, ENOMEM);
+    }
+    for (turn = 0; turn < 2; turn++) {
+        for (i = 0; i < count; i++)
+            if (((into->fields[i].access & DEVICE_READ) == 0) == turn) {
+                fields[to] = into->fields[i];
+                planned[to++] = into->planned[i];
+            }
+        if (turn == 0)
+            into->readable = to;
+    }
+    free(into->fields);
+    free(into->planned);
+    into->fields = fields;
+    into->planned = planned;
+    return 1;
+}
+
+static int read_root(yaml_file *file, const yaml_node_t *root, void *from)
+{
+    device *into = (device *)from;
+    mbm_planField shared = {.unit = 1, .intervalMs = 1000, .order = MBM_ORDER_ABCD};
+    const yaml_node_t *values[DEVICE_KEYS] = {NULL};
+    int writes_masks = 0;
+
+    if (!yaml_file_keys(file, "the file", root, DEVICE_NAMES, 1u << FIELDS, values) ||
+        !yaml_file_copy(file, "device", values[DEVICE], DEVICE_NAME_BYTES, &into->name) ||
+        !read_shared(file, values[DEVICE_UNIT], values[DEVICE_INTERVAL], values[DEVICE_ORDER],
+                     &shared) ||
+        !yaml_file_word(file, "mask_write", values[MASK_WRITE], ANSWERS, &writes_masks))
+        return 0;
+    into->writes_masks = (uint8_t)writes_masks;
+    return read_fields(file, values[FIELDS], &shared, into) && sort_fields(file, into);
+}
+
+int device_file_read(device *into, const char *path, char wrong[YAML_FILE_WRONG_BYTES])
+{
+    int code;
+
+    memset(into, 0, sizeof *into);
+    code = yaml_file_read(path, read_root, into, wrong);
+    if (code != CODE_DONE)
+        device_free(into);
+    return code;
+}

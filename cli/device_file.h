@@ -1,0 +1,25 @@
+/* The device file: the fields of a device, as mbm poll, mbm serve, mbm bridge and mbm header read
+ * them.
+ *
+ *     device: SDM120
+ *     unit: 1
+ *     fields:
+ *       - name: voltage
+ *         table: input
+ *         address: 0
+ *         type: float
+ *
+ * docs/serve.md describes every key.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef DEVICE_FILE_H
+#define DEVICE_FILE_H
+
+#include "device.h"
+#include "yaml_file.h"
+
+/* Reads a file. Returns CODE_DONE, and then device_free frees the device; or CODE_SYSTEM or
+ * CODE_WRONG with what is wrong, a sentence without its full stop: "meter.yaml:12: ...". */
+int device_file_read(device *into, const char *path, char wrong[YAML_FILE_WRONG_BYTES]);
+
+#endif
