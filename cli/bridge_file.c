@@ -259,7 +259,9 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
     for (setting = 0; setting < BRIDGE_SETTINGS; setting++) {
         if (!values[setting])
             continue;
-        text = yaml_file_text(file, bridge_names[setting], values[setting], LONGEST_VALUE);
+        text = setting == BRIDGE_GAP
+                   ? yaml_file_decimal(file, bridge_names[setting], values[setting])
+                   : yaml_file_text(file, bridge_names[setting], values[setting], LONGEST_VALUE);
         if (!text)
             return 0;
         wrong = bridge_setup_value(into, setting, text);

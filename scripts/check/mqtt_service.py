@@ -306,6 +306,7 @@ WRONG = [
     ("discovery_prefix: ha\nlines: []\n", ":1: a prefix of discovery needs discovery"),
     ("plain: true\nlines: []\n", ':1: plain: "true" is not one of no and yes'),
     ("gap: 124\nlines: []\n", "from 0 to 123 is allowed"),
+    ("gap: 010\nlines: []\n", ':1: gap: "010" begins with 0: write a decimal number'),
     ("cert: a\nlines: []\n", "cert and key need ca"),
     ("host: a\nlines: []\n", ':1: key: "host" is not one of broker, topic'),
     ("lines:\n- {line: rtu:/dev/null}\n", ":2: the line has no key file"),
