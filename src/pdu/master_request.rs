@@ -89,7 +89,12 @@ impl MasterRequest {
     /// not allow, [`Status::ILLEGAL_DATA_ADDRESS`] if the range goes beyond address 65535,
     /// otherwise [`Status::OK`].
     pub fn set(&mut self, function: u8, address: u16, word: u16) -> Status {
-        let ([a, b], [c, d]) = (address.to_be_bytes(), word.to_be_bytes());
+        let (a, b, c, d) = (
+            (address >> 8) as u8,
+            address as u8,
+            (word >> 8) as u8,
+            word as u8,
+        );
         let [at_0, at_1, at_2, at_3, at_4, ..] = &mut self.head;
         *at_0 = function & FUNCTION;
         (*at_1, *at_2, *at_3, *at_4) = (a, b, c, d);
