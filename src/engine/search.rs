@@ -87,7 +87,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             return false;
         }
         let is_response = if self.ends_with(EXCEPTION_FRAME.into(), function | EXCEPTION) {
-            self.accept_exception(is_whole)
+            self.accept_exception()
         } else {
             let length = self.ending_reply();
             length > S::Count::ZERO && self.accept(length)
@@ -106,7 +106,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Makes the exception at the end of the buffer the outcome. False if its code is invalid.
-    fn accept_exception(&mut self, is_whole: bool) -> bool {
+    fn accept_exception(&mut self) -> bool {
         let code = self.storage.byte(self.end - 3u8.into());
         if !self.is_held() {
             self.exception = code;
@@ -119,7 +119,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.seen = Outcome(code);
         self.content = S::Count::ZERO;
         // It may lie within another frame, unless it is a whole frame itself.
-        self.is_early = !is_whole || self.run_length != EXCEPTION_FRAME.into();
+        self.is_early = self.run_length != EXCEPTION_FRAME.into();
         true
     }
 
