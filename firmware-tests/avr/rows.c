@@ -32,23 +32,31 @@ span joined(const span *one, const span *other)
     return both;
 }
 
+static void print(const char *what, const char *unit, const char *figure, unsigned long most,
+                  unsigned long limit)
+{
+    char bound[40] = "";
+
+    if (limit) {
+        snprintf(bound, sizeof bound, "%lu", limit);
+        above += most > limit;
+    }
+    printf("| %s | %s | %s | %s | %s |\n", what, unit, figure, bound,
+           !limit         ? ""
+           : most > limit ? "**no**"
+                          : "yes");
+}
+
 void row(const char *what, const char *unit, unsigned long least, unsigned long most,
          unsigned long limit)
 {
-    char range[50], bound[40] = "";
+    char range[50];
 
     if (least == most)
         snprintf(range, sizeof range, "%lu", most);
     else
         snprintf(range, sizeof range, "%lu to %lu", least, most);
-    if (limit) {
-        snprintf(bound, sizeof bound, "%lu", limit);
-        above += most > limit;
-    }
-    printf("| %s | %s | %s | %s | %s |\n", what, unit, range, bound,
-           !limit         ? ""
-           : most > limit ? "**no**"
-                          : "yes");
+    print(what, unit, range, most, limit);
 }
 
 void row_cycles(const char *what, const span *s, unsigned long limit)
@@ -56,6 +64,17 @@ void row_cycles(const char *what, const span *s, unsigned long limit)
     if (s->count == 0)
         give_up(what);
     row(what, "cycles", s->least, s->most, limit);
+}
+
+void row_mean(const char *what, const span *s, unsigned long limit)
+{
+    char range[100];
+
+    if (s->count == 0)
+        give_up(what);
+    snprintf(range, sizeof range, "%lu to %lu, mean %lu", (unsigned long)s->least,
+             (unsigned long)s->most, mean(s));
+    print(what, "cycles", range, s->most, limit);
 }
 
 static void spanned(const span *s)

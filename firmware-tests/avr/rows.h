@@ -18,6 +18,8 @@ void row(const char *what, const char *unit, unsigned long least, unsigned long 
          unsigned long limit);
 /* The same for a span of cycles. */
 void row_cycles(const char *what, const span *s, unsigned long limit);
+/* The same, with the mean. */
+void row_mean(const char *what, const span *s, unsigned long limit);
 
 /* Prints a row of the comparison. If `theirs` is NULL, it was not measured, and the field
  * stays empty. */

@@ -5,7 +5,8 @@
 
 #include "board.h"
 
-/* The first transactions, which are not counted, and the number of those that are. */
+/* The first transactions, which are not counted, and the number of those that are, where the time
+ * depends less on the moment. */
 enum { SKIP = 2, COUNTED = 20 };
 
 /* An Uno that runs build/avr/FOLDER/NAME.elf. */

@@ -5,6 +5,14 @@
 
 #include <string.h>
 
+/* The dead time depends on where a reply comes in the loop that waits for it, and on when the timer
+ * of the core's clock interrupts that loop. So the device delays each of REPLIES replies to a
+ * request by another multiple of STEP cycles. The delays cover a period of the timer, which is
+ * more than 25 turns of the loop of either library. The device takes them in steps of ORDER, so
+ * that a few replies cover that period too. REPLIES is a prime: two requests in turn get every
+ * delay. */
+enum { REPLIES = 509, STEP = 37, ORDER = 315 };
+
 typedef struct observer {
     board *on;
     wire *bus;
@@ -30,7 +38,7 @@ static void answer(wire *w, const uint8_t *frame, size_t length)
     w->bytes_received = 0;
     o->bytes_before = 0;
     o->waiting = 1;
-    wire_play(w, MS, reply, have - 1);
+    wire_play(w, MS + w->frames * ORDER % REPLIES * STEP, reply, have - 1);
     wire_play(w, o->late, reply + have - 1, 1);
 }
 
@@ -73,7 +81,9 @@ static void poll_begins_or_ends(void *context, int level, uint64_t cycle)
     o->bytes_before = w->bytes_received;
 }
 
-static observer observe(const char *folder, const char *name, uint64_t late, pin_changed changed)
+/* Observes `count` requests of a sketch, after the first ones. */
+static observer observe(const char *folder, const char *name, unsigned count, uint64_t late,
+                        pin_changed changed)
 {
     static observer o;
 
@@ -86,75 +96,10 @@ static observer observe(const char *folder, const char *name, uint64_t late, pin
     board_paint(o.on);
     if (changed)
         board_watch_pin(o.on, 'B', 0, changed, &o);
-    while (o.bus->frames < SKIP + COUNTED)
+    while (o.bus->frames < SKIP + count)
         if (!board_run(o.on, MS))
             give_up("a sketch crashed");
     return o;
-}
-
-static void dead_times(void)
-{
-    observer o = observe("uno", "TimeRead", 0, NULL), again = observe("uno", "TimeRead", 0, NULL);
-    unsigned long gap = 32096; /* 3.5 characters of 11 bits at 19200 baud: 2006 us */
-
-    if (memcmp(&o.dead, &again.dead, sizeof o.dead) != 0)
-        give_up("two runs differ");
-    row_cycles("dead time, FC03 of 10 registers, 115200 baud, no gap", &o.dead[0], 3463);
-    o = observe("uno", "TimeBasicNoGap", 0, NULL);
-    row_cycles("dead time, Basic, 19200 baud, no gap: before FC10", &o.dead[1], 3075);
-    row_cycles("dead time, Basic, 19200 baud, no gap: before FC03", &o.dead[0], 3075);
-    o = observe("uno", "TimeBasicGap", 0, NULL);
-    row_cycles("dead time, Basic, 19200 baud, t3.5 = 32096 cycles: before FC10", &o.dead[1],
-               gap + gap / 20);
-    row_cycles("dead time, Basic, 19200 baud, t3.5 = 32096 cycles: before FC03", &o.dead[0],
-               gap + gap / 20);
-}
-
-static unsigned long ram_added(const char *folder)
-{
-    board *plain = timed_board("uno", "SizeSerial"), *reading = timed_board(folder, "SizeFC03");
-    /* The sketch itself uses two bytes. */
-    unsigned long ram = board_symbol(reading, "_end") - board_symbol(plain, "_end") - 2u;
-
-    board_free(plain);
-    board_free(reading);
-    return ram;
-}
-
-static void returns(void)
-{
-    observer o = observe("uno", "TimeRead", 0, call_begins_or_ends);
-    unsigned long ram = ram_added("uno"), stack = board_stack_depth(o.on);
-    board *plain = timed_board("uno", "SizeSerial"), *reading = timed_board("uno", "SizeFC03");
-
-    row_cycles("last byte of a reply to the end of the call", &o.back, 0);
-    row("static RAM added, default buffers", "bytes", ram, ram, 0);
-    row("stack of a transaction, interrupts included", "bytes", stack, stack, 0);
-    row("static RAM and stack together", "bytes", ram + stack, ram + stack, 557);
-    board_paint(reading);
-    board_paint(plain);
-    if (!board_run(plain, MS) || !board_run(reading, 100 * MS))
-        give_up("a sketch crashed");
-    stack = board_stack_depth(reading) - board_stack_depth(plain);
-    row("stack from reset on, constructor and begin included, above a serial-only sketch", "bytes",
-        stack, stack, 0);
-    board_free(plain);
-    board_free(reading);
-    o = observe("uno", "TimeRead", 100 * MS, call_begins_or_ends);
-    row_cycles("a last byte that comes 100 ms late, to the end of the call", &o.back, 0);
-}
-
-static void polls(void)
-{
-    observer o = observe("uno", "TimePoll", 0, poll_begins_or_ends);
-    unsigned long per_byte;
-
-    row_cycles("poll while nothing arrives", &o.without, 0);
-    row_cycles("poll with new bytes, 115200 baud", &o.with, 0);
-    /* The cycles of a received byte, with the core's interrupt, above those of waiting. */
-    per_byte = (unsigned long)((o.with.sum - o.with.count * mean(&o.without)) / o.bytes_polled);
-    row("a received byte, above waiting (one lasts 1388 at 115200 baud)", "cycles", per_byte,
-        per_byte, 0);
 }
 
 /* How much deeper the stack grows, from reset on, than in a sketch that only uses the
@@ -172,47 +117,121 @@ static unsigned long stack_added(const observer *o)
     return board_stack_depth(o->on) - depth;
 }
 
-/* The same sketches on the same board, compiled with each of the two libraries. */
-static void compare_with(const char *peer)
-{
-    static const struct {
-        const char *sketch, *what;
-        unsigned longer; /* 1: the request has more than 8 bytes */
-    } rows[] = {
-        {"TimeRead", "dead time, FC03 of 10 registers, 115200 baud", 0},
-        {"TimeBasicNoGap", "dead time, Basic, 19200 baud: before FC10", 1},
-        {"TimeBasicNoGap", "dead time, Basic, 19200 baud: before FC03", 0},
-    };
-    observer ours, theirs = {0};
-    unsigned long ram[2] = {0}, stack[2] = {0};
-    span both[2];
-    unsigned i;
+/* The dead times of a library that keeps no gap, and how deep its stack grows. */
+typedef struct dead_times {
+    span read, basic[2]; /* those of Basic before FC03 and before FC10 */
+    unsigned long stack;
+} dead_times;
 
-    for (i = 0; i < sizeof rows / sizeof *rows; i++) {
-        ours = observe("uno", rows[i].sketch, 0, NULL);
-        if (i == 0)
-            stack[0] = stack_added(&ours);
-        if (peer)
-            theirs = observe(peer, rows[i].sketch, 0, NULL);
-        if (peer && i == 0)
-            stack[1] = stack_added(&theirs);
-        row_beside(rows[i].what, &ours.dead[rows[i].longer],
-                   peer ? &theirs.dead[rows[i].longer] : NULL);
+static dead_times without_gap(const char *folder)
+{
+    dead_times d;
+    observer o = observe(folder, "TimeRead", REPLIES, 0, NULL);
+
+    d.read = o.dead[0];
+    d.stack = stack_added(&o);
+    o = observe(folder, "TimeBasicNoGap", 2 * REPLIES, 0, NULL);
+    memcpy(d.basic, o.dead, sizeof d.basic);
+    return d;
+}
+
+static void print_dead_times(const dead_times *without)
+{
+    observer again = observe("uno", "TimeRead", REPLIES, 0, NULL), o;
+    unsigned long gap = 32096; /* 3.5 characters of 11 bits at 19200 baud: 2006 us */
+
+    if (memcmp(&without->read, &again.dead[0], sizeof without->read) != 0)
+        give_up("two runs differ");
+    row_mean("dead time, FC03 of 10 registers, 115200 baud, no gap", &without->read, 3463);
+    row_mean("dead time, Basic, 19200 baud, no gap: before FC10", &without->basic[1], 3075);
+    row_mean("dead time, Basic, 19200 baud, no gap: before FC03", &without->basic[0], 3075);
+    o = observe("uno", "TimeBasicGap", 2 * REPLIES, 0, NULL);
+    row_mean("dead time, Basic, 19200 baud, t3.5 = 32096 cycles: before FC10", &o.dead[1],
+             gap + gap / 20);
+    row_mean("dead time, Basic, 19200 baud, t3.5 = 32096 cycles: before FC03", &o.dead[0],
+             gap + gap / 20);
+}
+
+static unsigned long ram_added(const char *folder)
+{
+    board *plain = timed_board("uno", "SizeSerial"), *reading = timed_board(folder, "SizeFC03");
+    /* The sketch itself uses two bytes. */
+    unsigned long ram = board_symbol(reading, "_end") - board_symbol(plain, "_end") - 2u;
+
+    board_free(plain);
+    board_free(reading);
+    return ram;
+}
+
+static void returns(void)
+{
+    observer o = observe("uno", "TimeRead", REPLIES, 0, call_begins_or_ends);
+    unsigned long ram = ram_added("uno"), stack = board_stack_depth(o.on);
+    board *plain = timed_board("uno", "SizeSerial"), *reading = timed_board("uno", "SizeFC03");
+
+    row_cycles("last byte of a reply to the end of the call", &o.back, 0);
+    row("static RAM added, default buffers", "bytes", ram, ram, 0);
+    row("stack of a transaction, interrupts included", "bytes", stack, stack, 0);
+    row("static RAM and stack together", "bytes", ram + stack, ram + stack, 557);
+    board_paint(reading);
+    board_paint(plain);
+    if (!board_run(plain, MS) || !board_run(reading, 100 * MS))
+        give_up("a sketch crashed");
+    stack = board_stack_depth(reading) - board_stack_depth(plain);
+    row("stack from reset on, constructor and begin included, above a serial-only sketch", "bytes",
+        stack, stack, 0);
+    board_free(plain);
+    board_free(reading);
+    o = observe("uno", "TimeRead", COUNTED, 100 * MS, call_begins_or_ends);
+    row_cycles("a last byte that comes 100 ms late, to the end of the call", &o.back, 0);
+}
+
+static void polls(void)
+{
+    observer o = observe("uno", "TimePoll", REPLIES, 0, poll_begins_or_ends);
+    unsigned long per_byte;
+
+    row_cycles("poll while nothing arrives", &o.without, 0);
+    row_cycles("poll with new bytes, 115200 baud", &o.with, 0);
+    /* The cycles of a received byte, with the core's interrupt, above those of waiting. */
+    per_byte = (unsigned long)((o.with.sum - o.with.count * mean(&o.without)) / o.bytes_polled);
+    row("a received byte, above waiting (one lasts 1388 at 115200 baud)", "cycles", per_byte,
+        per_byte, 0);
+}
+
+/* The same sketches on the same board with the same replies, compiled with each of the two
+ * libraries. */
+static void compare_with(const char *peer, const dead_times *ours)
+{
+    dead_times measured = {0}, *theirs = NULL;
+    unsigned long ram[2];
+    span both[2];
+
+    if (peer) {
+        measured = without_gap(peer);
+        theirs = &measured;
     }
-    /* The rows of Basic, which were measured last. */
-    both[0] = joined(&ours.dead[0], &ours.dead[1]);
-    both[1] = joined(&theirs.dead[0], &theirs.dead[1]);
-    row_beside("dead time, Basic, 19200 baud: before both", &both[0], peer ? &both[1] : NULL);
+    both[0] = joined(&ours->basic[0], &ours->basic[1]);
+    both[1] = joined(&measured.basic[0], &measured.basic[1]);
+    row_beside("dead time, FC03 of 10 registers, 115200 baud", &ours->read,
+               theirs ? &theirs->read : NULL);
+    row_beside("dead time, Basic, 19200 baud: before FC10", &ours->basic[1],
+               theirs ? &theirs->basic[1] : NULL);
+    row_beside("dead time, Basic, 19200 baud: before FC03", &ours->basic[0],
+               theirs ? &theirs->basic[0] : NULL);
+    row_beside("dead time, Basic, 19200 baud: before both", &both[0], theirs ? &both[1] : NULL);
     ram[0] = ram_added("uno");
     ram[1] = peer ? ram_added(peer) : 0;
     row_beside_bytes("static RAM", ram[0], peer ? &ram[1] : NULL);
-    row_beside_bytes("stack, from reset on", stack[0], peer ? &stack[1] : NULL);
+    row_beside_bytes("stack, from reset on", ours->stack, theirs ? &theirs->stack : NULL);
 }
 
 void time_master(const char *peer)
 {
-    dead_times();
+    dead_times ours = without_gap("uno");
+
+    print_dead_times(&ours);
     returns();
     polls();
-    compare_with(peer);
+    compare_with(peer, &ours);
 }
