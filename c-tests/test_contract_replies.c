@@ -460,9 +460,23 @@ static void an_exception_whose_code_is_the_byte_count_is_a_whole_frame(void **st
     assert_int_equal(s->counters.foreignFrames, 0);
 }
 
+static void a_right_crc_within_the_reply_is_no_frame(void **state)
+{
+    SIM;
+
+    s->read_piece = 3; /* a reply that comes at once is not searched on a host */
+    OK(read_words(s, 4, "11 03 08 12 34 + 56 78 9A BC +"));
+    assert_int_equal(s->response[0], 0x1234);
+    assert_int_equal(s->response[3], 0x9ABC);
+    assert_int_equal(s->counters.replies, 1);
+    assert_int_equal(s->counters.resynchronisations, 0);
+    assert_int_equal(s->counters.foreignFrames, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        SIM_TEST(a_right_crc_within_the_reply_is_no_frame),
         SIM_TEST(an_exception_whose_code_is_the_byte_count_is_a_whole_frame),
         SIM_TEST(exception_codes_of_the_device_are_returned_unchanged),
         SIM_TEST(an_exception_code_of_0_or_from_80_on_is_malformed_and_kept),

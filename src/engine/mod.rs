@@ -124,7 +124,7 @@ pub struct Engine<P, S: Storage, Q> {
     /// How many bytes of the request were sent.
     sent: S::Count,
     /// How many frames with a right CRC were skipped that were not counted yet.
-    foreign_frames: u8,
+    foreign_frames: i8,
     /// The request that is on the line was counted.
     is_counted: bool,
     /// CRC of the bytes that have arrived since the last frame ended.

@@ -160,7 +160,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             self.note(Outcome::MALFORMED);
             return false;
         }
-        self.is_early = self.run_length != length;
+        // By chance, the CRC may be right within the reply. Then that was no frame.
+        if self.run_length < length {
+            self.foreign_frames = self.foreign_frames.wrapping_sub(1);
+        }
+        self.is_early = self.run_length > length;
         self.seen = Outcome::OK;
         self.exception = 0;
         self.content = length - rtu::CRC.into();

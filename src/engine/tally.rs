@@ -22,7 +22,8 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
         let storage = &mut self.storage;
         storage.count(Counter::BytesReceived, self.received.into());
         self.received = 0;
-        storage.count(Counter::ForeignFrames, self.foreign_frames.into());
+        // It may be negative: one frame was counted that was none.
+        storage.count(Counter::ForeignFrames, self.foreign_frames as u32);
         self.foreign_frames = 0;
         let was_sent = self.phase > Phase::Gap;
         if was_sent && !self.is_counted {
