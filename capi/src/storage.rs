@@ -204,15 +204,20 @@ impl Words for LineStorage {
     fn store_words(&mut self, from: u8, count: u8, high_first: bool) {
         // SAFETY: within `frame_bytes` and `response_words`, see above.
         unsafe {
-            let flip = flip(high_first);
-            let words = (*self.words).response.cast::<u8>();
+            let mut word = (*self.words).response;
             let mut byte = self.frame.add(from.into());
             // An odd last byte is padded with 0. This overwrites a byte of the CRC, which
             // has been checked.
             *byte.add(count.into()) = 0;
-            for index in 0..count + (count & 1) {
-                *words.add((index ^ flip).into()) = *byte;
-                byte = byte.add(1);
+            for _ in 0..count.div_ceil(2) {
+                let bytes = [*byte, *byte.add(1)];
+                *word = if high_first {
+                    u16::from_be_bytes(bytes)
+                } else {
+                    u16::from_le_bytes(bytes)
+                };
+                word = word.add(1);
+                byte = byte.add(2);
             }
         }
     }
