@@ -22,9 +22,11 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
         let storage = &mut self.storage;
         storage.count(Counter::BytesReceived, self.received.into());
         self.received = 0;
-        // It may be negative: one frame was counted that was none.
-        storage.count(Counter::ForeignFrames, self.foreign_frames as u32);
-        self.foreign_frames = 0;
+        // The reply may take one back until the request ends: see `accept`.
+        let kept = i8::from(status == Status::PENDING).min(self.foreign_frames.max(0));
+        let foreign_frames = self.foreign_frames.max(0) - kept;
+        storage.count(Counter::ForeignFrames, foreign_frames as u32);
+        self.foreign_frames = kept;
         let was_sent = self.phase > Phase::Gap;
         if was_sent && !self.is_counted {
             storage.count(Counter::Requests, 1);
