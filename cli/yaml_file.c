@@ -170,18 +170,21 @@ int yaml_file_copy(yaml_file *file, const char *key, const yaml_node_t *node, si
     return *copy ? 1 : yaml_file_fail(file, ENOMEM);
 }
 
+/* Refuses a value if `wrong` says what is wrong with it. Returns 0 then. */
+static int check_value(yaml_file *file, const char *key, const yaml_node_t *node, const char *wrong)
+{
+    return wrong ? yaml_file_refuse(file, node, "%s: %s", key, wrong) : 1;
+}
+
 int yaml_file_word(yaml_file *file, const char *key, const yaml_node_t *node,
                    const char *const *words, int *index)
 {
-    const char *text, *wrong;
+    const char *text;
 
     if (!node)
         return 1;
     text = yaml_file_text(file, key, node, MOST_WORD);
-    if (!text)
-        return 0;
-    wrong = number_word(text, words, index);
-    return wrong ? yaml_file_refuse(file, node, "%s: %s", key, wrong) : 1;
+    return text && check_value(file, key, node, number_word(text, words, index));
 }
 
 const char *yaml_file_decimal(yaml_file *file, const char *key, const yaml_node_t *node)
@@ -199,17 +202,14 @@ const char *yaml_file_decimal(yaml_file *file, const char *key, const yaml_node_
 int yaml_file_number(yaml_file *file, const char *key, const yaml_node_t *node, uint32_t least,
                      uint32_t most, uint32_t *value)
 {
-    const char *text, *wrong;
+    const char *text;
     int64_t number;
 
     if (!node)
         return 1;
     text = yaml_file_decimal(file, key, node);
-    if (!text)
+    if (!text || !check_value(file, key, node, number_read(text, least, most, &number)))
         return 0;
-    wrong = number_read(text, least, most, &number);
-    if (wrong)
-        return yaml_file_refuse(file, node, "%s: %s", key, wrong);
     *value = (uint32_t)number;
     return 1;
 }
@@ -217,15 +217,12 @@ int yaml_file_number(yaml_file *file, const char *key, const yaml_node_t *node, 
 int yaml_file_time(yaml_file *file, const char *key, const yaml_node_t *node, uint32_t least,
                    uint32_t most, uint32_t *value)
 {
-    const char *text, *wrong;
+    const char *text;
 
     if (!node)
         return 1;
     text = yaml_file_text(file, key, node, MOST_WORD);
-    if (!text)
-        return 0;
-    wrong = number_time(text, least, most, value);
-    return wrong ? yaml_file_refuse(file, node, "%s: %s", key, wrong) : 1;
+    return text && check_value(file, key, node, number_time(text, least, most, value));
 }
 
 size_t yaml_file_size(const yaml_node_t *node)
