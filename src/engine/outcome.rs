@@ -21,7 +21,7 @@ impl Outcome {
     pub const MALFORMED: Outcome = Outcome(0xB5);
     /// A complete frame of our unit and function with a wrong CRC.
     pub const BAD_CRC: Outcome = Outcome(0xC3);
-    /// The reply, but the frame buffer cannot hold it.
+    /// No response, and the frame buffer cannot hold the reply.
     pub const TOO_LONG: Outcome = Outcome(0xD9);
 
     /// True for a response of the device: the right reply or an exception.

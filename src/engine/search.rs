@@ -304,8 +304,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Makes the outcome what the request ends with if no bytes arrive. Of a reply that the frame
-    /// buffer cannot hold, nothing is seen.
+    /// Makes the outcome what the request ends with if no bytes arrive.
     pub(super) fn see_nothing(&mut self) {
         self.is_early = false;
         self.exception = 0;
