@@ -73,8 +73,8 @@ install: linux ## Install the library with its ports, and files for pkg-config a
 	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/build/install
 
 .PHONY: check-install
-check-install: $(ARCHIVE) ## Install, and build and run the README's program from there
-	@scripts/need gcc libc6-dev make cmake pkg-config libmbedtls-dev
+check-install: tool ## Install, and build and run the README's program from there
+	@scripts/need gcc libc6-dev musl-tools make cmake pkg-config libmbedtls-dev
 	@scripts/check/install
 
 .PHONY: size

@@ -195,8 +195,15 @@ typedef struct rated {
     uint32_t in, out;
 } rated;
 
-#define GET_RATED _IOR('T', 0x2A, rated)
-#define SET_RATED _IOW('T', 0x2B, rated)
+/* The second parameter of ioctl: unsigned long in glibc, int in musl, as in POSIX. */
+#ifdef __GLIBC__
+typedef unsigned long ioctl_request;
+#else
+typedef int ioctl_request;
+#endif
+
+#define GET_RATED ((ioctl_request)_IOR('T', 0x2A, rated))
+#define SET_RATED ((ioctl_request)_IOW('T', 0x2B, rated))
 enum { RATE = 0x100F, RATE_IN = 0x100F << 16, OTHER_RATE = 0x1000 };
 
 static int set_rate(const mbm_tty *tty, uint32_t baud)
