@@ -75,9 +75,8 @@ static void publish_value(bridge_line *l, uint16_t field)
     const char *value = what->value ? what->value : "null";
     const char *name = l->table->fields.fields[field].name;
     struct timespec now;
-    struct tm utc;
     uint32_t age = 0;
-    char when[32];
+    char when[40];
 
     if (bridge.is_plain) {
         /* Plain text has no place for a status: what failed is not published. */
@@ -95,10 +94,9 @@ static void publish_value(bridge_line *l, uint16_t field)
             now.tv_sec--;
         }
     }
-    gmtime_r(&now.tv_sec, &utc);
-    (void)strftime(when, sizeof when, "%Y-%m-%dT%H:%M:%S", &utc);
-    snprintf(json, sizeof json, "{\"value\":%s,\"status\":\"%s\",\"time\":\"%s.%03ldZ\"}", value,
-             mbm_status_text(what->status), when, now.tv_nsec / 1000000);
+    report_time(&now, when);
+    snprintf(json, sizeof json, "{\"value\":%s,\"status\":\"%s\",\"time\":\"%s\"}", value,
+             mbm_status_text(what->status), when);
     publish(l, name, NULL, json, 1);
 }
 

@@ -115,7 +115,7 @@ const char *fault_read(fault_list *list, const char *text, enum place_kind line)
     if (kind == FAULT_KINDS)
         return say("\"%s\" is no fault: on this line they are %s", copy, listed(line, names));
     if (!(KINDS[kind].places >> line & 1))
-        return say("this line cannot have the fault %s: it can have %s", copy, listed(line, names));
+        return say("\"%s\": this line cannot have it: it can have %s", copy, listed(line, names));
     *one = (fault){.kind = (enum fault_kind)kind, .first = 1, .every = 1};
     wrong = read_value(value, text, one);
     if (!wrong && when)

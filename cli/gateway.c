@@ -491,6 +491,16 @@ static const struct argp parser = {
     NULL,
     NULL};
 
+static int cannot_listen(void)
+{
+    const char *advice =
+        listener.lookupError ? "Check the name of the host" : place_advice(&setup.listen, errno);
+
+    return report(CODE_LINE, "%s: %s%s%s", setup.listen.text,
+                  listener.lookupError ? gai_strerror(listener.lookupError) : strerror(errno),
+                  *advice ? ". " : "", advice);
+}
+
 int gateway_command(int argc, char **argv)
 {
     unsigned i;
@@ -509,16 +519,12 @@ int gateway_command(int argc, char **argv)
     if (begin() != CODE_DONE)
         return CODE_SYSTEM;
     if (mbm_tcp_listen(&listener, place_host(&setup.listen), setup.listen.service) != 0)
-        return report(CODE_LINE, "%s: %s%s", setup.listen.text,
-                      listener.lookupError ? gai_strerror(listener.lookupError) : strerror(errno),
-                      errno == EACCES       ? ". Ports below 1024 need the right to them"
-                      : errno == EADDRINUSE ? ". Another program listens there"
-                                            : "");
+        return cannot_listen();
     code = service_begin(fill_stats);
     if (code != CODE_DONE)
         return code;
     printf("ready %u\n", listener.port);
-    fflush(stdout);
+    report_flush();
     service_is_ready();
     while (!report_stopped)
         work();

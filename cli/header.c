@@ -35,7 +35,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case MARKDOWN: wanted.is_page = 1; return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0)
-            options_wrong(state, "\"%s\" is one argument too many", text);
+            options_too_many(state, text);
         wanted.file = text;
         return 0;
     case ARGP_KEY_END:
@@ -308,8 +308,10 @@ static int keep(const char *text, size_t length)
     if (!file)
         return report(CODE_SYSTEM, "%s: %s", wanted.output, strerror(errno));
     is_right = fwrite(text, 1, length, file) == length;
-    if (!wanted.output)
-        return CODE_DONE; /* report_end says whether standard output took it */
+    if (!wanted.output) {
+        report_flush(); /* notes whether standard output took it */
+        return CODE_DONE;
+    }
     if (fclose(file) != 0 || !is_right)
         return report(CODE_SYSTEM, "%s: %s", wanted.output, strerror(errno));
     return CODE_DONE;

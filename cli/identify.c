@@ -29,7 +29,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case 'c': category = 1 + options_word(state, "--category", text, categories); return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0)
-            return ARGP_ERR_UNKNOWN;
+            options_too_many(state, text);
         options_place(state, &where, text, 0);
         return 0;
     case ARGP_KEY_SUCCESS:
@@ -102,8 +102,10 @@ static int succeeds(const char *what, mbm_clientRequest *one, uint8_t queued)
     (void)line_status(&at, one, status);
     if (refused && !report_stopped)
         cJSON_AddStringToObject(refused, what, status);
-    if (!options.is_quiet && !report_stopped)
+    if (!options.is_quiet && !report_stopped) {
+        report_flush(); /* what was found first is printed first */
         fprintf(stderr, "%s: %s: %s.\n", report_name, what, status);
+    }
     return 0;
 }
 

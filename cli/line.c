@@ -30,19 +30,9 @@ static int cannot_open(const line *l, const char *reason, const char *advice)
 
 static int open_tty(line *l)
 {
-    const char *advice = "";
-
     if (mbm_tty_openWith(&l->tty, l->place.path, &l->place.tty) == 0)
         return CODE_DONE;
-    switch (errno) {
-    case ENOENT: advice = "Is the adapter plugged in? ls /dev/tty* shows the terminals"; break;
-    case EACCES: advice = "On many systems the group dialout may open terminals: see groups"; break;
-    case EBUSY: advice = "Another program has it open"; break;
-    case ENOTTY: advice = "It is no terminal, or its driver has no RS-485"; break;
-    case EINVAL: advice = "The terminal does not have this rate, parity or number of bits"; break;
-    default: break;
-    }
-    return cannot_open(l, strerror(errno), advice);
+    return cannot_open(l, strerror(errno), place_advice(&l->place, errno));
 }
 
 static int open_tcp(line *l)
@@ -64,17 +54,30 @@ static int open_udp(line *l)
                        "Check the name of the host");
 }
 
+const char *line_load_tls(const place *p, mbm_tls_files *files, mbm_tls_options *into)
+{
+    const char *const paths[] = {p->cert, p->key, p->ca};
+    int i = 0;
+
+    if (mbm_tls_load(files, into, p->cert, p->key, p->ca) == 0)
+        return NULL;
+    while (mbm_tls_load(files, into, paths[i], paths[i], paths[i]) == 0 && i < 2)
+        i++;
+    return paths[i];
+}
+
 static int open_tls(line *l)
 {
     const mbm_linkHooks hooks = mbm_tcp_link(&l->tcp);
     const mbm_port below = mbm_tcp_port(&l->tcp);
     mbm_tls_options tls = {0};
+    const char *unreadable;
     int code;
     uint8_t status;
 
-    if (mbm_tls_load(&l->files, &tls, l->place.cert, l->place.key, l->place.ca) != 0)
-        return report(CODE_WRONG, "%s, %s or %s: %s", l->place.cert, l->place.key, l->place.ca,
-                      strerror(errno));
+    unreadable = line_load_tls(&l->place, &l->files, &tls);
+    if (unreadable)
+        return report(CODE_WRONG, "%s: %s", unreadable, strerror(errno));
     status = mbm_tls_begin(&l->identity, &tls);
     mbm_tls_forgetKey(&l->files);
     if (status != 0)
@@ -108,9 +111,10 @@ static void take_link(void *context, uint8_t event, uint8_t status)
     else if (l->place.kind == PLACE_TLS && l->tls.status >= MBM_TLS_TIMED_OUT)
         snprintf(l->reason, sizeof l->reason, "%s", mbm_tls_text(l->tls.status));
     else if (place_is_tcp(&l->place) && l->tcp.error != 0)
-        snprintf(l->reason, sizeof l->reason, "%s", mbm_tcp_text(&l->tcp));
+        snprintf(l->reason, sizeof l->reason, "%s",
+                 l->tcp.lookupError ? mbm_tcp_text(&l->tcp) : report_error_text(l->tcp.error));
     else if (place_is_serial(&l->place) && l->tty.error != 0)
-        snprintf(l->reason, sizeof l->reason, "%s", strerror(l->tty.error));
+        snprintf(l->reason, sizeof l->reason, "%s", report_error_text(l->tty.error));
     else if (!*l->reason || status == MBM_CONNECT_TIMED_OUT)
         snprintf(l->reason, sizeof l->reason, "%s", mbm_status_text(status));
     if (l->is_logged && (!l->is_told || strcmp(before, l->reason) != 0))
@@ -339,7 +343,7 @@ const char *line_status(const line *l, const mbm_clientRequest *request, char te
 {
     const char *reason = request->status == MBM_LINK_LOST ? line_reason(l) : NULL;
 
-    snprintf(text, 256, "%s%s%s", mbm_status_textOf(request->status, request->exception),
+    snprintf(text, 256, "%s%s%s", report_words(request->status, request->exception),
              reason ? ": " : "", reason ? reason : "");
     return text;
 }

@@ -76,4 +76,8 @@ uint8_t line_read(line *l, mbm_clientRequest *request, uint8_t table, uint16_t a
 /* The time in milliseconds since some moment. It wraps. */
 uint32_t line_milliseconds(void);
 
+/* Reads the files of tls://. Returns NULL, or the path of the one that cannot be read, with errno
+ * set. */
+const char *line_load_tls(const place *p, mbm_tls_files *files, mbm_tls_options *into);
+
 #endif

@@ -114,7 +114,6 @@ static int run(const command *chosen, int argc, char **argv)
 
     snprintf(name, sizeof name, "mbm %s", chosen->name);
     report_name = argv[0] = name;
-    report_catch_signals();
     return chosen->run(argc, argv);
 }
 
@@ -127,6 +126,8 @@ int main(int argc, char **argv)
     const command *chosen;
 
     argp_err_exit_status = CODE_WRONG;
+    report_begin();
+    report_catch_signals();
     if (strcmp(word, "--version") == 0 || strcmp(word, "-V") == 0)
         return print_version();
     if (argc < 2 || strcmp(word, "--help") == 0 || strcmp(word, "-?") == 0 ||
@@ -139,5 +140,5 @@ int main(int argc, char **argv)
         count = 2;
     }
     chosen = find(words[0]);
-    return chosen ? report_end(run(chosen, count, words)) : CODE_WRONG;
+    return chosen ? run(chosen, count, words) : CODE_WRONG;
 }

@@ -67,6 +67,39 @@ int options_word(const struct argp_state *state, const char *what, const char *t
     return index;
 }
 
+unsigned options_units(const struct argp_state *state, const char *what, const char *text,
+                       uint8_t units[OPTIONS_UNITS])
+{
+    uint8_t is_given[OPTIONS_UNITS + 1] = {0};
+    unsigned count = 0, unit;
+    size_t length;
+
+    for (;; text += length + 1) {
+        char item[64], *dash;
+        int64_t first, last;
+
+        length = strcspn(text, ",");
+        if (length >= sizeof item)
+            options_wrong(state, "%s \"%.60s\" is not a unit", what, text);
+        snprintf(item, sizeof item, "%.*s", (int)length, text);
+        dash = length > 0 ? strchr(item + 1, '-') : NULL;
+        if (dash)
+            *dash++ = '\0';
+        first = last = options_number(state, what, item, 1, OPTIONS_UNITS);
+        if (dash)
+            last = options_number(state, what, dash, first, OPTIONS_UNITS);
+        for (; first <= last; first++)
+            if (is_given[first]++)
+                options_wrong(state, "%s: unit %u is there twice", what, (unsigned)first);
+        if (!text[length])
+            break;
+    }
+    for (unit = 1; unit <= OPTIONS_UNITS; unit++)
+        if (is_given[unit])
+            units[count++] = (uint8_t)unit;
+    return count;
+}
+
 uint16_t options_address(const struct argp_state *state, const char *text)
 {
     const int first = options.is_one_based;
@@ -81,6 +114,11 @@ void options_place(const struct argp_state *state, struct place *where, const ch
 
     if (wrong)
         options_wrong(state, "%s", wrong);
+}
+
+void options_too_many(const struct argp_state *state, const char *text)
+{
+    options_wrong(state, "\"%s\" is one word too many", text);
 }
 
 void options_check_unit(const struct argp_state *state, const place *where, int is_write)

@@ -54,12 +54,21 @@ uint32_t options_time(const struct argp_state *state, const char *what, const ch
 int options_word(const struct argp_state *state, const char *what, const char *text,
                  const char *const *words);
 
+/* Reads unit ids such as 1,17,30-39, and puts them in ascending order. Returns how many they are.
+ */
+enum { OPTIONS_UNITS = 255 };
+unsigned options_units(const struct argp_state *state, const char *what, const char *text,
+                       uint8_t units[OPTIONS_UNITS]);
+
 /* Reads an address, with --one-based from 1 on. Call it when all options are read. */
 uint16_t options_address(const struct argp_state *state, const char *text);
 
 /* Ends the program with CODE_WRONG and a sentence that argp follows by where to find help. */
 void options_wrong(const struct argp_state *state, const char *format, ...)
     __attribute__((format(printf, 2, 3), noreturn));
+
+/* Refuses a word after the last one that a command takes. */
+void options_too_many(const struct argp_state *state, const char *text) __attribute__((noreturn));
 
 /* Refuses unit 0, to which a client only writes, and only on a serial line. */
 void options_check_unit(const struct argp_state *state, const struct place *where, int is_write);

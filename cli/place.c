@@ -3,6 +3,7 @@
 
 #include "numbers.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -215,4 +216,20 @@ int place_is_tcp(const place *p)
 const char *place_host(const place *p)
 {
     return *p->host ? p->host : NULL;
+}
+
+const char *place_advice(const place *p, int error)
+{
+    if (!place_is_serial(p))
+        return error == EACCES       ? "Ports below 1024 need the right to them"
+               : error == EADDRINUSE ? "Another program listens there"
+                                     : "";
+    switch (error) {
+    case ENOENT: return "Is the adapter plugged in? ls /dev/tty* shows the terminals";
+    case EACCES: return "On many systems the group dialout may open terminals: see groups";
+    case EBUSY: return "Another program has it open";
+    case ENOTTY: return "It is no terminal, or its driver has no RS-485";
+    case EINVAL: return "The terminal does not have this rate, parity or number of bits";
+    default: return "";
+    }
 }

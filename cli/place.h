@@ -72,4 +72,8 @@ int place_is_tcp(const place *p);
 /* The host for mbm_tcp_listen and mbm_udp_listen: NULL if it is empty. */
 const char *place_host(const place *p);
 
+/* What to look at if a terminal could not be opened, or a server could not listen at an address.
+ * Empty if nothing helps. */
+const char *place_advice(const place *p, int error);
+
 #endif

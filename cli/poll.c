@@ -53,7 +53,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case SHOW_PLAN: wanted.shows_plan = 1; return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 1)
-            options_wrong(state, "\"%s\" is one argument too many", text);
+            options_too_many(state, text);
         if (state->arg_num == 0)
             options_place(state, &where, text, 0);
         else
@@ -180,24 +180,12 @@ static void show_plan(void)
 
 /* --- showing --- */
 
-static void print_time(char text[40])
-{
-    struct timespec now;
-    struct tm utc;
-    size_t length;
-
-    clock_gettime(CLOCK_REALTIME, &now);
-    gmtime_r(&now.tv_sec, &utc);
-    length = strftime(text, 40, "%Y-%m-%dT%H:%M:%S", &utc);
-    snprintf(text + length, 40 - length, ".%03dZ", (int)(now.tv_nsec / 1000000));
-}
-
 /* The status of a field in words; of a lost link with the reason. */
 static const char *print_status(uint8_t status, char text[256])
 {
     const char *reason = status == MBM_LINK_LOST ? line_reason(&at) : NULL;
 
-    snprintf(text, 256, "%s%s%s", mbm_status_text(status), reason ? ": " : "",
+    snprintf(text, 256, "%s%s%s", report_words(status, exception_of(status)), reason ? ": " : "",
              reason ? reason : "");
     return text;
 }
@@ -329,15 +317,17 @@ static void print_json(uint16_t field, uint32_t round, const char *time)
 
 static void show_round(uint32_t round)
 {
+    struct timespec now;
     char time[40];
     uint16_t i;
 
-    print_time(time);
+    clock_gettime(CLOCK_REALTIME, &now);
+    report_time(&now, time);
     if (!options.is_json)
         print_rows(round, time);
     for (i = 0; options.is_json && i < meter.readable; i++)
         print_json(i, round, time);
-    (void)fflush(stdout);
+    report_flush();
 }
 
 /* Says how it went, and what to look at after the first failure. */

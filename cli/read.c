@@ -86,7 +86,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
         else if (state->arg_num == 2)
             count_text = text;
         else
-            return ARGP_ERR_UNKNOWN;
+            options_too_many(state, text);
         return 0;
     case ARGP_KEY_SUCCESS: check_arguments(state); return 0;
     default: return ARGP_ERR_UNKNOWN;
@@ -258,16 +258,6 @@ static void print_round(uint32_t round)
     print_rows(1);
 }
 
-static void print_time(const struct timespec *when, char text[40])
-{
-    struct tm utc;
-    size_t length;
-
-    gmtime_r(&when->tv_sec, &utc);
-    length = strftime(text, 40, "%Y-%m-%dT%H:%M:%S", &utc);
-    snprintf(text + length, 40 - length, ".%03dZ", (int)(when->tv_nsec / 1000000));
-}
-
 static void print_cell(const char *text)
 {
     const char *c;
@@ -354,7 +344,7 @@ static void show(uint32_t round)
     unsigned i;
 
     clock_gettime(CLOCK_REALTIME, &now);
-    print_time(&now, time);
+    report_time(&now, time);
     if (options.is_json)
         print_json(time);
     else if (is_csv)
@@ -370,7 +360,7 @@ static void show(uint32_t round)
                parts[i].quantity * sizeof words[0]);
         parts[i].has_before = 1;
     }
-    (void)fflush(stdout);
+    report_flush();
 }
 
 /* Says on stderr why parts of the only round failed; of several with one reason the first. */

@@ -6,12 +6,15 @@
 
 #include <cjson/cJSON.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdarg.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
 
 const char *report_name = "mbm";
 int report_code;
@@ -29,13 +32,52 @@ static void stop(int number)
 
 void report_catch_signals(void)
 {
-    struct sigaction action = {0};
+    struct sigaction action = {0}, old;
 
     action.sa_handler = stop;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    if (sigaction(SIGHUP, NULL, &old) == 0 && old.sa_handler != SIG_IGN)
+        sigaction(SIGHUP, &action, NULL);
     action.sa_handler = SIG_IGN;
     sigaction(SIGPIPE, &action, NULL);
+}
+
+static int output_error; /* the first of stdout, or 0 */
+
+void report_flush(void)
+{
+    if ((fflush(stdout) != 0 || ferror(stdout)) && output_error == 0)
+        output_error = errno ? errno : EIO;
+}
+
+static void close_output(void)
+{
+    report_flush();
+    if (fclose(stdout) != 0 && output_error == 0)
+        output_error = errno;
+    if (output_error != 0)
+        _exit(report(CODE_SYSTEM, "standard output: %s", strerror(output_error)));
+}
+
+void report_begin(void)
+{
+    int fd;
+
+    for (fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++)
+        if (fcntl(fd, F_GETFD) < 0)
+            (void)open("/dev/null", O_RDWR); /* the lowest descriptor that is free: this one */
+    (void)atexit(close_output);
+}
+
+void report_time(const struct timespec *when, char text[40])
+{
+    struct tm utc;
+    size_t length;
+
+    gmtime_r(&when->tv_sec, &utc);
+    length = strftime(text, 40, "%Y-%m-%dT%H:%M:%S", &utc);
+    snprintf(text + length, 40 - length, ".%03dZ", (int)(when->tv_nsec / 1000000));
 }
 
 int report_note(int code)
@@ -121,15 +163,31 @@ int report_code_of(uint8_t status, uint8_t exception)
     }
 }
 
+const char *report_words(uint8_t status, uint8_t exception)
+{
+    static char text[64];
+    const char *words = mbm_status_textOf(status, exception);
+
+    if (exception == 0 || strncmp(words, "exception", 9) == 0)
+        return words;
+    snprintf(text, sizeof text, "exception %02X, which the standard does not have", exception);
+    return text;
+}
+
+const char *report_error_text(int error)
+{
+    return error == EPIPE ? "the other end has closed it" : strerror(error);
+}
+
 const char *report_advice(uint8_t status, uint8_t exception)
 {
     switch (exception) {
     case 0: break;
     case MBM_ILLEGAL_FUNCTION:
-        return "The device does not have this function; values may be in another --table";
+        return "The device does not have this function; values may be in another table";
     case MBM_ILLEGAL_DATA_ADDRESS:
-        return "Check address and count against the device's manual; manuals that count from 1 need "
-               "--one-based";
+        return "Check address and count against the device's manual; if that counts from "
+               "1, use --one-based or subtract 1";
     case MBM_ILLEGAL_DATA_VALUE:
         return "Check the count and the values against the device's manual";
     case MBM_SLAVE_DEVICE_BUSY: return "Try again later";
@@ -171,8 +229,7 @@ int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t ti
                       number_time_text(timeoutMs, time), space, advice);
     if (status == MBM_LINK_LOST && lost)
         return report(code, "unit %u: the link was lost: %s", unit, lost);
-    return report(code, "unit %u: %s%s%s", unit, mbm_status_textOf(status, exception), space,
-                  advice);
+    return report(code, "unit %u: %s%s%s", unit, report_words(status, exception), space, advice);
 }
 
 void report_print_json(cJSON *object)
@@ -180,7 +237,7 @@ void report_print_json(cJSON *object)
     char *text = cJSON_PrintUnformatted(object);
 
     puts(text ? text : "null");
-    (void)fflush(stdout);
+    report_flush();
     cJSON_free(text);
     cJSON_Delete(object);
 }
@@ -192,11 +249,4 @@ void report_json(cJSON *object, uint8_t status, uint8_t exception, const char *w
     if (exception != 0)
         cJSON_AddNumberToObject(object, "exception", exception);
     report_print_json(object);
-}
-
-int report_end(int code)
-{
-    if ((ferror(stdout) || fclose(stdout) != 0) && errno != EBADF)
-        code = report(CODE_SYSTEM, "standard output: %s", strerror(errno));
-    return code;
 }

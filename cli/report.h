@@ -62,6 +62,12 @@ int report_code_of(uint8_t status, uint8_t exception);
 int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t timeoutMs,
                    const char *lost);
 
+/* The status of a request in words, of an exception with its code. */
+const char *report_words(uint8_t status, uint8_t exception);
+
+/* An error number in words. EPIPE, of which strerror speaks as of a pipe, is a line's end. */
+const char *report_error_text(int error);
+
 /* What to look at after a failure, as a sentence. Empty if nothing helps. */
 const char *report_advice(uint8_t status, uint8_t exception);
 
@@ -71,12 +77,20 @@ struct cJSON;
 void report_print_json(struct cJSON *object);
 void report_json(struct cJSON *object, uint8_t status, uint8_t exception, const char *words);
 
-/* Ctrl-C and SIGTERM set `report_stopped`. */
+/* Ctrl-C, SIGTERM and SIGHUP set `report_stopped`. A SIGHUP that nohup ignores stays ignored. */
 extern volatile sig_atomic_t report_stopped;
 void report_catch_signals(void);
 
-/* Closes standard output. Returns the exit code: `code`, or CODE_SYSTEM after reporting that the
- * output could not be written. */
-int report_end(int code);
+/* Opens /dev/null in place of standard input, output and stderr if they are closed. Otherwise a
+ * line would get the number of one of them, and what is printed would be sent on the line. At the
+ * end the program exits with CODE_SYSTEM if its output could not be written. */
+void report_begin(void);
+
+/* Writes a time in UTC, such as 2026-01-31T12:00:00.123Z. */
+struct timespec;
+void report_time(const struct timespec *when, char text[40]);
+
+/* Writes what was printed so far to stdout, and keeps the reason if that fails. */
+void report_flush(void);
 
 #endif

@@ -11,46 +11,24 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { UNITS = 255, RATES = 16, PARITIES = 3 };
+enum { RATES = 16, PARITIES = 3 };
 
 static line at;
 static place where;
-static uint8_t units[UNITS];
+static uint8_t units[OPTIONS_UNITS];
 static unsigned unit_count;
 static uint32_t rates[RATES];
 static unsigned rate_count;
 static char parities[PARITIES];
 static unsigned parity_count;
 
-static mbm_clientRequest requests[UNITS];
-static uint16_t values[UNITS];
+static mbm_clientRequest requests[OPTIONS_UNITS];
+static uint16_t values[OPTIONS_UNITS];
 static unsigned answering, damaged, tried;
 
 /* --- the command line --- */
 
 enum { UNITS_KEY = 1, RATES_KEY, PARITIES_KEY };
-
-static void add_unit(const struct argp_state *state, const char *text, uint8_t unit)
-{
-    if (memchr(units, unit, unit_count))
-        options_wrong(state, "--units \"%s\": unit %u is there twice", text, unit);
-    units[unit_count++] = unit;
-}
-
-/* One item of a list of units: 17, or 1-247. */
-static void read_units(const struct argp_state *state, char *item)
-{
-    char *dash = strchr(item, '-');
-    int64_t first, last;
-
-    if (dash)
-        *dash = '\0';
-    first = last = options_number(state, "--units", item, 1, 255);
-    if (dash)
-        last = options_number(state, "--units", dash + 1, first, 255);
-    for (; first <= last; first++)
-        add_unit(state, item, (uint8_t)first);
-}
 
 static void read_rate(const struct argp_state *state, char *item)
 {
@@ -83,14 +61,12 @@ static void read_list(const struct argp_state *state, char *text,
 
 static void check_arguments(const struct argp_state *state)
 {
-    unsigned i;
-
     if (!where.text)
         options_wrong(state, "LINE is missing");
     if (!place_is_serial(&where) && rate_count + parity_count > 0)
         options_wrong(state, "--rates and --parities need a serial line");
-    for (i = 1; unit_count == 0 || (i <= 247 && unit_count < i); i++)
-        units[unit_count++] = (uint8_t)i;
+    if (unit_count == 0)
+        unit_count = options_units(state, "--units", "1-247", units);
     if (rate_count == 0)
         rates[rate_count++] = where.tty.baud;
     if (parity_count == 0)
@@ -102,12 +78,12 @@ static void check_arguments(const struct argp_state *state)
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     switch (key) {
-    case UNITS_KEY: read_list(state, text, read_units); return 0;
+    case UNITS_KEY: unit_count = options_units(state, "--units", text, units); return 0;
     case RATES_KEY: read_list(state, text, read_rate); return 0;
     case PARITIES_KEY: read_list(state, text, read_parity); return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0)
-            return ARGP_ERR_UNKNOWN;
+            options_too_many(state, text);
         options_place(state, &where, text, 0);
         return 0;
     case ARGP_KEY_SUCCESS: check_arguments(state); return 0;
@@ -154,9 +130,9 @@ static void print_unit(const mbm_clientRequest *request, uint16_t value)
             printf("unit %3u: holding register 0 is %u\n", request->unit, value);
         else
             printf("unit %3u: %s%s\n", request->unit,
-                   mbm_status_textOf(request->status, request->exception),
+                   report_words(request->status, request->exception),
                    request->exception ? "" : "; two units with one id, or another rate or parity?");
-        (void)fflush(stdout);
+        report_flush();
         return;
     }
     all = cJSON_CreateObject();

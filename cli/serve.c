@@ -24,36 +24,9 @@ static struct {
 
 static place where;
 static fault_list faults;
-static uint8_t ids[255], id_count;
+static uint8_t ids[OPTIONS_UNITS], id_count;
 
 /* --- the command line --- */
-
-/* Reads unit ids such as 1,17,30-39. */
-static void read_units(const struct argp_state *state, const char *text)
-{
-    char copy[600], *rest, *word;
-    uint8_t is_given[256] = {0};
-    int i;
-
-    if ((size_t)snprintf(copy, sizeof copy, "%s", text) >= sizeof copy)
-        options_wrong(state, "--unit is too long");
-    for (word = strtok_r(copy, ",", &rest); word; word = strtok_r(NULL, ",", &rest)) {
-        char *dash = strchr(word, '-');
-        int64_t first, last;
-
-        if (dash)
-            *dash++ = '\0';
-        first = last = options_number(state, "--unit", word, 1, 255);
-        if (dash)
-            last = options_number(state, "--unit", dash, first, 255);
-        memset(is_given + first, 1, (size_t)(last - first + 1));
-    }
-    for (i = 1; i < 256; i++)
-        if (is_given[i])
-            ids[id_count++] = (uint8_t)i;
-    if (id_count == 0)
-        options_wrong(state, "--unit \"%s\" has no unit: write 1, 1,17 or 1-10", text);
-}
 
 /* Checks what was given, once all of it is known. */
 static void check(const struct argp_state *state)
@@ -73,7 +46,8 @@ static void check(const struct argp_state *state)
         if (wrong)
             options_wrong(state, "--fault %s", wrong);
     }
-    read_units(state, wanted.unit_text ? wanted.unit_text : "1");
+    id_count =
+        (uint8_t)options_units(state, "--unit", wanted.unit_text ? wanted.unit_text : "1", ids);
 }
 
 static error_t parse(int key, char *text, struct argp_state *state)
@@ -90,7 +64,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
         return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 1)
-            options_wrong(state, "\"%s\" is one argument too many", text);
+            options_too_many(state, text);
         *(state->arg_num == 0 ? &wanted.line : &wanted.file) = text;
         return 0;
     case ARGP_KEY_END: check(state); return 0;
@@ -141,7 +115,7 @@ static void announce(const served_units *units, const char *name)
             printf("-%u", units->units[last].id);
     }
     printf(" on %s\n", name);
-    fflush(stdout);
+    report_flush();
 }
 
 static int make_units(served_units *units, const device *from, served_hook *hook)

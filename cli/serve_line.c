@@ -2,6 +2,7 @@
 #include "serve_line.h"
 
 #include "fault_port.h"
+#include "line.h"
 #include "mbm_tls_linux.h"
 #include "mbm_udp.h"
 #include "report.h"
@@ -39,15 +40,20 @@ static int count;
 
 /* --- opening --- */
 
-static int cannot_open(const char *reason)
+/* Says why, which is an error of getaddrinfo or one of the system. */
+static int cannot_open(int lookupError)
 {
-    return report(CODE_LINE, "%s: %s", at.text, reason);
+    const char *advice = lookupError ? "Check the name of the host" : place_advice(&at, errno);
+
+    return report(CODE_LINE, "%s: %s%s%s", at.text,
+                  lookupError ? gai_strerror(lookupError) : strerror(errno), *advice ? ". " : "",
+                  advice);
 }
 
 static int open_tty(char *name)
 {
     snprintf(name, SERVE_LINE_NAME_BYTES, "%s", at.path);
-    return mbm_tty_openWith(&tty, at.path, &at.tty) == 0 ? CODE_DONE : cannot_open(strerror(errno));
+    return mbm_tty_openWith(&tty, at.path, &at.tty) == 0 ? CODE_DONE : cannot_open(0);
 }
 
 /* Links a name to the far end, in place of an old link. */
@@ -61,7 +67,7 @@ static int link_name(const char *target)
         (void)unlink(at.path);
     }
     is_linked = symlink(target, at.path) == 0;
-    return is_linked ? CODE_DONE : cannot_open(strerror(errno));
+    return is_linked ? CODE_DONE : cannot_open(0);
 }
 
 static int open_pty(char *name)
@@ -71,7 +77,7 @@ static int open_pty(char *name)
     char path[64];
 
     if (near_end < 0)
-        return cannot_open(strerror(errno));
+        return cannot_open(0);
     if (grantpt(near_end) != 0 || unlockpt(near_end) != 0 ||
         ptsname_r(near_end, path, sizeof path) != 0 ||
         (far_end = open(path, O_RDWR | O_NOCTTY | O_CLOEXEC)) < 0 ||
@@ -79,7 +85,8 @@ static int open_pty(char *name)
         const int error = errno;
 
         (void)close(near_end);
-        return cannot_open(strerror(error));
+        errno = error;
+        return cannot_open(0);
     }
     cfmakeraw(&raw);
     (void)tcsetattr(far_end, TCSANOW, &raw);
@@ -91,16 +98,18 @@ static int open_udp(void)
 {
     if (mbm_udp_listen(&udp, place_host(&at), at.service) == 0)
         return CODE_DONE;
-    return cannot_open(udp.lookupError ? gai_strerror(udp.lookupError) : strerror(errno));
+    return cannot_open(udp.lookupError);
 }
 
 static int open_tls(void)
 {
     mbm_tls_options options = {.isServer = 1};
+    const char *unreadable;
     uint8_t status;
 
-    if (mbm_tls_load(&files, &options, at.cert, at.key, at.ca) != 0)
-        return report(CODE_WRONG, "%s, %s or %s: %s", at.cert, at.key, at.ca, strerror(errno));
+    unreadable = line_load_tls(&at, &files, &options);
+    if (unreadable)
+        return report(CODE_WRONG, "%s: %s", unreadable, strerror(errno));
     status = mbm_tls_begin(&identity, &options);
     mbm_tls_forgetKey(&files);
     return status == 0 ? CODE_DONE : report(CODE_WRONG, "%s: %s", at.text, mbm_tls_text(status));
@@ -114,7 +123,7 @@ static int open_listener(void)
 
     if (result == 0)
         return CODE_DONE;
-    return cannot_open(listener.lookupError ? gai_strerror(listener.lookupError) : strerror(errno));
+    return cannot_open(listener.lookupError);
 }
 
 /* Writes the name of a listening place with its port. */
@@ -295,7 +304,7 @@ int serve_line_run(served_units *units)
                 continue;
             if (!is_listening)
                 return report(CODE_LINE, "%s: the line was lost: %s", at.text,
-                              strerror(at.kind == PLACE_UDP ? udp.error : tty.error));
+                              report_error_text(at.kind == PLACE_UDP ? udp.error : tty.error));
             mbm_tls_close(&tlss[i]);
             mbm_tcp_close(&tcps[i]);
         }

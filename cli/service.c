@@ -179,7 +179,7 @@ static void write_stats(void)
         return;
     if (text && strcmp(stats_path, "-") == 0) {
         puts(text);
-        (void)fflush(stdout);
+        report_flush();
     } else if (!text || replace_file(stats_path, text) != 0) {
         if (!stats_failed)
             report_log(REPORT_ERROR, "%s: %s. The statistics are not written", stats_path,

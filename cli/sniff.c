@@ -10,6 +10,7 @@
 #include "report.h"
 #include "trace.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -117,9 +118,9 @@ static int watch(void)
             feed(bytes, (uint16_t)length);
         else if (length < 0)
             code = report(CODE_LINE, "%s: the line was lost: %s", where.text,
-                          strerror(place_is_tcp(&where) ? at.tcp.error : at.tty.error));
+                          report_error_text(place_is_tcp(&where) ? at.tcp.error : at.tty.error));
         print_events(now);
-        fflush(stdout);
+        report_flush();
     }
     line_close(&at);
     print_events(micros(CLOCK_MONOTONIC));
@@ -149,6 +150,8 @@ static int replay(void)
         pass_time(from.time);
         feed(from.bytes, from.length);
     }
+    if (ferror(stdin))
+        return report(CODE_SYSTEM, "the recording: %s", strerror(errno));
     if (found < 0)
         return report(CODE_WRONG, "line %u of the recording: %s", from.line, wrong);
     pass_time(now + ALL_ENDED);

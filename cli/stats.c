@@ -1,6 +1,8 @@
 #define _GNU_SOURCE
 #include "stats.h"
 
+#include "report.h"
+
 #include <cjson/cJSON.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -42,15 +44,12 @@ char *stats_json(const stats *from)
 {
     cJSON *root = cJSON_CreateObject(), *list;
     struct timespec now;
-    struct tm utc;
-    char when[40], second[24];
+    char when[40];
     size_t at, line;
     char *text;
 
     clock_gettime(CLOCK_REALTIME, &now);
-    gmtime_r(&now.tv_sec, &utc);
-    (void)strftime(second, sizeof second, "%Y-%m-%dT%H:%M:%S", &utc);
-    snprintf(when, sizeof when, "%s.%03ldZ", second, now.tv_nsec / 1000000);
+    report_time(&now, when);
     cJSON_AddStringToObject(root, "time", when);
     cJSON_AddStringToObject(root, "command", from->command);
     for (at = 0; at < from->count; at++)

@@ -28,17 +28,6 @@ static uint8_t bits[MBM_MAX_WRITE_BITS / 8];
 
 enum { MULTIPLE = 1 };
 
-/* Hides the minus of negative values, of which none follows an option directly. */
-static void hide_minus(int argc, char **argv)
-{
-    int i;
-
-    for (i = 2; i < argc && strcmp(argv[i - 1], "--") != 0; i++)
-        if (argv[i][0] == '-' && (isdigit((unsigned char)argv[i][1]) || argv[i][1] == '.') &&
-            argv[i - 1][0] != '-')
-            argv[i][0] = MINUS;
-}
-
 static void read_text(const struct argp_state *state, const char *text)
 {
     mbm_registers registers;
@@ -138,6 +127,35 @@ static const struct argp arguments = {
     children,
     NULL,
     NULL};
+
+/* Whether the word after an option is its argument. */
+static int takes_next(const struct argp *of, const char *word)
+{
+    const size_t length = strlen(word);
+    const struct argp_option *option = of->options;
+    const struct argp_child *child = of->children;
+
+    for (; option && option->name; option++)
+        if (option->arg &&
+            (strncmp(word, "--", 2) == 0 ? strncmp(option->name, word + 2, length - 2) == 0
+                                         : length == 2 && word[0] == '-' && word[1] == option->key))
+            return 1;
+    for (; child && child->argp; child++)
+        if (takes_next(child->argp, word))
+            return 1;
+    return 0;
+}
+
+/* Hides the minus of negative values, but not that of an option's argument. */
+static void hide_minus(int argc, char **argv)
+{
+    int i;
+
+    for (i = 2; i < argc && strcmp(argv[i - 1], "--") != 0; i++)
+        if (argv[i][0] == '-' && (isdigit((unsigned char)argv[i][1]) || argv[i][1] == '.') &&
+            !takes_next(&arguments, argv[i - 1]))
+            argv[i][0] = MINUS;
+}
 
 /* --- writing --- */
 
