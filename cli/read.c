@@ -7,6 +7,7 @@
 
 #include <cjson/cJSON.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -18,8 +19,13 @@ typedef struct part {
     mbm_clientRequest request;
     uint32_t first; /* index of its first word in `words` */
     uint16_t quantity;
-    uint8_t has_before;
 } part;
+
+/* What a unit had in the round before. */
+typedef struct history {
+    uint16_t words[ADDRESSES];
+    uint8_t has_part[PARTS];
+} history;
 
 static line at;
 static place where;
@@ -27,12 +33,17 @@ static const char *address_text, *count_text;
 static uint32_t interval, rounds;
 static int is_csv;
 
+/* The units, which are read one after another; `turn` is the index of the one at work. */
+static uint8_t units[OPTIONS_UNITS] = {1};
+static unsigned unit_count = 1, turn;
+static history *before; /* of each unit */
+
 static uint16_t address;
 static uint32_t count = 1, total; /* values; registers or bits */
 static uint16_t each;             /* registers or bits of a value */
 static part parts[PARTS];
 static unsigned part_count;
-static uint16_t words[ADDRESSES], before[ADDRESSES];
+static uint16_t words[ADDRESSES];
 static uint8_t bits[(ADDRESSES / MBM_MAX_READ_BITS + 1) * BYTES_OF_BITS];
 
 /* --- the command line --- */
@@ -47,7 +58,6 @@ static void check_arguments(const struct argp_state *state)
 
     if (!address_text)
         options_wrong(state, "%s is missing", where.text ? "ADDRESS" : "LINE");
-    options_check_unit(state, &where, 0);
     address = options_address(state, address_text);
     if (count_text)
         count = (uint32_t)options_number(state, "COUNT", count_text, 1,
@@ -75,6 +85,7 @@ static void check_arguments(const struct argp_state *state)
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     switch (key) {
+    case 'u': unit_count = options_units(state, "--unit", text, units); return 0;
     case EVERY: interval = options_time(state, "--every", text, 1, 86400000); return 0;
     case TIMES: rounds = (uint32_t)options_number(state, "--times", text, 1, 1000000000); return 0;
     case CSV: is_csv = 1; return 0;
@@ -94,15 +105,14 @@ static error_t parse(int key, char *text, struct argp_state *state)
 }
 
 static const struct argp_option texts[] = {
+    {"unit", 'u', "LIST", 0, "The unit ids to read, 1 to 255, such as 17 or 1,17,30-39 (1)", 1},
     {"every", EVERY, "TIME", 0, "Read again and again, such as every 500ms or 2s, until Ctrl-C", 0},
     {"times", TIMES, "N", 0, "With --every: so many times", 0},
     {"csv", CSV, NULL, 0, "Print CSV, one line a round", 3},
     {NULL, 0, NULL, 0, NULL, 0}};
 
-static const struct argp_child children[] = {{&options_unit, 0, NULL, 0},
-                                             {&options_values, 0, NULL, 0},
-                                             {&options_client, 0, NULL, 0},
-                                             {NULL, 0, NULL, 0}};
+static const struct argp_child children[] = {
+    {&options_values, 0, NULL, 0}, {&options_client, 0, NULL, 0}, {NULL, 0, NULL, 0}};
 
 static const struct argp arguments = {
     texts,
@@ -219,8 +229,10 @@ static unsigned shown_address(uint32_t offset)
     return address + (unsigned)offset + options.is_one_based;
 }
 
-static void print_rows(int is_round)
+/* Prints a row for each value; if it is one table of several, also for a part that failed. */
+static void print_rows(int is_table)
 {
+    const history *old = &before[turn];
     char text[VALUE_TEXT_BYTES], status[256];
     uint32_t value;
 
@@ -230,31 +242,35 @@ static void print_rows(int is_round)
         int is_changed;
 
         if (!is_read(value)) {
-            if (is_round && p->first == first)
+            if (is_table && p->first == first)
                 printf("  %5u  %s\n", shown_address(first), line_status(&at, &p->request, status));
             continue;
         }
-        is_changed =
-            p->has_before && memcmp(words + first, before + first, each * sizeof words[0]) != 0;
+        is_changed = old->has_part[p - parts] &&
+                     memcmp(words + first, old->words + first, each * sizeof words[0]) != 0;
         print_value(value, 0, text);
         printf("%s%5u  %s\n",
-               !is_round    ? ""
+               !is_table    ? ""
                : is_changed ? "* "
                             : "  ",
                shown_address(first), text);
     }
 }
 
-static void print_round(uint32_t round)
+/* Prints a table of one unit, in a round or, if that is 0, in the only one. */
+static void print_table(uint32_t round)
 {
     uint32_t value, right = 0;
+    char which[32] = "";
 
     for (value = 0; value < count; value++)
         right += (uint32_t)is_read(value);
-    if (isatty(STDOUT_FILENO))
+    if (round > 0)
+        snprintf(which, sizeof which, ", round %u", (unsigned)round);
+    if (round > 0 && turn == 0 && isatty(STDOUT_FILENO))
         printf("\033[H\033[J");
-    printf("unit %u, %s, round %u: %u of %u values read\n", options.unit,
-           value_table_names[options.table], (unsigned)round, (unsigned)right, (unsigned)count);
+    printf("unit %u, %s%s: %u of %u values read\n", options.unit, value_table_names[options.table],
+           which, (unsigned)right, (unsigned)count);
     print_rows(1);
 }
 
@@ -339,6 +355,7 @@ static void print_json(const char *time)
 
 static void show(uint32_t round)
 {
+    history *old = &before[turn];
     struct timespec now;
     char time[40];
     unsigned i;
@@ -349,16 +366,16 @@ static void show(uint32_t round)
         print_json(time);
     else if (is_csv)
         print_csv(time);
-    else if (interval > 0)
-        print_round(round);
+    else if (interval > 0 || unit_count > 1)
+        print_table(round);
     else
         print_rows(0);
     for (i = 0; i < part_count; i++) {
         if (parts[i].request.status != MBM_OK)
             continue;
-        memcpy(before + parts[i].first, words + parts[i].first,
+        memcpy(old->words + parts[i].first, words + parts[i].first,
                parts[i].quantity * sizeof words[0]);
-        parts[i].has_before = 1;
+        old->has_part[i] = 1;
     }
     report_flush();
 }
@@ -374,15 +391,37 @@ static void report_parts(void)
             (void)line_failure(&at, &parts[i].request);
 }
 
+/* Reads the units in a round, or in the only one, which is 0. Returns 0 after Ctrl-C; `right` is
+ * then meaningless. */
+static int read_units(uint32_t round, int *right)
+{
+    for (*right = 1, turn = 0; turn < unit_count; turn++) {
+        int is_read;
+
+        options.unit = units[turn];
+        is_read = read_parts();
+        if (!is_read && round > 0)
+            return 0;
+        *right &= first_failed() == NULL;
+        show(round);
+        if (round == 0)
+            report_parts();
+        if (!is_read)
+            return 0;
+    }
+    return 1;
+}
+
 static void read_rounds(void)
 {
+    int right;
     uint32_t round = 0, failed = 0, due = line_milliseconds();
 
     while (!report_stopped && !ferror(stdout) && (rounds == 0 || round < rounds)) {
-        if (!read_parts())
+        if (!read_units(round + 1, &right))
             break;
-        failed += first_failed() != NULL;
-        show(++round);
+        round++;
+        failed += !right;
         /* If a round took longer than the interval, the next one follows at once. */
         due += interval;
         if ((int32_t)(due - line_milliseconds()) < 0)
@@ -400,7 +439,12 @@ static void read_rounds(void)
 
 int read_command(int argc, char **argv)
 {
+    int right;
+
     argp_parse(&arguments, argc, argv, 0, NULL, NULL);
+    before = (history *)calloc(unit_count, sizeof *before);
+    if (!before)
+        return report(CODE_SYSTEM, "there is no memory for %u units", unit_count);
     if (line_open(&at, &where) != CODE_DONE)
         return report_code;
     if (interval == 0 && line_connect(&at) != CODE_DONE) {
@@ -412,9 +456,7 @@ int read_command(int argc, char **argv)
     if (interval > 0) {
         read_rounds();
     } else {
-        (void)read_parts();
-        show(1);
-        report_parts();
+        (void)read_units(0, &right);
     }
     line_close(&at);
     return report_code;
