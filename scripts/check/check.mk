@@ -129,7 +129,7 @@ address: ## Write the address of packaging/project.toml into the links to releas
 	@scripts/build/project.py
 
 # The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(BUILD)/plain/mbm $(SERVE)
+PAGE_PROGRAMS := $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(BUILD)/plain/mbm $(SERVE) $(PEERS)
 .PHONY: check-pages
 check-pages: linux ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
 	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev libmosquitto-dev libcjson-dev libyaml-dev openssl \
