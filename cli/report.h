@@ -12,7 +12,7 @@ enum {
     CODE_SYSTEM = 1,    /* a file, the memory */
     CODE_WRONG = 2,     /* the command line, or what a file says */
     CODE_LINE = 3,      /* the line could not be opened, or was lost */
-    CODE_NO_REPLY = 4,  /* no reply in time */
+    CODE_NO_REPLY = 4,  /* no reply in time, or Ctrl-C before the reply */
     CODE_EXCEPTION = 5, /* the device answered with an exception */
     CODE_DAMAGED = 6    /* the reply was damaged or malformed */
 };
@@ -23,7 +23,7 @@ enum {
     "  1  the system failed: a file, the memory\n"                                                 \
     "  2  the command line or a file is wrong\n"                                                   \
     "  3  the line could not be opened, or was lost\n"                                             \
-    "  4  no reply in time\n"                                                                      \
+    "  4  no reply in time, or Ctrl-C before the reply\n"                                          \
     "  5  the device answered with an exception\n"                                                 \
     "  6  the reply was damaged or malformed\n"                                                    \
     "Of several results the first failure counts.\n"

@@ -31,6 +31,7 @@ static void checked(int result)
 {
     if (result == 0)
         return;
+    (void)report_note(CODE_SYSTEM);
     report_log(REPORT_ERROR, "%s: %s. No more frames are written to it", pcap_path,
                strerror(errno));
     (void)fclose(pcap);
