@@ -121,24 +121,6 @@ static void on_update(void *context, mbm_plan *ended, uint16_t field)
         publish_value(l, field);
 }
 
-void bridge_line_connected(bridge_line *l)
-{
-    unsigned number;
-    uint16_t field;
-
-    broker_subscribe(&bridge.mqtt, l->below);
-    if (bridge.has_discovery)
-        bridge_line_discover(l);
-    for (number = 1; number < 256; number++)
-        if (l->table->units[number].state != UNIT_UNKNOWN)
-            publish_unit(l, number, unit_text(&l->table->units[number]));
-    for (field = 0; field < l->table->fields.readable; field++)
-        if (l->table->last[field].has_ended)
-            publish_value(l, field);
-}
-
-/* --- discovery, and what is left of fields that are gone --- */
-
 static const discovery_line *discovery_of(const bridge_line *l)
 {
     static discovery_line as;
@@ -149,7 +131,8 @@ static const discovery_line *discovery_of(const bridge_line *l)
     return &as;
 }
 
-void bridge_line_discover(bridge_line *l)
+/* Publishes how Home Assistant finds the fields. */
+static void discover(bridge_line *l)
 {
     uint16_t field;
 
@@ -162,6 +145,24 @@ void bridge_line_discover(bridge_line *l)
         free(text);
     }
 }
+
+void bridge_line_connected(bridge_line *l)
+{
+    unsigned number;
+    uint16_t field;
+
+    broker_subscribe(&bridge.mqtt, l->below);
+    if (bridge.has_discovery)
+        discover(l);
+    for (number = 1; number < 256; number++)
+        if (l->table->units[number].state != UNIT_UNKNOWN)
+            publish_unit(l, number, unit_text(&l->table->units[number]));
+    for (field = 0; field < l->table->fields.readable; field++)
+        if (l->table->last[field].has_ended)
+            publish_value(l, field);
+}
+
+/* --- what is left of fields that are gone --- */
 
 /* Whether the next table has this field with this topic of discovery. */
 static int is_discovered(const bridge_line *l, const device *next, const char *name,
@@ -387,7 +388,7 @@ void bridge_line_replace(bridge_line *l, bridge_table *next)
     begin_plan(l, next);
     bridge_table_free(before);
     if (bridge.has_discovery)
-        bridge_line_discover(l);
+        discover(l);
 }
 
 void bridge_line_clear(bridge_line *l)

@@ -69,9 +69,6 @@ int bridge_line_polls(bridge_line *l, struct pollfd *wait, uint32_t *micros);
 /* Subscribes, and publishes everything that has been read: the broker is connected. */
 void bridge_line_connected(bridge_line *l);
 
-/* Publishes how Home Assistant finds the fields. */
-void bridge_line_discover(bridge_line *l);
-
 /* Carries out a write to a field of the line. `name` is that after `below`. */
 void bridge_line_write(bridge_line *l, const char *name, const broker_event *event);
 

@@ -13,7 +13,7 @@ int cursor_skip_char(cursor *in, char one)
     return 1;
 }
 
-int cursor_skip_digits(cursor *in)
+static int skip_digits(cursor *in)
 {
     if (!cursor_is_digit(in))
         return 0;
@@ -25,13 +25,13 @@ int cursor_skip_digits(cursor *in)
 int cursor_skip_number(cursor *in)
 {
     (void)cursor_skip_char(in, '-');
-    if (!cursor_skip_char(in, '0') && !cursor_skip_digits(in))
+    if (!cursor_skip_char(in, '0') && !skip_digits(in))
         return 0;
-    if (cursor_skip_char(in, '.') && !cursor_skip_digits(in))
+    if (cursor_skip_char(in, '.') && !skip_digits(in))
         return 0;
     if (!cursor_skip_char(in, 'e') && !cursor_skip_char(in, 'E'))
         return 1;
     if (!cursor_skip_char(in, '-'))
         (void)cursor_skip_char(in, '+');
-    return cursor_skip_digits(in);
+    return skip_digits(in);
 }

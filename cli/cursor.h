@@ -11,11 +11,10 @@ typedef struct cursor {
 
 int cursor_is_digit(const cursor *in);
 
-/* Each returns 0 if the next bytes are not what it skips. */
+/* Returns 0 if the next byte is another one. */
 int cursor_skip_char(cursor *in, char one);
-int cursor_skip_digits(cursor *in);
 
-/* A number as JSON has it (RFC 8259, 6). */
+/* Skips a number as JSON has it (RFC 8259, 6). Returns 0 if there is none. */
 int cursor_skip_number(cursor *in);
 
 #endif

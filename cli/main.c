@@ -122,7 +122,7 @@ int main(int argc, char **argv)
     static char help[] = "--help";
     const char *word = argc > 1 ? argv[1] : "";
     char *of_help[] = {argc > 2 ? argv[2] : NULL, help, NULL}, **words = argv + 1;
-    int count = argc - 1, code;
+    int count = argc - 1;
     const command *chosen;
 
     argp_err_exit_status = CODE_WRONG;
@@ -140,8 +140,5 @@ int main(int argc, char **argv)
         count = 2;
     }
     chosen = find(words[0]);
-    if (!chosen)
-        return CODE_WRONG;
-    code = run(chosen, count, words);
-    return code == CODE_DONE ? report_code : code;
+    return chosen ? run(chosen, count, words) : CODE_WRONG;
 }

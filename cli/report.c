@@ -179,7 +179,8 @@ const char *report_error_text(int error)
     return error == EPIPE ? "the other end has closed it" : strerror(error);
 }
 
-const char *report_advice(uint8_t status, uint8_t exception)
+/* What to look at after a failure, as a sentence. Empty if nothing helps. */
+static const char *advice_on(uint8_t status, uint8_t exception)
 {
     switch (exception) {
     case 0: break;
@@ -216,7 +217,7 @@ int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t ti
                    const char *lost)
 {
     const int code = report_code_of(status, exception);
-    const char *advice = report_advice(status, exception);
+    const char *advice = advice_on(status, exception);
     const char *space = *advice ? ". " : "";
     char time[32];
 

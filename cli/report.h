@@ -68,9 +68,6 @@ const char *report_words(uint8_t status, uint8_t exception);
 /* An error number in words. EPIPE, of which strerror speaks as of a pipe, is a line's end. */
 const char *report_error_text(int error);
 
-/* What to look at after a failure, as a sentence. Empty if nothing helps. */
-const char *report_advice(uint8_t status, uint8_t exception);
-
 /* Prints an object in one line to stdout, and frees it. report_json adds the status of a request
  * before: its exit code, its status in words, and the code of an exception. */
 struct cJSON;

@@ -37,14 +37,6 @@ static place where = {.text = "-", .framing = MBM_FRAMING_RTU};
 static uint32_t timeoutMs = 1000;
 static int is_recording, has_recording_options;
 
-static uint64_t micros(clockid_t clock)
-{
-    struct timespec time;
-
-    clock_gettime(clock, &time);
-    return (uint64_t)time.tv_sec * 1000000u + (uint64_t)time.tv_nsec / 1000u;
-}
-
 static void print_text(const mbm_event *event, uint64_t time)
 {
     static char text[2400];
@@ -105,15 +97,15 @@ static int watch(void)
     if (code == CODE_DONE && place_is_tcp(&where))
         code = line_connect(&at);
     port = place_is_tcp(&where) ? mbm_tcp_port(&at.tcp) : mbm_tty_port(&at.tty);
-    first = micros(CLOCK_MONOTONIC);
+    first = trace_micros(CLOCK_MONOTONIC);
     if (code == CODE_DONE)
-        epoch = micros(CLOCK_REALTIME);
+        epoch = trace_micros(CLOCK_REALTIME);
     while (code == CODE_DONE && !report_stopped && !ferror(stdout)) {
         int length;
 
         line_wait(&at, -1, LIVE_STEP);
         length = port.read(port.context, bytes, sizeof bytes);
-        now = micros(CLOCK_MONOTONIC);
+        now = trace_micros(CLOCK_MONOTONIC);
         if (length > 0)
             feed(bytes, (uint16_t)length);
         else if (length < 0)
@@ -123,7 +115,7 @@ static int watch(void)
         report_flush();
     }
     line_close(&at);
-    print_events(micros(CLOCK_MONOTONIC));
+    print_events(trace_micros(CLOCK_MONOTONIC));
     return code;
 }
 
@@ -251,5 +243,5 @@ int sniff_command(int argc, char **argv)
                 report_name, totals[MBM_EVENT_REQUEST], totals[MBM_EVENT_REPLY],
                 totals[MBM_EVENT_EXCEPTION], totals[MBM_EVENT_UNPAIRED], totals[MBM_EVENT_TIMEOUT],
                 totals[MBM_EVENT_BAD_CRC], totals[MBM_EVENT_NOISE], slowest / 1000.0);
-    return code;
+    return code == CODE_DONE ? report_code : code;
 }

@@ -8,7 +8,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { LINKS = 32 };
 
@@ -26,7 +25,8 @@ static int is_printed;
 static FILE *pcap;
 static const char *pcap_path;
 
-/* Stops writing after an error, and reports it once. */
+/* Stops writing after an error, and reports it once. A command of a client then ends with
+ * CODE_SYSTEM; a service goes on, and ends as if nothing was wrong. */
 static void checked(int result)
 {
     if (result == 0)
@@ -74,7 +74,7 @@ static void take(traced *link, const mbm_traceRecord *record, const mbm_event *e
         checked(pcap_write(pcap, &link->pcap, record, time, decoded));
 }
 
-static uint64_t micros(clockid_t clock)
+uint64_t trace_micros(clockid_t clock)
 {
     struct timespec now;
 
@@ -85,9 +85,9 @@ static uint64_t micros(clockid_t clock)
 /* The clock of the ports is the monotonic one. */
 static void take_frame(void *context, const mbm_traceRecord *record)
 {
-    const uint32_t age = (uint32_t)micros(CLOCK_MONOTONIC) - record->timeUs;
+    const uint32_t age = (uint32_t)trace_micros(CLOCK_MONOTONIC) - record->timeUs;
 
-    take((traced *)context, record, NULL, micros(CLOCK_REALTIME) - age);
+    take((traced *)context, record, NULL, trace_micros(CLOCK_REALTIME) - age);
 }
 
 static void end(void)
