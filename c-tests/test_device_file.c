@@ -299,6 +299,7 @@ static void a_wrong_key_is_refused_with_its_line(void **state)
         {UINT16("    unit:\n"), "6: unit is empty"},
         {UINT16("    description: \"a\\0b\"\n"), "6: description has a control character"},
         {UINT16("    description: \"a\\nb\"\n"), "6: description has a control character"},
+        {UINT16("    description: \"a\\x9Bb\"\n"), "6: description has a control character"},
         {"device: \"\"\n" UINT16(""), "1: device is empty"},
         {UINT16("---\n") UINT16(""), "7: a second document begins: the file has one"},
     };

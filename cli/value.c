@@ -3,7 +3,6 @@
 
 #include "cursor.h"
 
-#include <cjson/cJSON.h>
 #include <ctype.h>
 #include <float.h>
 #include <inttypes.h>
@@ -278,34 +277,37 @@ static void print_real(char *text, double value, int digits, int is_json)
         snprintf(text, NUMBER_BYTES, "%.*g", digits, value);
 }
 
+/* A control character could do anything to a terminal: those of ASCII, and those from 0x80 to 0x9F,
+ * of which 0x9B begins a sequence like ESC [. */
 static void print_text(const mbm_registers *registers, uint16_t address, uint16_t count,
                        uint8_t order, int is_json, char *text)
 {
-    char latin[VALUE_LONGEST_TEXT + 1] = "", utf8[2 * VALUE_LONGEST_TEXT + 1];
-    size_t from, to = 0;
-    cJSON *json;
+    char latin[VALUE_LONGEST_TEXT + 1] = "";
+    size_t from;
 
     (void)mbm_registers_getString(registers, address, count, order, latin, sizeof latin);
+    if (is_json)
+        *text++ = '"';
     for (from = 0; latin[from]; from++) {
         const unsigned char byte = (unsigned char)latin[from];
+        const int is_control = byte < ' ' || (byte >= 0x7F && byte < 0xA0);
 
-        if (byte >= 0x80)
-            utf8[to++] = (char)(0xC0 | byte >> 6);
-        utf8[to++] = (char)(byte >= 0x80 ? 0x80 | (byte & 0x3F) : byte);
+        if (is_control && is_json) {
+            text += snprintf(text, 7, "\\u%04x", byte);
+        } else if (is_control) {
+            *text++ = '.';
+        } else if (byte >= 0x80) {
+            *text++ = (char)(0xC0 | byte >> 6);
+            *text++ = (char)(0x80 | (byte & 0x3F));
+        } else {
+            if (is_json && (byte == '"' || byte == '\\'))
+                *text++ = '\\';
+            *text++ = (char)byte;
+        }
     }
-    utf8[to] = '\0';
-    if (!is_json) {
-        /* A control character could do anything to a terminal. */
-        for (from = 0; utf8[from]; from++)
-            if (iscntrl((unsigned char)utf8[from]))
-                utf8[from] = '.';
-        strcpy(text, utf8);
-        return;
-    }
-    json = cJSON_CreateString(utf8);
-    if (!json || !cJSON_PrintPreallocated(json, text, VALUE_TEXT_BYTES, 0))
-        strcpy(text, "null");
-    cJSON_Delete(json);
+    if (is_json)
+        *text++ = '"';
+    *text = '\0';
 }
 
 /* The integer at an address: for signed types its sign, and without it the amount. */

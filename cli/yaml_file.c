@@ -151,7 +151,7 @@ const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *
         return yaml_file_refuse(file, node, "%s has more than %zu bytes", key, most), NULL;
     for (at = node->data.scalar.value; at < node->data.scalar.value + node->data.scalar.length;
          at++)
-        if (*at < ' ' || *at == 0x7F)
+        if (*at < ' ' || *at == 0x7F || (*at == 0xC2 && at[1] < 0xA0))
             return yaml_file_refuse(file, node, "%s has a control character", key), NULL;
     return (const char *)node->data.scalar.value;
 }
