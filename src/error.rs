@@ -10,6 +10,7 @@ use core::task::Poll;
 
 /// The outcome of a call: success, an exception code of the remote device, or an error of
 /// the library, the line or the caller.
+#[must_use = "it may be an error; `result()?` passes that on"]
 #[repr(transparent)]
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Status(u8);

@@ -140,13 +140,13 @@ proptest! {
         let request_length = usize::from(request.query().unwrap().length()) + 3;
         let mut master = TestMaster::<false>::new(unit, size.max(request_length));
         master.0.settings().echo_discard = echo;
-        master.request(request, &bytes, piece, step);
+        let _ = master.request(request, &bytes, piece, step);
         // The bytes as the PDU of a frame. Then again after a timeout, when the master holds
         // a reply for a while because it may be a late one.
         let pdu = &bytes[..bytes.len().min(253)];
-        master.request(request, &sealed(&[&[unit], pdu].concat()), piece, step);
+        let _ = master.request(request, &sealed(&[&[unit], pdu].concat()), piece, step);
         master.send(request, &[]);
-        master.request(request, &bytes, piece, step);
+        let _ = master.request(request, &bytes, piece, step);
     }
 
     #[test]

@@ -205,7 +205,7 @@ fn a_request_right_after_the_response_is_not_taken_for_an_echo() {
     let mut line = Line::new(Framing::Rtu);
     line.arrive(0, &sealed(&READ));
     while line.wire.borrow().sent.is_empty() {
-        line.poll();
+        let _ = line.poll();
         {
             let mut w = line.wire.borrow_mut();
             w.now = w.now.wrapping_add(50);
@@ -240,10 +240,10 @@ fn a_lost_link_is_reported_and_the_server_continues_when_the_line_is_back() {
 #[test]
 fn the_poll_delay_is_the_rest_of_the_silence() {
     let mut line = Line::new(Framing::Rtu);
-    line.poll();
+    let _ = line.poll();
     assert_eq!(line.server.poll_delay(0xFFFF_0000), u32::MAX);
     line.arrive(0, &[17]);
-    line.poll();
+    let _ = line.poll();
     assert_eq!(line.server.poll_delay(0xFFFF_0000), SILENCE);
     assert_eq!(line.server.poll_delay(0xFFFF_0000 + 6), SILENCE - 6);
     assert_eq!(line.server.poll_delay(0xFFFF_FFFF), 0);
@@ -262,7 +262,7 @@ fn a_full_connection_is_tried_every_millisecond_and_a_serial_line_at_once() {
         while line.wire.borrow().sent.is_empty() {
             let now = line.wire.borrow().now;
             line.wire.borrow_mut().now = now.wrapping_add(50);
-            line.poll();
+            let _ = line.poll();
         }
         let now = line.wire.borrow().now;
         assert_eq!(line.server.poll_delay(now), delay, "{framing:?}");

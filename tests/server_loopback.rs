@@ -196,7 +196,7 @@ fn after_the_wire_is_good_again_the_next_request_is_answered() {
     for round in 0..200 {
         line.wire.borrow_mut().changed = 6;
         let started = line.master.read_holding_registers(100, 10);
-        line.finish(started);
+        let _ = line.finish(started);
         line.wire.borrow_mut().changed = 0;
         let started = line.master.read_holding_registers(100, 10);
         assert_eq!(line.finish(started), Status::OK, "{round}");

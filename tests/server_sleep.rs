@@ -198,7 +198,7 @@ fn a_program_whose_requests_are_answered_at_once_polls_once_for_each() {
     line.arrive(0, &framed(Framing::Tcp, &READ));
     let now = line.wire.borrow().arriving.back().unwrap().0;
     line.wire.borrow_mut().now = now;
-    line.poll();
+    let _ = line.poll();
     assert_eq!(line.wire.borrow().sent.len(), 1);
     assert_eq!(line.server.poll_delay(now), u32::MAX);
 }

@@ -1,6 +1,6 @@
 //! Times and options of requests.
 
-use crate::error::Status;
+use crate::error::Error;
 use crate::time::{self, millis, DEFAULT_SILENCE};
 
 /// A time in microseconds with a default. It stores the difference from the default, so zeroed
@@ -20,25 +20,29 @@ impl<const DEFAULT: u32> Setting<DEFAULT> {
         self.0.wrapping_add(DEFAULT)
     }
 
-    /// Sets a timeout in milliseconds. Returns [`Status::INVALID_ARGUMENT`], with nothing
-    /// changed, above 1 000 000.
+    /// Sets a timeout in milliseconds, 0 to 1 000 000.
+    ///
+    /// # Errors
+    /// [`Error::INVALID_ARGUMENT`] above 1 000 000. Nothing changes then.
     #[inline(always)]
-    pub fn set_timeout(&mut self, milliseconds: u32) -> Status {
+    pub fn set_timeout(&mut self, milliseconds: u32) -> Result<(), Error> {
         let Some(timeout) = time::timeout(milliseconds) else {
-            return Status::INVALID_ARGUMENT;
+            return Err(Error::INVALID_ARGUMENT);
         };
         *self = Setting::new(timeout);
-        Status::OK
+        Ok(())
     }
 
-    /// Sets a delay in milliseconds. Returns [`Status::INVALID_ARGUMENT`], with nothing
-    /// changed, above 65 535.
-    pub fn set_delay(&mut self, milliseconds: u32) -> Status {
+    /// Sets a delay in milliseconds, 0 to 65 535.
+    ///
+    /// # Errors
+    /// [`Error::INVALID_ARGUMENT`] above 65 535. Nothing changes then.
+    pub fn set_delay(&mut self, milliseconds: u32) -> Result<(), Error> {
         let Ok(delay) = u16::try_from(milliseconds) else {
-            return Status::INVALID_ARGUMENT;
+            return Err(Error::INVALID_ARGUMENT);
         };
         *self = Setting::new(millis(delay));
-        Status::OK
+        Ok(())
     }
 }
 
@@ -122,13 +126,13 @@ mod tests {
     fn a_refused_time_changes_nothing() {
         let mut settings = Settings::DEFAULT;
         let response_timeout = &mut settings.response_timeout;
-        assert_eq!(response_timeout.set_timeout(1_000_000), Status::OK);
+        assert_eq!(response_timeout.set_timeout(1_000_000), Ok(()));
         let refused = response_timeout.set_timeout(1_000_001);
-        assert_eq!(refused, Status::INVALID_ARGUMENT);
+        assert_eq!(refused, Err(Error::INVALID_ARGUMENT));
         assert_eq!(response_timeout.get(), 1_000_000_000);
         let quiet_time = &mut settings.quiet_time;
-        assert_eq!(quiet_time.set_delay(65_535), Status::OK);
-        assert_eq!(quiet_time.set_delay(65_536), Status::INVALID_ARGUMENT);
+        assert_eq!(quiet_time.set_delay(65_535), Ok(()));
+        assert_eq!(quiet_time.set_delay(65_536), Err(Error::INVALID_ARGUMENT));
         assert_eq!(quiet_time.get(), 65_535_000);
     }
 

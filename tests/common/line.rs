@@ -138,7 +138,7 @@ impl Line {
     pub fn run(&mut self, time: u32, step: u32) -> Vec<(u32, Vec<u8>)> {
         let start = self.wire.borrow().now;
         while self.wire.borrow().now.wrapping_sub(start) < time {
-            self.poll();
+            let _ = self.poll();
             let now = self.wire.borrow().now;
             self.wire.borrow_mut().now = now.wrapping_add(step);
         }

@@ -113,7 +113,7 @@ pub unsafe extern "C" fn mbm_client_suspend(client: *mut mbm_client, line: *mut 
         }
         (*object).borrower = line;
         if !line.is_null() {
-            line::prepare(line);
+            let _ = line::prepare(line);
             let port = (*(*object).kind).port(object);
             pointers::object(line).port.set(port);
         }

@@ -69,7 +69,11 @@ pub unsafe extern "C" fn mbm_client_setResponseTimeout(
     timeoutMs: u32,
 ) -> u8 {
     set(client, |parts| {
-        parts.settings.response_timeout.set_timeout(timeoutMs)
+        parts
+            .settings
+            .response_timeout
+            .set_timeout(timeoutMs)
+            .into()
     })
 }
 
@@ -116,7 +120,7 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
     delayMs: u32,
 ) -> u8 {
     set(client, |parts| {
-        parts.settings.turnaround_delay.set_delay(delayMs)
+        parts.settings.turnaround_delay.set_delay(delayMs).into()
     })
 }
 
@@ -133,7 +137,9 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietMs: u32) -> u8 {
-    set(client, |parts| parts.settings.quiet_time.set_delay(quietMs))
+    set(client, |parts| {
+        parts.settings.quiet_time.set_delay(quietMs).into()
+    })
 }
 
 /// Switches echo discarding on or off. Switch it on if the receiver also receives what the

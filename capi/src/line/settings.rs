@@ -46,7 +46,7 @@ pub unsafe extern "C" fn mbm_line_setGap(line: *mut mbm_line, gapUs: u32) -> u8 
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setTurnaroundDelay(line: *mut mbm_line, delayMs: u32) -> u8 {
     with(line, |line| {
-        line.settings.turnaround_delay.set_delay(delayMs)
+        line.settings.turnaround_delay.set_delay(delayMs).into()
     })
 }
 
@@ -78,7 +78,9 @@ pub unsafe extern "C" fn mbm_line_setTurnaroundDelay(line: *mut mbm_line, delayM
 /// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setQuietTime(line: *mut mbm_line, quietMs: u32) -> u8 {
-    with(line, |line| line.settings.quiet_time.set_delay(quietMs))
+    with(line, |line| {
+        line.settings.quiet_time.set_delay(quietMs).into()
+    })
 }
 
 /// Sets how often the master repeats a request whose reply is missing, damaged or malformed.

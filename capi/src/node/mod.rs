@@ -170,7 +170,7 @@ unsafe extern "C" fn poll(node: *mut mbm_node) -> u8 {
                     let now = line.port.micros();
                     line.poll(now)
                 });
-                (*core).take(status, pointers::object(line));
+                let _ = (*core).take(status, pointers::object(line));
             } else {
                 // The line has given the request up.
                 (*core).end(Status::CANCELLED);

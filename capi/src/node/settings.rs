@@ -37,7 +37,7 @@ pub unsafe extern "C" fn mbm_node_getSlaveID(node: *const mbm_node) -> u8 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeoutMs: u32) -> u8 {
     with(node, |node| {
-        node.words.response_timeout.set_timeout(timeoutMs)
+        node.words.response_timeout.set_timeout(timeoutMs).into()
     })
 }
 

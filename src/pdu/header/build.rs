@@ -23,6 +23,8 @@ pub const GROUP: usize = files::REFERENCE_TYPE as usize;
 /// Bytes of the four words and the function code.
 const FOUR_WORDS: u8 = 9;
 
+// `set` refuses only ranges of addresses, so functions without one ignore its status.
+//
 // `add_…` and `follow` are functions of their own because all functions of the C API call
 // `set` in one common place first, which is smaller.
 impl RequestHeader {
@@ -112,7 +114,7 @@ impl RequestHeader {
     /// for 0 words, for more than one unless the sub-function is Return Query Data, and for
     /// more than a PDU holds; otherwise [`Status::OK`].
     pub fn diagnostics(&mut self, sub_function: u16, words: u16) -> Status {
-        self.set(FunctionSpec::DIAGNOSTICS, sub_function, 0);
+        let _ = self.set(FunctionSpec::DIAGNOSTICS, sub_function, 0);
         self.add_words(sub_function, words)
     }
 
@@ -157,7 +159,7 @@ impl RequestHeader {
 
     fn group(&mut self, spec: FunctionSpec, file: u16, record: u16, length: u16) -> Status {
         let words = [GROUP, file.into(), record.into(), length.into()];
-        self.set_all(spec, &words);
+        let _ = self.set_all(spec, &words);
         self.add_group(file, record, length)
     }
 
@@ -176,7 +178,7 @@ impl RequestHeader {
 
     /// 14 (hex) with several groups: the caller supplies the groups as `bytes` bytes of data.
     pub fn read_file_records(&mut self, bytes: u16) -> Status {
-        self.set(FunctionSpec::READ_FILE_RECORDS, 0, 0);
+        let _ = self.set(FunctionSpec::READ_FILE_RECORDS, 0, 0);
         self.count(bytes as u8);
         let bytes = usize::from(bytes);
         value(bytes >= READ_FILE_BYTES.0 && bytes <= READ_FILE_BYTES.1 && bytes.is_multiple_of(7))
@@ -184,7 +186,7 @@ impl RequestHeader {
 
     /// 15 (hex) with several groups: the caller supplies the groups as `bytes` bytes of data.
     pub fn write_file_records(&mut self, bytes: u16) -> Status {
-        self.set(FunctionSpec::WRITE_FILE_RECORDS, 0, 0);
+        let _ = self.set(FunctionSpec::WRITE_FILE_RECORDS, 0, 0);
         self.count(bytes as u8);
         self.length = (bytes as u8).wrapping_add(2);
         let bytes = usize::from(bytes);
@@ -195,7 +197,7 @@ impl RequestHeader {
     /// object to read.
     pub fn read_device_identification(&mut self, code: u8, object: u8) -> Status {
         let [first, second] = RequestHeader::identification(code, object);
-        self.set(FunctionSpec::READ_DEVICE_IDENTIFICATION, first, second);
+        let _ = self.set(FunctionSpec::READ_DEVICE_IDENTIFICATION, first, second);
         RequestHeader::check_code(code)
     }
 
@@ -213,14 +215,14 @@ impl RequestHeader {
     /// 2B (hex) of any MEI type, with `bytes` bytes of data. The end of the frame ends the
     /// response.
     pub fn encapsulated(&mut self, mei_type: u8, bytes: u16) -> Status {
-        self.set(FunctionSpec::ENCAPSULATED, u16::from(mei_type) << 8, 0);
+        let _ = self.set(FunctionSpec::ENCAPSULATED, u16::from(mei_type) << 8, 0);
         self.follow(bytes)
     }
 
     /// A user-defined function with `bytes` bytes of data. `rule` gives the length of its
     /// response.
     pub fn custom(&mut self, function: u8, bytes: u16, rule: Rule) -> Status {
-        self.set(FunctionSpec::CUSTOM, 0, 0);
+        let _ = self.set(FunctionSpec::CUSTOM, 0, 0);
         match rule {
             Rule::Fixed(0) | Rule::Counted(0, _) => Status::INVALID_ARGUMENT,
             Rule::Fixed(length) => self.add_rule(function, bytes, FIXED, [length, 0]),

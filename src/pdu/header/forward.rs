@@ -31,7 +31,7 @@ impl RequestHeader {
         let (first, second) = (word(0), word(1));
         let built = match function {
             functions::DIAGNOSTICS if first > LAST_SUB_FUNCTION => {
-                self.set(FunctionSpec::DIAGNOSTICS, first, 0);
+                let _ = self.set(FunctionSpec::DIAGNOSTICS, first, 0);
                 self.spec.0 |= OWN;
                 self.follow(length.saturating_sub(2))
             }
