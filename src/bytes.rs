@@ -19,7 +19,7 @@ pub(crate) fn move_items<T: Copy>(to: &[Cell<T>], from: &[Cell<T>]) {
 }
 
 /// Reads a byte slice from its front.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Reader<'a> {
     rest: &'a [u8],
 }
@@ -69,6 +69,7 @@ impl<'a> Reader<'a> {
 
 /// Writes to a byte slice from its front. If something does not fit, [`Writer::finish`]
 /// returns an error.
+#[derive(Debug)]
 pub struct Writer<'a> {
     bytes: &'a mut [u8],
     length: usize,

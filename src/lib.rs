@@ -2,9 +2,36 @@
 //! sniffer and a trace, on serial lines (RTU and ASCII) and on TCP. The crate does not use a
 //! heap and never panics.
 //!
-//! You call `poll` often; each call does what can be done without waiting. Functions return
-//! `Result` with [`error::Error`]. Time is a clock in microseconds, which may wrap. Your firmware implements [`port::Port`] for its UART or
-//! socket, to read and write bytes:
+//! # A master
+//!
+//! [`master::Master`] sends one request at a time on an RTU line. This example reads two
+//! registers of unit 17:
+//!
+//! ```
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
+//! use mbm::master::{Buffers, Master};
+//!
+//! # fn main() -> Result<(), mbm::Error> {
+//! # let uart = uart();
+//! // The frame buffer, the words that a read fills, the words that a write sends.
+//! let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
+//! let mut master = Master::new(17, uart, buffers);
+//! master.settings().set_baud_rate(9600);
+//!
+//! master.read_holding_registers(107, 2)?;
+//! master.wait(|| { /* The firmware does its other work here. */ })?;
+//! assert_eq!(master.response(), [555, 100]);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! [`master::Master::poll`] does not wait: a main loop calls it until it returns `Poll::Ready`.
+//! Functions return `Result` with [`Error`].
+//!
+//! # A port
+//!
+//! `uart` is a [`port::Port`], which your firmware implements for its UART or socket. Its clock is
+//! in microseconds and may wrap:
 //!
 //! ```
 //! use mbm::port::Port;
@@ -25,33 +52,10 @@
 //! ```
 //!
 //! With the feature `embedded-io`, `port::EmbeddedIo` is such a port over the UART of a HAL.
-//! The examples below use a `Uart` with a simulated device on its line.
+//! `docs/guide-rust.md` has one for `std::net::TcpStream`. The examples here use a `Uart` with a
+//! simulated device on its line.
 //!
-//! # A master
-//!
-//! [`master::Master`] sends one request at a time on an RTU line. This example reads two
-//! registers of unit 17:
-//!
-//! ```
-//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
-//! use mbm::engine::Buffers;
-//! use mbm::master::Master;
-//!
-//! # fn main() -> Result<(), mbm::error::Error> {
-//! # let uart = uart();
-//! // The frame buffer, the words that a read fills, the words that a write sends.
-//! let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
-//! let mut master = Master::new(17, uart, buffers);
-//! master.settings().set_baud_rate(9600);
-//!
-//! master.read_holding_registers(107, 2)?;
-//! master.wait(|| { /* The firmware does its other work here. */ })?;
-//! assert_eq!(master.response(), [555, 100]);
-//! # Ok(())
-//! # }
-//! ```
-//!
-//! [`master::Master::poll`] does not wait: a main loop calls it until it returns `Poll::Ready`.
+//! # Futures
 //!
 //! With the feature `embedded-io-async`, `master::AsyncMaster` has the same functions as futures.
 //! `uart` is a UART of embedded-io-async, `micros` a clock, and `Delay` is `DelayNs` of
@@ -60,11 +64,9 @@
 #![cfg_attr(feature = "embedded-io-async", doc = "```")]
 #![cfg_attr(not(feature = "embedded-io-async"), doc = "```ignore")]
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
-//! use mbm::engine::Buffers;
-//! use mbm::error::Error;
-//! use mbm::master::AsyncMaster;
+//! use mbm::master::{AsyncMaster, Buffers};
 //!
-//! async fn read() -> Result<[u16; 2], Error> {
+//! async fn read() -> Result<[u16; 2], mbm::Error> {
 //!     let buffers = Buffers::new([0; 32], [0; 10], [0; 10]);
 //!     let mut master = AsyncMaster::new(17, uart(), micros, Delay, buffers);
 //!     master.settings().set_baud_rate(9600);
@@ -84,16 +86,15 @@
 //!
 //! ```
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
-//! use mbm::client::{Client, Request, Serial};
-//! use mbm::engine::Frame;
+//! use mbm::client::{Client, Frame, Request, Serial};
 //!
-//! # fn main() -> Result<(), mbm::error::Error> {
+//! # fn main() -> Result<(), mbm::Error> {
 //! # let uart = uart();
 //! let mut words = [0; 2];
 //! // Up to four requests are queued or in flight.
 //! let mut client: Client<_, _, 4> = Client::new(Serial::new(uart, Frame::new([0; 256])));
-//! let request = Request::read_holding_registers(17, 107, &mut words)?;
-//! assert!(client.queue(request).is_ok());
+//! client.settings().set_baud_rate(9600);
+//! client.queue(Request::read_holding_registers(17, 107, &mut words)?)?;
 //!
 //! # for now in (0..1_000_000).step_by(100) {
 //! // In the main loop, with the time of the clock:
@@ -118,12 +119,13 @@
 //! use mbm::server::storage::{HoldingRegisters, RegisterArray};
 //! use mbm::server::{Server, Unit};
 //!
-//! # fn main() -> Result<(), mbm::error::Error> {
+//! # fn main() -> Result<(), mbm::Error> {
 //! let mut words = [555, 100, 0];
 //! # {
 //! # let arriving = &[17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55];
 //! # let uart = Uart { sends: &[], now: 0, arriving, sent: 0 };
 //! let mut server = Server::with_framing(Framing::Rtu, uart, [0; 256]);
+//! server.set_baud_rate(9600);
 //! let mut registers = HoldingRegisters(RegisterArray::new(107, &mut words));
 //! let mut units = [Unit {
 //!     id: 17,
@@ -160,19 +162,14 @@
 //! let frame = Framing::Rtu.parse(&mut buffer[..length], ascii::END)?;
 //! assert_eq!(frame.unit, 17);
 //! assert_eq!(Request::parse(frame.pdu)?, request);
-//! # Ok::<(), mbm::error::Error>(())
+//! # Ok::<(), mbm::Error>(())
 //! ```
 //!
-//! # Layers
+//! # Modules
 //!
-//! A module uses only modules to its left:
-//!
-//! ```text
-//! bytes -> frame -> pdu -> packet -> text -> {sniffer, trace, engine} -> {master, client, plan, server, gateway}
-//! ```
-//!
-//! Each of them may use `atomic`, `error`, `time`, `port`, `ring` and `data`. `make check`
-//! enforces this rule.
+//! [`plan`], [`gateway`], [`sniffer`] and [`trace`] have no example here: their first lines say how
+//! they work. [`data`] has numbers and texts of several registers, [`ring`] is a receive buffer that
+//! an interrupt fills.
 //!
 //! No module allocates memory, has global variables or panics, and none waits but
 //! [`master::Master::wait`]. The C ABI is the crate `mbm-c`.
@@ -181,28 +178,31 @@
 //!
 //! | feature | what it adds |
 //! |---|---|
-//! | `diagnosis` (default) | a failed request says why: see [`error::Error::INVALID_SLAVE_ID`]. Frames are counted, and deviating replies can be accepted |
+//! | `diagnosis` (default) | a failed request says why: see [`Error::INVALID_SLAVE_ID`]. Frames are counted, and deviating replies can be accepted |
 //! | `embedded-io` | `port::EmbeddedIo`, a port over embedded-io |
 //! | `embedded-io-async` | `master::AsyncMaster`, a master with futures, over embedded-io-async and embedded-hal-async |
-//! | `defmt` | `defmt::Format` for [`error::Status`] and [`error::Error`] |
+//! | `defmt` | `defmt::Format` for [`Status`] and [`Error`] |
 
 #![no_std]
 #![forbid(unsafe_code)]
-#![warn(missing_docs, clippy::indexing_slicing, clippy::unwrap_used)]
+#![warn(missing_docs, missing_debug_implementations)]
+#![warn(clippy::indexing_slicing, clippy::unwrap_used)]
 #![cfg_attr(test, allow(clippy::indexing_slicing, clippy::unwrap_used))]
+// docs.rs shows which feature an item needs.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 #[cfg(test)]
 extern crate std;
 
 mod atomic;
+mod bytes;
+#[doc(hidden)]
 pub mod error;
 pub mod port;
 pub mod ring;
 pub mod time;
 
-pub mod bytes;
 pub mod data;
-pub mod engine;
 pub mod frame;
 pub mod packet;
 pub mod pdu;
@@ -210,14 +210,22 @@ pub mod sniffer;
 pub mod text;
 pub mod trace;
 
+// The crate mbm-c uses these too. They may change in any version.
+#[doc(hidden)]
+pub mod engine;
+#[doc(hidden)]
+pub mod node;
+
 // The examples of the guide are tests.
 #[cfg(all(doctest, feature = "embedded-io", feature = "embedded-io-async"))]
 #[doc = include_str!("../docs/guide-rust.md")]
+#[doc = include_str!("../README.md")]
 struct Guide;
 
 pub mod client;
 pub mod gateway;
 pub mod master;
-pub mod node;
 pub mod plan;
 pub mod server;
+
+pub use error::{Error, Status};

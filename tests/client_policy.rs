@@ -164,7 +164,7 @@ fn outcomes_of_requests_are_counted_for_each_unit() {
     send_times(&end, &mut client);
     for pdu in [&[3, 2, 0, 7][..], &[0x83, 4]] {
         assert!(client.queue(read(1)).is_ok());
-        client.poll(end.now());
+        assert!(client.poll(end.now()).is_none());
         let request = end.sent();
         let mut frame = vec![request[0], request[1], 0, 0, 0, pdu.len() as u8 + 1, 1];
         frame.extend(pdu);

@@ -3,8 +3,7 @@
 mod common;
 
 use common::uart::{Bench, Wire};
-use mbm::client::{Client, Request, Serial};
-use mbm::engine::Frame;
+use mbm::client::{Client, Frame, Request, Serial};
 use mbm::error::{Error, Status};
 use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
@@ -45,7 +44,7 @@ type Rtu<'a> = Client<Serial<Uart, Frame<[u8; 256]>, Request<'a>>, Request<'a>, 
 fn client<'a>(bench: &Bench) -> Rtu<'a> {
     let uart = Uart(bench.wire.clone());
     let mut client = Client::new(Serial::new(uart, Frame::new([0; 256])));
-    client.line.engine.settings.set_baud_rate(115_200);
+    client.settings().set_baud_rate(115_200);
     client
 }
 
@@ -216,13 +215,35 @@ fn quantities_and_addresses_outside_the_standard_are_refused() {
 fn a_request_that_does_not_fit_into_the_queue_comes_back() {
     let bench = Bench::new();
     let mut client = client(&bench);
-    for _ in 0..4 {
-        let write = Request::write_single_register(17, 100, 1).unwrap();
+    for address in 0..4 {
+        let write = Request::write_single_register(17, address, 1).unwrap();
         assert!(client.queue(write).is_ok());
     }
-    let write = Request::write_single_register(17, 100, 1).unwrap();
+    let write = Request::write_single_register(17, 4, 1).unwrap();
     let refused = client.queue(write).unwrap_err();
-    assert_eq!(refused.result(), Err(Error::QUEUE_FULL));
+    assert_eq!(format!("{refused:?}"), "Refused(QUEUE_FULL)");
+    assert_eq!(refused.to_string(), "the queue is full");
+    assert_eq!(refused.error(), Error::QUEUE_FULL);
+    assert_eq!(refused.0.result(), Err(Error::QUEUE_FULL));
+}
+
+#[test]
+fn the_question_mark_passes_on_why_a_request_is_refused() {
+    fn no_coils(client: &mut Rtu) -> Result<(), Error> {
+        client.queue(Request::read_coils(17, 1, &mut [])?)?;
+        Ok(())
+    }
+    fn long_timeout(client: &mut Rtu) -> Result<(), Error> {
+        let mut request = Request::write_single_coil(17, 1, true)?;
+        request.state.timeout_ms = 1_000_001;
+        client.queue(request)?;
+        Ok(())
+    }
+    let bench = Bench::new();
+    let mut client = client(&bench);
+    assert_eq!(no_coils(&mut client), Err(Error::ILLEGAL_DATA_VALUE));
+    assert_eq!(long_timeout(&mut client), Err(Error::INVALID_ARGUMENT));
+    assert_eq!(client.pending(), 0);
 }
 
 #[test]

@@ -178,7 +178,7 @@ fn requests_are_sent_one_after_the_other_and_in_order() {
         assert!(client.queue(read(number as u8, number)).is_ok());
     }
     let refused = client.queue(read(9, 9)).err().unwrap();
-    assert_eq!(refused.state.status, Status::QUEUE_FULL);
+    assert_eq!(refused.error(), Status::QUEUE_FULL);
     for number in 1..=4u8 {
         let request = sent(&end, &mut client);
         assert_eq!(request[0], number);
@@ -212,7 +212,7 @@ fn only_writes_are_broadcast_and_they_take_the_turnaround_delay() {
             }
             Err(task) => {
                 assert!(!broadcast);
-                assert_eq!(task.state.status, Status::BROADCAST_NOT_ALLOWED);
+                assert_eq!(task.error(), Status::BROADCAST_NOT_ALLOWED);
             }
         }
     }
@@ -264,7 +264,7 @@ fn a_reconnect_ends_only_the_active_request() {
     }
     sent(&end, &mut client);
     end.deliver(0, &[1, 3]);
-    client.poll(end.now());
+    assert!(client.poll(end.now()).is_none());
     client.reconnect();
     let task = run(&end, &mut client);
     assert_eq!(

@@ -5,7 +5,7 @@
 mod stream;
 
 use mbm::engine::{Counter, Frame};
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::frame::tcp;
 use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
@@ -24,8 +24,8 @@ fn all_requests_are_under_way_at_once_and_answered_in_any_order() {
         assert!(client.queue(read(1, number)).is_ok());
     }
     assert_eq!(
-        client.queue(read(1, 17)).err().unwrap().state.status,
-        Status::QUEUE_FULL
+        client.queue(read(1, 17)).unwrap_err().error(),
+        Error::QUEUE_FULL
     );
     assert!(poll(&end, &mut client).is_empty());
     let sent = requests(&end.sent());
@@ -178,8 +178,9 @@ fn frames_are_found_again_after_garbage() {
 fn two_pending_requests_cannot_have_the_same_number() {
     let (end, mut client) = client();
     assert!(client.queue(read(1, 7)).is_ok());
-    let refused = client.queue(read(2, 7)).err().unwrap();
-    assert_eq!(refused.state.status, Status::DUPLICATE_TRANSACTION);
+    let refused = client.queue(read(2, 7)).unwrap_err();
+    assert_eq!(refused.error(), Error::DUPLICATE_TRANSACTION);
+    assert_eq!(refused.0.state.status, Status::DUPLICATE_TRANSACTION);
     assert!(client.queue(read(1, 0)).is_ok());
     assert!(client.queue(read(1, 0)).is_ok());
     poll(&end, &mut client);
@@ -231,8 +232,8 @@ fn a_broadcast_over_tcp_is_refused() {
         header.set(FunctionSpec::WRITE_SINGLE_REGISTER, 1, 2)
     });
     assert_eq!(
-        client.queue(task).err().unwrap().state.status,
-        Status::BROADCAST_NOT_ALLOWED
+        client.queue(task).unwrap_err().error(),
+        Error::BROADCAST_NOT_ALLOWED
     );
 }
 

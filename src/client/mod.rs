@@ -10,6 +10,7 @@ mod link;
 mod policy;
 mod queue;
 mod ready;
+mod refused;
 mod request;
 mod retry;
 mod serial;
@@ -23,17 +24,25 @@ pub use link::{Link, LinkEvent, LinkHooks, LinkState};
 pub use policy::{Backoff, Policy};
 pub use queue::RequestQueue;
 pub use ready::Request;
+pub use refused::Refused;
 pub use request::{ClientRequest, RequestState};
-pub use retry::{again, again_when_busy, NO_RETRIES};
+pub use retry::NO_RETRIES;
+#[doc(hidden)]
+pub use retry::{again, again_when_busy};
 pub use serial::Serial;
-pub use storage::ClientStorage;
+pub use storage::{ClientStorage, TcpBuffers};
 pub use tcp::Tcp;
+#[doc(hidden)]
 pub use transaction::{ClientEngine, ClientTransaction};
 pub use transport::Transport;
-pub use units::{find, note, rest, UnitRecord};
+pub use units::UnitRecord;
+#[doc(hidden)]
+pub use units::{find, note, rest};
+
+pub use crate::engine::{Count, Counter, Frame, Setting, Settings, Storage};
 
 #[cfg(doc)]
-use crate::error::Status;
+use crate::error::{Error, Status};
 use crate::time::millis;
 
 /// The pause, in microseconds, that ends a frame of a serial line in a TCP stream.
@@ -48,6 +57,7 @@ pub const ASCII_SILENCE: u32 = millis(1000);
 const WRITE_RETRY_DELAY: u32 = millis(1);
 
 /// A client on a [`Transport`], for up to `N` requests that are queued or in flight.
+#[derive(Debug)]
 pub struct Client<L, J, const N: usize> {
     queue: RequestQueue<J, N>,
     /// The last poll returned a request, so the next one continues it: it reads no new bytes.
@@ -81,7 +91,7 @@ impl<L, J, const N: usize> Client<L, J, N> {
 
 impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     /// A client without requests.
-    pub fn new(line: L) -> Self {
+    pub const fn new(line: L) -> Self {
         let mut queue = RequestQueue::new();
         queue.has_broadcast = L::HAS_BROADCAST;
         queue.has_transaction_ids = L::HAS_TRANSACTION_IDS;
@@ -92,21 +102,38 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
         }
     }
 
+    /// Timeouts and other settings of requests. On a serial line set the baud rate:
+    /// `client.settings().set_baud_rate(19200)`. On TCP only the response timeout matters, and the
+    /// turnaround delay for requests without a response.
+    pub fn settings(&mut self) -> &mut Settings {
+        self.line.settings()
+    }
+
+    /// The port. Call [`Client::reconnect`] after a new socket was put in its place.
+    pub fn port(&mut self) -> &mut L::Port {
+        self.line.port()
+    }
+
+    /// The buffers.
+    pub fn storage(&mut self) -> &mut L::Storage {
+        self.line.storage()
+    }
+
     /// Queues a request. [`Client::poll`] returns it when it has ended.
     ///
     /// # Errors
-    /// Returns the request, with one of these as its status: [`Status::QUEUE_FULL`];
-    /// [`Status::BROADCAST_NOT_ALLOWED`]; on TCP [`Status::DUPLICATE_TRANSACTION`] if its
+    /// [`Refused`] has the request, and one of these errors: [`Error::QUEUE_FULL`];
+    /// [`Error::BROADCAST_NOT_ALLOWED`]; on TCP [`Error::DUPLICATE_TRANSACTION`] if its
     /// transaction number is not 0 and another pending request has the same number;
-    /// [`Status::INVALID_ARGUMENT`] if it has its own limit of retries, and the client retries
-    /// none ([`RequestQueue::may_retry`]).
-    pub fn queue(&mut self, request: J) -> Result<(), J> {
-        self.queue.enqueue(request)
+    /// [`Error::INVALID_ARGUMENT`] if its timeout is longer than 1 000 000 ms.
+    pub fn queue(&mut self, request: J) -> Result<(), Refused<J>> {
+        self.queue.enqueue(request).map_err(Refused)
     }
 
     /// Advances all requests to the time `now`, without waiting, and returns one request
     /// that has ended. Call it until it returns `None`: `while let Some(request) =
     /// client.poll(now)`.
+    #[must_use = "it is a request that has ended"]
     pub fn poll(&mut self, now: u32) -> Option<J> {
         if self.queue.suspended {
             return None;

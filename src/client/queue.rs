@@ -12,6 +12,7 @@ use heapless::Vec;
 
 /// The requests and the policy of a client.
 #[repr(C)]
+#[derive(Debug)]
 pub struct RequestQueue<J, const N: usize> {
     /// The queue has changed: `since` and `wait` do not hold, a request may be due now.
     pub(super) changed: bool,

@@ -7,15 +7,17 @@ use super::storage::ClientStorage;
 use super::transaction::ClientEngine;
 use super::transport::Transport;
 use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
-use crate::engine::{Engine, Setting};
+use crate::engine::{Engine, Setting, Settings};
 use crate::error::Status;
 use crate::frame::{ascii, rtu};
 use crate::port::Port;
 
 /// One request at a time, in RTU or ASCII frames.
 #[repr(C)]
+#[derive(Debug)]
 pub struct Serial<P, S: ClientStorage, J> {
     /// The engine that sends the request and finds the reply.
+    #[doc(hidden)]
     pub engine: ClientEngine<P, S, J>,
 }
 
@@ -96,6 +98,21 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
 impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, J> {
     const HAS_BROADCAST: bool = true;
     const HAS_TRANSACTION_IDS: bool = false;
+
+    type Port = P;
+    type Storage = S;
+
+    fn settings(&mut self) -> &mut Settings {
+        &mut self.engine.settings
+    }
+
+    fn port(&mut self) -> &mut P {
+        &mut self.engine.port
+    }
+
+    fn storage(&mut self) -> &mut S {
+        &mut self.engine.storage
+    }
 
     fn advance<const N: usize>(
         &mut self,

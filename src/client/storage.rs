@@ -62,8 +62,66 @@ pub trait ClientStorage: Storage<Count = u16> {
 }
 
 /// Only a frame buffer, enough for a client on a serial line. A TCP client needs
-/// [`ClientStorage::outgoing`] too and sends nothing without it.
+/// [`TcpBuffers`], and sends nothing without a buffer of bytes to send.
 impl<F: AsRef<[u8]> + AsMut<[u8]>> ClientStorage for Frame<F> {}
+
+/// The buffers of a TCP client: arrays, slices or other containers of bytes.
+#[derive(Clone, Debug, Default)]
+pub struct TcpBuffers<F, O> {
+    incoming: Frame<F>,
+    outgoing: O,
+}
+
+/// A port returns how many bytes it has read or written as an `i16`.
+const MOST: u16 = i16::MAX as u16;
+
+impl<F, O> TcpBuffers<F, O> {
+    /// Takes a buffer of received bytes, at least 9, and a buffer of bytes to send, at least 12.
+    /// 260 bytes hold any frame. Larger ones take more responses from one read, and collect more
+    /// requests for one write. At most 32 767 bytes of each are used.
+    pub const fn new(incoming: F, outgoing: O) -> Self {
+        TcpBuffers {
+            incoming: Frame::new(incoming),
+            outgoing,
+        }
+    }
+}
+
+impl<F: AsRef<[u8]> + AsMut<[u8]>, O> Storage for TcpBuffers<F, O> {
+    type Count = u16;
+
+    fn capacity(&self) -> u16 {
+        self.incoming.capacity().min(MOST)
+    }
+
+    fn byte(&self, index: u16) -> u8 {
+        self.incoming.byte(index)
+    }
+
+    fn set_byte(&mut self, index: u16, byte: u8) {
+        self.incoming.set_byte(index, byte);
+    }
+
+    fn slice(&self, index: u16, count: u16) -> &[u8] {
+        self.incoming.slice(index, count)
+    }
+
+    fn bytes(&mut self, index: u16, count: u16) -> &mut [u8] {
+        self.incoming.bytes(index, count)
+    }
+}
+
+impl<F, O> ClientStorage for TcpBuffers<F, O>
+where
+    F: AsRef<[u8]> + AsMut<[u8]>,
+    O: AsMut<[u8]>,
+{
+    fn outgoing(&mut self) -> &mut [u8] {
+        let bytes = self.outgoing.as_mut();
+        let most = bytes.len().min(MOST.into());
+        bytes.get_mut(..most).unwrap_or_default()
+    }
+}
 
 impl RequestState {
     /// Microseconds until the request is due.

@@ -16,12 +16,14 @@ pub type ClientEngine<P, S, J> = Engine<P, S, ClientTransaction<P, S, J>>;
 
 /// The functions that write and find ASCII frames. (Pointers, so that firmware without an
 /// ASCII line does not contain them.)
+#[derive(Debug)]
 struct Ascii<P, S: ClientStorage, J> {
     encode: fn(&mut ClientEngine<P, S, J>, content: u16),
     search: fn(&mut ClientEngine<P, S, J>, received: u16) -> bool,
 }
 
 /// The request in flight.
+#[derive(Debug)]
 pub struct ClientTransaction<P, S: ClientStorage, J> {
     pub(super) client_request: Option<J>,
     /// `None` on an RTU line.

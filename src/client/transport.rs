@@ -2,6 +2,7 @@
 
 use super::queue::RequestQueue;
 use super::request::ClientRequest;
+use crate::engine::Settings;
 
 /// A serial line, or a TCP stream.
 pub trait Transport<J> {
@@ -10,6 +11,21 @@ pub trait Transport<J> {
 
     /// True if the transaction numbers of pending requests must differ.
     const HAS_TRANSACTION_IDS: bool;
+
+    /// The type of the port.
+    type Port;
+
+    /// The type of the buffers.
+    type Storage;
+
+    /// See [`Client::settings`](super::Client::settings).
+    fn settings(&mut self) -> &mut Settings;
+
+    /// See [`Client::port`](super::Client::port).
+    fn port(&mut self) -> &mut Self::Port;
+
+    /// See [`Client::storage`](super::Client::storage).
+    fn storage(&mut self) -> &mut Self::Storage;
 
     /// Advances the requests to the time `now`, and returns one that has ended. `fresh` is
     /// true in the first call of each poll, when new bytes may have arrived.

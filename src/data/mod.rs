@@ -5,3 +5,6 @@ pub mod order;
 pub mod registers;
 pub mod value;
 pub mod view;
+
+pub use order::Order;
+pub use view::Registers;

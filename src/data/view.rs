@@ -86,7 +86,7 @@ impl RegisterBytesMut for &mut [u16] {
 
 /// Typed access to registers: for reading if `C` is [`RegisterBytes`], also for writing if it is
 /// [`RegisterBytesMut`].
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Registers<C> {
     cells: C,
     first: u16,

@@ -17,6 +17,7 @@ pub(super) const TARGET_FAILED: u8 = 0x0B;
 
 /// A gateway.
 #[repr(C)]
+#[derive(Debug)]
 pub struct Gateway<S> {
     /// The number that the next request or response gets in the order.
     pub(super) order: u32,

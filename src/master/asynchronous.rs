@@ -124,7 +124,7 @@ pub struct AsyncMaster<D, C, T, S: Words, E = fn(bool)> {
 
 impl<D, C: FnMut() -> u32, T, S: Words> AsyncMaster<D, C, T, S> {
     /// A master that sends requests to `unit`.
-    pub fn new(unit: u8, device: D, clock: C, timer: T, buffers: S) -> Self {
+    pub const fn new(unit: u8, device: D, clock: C, timer: T, buffers: S) -> Self {
         AsyncMaster::with_driver(unit, device, clock, timer, buffers, |_| {})
     }
 }
@@ -132,7 +132,14 @@ impl<D, C: FnMut() -> u32, T, S: Words> AsyncMaster<D, C, T, S> {
 impl<D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)> AsyncMaster<D, C, T, S, E> {
     /// As [`AsyncMaster::new`], with an RS-485 driver: `driver` switches it on with `true` before
     /// the first byte is sent, and off after the last one.
-    pub fn with_driver(unit: u8, device: D, clock: C, timer: T, buffers: S, driver: E) -> Self {
+    pub const fn with_driver(
+        unit: u8,
+        device: D,
+        clock: C,
+        timer: T,
+        buffers: S,
+        driver: E,
+    ) -> Self {
         AsyncMaster {
             master: Master::new(unit, Bridge::new(clock, driver), buffers),
             device,

@@ -7,7 +7,7 @@ mod asynchronous;
 #[cfg(feature = "embedded-io-async")]
 pub use self::asynchronous::AsyncMaster;
 
-use crate::engine::{Settings, Words};
+pub use crate::engine::{Buffers, Count, Counter, Setting, Settings, Storage, Words, COUNTERS};
 use crate::error::{Error, Status};
 use crate::node::{Line, Node};
 use crate::pdu::functions::FunctionSpec;
@@ -124,9 +124,10 @@ impl<P: Port, S: Words> Master<P, S> {
         }
     }
 
-    /// Sets whether a reply that deviates from the standard is accepted if no right reply
-    /// comes, and whether reads are sent to unit 0: see
-    /// [`crate::engine::Engine::lenient`].
+    /// Sets whether a reply that deviates from the standard is accepted if no right reply has
+    /// arrived within the response timeout, and whether reads are sent to unit 0. A deviating reply
+    /// has the right unit, function and CRC, and repeats another address, value or quantity, or has
+    /// more or fewer data than were requested. Call it only while no request is in progress.
     pub fn set_lenient(&mut self, on: bool) {
         self.line.set_lenient(Line::<P, S>::lenient(on));
     }

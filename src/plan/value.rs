@@ -7,7 +7,7 @@ use crate::data::value::{ShortDouble, Value as _};
 use crate::error::Error;
 
 /// A value: its words, and its field.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Words<'a> {
     /// The words of its read from the first one that has a part of the value.
     pub words: &'a [u16],

@@ -48,6 +48,7 @@ pub enum Outcome {
 }
 
 /// Serves one function code with a closure: see [`serve`].
+#[derive(Debug)]
 pub struct Custom<F> {
     /// The function code; 0 stands for every code that no earlier service serves.
     pub function: u8,
@@ -74,6 +75,7 @@ impl<F: FnMut(u8, &[u8], &mut [u8]) -> Outcome> Service for Custom<F> {
 
 /// Responds with exception 01 to disabled functions. It comes before the services that would
 /// serve them. One bit for each function code; 1 disables the function.
+#[derive(Debug)]
 pub struct DisabledFunctions(pub [u8; 16]);
 
 impl DisabledFunctions {

@@ -87,6 +87,7 @@ pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 /// A server on one line or connection.
 // The small fields come first: see `Engine`.
 #[repr(C)]
+#[derive(Debug)]
 pub struct Server<P, B> {
     pub(super) phase: ServerPhase,
     /// In a stream of RTU frames: the received bytes are not a frame of known length. With echo
@@ -180,6 +181,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// inter-character timeout for ASCII.
     pub fn set_silence(&mut self, microseconds: u32) {
         self.silence = time::clamped(microseconds);
+    }
+
+    /// Sets the silence that ends an RTU frame, t3.5, from the baud rate in bits per second; 0 means
+    /// that the rate is unknown. Set it after [`Server::with_framing`].
+    pub fn set_baud_rate(&mut self, baud: u32) {
+        self.silence = time::silence(baud);
     }
 
     /// Waits for the next request.

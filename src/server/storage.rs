@@ -2,18 +2,23 @@
 
 use super::table::{self, DataModel, Direction, TableKind};
 use super::{Reply, Service};
+use core::fmt;
 use core::ops::Range;
 
 /// Input registers: serves 04.
+#[derive(Debug)]
 pub struct InputRegisters<T>(pub T);
 
 /// Holding registers: serves 03, 06, 10, 16 and 17.
+#[derive(Debug)]
 pub struct HoldingRegisters<T>(pub T);
 
 /// Discrete inputs: serves 02.
+#[derive(Debug)]
 pub struct DiscreteInputs<T>(pub T);
 
 /// Coils: serves 01, 05 and 0F.
+#[derive(Debug)]
 pub struct Coils<T>(pub T);
 
 impl<T: DataModel> Service for InputRegisters<T> {
@@ -67,7 +72,7 @@ pub struct RegisterArray<'a> {
     pub after_write: Option<AfterWrite<'a>>,
 }
 
-/// BitArray in an array, eight to a byte, lowest first.
+/// Bits in an array, eight to a byte, lowest first.
 pub struct BitArray<'a> {
     /// The bits.
     pub bits: &'a mut [u8],
@@ -112,6 +117,27 @@ impl<'a> BitArray<'a> {
             before_write: None,
             after_write: None,
         }
+    }
+}
+
+impl fmt::Debug for RegisterArray<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter
+            .debug_struct("RegisterArray")
+            .field("base", &self.base)
+            .field("words", &self.words)
+            .finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for BitArray<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter
+            .debug_struct("BitArray")
+            .field("base", &self.base)
+            .field("size", &self.size)
+            .field("bits", &self.bits)
+            .finish_non_exhaustive()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::diagnostics::Diagnostics;
 use super::{Addressing, Indication, Reply};
+use core::fmt;
 
 /// A service: one family of functions.
 pub trait Service {
@@ -32,6 +33,15 @@ pub struct Unit<'a> {
     pub services: &'a mut [&'a mut dyn Service],
     /// The counters of the line, if any: serve functions 08, 0B and 0C.
     pub diagnostics: Option<&'a mut Diagnostics>,
+}
+
+impl fmt::Debug for Unit<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter
+            .debug_struct("Unit")
+            .field("id", &self.id)
+            .finish_non_exhaustive()
+    }
 }
 
 /// The units of a server, as [`dispatch`] offers them one frame, one unit after the other.

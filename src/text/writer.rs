@@ -6,6 +6,7 @@ use crate::frame::ascii::character;
 
 /// A line of ASCII text in a buffer. If the buffer is too small, the rest of the text is cut
 /// off and [`TextWriter::finish`] returns an error. A zero byte ends the text, also if it was cut.
+#[derive(Debug)]
 pub struct TextWriter<'a> {
     text: &'a mut [u8],
     length: usize,

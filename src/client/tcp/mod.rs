@@ -16,6 +16,7 @@ use crate::port::Port;
 /// A TCP stream with as many requests in flight as the queue holds. Received bytes are in
 /// the frame buffer, bytes to send in [`ClientStorage::outgoing`].
 #[repr(C)]
+#[derive(Debug)]
 pub struct Tcp<P, S> {
     /// Number of requests in flight, and its limit.
     in_flight: u8,
@@ -386,6 +387,21 @@ fn write_frame<J: ClientRequest>(request: &J, place: &mut [u8], wire: u16) -> Re
 impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
     const HAS_BROADCAST: bool = false;
     const HAS_TRANSACTION_IDS: bool = true;
+
+    type Port = P;
+    type Storage = S;
+
+    fn settings(&mut self) -> &mut Settings {
+        &mut self.settings
+    }
+
+    fn port(&mut self) -> &mut P {
+        &mut self.port
+    }
+
+    fn storage(&mut self) -> &mut S {
+        &mut self.storage
+    }
 
     fn advance<const N: usize>(
         &mut self,
