@@ -24,22 +24,26 @@ def items(file):
             for kind, link, path, about in ITEM.findall(file.read_text(encoding="utf-8")) if kind in KINDS]
 
 
+def rows(found, place):
+    """The table of items whose pages are in the folder `place`."""
+    made = [[f'<a href="../rust/mbm/{place}{address}"><code>{path.rpartition("::")[2]}</code></a>', kind, about]
+            for kind, address, path, about in found]
+    return table("sections", ["item", "kind", "about"], made) if made else ""
+
+
 def page(folder):
     """The Markdown of the page, from `folder`, where rustdoc's pages of the crate are."""
     text = ("# Rust API\n\nThe core is a crate, `mbm`: `no_std`, without `alloc`, without unsafe code. The C functions"
             " stand on it.\n\n")
     text += ('<p><a class="md-button md-button--primary" href="../rust/mbm/index.html">The crate\'s documentation, with'
              " examples</a></p>\n\n")
-    for kind, link, path, about in items(folder / "index.html"):
-        if kind != "module":
-            continue
-        name = path.removeprefix("mbm::")
-        text += f"## {name}\n\n<div class=\"entry\"><p>{about}</p></div>\n\n"
-        rows = [[f'<a href="../rust/mbm/{html.escape(name)}/{address}"><code>{inner.rpartition("::")[2]}</code></a>',
-                 inner_kind, inner_about]
-                for inner_kind, address, inner, inner_about in items(folder / name / "index.html")]
-        if rows:
-            text += table("sections", ["item", "kind", "about"], rows)
+    root = items(folder / "index.html")
+    text += rows([item for item in root if item[0] != "module"], "")
+    for kind, _, path, about in root:
+        if kind == "module":
+            name = path.removeprefix("mbm::")
+            text += f"## {name}\n\n<div class=\"entry\"><p>{about}</p></div>\n\n"
+            text += rows(items(folder / name / "index.html"), f"{html.escape(name)}/")
     return text
 
 

@@ -11,10 +11,9 @@ use core::fmt::Write;
 use core::future::Future;
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
-use mbm::engine::Buffers;
-use mbm::error::Error;
-use mbm::master::{AsyncMaster, Master};
+use mbm::master::{AsyncMaster, Buffers, Master};
 use mbm::port::EmbeddedIo;
+use mbm::Error;
 use uart::Uart;
 
 const UNIT: u8 = 17;
