@@ -373,3 +373,87 @@ fn a_request_that_is_dropped_at_any_time_leaves_the_master_usable() {
         assert_eq!(bench.device.holding[7], value);
     }
 }
+
+#[test]
+fn a_reply_that_arrived_before_the_request_is_not_taken_for_its_reply() {
+    let mut bench = Bench::new();
+    let mut master = master(&bench);
+    let mut words = [0];
+    let read = master.read_holding_registers(100, &mut words);
+    assert_eq!(bench.run(read), Ok(()));
+    // The device sends its reply twice. The UART keeps the second one for a long time.
+    let again = common::device::sealed(&[17, 3, 2, 0x10, 0x00]);
+    bench.wire.borrow_mut().arrive(&again);
+    bench.wire.borrow_mut().now += 10_000_000;
+    let read = master.read_holding_registers(105, &mut words);
+    assert_eq!(bench.run(read), Ok(()));
+    assert_eq!(words, [0x1005]);
+}
+
+#[test]
+fn many_bytes_that_arrived_before_the_request_are_skipped() {
+    let mut bench = Bench::new();
+    let mut master = master(&bench);
+    let mut bytes = vec![0x55; 300];
+    bytes.extend(common::device::sealed(&[17, 3, 2, 0x12, 0x34]));
+    bench.wire.borrow_mut().arrive(&bytes);
+    bench.wire.borrow_mut().read_fails = true;
+    bench.wire.borrow_mut().now += 10_000_000;
+    let mut words = [0];
+    let read = master.read_holding_registers(105, &mut words);
+    assert_eq!(bench.run(read), Ok(()));
+    assert_eq!(words, [0x1005]);
+}
+
+#[test]
+fn a_future_that_is_forgotten_leaves_the_master_usable() {
+    let mut bench = Bench::new();
+    let mut master = master(&bench);
+    let mut words = [0; 2];
+    let mut read = Box::pin(master.read_holding_registers(100, &mut words));
+    assert!(poll(read.as_mut()).is_pending());
+    std::mem::forget(read);
+    let write = master.write_single_register(100, 1);
+    assert_eq!(bench.run(write), Ok(()));
+}
+
+/// A UART that is at its end: it writes nothing, or fails to flush.
+struct Ended {
+    uart: Uart,
+    writes: bool,
+}
+
+impl ErrorType for Ended {
+    type Error = ErrorKind;
+}
+
+impl Read for Ended {
+    async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
+        self.uart.read(bytes).await
+    }
+}
+
+impl Write for Ended {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        Ok(if self.writes { bytes.len() } else { 0 })
+    }
+
+    async fn flush(&mut self) -> Result<(), ErrorKind> {
+        Err(ErrorKind::BrokenPipe)
+    }
+}
+
+#[test]
+fn a_write_of_no_byte_and_a_flush_that_fails_are_a_lost_link() {
+    for writes in [false, true] {
+        let mut bench = Bench::new();
+        let wire = bench.wire.clone();
+        let clock = move || wire.borrow().now;
+        let uart = Uart(bench.wire.clone());
+        let delay = Delay(bench.wire.clone());
+        let buffers = Buffers::new([0; 64], [0; 2], [0; 2]);
+        let mut master = AsyncMaster::new(17, Ended { uart, writes }, clock, delay, buffers);
+        let write = master.write_single_register(100, 1);
+        assert_eq!(bench.run(write), Err(Error::LINK_LOST), "{writes}");
+    }
+}

@@ -210,3 +210,16 @@ fn a_device_that_receives_nothing_times_out() {
     assert_eq!(master.wait(|| bench.pass()), Err(Error::RESPONSE_TIMED_OUT));
     assert_eq!(master.status(), Status::RESPONSE_TIMED_OUT);
 }
+
+#[test]
+fn the_clock_may_wrap_at_any_time_of_a_request() {
+    for before in (0..6_000).step_by(50) {
+        let mut bench = Bench::new();
+        let (wire, uart) = (bench.wire.clone(), Uart(bench.wire.clone()));
+        let clock = move || wire.borrow().now.wrapping_sub(before);
+        let port = EmbeddedIo::serial(uart, clock).with_driver(driver(&bench.wire), 115_200);
+        assert!(read(&mut bench, port).is_ok(), "{before}");
+        let wire = bench.wire.borrow();
+        assert!(!wire.driver && !wire.is_cut_off, "{before}");
+    }
+}

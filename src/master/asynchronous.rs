@@ -4,7 +4,7 @@ use super::Master;
 use crate::engine::{Settings, Words};
 use crate::error::Error;
 use crate::port::Port;
-use core::future::{poll_fn, Future};
+use core::future::{poll_fn, ready, Future};
 use core::pin::pin;
 use core::task::Poll;
 use embedded_hal_async::delay::DelayNs;
@@ -101,13 +101,20 @@ impl<C, E> Bridge<C, E> {
         }
         self.received.get_mut(self.end..).unwrap_or_default()
     }
+
+    /// Notes that the device has filled `count` bytes of the place; 0 if it is at its end.
+    fn note_received(&mut self, count: usize) {
+        self.is_lost = count == 0;
+        self.end = (self.end + count).min(PIECE);
+    }
 }
 
 /// A master of one RTU line, whose functions are futures. It has one request at a time.
 ///
 /// - `D` is the UART: [`Read`] and [`Write`] of embedded-io-async. Its read must lose no byte if
 ///   its future is dropped, as a UART with a receive buffer does. A read that fails means that
-///   characters were damaged or lost, a write that fails that the link is lost.
+///   characters were damaged or lost. A write or flush that fails, and a read or write of 0 bytes,
+///   mean that the link is lost.
 /// - `C` is the clock, in microseconds, which wraps at 2^32. `T` is [`DelayNs`] of
 ///   embedded-hal-async. An executor's timer has both.
 /// - `S` are the buffers, as those of [`Master`]. Values are copied between them and the slices of
@@ -186,16 +193,36 @@ where
         &mut self,
         start: impl FnOnce(&mut Master<Bridge<C, E>, S>) -> Result<(), Error>,
     ) -> Result<(), Error> {
+        // A future that was forgotten, and not dropped, has left its request.
+        self.master.cancel();
         let port = self.master.port();
         port.is_lost = false;
         port.outgoing = Outgoing::None;
         start(&mut self.master)?;
         let running = Running(self);
+        running.0.take_old_bytes().await;
         loop {
             if let Poll::Ready(result) = running.0.master.poll() {
                 return result;
             }
             running.0.go_on().await;
+        }
+    }
+
+    /// Takes what arrived before the request, so that the engine does not search it for the reply.
+    async fn take_old_bytes(&mut self) {
+        // A device that has lost characters may say so before it returns the others.
+        for _ in 0..2 {
+            let port = self.master.port();
+            let place = port.place();
+            if place.is_empty() {
+                return;
+            }
+            match first(self.device.read(place), ready(())).await {
+                Some(Ok(count)) => return port.note_received(count),
+                Some(Err(_)) => {}
+                None => return,
+            }
         }
     }
 
@@ -208,9 +235,17 @@ where
             let limit = characters.saturating_add(settings.response_timeout.get());
             let frame = line.storage.slice(0, length);
             let device = &mut self.device;
+            // Not `write_all`, which panics if the device takes no byte.
             let send = async {
-                device.write_all(frame).await?;
-                device.flush().await
+                let mut rest = frame;
+                while !rest.is_empty() {
+                    match device.write(rest).await? {
+                        0 => return Ok(false),
+                        sent => rest = rest.get(sent..).unwrap_or_default(),
+                    }
+                }
+                device.flush().await?;
+                Ok::<_, D::Error>(true)
             };
             let sent = first(send, self.timer.delay_us(limit)).await;
             let port = &mut line.port;
@@ -218,7 +253,7 @@ where
                 Some(_) => Outgoing::None,
                 None => Outgoing::Stuck,
             };
-            port.is_lost = matches!(sent, Some(Err(_)));
+            port.is_lost = matches!(sent, Some(Ok(false) | Err(_)));
             return;
         }
         let delay = self.master.poll_delay();
@@ -235,8 +270,7 @@ where
             return self.timer.delay_us(delay).await;
         }
         match first(self.device.read(place), self.timer.delay_us(delay)).await {
-            Some(Ok(0)) => port.is_lost = true,
-            Some(Ok(count)) => port.end = (port.end + count).min(PIECE),
+            Some(Ok(count)) => port.note_received(count),
             // A device that fails at once again must not keep other tasks from running.
             Some(Err(_)) => self.timer.delay_us(delay.min(PAUSE)).await,
             None => {}
