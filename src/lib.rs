@@ -35,15 +35,16 @@
 //!
 //! ```
 //! use mbm::port::Port;
+//! use mbm::Error;
 //!
 //! struct Uart { /* ... */ }
 //!
 //! impl Port for Uart {
-//!     fn read(&mut self, bytes: &mut [u8]) -> i16 {
-//!         0 // The number of received bytes that were copied to `bytes`.
+//!     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
+//!         Ok(0) // The number of received bytes that were copied to `bytes`.
 //!     }
-//!     fn write(&mut self, bytes: &[u8]) -> i16 {
-//!         bytes.len() as i16 // The number of these bytes that will be sent.
+//!     fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
+//!         Ok(bytes.len()) // The number of these bytes that will be sent.
 //!     }
 //!     fn micros(&mut self) -> u32 {
 //!         0 // The time in microseconds.

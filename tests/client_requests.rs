@@ -14,12 +14,12 @@ use std::rc::Rc;
 struct Uart(Rc<RefCell<Wire>>);
 
 impl Port for Uart {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
-        self.0.borrow_mut().receive(bytes) as i16
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
+        Ok(self.0.borrow_mut().receive(bytes))
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
-        self.0.borrow_mut().send(bytes) as i16
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
+        Ok(self.0.borrow_mut().send(bytes))
     }
 
     fn micros(&mut self) -> u32 {

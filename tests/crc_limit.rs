@@ -161,20 +161,20 @@ struct Line {
 }
 
 impl Port for Line {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         if !self.is_sent {
-            return 0;
+            return Ok(0);
         }
         let count = bytes.len().min(self.arriving.len());
         for (place, byte) in bytes.iter_mut().zip(self.arriving.drain(..count)) {
             *place = byte;
         }
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         self.is_sent = true;
-        bytes.len() as i16
+        Ok(bytes.len())
     }
 
     fn micros(&mut self) -> u32 {

@@ -144,16 +144,16 @@ fn a_uart_may_take_a_frame_in_pieces() {
 #[test]
 fn a_uart_without_bytes_reads_none_and_is_not_asked() {
     let bench = Bench::new();
-    assert_eq!(serial(&bench).read(&mut [0; 8]), 0);
-    assert_eq!(stream(&bench).read(&mut [0; 8]), 0);
+    assert_eq!(serial(&bench).read(&mut [0; 8]), Ok(0));
+    assert_eq!(stream(&bench).read(&mut [0; 8]), Ok(0));
 }
 
 #[test]
 fn a_uart_that_is_full_accepts_no_byte_and_is_not_asked() {
     let bench = Bench::new();
     bench.wire.borrow_mut().accepts = 0;
-    assert_eq!(serial(&bench).write(&[1, 2]), 0);
-    assert_eq!(stream(&bench).write(&[1, 2]), 0);
+    assert_eq!(serial(&bench).write(&[1, 2]), Ok(0));
+    assert_eq!(stream(&bench).write(&[1, 2]), Ok(0));
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn a_damaged_character_of_a_serial_line_is_not_a_lost_link() {
     let mut bench = Bench::new();
     bench.wire.borrow_mut().read_fails = true;
     let mut port = serial(&bench);
-    assert_eq!(port.read(&mut [0; 8]), 0);
+    assert_eq!(port.read(&mut [0; 8]), Ok(0));
     bench.wire.borrow_mut().read_fails = true;
     assert!(read(&mut bench, port).is_ok());
 }

@@ -41,7 +41,7 @@ impl Wire {
 struct End(Rc<RefCell<Wire>>, usize);
 
 impl Port for End {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         let mut count = 0;
         for place in bytes {
@@ -52,10 +52,10 @@ impl Port for End {
             wire.to[self.1].pop_front();
             count += 1;
         }
-        count
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         let mut at = wire.now;
         for byte in bytes {
@@ -66,7 +66,7 @@ impl Port for End {
             let bit = u8::from(wire.chance(wire.changed)) << (wire.random >> 28 & 7);
             wire.to[1 - self.1].push_back((at, byte ^ bit));
         }
-        bytes.len() as i16
+        Ok(bytes.len())
     }
 
     fn micros(&mut self) -> u32 {

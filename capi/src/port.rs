@@ -3,7 +3,8 @@
 use super::node::object::mbm_node;
 use core::ffi::c_void;
 use core::ptr::null;
-use mbm::port::Port;
+use mbm::error::Error;
+use mbm::port::{result, Port};
 
 /// What your firmware supplies: a byte stream, a clock, and optional hooks.
 ///
@@ -106,7 +107,11 @@ impl Port for mbm_port {
         self.read.is_some()
     }
 
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
+        result(self.read_count(bytes))
+    }
+
+    fn read_count(&mut self, bytes: &mut [u8]) -> i16 {
         // SAFETY: see above.
         let count = unsafe {
             let read = self.read.unwrap_unchecked();
@@ -115,7 +120,11 @@ impl Port for mbm_port {
         count.min(bytes.len() as i16)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
+        result(self.write_count(bytes))
+    }
+
+    fn write_count(&mut self, bytes: &[u8]) -> i16 {
         // SAFETY: see above.
         let count = unsafe {
             let write = self.write.unwrap_unchecked();
@@ -208,7 +217,11 @@ impl Port for PortRef {
         !self.port.is_null()
     }
 
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
+        result(self.read_count(bytes))
+    }
+
+    fn read_count(&mut self, bytes: &mut [u8]) -> i16 {
         // SAFETY: see above.
         let count = unsafe {
             let read = (*self.port).read.unwrap_unchecked();
@@ -217,7 +230,11 @@ impl Port for PortRef {
         count.min(bytes.len() as i16)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
+        result(self.write_count(bytes))
+    }
+
+    fn write_count(&mut self, bytes: &[u8]) -> i16 {
         // SAFETY: see above.
         let count = unsafe {
             let write = (*self.port).write.unwrap_unchecked();

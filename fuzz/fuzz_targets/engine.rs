@@ -45,17 +45,17 @@ struct Line<const SINGLE: bool> {
 impl<const SINGLE: bool> Port for Line<SINGLE> {
     const READS_SINGLE_BYTES: bool = SINGLE;
 
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         assert!(!self.driver, "the engine reads while it sends");
         let Some((delay, next)) = self.script.front_mut() else {
-            return 0;
+            return Ok(0);
         };
         if self.now.wrapping_sub(self.since) < *delay {
-            return 0;
+            return Ok(0);
         }
         let Next::Bytes(waiting) = next else {
             self.lost = true;
-            return -1;
+            return Err(mbm::Error::LINK_LOST);
         };
         let count = waiting.len().min(bytes.len());
         for (place, byte) in bytes.iter_mut().zip(waiting.drain(..count)) {
@@ -66,21 +66,21 @@ impl<const SINGLE: bool> Port for Line<SINGLE> {
             self.script.pop_front();
             self.since = self.now;
         }
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         assert!(self.driver, "the engine sends with the driver off");
         self.writes += 1;
         if self.accept > 0 && self.writes.is_multiple_of(2) {
-            return 0;
+            return Ok(0);
         }
         let count = match self.accept {
             0 => bytes.len(),
             some => bytes.len().min(some),
         };
         self.sent.extend_from_slice(&bytes[..count]);
-        count as i16
+        Ok(count)
     }
 
     fn micros(&mut self) -> u32 {

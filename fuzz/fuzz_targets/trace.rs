@@ -27,19 +27,19 @@ struct Wire {
 struct TestPort(Rc<RefCell<Wire>>);
 
 impl Port for TestPort {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         let count = bytes.len().min(wire.arriving.len());
         bytes[..count].copy_from_slice(&wire.arriving[..count]);
         wire.moved[0].extend(wire.arriving.drain(..count));
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         let count = bytes.len().min(wire.accepts);
         wire.moved[1].extend(&bytes[..count]);
-        count as i16
+        Ok(count)
     }
 
     fn micros(&mut self) -> u32 {
@@ -101,15 +101,15 @@ fuzz_target!(|data: &[u8]| {
             3 => {
                 wire.borrow_mut().accepts = usize::from(input.u8());
                 let bytes = framed(framing, 1, &[input.counted(), &[3]].concat()[..1]);
-                trace.write(&bytes);
+                assert!(trace.write(&bytes).is_ok());
             }
             _ => {
                 let count = usize::from(input.u8() % 64);
-                trace.read(&mut place[..count]);
+                assert!(trace.read(&mut place[..count]).is_ok());
             }
         }
     }
-    while trace.read(&mut place) > 0 {}
+    while matches!(trace.read(&mut place), Ok(1..)) {}
     trace.hand_out_rest();
     assert_eq!(wire.borrow().moved, wire.borrow().handed_out);
 
@@ -117,7 +117,7 @@ fuzz_target!(|data: &[u8]| {
     let reply = framed(framing, 17, &[3, 2, 0, 1]);
     let before = wire.borrow().frames;
     wire.borrow_mut().arriving.extend(&reply);
-    while trace.read(&mut place) > 0 {}
+    while matches!(trace.read(&mut place), Ok(1..)) {}
     trace.hand_out_rest();
     let found = wire.borrow().frames - before;
     assert!(found == 1 || reply.len() > size / 2, "{found} frames");

@@ -15,17 +15,17 @@ pub struct Wire {
 }
 
 impl Port for Wire {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let count = self.arrived.len().min(bytes.len());
         for (place, byte) in bytes.iter_mut().zip(self.arrived.drain(..count)) {
             *place = byte;
         }
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         self.sent.extend_from_slice(bytes);
-        bytes.len() as i16
+        Ok(bytes.len())
     }
 
     fn micros(&mut self) -> u32 {

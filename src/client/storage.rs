@@ -72,13 +72,10 @@ pub struct TcpBuffers<F, O> {
     outgoing: O,
 }
 
-/// A port returns how many bytes it has read or written as an `i16`.
-const MOST: u16 = i16::MAX as u16;
-
 impl<F, O> TcpBuffers<F, O> {
     /// Takes a buffer of received bytes, at least 9, and a buffer of bytes to send, at least 12.
     /// 260 bytes hold any frame. Larger ones take more responses from one read, and collect more
-    /// requests for one write. At most 32 767 bytes of each are used.
+    /// requests for one write. At most 65 535 bytes of each are used.
     pub const fn new(incoming: F, outgoing: O) -> Self {
         TcpBuffers {
             incoming: Frame::new(incoming),
@@ -91,7 +88,7 @@ impl<F: AsRef<[u8]> + AsMut<[u8]>, O> Storage for TcpBuffers<F, O> {
     type Count = u16;
 
     fn capacity(&self) -> u16 {
-        self.incoming.capacity().min(MOST)
+        self.incoming.capacity()
     }
 
     fn byte(&self, index: u16) -> u8 {
@@ -118,7 +115,7 @@ where
 {
     fn outgoing(&mut self) -> &mut [u8] {
         let bytes = self.outgoing.as_mut();
-        let most = bytes.len().min(MOST.into());
+        let most = bytes.len().min(u16::MAX.into());
         bytes.get_mut(..most).unwrap_or_default()
     }
 }

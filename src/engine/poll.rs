@@ -159,7 +159,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// many; negative if the link is lost.
     #[inline(always)]
     fn read_bytes(&mut self, index: S::Count, space: S::Count) -> i16 {
-        let received = self.port.read(self.storage.bytes(index, space));
+        let received = self.port.read_count(self.storage.bytes(index, space));
         if received > 0 {
             self.received = self.received.wrapping_add(received as u16);
         }

@@ -89,7 +89,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     pub(super) fn send(&mut self) -> Status {
         if self.phase == Phase::Send {
             let left = self.outgoing - self.sent;
-            let sent = self.port.write(self.storage.bytes(self.sent, left));
+            let sent = self.port.write_count(self.storage.bytes(self.sent, left));
             if sent < 0 {
                 return Status::LINK_LOST;
             }

@@ -42,10 +42,10 @@ struct Bridge<C, E> {
 }
 
 impl<C: FnMut() -> u32, E: FnMut(bool)> Port for Bridge<C, E> {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
         let received = self.received.get(self.start..self.end).unwrap_or_default();
         if received.is_empty() && self.is_lost {
-            return -1;
+            return Err(Error::LINK_LOST);
         }
         let mut count = 0;
         for (place, byte) in bytes.iter_mut().zip(received) {
@@ -53,14 +53,14 @@ impl<C: FnMut() -> u32, E: FnMut(bool)> Port for Bridge<C, E> {
             count += 1;
         }
         self.start += count;
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
         // The engine writes the whole frame in one call, as all of it is accepted.
         let length = bytes.len() as u8;
         self.outgoing = Outgoing::Frame(length);
-        length.into()
+        Ok(length.into())
     }
 
     fn micros(&mut self) -> u32 {

@@ -1,6 +1,7 @@
 //! A port over the traits of the crate embedded-io, for UARTs and sockets of a HAL.
 
 use super::Port;
+use crate::error::Error;
 use crate::time::{character, elapsed};
 use ::embedded_io::{Read, ReadReady, Write, WriteReady};
 
@@ -70,15 +71,6 @@ impl<D, C> EmbeddedIo<D, C> {
     }
 }
 
-/// The number of bytes that a device has read or written, which fits into an `i16`: a port gets
-/// frames, and is never asked for more.
-fn count(bytes: usize) -> i16 {
-    bytes.try_into().unwrap_or(i16::MAX)
-}
-
-/// What a port returns whose link is lost.
-const LOST: i16 = -1;
-
 impl<D, C: FnMut() -> u32, E> EmbeddedIo<D, C, E> {
     /// Notes that the device has accepted bytes.
     fn note_sent(&mut self, bytes: usize) {
@@ -98,30 +90,33 @@ where
     C: FnMut() -> u32,
     E: FnMut(bool),
 {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
-        let failed = if self.is_serial { 0 } else { LOST };
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
+        let failed = match self.is_serial {
+            true => Ok(0),
+            false => Err(Error::LINK_LOST),
+        };
         match self.device.read_ready() {
-            Ok(false) => 0,
+            Ok(false) => Ok(0),
             Ok(true) => match self.device.read(bytes) {
                 Ok(0) if !bytes.is_empty() => failed,
-                Ok(read) => count(read),
+                Ok(read) => Ok(read),
                 Err(_) => failed,
             },
             Err(_) => failed,
         }
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
         match self.device.write_ready() {
-            Ok(false) => 0,
+            Ok(false) => Ok(0),
             Ok(true) => match self.device.write(bytes) {
                 Ok(written) => {
                     self.note_sent(written);
-                    count(written)
+                    Ok(written)
                 }
-                Err(_) => LOST,
+                Err(_) => Err(Error::LINK_LOST),
             },
-            Err(_) => LOST,
+            Err(_) => Err(Error::LINK_LOST),
         }
     }
 

@@ -6,6 +6,8 @@ mod embedded_io;
 #[cfg(feature = "embedded-io")]
 pub use self::embedded_io::EmbeddedIo;
 
+use crate::error::Error;
+
 /// A byte stream and a clock. No function may block.
 pub trait Port {
     /// True if a master and a client's line read one byte at a time: that takes less code, 56
@@ -20,12 +22,35 @@ pub trait Port {
     }
 
     /// Copies up to `bytes.len()` received bytes to `bytes`, in the order of arrival. Returns
-    /// their number: 0 if none has arrived yet, a negative number if the link is lost.
-    fn read(&mut self, bytes: &mut [u8]) -> i16;
+    /// their number, 0 if none has arrived yet.
+    ///
+    /// # Errors
+    /// [`Error::LINK_LOST`]. Every other error counts as that.
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error>;
 
-    /// Accepts bytes to send. Returns the number of bytes accepted: 0 if the port cannot
-    /// accept any now, a negative number if the link is lost.
-    fn write(&mut self, bytes: &[u8]) -> i16;
+    /// Accepts bytes to send. Returns the number of bytes accepted, 0 if the port cannot accept
+    /// any now.
+    ///
+    /// # Errors
+    /// As [`Port::read`].
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error>;
+
+    /// As [`Port::read`], in the form of a hook in C: negative if the link is lost. All parts call
+    /// this one, so that a port in C needs no code between them and its hook.
+    #[doc(hidden)]
+    fn read_count(&mut self, bytes: &mut [u8]) -> i16 {
+        let most = bytes.len().min(MOST);
+        let bytes = bytes.get_mut(..most).unwrap_or_default();
+        count(self.read(bytes), most)
+    }
+
+    /// As [`Port::read_count`], for [`Port::write`].
+    #[doc(hidden)]
+    fn write_count(&mut self, bytes: &[u8]) -> i16 {
+        let most = bytes.len().min(MOST);
+        let bytes = bytes.get(..most).unwrap_or_default();
+        count(self.write(bytes), most)
+    }
 
     /// The time in microseconds, which wraps at 2^32.
     fn micros(&mut self) -> u32;
@@ -46,4 +71,68 @@ pub trait Port {
 
     /// Called after the last bit of a request or response: switches the RS-485 driver off.
     fn post_transmission(&mut self) {}
+}
+
+/// The most bytes that an `i16` counts.
+const MOST: usize = i16::MAX as usize;
+
+/// How many of `most` bytes a port has read or written; negative if the link is lost.
+fn count(result: Result<usize, Error>, most: usize) -> i16 {
+    result.map_or(-1, |count| count.min(most) as i16)
+}
+
+/// What [`Port::read`] returns where [`Port::read_count`] returns `count`.
+#[doc(hidden)]
+pub fn result(count: i16) -> Result<usize, Error> {
+    count.try_into().map_err(|_| Error::LINK_LOST)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Claims this many bytes at each call.
+    struct Claims(Result<usize, Error>);
+
+    impl Port for Claims {
+        fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
+            assert!(bytes.len() <= MOST);
+            self.0
+        }
+
+        fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
+            assert!(bytes.len() <= MOST);
+            self.0
+        }
+
+        fn micros(&mut self) -> u32 {
+            0
+        }
+    }
+
+    #[test]
+    fn no_more_bytes_are_counted_than_the_port_was_given() {
+        for (claimed, counts) in [
+            (Ok(0), [0, 0]),
+            (Ok(7), [7, 7]),
+            (Ok(usize::MAX), [8, i16::MAX]),
+            (Err(Error::LINK_LOST), [-1, -1]),
+            (Err(Error::BUSY), [-1, -1]),
+        ] {
+            let mut port = Claims(claimed);
+            for (length, count) in [8, 40_000].into_iter().zip(counts) {
+                let mut bytes = std::vec![0; length];
+                assert_eq!(port.read_count(&mut bytes), count);
+                assert_eq!(port.write_count(&bytes), count);
+            }
+        }
+    }
+
+    #[test]
+    fn a_negative_count_is_a_lost_link() {
+        assert_eq!(result(0), Ok(0));
+        assert_eq!(result(i16::MAX), Ok(MOST));
+        assert_eq!(result(-1), Err(Error::LINK_LOST));
+        assert_eq!(result(i16::MIN), Err(Error::LINK_LOST));
+    }
 }

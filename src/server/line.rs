@@ -265,7 +265,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         if end == capacity {
             (start, until) = (0, 1);
         }
-        let received = self.port.read(self.storage.part(start, until));
+        let received = self.port.read_count(self.storage.part(start, until));
         if received > 0 {
             self.last_byte = self.now;
             if start != end {
@@ -383,7 +383,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         let mut status = Status::OK;
         let rest = self.storage.part(self.sent.into(), self.end.into());
         if !rest.is_empty() {
-            let sent = self.port.write(rest);
+            let sent = self.port.write_count(rest);
             if sent < 0 {
                 status = Status::LINK_LOST;
             } else {

@@ -11,9 +11,10 @@ mod record;
 
 pub use record::{Direction, Observer, Record};
 
+use crate::error::Error;
 use crate::frame::Framing;
 use crate::packet::PduKind;
-use crate::port::Port;
+use crate::port::{result, Port};
 use cutter::{Cutter, Rules};
 
 /// The smallest buffer, in bytes. Each direction uses a half of it.
@@ -125,8 +126,12 @@ impl<P: Port, B: AsMut<[u8]>, O: Observer> Port for Trace<P, B, O> {
         self.port.is_ready()
     }
 
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
-        let count = self.port.read(bytes);
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
+        result(self.read_count(bytes))
+    }
+
+    fn read_count(&mut self, bytes: &mut [u8]) -> i16 {
+        let count = self.port.read_count(bytes);
         if count < 0 {
             self.hand_out_rest();
         }
@@ -141,9 +146,13 @@ impl<P: Port, B: AsMut<[u8]>, O: Observer> Port for Trace<P, B, O> {
         count
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
+        result(self.write_count(bytes))
+    }
+
+    fn write_count(&mut self, bytes: &[u8]) -> i16 {
         let now = self.port.micros();
-        let count = self.port.write(bytes);
+        let count = self.port.write_count(bytes);
         if count < 0 {
             self.hand_out_rest();
             return count;

@@ -32,10 +32,10 @@ pub struct Wire {
 pub struct Tap(pub Rc<RefCell<Wire>>);
 
 impl Port for Tap {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         if wire.lost {
-            return -1;
+            return Err(mbm::Error::LINK_LOST);
         }
         let mut count = 0;
         for place in bytes {
@@ -46,13 +46,13 @@ impl Port for Tap {
             wire.arriving.pop_front();
             count += 1;
         }
-        count
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         if wire.lost {
-            return -1;
+            return Err(mbm::Error::LINK_LOST);
         }
         let count = match wire.piece {
             0 => bytes.len(),
@@ -69,7 +69,7 @@ impl Port for Tap {
             wire.arriving
                 .extend(bytes[..count].iter().map(|byte| (now, *byte)));
         }
-        count as i16
+        Ok(count)
     }
 
     fn micros(&mut self) -> u32 {

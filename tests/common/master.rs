@@ -40,9 +40,9 @@ impl<const SINGLE: bool> Line<SINGLE> {
 impl<const SINGLE: bool> Port for Line<SINGLE> {
     const READS_SINGLE_BYTES: bool = SINGLE;
 
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let Some(piece) = self.pieces.front_mut() else {
-            return 0;
+            return Ok(0);
         };
         let count = piece.len().min(bytes.len());
         for (place, byte) in bytes.iter_mut().zip(piece.drain(..count)) {
@@ -51,13 +51,13 @@ impl<const SINGLE: bool> Port for Line<SINGLE> {
         if piece.is_empty() {
             self.pieces.pop_front();
         }
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         self.sent.extend_from_slice(bytes);
         self.pieces = std::mem::take(&mut self.reply);
-        bytes.len() as i16
+        Ok(bytes.len())
     }
 
     fn micros(&mut self) -> u32 {

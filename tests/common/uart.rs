@@ -85,7 +85,7 @@ impl Wire {
 struct DeviceEnd(Rc<RefCell<Wire>>);
 
 impl Port for DeviceEnd {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         let mut count = 0;
         while count < bytes.len() {
@@ -96,17 +96,17 @@ impl Port for DeviceEnd {
             wire.to_device.pop_front();
             count += usize::from(!wire.is_cut);
         }
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         let mut at = wire.now;
         for byte in bytes {
             at += CHARACTER;
             wire.to_master.push_back((at, *byte));
         }
-        bytes.len() as i16
+        Ok(bytes.len())
     }
 
     fn micros(&mut self) -> u32 {

@@ -54,17 +54,17 @@ impl End {
 }
 
 impl Port for End {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let mut wire = self.0.borrow_mut();
         if wire.dead {
-            return -1;
+            return Err(mbm::Error::LINK_LOST);
         }
         let now = wire.now;
         let Some((at, first)) = wire.incoming.front_mut() else {
-            return 0;
+            return Ok(0);
         };
         if now.wrapping_sub(*at) as i32 <= -1 {
-            return 0;
+            return Ok(0);
         }
         let count = first.len().min(bytes.len());
         bytes[..count].copy_from_slice(&first[..count]);
@@ -72,20 +72,20 @@ impl Port for End {
         if first.is_empty() {
             wire.incoming.pop_front();
         }
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         let mut wire = self.0.borrow_mut();
         if wire.dead {
-            return -1;
+            return Err(mbm::Error::LINK_LOST);
         }
         if wire.stuck {
-            return 0;
+            return Ok(0);
         }
         let count = bytes.len().min(wire.piece.unwrap_or(usize::MAX));
         wire.sent.push(bytes[..count].to_vec());
-        count as i16
+        Ok(count)
     }
 
     fn micros(&mut self) -> u32 {

@@ -9,18 +9,18 @@ struct Uart {
 }
 
 impl mbm::port::Port for Uart {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let count = bytes.len().min(self.arriving.len());
         let (now, later) = self.arriving.split_at(count);
         bytes[..count].copy_from_slice(now);
         self.arriving = later;
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         self.sent += bytes.len();
         self.arriving = self.sends;
-        bytes.len() as i16
+        Ok(bytes.len())
     }
 
     fn micros(&mut self) -> u32 {

@@ -40,22 +40,22 @@ impl Wire {
 }
 
 impl Port for Wire {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         self.pending
             .extend(self.server.arrived.try_iter().flatten());
         let count = bytes.len().min(self.pending.len());
         for (place, byte) in bytes.iter_mut().zip(self.pending.drain(..count)) {
             *place = byte;
         }
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         self.server
             .out
             .write_all(bytes)
             .expect("the bytes are sent");
-        bytes.len() as i16
+        Ok(bytes.len())
     }
 
     fn micros(&mut self) -> u32 {

@@ -15,7 +15,7 @@ use std::rc::Rc;
 pub struct Wire {
     pub arriving: VecDeque<u8>,
     /// How many bytes the next writes accept; without an entry all of them.
-    pub accepts: VecDeque<i16>,
+    pub accepts: VecDeque<usize>,
     pub now: u32,
     pub is_lost: bool,
     pub flushed: bool,
@@ -27,25 +27,25 @@ pub type Shared = Rc<RefCell<Wire>>;
 pub struct TestPort(pub Shared);
 
 impl Port for TestPort {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let mut wire = self.0.borrow_mut();
         if wire.is_lost {
-            return -1;
+            return Err(mbm::Error::LINK_LOST);
         }
         let count = bytes.len().min(wire.arriving.len());
         for (place, byte) in bytes.iter_mut().zip(wire.arriving.drain(..count)) {
             *place = byte;
         }
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         let mut wire = self.0.borrow_mut();
         if wire.is_lost {
-            return -1;
+            return Err(mbm::Error::LINK_LOST);
         }
-        let accepted = wire.accepts.pop_front().unwrap_or(i16::MAX);
-        accepted.min(bytes.len() as i16)
+        let accepted = wire.accepts.pop_front().unwrap_or(usize::MAX);
+        Ok(accepted.min(bytes.len()))
     }
 
     fn micros(&mut self) -> u32 {
@@ -131,7 +131,7 @@ impl Bench {
     pub fn receive(&mut self, bytes: &[u8]) {
         self.wire.borrow_mut().arriving.extend(bytes);
         let mut place = [0; 64];
-        while self.trace.read(&mut place) > 0 {}
+        while matches!(self.trace.read(&mut place), Ok(1..)) {}
     }
 
     /// Writes a frame as a master does: what is left of it, until all is accepted.
@@ -139,9 +139,8 @@ impl Bench {
         let mut left = frame;
         self.trace.pre_transmission();
         while !left.is_empty() {
-            let count = self.trace.write(left);
-            assert!(count >= 0);
-            left = &left[count as usize..];
+            let count = self.trace.write(left).unwrap();
+            left = &left[count..];
         }
         self.trace.post_transmission();
     }

@@ -5,7 +5,7 @@ mod properties;
 
 use bench::{frame, record, with_crc, Bench, Kept, Shared, TestPort, ALL, READ, REPLY};
 use mbm::engine::Buffers;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::frame::{ascii, rtu, Framing};
 use mbm::master::Master;
 use mbm::packet::PduKind::{Request, Response};
@@ -40,7 +40,7 @@ fn a_request_and_its_reply_are_handed_out_at_once() {
 fn parts_of_a_sent_frame_are_joined() {
     for framing in ALL {
         let sent = frame(framing, &[16, 0, 1, 0, 2, 4, 1, 2, 3, 4]);
-        for first in 1..sent.len() as i16 {
+        for first in 1..sent.len() {
             let mut bench = Bench::new(framing, Request);
             bench.wire.borrow_mut().accepts.extend([0, first, 0, 1]);
             bench.send(&sent);
@@ -57,7 +57,7 @@ fn a_sent_frame_that_is_given_up_is_incomplete() {
         let sent = frame(framing, READ);
         let mut bench = Bench::new(framing, Request);
         bench.wire.borrow_mut().accepts.push_back(3);
-        assert_eq!(bench.trace.write(&sent), 3);
+        assert_eq!(bench.trace.write(&sent), Ok(3));
         assert_eq!(bench.taken(), []);
         bench.trace.post_transmission();
         let part = [record(
@@ -78,16 +78,12 @@ fn several_requests_in_one_write_are_several_frames_on_tcp() {
     let mut bench = Bench::new(Framing::Tcp, Request);
     let (one, other) = (frame(Framing::Tcp, READ), frame(Framing::Tcp, &[7]));
     let both = [&one[..], &other].concat();
-    bench
-        .wire
-        .borrow_mut()
-        .accepts
-        .push_back(one.len() as i16 + 2);
+    bench.wire.borrow_mut().accepts.push_back(one.len() + 2);
     // Bytes of a reply arrive meanwhile; a stream carries both directions at the same time.
     let reply = frame(Framing::Tcp, REPLY);
-    let cut = bench.trace.write(&both) as usize;
+    let cut = bench.trace.write(&both).unwrap();
     bench.receive(&reply[..9]);
-    bench.trace.write(&both[cut..]);
+    assert_eq!(bench.trace.write(&both[cut..]), Ok(both.len() - cut));
     bench.receive(&reply[9..]);
     let expected = [
         record(Sent, Request, Status::OK, 0, &one),
@@ -196,7 +192,7 @@ fn a_lost_link_hands_out_the_rest() {
         } else {
             bench.trace.write(&reply)
         };
-        assert_eq!(count, -1);
+        assert_eq!(count, Err(Error::LINK_LOST));
         let expected = [record(
             Received,
             Response,
@@ -380,7 +376,7 @@ fn a_closure_can_take_the_frames() {
     let observer = |record: &Record<'_>| count += record.bytes.len();
     let port = TestPort(wire);
     let mut trace = Trace::new(port, Framing::Rtu, Request, ascii::END, [0; 512], observer);
-    trace.read(&mut [0; 64]);
+    assert!(trace.read(&mut [0; 64]).is_ok());
     drop(trace);
     assert_eq!(count, REPLY.len() + 3);
 }

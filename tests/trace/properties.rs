@@ -46,9 +46,9 @@ proptest! {
             let [sent, received] = &mut left;
             if is_sent && !sent.is_empty() {
                 let offered = &sent[..sent.len().min(60)];
-                bench.wire.borrow_mut().accepts.push_back(count as i16);
-                let count = bench.trace.write(offered);
-                *sent = &sent[count as usize..];
+                bench.wire.borrow_mut().accepts.push_back(count);
+                let count = bench.trace.write(offered).unwrap();
+                *sent = &sent[count..];
             } else {
                 let count = count.min(received.len());
                 bench.receive(&received[..count]);

@@ -119,13 +119,13 @@ impl GatewayStorage for Parts {
     fn read(&mut self, connection: u8, request: u16, from: u16, until: u16) -> i16 {
         let port = mbm_gatewayConnection::port(self.connection_at(connection));
         // SAFETY: see above; the port of an open connection is complete.
-        unsafe { (*port).read(self.bytes(request, from, until)) }
+        unsafe { (*port).read_count(self.bytes(request, from, until)) }
     }
 
     fn write(&mut self, connection: u8, request: u16, from: u16, until: u16) -> i16 {
         let port = mbm_gatewayConnection::port(self.connection_at(connection));
         // SAFETY: as for `read`.
-        unsafe { (*port).write(self.bytes(request, from, until)) }
+        unsafe { (*port).write_count(self.bytes(request, from, until)) }
     }
 
     fn now(&mut self, connection: u8) -> u32 {

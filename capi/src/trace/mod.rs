@@ -133,7 +133,7 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
     // SAFETY: see above; the arguments are those of a port.
     let result = unsafe {
         with_core(context.cast(), |core| {
-            core.read(from_raw_parts_mut(bytes, countable(capacity).into()))
+            core.read_count(from_raw_parts_mut(bytes, countable(capacity).into()))
         })
     };
     result.unwrap_or_else(unusable)
@@ -143,7 +143,7 @@ unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) 
     // SAFETY: see above; the arguments are those of a port.
     let result = unsafe {
         with_core(context.cast(), |core| {
-            core.write(from_raw_parts(bytes, countable(length).into()))
+            core.write_count(from_raw_parts(bytes, countable(length).into()))
         })
     };
     result.unwrap_or_else(unusable)

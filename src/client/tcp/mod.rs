@@ -102,7 +102,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         if space.is_empty() {
             return true;
         }
-        let received = self.port.read(space);
+        let received = self.port.read_count(space);
         if received < 0 {
             return false;
         }
@@ -277,7 +277,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             return true;
         }
         let bytes = self.storage.to_send(self.sent, self.filled);
-        let sent = self.port.write(bytes);
+        let sent = self.port.write_count(bytes);
         if sent < 0 {
             return false;
         }

@@ -1,9 +1,8 @@
 //! Reads a register of unit 17, over a port with a simulated device on its line.
 
-use mbm::engine::Buffers;
-use mbm::error::Error;
-use mbm::master::Master;
+use mbm::master::{Buffers, Master};
 use mbm::port::Port;
+use mbm::Error;
 
 /// The device answers the only right request with the value 0x1234 of register 2.
 #[derive(Default)]
@@ -17,19 +16,19 @@ const REQUEST: [u8; 8] = [17, 3, 0, 2, 0, 1, 0x27, 0x5A];
 const RESPONSE: [u8; 7] = [17, 3, 2, 0x12, 0x34, 0x74, 0xF0];
 
 impl Port for Line {
-    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
         let count = bytes.len().min(self.arriving.len());
         bytes[..count].copy_from_slice(&self.arriving[..count]);
         self.arriving.drain(..count);
-        count as i16
+        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> i16 {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
         self.request.extend_from_slice(bytes);
         if self.request == REQUEST {
             self.arriving.extend_from_slice(&RESPONSE);
         }
-        bytes.len() as i16
+        Ok(bytes.len())
     }
 
     fn micros(&mut self) -> u32 {
