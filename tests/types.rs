@@ -1,4 +1,4 @@
-//! What a program in Rust writes down of the types: in structs, in statics, for tasks and threads.
+//! What a program in Rust writes down of the types: in a struct, in a static, for tasks and threads.
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async"))]
 
 use embedded_hal_async::delay::DelayNs;

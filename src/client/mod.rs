@@ -171,6 +171,7 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
 
     /// Leaves the line to another user of the port until [`Client::take_back`]. Returns
     /// false, and changes nothing, if a request is in flight or another user has the line.
+    #[must_use = "the line may be in use"]
     pub fn suspend(&mut self) -> bool {
         self.line.suspend(&mut self.queue)
     }

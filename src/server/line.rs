@@ -223,6 +223,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// The first half of [`Server::poll`]: looks for a request.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn look(&mut self, now: u32) -> Status {
         self.now = now;
@@ -238,6 +239,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// The second half of [`Server::poll`]: sends the response, if there is one.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn go_on(&mut self) -> Status {
         if self.phase == ServerPhase::Send {
@@ -359,6 +361,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// As [`Server::answer`], for a request that a service has served.
+    #[doc(hidden)]
     #[cfg_attr(target_os = "none", inline(always))]
     pub fn answer_served(&mut self, reply: Reply) -> bool {
         if reply == Reply::PENDING {
