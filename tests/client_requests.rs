@@ -4,7 +4,7 @@ mod common;
 
 use common::uart::{Bench, Wire};
 use mbm::client::{Client, Frame, Request, Serial};
-use mbm::error::{Error, Status};
+use mbm::error::Error;
 use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use mbm::port::Port;
@@ -164,24 +164,23 @@ fn a_request_that_failed_has_read_nothing() {
 fn a_function_without_a_constructor_takes_and_returns_bytes() {
     let mut bench = Bench::new();
     let mut queue = [0; 64];
-    let mut header = RequestHeader::NONE;
-    assert_eq!(
-        header.set(FunctionSpec::READ_FIFO_QUEUE, 0x04DE, 0),
-        Status::OK
-    );
-    let fifo = Request::with_header(17, header, &mut [], &mut queue);
+    let read = |header: &mut RequestHeader| header.set(FunctionSpec::READ_FIFO_QUEUE, 0x04DE, 0);
+    let fifo = Request::with_header(17, read, &mut [], &mut queue);
     let ended = ask(&mut bench, fifo);
     assert_eq!(ended.bytes(), [0x01, 0xB8, 0x12, 0x84]);
     let mut data = [0xA5, 0x37];
     let mut echo = [0; 2];
-    assert_eq!(header.diagnostics(0, 1), Status::OK);
+    let query = |header: &mut RequestHeader| header.diagnostics(0, 1);
     let ended = ask(
         &mut bench,
-        Request::with_header(17, header, &mut data, &mut echo),
+        Request::with_header(17, query, &mut data, &mut echo),
     );
     assert_eq!(ended.bytes(), [0xA5, 0x37]);
-    let refused = Request::with_header(17, header, &mut data[..1], &mut []).err();
+    let refused = Request::with_header(17, query, &mut data[..1], &mut []).err();
     assert_eq!(refused, Some(Error::INVALID_ARGUMENT));
+    let beyond = |header: &mut RequestHeader| header.set(FunctionSpec::READ_COILS, 0xFFFF, 2);
+    let refused = Request::with_header(17, beyond, &mut [], &mut []).err();
+    assert_eq!(refused, Some(Error::ILLEGAL_DATA_ADDRESS));
 }
 
 #[test]

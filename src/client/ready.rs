@@ -92,26 +92,34 @@ pub struct Request<'a> {
 }
 
 impl<'a> Request<'a> {
-    /// A request that a header describes. `sends` has its data in the order of the wire, as many
-    /// bytes as the header says; `takes` is the place for those of the response. For functions that
-    /// have no constructor here.
+    /// A request of any function, for those that have no constructor here. `build` calls one of the
+    /// functions of its header. `sends` has the data in the order of the wire, as many bytes as the
+    /// header says; `takes` is the place for those of the response.
+    ///
+    /// ```
+    /// use mbm::client::Request;
+    ///
+    /// // 08, sub-function 0: the device returns the two bytes.
+    /// let (mut data, mut echo) = ([0xA5, 0x37], [0; 2]);
+    /// let request =
+    ///     Request::with_header(17, |header| header.diagnostics(0, 1), &mut data, &mut echo)?;
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] if `sends` has another length.
+    /// What `build` returns; [`Error::INVALID_ARGUMENT`] if `sends` has another length.
     pub fn with_header(
         unit: u8,
-        header: RequestHeader,
+        build: impl FnOnce(&mut RequestHeader) -> Status,
         sends: &'a mut [u8],
         takes: &'a mut [u8],
     ) -> Result<Self, Error> {
-        if sends.len() != usize::from(header.data_length()) {
-            return Err(Error::INVALID_ARGUMENT);
+        let length = sends.len();
+        let request = Request::build(unit, Slice::Bytes(sends), Slice::Bytes(takes), build)?;
+        match usize::from(request.state.header.data_length()) == length {
+            true => Ok(request),
+            false => Err(Error::INVALID_ARGUMENT),
         }
-        let build = |built: &mut RequestHeader| {
-            *built = header;
-            Status::OK
-        };
-        Request::build(unit, Slice::Bytes(sends), Slice::Bytes(takes), build)
     }
 
     fn build(

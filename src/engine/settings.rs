@@ -48,21 +48,33 @@ impl<const DEFAULT: u32> Setting<DEFAULT> {
 
 /// Times and options of requests, which hold until they are changed. Zeroed memory is the
 /// default.
+///
+/// ```
+/// use mbm::master::{Setting, Settings};
+///
+/// let mut settings = Settings::DEFAULT;
+/// settings.set_baud_rate(19200);
+/// settings.retries = 2;
+/// // A timeout of 1 s, in milliseconds and in microseconds.
+/// settings.response_timeout.set_timeout(1000)?;
+/// assert_eq!(settings.response_timeout, Setting::new(1_000_000));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 #[repr(C)]
 pub struct Settings {
-    /// Response timeout: from the end of the request to the end of the reply.
+    /// Response timeout: from the end of the request to the end of the reply. The default is 2 s.
     pub response_timeout: Setting<{ millis(2000) }>,
-    /// The silence t3.5 that ends a frame (serial line guide V1.02, 2.5.1.1).
+    /// The silence t3.5 that ends a frame (serial line guide V1.02, 2.5.1.1). The default is 4 ms.
     pub silence: Setting<DEFAULT_SILENCE>,
-    /// Silence before a request. Set it with [`Settings::set_gap`].
+    /// Silence before a request. Set it with [`Settings::set_gap`]. The default is 4 ms.
     pub gap: Setting<DEFAULT_SILENCE>,
     /// Quiet time: the silence before the next request after a request without a reply, so
-    /// that a late reply can pass.
+    /// that a late reply can pass. The default is 100 ms.
     pub quiet_time: Setting<{ millis(100) }>,
-    /// Turnaround delay: the time that slaves get to carry out a broadcast.
+    /// Turnaround delay: the time that slaves get to carry out a broadcast. The default is 100 ms.
     pub turnaround_delay: Setting<{ millis(100) }>,
-    /// Time of one character; 0 if the baud rate is unknown.
+    /// Time of one character in microseconds; 0 if the baud rate is unknown.
     pub character: u16,
     /// How often an unanswered request is repeated.
     pub retries: u8,
@@ -91,8 +103,8 @@ impl Settings {
         self.gap = Setting::new(time::clamped(microseconds));
     }
 
-    /// Derives gap, silence and character time from the baud rate; 0 means that the rate is
-    /// unknown.
+    /// Derives gap, silence and character time from the baud rate in bits per second; 0 means that
+    /// the rate is unknown.
     pub const fn set_baud_rate(&mut self, baud: u32) {
         self.silence = Setting::new(time::silence(baud));
         self.gap = self.silence;

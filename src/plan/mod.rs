@@ -7,6 +7,7 @@
 //! Nothing here sends anything or has a clock: time is an argument in milliseconds, which may
 //! wrap.
 
+#[doc(hidden)]
 pub mod divide;
 pub mod field;
 pub mod group;
