@@ -132,7 +132,8 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
 
     /// Advances all requests to the time `now`, without waiting, and returns one request
     /// that has ended. Call it until it returns `None`: `while let Some(request) =
-    /// client.poll(now)`.
+    /// client.poll(now)`. The time is in microseconds, and wraps at 2^32. It is that of the clock of
+    /// the port, [`Port::micros`](crate::port::Port::micros).
     #[must_use = "it is a request that has ended"]
     pub fn poll(&mut self, now: u32) -> Option<J> {
         if self.queue.suspended {

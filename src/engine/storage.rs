@@ -152,7 +152,7 @@ pub struct Frame<F> {
 }
 
 impl<F> Frame<F> {
-    /// A frame buffer.
+    /// A frame buffer of at least 8 bytes. 256 hold any RTU frame, 513 any ASCII frame.
     pub const fn new(bytes: F) -> Self {
         Frame { bytes }
     }
@@ -199,7 +199,9 @@ pub struct Buffers<F, R, T> {
 
 impl<F, R, T> Buffers<F, R, T> {
     /// Takes a frame buffer of at least 8 bytes, of which at most 255 are used, response words,
-    /// and transmit words.
+    /// which a read fills, and transmit words, which a write sends, also one of a single register.
+    /// A frame buffer of 13 + 2 N bytes holds every request and reply with N words, one of 13 + 4 N
+    /// bytes also a late reply beside the right one. The words of what no request does may be `[]`.
     pub const fn new(frame: F, response: R, transmit: T) -> Self {
         Buffers {
             frame: Frame::new(frame),

@@ -141,7 +141,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         }
     }
 
-    /// A server that has begun with this framing.
+    /// A server that has begun with this framing. 256 bytes of storage hold any RTU frame, 513 any
+    /// ASCII frame, 260 any frame on TCP.
     pub fn with_framing(framing: Framing, port: P, storage: B) -> Self {
         let mut server = Server::new(port, storage);
         match framing {
