@@ -355,7 +355,7 @@ int line_failure(line *l, const mbm_clientRequest *request)
         request->status == MBM_LINK_LOST || (l->place.kind == PLACE_UDP && l->udp.error != 0);
 
     return report_failure(request->unit, request->status, request->exception, options.timeoutMs,
-                          has_reason ? line_reason(l) : NULL);
+                          place_is_serial(&l->place), has_reason ? line_reason(l) : NULL);
 }
 
 uint8_t line_read(line *l, mbm_clientRequest *request, uint8_t table, uint16_t address,

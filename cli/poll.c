@@ -337,7 +337,7 @@ static void show_end(uint32_t round)
 
     if (first_failure.status != MBM_OK)
         (void)report_failure(first_failure.unit, first_failure.status, first_failure.exception,
-                             options.timeoutMs, line_reason(&at));
+                             options.timeoutMs, place_is_serial(&at.place), line_reason(&at));
     if (!options.is_quiet)
         fprintf(stderr, "%s: rounds: %u, requests: %u, replies: %u, exceptions: %u.\n", report_name,
                 (unsigned)round, (unsigned)counters->requests, (unsigned)counters->replies,

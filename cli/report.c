@@ -180,7 +180,7 @@ const char *report_error_text(int error)
 }
 
 /* What to look at after a failure, as a sentence. Empty if nothing helps. */
-static const char *advice_on(uint8_t status, uint8_t exception)
+static const char *advice_on(uint8_t status, uint8_t exception, int is_serial)
 {
     switch (exception) {
     case 0: break;
@@ -199,8 +199,10 @@ static const char *advice_on(uint8_t status, uint8_t exception)
     }
     switch (status) {
     case MBM_RESPONSE_TIMED_OUT:
-        return "Check the unit's number, baud rate, parity and wiring. A slow device needs a longer "
-               "--timeout";
+        return is_serial ? "Check the unit's number, baud rate, parity and wiring. A slow device "
+                           "needs a longer --timeout"
+                         : "Check the unit's number; of a device behind a gateway also its line. A "
+                           "slow device needs a longer --timeout";
     case MBM_INVALID_SLAVE_ID: return "Check the unit's number";
     case MBM_INVALID_CRC:
         return "Check baud rate, parity, wiring and termination, and that no two devices have the "
@@ -214,10 +216,10 @@ static const char *advice_on(uint8_t status, uint8_t exception)
 }
 
 int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t timeoutMs,
-                   const char *lost)
+                   int is_serial, const char *lost)
 {
     const int code = report_code_of(status, exception);
-    const char *advice = advice_on(status, exception);
+    const char *advice = advice_on(status, exception, is_serial);
     const char *space = *advice ? ". " : "";
     char time[32];
 

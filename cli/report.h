@@ -58,9 +58,10 @@ int report_note(int code);
 int report_code_of(uint8_t status, uint8_t exception);
 
 /* Notes and reports how a request to a unit failed, and what to look at. `timeoutMs` is how long it
- * waited; `lost` says why the link was lost, or is NULL. Returns the exit code. */
+ * waited; `lost` says why the link was lost, or is NULL. On a serial line the advice is about that.
+ * Returns the exit code. */
 int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t timeoutMs,
-                   const char *lost);
+                   int is_serial, const char *lost);
 
 /* The status of a request in words, of an exception with its code. */
 const char *report_words(uint8_t status, uint8_t exception);
