@@ -3,6 +3,7 @@
 import asyncio
 import os
 import select
+import signal
 import socket
 import subprocess
 import sys
@@ -11,6 +12,8 @@ import time
 import tty
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+# nohup ignores SIGHUP, and the programs that a script begins would inherit that.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def word(address):
