@@ -224,6 +224,10 @@ const char *place_advice(const place *p, int error)
         return error == EACCES       ? "Ports below 1024 need the right to them"
                : error == EADDRINUSE ? "Another program listens there"
                                      : "";
+    if (p->kind == PLACE_PTY)
+        return error == ENOENT   ? "The folder of this name is not there"
+               : error == EACCES ? "Take a name in a folder that you may write to"
+                                 : "";
     switch (error) {
     case ENOENT: return "Is the adapter plugged in? ls /dev/tty* shows the terminals";
     case EACCES: return "On many systems the group dialout may open terminals: see groups";

@@ -19,12 +19,15 @@
 #include <unistd.h>
 
 /* REST: the longest sleep in microseconds, since a signal just before it does not end it. */
-enum { PLACES = 32, REST = 500000 };
+enum { PLACES = 32, REST = 500000, LINK_BYTES = 256 };
+
+/* Where Linux names pseudo terminals. */
+#define PSEUDO_TERMINALS "/dev/pts/"
 
 static place at;
 static mbm_tty tty;
 static int far_end = -1; /* of a pseudo terminal, kept open so that the line does not hang up */
-static int is_linked;    /* whether the name of a pseudo terminal is a link of this program */
+static char linked_to[64]; /* the pseudo terminal to which this program has made a link */
 static mbm_udp udp;
 static mbm_tcp_listener listener;
 static mbm_tls_identity identity;
@@ -56,18 +59,60 @@ static int open_tty(char *name)
     return mbm_tty_openWith(&tty, at.path, &at.tty) == 0 ? CODE_DONE : cannot_open(0);
 }
 
-/* Links a name to the far end, in place of an old link. */
+/* Whether a link leads to what a pseudo terminal was: a name of one that is gone, or that the
+ * system has given to this program again. */
+static int is_left_over(const char *leads_to, const char *target)
+{
+    const size_t folder = sizeof PSEUDO_TERMINALS - 1;
+
+    return strcmp(leads_to, target) == 0 ||
+           (strncmp(leads_to, PSEUDO_TERMINALS, folder) == 0 && leads_to[folder] != '\0' &&
+            strspn(leads_to + folder, "0123456789") == strlen(leads_to + folder) &&
+            access(leads_to, F_OK) != 0 && errno == ENOENT);
+}
+
+/* Reads where the link of the place leads. Returns 0 if there is none. */
+static int read_link(char leads_to[LINK_BYTES])
+{
+    const ssize_t length = readlink(at.path, leads_to, LINK_BYTES - 1);
+
+    leads_to[length > 0 ? length : 0] = '\0';
+    return length > 0;
+}
+
+/* Links a name to the far end. Replaces only a link that an ended program has left. */
 static int link_name(const char *target)
 {
+    char leads_to[LINK_BYTES];
     struct stat old;
 
     if (lstat(at.path, &old) == 0) {
-        if (!S_ISLNK(old.st_mode))
+        if (!read_link(leads_to))
             return report(CODE_LINE, "%s: %s is there already and is no link", at.text, at.path);
+        if (!is_left_over(leads_to, target))
+            return report(CODE_LINE,
+                          strncmp(leads_to, PSEUDO_TERMINALS, sizeof PSEUDO_TERMINALS - 1) == 0
+                              ? "%s: %s leads to %s, which a program has open, such as another mbm "
+                                "serve. Take another name, or end that program"
+                              : "%s: %s leads to %s, and only a link that mbm serve has left is "
+                                "replaced. Take another name, or remove the link",
+                          at.text, at.path, leads_to);
         (void)unlink(at.path);
     }
-    is_linked = symlink(target, at.path) == 0;
-    return is_linked ? CODE_DONE : cannot_open(0);
+    if (symlink(target, at.path) != 0)
+        return cannot_open(0);
+    snprintf(linked_to, sizeof linked_to, "%s", target);
+    return CODE_DONE;
+}
+
+/* Removes the link of this program. Another one may stand there by now. */
+static void unlink_name(void)
+{
+    char leads_to[LINK_BYTES];
+
+    if (*linked_to && read_link(leads_to) && strcmp(leads_to, linked_to) == 0)
+        (void)unlink(at.path);
+    linked_to[0] = '\0';
 }
 
 static int open_pty(char *name)
@@ -175,8 +220,7 @@ void serve_line_close(void)
         (void)tcflush(near_end, TCIOFLUSH);
         mbm_tty_detach(&tty);
         (void)close(near_end);
-        if (is_linked)
-            (void)unlink(at.path);
+        unlink_name();
     }
     if (far_end >= 0)
         (void)close(far_end);
