@@ -287,6 +287,31 @@ static void an_exclusive_terminal_is_busy_for_a_second_one(void **state)
     mbm_tty_close(&second);
 }
 
+static void a_shared_terminal_is_open_to_others_that_share_it(void **state)
+{
+    mbm_tty_options shared = PLAIN, exclusive = PLAIN;
+    mbm_tty first, second;
+    int is_exclusive = 1;
+
+    (void)state;
+    SKIP_IF_EMULATED();
+    shared.shared = 1;
+    exclusive.exclusive = 1;
+    assert_int_equal(mbm_tty_openWith(&first, line.path, &shared), 0);
+    assert_int_equal(ioctl(line.theirs, TIOCGEXCL, &is_exclusive), 0);
+    assert_int_equal(is_exclusive, 0);
+    assert_int_equal(mbm_tty_openWith(&second, line.path, &shared), 0);
+    mbm_tty_close(&second);
+    FAILS(EBUSY, mbm_tty_openWith(&second, line.path, &exclusive));
+    mbm_tty_close(&first);
+
+    assert_int_equal(mbm_tty_openWith(&first, line.path, &exclusive), 0);
+    FAILS(EBUSY, mbm_tty_openWith(&second, line.path, &shared));
+    assert_int_equal(ioctl(line.theirs, TIOCGEXCL, &is_exclusive), 0);
+    assert_int_equal(is_exclusive, 1);
+    mbm_tty_close(&first);
+}
+
 static void without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed(void **state)
 {
     struct termios before = settings_of(line.theirs), after;
@@ -418,6 +443,7 @@ int main(void)
         TEST(close_leaves_the_terminal_as_it_was_found),
         TEST(detach_gives_the_descriptor_back_as_it_was),
         TEST(an_exclusive_terminal_is_busy_for_a_second_one),
+        TEST(a_shared_terminal_is_open_to_others_that_share_it),
         TEST(without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed),
         TEST(rs485_sets_up_the_driver_and_close_restores_it),
         TEST(an_rs485_delay_that_the_driver_shortens_is_refused),

@@ -2,6 +2,7 @@
 #include "gateway_line.h"
 
 #include "report.h"
+#include "terminal.h"
 #include "trace.h"
 
 #include <errno.h>
@@ -90,7 +91,7 @@ static uint8_t open_line(void *context)
     free_reserve(line);
     if (place_is_tcp(&line->place))
         return open_tcp(line);
-    if (mbm_tty_openWith(&line->tty, line->place.path, &line->place.tty) == 0)
+    if (terminal_open(&line->tty, &line->place) == 0)
         return MBM_OK;
     line->tty.error = errno;
     return MBM_LINK_LOST;
@@ -103,7 +104,8 @@ static void on_link(void *context, uint8_t event, uint8_t status)
     const int error = place_is_tcp(&line->place) ? line->tcp.error : line->tty.error;
     const char *reason = line->tcp.lookupError ? gai_strerror(line->tcp.lookupError)
                          : status == MBM_RESPONSE_TIMED_OUT || error == 0 ? mbm_status_text(status)
-                                                                          : strerror(error);
+                         : place_is_tcp(&line->place)                     ? strerror(error)
+                                                      : terminal_error_text(&line->place, error);
 
     if (event == MBM_LINK_EVENT_CONNECTED) {
         if (line->reason[0])

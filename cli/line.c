@@ -4,6 +4,7 @@
 #include "numbers.h"
 #include "options.h"
 #include "report.h"
+#include "terminal.h"
 #include "trace.h"
 
 #include <errno.h>
@@ -30,9 +31,12 @@ static int cannot_open(const line *l, const char *reason, const char *advice)
 
 static int open_tty(line *l)
 {
-    if (mbm_tty_openWith(&l->tty, l->place.path, &l->place.tty) == 0)
+    int error;
+
+    if (terminal_open(&l->tty, &l->place) == 0)
         return CODE_DONE;
-    return cannot_open(l, strerror(errno), place_advice(&l->place, errno));
+    error = errno;
+    return cannot_open(l, terminal_error_text(&l->place, error), place_advice(&l->place, error));
 }
 
 static int open_tcp(line *l)
@@ -114,7 +118,7 @@ static void take_link(void *context, uint8_t event, uint8_t status)
         snprintf(l->reason, sizeof l->reason, "%s",
                  l->tcp.lookupError ? mbm_tcp_text(&l->tcp) : report_error_text(l->tcp.error));
     else if (place_is_serial(&l->place) && l->tty.error != 0)
-        snprintf(l->reason, sizeof l->reason, "%s", report_error_text(l->tty.error));
+        snprintf(l->reason, sizeof l->reason, "%s", terminal_error_text(&l->place, l->tty.error));
     else if (!*l->reason || status == MBM_CONNECT_TIMED_OUT)
         snprintf(l->reason, sizeof l->reason, "%s", mbm_status_text(status));
     if (l->is_logged && (!l->is_told || strcmp(before, l->reason) != 0))
@@ -123,11 +127,31 @@ static void take_link(void *context, uint8_t event, uint8_t status)
     l->is_told = l->is_logged;
 }
 
+/* --- the hooks of a terminal, which is opened for this program alone --- */
+
+static void close_tty(void *context)
+{
+    mbm_tty_disconnect(&((line *)context)->tty);
+}
+
+static uint8_t open_tty_again(void *context)
+{
+    line *l = (line *)context;
+
+    return terminal_connect(&l->tty, &l->place);
+}
+
+static uint8_t tty_status(void *context)
+{
+    return mbm_tty_status(&((line *)context)->tty);
+}
+
 static void keep_open(line *l)
 {
+    const mbm_linkHooks terminal = {l, close_tty, open_tty_again, tty_status};
     const mbm_linkHooks hooks = l->place.kind == PLACE_TLS ? mbm_tls_link(&l->tls)
                                 : place_is_tcp(&l->place)  ? mbm_tcp_link(&l->tcp)
-                                                           : mbm_tty_link(&l->tty);
+                                                           : terminal;
 
     if (l->place.kind == PLACE_UDP)
         return;

@@ -14,8 +14,9 @@ static const struct {
     const char *service; /* NULL: must be given */
     const char *keys;
 } kinds[] = {
-    {"rtu:", PLACE_RTU, MBM_FRAMING_RTU, NULL, "baud, parity, stop, rs485, echo and gap"},
-    {"ascii:", PLACE_ASCII, MBM_FRAMING_ASCII, NULL, "baud, parity, stop, data, rs485 and echo"},
+    {"rtu:", PLACE_RTU, MBM_FRAMING_RTU, NULL, "baud, parity, stop, rs485, echo, shared and gap"},
+    {"ascii:", PLACE_ASCII, MBM_FRAMING_ASCII, NULL,
+     "baud, parity, stop, data, rs485, echo and shared"},
     {"pty:", PLACE_PTY, MBM_FRAMING_RTU, NULL, ""},
     {"tcp://", PLACE_TCP, MBM_FRAMING_TCP, "502", ""},
     {"rtu+tcp://", PLACE_RTU_OVER_TCP, MBM_FRAMING_RTU_OVER_TCP, NULL, ""},
@@ -55,6 +56,10 @@ static int read_serial_key(place *p, const char *key, const char *value, const c
     } else if (strcmp(key, "echo") == 0) {
         *wrong = number_word(value, yes, &index);
         p->discards_echo = (uint8_t)index;
+    } else if (strcmp(key, "shared") == 0) {
+        *wrong = number_word(value, yes, &index);
+        p->tty.shared = (uint8_t)index;
+        p->tty.exclusive = !index;
     } else if (strcmp(key, "gap") == 0 && !is_ascii) {
         *wrong = number_time(value, 1, 60000, &p->gapMs);
         p->has_gap = 1;
@@ -122,6 +127,7 @@ static const char *read_path(place *p, const char *path, int is_server)
                                       .anyRate = 1,
                                       .parity = 'E',
                                       .stop = 1,
+                                      .exclusive = 1,
                                       .data = p->kind == PLACE_ASCII ? 7 : 8};
 
     p->tty = defaults;
@@ -231,7 +237,9 @@ const char *place_advice(const place *p, int error)
     switch (error) {
     case ENOENT: return "Is the adapter plugged in? ls /dev/tty* shows the terminals";
     case EACCES: return "On many systems the group dialout may open terminals: see groups";
-    case EBUSY: return "Another program has it open";
+    case EBUSY:
+        return "End that program first. shared=yes in the name of the line lets both have it, but "
+               "each byte then reaches only one of them";
     case ENOTTY: return "It is no terminal, or its driver has no RS-485";
     case EINVAL: return "The terminal does not have this rate, parity or number of bits";
     default: return "";

@@ -23,7 +23,7 @@
     "LINE is one of\n"                                                                             \
     "  rtu:PATH[?KEY=VALUE&...]    a serial line; keys: baud=19200, stop=1|2,\n"                   \
     "                              parity=even|none|odd, gap=5ms, echo=yes,\n"                     \
-    "                              rs485=yes\n"                                                    \
+    "                              rs485=yes, shared=yes\n"                                        \
     "  ascii:PATH[?KEY=VALUE&...]  the same with ASCII frames; also data=7|8\n"                    \
     "  tcp://HOST[:PORT]           Modbus TCP, port 502 if left out\n"                             \
     "  rtu+tcp://HOST:PORT         RTU frames in a TCP stream\n"                                   \

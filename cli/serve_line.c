@@ -6,6 +6,7 @@
 #include "mbm_tls_linux.h"
 #include "mbm_udp.h"
 #include "report.h"
+#include "terminal.h"
 #include "trace.h"
 
 #include <errno.h>
@@ -26,7 +27,7 @@ enum { PLACES = 32, REST = 500000, LINK_BYTES = 256 };
 
 static place at;
 static mbm_tty tty;
-static int far_end = -1; /* of a pseudo terminal, kept open so that the line does not hang up */
+static int far_end = -1;   /* of a pseudo terminal, kept open so that the line does not hang up */
 static char linked_to[64]; /* the pseudo terminal to which this program has made a link */
 static mbm_udp udp;
 static mbm_tcp_listener listener;
@@ -46,17 +47,18 @@ static int count;
 /* Says why, which is an error of getaddrinfo or one of the system. */
 static int cannot_open(int lookupError)
 {
-    const char *advice = lookupError ? "Check the name of the host" : place_advice(&at, errno);
+    const int error = errno;
+    const char *advice = lookupError ? "Check the name of the host" : place_advice(&at, error);
 
     return report(CODE_LINE, "%s: %s%s%s", at.text,
-                  lookupError ? gai_strerror(lookupError) : strerror(errno), *advice ? ". " : "",
-                  advice);
+                  lookupError ? gai_strerror(lookupError) : terminal_error_text(&at, error),
+                  *advice ? ". " : "", advice);
 }
 
 static int open_tty(char *name)
 {
     snprintf(name, SERVE_LINE_NAME_BYTES, "%s", at.path);
-    return mbm_tty_openWith(&tty, at.path, &at.tty) == 0 ? CODE_DONE : cannot_open(0);
+    return terminal_open(&tty, &at) == 0 ? CODE_DONE : cannot_open(0);
 }
 
 /* Whether a link leads to what a pseudo terminal was: a name of one that is gone, or that the
@@ -307,6 +309,8 @@ static void rest(void)
         (void)mbm_tcp_wait(tcps, PLACES, &listener, -1, delay);
     else
         (void)mbm_tty_wait(&tty, delay);
+    if (far_end >= 0)
+        terminal_free(far_end);
 }
 
 /* Accepts the connections that wait; of TLS one in each round. */

@@ -275,10 +275,10 @@ static void release(mbm_tty *tty)
         tcsetattr(tty->fd, TCSADRAIN, &tty->before);
     if (tty->is_rs485)
         end_rs485(tty);
-    if (tty->is_exclusive) {
+    if (tty->is_locked && tty->options.exclusive)
         ioctl(tty->fd, TIOCNXCL);
+    if (tty->is_locked)
         flock(tty->fd, LOCK_UN);
-    }
     fcntl(tty->fd, F_SETFL, tty->flags_before);
     tty->fd = -1;
     tty->isOpen = 0;
@@ -309,13 +309,15 @@ void mbm_tty_close(mbm_tty *tty)
 }
 
 /* TIOCEXCL keeps other programs out except those of root. The lock of the file keeps root's
- * out too. */
+ * out too, and those that would share the terminal. */
 static int lock(mbm_tty *tty)
 {
-    if (flock(tty->fd, LOCK_EX | LOCK_NB) < 0)
+    const int is_exclusive = tty->options.exclusive;
+
+    if (flock(tty->fd, (is_exclusive ? LOCK_EX : LOCK_SH) | LOCK_NB) < 0)
         return errno == EWOULDBLOCK ? refuse(EBUSY) : -1;
-    tty->is_exclusive = 1;
-    return ioctl(tty->fd, TIOCEXCL);
+    tty->is_locked = 1;
+    return is_exclusive ? ioctl(tty->fd, TIOCEXCL) : 0;
 }
 
 /* tcsetattr succeeds if it could do any part of its task, so the settings are read back. A
@@ -361,8 +363,8 @@ static int open_noted(mbm_tty *tty, const char *path)
     tty->fd = fd;
     tty->flags_before = O_RDWR;
     /* Locks first, so that the settings of another program's terminal stay as they are. */
-    if ((options->exclusive && lock(tty) < 0) || take_over(tty) < 0 || set(tty, options) < 0 ||
-        (options->rs485 && begin_rs485(tty, options) < 0) ||
+    if (((options->exclusive || options->shared) && lock(tty) < 0) || take_over(tty) < 0 ||
+        set(tty, options) < 0 || (options->rs485 && begin_rs485(tty, options) < 0) ||
         (tty->watch && tty->watch(tty->owner, fd, 1) < 0)) {
         error = errno;
         release(tty);

@@ -38,6 +38,7 @@ typedef struct mbm_tty_options {
     uint8_t hearSelf;        /**< with rs485, 1: the receiver also receives what is sent */
     uint16_t rtsDelayBefore; /**< with rs485: from RTS to the first bit, milliseconds */
     uint16_t rtsDelayAfter;  /**< with rs485: from the last bit to RTS, milliseconds */
+    uint8_t shared;          /**< 1: others may open it too, but none has it exclusively */
 } mbm_tty_options;
 
 /** A terminal in use as a port. Initialise it with MBM_INIT. */
@@ -48,7 +49,7 @@ typedef struct mbm_tty {
     uint8_t has_uart;     /**< whether there is a transmitter to wait for */
     uint8_t events;       /**< what mbm_tty_wait polls it for: POLLIN or 0 */
     uint8_t has_before;   /**< private */
-    uint8_t is_exclusive; /**< private */
+    uint8_t is_locked;    /**< private */
     uint8_t is_rs485;     /**< private */
     int flags_before;     /**< private */
     uint32_t rs485_before[8];      /**< private */
@@ -79,7 +80,8 @@ int mbm_tty_open(mbm_tty *tty, const char *path, uint32_t baud, char parity, int
  * @param path     for example "/dev/ttyUSB0"
  * @param options  the settings of the line
  * @return 0, or -1 with errno set: EINVAL for options that no terminal has or that this
- *         one does not accept, EBUSY if another program has it exclusively, ENOTTY for
+ *         one does not accept, EBUSY if another program has it exclusively, or with exclusive
+ *         if one shares it, ENOTTY for
  *         RS-485 if the driver does not support it, or an error of open
  */
 int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *options);
