@@ -14,7 +14,7 @@ static const struct {
     const char *service; /* NULL: must be given */
     const char *keys;
 } kinds[] = {
-    {"rtu:", PLACE_RTU, MBM_FRAMING_RTU, NULL, "baud, parity, stop, rs485, echo, shared and gap"},
+    {"rtu:", PLACE_RTU, MBM_FRAMING_RTU, NULL, "baud, parity, stop, rs485, echo, gap and shared"},
     {"ascii:", PLACE_ASCII, MBM_FRAMING_ASCII, NULL,
      "baud, parity, stop, data, rs485, echo and shared"},
     {"pty:", PLACE_PTY, MBM_FRAMING_RTU, NULL, ""},
