@@ -43,15 +43,15 @@ typedef struct mbm_tty_options {
 
 /** A terminal in use as a port. Initialise it with MBM_INIT. */
 typedef struct mbm_tty {
-    int fd;               /**< the terminal, while isOpen is 1; -1 once closed */
-    int error;            /**< why the link was lost, an errno; 0 while there is a link */
-    uint8_t isOpen;       /**< 1 from open or attach to close or detach; a zeroed one is closed */
-    uint8_t has_uart;     /**< whether there is a transmitter to wait for */
-    uint8_t events;       /**< what mbm_tty_wait polls it for: POLLIN or 0 */
-    uint8_t has_before;   /**< private */
-    uint8_t is_locked;    /**< private */
-    uint8_t is_rs485;     /**< private */
-    int flags_before;     /**< private */
+    int fd;             /**< the terminal, while isOpen is 1; -1 once closed */
+    int error;          /**< why the link was lost, an errno; 0 while there is a link */
+    uint8_t isOpen;     /**< 1 from open or attach to close or detach; a zeroed one is closed */
+    uint8_t has_uart;   /**< whether there is a transmitter to wait for */
+    uint8_t events;     /**< what mbm_tty_wait polls it for: POLLIN or 0 */
+    uint8_t has_before; /**< private */
+    uint8_t is_locked;  /**< private */
+    uint8_t is_rs485;   /**< private */
+    int flags_before;   /**< private */
     uint32_t rs485_before[8];      /**< private */
     struct termios before;         /**< private */
     mbm_tty_options options;       /**< private */
