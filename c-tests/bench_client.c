@@ -256,6 +256,8 @@ static void begin_client(bench *b, const mbm_port *port)
 
     if (begun != MBM_OK || mbm_client_setGap(&b->client, 0) != MBM_OK)
         fail("mbm");
+    if (b->is_tcp)
+        (void)mbm_client_setInFlight(&b->client, FLIGHT);
     for (i = 0; i < FLIGHT; i++) {
         b->requests[i].unit = UNIT;
         b->requests[i].reply = b->replies[i];
@@ -448,7 +450,8 @@ static void poll_with(unsigned flight, unsigned long count)
     port.write = quiet_write;
     port.micros = quiet_micros;
     if (mbm_client_beginTcp(&b.client, &port, b.incoming, sizeof b.incoming, b.outgoing,
-                            sizeof b.outgoing) != MBM_OK)
+                            sizeof b.outgoing) != MBM_OK ||
+        mbm_client_setInFlight(&b.client, FLIGHT) != MBM_OK)
         fail("mbm");
     b.to_queue = flight;
     for (i = 0; i < flight; i++) {

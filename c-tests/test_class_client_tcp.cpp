@@ -102,6 +102,7 @@ static void many_requests_are_under_way_at_once(void **)
 {
     ModbusRequestOf<1> a(255), b(255), c(255);
     unsigned sum = 0;
+    assert_int_equal(client->setInFlight(16), MBM_OK);
     client->connect(device);
     a.onDone([&sum](ModbusRequest &reply) { sum += reply[0]; });
     b.onDone([&sum](ModbusRequest &reply) { sum += reply[0]; });
@@ -174,6 +175,7 @@ static void replies_in_any_order_find_their_requests(void **)
     ModbusRequestOf<1> late(7), early(7);
     tcp_peer_fault(faulty, 1, FAULT_DELAY, 300);
     networkPort(502) = tcp_peer_start(faulty, 0);
+    assert_int_equal(client->setInFlight(16), MBM_OK);
     client->connect(device);
     client->readHoldingRegisters(late, 11, 1);
     client->readHoldingRegisters(early, 12, 1);

@@ -121,6 +121,7 @@ static void sixteen_requests_are_pipelined(void **state)
     (void)state;
     tcp_server_start(&s);
     asker_begin_tcp(&a, s.port);
+    OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
     for (round = 0; round < 20; round++) {
         for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
             requests[i] = asker_request(UNIT, words[i], sizeof words[i], NULL);

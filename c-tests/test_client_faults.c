@@ -272,6 +272,7 @@ static void every_request_ends_once_and_with_its_own_data(void **state)
     held_clock_start(&d.clock);
     assert_int_equal(pthread_create(&d.thread, NULL, run_device, &d), 0);
     asker_begin_tcp_by(&a, port, &d.clock);
+    OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
     OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
     OK(mbm_client_setRetries(&a.client, 1));
     for (i = 0; i < MBM_CLIENT_DEPTH && queued < total; i++)

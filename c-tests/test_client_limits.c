@@ -42,6 +42,7 @@ static void begin(int framing)
         break;
     default:
         OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+        OK(mbm_client_setInFlight(&client, MBM_CLIENT_DEPTH));
         break;
     }
     OK(mbm_client_setResponseTimeout(&client, CLIENTS));
@@ -353,6 +354,7 @@ static int begin_peer(void **state)
     held_clock_start(&by_clock);
     tcp_peer_clock(peer, &by_clock);
     asker_begin_tcp_by(&a, tcp_peer_start(peer, 0), &by_clock);
+    OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
     OK(mbm_client_setResponseTimeout(&a.client, 150));
     return 0;
 }

@@ -28,6 +28,7 @@ static void begin(int framing)
         break;
     default:
         OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+        OK(mbm_client_setInFlight(&client, MBM_CLIENT_DEPTH));
         break;
     }
     request.unit = UNIT;

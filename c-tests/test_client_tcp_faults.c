@@ -23,6 +23,7 @@ static int begin(void **state)
     held_clock_start(&by_clock);
     tcp_peer_clock(peer, &by_clock);
     asker_begin_tcp_by(&a, tcp_peer_start(peer, 0), &by_clock);
+    OK(mbm_client_setInFlight(&a.client, ASKED));
     OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
     return 0;
 }

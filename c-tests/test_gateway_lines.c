@@ -185,6 +185,7 @@ static void a_line_may_be_a_tcp_connection(void **state)
     (void)state;
     OK(mbm_client_beginTcp(&b.clients[0], &port, b.frames[0], MBM_MAX_TCP_FRAME, outgoing,
                            sizeof outgoing));
+    OK(mbm_client_setInFlight(&b.clients[0], 3));
     b.lines[0].inFlight = 3;
     for (i = 0; i < 4; i++)
         ASK(0, 100 + i, 2, READ);

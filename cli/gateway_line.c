@@ -151,6 +151,8 @@ static void begin_client(gateway_line *line)
 
 void gateway_line_set(gateway_line *line, const gateway_pace *pace)
 {
+    if (line->place.framing == MBM_FRAMING_TCP)
+        (void)mbm_client_setInFlight(&line->client, (uint8_t)pace->in_flight);
     (void)mbm_client_setResponseTimeout(&line->client, pace->timeoutMs);
     (void)mbm_client_setQuietTime(&line->client, pace->quietMs);
     (void)mbm_link_setConnectTimeout(&line->link, pace->timeoutMs);

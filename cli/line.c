@@ -196,8 +196,10 @@ static void begin_client(line *l)
         if (l->place.has_gap)
             (void)mbm_client_setGap(&l->client, l->place.gapMs * 1000);
     }
-    if (l->place.framing == MBM_FRAMING_TCP && options.in_flight > 0)
+    if (l->place.framing == MBM_FRAMING_TCP) {
         (void)mbm_client_setInFlight(&l->client, options.in_flight);
+        report_in_flight = options.in_flight;
+    }
     (void)mbm_client_setResponseTimeout(&l->client, options.timeoutMs);
     (void)mbm_client_setRetries(&l->client, options.retries);
     (void)mbm_client_setCounters(&l->client, &l->counters);

@@ -16,6 +16,7 @@
 enum { TRACE = 0x1000, PCAP, TIMEOUT, RETRIES, IN_FLIGHT, JSON, SCALE, HEX, ONE_BASED };
 
 client_options options = {.timeoutMs = 1000,
+                          .in_flight = 1,
                           .unit = 1,
                           .table = MBM_TABLE_HOLDING_REGISTERS,
                           .form = {.type = MBM_TYPE_UINT16, .order = MBM_ORDER_ABCD}};
@@ -176,7 +177,9 @@ static const struct argp_option request_texts[] = {
     {"retries", RETRIES, "N", 0,
      "How often a request without a right reply is repeated, 0 to 254 (0)", 2},
     {"in-flight", IN_FLIGHT, "N", 0,
-     "Requests under way at once on Modbus TCP, 1 to 16 (16); some servers accept only one", 2},
+     "Requests under way at once on Modbus TCP, 1 to 16 (1). More are faster, but many devices take "
+     "one at a time",
+     2},
     {NULL, 0, NULL, 0, NULL, 0}};
 
 const struct argp options_request = {request_texts, parse_request, NULL, NULL, NULL, NULL, NULL};

@@ -147,9 +147,7 @@ static int begin_plan(void)
     setup.bitGap = wanted.gap;
     setup.registerGap = wanted.gap < MBM_MAX_READ_REGISTERS ? wanted.gap : MBM_MAX_READ_REGISTERS;
     /* Only on Modbus TCP several requests may be under way. */
-    setup.requestCount = where.framing != MBM_FRAMING_TCP ? 1
-                         : options.in_flight              ? options.in_flight
-                                                          : MBM_CLIENT_DEPTH;
+    setup.requestCount = where.framing == MBM_FRAMING_TCP ? options.in_flight : 1;
     status = mbm_plan_begin(&plan, &at.client, &setup, &wrong);
     if (status != MBM_OK && wrong < count)
         return report(CODE_WRONG, "%s:%d: %s", wanted.file, meter.fields[wrong].line,

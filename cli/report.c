@@ -18,6 +18,7 @@
 
 const char *report_name = "mbm";
 int report_code;
+unsigned report_in_flight = 1;
 volatile sig_atomic_t report_stopped;
 
 const char *const report_level_names[] = {"error", "warning", "info", "debug", NULL};
@@ -215,21 +216,29 @@ static const char *advice_on(uint8_t status, uint8_t exception, int is_serial)
     }
 }
 
+/* Many devices answer one request, and drop those that come meanwhile. */
+static const char *advice_in_flight(char text[96])
+{
+    snprintf(text, 96, ". %u requests were under way at once: try --in-flight 1", report_in_flight);
+    return report_in_flight > 1 ? text : "";
+}
+
 int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t timeoutMs,
                    int is_serial, const char *lost)
 {
     const int code = report_code_of(status, exception);
     const char *advice = advice_on(status, exception, is_serial);
     const char *space = *advice ? ". " : "";
-    char time[32];
+    char time[32], in_flight[96];
 
     if (status == MBM_CANCELLED)
         return report(code, "stopped before unit %u answered", unit);
     if (status == MBM_RESPONSE_TIMED_OUT && exception == 0 && lost)
         return report(code, "unit %u did not answer: %s", unit, lost);
     if (status == MBM_RESPONSE_TIMED_OUT && exception == 0)
-        return report(code, "unit %u did not answer within %s%s%s", unit,
-                      number_time_text(timeoutMs, time), space, advice);
+        return report(code, "unit %u did not answer within %s%s%s%s", unit,
+                      number_time_text(timeoutMs, time), space, advice,
+                      advice_in_flight(in_flight));
     if (status == MBM_LINK_LOST && lost)
         return report(code, "unit %u: the link was lost: %s", unit, lost);
     return report(code, "unit %u: %s%s%s", unit, report_words(status, exception), space, advice);

@@ -57,6 +57,9 @@ int report_note(int code);
 /* The exit code for the status of a request. */
 int report_code_of(uint8_t status, uint8_t exception);
 
+/* How many requests are under way at once. The advice on a missing reply names more than one. */
+extern unsigned report_in_flight;
+
 /* Notes and reports how a request to a unit failed, and what to look at. `timeoutMs` is how long it
  * waited; `lost` says why the link was lost, or is NULL. On a serial line the advice is about that.
  * Returns the exit code. */

@@ -232,7 +232,8 @@ public:
             link->stop();
     }
 
-    /** How many requests are under way at once, 1 to 16, for devices that take fewer; 16 at first. */
+    /** How many requests are under way at once, 1 (the default) to 16. More are faster, but many
+     *  devices take one at a time. */
     uint8_t setInFlight(uint8_t most) { return mbm_client_setInFlight(&client, most); }
 
 private:

@@ -82,7 +82,7 @@
 //! # A client
 //!
 //! [`client::Client`] queues requests of every function, and retries them as its policy says.
-//! On TCP it has many requests in flight at the same time. [`client::Request`] is a request with
+//! On TCP it may have many requests in flight at the same time. [`client::Request`] is a request with
 //! its data in slices:
 //!
 //! ```

@@ -48,7 +48,9 @@ fn serial(lent: Lent) -> (End, Client<Serial<End, Lent, Task>, Task, 4>) {
 
 fn tcp(lent: Lent) -> (End, Client<Tcp<End, Lent>, Task, 4>) {
     let end = End::default();
-    (end.clone(), Client::new(Tcp::new(end, lent)))
+    let mut client = Client::new(Tcp::new(end.clone(), lent));
+    client.line.set_in_flight(4);
+    (end, client)
 }
 
 /// The pauses between sent requests, less the response timeout of two seconds.
@@ -136,7 +138,7 @@ fn the_delay_between_requests_to_one_unit_does_not_delay_other_units() {
         units,
         ..Lent::default()
     });
-    client.line.limit(1);
+    client.line.set_in_flight(1);
     for unit in [1, 1, 2] {
         assert!(client.queue(read(unit)).is_ok());
     }

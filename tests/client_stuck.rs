@@ -19,7 +19,9 @@ const REQUEST: usize = 12;
 
 fn client() -> (End, TcpIp) {
     let end = End::default();
-    (end.clone(), Client::new(Tcp::new(end, Lent::default())))
+    let mut client = Client::new(Tcp::new(end.clone(), Lent::default()));
+    client.line.set_in_flight(16);
+    (end, client)
 }
 
 fn read(transaction: u16) -> Task {

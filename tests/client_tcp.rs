@@ -4,13 +4,15 @@
 #[path = "common/stream.rs"]
 mod stream;
 
+use mbm::client::{Client, Tcp};
 use mbm::engine::{Counter, Frame};
 use mbm::error::{Error, Status};
 use mbm::frame::tcp;
 use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use proptest::prelude::*;
-use stream::{client, poll, read, requests, response, wire::Task};
+use stream::wire::{Lent, Task};
+use stream::{client, poll, read, requests, response, TcpIp};
 
 fn assert_right(task: &Task) {
     assert_eq!(task.state.status, Status::OK);
@@ -237,10 +239,29 @@ fn a_broadcast_over_tcp_is_refused() {
     );
 }
 
+/// Devices that take one request at a time lose the others.
+#[test]
+fn one_request_is_in_flight_unless_the_program_allows_more() {
+    let (end, _) = client();
+    let mut client: TcpIp = Client::new(Tcp::new(end.clone(), Lent::default()));
+    for number in 1..=3 {
+        assert!(client.queue(read(1, number)).is_ok());
+    }
+    for _ in 1..=3 {
+        assert!(poll(&end, &mut client).is_empty());
+        let sent = requests(&end.sent());
+        assert_eq!(sent.len(), 1);
+        assert!(poll(&end, &mut client).is_empty());
+        assert!(end.sent().is_empty());
+        end.deliver(0, &response(sent[0]));
+        assert_right(&poll(&end, &mut client)[0]);
+    }
+}
+
 #[test]
 fn no_more_requests_are_in_flight_than_the_limit_allows() {
     let (end, mut client) = client();
-    client.line.limit(2);
+    client.line.set_in_flight(2);
     for number in 1..=5 {
         assert!(client.queue(read(1, number)).is_ok());
     }
@@ -421,7 +442,7 @@ fn a_reconnect_discards_a_half_received_response() {
 #[test]
 fn a_cancelled_request_frees_its_place_for_the_next() {
     let (end, mut client) = client();
-    client.line.limit(1);
+    client.line.set_in_flight(1);
     assert!(client.queue(read(1, 1)).is_ok());
     assert!(client.queue(read(1, 2)).is_ok());
     poll(&end, &mut client);

@@ -79,6 +79,7 @@ static inline void begin_client(int framing)
         break;
     default:
         OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+        OK(mbm_client_setInFlight(&client, MBM_CLIENT_DEPTH));
         break;
     }
     OK(mbm_client_setResponseTimeout(&client, 300));

@@ -257,8 +257,9 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
 
 /**
  * Begins a client of a TCP stream with frames that have the MBAP header (messaging on
- * TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at once. The client matches
- * responses to requests by the transaction identifier, in any order.
+ * TCP/IP guide V1.0b, 3.1.3). One request is under way at a time, unless mbm_client_setInFlight
+ * allows more. The client matches responses to requests by the transaction identifier, in any
+ * order.
  *
  * @param client         the object; initialised with MBM_INIT before the first call
  * @param port           the port, which is copied; read, write and micros must not be NULL
@@ -291,14 +292,13 @@ uint8_t mbm_client_beginTcp(struct mbm_client *client,
 uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
 
 /**
- * Sets how many requests may be under way at once on TCP. Use it for servers that accept
- * fewer at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1
- * to 16): some drop a request that arrives in one segment with another. The queue always
- * holds 16.
+ * Sets how many requests may be under way at once on TCP. More are faster, if the server accepts
+ * them (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to 16). Many take
+ * one at a time: they drop a request that arrives before they have answered the last one, or
+ * in one segment with another. The queue always holds 16.
  *
  * @param client  the object
- * @param most    1 to 16; the default is 16. On a serial line and in RTU over TCP only 1 is
- *                accepted
+ * @param most    1 (the default) to 16. On a serial line and in RTU over TCP only 1 is accepted
  * @return a status
  */
 uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);

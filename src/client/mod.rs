@@ -1,8 +1,7 @@
 //! A client that never waits. The caller queues requests; `poll` advances them and
 //! returns each request that has ended.
 //!
-//! A serial line carries one request at a time, a TCP stream as many as the
-//! queue holds. [`Request`] is a request with its data in slices. A program that keeps the data
+//! A serial line carries one request at a time, a TCP stream as many as the program allows. [`Request`] is a request with its data in slices. A program that keeps the data
 //! in another way, as the C API does, implements [`ClientRequest`]. The client copies data only
 //! between a request and a frame buffer.
 

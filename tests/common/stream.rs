@@ -13,7 +13,9 @@ pub type TcpIp = Client<Tcp<End, Lent>, Task, 16>;
 
 pub fn client() -> (End, TcpIp) {
     let end = End::default();
-    (end.clone(), Client::new(Tcp::new(end, Lent::default())))
+    let mut client = Client::new(Tcp::new(end.clone(), Lent::default()));
+    client.line.set_in_flight(16);
+    (end, client)
 }
 
 pub fn read(unit: u8, transaction: u16) -> Task {

@@ -96,6 +96,5 @@ unsafe fn start_tcp(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
         (*object).queue.has_transaction_ids = true;
-        transport::<TcpTransport>(object).limit(super::MBM_CLIENT_DEPTH);
     }
 }

@@ -1,5 +1,5 @@
-//! A client's TCP stream. Many requests are in flight at the same time; the transaction
-//! identifier in the header shows which request a response answers.
+//! A client's TCP stream. One request is in flight at a time, or as many as the program allows; the
+//! transaction identifier in the header shows which request a response answers.
 
 mod find;
 
@@ -13,14 +13,14 @@ use crate::error::{Error, Status};
 use crate::frame::tcp;
 use crate::port::Port;
 
-/// A TCP stream with as many requests in flight as the queue holds. Received bytes are in
-/// the frame buffer, bytes to send in [`ClientStorage::outgoing`].
+/// A TCP stream. One request is in flight at a time, unless [`Tcp::set_in_flight`] allows more.
+/// Received bytes are in the frame buffer, bytes to send in [`ClientStorage::outgoing`].
 #[repr(C)]
 #[derive(Debug)]
 pub struct Tcp<P, S> {
-    /// Number of requests in flight, and its limit.
+    /// Number of requests in flight, and how many may be in flight beside one.
     in_flight: u8,
-    max_in_flight: u8,
+    more_in_flight: u8,
     /// The received bytes that were not searched yet: the indices of the first, and after
     /// the last, in the frame buffer.
     start: u16,
@@ -61,7 +61,7 @@ impl<P, S> Tcp<P, S> {
             filled: 0,
             sent: 0,
             in_flight: 0,
-            max_in_flight: u8::MAX,
+            more_in_flight: 0,
             resyncing: false,
             accepts: false,
             blocked: false,
@@ -71,9 +71,10 @@ impl<P, S> Tcp<P, S> {
         }
     }
 
-    /// Allows at most `most` requests in flight, at least 1.
-    pub fn limit(&mut self, most: u8) {
-        self.max_in_flight = most.max(1);
+    /// Allows up to `most` requests in flight at the same time, at least 1, which is the default.
+    /// More are faster, but many servers take one at a time and drop the others.
+    pub fn set_in_flight(&mut self, most: u8) {
+        self.more_in_flight = most.saturating_sub(1);
     }
 
     fn clear(&mut self) {
@@ -238,7 +239,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     /// the request has to wait for others, [`Status::LINE_BUSY`] if the bytes before it are
     /// `stuck`, [`Status::BUFFER_TOO_SMALL`] if the buffer can never hold it.
     fn encode<J: ClientRequest>(&mut self, request: &mut J, now: u32, stuck: bool) -> Status {
-        if self.in_flight >= self.max_in_flight {
+        if self.in_flight > self.more_in_flight {
             return Status::BUSY;
         }
         let begin = usize::from(self.filled);
