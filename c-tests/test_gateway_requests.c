@@ -147,6 +147,21 @@ static void unknown_functions_pass(void **state)
     EXPECT(0, 2, 2, "\x41\x00");
 }
 
+static void a_reply_without_data_passes(void **state)
+{
+    unsigned function;
+
+    (void)state;
+    for (function = 0x41; function <= 0x48; function++) {
+        const char pdu[] = {(char)function};
+
+        gateway_bench_ask(&b, 0, function, 2, pdu, 1);
+        gateway_bench_on_line(&b, 0, 2, pdu, 1);
+        gateway_bench_reply(&b, 0, 2, pdu, 1);
+        gateway_bench_expect(&b, 0, function, 2, pdu, 1);
+    }
+}
+
 static void a_declared_function_has_its_lengths(void **state)
 {
     static const mbm_function functions[] = {
@@ -283,6 +298,7 @@ int main(void)
         TEST(a_request_that_the_standard_forbids_is_refused),
         TEST(force_listen_only_mode_gets_no_response),
         TEST(unknown_functions_pass),
+        TEST(a_reply_without_data_passes),
         TEST(a_declared_function_has_its_lengths),
         TEST(a_retry_sends_the_same_request),
         TEST(the_longest_request_and_reply_pass),

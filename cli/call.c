@@ -87,6 +87,15 @@ static void describe(uint8_t *frame, uint16_t bytes, uint8_t kind, char *hex, ch
     (void)mbm_frame_text(&framing, kind, frame, (uint16_t)(MBAP + bytes), words, 2400);
 }
 
+/* True unless no device answers the request: a broadcast, or Force Listen Only Mode. */
+static int has_reply(void)
+{
+    static const uint8_t listen_only[] = {8, 0, MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY};
+
+    return !(options.unit == 0 && place_is_serial(&where)) &&
+           !(length > sizeof listen_only && !memcmp(asked + MBAP, listen_only, sizeof listen_only));
+}
+
 static void show(const mbm_clientRequest *request)
 {
     char hex[3 * MBM_MAX_PDU + 1], words[2400], status[256];
@@ -97,7 +106,7 @@ static void show(const mbm_clientRequest *request)
         answered[MBAP] = asked[MBAP] | 0x80;
         answered[MBAP + 1] = request->exception;
         bytes = 2;
-    } else if (request->status == MBM_OK && request->length > 0) {
+    } else if (request->status == MBM_OK && has_reply()) {
         answered[MBAP] = asked[MBAP];
         bytes = (uint16_t)(1 + request->length);
     }

@@ -106,6 +106,27 @@ fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
     }
 }
 
+/// The data of a user-defined 08 do not tell its replies apart, as those of Return Query Data do.
+#[test]
+fn a_late_reply_to_a_function_08_of_the_program_is_not_taken() {
+    let (end, mut client) = rtu_client();
+    let build: fn(&mut RequestHeader) -> Status = |o| o.custom(8, 2, Rule::Fixed(5));
+    for status in [Status::RESPONSE_TIMED_OUT, Status::OK] {
+        let task = Task::new(17, 1, &[0, 0x0B], build);
+        assert!(client.queue(task).is_ok());
+        sent(&end, &mut client);
+        if status == Status::OK {
+            end.deliver(1_000, &frame(17, &[8, 0, 0x0B, 0, 1]));
+            end.deliver(9_000, &frame(17, &[8, 0, 0x0B, 0, 2]));
+        }
+        let task = run(&end, &mut client);
+        assert_eq!(task.state.status, status);
+        if status == Status::OK {
+            assert_eq!(task.received(), [0, 0x0B, 0, 2]);
+        }
+    }
+}
+
 #[test]
 fn every_function_is_sent_and_answered_in_ascii() {
     for (build, data, request, response, received) in CASES {

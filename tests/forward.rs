@@ -46,9 +46,7 @@ fn the_responses_printed_in_the_standard_match_their_requests() {
     let all = all();
     let mut count = 0;
     for answer in &all {
-        // The client accepts no response that consists of a function code alone.
-        let name = answer.name.strip_suffix("-answer");
-        let Some(name) = name.filter(|_| answer.bytes.len() > 1) else {
+        let Some(name) = answer.name.strip_suffix("-answer") else {
             continue;
         };
         let right =

@@ -832,7 +832,8 @@ uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
 
 /**
  * Any function code: sends the bytes of `data` after the function code, and reads the bytes
- * after the function code of the response into `reply`.
+ * after the function code of the response into `reply`. There may be none: `length` is 0 then.
+ * The length rule holds for every function code, also for one of the standard.
  *
  * @param client    the object
  * @param request   the request
@@ -854,9 +855,9 @@ uint8_t mbm_client_custom(struct mbm_client *client,
  * `body` and return the same `reply`.
  *
  * The client accepts a response only if it matches the request, as for the other functions:
- * its length, byte count, echoed address, value, quantity and records must be right. On RTU,
- * silence ends the response to a function code that the standard does not define, and to
- * sub-functions of 08 from 0x15 on. If you know the length of the response, use
+ * its length, byte count, echoed address, value, quantity and records must be right. The response
+ * to a function code that the standard does not define may have no data. On RTU, silence ends it,
+ * and the response to sub-functions of 08 from 0x15 on. If you know the length of the response, use
  * mbm_client_custom.
  *
  * No device responds to 08 with sub-function 04: the request ends with MBM_OK and `length` 0

@@ -5,7 +5,6 @@ use super::storage::ClientStorage;
 use crate::engine::{ascii, Engine, Transaction};
 use crate::error::Status;
 use crate::frame::{ascii as characters, rtu};
-use crate::pdu::functions::REPORT_SERVER_ID;
 use crate::pdu::header::RequestHeader;
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
@@ -145,7 +144,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
     {
         // The buffer may be larger than any frame.
         let mut length = (engine.end() - engine.content).min(rtu::MAX_FRAME as u16);
-        while length > rtu::MIN_FRAME.into() {
+        while length >= rtu::MIN_FRAME.into() {
             if engine.would_end(length, is_silent)
                 && engine.ends_with(length, engine.request.function)
             {
@@ -179,15 +178,8 @@ impl<P, S: ClientStorage, J: ClientRequest> ClientEngine<P, S, J> {
             .storage
             .slice(front + rtu::PDU as u16, length - rtu::PDU as u16);
         let whole = usize::from(length) - rtu::OVERHEAD;
-        // While more bytes may arrive, a reply that only its end ends has the greatest length,
-        // or for 11 (hex) the counted one.
-        let is_counted = self.request.function == REPORT_SERVER_ID;
-        let least = match is_silent {
-            true => whole,
-            false if is_counted => 0,
-            false => MAX_PDU,
-        };
-        let expected = self.request.header().expected(pdu, least);
+        let end = if is_silent { whole } else { MAX_PDU + 1 };
+        let expected = self.request.header().expected(pdu, end);
         usize::from(expected.map_or(0, NonZeroU8::get)) == whole
     }
 }

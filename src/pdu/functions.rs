@@ -251,7 +251,15 @@ pub(super) const KIND: u32 = 3 << 17;
 /// The lowest of three bits: the length of the head.
 pub(super) const HEAD_LENGTH: u32 = 19;
 /// The lowest of three bits: the length of the response, or the index of the byte that counts.
+/// Of [`OWN`]: which function's rule holds, named by the least length of its response, or 0 for
+/// the end of the frame. (The function code does not say it: a user may give it another rule.)
 pub(super) const LENGTH: u32 = 22;
+/// The rule of 11 (hex).
+pub(super) const SERVER_ID: u8 = 2;
+/// The rule of 18 (hex).
+pub(super) const QUEUE: u8 = 3;
+/// The rule of 2B/0E (hex).
+pub(super) const OBJECTS: u8 = 7;
 /// The lowest of three bits: the number of bytes of the request that the response repeats.
 pub(super) const REPEATED: u32 = 25;
 /// The lowest of three bits: the index of the data in the response; 0 if it has none.
@@ -375,13 +383,14 @@ impl FunctionSpec {
     pub const WRITE_MULTIPLE_REGISTERS: FunctionSpec =
         FunctionSpec::echoed(WRITE_MULTIPLE_REGISTERS, RANGE | SENDS_WORDS);
     /// 11. Its response may be longer than its byte count says.
-    pub const REPORT_SERVER_ID: FunctionSpec = FunctionSpec::new(REPORT_SERVER_ID, OWN, 1, 0, 0, 2);
+    pub const REPORT_SERVER_ID: FunctionSpec =
+        FunctionSpec::new(REPORT_SERVER_ID, OWN, 1, SERVER_ID as u32, 0, 2);
     /// 16: address and AND mask; the OR mask is added later.
     pub const MASK_WRITE_REGISTER: FunctionSpec =
         FunctionSpec::new(MASK_WRITE_REGISTER, 0, 7, 7, 7, 0);
     /// 18: address.
     pub const READ_FIFO_QUEUE: FunctionSpec =
-        FunctionSpec::new(READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
+        FunctionSpec::new(READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, QUEUE as u32, 0, 5);
 
     /// 17: address and quantity to read; the range to write is added later.
     pub const READ_WRITE_REGISTERS: FunctionSpec =
@@ -412,8 +421,14 @@ impl FunctionSpec {
     pub const ENCAPSULATED: FunctionSpec =
         FunctionSpec::new(ENCAPSULATED_INTERFACE_TRANSPORT, OWN, 2, 0, 2, 2);
     /// 2B/0E: MEI type, read device id code and object id. Its data begin after the code.
-    pub const READ_DEVICE_IDENTIFICATION: FunctionSpec =
-        FunctionSpec::new(ENCAPSULATED_INTERFACE_TRANSPORT, OWN, 4, 0, 3, 3);
+    pub const READ_DEVICE_IDENTIFICATION: FunctionSpec = FunctionSpec::new(
+        ENCAPSULATED_INTERFACE_TRANSPORT,
+        OWN,
+        4,
+        OBJECTS as u32,
+        3,
+        3,
+    );
     /// A user-defined function; its code and its length rule are added later.
     pub const CUSTOM: FunctionSpec = FunctionSpec::new(0, 0, 1, 0, 0, 1);
 }

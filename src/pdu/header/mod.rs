@@ -12,13 +12,13 @@ pub use build::GROUP;
 
 use super::functions::{self, Direction};
 use super::functions::{
-    FunctionSpec, BITS, BROADCAST, COUNTS, DATA, FIXED, GROUPS, KIND, READ, REPEATS_DATA,
-    SENDS_WORDS, TAKES_WORDS, UNANSWERED,
+    FunctionSpec, BITS, BROADCAST, COUNTS, DATA, FIXED, GROUPS, KIND, OBJECTS, QUEUE, READ,
+    REPEATS_DATA, SENDS_WORDS, SERVER_ID, TAKES_WORDS, UNANSWERED,
 };
 use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use super::length::Length;
 use super::limits::{MAX_FIFO, MAX_PDU};
-use super::{diagnostics, files, length, EXCEPTION};
+use super::{files, length, EXCEPTION};
 use crate::error::Status;
 use core::num::NonZeroU8;
 
@@ -35,7 +35,7 @@ pub struct RequestHeader {
     head_length: u8,
     /// Bytes of the caller's data.
     data_length: u8,
-    /// Length of the response PDU, or the index of the byte that counts.
+    /// Length of the response PDU, or the index of the byte that counts. Of [`OWN`]: the rule, as [`QUEUE`].
     length: u8,
     /// Bytes after the counted ones.
     more: u8,
@@ -67,9 +67,7 @@ impl RequestHeader {
     /// True for Return Query Data (clause 6.8.1), whose response repeats data of the caller's
     /// choice.
     pub fn returns_query_data(&self) -> bool {
-        const SUB_FUNCTION: [u8; 2] = diagnostics::sub_function::RETURN_QUERY_DATA.to_be_bytes();
-        self.head
-            .starts_with(&[functions::DIAGNOSTICS, SUB_FUNCTION[0], SUB_FUNCTION[1]])
+        self.function() == functions::DIAGNOSTICS && self.spec.has(REPEATS_DATA)
     }
 
     /// Bytes of the caller's data that are sent.
@@ -189,7 +187,8 @@ impl RequestHeader {
     /// The length of the response that begins with `pdu`. While `pdu` is too short to
     /// determine the length, the least possible length; `None` if no response to this request
     /// begins with `pdu`. If only the end of the frame determines the length, `whole`; for 11
-    /// (hex) the counted length if that is greater.
+    /// (hex) the counted length if that is greater. More than [`MAX_PDU`] for `whole` means that
+    /// the frame may go on: then no such response ends, and one of 11 ends as it counts.
     pub fn expected(&self, pdu: &[u8], whole: usize) -> Option<NonZeroU8> {
         let length = match pdu {
             [] => 2,
@@ -221,26 +220,30 @@ impl RequestHeader {
     /// As [`RequestHeader::expected`], for the functions 11, 18 and 2B/0E (hex), which have
     /// rules of their own, and for those whose response only the end of the frame ends.
     fn own_length(&self, pdu: &[u8], whole: usize) -> usize {
-        let mut least = 2;
-        let rule = match self.head {
-            [functions::READ_FIFO_QUEUE, ..] => match pdu.get(1..3) {
-                Some([0, low]) => Length::Exactly(3 + usize::from(*low)),
-                Some(_) => Length::Exactly(MAX_PDU + 1),
-                None => Length::AtLeast(3),
+        match self.length {
+            QUEUE => match *pdu {
+                [_, 0, bytes, 0, words, ..]
+                    if u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2 =>
+                {
+                    3 + usize::from(bytes)
+                }
+                [_, _, _, _, _, ..] => MAX_PDU + 1,
+                _ => 5,
             },
-            [functions::ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, ..] => {
-                length::objects(pdu)
-            }
+            OBJECTS => match length::objects(pdu) {
+                Length::Exactly(length) | Length::AtLeast(length) => length,
+                _ => whole,
+            },
             // Some devices count the id alone and send more after it.
-            [functions::REPORT_SERVER_ID, ..] => {
-                least += usize::from(pdu.get(1).copied().unwrap_or(0));
-                Length::Silence
+            SERVER_ID => {
+                let counted = 2 + usize::from(pdu.get(1).copied().unwrap_or(0));
+                if whole > MAX_PDU {
+                    counted
+                } else {
+                    whole.max(counted)
+                }
             }
-            _ => Length::Silence,
-        };
-        match rule {
-            Length::Exactly(length) | Length::AtLeast(length) => length,
-            _ => whole.max(least),
+            _ => whole,
         }
     }
 
@@ -275,13 +278,7 @@ impl RequestHeader {
         // A response holds at least the bytes that it repeats and those before its data.
         if pdu.len() >= repeated.max(self.data_at().into())
             && self.is_repeated(pdu, repeated, &byte)
-            && match *pdu {
-                _ if self.spec.has(GROUPS) => self.answers_groups(pdu, byte),
-                [functions::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
-                    high == 0 && u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2
-                }
-                _ => true,
-            }
+            && (!self.spec.has(GROUPS) || self.answers_groups(pdu, byte))
         {
             Status::OK
         } else {
