@@ -16,6 +16,9 @@ LANGUAGES = {".c": "c", ".h": "c", ".ino": "cpp", ".cpp": "cpp", ".rs": "rust", 
 # Headers that have pages of the API.
 HEADERS = {"include/mbm.h": "api/c/index.md", "include/mbm": "api/c/index.md"}
 LONGEST_SOURCE = 200_000
+# Where the field cases are, and where docs/field-cases.md gets a table of them.
+CASES = "capi/tests/field/cases/"
+CASES_MARK = "<!-- field cases -->"
 
 
 class Site:
@@ -62,6 +65,7 @@ class Site:
     def convert(self, text, path, page):
         """The Markdown of `page`, made of the file `path` of the project."""
         lines, fence = [], None
+        text = text.replace(CASES_MARK, self.field_cases()) if CASES_MARK in text else text
         for line in text.splitlines():
             mark = re.match(r"\s*(`{3,})", line)
             if mark and (fence is None or len(mark[1]) >= fence):
@@ -70,6 +74,18 @@ class Site:
                 line = self.line(line, path, page)
             lines.append(line)
         return self.resolve("\n".join(lines) + "\n", page)
+
+    def field_cases(self):
+        """The table of the field cases, one row for each file."""
+        rows = ["| report | symptom | what mbm does | case |", "|---|---|---|---|"]
+        for file in sorted(name for name in self.files if name.startswith(CASES) and name.endswith(".txt")):
+            lines = (self.root / file).read_text(encoding="utf-8").splitlines()
+            head = dict(line.split(" ", 1) for line in lines if " " in line and not line.startswith((" ", "#")))
+            reports = [f"[{name}](https://github.com/{name.replace('#', '/issues/')})" if "#" in name else name
+                       for name in head["report"].split(", ")]
+            done = f"not yet: {head['pending']}" if "pending" in head else head["mbm"]
+            rows.append(f"| {', '.join(reports)} | {head['symptom']} | {done} | [{pathlib.PurePath(file).stem}](/{file}) |")
+        return "\n".join(rows)
 
     def line(self, line, path, page):
         folder = os.path.dirname(path)
