@@ -50,6 +50,7 @@ static void update_unit(bridge_line *l, uint16_t field, uint8_t status)
     unit_state *unit = &l->table->units[number];
     published *was = &l->table->last[field];
     const uint8_t answered = (uint8_t)is_answer(status);
+    const char *why = line_why(&l->at, status);
 
     unit->ended = (uint16_t)(unit->ended + !was->has_ended);
     was->has_ended = 1;
@@ -63,8 +64,8 @@ static void update_unit(bridge_line *l, uint16_t field, uint8_t status)
     if (unit->state == UNIT_ONLINE)
         report_log(REPORT_INFO, "%s: unit %u answers", l->text, number);
     else
-        report_log(REPORT_WARNING, "%s: unit %u does not answer: %s", l->text, number,
-                   mbm_status_text(status));
+        report_log(REPORT_WARNING, "%s: unit %u does not answer: %s%s%s", l->text, number,
+                   mbm_status_text(status), why ? ": " : "", why ? why : "");
 }
 
 /* Publishes the last value of a field, with its status and the time at which it was read. */

@@ -1,5 +1,6 @@
 /* mbm call: sends any request. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
+#include "advice.h"
 #include "commands.h"
 #include "line.h"
 #include "numbers.h"
@@ -139,7 +140,7 @@ int call_command(int argc, char **argv)
     if (line_open(&at, &where) == CODE_DONE && line_connect(&at) == CODE_DONE) {
         request.status = line_call(&at, &request, queue(&request));
         if (request.status != MBM_OK)
-            (void)line_failure(&at, &request);
+            (void)line_failure(&at, &request, ADVICE_CALL);
         show(&request);
     }
     line_close(&at);

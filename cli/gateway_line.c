@@ -1,6 +1,8 @@
 #define _GNU_SOURCE
 #include "gateway_line.h"
 
+#include "advice.h"
+#include "numbers.h"
 #include "report.h"
 #include "terminal.h"
 #include "trace.h"
@@ -125,9 +127,10 @@ static void on_link(void *context, uint8_t event, uint8_t status)
 static void begin_client(gateway_line *line)
 {
     const place *where = &line->place;
-    const mbm_port port =
-        trace_client(place_is_tcp(where) ? mbm_tcp_port(&line->tcp) : mbm_tty_port(&line->tty),
-                     where->framing, where->text);
+    const mbm_port below =
+        place_is_tcp(where) ? mbm_tcp_port(&line->tcp) : mbm_tty_port(&line->tty);
+    const mbm_port port = trace_client(received_begin(&line->received, &below, where->framing),
+                                       where->framing, where->text);
     mbm_client *client = &line->client;
 
     switch (where->framing) {
@@ -220,6 +223,7 @@ void gateway_line_leave(gateway_line *line)
 
 void gateway_line_watch(gateway_line *line)
 {
+    const char *why;
     const mbm_counters *now = &line->counters;
     const uint32_t damaged = now->badCrc - line->known.badCrc,
                    failed = damaged + now->timeouts - line->known.timeouts;
@@ -231,17 +235,15 @@ void gateway_line_watch(gateway_line *line)
         line->known = *now;
     } else if (!line->is_silent && failed >= SILENT_AFTER) {
         line->is_silent = 1;
+        why = received_text(&line->received);
         if (damaged > 0)
-            report_log(
-                REPORT_WARNING,
-                "%s: the last %u requests got no right reply, %u of them damaged ones. Check "
-                "wiring, baud rate and parity, and that no two devices have one unit id",
-                line->place.text, failed, damaged);
-        else
             report_log(REPORT_WARNING,
-                       "%s: the last %u requests got no reply. Check device, wiring, baud rate and "
-                       "parity",
-                       line->place.text, failed);
+                       "%s: the last %u requests got no right reply, %u of them damaged ones. %s",
+                       line->place.text, failed, damaged, advice_damaged(&line->place));
+        else
+            report_log(REPORT_WARNING, "%s: the last %u requests got no reply%s%s. %s",
+                       line->place.text, failed, why ? ": " : "", why ? why : "",
+                       advice_silent(&line->place));
     }
 }
 

@@ -7,6 +7,7 @@
 #define GATEWAY_LINE_H
 
 #include "gateway_file.h"
+#include "received.h"
 
 #include <poll.h>
 
@@ -26,6 +27,7 @@ typedef struct gateway_line {
     int reserve;        /* a descriptor that is kept for the line while it is not open; 0: none */
     uint32_t tried;     /* when the last attempt began */
     uint32_t looked_up; /* when the host was last looked up and not found */
+    received received;  /* since the last request */
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     uint8_t outgoing[MBM_MAX_TCP_FRAME]; /* of Modbus TCP */
 } gateway_line;

@@ -1,5 +1,6 @@
 /* mbm identify: shows what a device says about itself. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
+#include "advice.h"
 #include "commands.h"
 #include "line.h"
 #include "options.h"
@@ -150,7 +151,7 @@ int identify_command(int argc, char **argv)
     if (line_open(&at, &where) == CODE_DONE && line_connect(&at) == CODE_DONE) {
         identify();
         if (found == 0 && failed.status != MBM_OK)
-            (void)line_failure(&at, &failed);
+            (void)line_failure(&at, &failed, ADVICE_DEVICE);
         if (json)
             report_print_json(json);
     }

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include "line.h"
 
+#include "advice.h"
 #include "numbers.h"
 #include "options.h"
 #include "report.h"
@@ -174,7 +175,9 @@ static mbm_port port_of(line *l)
 
 static void begin_client(line *l)
 {
-    const mbm_port port = trace_client(port_of(l), l->place.framing, l->place.text);
+    const mbm_port below = port_of(l);
+    const mbm_port port = trace_client(received_begin(&l->received, &below, l->place.framing),
+                                       l->place.framing, l->place.text);
 
     switch (l->place.framing) {
     case MBM_FRAMING_RTU:
@@ -365,23 +368,46 @@ const char *line_reason(const line *l)
     return *l->reason ? l->reason : NULL;
 }
 
+const char *line_why(const line *l, uint8_t status)
+{
+    /* A datagram that its receiver refused is no loss of the link. */
+    if (status == MBM_LINK_LOST || (l->place.kind == PLACE_UDP && l->udp.error != 0))
+        return line_reason(l);
+    switch (status) {
+    case MBM_RESPONSE_TIMED_OUT: return received_text(&l->received);
+    case MBM_INVALID_SLAVE_ID:
+        return l->place.framing == MBM_FRAMING_TCP ? received_text(&l->received) : NULL;
+    case MBM_MALFORMED_REPLY:
+    case MBM_INVALID_FUNCTION:
+        return received_is_echo(&l->received) ? received_text(&l->received) : NULL;
+    default: return NULL;
+    }
+}
+
 const char *line_status(const line *l, const mbm_clientRequest *request, char text[256])
 {
-    const char *reason = request->status == MBM_LINK_LOST ? line_reason(l) : NULL;
+    const char *reason = line_why(l, request->status);
 
     snprintf(text, 256, "%s%s%s", report_words(request->status, request->exception),
              reason ? ": " : "", reason ? reason : "");
     return text;
 }
 
-int line_failure(line *l, const mbm_clientRequest *request)
+int line_failure_of(line *l, const char *who, const mbm_clientRequest *request, int about)
 {
-    /* A datagram that its receiver refused is no loss of the link. */
-    const int has_reason =
-        request->status == MBM_LINK_LOST || (l->place.kind == PLACE_UDP && l->udp.error != 0);
+    const uint8_t status = request->status, exception = request->exception;
+    const char *why = line_why(l, status);
 
-    return report_failure(request->unit, request->status, request->exception, options.timeoutMs,
-                          place_is_serial(&l->place), has_reason ? line_reason(l) : NULL);
+    return report_failure(who, status, exception, options.timeoutMs, why,
+                          advice_on(&l->place, about, status, exception, why));
+}
+
+int line_failure(line *l, const mbm_clientRequest *request, int about)
+{
+    char who[24];
+
+    snprintf(who, sizeof who, "unit %u", request->unit);
+    return line_failure_of(l, who, request, about);
 }
 
 uint8_t line_read(line *l, mbm_clientRequest *request, uint8_t table, uint16_t address,

@@ -8,6 +8,7 @@
 #include "mbm_tls_linux.h"
 #include "mbm_udp.h"
 #include "place.h"
+#include "received.h"
 
 #include <poll.h>
 
@@ -28,6 +29,7 @@ typedef struct line {
     uint8_t is_logged; /* set by the program after line_open: report losses as log lines */
     uint8_t is_told;   /* a loss was, and is not over */
     char reason[160];  /* why it was the last time */
+    received received; /* since the last request */
     uint8_t incoming[1024], outgoing[1024];
 } line;
 
@@ -62,8 +64,16 @@ uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued);
 /* Why the link was lost, or NULL if that is not known. */
 const char *line_reason(const line *l);
 
-/* Reports how a request failed. Returns the exit code. */
-int line_failure(line *l, const mbm_clientRequest *request);
+/* Why a request that has just ended with a status got no reply: why the link was lost, or what came
+ * in place of the reply. NULL if that is not known. */
+const char *line_why(const line *l, uint8_t status);
+
+/* Reports how a request failed that was made from `about`, one of ADVICE_. Returns the exit code.
+ */
+int line_failure(line *l, const mbm_clientRequest *request, int about);
+
+/* The same of `who` in place of the unit. */
+int line_failure_of(line *l, const char *who, const mbm_clientRequest *request, int about);
 
 /* The status of a request in words. For a lost link it includes the reason. `text` has 256 bytes.
  */

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include "options.h"
 
+#include "advice.h"
 #include "mbm.h"
 #include "numbers.h"
 #include "place.h"
@@ -31,7 +32,7 @@ void options_wrong(const struct argp_state *state, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    argp_error(state, "%s.", text);
+    argp_error(state, "%s%s", text, strchr(text, '\n') ? "" : ".");
     exit(CODE_WRONG);
 }
 
@@ -104,7 +105,14 @@ unsigned options_units(const struct argp_state *state, const char *what, const c
 uint16_t options_address(const struct argp_state *state, const char *text)
 {
     const int first = options.is_one_based;
+    int64_t number = 0;
 
+    advice_keep(state->argc, state->argv, text);
+    if (number_read(text, first, 65535 + first, &number) &&
+        !number_read(text, 65536 + first, UINT32_MAX, &number) &&
+        *advice_on_number((uint32_t)number))
+        options_wrong(state, "ADDRESS \"%s\" is above 65535. %s", text,
+                      advice_on_number((uint32_t)number));
     return (uint16_t)(options_number(state, "ADDRESS", text, first, 65535 + first) - first);
 }
 

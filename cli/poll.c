@@ -1,5 +1,6 @@
 /* mbm poll: reads the fields of a device file again and again. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
+#include "advice.h"
 #include "commands.h"
 #include "device_file.h"
 #include "line.h"
@@ -34,7 +35,8 @@ static mbm_clientRequest requests[MBM_CLIENT_DEPTH];
 /* The first failure, which is reported at the end. */
 static struct {
     uint8_t status, exception;
-    uint16_t unit;
+    uint16_t field;
+    char why[160];
 } first_failure;
 
 /* --- the command line --- */
@@ -102,6 +104,7 @@ static uint8_t exception_of(uint8_t status)
 static void take_field(void *context, mbm_plan *of, uint16_t field)
 {
     const uint8_t status = mbm_plan_getStatus(of, field, NULL);
+    const char *why = line_why(&at, status);
 
     (void)context;
     if (status == MBM_OK || status == MBM_CANCELLED || report_stopped)
@@ -109,7 +112,8 @@ static void take_field(void *context, mbm_plan *of, uint16_t field)
     if (first_failure.status == MBM_OK) {
         first_failure.status = status;
         first_failure.exception = exception_of(status);
-        first_failure.unit = meter.planned[field].unit;
+        first_failure.field = field;
+        snprintf(first_failure.why, sizeof first_failure.why, "%s", why ? why : "");
     }
     (void)report_note(report_code_of(status, exception_of(status)));
 }
@@ -328,14 +332,39 @@ static void show_round(uint32_t round)
     report_flush();
 }
 
+/* Says how the first failure came about, and what to look at. An exception is about a field, other
+ * failures are about its unit. */
+static void report_first_failure(void)
+{
+    const uint8_t status = first_failure.status, exception = first_failure.exception;
+    const char *why = *first_failure.why ? first_failure.why : NULL;
+    const mbm_planField *planned = &meter.planned[first_failure.field];
+    const device_field *field = &meter.fields[first_failure.field];
+    const char *advice = advice_on(&at.place, ADVICE_FILE, status, exception, why);
+    char who[200];
+    uint16_t address;
+    uint8_t table;
+
+    snprintf(who, sizeof who, "unit %u", planned->unit);
+    if (exception != 0)
+        snprintf(who, sizeof who, "unit %u, field %.100s in line %d of the file", planned->unit,
+                 field->name, field->line);
+    table = advice_manual(planned->table, planned->address, &address);
+    if (exception == MBM_ILLEGAL_DATA_ADDRESS && table != 0)
+        advice = say("In a manual, %u is address %u: write \"table: %s\" and \"address: %u\"",
+                     planned->address, address, value_table_names[table], address);
+    else if (exception == MBM_ILLEGAL_DATA_ADDRESS && wanted.gap > 0)
+        advice = say("%s. Try without --gap", advice);
+    (void)report_failure(who, status, exception, options.timeoutMs, why, advice);
+}
+
 /* Says how it went, and what to look at after the first failure. */
 static void show_end(uint32_t round)
 {
     const mbm_counters *counters = &at.counters;
 
     if (first_failure.status != MBM_OK)
-        (void)report_failure(first_failure.unit, first_failure.status, first_failure.exception,
-                             options.timeoutMs, place_is_serial(&at.place), line_reason(&at));
+        report_first_failure();
     if (!options.is_quiet)
         fprintf(stderr, "%s: rounds: %u, requests: %u, replies: %u, exceptions: %u.\n", report_name,
                 (unsigned)round, (unsigned)counters->requests, (unsigned)counters->replies,

@@ -1,5 +1,6 @@
 /* mbm read: reads values once, or again and again. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
+#include "advice.h"
 #include "commands.h"
 #include "line.h"
 #include "options.h"
@@ -380,15 +381,28 @@ static void show(uint32_t round)
     report_flush();
 }
 
-/* Says on stderr why parts of the only round failed; of several with one reason the first. */
+/* Says on stderr why parts of the only round failed: once for parts in a row with one reason, and
+ * with their addresses if not all parts failed for it. */
 static void report_parts(void)
 {
-    unsigned i;
+    unsigned i, next;
+    char who[64];
 
-    for (i = 0; i < part_count; i++)
-        if (parts[i].request.status != MBM_OK &&
-            (i == 0 || parts[i].request.status != parts[i - 1].request.status))
-            (void)line_failure(&at, &parts[i].request);
+    for (i = 0; i < part_count; i = next) {
+        const mbm_clientRequest *failed = &parts[i].request;
+
+        for (next = i + 1; next < part_count && parts[next].request.status == failed->status;
+             next++)
+            ;
+        if (failed->status == MBM_OK)
+            continue;
+        snprintf(who, sizeof who, "unit %u", failed->unit);
+        if (next - i < part_count)
+            snprintf(who, sizeof who, "unit %u, addresses %u to %u", failed->unit,
+                     shown_address(parts[i].first),
+                     shown_address(parts[next - 1].first + parts[next - 1].quantity - 1));
+        (void)line_failure_of(&at, who, failed, ADVICE_READ);
+    }
 }
 
 /* Reads the units in a round, or in the only one, which is 0. Returns 0 after Ctrl-C; `right` is
@@ -433,8 +447,8 @@ static void read_rounds(void)
         }
     }
     if (!options.is_quiet)
-        fprintf(stderr, "%s: %u rounds, %u of them with failures.\n", report_name, (unsigned)round,
-                (unsigned)failed);
+        fprintf(stderr, "%s: %u round%s, %u of them with failures.\n", report_name, (unsigned)round,
+                round == 1 ? "" : "s", (unsigned)failed);
 }
 
 int read_command(int argc, char **argv)
@@ -442,6 +456,7 @@ int read_command(int argc, char **argv)
     int right;
 
     argp_parse(&arguments, argc, argv, 0, NULL, NULL);
+    advice_keep(argc, argv, address_text);
     before = (history *)calloc(unit_count, sizeof *before);
     if (!before)
         return report(CODE_SYSTEM, "there is no memory for %u units", unit_count);

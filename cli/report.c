@@ -102,12 +102,12 @@ static int is_journal(void)
     return strcmp(stream, expected) == 0;
 }
 
-/* The full stop that a sentence lacks. */
+/* The full stop that a sentence lacks. A command in a line of its own has none. */
 static const char *stop_of(const char *text)
 {
     const size_t length = strlen(text);
 
-    return length > 0 && strchr(".?!", text[length - 1]) ? "" : ".";
+    return strchr(text, '\n') || (length > 0 && strchr(".?!", text[length - 1])) ? "" : ".";
 }
 
 int report(int code, const char *format, ...)
@@ -180,42 +180,6 @@ const char *report_error_text(int error)
     return error == EPIPE ? "the other end has closed it" : strerror(error);
 }
 
-/* What to look at after a failure, as a sentence. Empty if nothing helps. */
-static const char *advice_on(uint8_t status, uint8_t exception, int is_serial)
-{
-    switch (exception) {
-    case 0: break;
-    case MBM_ILLEGAL_FUNCTION:
-        return "The device does not have this function; values may be in another table";
-    case MBM_ILLEGAL_DATA_ADDRESS:
-        return "Check address and count against the device's manual; if that counts from "
-               "1, use --one-based or subtract 1";
-    case MBM_ILLEGAL_DATA_VALUE:
-        return "Check the count and the values against the device's manual";
-    case MBM_SLAVE_DEVICE_BUSY: return "Try again later";
-    case MBM_GATEWAY_PATH_UNAVAILABLE: return "Check the gateway's settings for this unit";
-    case MBM_GATEWAY_TARGET_FAILED_TO_RESPOND:
-        return "Check the unit's number, and the line behind the gateway";
-    default: return "";
-    }
-    switch (status) {
-    case MBM_RESPONSE_TIMED_OUT:
-        return is_serial ? "Check the unit's number, baud rate, parity and wiring. A slow device "
-                           "needs a longer --timeout"
-                         : "Check the unit's number; of a device behind a gateway also its line. A "
-                           "slow device needs a longer --timeout";
-    case MBM_INVALID_SLAVE_ID: return "Check the unit's number";
-    case MBM_INVALID_CRC:
-        return "Check baud rate, parity, wiring and termination, and that no two devices have the "
-               "same unit id";
-    case MBM_LINE_BUSY: return "Is another master on the line?";
-    case MBM_INVALID_FUNCTION:
-    case MBM_NO_PROGRESS:
-    case MBM_MALFORMED_REPLY: return "--trace shows what the device sent";
-    default: return "";
-    }
-}
-
 /* Many devices answer one request, and drop those that come meanwhile. */
 static const char *advice_in_flight(char text[96])
 {
@@ -223,25 +187,26 @@ static const char *advice_in_flight(char text[96])
     return report_in_flight > 1 ? text : "";
 }
 
-int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t timeoutMs,
-                   int is_serial, const char *lost)
+int report_failure(const char *who, uint8_t status, uint8_t exception, uint32_t timeoutMs,
+                   const char *why, const char *advice)
 {
     const int code = report_code_of(status, exception);
-    const char *advice = advice_on(status, exception, is_serial);
-    const char *space = *advice ? ". " : "";
+    const char *space = *advice ? ". " : "", *colon = why ? ": " : "";
     char time[32], in_flight[96];
 
+    if (!why)
+        why = "";
     if (status == MBM_CANCELLED)
-        return report(code, "stopped before unit %u answered", unit);
-    if (status == MBM_RESPONSE_TIMED_OUT && exception == 0 && lost)
-        return report(code, "unit %u did not answer: %s", unit, lost);
+        return report(code, "stopped before %s answered", who);
     if (status == MBM_RESPONSE_TIMED_OUT && exception == 0)
-        return report(code, "unit %u did not answer within %s%s%s%s", unit,
-                      number_time_text(timeoutMs, time), space, advice,
-                      advice_in_flight(in_flight));
-    if (status == MBM_LINK_LOST && lost)
-        return report(code, "unit %u: the link was lost: %s", unit, lost);
-    return report(code, "unit %u: %s%s%s", unit, report_words(status, exception), space, advice);
+        return report(code,
+                      *why ? "no right reply from %s within %s%s%s%s%s"
+                           : "%s did not answer within %s%s%s%s%s",
+                      who, number_time_text(timeoutMs, time), colon, why, space, advice);
+    if (status == MBM_LINK_LOST && *why)
+        return report(code, "%s: the link was lost: %s%s%s", who, why, space, advice);
+    return report(code, "%s: %s%s%s%s%s", who, report_words(status, exception), colon, why, space,
+                  advice);
 }
 
 void report_print_json(cJSON *object)

@@ -60,11 +60,11 @@ int report_code_of(uint8_t status, uint8_t exception);
 /* How many requests are under way at once. The advice on a missing reply names more than one. */
 extern unsigned report_in_flight;
 
-/* Notes and reports how a request to a unit failed, and what to look at. `timeoutMs` is how long it
- * waited; `lost` says why the link was lost, or is NULL. On a serial line the advice is about that.
- * Returns the exit code. */
-int report_failure(unsigned unit, uint8_t status, uint8_t exception, uint32_t timeoutMs,
-                   int is_serial, const char *lost);
+/* Notes and reports how a request failed, and what to look at. `who` was asked, such as "unit 17",
+ * and had `timeoutMs` to answer. `why` says why the link was lost, or what came in place of a
+ * reply, or is NULL; `advice` is that of advice.h. Returns the exit code. */
+int report_failure(const char *who, uint8_t status, uint8_t exception, uint32_t timeoutMs,
+                   const char *why, const char *advice);
 
 /* The status of a request in words, of an exception with its code. */
 const char *report_words(uint8_t status, uint8_t exception);

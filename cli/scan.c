@@ -1,5 +1,6 @@
 /* mbm scan: finds the units that answer. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
+#include "advice.h"
 #include "commands.h"
 #include "line.h"
 #include "numbers.h"
@@ -25,6 +26,7 @@ static unsigned parity_count;
 static mbm_clientRequest requests[OPTIONS_UNITS];
 static uint16_t values[OPTIONS_UNITS];
 static unsigned answering, damaged, tried;
+static char came[160]; /* in place of the first reply that did not come, if anything did */
 
 /* --- the command line --- */
 
@@ -129,9 +131,11 @@ static void print_unit(const mbm_clientRequest *request, uint16_t value)
         if (request->status == MBM_OK)
             printf("unit %3u: holding register 0 is %u\n", request->unit, value);
         else
-            printf("unit %3u: %s%s\n", request->unit,
-                   report_words(request->status, request->exception),
-                   request->exception ? "" : "; two units with one id, or another rate or parity?");
+            printf("unit %3u: %s%s\n", request->unit, line_status(&at, request, status),
+                   request->exception ? ""
+                   : place_is_serial(&at.place)
+                       ? "; two units with one id, or another rate or parity?"
+                       : "; --trace shows what came");
         report_flush();
         return;
     }
@@ -163,6 +167,7 @@ static void take(const mbm_clientRequest *request, uint16_t value)
 static int scan(void)
 {
     unsigned queued = 0, ended = 0;
+    const char *why;
 
     while (!report_stopped && ended < unit_count) {
         for (; queued < unit_count && queued - ended < MBM_CLIENT_DEPTH; queued++) {
@@ -175,7 +180,10 @@ static int scan(void)
         line_poll(&at);
         for (; ended < queued && requests[ended].status != MBM_PENDING; ended++, tried++) {
             if (report_code_of(requests[ended].status, requests[ended].exception) == CODE_LINE)
-                return line_failure(&at, &requests[ended]);
+                return line_failure(&at, &requests[ended], ADVICE_DEVICE);
+            why = line_why(&at, requests[ended].status);
+            if (!*came && requests[ended].exception == 0 && why)
+                snprintf(came, sizeof came, "%s", why);
             take(&requests[ended], values[ended]);
             if (isatty(STDERR_FILENO) && !options.is_quiet)
                 fprintf(stderr, "\r%u of %u \r", tried + 1, unit_count * rate_count * parity_count);
@@ -215,9 +223,10 @@ int scan_command(int argc, char **argv)
         code = scan_line(rates[i / parity_count], parities[i % parity_count]);
     if (code == CODE_DONE && !options.is_quiet)
         fprintf(stderr, "%s: %u of %u requests were answered%s.\n", report_name, answering, tried,
-                answering == 0 && damaged == 0 && !report_stopped
-                    ? ". Check baud rate, parity and wiring, and try a longer --timeout"
-                    : "");
+                answering > 0 || damaged > 0 || report_stopped ? ""
+                : *came
+                    ? say(", although %s. %s; --trace shows what came", came, advice_silent(&where))
+                    : say(". %s, and try a longer --timeout", advice_silent(&where)));
     if (answering == 0 && !report_stopped)
         (void)report_note(damaged > 0 ? CODE_DAMAGED : CODE_NO_REPLY);
     return report_code;

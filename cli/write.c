@@ -1,5 +1,6 @@
 /* mbm write: writes values. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
+#include "advice.h"
 #include "commands.h"
 #include "line.h"
 #include "options.h"
@@ -49,6 +50,8 @@ static void read_number(const struct argp_state *state, const char *text)
     const char *wrong;
     const uint16_t added = value_read(&options.form, text, strlen(text), words + total, &wrong);
 
+    if (added == 0 && options.form.type == MBM_TYPE_BIT)
+        options_wrong(state, "VALUE \"%s\" is no value of a coil: 1 is on, and 0 is off", text);
     if (added == 0)
         options_wrong(state, "VALUE \"%s\" %s%s%s", text, wrong,
                       strstr(wrong, "range") ? " of the type " : "",
@@ -208,11 +211,12 @@ int write_command(int argc, char **argv)
 
     hide_minus(argc, argv);
     argp_parse(&arguments, argc, argv, 0, NULL, NULL);
+    advice_keep(argc, argv, address_text);
     request.unit = options.unit;
     if (line_open(&at, &where) == CODE_DONE && line_connect(&at) == CODE_DONE) {
         request.status = line_call(&at, &request, queue(&request, &function));
         if (request.status != MBM_OK)
-            (void)line_failure(&at, &request);
+            (void)line_failure(&at, &request, ADVICE_WRITE);
         show(&request, function);
     }
     line_close(&at);

@@ -405,8 +405,8 @@ def check_drill(mbm, files):
     expect("the device answers", wait(lambda: client.ask(7) == number(7)))
 
     for mood, pattern in (
-        ("silent", r"^warning: rtu:.*: the last 5 requests got no reply\. Check device, wiring, baud rate and parity\.$"),
-        ("damaged", r"^warning: rtu:.*: the last 5 requests got no right reply, [1-5] of them damaged ones\. Check wiring"),
+        ("silent", r"^warning: rtu:.*: the last 5 requests got no reply\. Check the units' numbers, baud rate, parity and wiring\.$"),
+        ("damaged", r"^warning: rtu:.*: the last 5 requests got no right reply, [1-5] of them damaged ones\. Check baud rate, parity, wiring"),
     ):
         since, serial.mood = len(gateway.log), mood
         expect(f"a {mood} device gets 0B", [client.ask(7) for _ in range(6)] == [NO_REPLY] * 6)
