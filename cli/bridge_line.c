@@ -50,8 +50,10 @@ static void update_unit(bridge_line *l, uint16_t field, uint8_t status)
     unit_state *unit = &l->table->units[number];
     published *was = &l->table->last[field];
     const uint8_t answered = (uint8_t)is_answer(status);
-    const char *why = line_why(&l->at, status);
+    const char *why;
 
+    line_note(&l->at, status);
+    why = line_why(&l->at, status);
     unit->ended = (uint16_t)(unit->ended + !was->has_ended);
     was->has_ended = 1;
     unit->answered = (uint16_t)(unit->answered + answered - was->is_answered);

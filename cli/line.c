@@ -358,7 +358,10 @@ uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued)
                                .timeoutMs = MBM_CALL_FOREVER,
                                .stop = &report_stopped};
 
-    return mbm_call(&caller, queued);
+    const uint8_t status = mbm_call(&caller, queued);
+
+    line_note(l, status);
+    return status;
 }
 
 const char *line_reason(const line *l)
@@ -368,20 +371,32 @@ const char *line_reason(const line *l)
     return *l->reason ? l->reason : NULL;
 }
 
+void line_note(line *l, uint8_t status)
+{
+    const char *text = NULL;
+
+    if (status == MBM_OK || status == MBM_CANCELLED)
+        return;
+    if (status == MBM_RESPONSE_TIMED_OUT ||
+        (status == MBM_INVALID_SLAVE_ID && l->place.framing == MBM_FRAMING_TCP) ||
+        ((status == MBM_MALFORMED_REPLY || status == MBM_INVALID_FUNCTION) &&
+         received_is_echo(&l->received)))
+        text = received_text(&l->received);
+    snprintf(l->came, sizeof l->came, "%s", text ? text : "");
+}
+
+/* `done` of a request. */
+static void on_end(void *context, mbm_clientRequest *request)
+{
+    line_note((line *)context, request->status);
+}
+
 const char *line_why(const line *l, uint8_t status)
 {
     /* A datagram that its receiver refused is no loss of the link. */
     if (status == MBM_LINK_LOST || (l->place.kind == PLACE_UDP && l->udp.error != 0))
         return line_reason(l);
-    switch (status) {
-    case MBM_RESPONSE_TIMED_OUT: return received_text(&l->received);
-    case MBM_INVALID_SLAVE_ID:
-        return l->place.framing == MBM_FRAMING_TCP ? received_text(&l->received) : NULL;
-    case MBM_MALFORMED_REPLY:
-    case MBM_INVALID_FUNCTION:
-        return received_is_echo(&l->received) ? received_text(&l->received) : NULL;
-    default: return NULL;
-    }
+    return status != MBM_OK && status != MBM_CANCELLED && *l->came ? l->came : NULL;
 }
 
 const char *line_status(const line *l, const mbm_clientRequest *request, char text[256])
@@ -413,6 +428,8 @@ int line_failure(line *l, const mbm_clientRequest *request, int about)
 uint8_t line_read(line *l, mbm_clientRequest *request, uint8_t table, uint16_t address,
                   uint16_t quantity)
 {
+    request->done = on_end;
+    request->context = l;
     switch (table) {
     case MBM_TABLE_COILS: return mbm_client_readCoils(&l->client, request, address, quantity);
     case MBM_TABLE_DISCRETE_INPUTS:

@@ -30,6 +30,7 @@ typedef struct line {
     uint8_t is_told;   /* a loss was, and is not over */
     char reason[160];  /* why it was the last time */
     received received; /* since the last request */
+    char came[160];    /* in place of a reply, to the last request that failed */
     uint8_t incoming[1024], outgoing[1024];
 } line;
 
@@ -64,9 +65,13 @@ uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued);
 /* Why the link was lost, or NULL if that is not known. */
 const char *line_reason(const line *l);
 
-/* Why a request that has just ended with a status got no reply: why the link was lost, or what came
- * in place of the reply. NULL if that is not known. */
+/* Why a request that ended with a status got no reply: why the link was lost, or what came in place
+ * of the reply. NULL if that is not known. */
 const char *line_why(const line *l, uint8_t status);
+
+/* Notes what came for line_why. Call it when a request has ended, before the next one is sent;
+ * after line_read and line_call it has been called. */
+void line_note(line *l, uint8_t status);
 
 /* Reports how a request failed that was made from `about`, one of ADVICE_. Returns the exit code.
  */

@@ -104,8 +104,10 @@ static uint8_t exception_of(uint8_t status)
 static void take_field(void *context, mbm_plan *of, uint16_t field)
 {
     const uint8_t status = mbm_plan_getStatus(of, field, NULL);
-    const char *why = line_why(&at, status);
+    const char *why;
 
+    line_note(&at, status);
+    why = line_why(&at, status);
     (void)context;
     if (status == MBM_OK || status == MBM_CANCELLED || report_stopped)
         return;

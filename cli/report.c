@@ -200,9 +200,10 @@ int report_failure(const char *who, uint8_t status, uint8_t exception, uint32_t 
         return report(code, "stopped before %s answered", who);
     if (status == MBM_RESPONSE_TIMED_OUT && exception == 0)
         return report(code,
-                      *why ? "no right reply from %s within %s%s%s%s%s"
-                           : "%s did not answer within %s%s%s%s%s",
-                      who, number_time_text(timeoutMs, time), colon, why, space, advice);
+                      *why ? "no right reply from %s within %s%s%s%s%s%s"
+                           : "%s did not answer within %s%s%s%s%s%s",
+                      who, number_time_text(timeoutMs, time), colon, why, space, advice,
+                      advice_in_flight(in_flight));
     if (status == MBM_LINK_LOST && *why)
         return report(code, "%s: the link was lost: %s%s%s", who, why, space, advice);
     return report(code, "%s: %s%s%s%s%s", who, report_words(status, exception), colon, why, space,

@@ -175,7 +175,7 @@ static int scan(void)
             requests[queued].unit = units[queued];
             requests[queued].reply = &values[queued];
             requests[queued].replyBytes = sizeof values[queued];
-            (void)mbm_client_readHoldingRegisters(&at.client, &requests[queued], 0, 1);
+            (void)line_read(&at, &requests[queued], MBM_TABLE_HOLDING_REGISTERS, 0, 1);
         }
         line_poll(&at);
         for (; ended < queued && requests[ended].status != MBM_PENDING; ended++, tried++) {
