@@ -364,6 +364,161 @@ static void sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply(void *
     assert_in_range(s->now - s->last_byte, 500000, 500100);
 }
 
+/* Polls as pollDelay says, and every 20 us while it says 0, until the driver has been on and is off
+ * again. Returns how often it polled meanwhile. */
+static unsigned poll_while_the_frame_leaves(sim *s, uint8_t (*poll)(sim *s),
+                                            uint32_t (*delay)(sim *s))
+{
+    const unsigned sent = s->sent;
+    unsigned polls = 0;
+
+    while (s->sent == sent || s->driver_on) {
+        uint32_t sleep;
+
+        polls += s->sent > sent;
+        assert_int_equal(poll(s), MBM_PENDING);
+        sleep = delay(s);
+        s->now += sleep > 0 ? sleep : 20;
+    }
+    return polls;
+}
+
+static uint8_t poll_node(sim *s)
+{
+    return mbm_node_poll(&s->node);
+}
+
+static uint32_t node_delay(sim *s)
+{
+    return mbm_node_pollDelay(&s->node);
+}
+
+/* Words to write, the characters of that frame. */
+enum { LONGEST_WRITE = 123, LONGEST_FRAME = 9 + 2 * LONGEST_WRITE };
+
+/* The rate that the program gives is for characters of 11 bits. */
+static const struct leaving {
+    uint32_t baud, character; /* the time of a character on the wire, in microseconds */
+    uint16_t piece;           /* what the port takes at once; 0: all */
+} leavings[] = {
+    {9600, 1146, 0},   {9600, 1042, 0}, /* 8N1: ten bits */
+    {9600, 1021, 0},                    /* and 2 % too fast */
+    {19200, 573, 0},   {115200, 96, 0},   {115200, 85, 0},
+    {9600, 1042, 200}, {9600, 1042, 128}, /* a port that takes the frame in two parts */
+};
+
+static void a_program_sleeps_while_a_frame_leaves(void **state)
+{
+    static const uint16_t quantities[] = {1, 2, 10, 60, LONGEST_WRITE};
+    unsigned i, k;
+    NODE;
+
+    OK(mbm_node_setBlocking(n, 0));
+    for (i = 0; i < COUNT(leavings); i++)
+        for (k = 0; k < COUNT(quantities); k++) {
+            const uint32_t length = 9u + 2u * quantities[k];
+            uint64_t end, off;
+            unsigned polls;
+
+            OK(mbm_line_setBaudRate(&s->line, leavings[i].baud));
+            s->character = leavings[i].character;
+            s->write_piece = leavings[i].piece;
+            s->order_length = 0;
+            assert_int_equal(mbm_node_writeMultipleRegisters(n, 0, quantities[k]), MBM_PENDING);
+            polls = poll_while_the_frame_leaves(s, poll_node, node_delay);
+            end = s->frames[s->sent - 1].end;
+            assert_int_equal(s->frames[s->sent - 1].length, length);
+            /* The driver goes off as soon as the last bit has left. */
+            off = sim_time_of(s, 'O');
+            assert_in_range(off, end, end + 30);
+            /* At most an eighth of the time and two characters are spent in polls of 20 us. */
+            if (leavings[i].piece == 0)
+                assert_in_range(polls, 1, (length / 8 + 2) * s->character / 20 + 3);
+            OK(mbm_node_cancel(n));
+        }
+}
+
+/* Without a baud rate, the frame may leave at any time. */
+static void a_program_polls_while_a_frame_leaves_at_an_unknown_rate(void **state)
+{
+    NODE;
+
+    OK(mbm_node_setBlocking(n, 0));
+    assert_int_equal(mbm_node_writeMultipleRegisters(n, 0, LONGEST_WRITE), MBM_PENDING);
+    (void)poll_while_the_frame_leaves(s, poll_node, node_delay);
+    assert_in_range(sim_time_of(s, 'O'), s->frames[0].end, s->frames[0].end + 30);
+    OK(mbm_node_cancel(n));
+}
+
+static void a_program_sleeps_while_the_driver_stays_on(void **state)
+{
+    unsigned polls;
+    NODE;
+
+    OK(mbm_node_setBlocking(n, 0));
+    OK(mbm_line_setBaudRate(&s->line, 9600));
+    OK(mbm_line_setPostFlushHold(&s->line, 200));
+    s->character = 100;
+    s->flush_lies = 1;
+    assert_int_equal(sim_read_one(s), MBM_PENDING);
+    polls = poll_while_the_frame_leaves(s, poll_node, node_delay);
+    /* 200 characters of 11 bits after the frame has been written. */
+    assert_in_range(sim_time_of(s, 'O') - sim_time_of(s, 'W'), 200 * 1146, 200 * 1147 + 100);
+    assert_in_range(polls, 1, 4);
+    OK(mbm_node_cancel(n));
+}
+
+static mbm_client a_client;
+
+static uint8_t poll_client(sim *s)
+{
+    (void)s;
+    return mbm_client_poll(&a_client);
+}
+
+static uint32_t client_delay(sim *s)
+{
+    (void)s;
+    return mbm_client_pollDelay(&a_client);
+}
+
+static void a_program_with_a_client_sleeps_while_a_frame_leaves(void **state)
+{
+    static const uint16_t words[LONGEST_WRITE] = {0};
+    static uint8_t frame[MBM_MAX_ASCII_FRAME];
+    unsigned i, ascii;
+    SIM;
+
+    for (ascii = 0; ascii <= 1; ascii++)
+        for (i = 0; i < COUNT(leavings); i++) {
+            mbm_clientRequest request = {0};
+            unsigned polls;
+
+            if (ascii && leavings[i].piece)
+                continue; /* the wire looks for the end of an RTU frame */
+            memset(&a_client, 0, sizeof a_client);
+            if (ascii)
+                OK(mbm_client_beginAscii(&a_client, &s->port, frame, sizeof frame));
+            else
+                OK(mbm_client_beginRtu(&a_client, &s->port, frame, sizeof frame));
+            OK(mbm_client_setBaudRate(&a_client, leavings[i].baud));
+            s->character = leavings[i].character;
+            s->write_piece = leavings[i].piece;
+            s->order_length = 0;
+            request.unit = 17;
+            request.data = words;
+            IS(MBM_PENDING,
+               mbm_client_writeMultipleRegisters(&a_client, &request, 0, LONGEST_WRITE));
+            polls = poll_while_the_frame_leaves(s, poll_client, client_delay);
+            assert_in_range(sim_time_of(s, 'O'), s->transmitted, s->transmitted + 30);
+            if (leavings[i].piece == 0)
+                assert_in_range(polls, 1,
+                                ((1u + ascii) * LONGEST_FRAME / 8 + 2) * s->character / 20);
+            OK(mbm_client_cancel(&a_client, &request));
+            s->cut_allowed += ascii;
+        }
+}
+
 /* A longer gap could not be measured with the clock, so it would not be kept at all. */
 static void the_longest_gap_is_2_to_the_31_microseconds(void **state)
 {
@@ -444,6 +599,10 @@ int main(void)
         SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout),
         SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay),
         SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply),
+        SIM_TEST(a_program_sleeps_while_a_frame_leaves),
+        SIM_TEST(a_program_polls_while_a_frame_leaves_at_an_unknown_rate),
+        SIM_TEST(a_program_sleeps_while_the_driver_stays_on),
+        SIM_TEST(a_program_with_a_client_sleeps_while_a_frame_leaves),
         SIM_TEST(the_longest_gap_is_2_to_the_31_microseconds),
         SIM_TEST(the_longest_gap_of_a_client_is_2_to_the_31_microseconds),
     };

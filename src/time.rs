@@ -97,6 +97,14 @@ pub const fn character(baud: u32) -> u16 {
     }
 }
 
+/// How long after the start of a frame of `count` characters its last bit has not left for sure, in
+/// microseconds: up to an eighth of the time and a character before its end. A character may have
+/// 10 bits instead of 11, clocks differ, and a program that sleeps so long may wake up late, though
+/// the driver must go off in time. 0 if `character` is 0, the length of an unknown one.
+pub const fn sure_to_be_sending(character: u16, count: u16) -> u32 {
+    character as u32 * (count - count / 8).saturating_sub(1) as u32
+}
+
 /// The silence t3.5 that separates two frames, in microseconds. [`DEFAULT_SILENCE`] if
 /// `baud` is 0.
 pub const fn silence(baud: u32) -> u32 {
@@ -113,6 +121,21 @@ pub const fn silence(baud: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_frame_still_leaves_while_a_program_sleeps() {
+        for (count, sleep) in [
+            (0, 0),
+            (1, 0),
+            (4, 3),
+            (8, 6),
+            (256, 223),
+            (u16::MAX, 57_343),
+        ] {
+            assert_eq!(sure_to_be_sending(1146, count), 1146 * sleep, "{count}");
+            assert_eq!(sure_to_be_sending(0, count), 0);
+        }
+    }
 
     #[test]
     fn silence_is_three_and_a_half_characters_up_to_19200_baud() {

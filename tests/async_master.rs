@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::uart::{Bench, Wire};
+use common::uart::{Bench, Wire, CHARACTER};
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
 use mbm::engine::{Buffers, Counter, Setting};
@@ -212,6 +212,34 @@ fn a_device_that_receives_nothing_times_out_and_is_asked_again() {
     assert_eq!(master.storage().counters[Counter::Requests as usize], 3);
     bench.wire.borrow_mut().is_cut = false;
     assert_eq!(bench.run(master.write_single_register(100, 1)), Ok(()));
+}
+
+#[test]
+fn the_driver_goes_off_when_the_hold_is_over() {
+    let mut bench = Bench::new();
+    let mut master = master(&bench);
+    master.settings().post_flush_hold = 7;
+    let mut words = [0];
+    let (mut sent, mut off) = (0, 0);
+    let mut read = pin!(master.read_holding_registers(100, &mut words));
+    while poll(read.as_mut()).is_pending() {
+        let wire = bench.wire.borrow();
+        if wire.driver && wire.is_flushed() && !wire.sent.is_empty() && sent == 0 {
+            sent = wire.now;
+        }
+        if sent > 0 && !wire.driver && off == 0 {
+            off = wire.now;
+        }
+        drop(wire);
+        bench.pass();
+    }
+    // Time passes in steps of 50.
+    let hold = 7 * CHARACTER;
+    assert!(
+        (hold..=hold + 100).contains(&(off - sent)),
+        "{}",
+        off - sent
+    );
 }
 
 #[test]

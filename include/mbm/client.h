@@ -391,7 +391,8 @@ uint8_t mbm_client_poll(struct mbm_client *client);
 
 /**
  * Returns how long mbm_client_poll will have nothing to do unless a byte arrives. A program
- * may sleep, or wait for a byte in select, for that time. The client reads bytes only while
+ * may sleep, or wait for a byte in select, for that time, but no longer: while a frame leaves on a
+ * serial line, the driver would go off late. The client reads bytes only while
  * a request is pending, or if it has a link (mbm_link_begin). With a link the delay also ends
  * when the link is to be opened again, and is at most one second while the client is idle.
  *

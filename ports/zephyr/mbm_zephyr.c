@@ -214,10 +214,14 @@ int mbm_zephyr_open(mbm_zephyrLine *line, mbm_port *port)
     return 0;
 }
 
+/* A sleep of n ticks ends after up to n + 1, and must not be too long: the driver would still be on
+ * when the reply comes. */
 void mbm_zephyr_wait(mbm_zephyrLine *line, uint32_t timeoutUs)
 {
-    if (line != NULL && timeoutUs > 0)
-        k_sem_take(&line->received, K_USEC(MIN(timeoutUs, LONGEST_SLEEP)));
+    const uint32_t ticks = k_us_to_ticks_floor32(MIN(timeoutUs, LONGEST_SLEEP));
+
+    if (line != NULL && ticks > 1)
+        k_sem_take(&line->received, K_TICKS(ticks - 1));
 }
 
 uint16_t mbm_zephyr_lost(const mbm_zephyrLine *line)

@@ -66,7 +66,8 @@ int mbm_zephyr_open(mbm_zephyrLine *line, mbm_port *port);
 
 /**
  * Sleeps until bytes arrive or a time is over. For a program that polls a client or a server: pass
- * the value that its pollDelay function returned.
+ * the value that its pollDelay function returned. Does not sleep for a last tick or two, so that
+ * the driver goes off in time.
  *
  * @param line       the line, open
  * @param timeoutUs  the longest time to sleep, in microseconds; the sleep may be shorter

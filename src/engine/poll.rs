@@ -4,7 +4,7 @@ use super::{Count, Engine, Moment, Outcome, Phase, Probation, Settings, Storage,
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::port::Port;
-use crate::time::{elapsed, has_elapsed};
+use crate::time::{elapsed, has_elapsed, sure_to_be_sending};
 
 impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// True while a request is pending.
@@ -339,14 +339,24 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Microseconds from `now` for which poll will find nothing to do unless a byte arrives; 0 if
-    /// the last poll has left bytes unread; `u32::MAX` if no request is pending. A phase that has
-    /// just begun counts its time from this call, so the caller may sleep for the returned time.
+    /// the last poll has left bytes unread, or if only the port knows; `u32::MAX` if no request is
+    /// pending. A phase that has just begun counts its time from this call, so the caller may sleep
+    /// for the returned time.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
         self.look_at_clock(now);
-        match self.phase {
-            Phase::Idle => u32::MAX,
-            phase if phase >= Phase::Send || self.has_more => 0,
-            _ => self.wait.saturating_sub(elapsed(now, self.since)),
-        }
+        let (wait, since) = match self.phase {
+            Phase::Idle => return u32::MAX,
+            // The port may take the next byte at any time.
+            _ if self.has_more || self.phase == Phase::Send => return 0,
+            Phase::Flush => {
+                let sent = self.sent.into();
+                (
+                    sure_to_be_sending(self.settings.character, sent),
+                    self.begun,
+                )
+            }
+            _ => (self.wait, self.since),
+        };
+        wait.saturating_sub(elapsed(now, since))
     }
 }

@@ -79,6 +79,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
         self.is_late = false;
         self.since = self.now;
+        self.begun = self.now;
         self.phase = Phase::Send;
         self.port.pre_transmission();
         self.send()

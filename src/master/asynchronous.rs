@@ -258,8 +258,9 @@ where
         }
         let delay = self.master.poll_delay();
         if !self.master.is_waiting() {
-            // The device is stuck, or the driver stays on for a while.
-            return self.timer.delay_us(PAUSE).await;
+            // The device is stuck, or the driver stays on for `delay`.
+            let pause = if delay == 0 { PAUSE } else { delay };
+            return self.timer.delay_us(pause).await;
         }
         if delay == 0 {
             return;

@@ -182,7 +182,8 @@ unsafe extern "C" fn poll(node: *mut mbm_node) -> u8 {
 
 /// Returns how long mbm_node_poll will have nothing to do unless a byte arrives. A program
 /// or the hook `idle` may sleep for that time. A waiting time that has just started counts
-/// from this call, so sleeping makes no timeout longer.
+/// from this call, so sleeping makes no timeout longer. Do not sleep longer: while a frame leaves,
+/// the driver would go off late.
 ///
 /// @param node  the object
 /// @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;

@@ -195,6 +195,11 @@ uint32_t k_cycle_get_32(void)
     return line_micros() * STAND_IN_MHZ;
 }
 
+uint32_t k_us_to_ticks_floor32(uint32_t micros)
+{
+    return micros / STAND_IN_TICK_US;
+}
+
 uint32_t k_us_to_cyc_ceil32(uint32_t micros)
 {
     return micros * STAND_IN_MHZ;

@@ -18,12 +18,12 @@ enum { STAND_IN_TICK_US = 100, STAND_IN_MHZ = 64 };
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 
-#define K_USEC(micros)                                                                             \
-    ((k_timeout_t){(int64_t)((micros) + STAND_IN_TICK_US - 1) / STAND_IN_TICK_US})
+#define K_TICKS(count) ((k_timeout_t){(int64_t)(count)})
 
 int64_t k_uptime_ticks(void);
 uint32_t k_cycle_get_32(void);
 uint32_t k_us_to_cyc_ceil32(uint32_t micros);
+uint32_t k_us_to_ticks_floor32(uint32_t micros);
 uint64_t k_ticks_to_us_floor64(uint64_t ticks);
 int32_t k_msleep(int32_t milliseconds);
 
