@@ -58,6 +58,7 @@ pub struct Device {
     last_transaction: u16,
     replies: u32,
     opened: u64,
+    is_open: bool,
     last_request: u64,
 }
 
@@ -82,6 +83,7 @@ impl Device {
             last_transaction: 0,
             replies: 0,
             opened: 0,
+            is_open: false,
             last_request: 0,
         }
     }
@@ -137,11 +139,20 @@ impl Device {
     /// A connection was opened.
     pub fn open(&mut self, now: u64) {
         (self.replies, self.opened, self.last_request) = (0, now, now);
+        self.is_open = true;
+    }
+
+    /// True once, when it closes a connection on which nothing has arrived for too long.
+    pub fn hangs_up(&mut self, now: u64) -> bool {
+        let is_due = self.closes_at().is_some_and(|at| now >= at);
+        self.is_open &= !is_due;
+        is_due
     }
 
     /// When it closes the connection if nothing arrives.
     pub fn closes_at(&self) -> Option<u64> {
-        Some(self.last_request + self.manner.idle?)
+        let idle = self.manner.idle.filter(|_| self.is_open)?;
+        Some(self.last_request + idle)
     }
 
     /// The register's value now.

@@ -3,13 +3,13 @@
 //! the notation. A new report is a new file.
 //!
 //! The runner plays them on a simulated line or stream with a simulated clock. It is in Rust,
-//! because it then runs with `cargo test` in a second, and it calls the functions of the C API,
+//! because it then runs with `cargo test` in seconds, and it calls the functions of the C API,
 //! because they are what all programs but those in Rust use: a case covers the core and the layer
 //! of C above it, and a gateway is the one that firmware has, with its lines.
 //!
 //! Cargo's own test runner wants a function for each test. This one makes a test of each file, role
 //! and way of handing bytes over, takes the same arguments, and prints the same lines. It fails if it
-//! finds no case.
+//! finds no case. The files in `planted` expect what does not happen: each of them must fail.
 
 mod case;
 mod device;
@@ -20,6 +20,7 @@ mod wire;
 mod world;
 
 use case::{Case, Role};
+use std::collections::BTreeMap;
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -32,26 +33,32 @@ struct Test<'a> {
     case: &'a Case,
     role: Role,
     block: Block,
+    /// It expects what does not happen, and must fail.
+    is_planted: bool,
 }
 
-/// The files with the cases, in the order of their names.
-fn files() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/field/cases");
-    let entries = std::fs::read_dir(&folder).expect("the folder of the cases");
-    let paths = entries.map(|entry| entry.expect("a file").path());
-    let mut files: Vec<_> = paths
-        .filter(|path| path.extension().is_some_and(|kind| kind == "txt"))
-        .collect();
-    files.sort();
-    files
+/// The cases in a folder, in the order of their names.
+fn cases(folder: &str) -> Result<Vec<(PathBuf, Case)>, String> {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/field");
+    let entries = std::fs::read_dir(tests.join(folder)).map_err(|why| why.to_string())?;
+    let mut paths = Vec::new();
+    for entry in entries {
+        paths.push(entry.map_err(|why| why.to_string())?.path());
+    }
+    paths.retain(|path| path.extension().is_some_and(|kind| kind == "txt"));
+    paths.sort();
+    let read = |path: PathBuf| Case::read(&path).map(|case| (path, case));
+    paths.into_iter().map(read).collect()
 }
 
 /// The tests of a case.
-fn tests<'a>(path: &'a Path, case: &'a Case) -> Vec<Test<'a>> {
+fn tests<'a>(path: &'a Path, case: &'a Case, is_planted: bool) -> Vec<Test<'a>> {
     let mut tests = Vec::new();
+    let folder = if is_planted { "planted::" } else { "" };
     for role in &case.roles {
+        let role_name = format!("{role:?}").to_lowercase();
         for block in &case.blocks {
-            let mut name = format!("{}::{}", case.name, format!("{role:?}").to_lowercase());
+            let mut name = format!("{folder}{}::{role_name}", case.name);
             if case.blocks.len() > 1 {
                 let delay = block.delay as f64 / 1_000.0;
                 name += &format!("::{}_bytes_or_{delay}_ms", block.bytes);
@@ -62,6 +69,7 @@ fn tests<'a>(path: &'a Path, case: &'a Case) -> Vec<Test<'a>> {
                 case,
                 role: *role,
                 block: *block,
+                is_planted,
             });
         }
     }
@@ -71,106 +79,130 @@ fn tests<'a>(path: &'a Path, case: &'a Case) -> Vec<Test<'a>> {
 impl Test<'_> {
     /// Why the test fails.
     fn run(&self) -> Result<(), String> {
+        let path = self.path.display();
         let played = catch_unwind(|| world::play(self.case, self.role, self.block));
-        let failure = match played {
-            Ok(Ok(())) => None,
-            Ok(Err((line, why))) => Some(format!("{}:{line}: {why}", self.path.display())),
-            Err(_) => Some("the runner panicked".into()),
-        };
-        failure.map_or(Ok(()), Err)
+        match (played, self.is_planted) {
+            (Ok(Ok(())), false) | (Ok(Err(_)), true) => Ok(()),
+            (Ok(Ok(())), true) => Err(format!("{path}: it passes, so the runner notices nothing")),
+            (Ok(Err((line, why))), false) => Err(format!("{path}:{line}: {why}")),
+            (Err(_), _) => Err(format!("{path}: the runner panicked")),
+        }
     }
 }
 
-fn main() -> ExitCode {
-    let begin = Instant::now();
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let has = |flag: &str| arguments.iter().any(|argument| argument == flag);
-    let mut filters = Vec::new();
-    let mut words = arguments.iter();
-    while let Some(word) = words.next() {
-        match word.as_str() {
-            "--test-threads" | "--format" | "--skip" | "--color" | "--logfile" | "-Z" => {
-                words.next();
+/// The arguments of a test program: the names to run, and the flags.
+struct Arguments {
+    names: Vec<String>,
+    is_exact: bool,
+    lists: bool,
+}
+
+impl Arguments {
+    fn read() -> Arguments {
+        let mut own = Arguments {
+            names: Vec::new(),
+            is_exact: false,
+            lists: false,
+        };
+        let mut words = std::env::args().skip(1);
+        while let Some(word) = words.next() {
+            match word.as_str() {
+                "--exact" => own.is_exact = true,
+                "--list" => own.lists = true,
+                // These have a value.
+                "--test-threads" | "--format" | "--skip" | "--color" | "--logfile" | "-Z" => {
+                    words.next();
+                }
+                _ if word.starts_with('-') => {}
+                _ => own.names.push(word),
             }
-            _ if word.starts_with('-') => {}
-            _ => filters.push(word.as_str()),
         }
+        own
     }
-    let files = files();
-    let mut cases = Vec::new();
-    for path in &files {
-        match Case::read(path) {
-            Ok(case) => cases.push((path, case)),
-            Err(why) => {
-                println!("{why}");
-                return ExitCode::FAILURE;
-            }
-        }
+
+    fn choose(&self, test: &Test) -> bool {
+        let is_named = |name: &String| match self.is_exact {
+            true => test.name == *name,
+            false => test.name.contains(name.as_str()),
+        };
+        self.names.is_empty() || self.names.iter().any(is_named)
     }
-    let all: Vec<_> = cases
-        .iter()
-        .flat_map(|(path, case)| tests(path, case))
-        .collect();
-    let is_chosen = |test: &&Test| {
-        let mut filters = filters.iter();
-        filters.len() == 0
-            || filters.any(|filter| match has("--exact") {
-                true => test.name == *filter,
-                false => test.name.contains(filter),
-            })
-    };
-    let chosen: Vec<_> = all.iter().filter(is_chosen).collect();
-    if has("--list") {
-        chosen
-            .iter()
-            .for_each(|test| println!("{}: test", test.name));
-        return ExitCode::SUCCESS;
-    }
-    println!("\nrunning {} tests", chosen.len());
+}
+
+/// Runs the tests. Returns the names of those that failed, and why.
+fn run(tests: &[&Test]) -> Vec<(String, String)> {
     let mut failures = Vec::new();
-    // The cases that are pending, and have failed, as they must.
-    let mut pending = Vec::new();
-    for test in &chosen {
+    // The pending cases, how many of their tests ran, and whether one has failed, as it must.
+    let mut pending = BTreeMap::new();
+    for test in tests {
         let result = test.run();
+        if test.case.pending.is_some() {
+            let (_, count, has_failed) = pending.entry(test.path).or_insert((test.case, 0, false));
+            *count += 1;
+            *has_failed |= result.is_err();
+        }
         match (result, &test.case.pending) {
             (Ok(()), _) => println!("test {} ... ok", test.name),
-            (Err(_), Some(why)) => {
-                println!("test {} ... ok (fails: {why})", test.name);
-                pending.push(test.path);
-            }
+            (Err(_), Some(why)) => println!("test {} ... ok (fails: {why})", test.name),
             (Err(why), None) => {
                 println!("test {} ... FAILED", test.name);
                 failures.push((test.name.clone(), why));
             }
         }
     }
-    let is_whole = chosen.len() == all.len();
-    for (path, case) in cases.iter().filter(|_| is_whole) {
-        if case.pending.is_some() && !pending.contains(&path.as_path()) {
-            let why = format!("{}: it passes: remove the line pending", path.display());
+    for (path, (case, count, has_failed)) in pending {
+        if !has_failed && count == case.roles.len() * case.blocks.len() {
+            let why = format!("{}: it passes: remove its line pending", path.display());
             failures.push((case.name.clone(), why));
         }
     }
+    failures
+}
+
+fn main() -> ExitCode {
+    let begin = Instant::now();
+    let arguments = Arguments::read();
+    let (real, planted) = match (cases("cases"), cases("planted")) {
+        (Ok(real), Ok(planted)) if !real.is_empty() && !planted.is_empty() => (real, planted),
+        (Ok(_), Ok(_)) => {
+            println!("test result: FAILED. 0 passed; 1 failed; there is no case");
+            return ExitCode::FAILURE;
+        }
+        (Err(why), _) | (_, Err(why)) => {
+            println!("test result: FAILED. 0 passed; 1 failed; {why}");
+            return ExitCode::FAILURE;
+        }
+    };
+    let mut all = Vec::new();
+    for (list, is_planted) in [(&real, false), (&planted, true)] {
+        for (path, case) in list {
+            all.extend(tests(path, case, is_planted));
+        }
+    }
+    let chosen: Vec<_> = all.iter().filter(|test| arguments.choose(test)).collect();
+    if arguments.lists {
+        for test in &chosen {
+            println!("{}: test", test.name);
+        }
+        return ExitCode::SUCCESS;
+    }
+    println!("\nrunning {} tests", chosen.len());
+    let failures = run(&chosen);
     if !failures.is_empty() {
         println!("\nfailures:");
-        failures
-            .iter()
-            .for_each(|(name, why)| println!("\n{name}\n    {why}"));
     }
-    let is_empty = all.is_empty();
-    if is_empty {
-        println!("there is no case");
+    for (name, why) in &failures {
+        println!("\n{name}\n    {why}");
     }
-    let is_good = failures.is_empty() && !is_empty;
     println!(
         "\ntest result: {}. {} passed; {} failed; 0 ignored; 0 measured; {} filtered out; finished in {:.2}s\n",
-        if is_good { "ok" } else { "FAILED" },
-        chosen.len().saturating_sub(failures.len()),
-        failures.len() + usize::from(is_empty),
+        if failures.is_empty() { "ok" } else { "FAILED" },
+        chosen.len() - failures.len().min(chosen.len()),
+        failures.len(),
         all.len() - chosen.len(),
         begin.elapsed().as_secs_f64()
     );
-    match is_good {
+    match failures.is_empty() {
         true => ExitCode::SUCCESS,
         false => ExitCode::FAILURE,
     }

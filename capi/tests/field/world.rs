@@ -193,9 +193,10 @@ impl<'a> World<'a> {
             }
         }
         if self.opened > 0 && self.case.framing.is_stream() {
-            let mut closing = self.devices.iter().filter_map(Device::closes_at);
-            if closing.any(|at| now >= at) {
-                self.wire.borrow_mut().close(self.end);
+            for device in &mut self.devices {
+                if device.hangs_up(now) {
+                    self.wire.borrow_mut().close(self.end);
+                }
             }
         }
     }
