@@ -297,8 +297,6 @@ static void bad_calls_are_refused_with_a_status(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_client_setBackoff(c, 4, 1, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_client_setJitter(c, 10, NULL, NULL));
     assert_int_equal(r.status, MBM_INVALID_ARGUMENT);
-    r.unit = 0;
-    IS(MBM_BROADCAST_NOT_ALLOWED, mbm_client_readHoldingRegisters(c, &r, 0, 1));
     assert_int_equal(mbm_client_pending(c), 0);
 
     r.unit = UNIT;

@@ -189,7 +189,7 @@ static void every_function_in_rtu_over_tcp(void **state)
     every_function(MBM_FRAMING_RTU_OVER_TCP);
 }
 
-static void a_broadcast_reaches_every_unit_in_ascii_and_is_refused_over_tcp(void **state)
+static void a_broadcast_reaches_every_unit_in_ascii_and_is_refused_in_rtu_over_tcp(void **state)
 {
     mbm_clientRequest r = asker_request(0, NULL, 0, NULL);
 
@@ -327,7 +327,7 @@ int main(void)
         cmocka_unit_test(every_function_in_ascii),
         cmocka_unit_test(every_function_in_tcp),
         cmocka_unit_test(every_function_in_rtu_over_tcp),
-        cmocka_unit_test(a_broadcast_reaches_every_unit_in_ascii_and_is_refused_over_tcp),
+        cmocka_unit_test(a_broadcast_reaches_every_unit_in_ascii_and_is_refused_in_rtu_over_tcp),
         cmocka_unit_test(the_ascii_delimiter_follows_the_devices),
         cmocka_unit_test(one_request_is_under_way_over_tcp_unless_the_program_allows_more),
         cmocka_unit_test(requests_under_way_over_tcp_are_1_to_16),

@@ -435,8 +435,8 @@ static void wrong_arguments_change_nothing(void **state)
     refuses(MBM_NOT_INITIALISED, &never_begun, MBM_DEVICE_ID_BASIC);
     refuses(MBM_ILLEGAL_DATA_VALUE, &client, 0);
     refuses(MBM_ILLEGAL_DATA_VALUE, &client, 5);
-    id.request.unit = 0;
-    refuses(MBM_BROADCAST_NOT_ALLOWED, &client, MBM_DEVICE_ID_BASIC);
+    id.request.unit = 256;
+    refuses(MBM_INVALID_ARGUMENT, &client, MBM_DEVICE_ID_BASIC);
     id.request.unit = UNIT;
     id.request.reply = NULL;
     refuses(MBM_INVALID_ARGUMENT, &client, MBM_DEVICE_ID_BASIC);

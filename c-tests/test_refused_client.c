@@ -127,8 +127,11 @@ static void a_client_goes_on_after_refused_calls(void **state)
         if (framing == 2)
             REFUSED(MBM_DUPLICATE_TRANSACTION, client, mbm_client_readCoils(&client, &other, 0, 1));
         other.unit = 0;
-        REFUSED(MBM_BROADCAST_NOT_ALLOWED, client, mbm_client_readCoils(&client, &other, 0, 1));
-        IS(MBM_BROADCAST_NOT_ALLOWED, other.status);
+        /* In TCP frames unit 0 is a unit. */
+        if (framing != 2) {
+            REFUSED(MBM_BROADCAST_NOT_ALLOWED, client, mbm_client_readCoils(&client, &other, 0, 1));
+            IS(MBM_BROADCAST_NOT_ALLOWED, other.status);
+        }
         assert_int_equal(mbm_client_pending(&client), 1);
 
         if (framing == 0 || framing == 3) {

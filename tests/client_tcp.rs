@@ -227,16 +227,27 @@ fn a_transaction_identifier_is_not_used_again_while_its_request_is_pending() {
     }
 }
 
+/// In TCP frames unit 0 is no broadcast (messaging on TCP/IP guide V1.0b, 4.4.1.2).
 #[test]
-fn a_broadcast_over_tcp_is_refused() {
-    let (_, mut client) = client();
-    let task = Task::new(0, 1, &[], |header| {
+fn unit_0_answers_over_tcp() {
+    let (end, mut client) = client();
+    assert!(client.queue(read(0, 7)).is_ok());
+    assert!(poll(&end, &mut client).is_empty());
+    let sent = requests(&end.sent());
+    assert_eq!(sent[0].1, 0);
+    end.deliver(0, &response(sent[0]));
+    assert_right(&poll(&end, &mut client)[0]);
+    let write = Task::new(0, 1, &[], |header| {
         header.set(FunctionSpec::WRITE_SINGLE_REGISTER, 1, 2)
     });
-    assert_eq!(
-        client.queue(task).unwrap_err().error(),
-        Error::BROADCAST_NOT_ALLOWED
-    );
+    assert!(client.queue(write).is_ok());
+    assert!(poll(&end, &mut client).is_empty());
+    // It waits for the response.
+    let request = end.sent();
+    assert_eq!(request[6..], [0, 6, 0, 1, 0, 2]);
+    assert!(poll(&end, &mut client).is_empty());
+    end.deliver(0, &request);
+    assert_eq!(poll(&end, &mut client)[0].state.status, Status::OK);
 }
 
 /// Devices that take one request at a time lose the others.

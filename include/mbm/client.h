@@ -84,8 +84,9 @@ typedef struct mbm_clientRequest {
      *  on the wire: mbm_client_wireTransaction returns that. */
     uint16_t transaction;
     /** The unit identifier of the device. On a serial line 1 to 247; 0 is broadcast; the
-     *  client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255. A client
-     *  refuses a greater number (MBM_INVALID_ARGUMENT). */
+     *  client also sends to 248 to 255, which the standard reserves. In TCP frames 0 to 255:
+     *  there unit 0 is a unit and answers. A client refuses a greater number
+     *  (MBM_INVALID_ARGUMENT). */
     uint16_t unit;
     /** MBM_PENDING from the call that queues the request until it ends; then its result. */
     uint8_t status;
@@ -533,8 +534,8 @@ uint8_t mbm_client_setJitter(struct mbm_client *client,
  *         is NULL, or if `capacity` is too small; MBM_MALFORMED_REPLY if the data are not those
  *         of a reply of the function, although the client accepted them: it does not look into
  *         an event log or a device identification; MBM_INVALID_ARGUMENT for overlapping memory,
- *         a request that was never queued, and one that no device answers: a broadcast, or
- *         sub-function 04 of 08
+ *         a request that was never queued, one that no device answers: a broadcast, or
+ *         sub-function 04 of 08, and a write to unit 0 in TCP frames
  */
 uint8_t mbm_client_reply(const struct mbm_clientRequest *request,
                          uint8_t *pdu,

@@ -101,10 +101,11 @@ impl RequestState {
         self.is(Stage::Ended)
     }
 
-    /// True if a device answers such a request: it is no broadcast, which only a serial line
-    /// has, and its function has a response.
+    /// True if a device answers such a request: its function has a response, and it is no
+    /// broadcast, for which it takes a write to unit 0 in TCP frames, too.
     pub const fn has_reply(&self) -> bool {
-        self.unit() != BROADCAST && self.header.is_answered()
+        let may_be_broadcast = self.unit() == BROADCAST && self.header.may_be_broadcast();
+        !may_be_broadcast && self.header.is_answered()
     }
 
     /// Ends the request with `status`.

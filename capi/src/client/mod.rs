@@ -14,6 +14,7 @@ mod settings;
 mod storage;
 mod units;
 
+pub(crate) use begin::has_tcp_frames;
 pub use begin::*;
 pub use identification::*;
 pub use link::*;

@@ -78,8 +78,8 @@ fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Error> {
 ///         is NULL, or if `capacity` is too small; MBM_MALFORMED_REPLY if the data are not those
 ///         of a reply of the function, although the client accepted them: it does not look into
 ///         an event log or a device identification; MBM_INVALID_ARGUMENT for overlapping memory,
-///         a request that was never queued, and one that no device answers: a broadcast, or
-///         sub-function 04 of 08
+///         a request that was never queued, one that no device answers: a broadcast, or
+///         sub-function 04 of 08, and a write to unit 0 in TCP frames
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_reply(
     request: *const mbm_clientRequest,

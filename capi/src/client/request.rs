@@ -33,8 +33,9 @@ pub struct mbm_clientRequest {
     /// on the wire: mbm_client_wireTransaction returns that.
     pub transaction: u16,
     /// The unit identifier of the device. On a serial line 1 to 247; 0 is broadcast; the
-    /// client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255. A client
-    /// refuses a greater number (MBM_INVALID_ARGUMENT).
+    /// client also sends to 248 to 255, which the standard reserves. In TCP frames 0 to 255:
+    /// there unit 0 is a unit and answers. A client refuses a greater number
+    /// (MBM_INVALID_ARGUMENT).
     pub unit: u16,
     /// MBM_PENDING from the call that queues the request until it ends; then its result.
     pub status: u8,

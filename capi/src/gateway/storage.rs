@@ -2,8 +2,8 @@
 
 use super::parts::{mbm_gatewayConfig, mbm_gatewayConnection, mbm_gatewayLine, mbm_gatewayRequest};
 use crate::client::{
-    mbm_client, mbm_clientRequest, mbm_client_cancel, mbm_client_forward, mbm_client_poll,
-    mbm_client_pollDelay,
+    has_tcp_frames, mbm_client, mbm_clientRequest, mbm_client_cancel, mbm_client_forward,
+    mbm_client_poll, mbm_client_pollDelay,
 };
 use crate::framing::MBM_MAX_TCP_FRAME;
 use crate::functions::mbm_function;
@@ -172,6 +172,10 @@ impl GatewayStorage for Parts {
         unsafe {
             let frame = mbm_gatewayRequest::frame(place);
             let body = frame.add(BODY);
+            // A gateway's unit 0 is a broadcast, and a TCP stream has none.
+            if unit == 0 && has_tcp_frames(client) {
+                return Status::BROADCAST_NOT_ALLOWED;
+            }
             let request = &raw mut (*place).request;
             (*request).unit = unit.into();
             (*request).data = body.cast();
