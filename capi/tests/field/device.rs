@@ -43,6 +43,8 @@ struct Manner {
     /// It does not answer before so long after the connection was opened.
     slow_start: u64,
     is_dead: bool,
+    /// It does not receive a request without so long a silence before it.
+    gap: u64,
     /// It sends its replies in pieces of so many bytes, with a pause between them.
     pieces: Option<(usize, u64)>,
 }
@@ -117,6 +119,7 @@ impl Device {
                 "idle" => manner.idle = Some((number()? * 1_000.0) as u64),
                 "closes" => manner.closes = Some(number()? as u32),
                 "deaf" => manner.deaf = Some(number()? as u32),
+                "gap" => manner.gap = (number()? * 1_000.0) as u64,
                 "slow-start" => manner.slow_start = (number()? * 1_000.0) as u64,
                 "pieces" => {
                     let bytes = number()? as usize;
@@ -203,13 +206,15 @@ impl Device {
         }
     }
 
-    /// A request has arrived. `is_joined`: with another one before it in the same segment.
+    /// A request has arrived, after this time of silence. `is_joined`: with another one before it in
+    /// the same segment.
     pub fn receive(
         &mut self,
         framing: Framing,
         transaction: u16,
         body: &[u8],
         now: u64,
+        silence: u64,
         is_joined: bool,
     ) -> Vec<Reply> {
         let (unit, previous) = (body[0], self.last_transaction);
@@ -218,7 +223,12 @@ impl Device {
         let manner = self.manner.clone();
         let is_deaf = manner.deaf.is_some_and(|most| self.replies >= most);
         let is_busy = manner.takes_one && (is_joined || now < self.free);
-        if manner.is_dead || is_deaf || is_busy || now < self.opened + manner.slow_start {
+        if manner.is_dead
+            || silence < manner.gap
+            || is_deaf
+            || is_busy
+            || now < self.opened + manner.slow_start
+        {
             return Vec::new();
         }
         let fate = self.fates.pop_front();

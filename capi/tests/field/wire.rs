@@ -104,6 +104,16 @@ impl Wire {
         }
     }
 
+    /// The silence on the line before a frame of so many bytes that has ended at `end`; of the first
+    /// one it is without limit.
+    pub fn silence(&self, bytes: usize, end: u64) -> u64 {
+        if self.taken[0] == 0 {
+            return u64::MAX;
+        }
+        let begin = end.saturating_sub(self.character * bytes as u64);
+        begin.saturating_sub(self.taken[0])
+    }
+
     /// When a medium is free of what devices and scripted peers send.
     pub fn free(&self, medium: usize) -> u64 {
         self.taken[medium].max(self.now)

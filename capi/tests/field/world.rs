@@ -206,6 +206,7 @@ impl<'a> World<'a> {
         let framing = self.case.framing;
         let mut rest = bytes;
         let mut is_joined = false;
+        let silence = self.wire.borrow().silence(bytes.len(), at);
         while let Some((length, transaction, body)) = frame::open(framing, rest) {
             rest = &rest[length..];
             let connection = self.opened;
@@ -213,7 +214,7 @@ impl<'a> World<'a> {
             let mut is_found = false;
             for device in found {
                 is_found = true;
-                let replies = device.receive(framing, transaction, &body, at, is_joined);
+                let replies = device.receive(framing, transaction, &body, at, silence, is_joined);
                 self.due.extend(replies.into_iter().map(|reply| Due {
                     at: reply.at,
                     pause: reply.pause,
