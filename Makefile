@@ -199,11 +199,13 @@ model: ## Try every order of events around a request, then every stream of bytes
 	@$(CARGO) test $(MODEL) >$(BUILD)/model.log 2>&1 || { cat $(BUILD)/model.log; exit 1; }
 	@$(CARGO) run $(MODEL) -- $(MODEL_SECONDS)
 
+FAULT_TABLES := $(patsubst %,$(BUILD)/plain/test_%,bad_wire slow_devices server_blocks)
 .PHONY: fault-table
-fault-table: need-test ## Generate docs/reports/fault-table.md from the test's results
-	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire $(BUILD)/plain/test_slow_devices
-	@scripts/check/run-c-tests $(BUILD)/plain/test_bad_wire $(BUILD)/plain/test_slow_devices
+fault-table: need-test ## Generate docs/reports/fault-table.md and the table of docs/server.md from the tests' results
+	@$(MAKE) --no-print-directory $(FAULT_TABLES)
+	@scripts/check/run-c-tests $(FAULT_TABLES)
 	@for table in bad_wire slow_devices; do scripts/fill docs/reports/fault-table.md $$table <$(BUILD)/plain/test_$$table.rows || exit 1; done
+	@scripts/fill docs/server.md server_blocks <$(BUILD)/plain/test_server_blocks.rows
 	@scripts/build/pictures
 
 .PHONY: conformance

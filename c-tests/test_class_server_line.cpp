@@ -37,12 +37,99 @@ static void a_request_may_pause_for_t15(void **)
     Serial.arrive(rest, board().now + t15, 573);
     run_loop(server);
     assert_sent(Serial, {17, 6, 0, 0, 0, 1});
-    registers[0] = 0;
-    Serial.inject(front);
-    Serial.arrive(rest, board().now + 2 * t35, 573);
+}
+
+static void a_request_that_the_serial_driver_hands_over_in_blocks_is_answered(void **)
+{
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    Bytes request = adu({17, 6, 0, 0, 0, 1});
+    for (size_t cut = 1; cut < request.size(); cut++) {
+        Bytes front(request.begin(), request.begin() + cut),
+            rest(request.begin() + cut, request.end());
+        registers[0] = 0;
+        Serial.sent.clear();
+        Serial.inject(front);
+        run_loop(server);
+        assert_int_equal(Serial.sent.size(), 0);
+        Serial.inject(rest);
+        run_loop(server);
+        assert_sent(Serial, {17, 6, 0, 0, 0, 1});
+        for (int i = 0; i < 4; i++) // longer than an echo may take
+            run_loop(server);
+    }
+    // 130 bytes as the FIFO of an ESP32 hands them over at 19200 baud: after 120 characters.
+    std::initializer_list<int> head = {17, 16, 0, 0, 0, 60, 120};
+    Bytes longer;
+    for (int byte : head)
+        longer.push_back(static_cast<uint8_t>(byte));
+    longer.resize(127);
+    longer = sealed(longer);
+    Serial.sent.clear();
+    Serial.inject(Bytes(longer.begin(), longer.begin() + 120));
     run_loop(server);
+    Serial.arrive(Bytes(longer.begin() + 120, longer.end()), board().now + 10 * 573, 0);
+    run_loop(server);
+    assert_sent(Serial, {17, 0x90, 2});
+}
+
+/* A serial port as that of an ESP32. */
+struct FifoSerial : HardwareSerial {
+    uint8_t threshold = 120;
+    void setRxFIFOFull(uint8_t bytes) { threshold = bytes; }
+};
+
+static void a_serial_port_with_a_fifo_hands_over_each_byte(void **)
+{
+    ModbusServer server;
+    ModbusUnit units[1] = {{17}};
+    FifoSerial one, other, refused;
+    assert_int_equal(server.begin(17, one, 19200), MBM_OK);
+    assert_int_equal(one.threshold, 1);
+    assert_int_equal(server.begin(units, other), MBM_OK);
+    assert_int_equal(other.threshold, 1);
+    assert_int_equal(server.begin(256, refused), MBM_INVALID_ARGUMENT);
+    assert_int_equal(refused.threshold, 120);
+    // Known only as a Stream, it keeps its threshold.
+    assert_int_equal(server.begin(17, static_cast<Stream &>(refused)), MBM_OK);
+    assert_int_equal(refused.threshold, 120);
+}
+
+static void the_time_that_an_adapter_takes_can_be_set(void **)
+{
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    Bytes request = adu({17, 6, 0, 0, 0, 1});
+    Bytes front(request.begin(), request.begin() + 4), rest(request.begin() + 4, request.end());
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    for (int i = 0; i < 2; i++) {
+        Serial.inject(front);
+        for (int wait = 0; wait < 5; wait++)
+            run_loop(server);
+        Serial.inject(rest);
+        run_loop(server);
+        assert_int_equal(Serial.sent.size(), i);
+        Serial.sent.clear();
+        assert_int_equal(server.setReceiveLatency(120), MBM_OK);
+    }
+}
+
+static void a_sketch_whose_receiver_gets_what_it_sends_answers_once(void **)
+{
+    ModbusRegisterArray<2> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    server.postTransmission([] { Serial.inject(Serial.sent.back()); });
+    expect_response(server, {17, 6, 0, 1, 0, 7}, {17, 6, 0, 1, 0, 7});
+    expect_response(server, {17, 3, 0, 1, 0, 1}, {17, 3, 2, 0, 7});
+    expect_response(server, {17, 3, 0, 9, 0, 1}, {17, 0x83, 2});
+    for (int i = 0; i < 4; i++)
+        run_loop(server);
     assert_int_equal(Serial.sent.size(), 0);
-    assert_int_equal(registers[0], 0);
 }
 
 static void a_stream_that_returns_0_for_what_it_sends_works(void **)
@@ -231,6 +318,10 @@ int main()
     const struct CMUnitTest tests[] = {
         TEST(a_response_begins_after_the_silence),
         TEST(a_request_may_pause_for_t15),
+        TEST(a_request_that_the_serial_driver_hands_over_in_blocks_is_answered),
+        TEST(a_serial_port_with_a_fifo_hands_over_each_byte),
+        TEST(the_time_that_an_adapter_takes_can_be_set),
+        TEST(a_sketch_whose_receiver_gets_what_it_sends_answers_once),
         TEST(a_stream_that_returns_0_for_what_it_sends_works),
         TEST(the_driver_is_off_until_the_silence_has_passed),
         TEST(a_sketch_may_sleep_for_the_time_of_pollDelay),

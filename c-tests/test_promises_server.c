@@ -98,6 +98,7 @@ static void a_begin_restores_the_defaults_of_its_framing(void **state)
             setup(state);
             OK(begins[first].begin(&server, &port, &unit, 1, frame, 300));
             OK(mbm_server_setSilence(&server, 77));
+            OK(mbm_server_setReceiveLatency(&server, 7));
             if (begins[first].is_rtu)
                 OK(mbm_server_setEchoDiscard(&server, 1));
             OK(begins[i].begin(&server, &port, &unit, 1, frame, 300));
@@ -112,11 +113,13 @@ static void a_server_that_was_never_begun_does_nothing(void **state)
     (void)state;
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_poll(&server));
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setSilence(&server, 1));
+    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setReceiveLatency(&server, 1));
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setBaudRate(&server, 9600));
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setEchoDiscard(&server, 1));
     assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFF);
     IS(MBM_INVALID_ARGUMENT, mbm_server_poll(NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setSilence(NULL, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_setReceiveLatency(NULL, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(NULL, 9600));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setEchoDiscard(NULL, 1));
     assert_int_equal(mbm_server_pollDelay(NULL), 0xFFFFFFFF);
@@ -142,6 +145,7 @@ static void settings_of_rtu_are_refused_in_other_framings(void **state)
             REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_setBaudRate(&server, 9600));
             REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_setEchoDiscard(&server, 1));
         }
+        OK(mbm_server_setReceiveLatency(&server, 0xFFFF));
         OK(mbm_server_setSilence(&server, 0xFFFFFFFF));
         if (begins[i].is_rtu)
             assert_int_equal(silence(), 0x80000000);

@@ -206,6 +206,7 @@ static void every_function_of_the_server_is_busy(void)
     IS(MBM_BUSY, mbm_server_setSilence(&server, 1));
     IS(MBM_BUSY, mbm_server_setBaudRate(&server, 9600));
     IS(MBM_BUSY, mbm_server_setEchoDiscard(&server, 1));
+    IS(MBM_BUSY, mbm_server_setReceiveLatency(&server, 1));
     IS(MBM_BUSY, mbm_server_poll(&server));
     assert_int_equal(mbm_server_pollDelay(&server), 0);
 }

@@ -14,7 +14,8 @@ static const struct {
     const char *service; /* NULL: must be given */
     const char *keys;
 } kinds[] = {
-    {"rtu:", PLACE_RTU, MBM_FRAMING_RTU, NULL, "baud, parity, stop, rs485, echo, gap and shared"},
+    {"rtu:", PLACE_RTU, MBM_FRAMING_RTU, NULL,
+     "baud, parity, stop, rs485, echo, gap, latency and shared"},
     {"ascii:", PLACE_ASCII, MBM_FRAMING_ASCII, NULL,
      "baud, parity, stop, data, rs485, echo and shared"},
     {"pty:", PLACE_PTY, MBM_FRAMING_RTU, NULL, ""},
@@ -56,6 +57,7 @@ static int read_serial_key(place *p, const char *key, const char *value, const c
     } else if (strcmp(key, "echo") == 0) {
         *wrong = number_word(value, yes, &index);
         p->discards_echo = (uint8_t)index;
+        p->has_echo = 1;
     } else if (strcmp(key, "shared") == 0) {
         *wrong = number_word(value, yes, &index);
         p->tty.shared = (uint8_t)index;
@@ -63,6 +65,9 @@ static int read_serial_key(place *p, const char *key, const char *value, const c
     } else if (strcmp(key, "gap") == 0 && !is_ascii) {
         *wrong = number_time(value, 1, 60000, &p->gapMs);
         p->has_gap = 1;
+    } else if (strcmp(key, "latency") == 0 && !is_ascii) {
+        *wrong = number_time(value, 0, UINT16_MAX, &p->latencyMs);
+        p->has_latency = 1;
     } else {
         return 0;
     }

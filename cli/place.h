@@ -23,7 +23,7 @@
     "LINE is one of\n"                                                                             \
     "  rtu:PATH[?KEY=VALUE&...]    a serial line; keys: baud=19200, stop=1|2,\n"                   \
     "                              parity=even|none|odd, gap=5ms, echo=yes,\n"                     \
-    "                              rs485=yes, shared=yes\n"                                        \
+    "                              rs485=yes, shared=yes; of a server latency=50ms\n"              \
     "  ascii:PATH[?KEY=VALUE&...]  the same with ASCII frames; also data=7|8\n"                    \
     "  tcp://HOST[:PORT]           Modbus TCP, port 502 if left out\n"                             \
     "  rtu+tcp://HOST:PORT         RTU frames in a TCP stream\n"                                   \
@@ -51,8 +51,8 @@ typedef struct place {
     /* of serial lines */
     char path[MBM_TTY_PATH_BYTES];
     mbm_tty_options tty;
-    uint8_t discards_echo, has_gap;
-    uint32_t gapMs;
+    uint8_t has_echo, discards_echo, has_gap, has_latency;
+    uint32_t gapMs, latencyMs;
 
     /* of networks; an empty host is all addresses of this machine, for servers only */
     char host[MBM_TCP_HOST_BYTES];

@@ -274,7 +274,10 @@ static void begin(served_units *units, int i, const mbm_port *below)
     }
     if (at.kind == PLACE_RTU) {
         (void)mbm_server_setBaudRate(&servers[i], at.tty.baud);
-        (void)mbm_server_setEchoDiscard(&servers[i], at.discards_echo);
+        if (at.has_echo)
+            (void)mbm_server_setEchoDiscard(&servers[i], at.discards_echo);
+        if (at.has_latency)
+            (void)mbm_server_setReceiveLatency(&servers[i], (uint16_t)at.latencyMs);
         if (at.has_gap)
             (void)mbm_server_setSilence(&servers[i], at.gapMs * 1000);
     }

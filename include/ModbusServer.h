@@ -176,6 +176,8 @@ public:
     /**
      * Answers as unit `id` over a Stream that is already open. May be called
      * again: a request under way is dropped; the unit keeps its tables and functions.
+     * If the Stream has setRxFIFOFull, as on an ESP32, the receiver hands over each byte at
+     * once from then on.
      *
      * @param id      1 to 247
      * @param stream  must outlive its use here
@@ -183,17 +185,18 @@ public:
      * @return MBM_OK; or with nothing changed MBM_BUSY from within a hook or function of
      *         this server, MBM_INVALID_ARGUMENT for a unit id above 255
      */
-    uint8_t begin(uint16_t id, Stream &stream, uint32_t baud = 0)
+    template <typename Port> uint8_t begin(uint16_t id, Port &stream, uint32_t baud = 0)
     {
         const uint16_t before = setID(id);
-        return keepID(before, beginRtu(*this, 1, stream, baud));
+        return keepID(before, receiveAtOnce(stream, beginRtu(*this, 1, stream, baud)));
     }
 
     /** As begin, for all units of an array, which answer instead of this one. */
-    template <size_t N> uint8_t begin(ModbusUnit (&units)[N], Stream &stream, uint32_t baud = 0)
+    template <size_t N, typename Port>
+    uint8_t begin(ModbusUnit (&units)[N], Port &stream, uint32_t baud = 0)
     {
         static_assert(N <= 247, "a line has 247 units");
-        return beginRtu(units[0], N, stream, baud);
+        return receiveAtOnce(stream, beginRtu(units[0], N, stream, baud));
     }
 
     /** As begin, with ASCII instead of RTU; a frame takes twice as many bytes and 1. */
@@ -232,7 +235,7 @@ public:
      */
     void setBaudRate(uint32_t baud)
     {
-        if (!state.rtu)
+        if (mbm_server_setBaudRate(&state.server, baud) != MBM_OK)
             return;
         setSilence(baud == 0 ? 4000 : baud > 19200 ? 1750 : 38500000 / baud + 1);
     }
@@ -248,13 +251,26 @@ public:
             state.silence = us;
     }
 
-    /** Discards the local echo, if the receiver receives what the driver sends (RTU only; call it after begin). */
+    /**
+     * How long the UART or an adapter may hold received bytes back, in milliseconds; 50 after
+     * begin. See mbm_server_setReceiveLatency.
+     */
+    uint8_t setReceiveLatency(uint16_t ms)
+    {
+        return mbm_server_setReceiveLatency(&state.server, ms);
+    }
+
+    /**
+     * Says whether the receiver receives what the driver sends (RTU only; call it after begin).
+     * Without this call the server finds out. See mbm_server_setEchoDiscard.
+     */
     void setEchoDiscard(bool on) { mbm_server_setEchoDiscard(&state.server, on); }
 
 private:
     static_assert(MODBUSSERVER_FRAME_BYTES >= 32 && MODBUSSERVER_FRAME_BYTES <= 256,
                   "MODBUSSERVER_FRAME_BYTES is 32 to 256");
-    static_assert(sizeof(ModbusUnit) == sizeof(mbm_unit), "an array of ModbusUnit is an array of mbm_unit");
+    static_assert(sizeof(ModbusUnit) == sizeof(mbm_unit),
+                  "an array of ModbusUnit is an array of mbm_unit");
 
     enum : uint8_t { shortWait = 100 }; // microseconds
 
@@ -268,7 +284,6 @@ private:
         uint32_t receivedAt; // microseconds: when the last byte was read
         uint32_t silence;
         bool ready; // a response waits for the silence to end
-        bool rtu;
         mbm_server server;
         uint8_t frame[MODBUSSERVER_FRAME_BYTES];
     };
@@ -281,28 +296,39 @@ private:
     ModbusTransmissionHook &postHookOf() { return state.onPost; }
 
     uint8_t listen(uint8_t (*beginFraming)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t,
-                                         uint8_t *, uint16_t),
+                                           uint8_t *, uint16_t),
                    ModbusUnit &first, uint8_t count, Stream &stream)
     {
-        const mbm_port port = modbusPort(&state, readHook, writeHook, clockHook, flushHook,
-                                         preHook, postHook);
+        const mbm_port port =
+            modbusPort(&state, readHook, writeHook, clockHook, flushHook, preHook, postHook);
         uint8_t status = beginFraming(&state.server, &port, &first.unit, count, state.frame,
-                             MODBUSSERVER_FRAME_BYTES);
+                                      MODBUSSERVER_FRAME_BYTES);
         if (status == MBM_OK) {
             state.stream = &stream;
             state.silence = 0;
             state.ready = false;
-            state.rtu = false;
         }
         return status;
     }
     uint8_t beginRtu(ModbusUnit &first, uint8_t count, Stream &stream, uint32_t baud)
     {
         uint8_t status = listen(mbm_server_beginRtu, first, count, stream);
-        if (status == MBM_OK) {
-            state.rtu = true;
+        if (status == MBM_OK)
             setBaudRate(baud);
-        }
+        return status;
+    }
+
+    // A Stream with setRxFIFOFull, and any other.
+    template <typename Port>
+    static auto setThreshold(Port &port, int) -> decltype(port.setRxFIFOFull(1), void())
+    {
+        port.setRxFIFOFull(1);
+    }
+    template <typename Port> static void setThreshold(Port &, long) {}
+    template <typename Port> static uint8_t receiveAtOnce(Port &port, uint8_t status)
+    {
+        if (status == MBM_OK)
+            setThreshold(port, 0);
         return status;
     }
 

@@ -326,6 +326,8 @@ fn compare_with_model(edges: &'static [usize]) {
         services.extend(discrete_tables.iter_mut().map(|t| t as &mut dyn Service));
         let info = Indication {
             to: 17,
+            // As in Modbus TCP: on a line no function code from 0x80 on is answered.
+            head: 7,
             length: pdu.len() as u16,
             space: 253,
             ..Indication::NONE

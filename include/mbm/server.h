@@ -656,9 +656,9 @@ uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table)
  */
 typedef struct mbm_server {
     /** Private. */
-    void *pointers[14];
+    void *pointers[16];
     /** Private. */
-    uint32_t words[8];
+    uint32_t words[10];
 } mbm_server;
 
 /**
@@ -794,8 +794,8 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
 
 /**
  * Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
- * 2.5.1.1). It does not change the rate of the line. Other framings do not use t3.5: see
- * mbm_server_setSilence.
+ * 2.5.1.1), and how long missing bytes of a request take. It does not change the rate of the
+ * line. Other framings do not use t3.5: see mbm_server_setSilence.
  *
  * @param server  the object
  * @param baud    bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
@@ -804,12 +804,28 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
 uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
 
 /**
- * Sets whether the server discards its own echo: on an RTU line whose receiver also
- * receives what the driver sends, the server then drops as many bytes after each
- * response as it has sent. mbm_server_beginRtu switches it off.
+ * Sets how long a UART or an adapter may hold received bytes back on an RTU line: the latency
+ * timer of a USB adapter, the threshold of a FIFO, the tick of a scheduler. If a request to one
+ * of the units lacks bytes that its first bytes announce, the server waits for as long as the
+ * missing bytes and ten more take at the baud rate, and for this time, since the last byte. A
+ * longer time does not delay complete requests. The begin functions restore the default.
+ *
+ * @param server     the object
+ * @param latencyMs  0 to 65535 ms; 50 ms after a begin function
+ * @return a status
+ */
+uint8_t mbm_server_setReceiveLatency(struct mbm_server *server, uint16_t latencyMs);
+
+/**
+ * Says whether the receiver of an RTU line gets what the driver sends (a local echo). Without
+ * this call the server finds out: it drops a frame that is byte for byte its last response,
+ * until another frame, or none in time, has followed a response. A client whose very first
+ * requests are the same write again and again, each less than 60 ms after the response, then
+ * loses some of them: say that there is no echo. mbm_server_beginRtu takes the answer back.
  *
  * @param server  the object
- * @param on      0 for off, the default; anything else for on
+ * @param on      0: there is none, so no request is taken for it; anything else: there is one,
+ *                so the server drops as many bytes after each response as it has sent
  * @return a status; MBM_INVALID_ARGUMENT for other framings
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);

@@ -7,7 +7,7 @@ use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp};
 use crate::pdu::custom::Function;
-use crate::pdu::functions::DIAGNOSTICS;
+use crate::pdu::functions::{DIAGNOSTICS, ENCAPSULATED_INTERFACE_TRANSPORT};
 use crate::pdu::length::{self, Length};
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
@@ -26,6 +26,9 @@ const ASCII_TIMEOUT: u32 = time::millis(1000);
 
 /// Longest time between two bytes of an RTU frame in a TCP stream.
 const STREAM_TIMEOUT: u32 = time::millis(500);
+
+/// Bytes of the RTU response to a write, which repeats address and value or quantity.
+const ECHOED: usize = 8;
 
 /// Bytes of the shortest TCP frame.
 const MIN_TCP: usize = tcp::PDU + 1;
@@ -62,7 +65,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         // If the buffer is too short for any frame, this wraps. `Server::pdu` is then empty.
         let space = self.storage.capacity().wrapping_sub(rtu::OVERHEAD);
         self.begin(1, space, Self::receive_rtu, Self::encode_rtu);
-        self.set_silence(time::DEFAULT_SILENCE);
+        self.silence = time::DEFAULT_SILENCE;
         self.request.own = SERIAL;
     }
 
@@ -90,30 +93,113 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.set_silence(0);
     }
 
-    /// Receives an RTU frame, which is the bytes between two silences. If poll is called late, the
-    /// buffer may hold several frames. Then the last one counts: the client no longer waits for
-    /// the response to an earlier one.
+    /// Receives an RTU frame. It ends with a silence after its last byte. A silence inside a request
+    /// to one of the server's units does not end it, because a UART or an adapter may hand bytes
+    /// over in blocks: see [`Server::waits_for_rest`]. If poll is called late, the buffer may hold
+    /// several frames. Then the last one counts: the client no longer waits for the response to
+    /// an earlier one.
     fn receive_rtu(&mut self) -> Status {
+        let end = self.end;
+        let is_silent = (end | self.sent) != 0 && self.is_silent();
+        if is_silent && end == 0 {
+            self.give_up_echo();
+        }
         let received = self.read_bytes(usize::MAX);
         if received > 0 {
             return Status::OK;
         }
-        self.receive_no_more(received)
-    }
-
-    /// Handles a port that returned no byte: if the silence is long enough, the frame has ended.
-    #[cfg_attr(target_os = "none", inline(always))]
-    fn receive_no_more(&mut self, received: i16) -> Status {
         if received < 0 {
             return Status::LINK_LOST;
         }
-        if self.end == 0 || !self.is_silent() {
+        if end == 0 || !is_silent {
             return Status::OK;
         }
-        self.last_frame()
+        self.end_of_block(&B::serves)
     }
 
-    /// As [`Server::receive_no_more`], for the framings other than RTU. It is not inlined.
+    /// Handles a silence after received bytes, with which a frame or a block of it ends. `serves`
+    /// says which units the server has. As [`Server::look`].
+    ///
+    /// If the bytes are part of a request to a unit of the server, whose other bytes have not
+    /// arrived, the server waits for them for as long as they take, and drops the bytes before the
+    /// request. But a frame that stands for itself ends the wait, because a client has begun anew
+    /// after it has cut a request off.
+    #[cfg_attr(target_os = "none", inline(always))]
+    pub(super) fn end_of_block(&mut self, serves: &impl Fn(&B, u8) -> bool) -> Status {
+        let end = usize::from(self.end);
+        let frame = self.find_last();
+        if self.missing == 0 {
+            let echo = self.echo.to_bytes();
+            let is_end = match self.storage.part(0, end) {
+                [.., low, high] => [*low, *high] == echo,
+                _ => false,
+            };
+            if is_end && self.drops_echo() {
+                return Status::OK;
+            }
+            let mut start = 0;
+            while start <= frame && start < end {
+                let total = self.announced(start, serves);
+                if total > end - start {
+                    if frame < end && self.announced(frame, serves) == end - frame {
+                        break;
+                    }
+                    self.missing = (total - (end - start)) as u16;
+                    self.keep(start);
+                    self.crc = Crc16::START.with(self.storage.part(0, end - start));
+                    return Status::OK;
+                }
+                start += 1;
+            }
+        }
+        self.keep(frame);
+        let status = self.found_frame();
+        if self.request.length != 0 {
+            self.give_up_echo();
+            let length = usize::from(self.end);
+            let count = usize::from(self.storage.byte(rtu::PDU + 1));
+            let announced = self.announced(0, serves);
+            // The length is that of a response, and not the one of a request.
+            self.request.is_response = announced != 0
+                && announced != length
+                && (length == ECHOED || length == rtu::OVERHEAD + 2 + count);
+        }
+        status
+    }
+
+    /// The length of the frame of a request whose first bytes are in the buffer from `start` on,
+    /// as they announce it: that of the longest frame if its byte count is missing. 0 if they are no
+    /// request to a unit of the server, or if only silence ends it. (The rules of
+    /// [`length::request`] in the form that takes the least flash.)
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn announced(&mut self, start: usize, serves: &impl Fn(&B, u8) -> bool) -> usize {
+        let unit = self.storage.byte(start);
+        if !serves(&self.storage, unit) {
+            return 0;
+        }
+        let known = usize::from(self.end) - start;
+        if known == 1 {
+            return rtu::MAX_FRAME;
+        }
+        let offset = match self.storage.byte(start + 1) {
+            // Return Query Data may be longer.
+            1..=6 | DIAGNOSTICS => return 8,
+            7 | 0x0B | 0x0C | 0x11 => return 4,
+            0x16 => return 10,
+            0x18 => return 6,
+            ENCAPSULATED_INTERFACE_TRANSPORT => return 7,
+            0x0F | 0x10 => 6,
+            0x14 | 0x15 => 2,
+            0x17 => 10,
+            _ => return 0,
+        };
+        if offset >= known {
+            return rtu::MAX_FRAME;
+        }
+        offset + rtu::OVERHEAD + usize::from(self.storage.byte(start + offset))
+    }
+
+    /// As the end of [`Server::receive_rtu`], for the framings other than RTU. It is not inlined.
     fn receive_no_more_not_inlined(&mut self, received: i16) -> Status {
         if received < 0 {
             return Status::LINK_LOST;
@@ -136,9 +222,10 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.request.is_serial() && self.encode_adu.is_some_and(is_rtu)
     }
 
-    /// Switches the discarding of the echo on or off. It is needed if the receiver gets the bytes
-    /// that the driver sends: the server then drops as many bytes as it sent. Returns false if
-    /// this is not an RTU line. (This is a function of its own, so that only programs that call
+    /// Says whether the receiver gets the bytes that the driver sends. If so, the server drops as many
+    /// bytes as it sent. If not, no request is ever taken for an echo. Without this call, the server
+    /// drops a frame that is byte for byte its last response, unless another frame has followed a
+    /// response before. Returns false if this is not an RTU line. (This is a function of its own, so that only programs that call
     /// it contain it.)
     pub fn set_echo_discard(&mut self, on: bool) -> bool {
         let without_echo: Receive<P, B> = Self::receive_rtu;
@@ -147,6 +234,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         if is_rtu {
             self.receive = Some(if on { after_echo } else { without_echo });
             self.sent = 0;
+            self.has_no_echo = !on;
         }
         is_rtu
     }
@@ -160,6 +248,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         // This is the first poll after the response: the wait for the echo begins.
         if !self.resyncing {
             self.resyncing = true;
+            self.missing = 0;
             self.last_byte = self.now;
         }
         let received = self.read_bytes_not_inlined(self.sent.into());
@@ -197,14 +286,31 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Moves the last frame of the received bytes to the front. Any other bytes are dropped.
     #[inline(always)]
     fn last_frame(&mut self) -> Status {
-        let mut length = usize::from(self.end);
-        if !self.crc.is_residue() || self.request.overrun {
-            let start = rtu::find_last(self.storage.part(0, length));
-            self.storage.keep(start, length);
-            length -= start;
+        let start = self.find_last();
+        self.keep(start);
+        self.found_frame()
+    }
+
+    /// Index of the last frame of the received bytes, or of their end.
+    #[inline(always)]
+    fn find_last(&mut self) -> usize {
+        if self.crc.is_residue() && !self.request.overrun {
+            return 0;
         }
-        // If there is no frame, no bytes are left.
-        length = length.wrapping_sub(rtu::OVERHEAD);
+        rtu::find_last(self.storage.part(0, self.end.into()))
+    }
+
+    /// Drops the received bytes before `start`.
+    fn keep(&mut self, start: usize) {
+        let end = usize::from(self.end);
+        self.storage.keep(start, end);
+        self.end = (end - start) as u16;
+    }
+
+    /// The received bytes are a frame, or none are left.
+    #[inline(always)]
+    fn found_frame(&mut self) -> Status {
+        let mut length = usize::from(self.end).wrapping_sub(rtu::OVERHEAD);
         if length > MAX_PDU {
             length = 0;
         }
@@ -267,7 +373,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     fn encode_rtu(&mut self, length: usize) -> usize {
         let end = rtu::PDU + length;
-        let crc = Crc16::START.with(self.storage.part(0, end)).to_bytes();
+        self.echo = Crc16::START.with(self.storage.part(0, end));
+        let crc = self.echo.to_bytes();
         if let [low, high] = self.storage.part(end, end + 2) {
             [*low, *high] = crc;
         }
@@ -277,6 +384,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Receives an ASCII frame. Reads byte by byte, because each colon begins a new frame, and
     /// the bytes after a frame belong to the next frame.
     fn receive_ascii(&mut self) -> Status {
+        if self.sent != 0 && self.end == 0 && self.is_silent() {
+            self.give_up_echo();
+        }
         for _ in 0..MAX_BYTES_PER_POLL {
             let end = usize::from(self.end);
             if end == self.storage.capacity() {
@@ -308,11 +418,19 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                 CharacterKind::Inside if end == 0 => self.end = 0,
                 CharacterKind::Inside => {}
                 CharacterKind::End => {
+                    self.end = end as u16 + 1;
+                    let crc = Crc16::START.with(self.storage.part(0, end + 1));
+                    if crc == self.echo && self.drops_echo() {
+                        return Status::OK;
+                    }
                     let frame = self.storage.part(0, end + 1);
                     let length = match ascii::decode(frame, delimiter, true) {
                         Decoded::Valid(content) => content - 1,
                         _ => 0,
                     };
+                    if length != 0 {
+                        self.give_up_echo();
+                    }
                     return self.found(length.into());
                 }
             }
@@ -329,7 +447,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             self.delimiter = character;
         }
         let frame = self.storage.frame();
-        ascii::emit(frame, unit, delimiter, |_| Ok(length)).unwrap_or(0)
+        let total = ascii::emit(frame, unit, delimiter, |_| Ok(length)).unwrap_or(0);
+        self.echo = Crc16::START.with(self.storage.part(0, total));
+        total
     }
 
     /// Receives a TCP frame. Reads only one frame from the stream, so that its response can use
@@ -388,5 +508,57 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             [*high, *low] = tcp::length(length);
         }
         tcp::PDU + length
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Silent;
+
+    impl Port for Silent {
+        fn read(&mut self, _: &mut [u8]) -> Result<usize, Error> {
+            Ok(0)
+        }
+
+        fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
+            Ok(bytes.len())
+        }
+
+        fn micros(&mut self) -> u32 {
+            0
+        }
+    }
+
+    #[test]
+    fn the_announced_length_of_a_request_is_that_of_its_function() {
+        for code in 0..=u8::MAX {
+            for second in [0u8, 1, 0x0D, 0x0E] {
+                for known in 1..=13 {
+                    let mut frame = [17, code, 0, second, 0, 0, 4, 0, 0, 0, 6, 0, 0];
+                    if code == ENCAPSULATED_INTERFACE_TRANSPORT {
+                        frame[2] = second;
+                    }
+                    let mut server = Server::new(Silent, frame);
+                    server.end = known as u16;
+                    let announced = server.announced(0, &|_, unit| unit == 17);
+                    assert_eq!(server.announced(0, &|_, _| false), 0);
+                    let whole = match length::request(&frame[1..known], &[]) {
+                        Length::Exactly(length) => length + rtu::OVERHEAD,
+                        // A function of one length is known by its code.
+                        Length::AtLeast(_) => {
+                            assert!(announced > known, "{frame:02X?}, {known}");
+                            continue;
+                        }
+                        // Silence ends them, but they are not shorter than that.
+                        Length::Silence if code == DIAGNOSTICS => 8,
+                        Length::Silence => 7,
+                        Length::Unknown => 0,
+                    };
+                    assert_eq!(announced, whole, "{frame:02X?}, {known}");
+                }
+            }
+        }
     }
 }

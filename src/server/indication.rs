@@ -1,7 +1,9 @@
 //! Which unit a received frame is addressed to.
 
 use super::table::MachineByte;
+use crate::frame::rtu;
 use crate::pdu::functions::{self, Direction};
+use crate::pdu::EXCEPTION;
 
 /// The address and the position of a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -22,6 +24,8 @@ pub struct Indication {
     /// The exception code if no service of the unit answers: 01, or 02 as soon as a service has
     /// returned [`Reply::ABSENT`](super::Reply::ABSENT).
     pub refusal: u8,
+    /// On an RTU line: the frame has the length of a response, not of a request.
+    pub is_response: bool,
     /// Length of the PDU; 0 if the frame is damaged.
     pub length: u16,
     /// Greatest length of the response PDU.
@@ -69,6 +73,7 @@ impl Indication {
         head: 1,
         again: false,
         refusal: 1,
+        is_response: false,
         length: 0,
         space: 0,
     };
@@ -76,22 +81,31 @@ impl Indication {
     /// How the frame, with this function code, addresses the unit that its id names.
     #[inline]
     pub const fn addressing(&self, function: u8) -> Addressing {
-        match self.addressing_of_all() {
+        match self.addressing_of_all(function) {
             Addressing::BROADCAST if !only_writes(function) => Addressing::FOREIGN,
             addressing => addressing,
         }
     }
 
-    /// As [`Indication::addressing`], whatever the function code.
+    /// As [`Indication::addressing`], but services drop a broadcast of a function that reads.
     #[inline(always)]
-    pub const fn addressing_of_all(&self) -> Addressing {
-        if self.length == 0 {
+    pub const fn addressing_of_all(&self, function: u8) -> Addressing {
+        if self.length == 0 || self.is_from_server(function) {
             Addressing::FOREIGN
         } else if self.is_broadcast() {
             Addressing::BROADCAST
         } else {
             Addressing::OWN
         }
+    }
+
+    /// True for a response, whose sender is another server, or this one, if its receiver gets what
+    /// the driver sends. It is never answered. The function codes from 80 (hex) on are those of
+    /// exception responses (application protocol V1.1b3, 4.1). In Modbus TCP each client has a
+    /// connection of its own, so there it is a request that is not valid.
+    #[inline(always)]
+    const fn is_from_server(&self, function: u8) -> bool {
+        self.is_response || function & EXCEPTION != 0 && self.head as usize == rtu::PDU
     }
 
     /// True if the frame is a broadcast.

@@ -18,6 +18,14 @@ use crate::time::{self, elapsed};
 /// Time until the next poll if only the port or a service can bring progress.
 const EXTERNAL_POLL_DELAY: u32 = time::millis(1);
 
+/// The default of [`Server::set_receive_latency`] in microseconds: the 16 ms of a USB adapter, on a host
+/// whose clock tick or load adds some more. It is shorter than the response timeout of a client.
+const RECEIVE_LATENCY: u32 = time::millis(50);
+
+/// For how many characters a UART with a FIFO waits, after the last one, before it hands over
+/// fewer bytes than it usually does (ESP32: 10).
+const FIFO_TIMEOUT: u16 = 10;
+
 /// The storage that the caller supplies for a server.
 pub trait ServerStorage {
     /// The frame buffer. It holds a request, then its response.
@@ -45,8 +53,14 @@ pub trait ServerStorage {
         move_to_front(self.part(0, end), start);
     }
 
-    /// The length rule for requests of a user-defined function. Framings without silence need
-    /// it.
+    /// True if the server serves this unit. On an RTU line it waits for the rest of a request to
+    /// such a unit. [`Server::serve`] also asks [`Units::has`].
+    fn serves(&self, unit: u8) -> bool {
+        let _ = unit;
+        true
+    }
+
+    /// The length rule for requests of a user-defined function.
     fn rule(&self, function: u8) -> Option<Rule> {
         let _ = function;
         None
@@ -91,8 +105,11 @@ pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 pub struct Server<P, B> {
     pub(super) phase: ServerPhase,
     /// In a stream of RTU frames: the received bytes are not a frame of known length. With echo
-    /// discard: the wait for the echo has begun.
+    /// discard: the wait for the echo has begun. While a response is sent on a serial line: its
+    /// echo is not expected.
     pub(super) resyncing: bool,
+    /// A response of the server was not the next frame that it received: the line has no echo.
+    pub(super) has_no_echo: bool,
     /// The end character of ASCII frames.
     pub(super) delimiter: u8,
     /// Over TCP: how many bytes of the next frame are stored in `last_byte`.
@@ -101,9 +118,16 @@ pub struct Server<P, B> {
     pub(super) crc: Crc16,
     /// Index in the buffer after the received bytes, or after the response to send.
     pub(super) end: u16,
-    /// How many bytes of the response were sent; with echo discard, then how many of them may
-    /// still come back.
+    /// How many bytes of the response were sent; then, on a serial line, how many of them may
+    /// come back as an echo.
     pub(super) sent: u16,
+    /// The CRC of the response that may come back. In ASCII it is that of its characters.
+    pub(super) echo: Crc16,
+    /// On an RTU line: how many bytes the received bytes lack that begin a request; 0 if they end
+    /// with [`Server::silence`]. On any serial line 1 while a response may come back.
+    pub(super) missing: u16,
+    /// On an RTU line: the length of a character in microseconds.
+    pub(super) character: u16,
     /// The request that was found last.
     pub request: Indication,
     /// Time at which the last byte arrived; see [`Server::keeps_time`].
@@ -113,6 +137,8 @@ pub struct Server<P, B> {
     pub(super) now: u32,
     /// The silence that ends a frame. Set it with [`Server::set_silence`].
     pub silence: u32,
+    /// See [`Server::set_receive_latency`].
+    pub(super) receive_latency: u32,
     pub(super) receive: Option<Receive<P, B>>,
     pub(super) encode_adu: Option<EncodeAdu<P, B>>,
     /// The byte stream.
@@ -125,15 +151,20 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         Server {
             phase: ServerPhase::Listen,
             resyncing: false,
+            has_no_echo: false,
             delimiter: ascii::END,
             read_ahead: 0,
             crc: Crc16::START,
             end: 0,
             sent: 0,
+            echo: Crc16::START,
+            missing: 0,
+            character: time::DEFAULT_CHARACTER,
             request: Indication::NONE,
             last_byte: 0,
             now: 0,
             silence: time::DEFAULT_SILENCE,
+            receive_latency: RECEIVE_LATENCY,
             receive: None,
             encode_adu: None,
             storage,
@@ -165,10 +196,15 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     ) {
         self.request.head = head;
         self.request.own = STREAM;
+        self.request.is_response = false;
         self.request.space = space as u16;
         self.receive = Some(receive);
         self.encode_adu = Some(encode_adu);
         self.request.again = true;
+        self.has_no_echo = false;
+        self.sent = 0;
+        self.character = time::DEFAULT_CHARACTER;
+        self.receive_latency = RECEIVE_LATENCY;
         self.listen();
     }
 
@@ -184,10 +220,19 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.silence = time::clamped(microseconds);
     }
 
-    /// Sets the silence that ends an RTU frame, t3.5, from the baud rate in bits per second; 0 means
-    /// that the rate is unknown. Set it after [`Server::with_framing`].
+    /// Sets the silence that ends an RTU frame, t3.5, and the time that missing bytes take, from
+    /// the baud rate in bits per second; 0 means that the rate is unknown, and counts as 9600. Set
+    /// it after [`Server::with_framing`].
     pub fn set_baud_rate(&mut self, baud: u32) {
         self.silence = time::silence(baud);
+        self.character = time::character(baud);
+    }
+
+    /// Sets how long the UART or an adapter may hold received bytes back on a serial line, in
+    /// milliseconds; 50 at first. If a request to a unit of the server lacks bytes that it announces,
+    /// the server waits for the time of those bytes and ten more at the baud rate, and for this time.
+    pub fn set_receive_latency(&mut self, milliseconds: u16) {
+        self.receive_latency = time::millis(milliseconds);
     }
 
     /// Waits for the next request.
@@ -195,6 +240,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     pub(super) fn listen(&mut self) {
         self.phase = ServerPhase::Listen;
         self.end = 0;
+        self.missing = 0;
         self.request.overrun = false;
         self.resyncing = false;
         self.crc = Crc16::START;
@@ -271,6 +317,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         let received = self.port.read_count(self.storage.part(start, until));
         if received > 0 {
             self.last_byte = self.now;
+            self.missing = 0;
             if start != end {
                 start = self.drop_oldest();
             }
@@ -292,7 +339,17 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// True if the line has been silent for long enough to end a frame.
     pub(super) fn is_silent(&self) -> bool {
-        time::has_elapsed(self.silence, self.now, self.last_byte)
+        time::has_elapsed(self.longest_pause(), self.now, self.last_byte)
+    }
+
+    /// How long the line is silent before the received bytes are all that arrive.
+    fn longest_pause(&self) -> u32 {
+        match self.missing {
+            0 => self.silence,
+            missing => {
+                u32::from(missing + FIFO_TIMEOUT) * u32::from(self.character) + self.receive_latency
+            }
+        }
     }
 
     /// Microseconds from `now` for which poll has nothing to do unless the port has bytes to read.
@@ -303,7 +360,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         match self.phase {
             ServerPhase::Listen if self.request.again => 0,
             ServerPhase::Listen if self.end == 0 || !self.keeps_time() => u32::MAX,
-            ServerPhase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
+            ServerPhase::Listen => self
+                .longest_pause()
+                .saturating_sub(elapsed(now, self.last_byte)),
             // On a serial line, neither the next byte nor switching off the driver may be late.
             ServerPhase::Send if self.request.is_serial() => 0,
             _ => EXTERNAL_POLL_DELAY,
@@ -342,7 +401,13 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// # Errors
     /// As [`Server::poll`].
     pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Result<(), Error> {
-        match self.look(now) {
+        let was_missing = self.missing;
+        let mut status = self.look(now);
+        if was_missing == 0 && self.missing != 0 {
+            self.missing = 0;
+            status = self.end_of_block(&|_, unit| units.has(unit));
+        }
+        match status {
             Status::PENDING => {
                 let info = self.request;
                 let reply = units.serve(&info, self.pdu());
@@ -373,6 +438,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         let length = reply.write_served_exception(self.storage.part(head, head + 2));
         match self.encode_adu {
             Some(encode_adu) if length != 0 => {
+                // On a line without an echo, the same bytes are the same write again.
+                self.resyncing = self.has_no_echo && length == usize::from(self.request.length);
                 self.end = encode_adu(self, length) as u16;
                 self.sent = 0;
                 self.phase = ServerPhase::Send;
@@ -404,6 +471,36 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     fn end_transmission(&mut self) {
         self.port.post_transmission();
+        if self.request.is_serial() {
+            if self.resyncing {
+                self.sent = 0;
+            }
+            self.last_byte = self.now;
+        }
         self.listen();
+        // It is the echo that is missing.
+        self.missing = 1;
+    }
+
+    /// After bytes that end as the last response. If they are as long as it, and no other frame has
+    /// arrived since: drops them, because the receiver gets what the driver sends, and returns
+    /// true.
+    #[inline(always)]
+    pub(super) fn drops_echo(&mut self) -> bool {
+        if self.sent == 0 || self.end < self.sent {
+            return false;
+        }
+        self.sent = 0;
+        self.has_no_echo = false;
+        self.listen();
+        true
+    }
+
+    /// After another frame than the echo, or none in time: the line has none.
+    pub(super) fn give_up_echo(&mut self) {
+        if self.sent != 0 {
+            self.sent = 0;
+            self.has_no_echo = true;
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Units: find the unit that a request is addressed to, and let its services serve it.
 
 use super::diagnostics::Diagnostics;
+use super::indication::ANY;
 use super::{Addressing, Indication, Reply};
 use core::fmt;
 
@@ -22,6 +23,13 @@ pub trait Service {
 pub trait Units {
     /// Serves a frame, whichever unit it is addressed to. Its PDU is at the front of `pdu`.
     fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply;
+
+    /// True if one of them has this id, and for 0, the address of a broadcast. A server on an RTU
+    /// line waits for the rest of a request to such a unit, but not for that of another frame.
+    fn has(&self, unit: u8) -> bool {
+        let _ = unit;
+        true
+    }
 }
 
 /// One unit: its id and its services.
@@ -174,5 +182,9 @@ impl Units for [Unit<'_>] {
         let all = info.addressing(pdu.first().copied().unwrap_or(0));
         let units = self.iter_mut();
         dispatch(&mut Slice { units, info, pdu }, all)
+    }
+
+    fn has(&self, unit: u8) -> bool {
+        unit == 0 || self.iter().any(|known| known.id == unit || known.id == ANY)
     }
 }

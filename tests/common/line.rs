@@ -21,8 +21,12 @@ pub struct Wire {
     pub sent: Vec<(u32, Vec<u8>)>,
     pub driver: bool,
     pub flushed: bool,
-    /// Sent bytes are received again at once.
+    /// Sent bytes are received again, at once or `echo_late` microseconds later, after `glitch` and
+    /// with these bits of the first byte changed.
     pub echo: bool,
+    pub echo_late: u32,
+    pub echo_damage: u8,
+    pub glitch: Vec<u8>,
     /// How many bytes the port accepts at once; 0: all.
     pub piece: usize,
     pub lost: bool,
@@ -66,8 +70,11 @@ impl Port for Tap {
         wire.flushed = false;
         wire.sent.last_mut().unwrap().1.extend(&bytes[..count]);
         if wire.echo {
+            let at = now.wrapping_add(wire.echo_late);
+            let mut echo = [&wire.glitch[..], &bytes[..count]].concat();
+            echo[0] ^= wire.echo_damage;
             wire.arriving
-                .extend(bytes[..count].iter().map(|byte| (now, *byte)));
+                .extend(echo.into_iter().map(|byte| (at, byte)));
         }
         Ok(count)
     }
@@ -104,7 +111,7 @@ impl Line {
         wire.borrow_mut().now = 0xFFFF_0000;
         let mut server = Server::with_framing(framing, tap, [0; 600]);
         if framing == Framing::Rtu {
-            server.set_silence(SILENCE);
+            server.set_baud_rate(19_200);
         }
         Line {
             wire,

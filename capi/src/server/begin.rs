@@ -7,7 +7,6 @@ use crate::framing::MBM_MAX_TCP_FRAME;
 use crate::pointers::{check, object, with_hooks, zero_on_host, CObject, BEGUN, IN_HOOK};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
-use mbm::time;
 
 /// The shortest frame buffer for RTU, in bytes.
 const MIN_FRAME: u16 = 16;
@@ -201,8 +200,8 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceU
 }
 
 /// Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
-/// 2.5.1.1). It does not change the rate of the line. Other framings do not use t3.5: see
-/// mbm_server_setSilence.
+/// 2.5.1.1), and how long missing bytes of a request take. It does not change the rate of the
+/// line. Other framings do not use t3.5: see mbm_server_setSilence.
 ///
 /// @param server  the object
 /// @param baud    bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
@@ -211,7 +210,7 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceU
 pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u32) -> u8 {
     match check(server) {
         Status::OK if (*object(server)).is_rtu_line() => {
-            (*object(server)).set_silence(time::silence(baud));
+            (*object(server)).set_baud_rate(baud);
             Status::OK.code()
         }
         Status::OK => Status::INVALID_ARGUMENT.code(),
@@ -219,12 +218,39 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
     }
 }
 
-/// Sets whether the server discards its own echo: on an RTU line whose receiver also
-/// receives what the driver sends, the server then drops as many bytes after each
-/// response as it has sent. mbm_server_beginRtu switches it off.
+/// Sets how long a UART or an adapter may hold received bytes back on an RTU line: the latency
+/// timer of a USB adapter, the threshold of a FIFO, the tick of a scheduler. If a request to one
+/// of the units lacks bytes that its first bytes announce, the server waits for as long as the
+/// missing bytes and ten more take at the baud rate, and for this time, since the last byte. A
+/// longer time does not delay complete requests. The begin functions restore the default.
+///
+/// @param server     the object
+/// @param latencyMs  0 to 65535 ms; 50 ms after a begin function
+/// @return a status
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_setReceiveLatency(
+    server: *mut mbm_server,
+    latencyMs: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let status = check(server);
+        if status == Status::OK {
+            (*object(server)).set_receive_latency(latencyMs);
+        }
+        status.code()
+    }
+}
+
+/// Says whether the receiver of an RTU line gets what the driver sends (a local echo). Without
+/// this call the server finds out: it drops a frame that is byte for byte its last response,
+/// until another frame, or none in time, has followed a response. A client whose very first
+/// requests are the same write again and again, each less than 60 ms after the response, then
+/// loses some of them: say that there is no echo. mbm_server_beginRtu takes the answer back.
 ///
 /// @param server  the object
-/// @param on      0 for off, the default; anything else for on
+/// @param on      0: there is none, so no request is taken for it; anything else: there is one,
+///                so the server drops as many bytes after each response as it has sent
 /// @return a status; MBM_INVALID_ARGUMENT for other framings
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: u8) -> u8 {

@@ -51,9 +51,9 @@ use mbm::server::{Reply, ServerStorage};
 #[repr(C)]
 pub struct mbm_server {
     /// Private.
-    pointers: [*mut c_void; 14],
+    pointers: [*mut c_void; 16],
     /// Private.
-    words: [u32; 8],
+    words: [u32; 10],
 }
 
 /// The real content of an `mbm_server`.
@@ -107,6 +107,11 @@ impl ServerStorage for ServerBuffers {
                 left -= 1;
             }
         }
+    }
+
+    fn serves(&self, unit: u8) -> bool {
+        // SAFETY: as for `rule`.
+        unsafe { units::have(self.units, self.count, unit) }
     }
 
     fn rule(&self, function: u8) -> Option<Rule> {

@@ -290,6 +290,19 @@ pub(crate) unsafe fn have_ids(units: *const mbm_unit, count: u8) -> bool {
     (0..count).all(|index| unsafe { (*units.add(index.into())).id <= u8::MAX.into() })
 }
 
+/// True if one of the units answers this id, and for 0, the address of a broadcast.
+///
+/// # Safety
+/// `units` points to `count` units.
+pub(super) unsafe fn have(units: *const mbm_unit, count: u8, id: u8) -> bool {
+    // SAFETY: as the caller promises.
+    let is_it = |index: u8| match unsafe { (*units.add(index.into())).id } {
+        0 => true,
+        known => known == u16::from(id),
+    };
+    id == 0 || (0..count).any(is_it)
+}
+
 /// Passes a frame to each unit. The first unit that it addresses answers.
 ///
 /// # Safety
@@ -301,8 +314,9 @@ pub(super) unsafe fn serve(
     info: *const Indication,
     pdu: *mut u8,
 ) -> usize {
-    // SAFETY: as the caller promises.
-    let all = unsafe { (*info).addressing_of_all() };
+    // SAFETY: as the caller promises. The PDU has space for a function code, even after a damaged
+    // frame.
+    let all = unsafe { (*info).addressing_of_all(*pdu) };
     let mut frame = UnitsForFrame {
         unit: units,
         left: count,

@@ -69,7 +69,7 @@ fn poll(w: &World) {
 fn set(w: &World) {
     let server = w.servers.pick(w);
     let spans = [span(server)];
-    refused_changes_nothing(w, &spans, "mbm_server_set", || match w.byte() % 3 {
+    refused_changes_nothing(w, &spans, "mbm_server_set", || match w.byte() % 4 {
         0 => {
             let time = w.long();
             call!(w, server, mbm_server_setSilence(server, time))
@@ -77,6 +77,10 @@ fn set(w: &World) {
         1 => {
             let baud = w.long();
             call!(w, server, mbm_server_setBaudRate(server, baud))
+        }
+        2 => {
+            let time = w.long() as u16;
+            call!(w, server, mbm_server_setReceiveLatency(server, time))
         }
         _ => {
             let on = w.byte() & 3;
