@@ -396,6 +396,8 @@ static void use_link(line *l)
         OK(mbm_link_setRequestsWait(l->link, byte_below(2)));
         OK(mbm_link_setBackoff(l->link, byte_below(4), (uint16_t)below(200), 400));
         OK(mbm_link_setConnectTimeout(l->link, (uint16_t)(1 + below(300))));
+        if (below(2))
+            OK(mbm_link_setReplaceAfter(l->link, byte_below(101)));
         break;
     case 2:
         if (!l->has_link || mbm_link_end(l->link) != MBM_OK)

@@ -524,6 +524,9 @@ static void a_link_has_the_limits_of_the_header(void **state)
     OK(mbm_link_setConnectTimeout(&link, 0));
     OK(mbm_link_setConnectTimeout(&link, 1000000));
     REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setConnectTimeout(&link, 1000001));
+    OK(mbm_link_setReplaceAfter(&link, 0));
+    OK(mbm_link_setReplaceAfter(&link, 100));
+    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setReplaceAfter(&link, 101));
     OK(mbm_link_setBackoff(&link, MBM_BACKOFF_NONE, 1000000, 1000000));
     REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setBackoff(&link, 4, 1, 1));
     REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setBackoff(&link, 1, 1000001, 1));

@@ -46,10 +46,11 @@ static mbm_tcp_listener listener = MBM_INIT;
 static unsigned long connected, reloads, refused_reloads;
 
 /* What the command line says, and what is in force: the same, or with what the file says. */
-static gateway_setup given = {.idleMs = 60000,
-                              .connections = CONNECTIONS,
-                              .requests = 8,
-                              .pace = {.timeoutMs = 1000, .quietMs = 100, .in_flight = 1}};
+static gateway_setup given = {
+    .idleMs = 60000,
+    .connections = CONNECTIONS,
+    .requests = 8,
+    .pace = {.timeoutMs = 1000, .quietMs = 100, .in_flight = 1, .replace_after = 2}};
 static gateway_setup setup;
 static const char *path;                /* of the file; NULL: the command line has the lines */
 static uint8_t place_of[GATEWAY_LINES]; /* the index in `lines` of each line of the setup */
@@ -386,7 +387,7 @@ static void print_summary(void)
 
 /* --- the command line --- */
 
-enum { CHECK = 0x100, IDLE, IN_FLIGHT, QUEUE_TIME, QUIET_TIME, REQUESTS, TIMEOUT };
+enum { CHECK = 0x100, IDLE, IN_FLIGHT, QUEUE_TIME, QUIET_TIME, REPLACE_AFTER, REQUESTS, TIMEOUT };
 
 /* Reads a word that is no option: FILE, or LISTEN and then LINE and UNITS by turns. */
 static void read_word(const struct argp_state *state, char *text)
@@ -425,6 +426,9 @@ static error_t parse(int key, char *text, struct argp_state *state)
         given.pace.in_flight =
             (uint32_t)options_number(state, "--in-flight", text, 1, MBM_CLIENT_DEPTH);
         return 0;
+    case REPLACE_AFTER:
+        given.pace.replace_after = (uint32_t)options_number(state, "--replace-after", text, 0, 100);
+        return 0;
     case IDLE: given.idleMs = options_time(state, "--idle", text, 0, 1000000000); return 0;
     case TIMEOUT:
         given.pace.timeoutMs = options_time(state, "--timeout", text, 1, UINT16_MAX);
@@ -460,6 +464,10 @@ static const struct argp_option texts[] = {
      1},
     {"in-flight", IN_FLIGHT, "N", 0,
      "Requests that are under way at once on a line tcp://, 1 to 16 (1)", 2},
+    {"replace-after", REPLACE_AFTER, "N", 0,
+     "Requests in a row without any byte after which the connection to a device is made anew, 0 to 100 "
+     "(2); 0 for never",
+     2},
     {"timeout", TIMEOUT, "TIME", 0,
      "How long a device may take to reply, and a connection to it to be made, up to 65s (1s)", 2},
     {"quiet-time", QUIET_TIME, "TIME", 0,

@@ -18,15 +18,16 @@ enum {
     TIMEOUT,
     QUIET_TIME,
     IN_FLIGHT,
+    REPLACE_AFTER,
     THE_LINES,
     GATEWAY_KEYS
 };
-static const char *const GATEWAY_NAMES[] = {"listen",     "connections", "requests",   "idle",
-                                            "queue_time", "timeout",     "quiet_time", "in_flight",
-                                            "lines",      NULL};
-enum { LINE, UNITS, LINE_TIMEOUT, LINE_QUIET_TIME, LINE_IN_FLIGHT, LINE_KEYS };
-static const char *const LINE_NAMES[] = {"line",       "units",     "timeout",
-                                         "quiet_time", "in_flight", NULL};
+static const char *const GATEWAY_NAMES[] = {
+    "listen",     "connections", "requests",      "idle",  "queue_time", "timeout",
+    "quiet_time", "in_flight",   "replace_after", "lines", NULL};
+enum { LINE, UNITS, LINE_TIMEOUT, LINE_QUIET_TIME, LINE_IN_FLIGHT, LINE_REPLACE_AFTER, LINE_KEYS };
+static const char *const LINE_NAMES[] = {"line",      "units",         "timeout", "quiet_time",
+                                         "in_flight", "replace_after", NULL};
 
 /* --- the map of units --- */
 
@@ -99,7 +100,7 @@ const char *gateway_setup_line(gateway_setup *to, const char *text)
     if (!to->lines[i].text)
         return "there is not enough memory";
     to->line_count++;
-    to->lines[i].pace = (gateway_pace){0, 0, 0};
+    to->lines[i].pace = (gateway_pace){0};
     wrong = place_read(&to->lines[i].place, to->lines[i].text, 0);
     if (!wrong && (to->lines[i].place.kind == PLACE_UDP || to->lines[i].place.kind == PLACE_TLS))
         wrong = "a line of a gateway is rtu:, ascii:, tcp:// or rtu+tcp://";
@@ -126,7 +127,8 @@ static int read_pace(yaml_file *file, const yaml_node_t *const *values, gateway_
 {
     return yaml_file_time(file, "timeout", values[0], 1, UINT16_MAX, &pace->timeoutMs) &&
            yaml_file_time(file, "quiet_time", values[1], 0, UINT16_MAX, &pace->quietMs) &&
-           yaml_file_number(file, "in_flight", values[2], 1, MBM_CLIENT_DEPTH, &pace->in_flight);
+           yaml_file_number(file, "in_flight", values[2], 1, MBM_CLIENT_DEPTH, &pace->in_flight) &&
+           yaml_file_number(file, "replace_after", values[3], 0, 100, &pace->replace_after);
 }
 
 static int read_line(yaml_file *file, const yaml_node_t *node, gateway_setup *into)

@@ -99,6 +99,26 @@ static uint8_t open_line(void *context)
     return MBM_LINK_LOST;
 }
 
+/* Whether a loss harms nobody, unless the line cannot be opened again: a device has closed a
+ * connection over which it has answered, or which was idle. */
+static int is_harmless(const gateway_line *line, uint8_t event)
+{
+    return event == MBM_LINK_EVENT_LOST && place_is_tcp(&line->place) &&
+           (line->counters.replies != line->opened.replies ||
+            line->counters.requests == line->opened.requests);
+}
+
+/* A device has fallen silent, and is connected to anew. */
+static void take_silence(gateway_line *line)
+{
+    if (!line->is_replaced)
+        report_log(REPORT_WARNING,
+                   "%s: no byte came after %u requests in a row. The connection is made anew, now "
+                   "and each time that this happens",
+                   line->place.text, line->replace_after);
+    line->is_replaced = 1;
+}
+
 /* Prints why a line was lost or not opened, once for each reason. */
 static void on_link(void *context, uint8_t event, uint8_t status)
 {
@@ -109,7 +129,17 @@ static void on_link(void *context, uint8_t event, uint8_t status)
                          : place_is_tcp(&line->place)                     ? strerror(error)
                                                       : terminal_error_text(&line->place, error);
 
+    /* The next request may open a line that was open until now. */
+    if (event == MBM_LINK_EVENT_LOST)
+        line->tried = micros() - REOPEN_MS * 1000u;
+    if (event == MBM_LINK_EVENT_LOST && status == MBM_RESPONSE_TIMED_OUT) {
+        take_silence(line);
+        return;
+    }
+    if (is_harmless(line, event))
+        return;
     if (event == MBM_LINK_EVENT_CONNECTED) {
+        line->opened = line->counters;
         if (line->reason[0])
             report_log(REPORT_INFO, "%s: the line is open again", line->place.text);
         line->reason[0] = '\0';
@@ -119,9 +149,6 @@ static void on_link(void *context, uint8_t event, uint8_t status)
         report_log(REPORT_WARNING, "%s: %s. The line is opened again each second", line->place.text,
                    reason);
     snprintf(line->reason, sizeof line->reason, "%s", reason);
-    /* The next request may open a line that was open until now. */
-    if (event == MBM_LINK_EVENT_LOST)
-        line->tried = micros() - REOPEN_MS * 1000u;
 }
 
 static void begin_client(gateway_line *line)
@@ -159,6 +186,9 @@ void gateway_line_set(gateway_line *line, const gateway_pace *pace)
     (void)mbm_client_setResponseTimeout(&line->client, pace->timeoutMs);
     (void)mbm_client_setQuietTime(&line->client, pace->quietMs);
     (void)mbm_link_setConnectTimeout(&line->link, pace->timeoutMs);
+    line->replace_after = pace->replace_after;
+    if (place_is_tcp(&line->place))
+        (void)mbm_link_setReplaceAfter(&line->link, (uint8_t)pace->replace_after);
 }
 
 int gateway_line_begin(gateway_line *line, const place *where, const gateway_pace *pace)
@@ -168,6 +198,8 @@ int gateway_line_begin(gateway_line *line, const place *where, const gateway_pac
     memset(&line->counters, 0, sizeof line->counters);
     memset(&line->known, 0, sizeof line->known);
     memset(&line->losses, 0, sizeof line->losses);
+    memset(&line->opened, 0, sizeof line->opened);
+    line->is_replaced = 0;
     line->is_silent = 0;
     line->reason[0] = '\0';
     line->text = strdup(where->text);
@@ -247,14 +279,6 @@ void gateway_line_watch(gateway_line *line)
     }
 }
 
-/* Whether a line that was open has hung up since the last wait. */
-static int has_hung_up(gateway_line *line)
-{
-    struct pollfd idle = {line->tty.fd, 0, 0};
-
-    return place_is_tcp(&line->place) ? mbm_tcp_isConnected(&line->tcp) < 0 : poll(&idle, 1, 0) > 0;
-}
-
 uint8_t gateway_line_isReady(void *context)
 {
     gateway_line *line = (gateway_line *)context;
@@ -262,8 +286,7 @@ uint8_t gateway_line_isReady(void *context)
 
     if (!line->is_used)
         return 0;
-    if ((state == MBM_LINK_IS_UP && mbm_client_pending(&line->client) == 0 && has_hung_up(line)) ||
-        (state == MBM_LINK_IS_DOWN && micros() - line->tried >= REOPEN_MS * 1000u)) {
+    if (state == MBM_LINK_IS_DOWN && micros() - line->tried >= REOPEN_MS * 1000u) {
         /* The request waits for this attempt, and ends if it fails. */
         (void)mbm_link_reconnect(&line->link);
         return 1;

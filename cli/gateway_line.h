@@ -16,15 +16,18 @@ typedef struct gateway_line {
     mbm_counters counters, known; /* `known`: at the last good reply */
     mbm_link link;
     mbm_linkCounters losses;
-    uint8_t is_used;   /* 0: a place for a line, which refuses every request */
-    uint8_t is_silent; /* and that was reported */
+    uint8_t is_used;     /* 0: a place for a line, which refuses every request */
+    uint8_t is_silent;   /* and that was reported */
+    uint8_t is_replaced; /* that a silent device is connected to anew was reported */
+    mbm_counters opened; /* `counters` when the line was opened the last time */
     char *text;
     place place;
     mbm_tty tty;
     mbm_tcp tcp;
     mbm_tcp_addresses addresses;
-    char reason[80];    /* why it is not open, as printed */
-    int reserve;        /* a descriptor that is kept for the line while it is not open; 0: none */
+    char reason[80]; /* why it is not open, as printed */
+    int reserve;     /* a descriptor that is kept for the line while it is not open; 0: none */
+    uint32_t replace_after;
     uint32_t tried;     /* when the last attempt began */
     uint32_t looked_up; /* when the host was last looked up and not found */
     received received;  /* since the last request */

@@ -95,14 +95,42 @@ static int open_tls(line *l)
     return code;
 }
 
+/* Whether a loss harms nobody, unless the line cannot be opened again: a device has closed a
+ * connection over which it has answered, or which was idle. */
+static int is_harmless(const line *l, uint8_t event)
+{
+    const mbm_counters *opened = &l->opened, *now = &l->counters;
+
+    return event == MBM_LINK_EVENT_LOST && place_is_tcp(&l->place) &&
+           (l->place.kind != PLACE_TLS || l->tls.status < MBM_TLS_TIMED_OUT) &&
+           (now->replies != opened->replies || now->requests == opened->requests);
+}
+
+/* A device has fallen silent, and is connected to anew. */
+static void take_silence(line *l)
+{
+    if (l->is_logged && !l->is_replaced)
+        report_log(REPORT_WARNING,
+                   "%s: no byte came after %u requests in a row. The connection is made anew, now "
+                   "and each time that this happens",
+                   l->place.text, options.replace_after);
+    l->is_replaced = 1;
+}
+
 /* Keeps the reason why the link was lost or not opened, since the next attempt clears it. A loss is
  * logged once, with its first reason and with each other one. */
 static void take_link(void *context, uint8_t event, uint8_t status)
 {
     line *l = (line *)context;
+    const int is_quiet = is_harmless(l, event);
     char before[sizeof l->reason];
 
+    if (event == MBM_LINK_EVENT_LOST && status == MBM_RESPONSE_TIMED_OUT) {
+        take_silence(l);
+        return;
+    }
     if (event == MBM_LINK_EVENT_CONNECTED) {
+        l->opened = l->counters;
         if (l->is_told)
             report_log(REPORT_INFO, "%s: the line is open again", l->place.text);
         l->is_told = 0;
@@ -122,6 +150,8 @@ static void take_link(void *context, uint8_t event, uint8_t status)
         snprintf(l->reason, sizeof l->reason, "%s", terminal_error_text(&l->place, l->tty.error));
     else if (!*l->reason || status == MBM_CONNECT_TIMED_OUT)
         snprintf(l->reason, sizeof l->reason, "%s", mbm_status_text(status));
+    if (is_quiet)
+        return;
     if (l->is_logged && (!l->is_told || strcmp(before, l->reason) != 0))
         report_log(REPORT_WARNING, "%s: %s. The line is opened again each second", l->place.text,
                    l->reason);
@@ -158,6 +188,8 @@ static void keep_open(line *l)
         return;
     (void)mbm_link_begin(&l->kept, &l->client, &hooks);
     (void)mbm_link_setBackoff(&l->kept, MBM_BACKOFF_FIXED, 1000, 1000);
+    if (!place_is_serial(&l->place))
+        (void)mbm_link_setReplaceAfter(&l->kept, options.replace_after);
     (void)mbm_link_setCallback(&l->kept, take_link, l);
     (void)mbm_link_setCounters(&l->kept, &l->losses);
 }

@@ -25,12 +25,14 @@ typedef struct line {
     mbm_tls_identity identity;
     mbm_tls_files files;
     mbm_linkCounters losses;
-    unsigned failed;   /* how often the link was lost or not opened */
-    uint8_t is_logged; /* set by the program after line_open: report losses as log lines */
-    uint8_t is_told;   /* a loss was, and is not over */
-    char reason[160];  /* why it was the last time */
-    received received; /* since the last request */
-    char came[160];    /* in place of a reply, to the last request that failed */
+    unsigned failed;     /* how often the link was lost or not opened */
+    uint8_t is_logged;   /* set by the program after line_open: report losses as log lines */
+    uint8_t is_told;     /* a loss was, and is not over */
+    uint8_t is_replaced; /* that a silent device is connected to anew was reported */
+    mbm_counters opened; /* `counters` when the line was opened the last time */
+    char reason[160];    /* why it was the last time */
+    received received;   /* since the last request */
+    char came[160];      /* in place of a reply, to the last request that failed */
     uint8_t incoming[1024], outgoing[1024];
 } line;
 
@@ -45,7 +47,8 @@ void line_close(line *l);
 /* Waits until there is a connection. Returns as line_open. */
 int line_connect(line *l);
 
-/* Moves requests on. A terminal or connection that was lost is opened again a second later. */
+/* Moves requests on. A terminal or connection that was lost is opened again for the next request,
+ * or a second later. */
 void line_poll(line *l);
 
 /* Sleeps until the client has something to do, at most `milliseconds` or a second. */

@@ -14,10 +14,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TRACE = 0x1000, PCAP, TIMEOUT, RETRIES, IN_FLIGHT, JSON, SCALE, HEX, ONE_BASED };
+enum {
+    TRACE = 0x1000,
+    PCAP,
+    TIMEOUT,
+    RETRIES,
+    IN_FLIGHT,
+    REPLACE_AFTER,
+    JSON,
+    SCALE,
+    HEX,
+    ONE_BASED
+};
 
 client_options options = {.timeoutMs = 1000,
                           .in_flight = 1,
+                          .replace_after = 2,
                           .unit = 1,
                           .table = MBM_TABLE_HOLDING_REGISTERS,
                           .form = {.type = MBM_TYPE_UINT16, .order = MBM_ORDER_ABCD}};
@@ -176,6 +188,10 @@ static error_t parse_request(int key, char *text, struct argp_state *state)
         options.in_flight =
             (uint8_t)options_number(state, "--in-flight", text, 1, MBM_CLIENT_DEPTH);
         return 0;
+    case REPLACE_AFTER:
+        options.replace_after = (uint8_t)options_number(state, "--replace-after", text, 0, 100);
+        options.has_replace_after = 1;
+        return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
@@ -187,6 +203,10 @@ static const struct argp_option request_texts[] = {
     {"in-flight", IN_FLIGHT, "N", 0,
      "Requests under way at once on Modbus TCP, 1 to 16 (1). More are faster, but many devices take "
      "one at a time",
+     2},
+    {"replace-after", REPLACE_AFTER, "N", 0,
+     "Requests in a row without any byte after which a connection is made anew, 0 to 100 (2); 0 for "
+     "never",
      2},
     {NULL, 0, NULL, 0, NULL, 0}};
 

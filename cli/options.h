@@ -17,7 +17,7 @@ struct place;
 typedef struct client_options {
     /* of options_request */
     uint32_t timeoutMs;
-    uint8_t has_timeout, retries, in_flight;
+    uint8_t has_timeout, retries, in_flight, has_replace_after, replace_after;
     /* of options_output */
     uint8_t is_json, is_quiet;
     /* of options_unit */
@@ -33,7 +33,7 @@ extern client_options options;
 
 /* --trace and --pcap; a program that is no client has these alone. */
 extern const struct argp options_trace;
-/* --timeout, --retries, --in-flight. */
+/* --timeout, --retries, --in-flight, --replace-after. */
 extern const struct argp options_request;
 /* --json, --quiet. */
 extern const struct argp options_output;

@@ -75,6 +75,9 @@ static void check_arguments(const struct argp_state *state)
         parities[parity_count++] = where.tty.parity;
     if (!options.has_timeout && place_is_serial(&where))
         options.timeoutMs = 200;
+    /* That units are silent is what a scan expects. */
+    if (!options.has_replace_after)
+        options.replace_after = 0;
 }
 
 static error_t parse(int key, char *text, struct argp_state *state)

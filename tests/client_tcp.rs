@@ -450,6 +450,49 @@ fn a_reconnect_discards_a_half_received_response() {
     assert_right(&poll(&end, &mut client)[0]);
 }
 
+/// A device may keep a connection open on which it answers no more.
+#[test]
+fn a_program_sees_how_many_requests_in_a_row_were_unanswered() {
+    let (end, mut client) = client();
+    client.policy().retries = 1;
+    for round in 0..3 {
+        assert!(client.queue(read(1, 1)).is_ok());
+        poll(&end, &mut client);
+        for expected in [1, 2] {
+            assert_eq!(client.unanswered(), expected - 1);
+            end.pass(2_000_000);
+            poll(&end, &mut client);
+            poll(&end, &mut client);
+            assert_eq!(client.unanswered(), expected);
+        }
+        if round == 1 {
+            client.reconnect();
+            assert_eq!(client.unanswered(), 0);
+        }
+        end.sent();
+        assert!(client.queue(read(1, 2)).is_ok());
+        poll(&end, &mut client);
+        end.deliver(0, &response(requests(&end.sent())[0]));
+        assert_right(&poll(&end, &mut client)[0]);
+        assert_eq!(client.unanswered(), 0);
+    }
+}
+
+/// Two requests time out. While they were in flight, another one was answered.
+#[test]
+fn requests_that_were_in_flight_while_a_byte_came_do_not_count_as_unanswered() {
+    let (end, mut client) = client();
+    for number in 1..=3 {
+        assert!(client.queue(read(1, number)).is_ok());
+    }
+    poll(&end, &mut client);
+    end.deliver(0, &response(requests(&end.sent())[1]));
+    assert_right(&poll(&end, &mut client)[0]);
+    end.pass(2_000_000);
+    assert_eq!(poll(&end, &mut client).len(), 2);
+    assert_eq!(client.unanswered(), 0);
+}
+
 #[test]
 fn a_cancelled_request_frees_its_place_for_the_next() {
     let (end, mut client) = client();

@@ -25,7 +25,9 @@ extern "C" {
 #define MBM_LINK_IS_UP 3u
 /** An event of a link: it is open now. The status is MBM_OK. */
 #define MBM_LINK_EVENT_CONNECTED 0u
-/** An event of a link: it was open and is lost. The status is MBM_LINK_LOST. */
+/** An event of a link: it was open and is lost. The status is MBM_LINK_LOST, or
+ *  MBM_RESPONSE_TIMED_OUT if the link has closed it since the device had fallen silent: see
+ *  mbm_link_setReplaceAfter. */
 #define MBM_LINK_EVENT_LOST 1u
 /** An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
  *  mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long. */
@@ -42,7 +44,7 @@ typedef struct mbm_link {
     /** Private. */
     void *pointers[32];
     /** Private. */
-    uint32_t words[21];
+    uint32_t words[24];
 } mbm_link;
 
 /**
@@ -65,7 +67,13 @@ typedef struct mbm_linkCounters {
  * - It notices the loss of the link also while the client has no request. For that, an idle
  *   client reads the port in each poll and drops what it reads: late replies, noise, frames
  *   of others. If something else reads the line, call mbm_client_suspend first.
- * - It opens the link again, after a wait that grows with each attempt that fails.
+ * - It opens the link again: for a request at once, if the link was good until it was lost; else
+ *   after a wait that grows with each attempt that fails.
+ * - A link that the peer closes twice in a row while no request is there stays closed until the
+ *   next request.
+ * - It looks whether the link is still open before it sends a request. So a peer that closes idle
+ *   connections costs no request.
+ * - It replaces a connection on which the device answers no more: see mbm_link_setReplaceAfter.
  * - When the link is lost, requests under way end with MBM_LINK_LOST, because the device may
  *   have carried them out. The others end too, or wait: see mbm_link_setRequestsWait.
  * - Requests that are under way when the link begins go on if `status` finds the link open, and
@@ -118,7 +126,8 @@ uint8_t mbm_link_reconnect(struct mbm_link *link);
 /**
  * Sets the wait before an attempt to open the link. The first attempt after a loss waits for
  * `delayMs`; each attempt that fails lets the wait grow. It starts anew when the link was open
- * for as long as the last wait.
+ * for as long as the last wait, or bytes have arrived. A request does not wait for the first
+ * attempt after the loss of such a link: it is made at once.
  *
  * @param link        the object
  * @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
@@ -160,12 +169,28 @@ uint8_t mbm_link_setJitter(struct mbm_link *link,
 uint8_t mbm_link_setConnectTimeout(struct mbm_link *link, uint32_t timeoutMs);
 
 /**
+ * Sets after how many requests in a row without any byte the link is closed and opened anew,
+ * because some devices keep a connection open on which they answer no more. Repetitions count. So
+ * do requests that you cancel while they are under way, once nothing was heard for the client's
+ * response timeout. While others are under way, which may still be answered, the link is closed
+ * 16 requests later at the most; they end with MBM_LINK_LOST. Requests that wait are sent over
+ * the new link.
+ *
+ * @param link      the object
+ * @param requests  0 to 100; 0 for never. The default is 2 on TCP, and 0 on a serial line
+ * @return a status
+ */
+uint8_t mbm_link_setReplaceAfter(struct mbm_link *link, uint8_t requests);
+
+/**
  * Sets whether requests wait for the link. By default they do not: while the link is down,
  * every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took longer
  * than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
  * request again at once then polls without a pause: let it wait.) If requests wait, they stay
  * in the queue until the link is open again or until you cancel them; their response timeout
- * begins when they are sent. While a connection is being made, requests always wait.
+ * begins when they are sent. While a connection is being made, requests always wait; those for
+ * which a lost link is opened again end with MBM_CONNECT_TIMED_OUT if that takes as long as their
+ * response timeout.
  *
  * @param link  the object
  * @param on    0 (the default) or 1

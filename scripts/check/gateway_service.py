@@ -438,6 +438,33 @@ def check_drill(mbm, files):
     other.go()
 
 
+def check_connections(mbm, files):
+    """Devices that close idle connections, or answer no more on one that stays open."""
+    idle, closing = TcpDevice(lambda pdu: number(1), idle=0.2), TcpDevice(lambda pdu: number(2), hangs_up=True)
+    silent, kept = (TcpDevice(lambda pdu: number(3), answers=3) for _ in range(2))
+    files.write(files.line(idle.line, "1"), files.line(closing.line, "2"), files.line(silent.line, "3"),
+                files.line(kept.line, "4", ", replace_after: 0"), head="listen: tcp://127.0.0.1:0\ntimeout: 300ms\n")
+    gateway = Service(mbm, "gateway", files.path, ready=READY)
+    client, waiting = Client(gateway.port), Client(gateway.port)
+    for _ in range(8):
+        expect("a device that closes idle connections answers", client.ask(1) == number(1))
+        time.sleep(0.4)
+    expect("each request is sent once", len(idle.asked) == 8, idle.asked)
+    expect("a device that closes each connection answers", [client.ask(2) for _ in range(8) if not time.sleep(0.1)]
+           == [number(2)] * 8)
+    expect("nothing of that is reported", gateway.log == [], gateway.log)
+    answers = [waiting.ask(3) for _ in range(20)]
+    expect("a silent connection costs two requests", answers == ([number(3)] * 3 + [NO_REPLY] * 2) * 4, answers)
+    gateway.expect_line("a silent connection", r"^warning: tcp://.*: no byte came after 2 requests in a row\. The connection is "
+                        "made anew, now and each time that this happens\\.$")
+    expect("that is reported once", len(gateway.log) == 1, gateway.log)
+    answers = [waiting.ask(4) for _ in range(8)]
+    expect("replace_after: 0 keeps the connection", answers == [number(3)] * 3 + [NO_REPLY] * 5, answers)
+    gateway.end()
+    for one in idle, closing, silent, kept:
+        one.go()
+
+
 def check_crowd(mbm, files):
     """A client that finds no place."""
     files.write(files.line("rtu:/dev/no-such-line", "1"), head="listen: tcp://127.0.0.1:0\nconnections: 1\n")
@@ -466,5 +493,5 @@ def check_service(mbm):
     with tempfile.TemporaryDirectory() as folder:
         files = Files(folder)
         for check in (check_wrong_files, check_reload, check_stats, check_metrics, check_log, check_terminal, check_drill,
-                      check_crowd, check_example):
+                      check_connections, check_crowd, check_example):
             check(mbm, files)

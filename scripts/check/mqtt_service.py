@@ -614,6 +614,41 @@ def check_drill(bench):
     model.device.go()
 
 
+def check_connections(bench):
+    """Devices that close idle connections, or answer no more on one that stays open."""
+    idle, silent = numbers(1, 2), numbers(3, 4)
+    idle.device.idle, silent.device.answers = 0.2, 3
+    bench.write("idle.yaml", (FIELDS % ("idle", 1)).replace("100ms", "500ms"))
+    bench.write("silent.yaml", (FIELDS % ("silent", 1)).replace("100ms", "300ms"))
+    path = bridge_file(bench, (idle.line, "file: idle.yaml, topic: idle"), (silent.line, "file: silent.yaml, topic: silent"))
+    bridge = Service(bench.mbm, "bridge", path, "--timeout", "300ms", "--all")
+    subscriber = Subscriber(bench.broker)
+    subscriber.expect_last("hall/status", "online")
+    subscriber.expect_value("hall/idle/level", 1)
+    for value in range(10, 26):
+        result(bench, subscriber, "hall/idle/level", str(value), "success")
+        time.sleep(0.25)
+
+    def readings(name):
+        return [json.loads(text) for topic, text in list(subscriber.messages) if topic == f"hall/{name}"]
+
+    expect("each round reads a device that closes idle connections", len(readings("idle/level")) > 8
+           and {one["status"] for one in readings("idle/level")} == {"success"}, readings("idle/level"))
+    expect("each write is sent once", len(idle.writes()) == 16, idle.writes())
+    wait(lambda: len(readings("silent/level")) > 20)
+    statuses = [one["status"] == "success" for one in readings("silent/level")]
+    expect("a silent device is heard again", sum(statuses) > 8, statuses)
+    expect("two requests fail in a row", "000" not in "".join(str(int(one)) for one in statuses), statuses)
+    expect("a connection that was closed is not reported", not [line for line in bridge.log if idle.line in line and "answers" not in line],
+           bridge.log)
+    expect("a silent connection is reported once", sum("The connection is made anew" in line for line in bridge.log) == 1,
+           bridge.log)
+    bridge.end()
+    subscriber.end()
+    idle.device.go()
+    silent.device.go()
+
+
 def check_example(bench):
     """The example that is installed."""
     folder = os.path.join(ROOT, "examples/services")
@@ -630,7 +665,7 @@ def check_example(bench):
 def check_service(mbm):
     with tempfile.TemporaryDirectory() as folder:
         for check in (check_values, check_several_lines, check_wrong_files, check_reload, check_discovery, check_drill,
-                      check_example):
+                      check_connections, check_example):
             # Each has a broker of its own, which retains nothing.
             bench = Bench(mbm, folder)
             check(bench)

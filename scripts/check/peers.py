@@ -121,10 +121,13 @@ class Wire(threading.Thread):
 
 class TcpDevice:
     """Answers requests of Modbus TCP by a function of the PDU; None is no answer. It may close the
-    connection after each answer, answer late, or be away."""
+    connection after each answer, or after `idle` seconds without a request, answer late, answer only the
+    first `answers` requests of a connection, or be away."""
 
-    def __init__(self, answer=lambda pdu: bytes([3, 2, 0, 42]), hangs_up=False, late=0.0, host="127.0.0.1"):
+    def __init__(self, answer=lambda pdu: bytes([3, 2, 0, 42]), hangs_up=False, late=0.0, host="127.0.0.1", idle=None,
+                 answers=None):
         self.answer, self.hangs_up, self.late, self.host = answer, hangs_up, late, host
+        self.idle, self.answers, self.connections = idle, answers, 0
         self.port = 0
         self.asked = []
         self.come()
@@ -157,20 +160,26 @@ class TcpDevice:
             except OSError:
                 return
             self.peers.append(peer)
+            self.connections += 1
             threading.Thread(target=self.serve, args=(peer,), daemon=True).start()
 
     def serve(self, peer):
+        answered = 0
         try:
+            peer.settimeout(self.idle)
             stream = peer.makefile("rb")
             while len(head := stream.read(7)) == 7:
                 pdu = stream.read(int.from_bytes(head[4:6], "big") - 1)
                 self.asked.append((head[6], pdu.hex()))
                 reply = self.answer(pdu)
-                if reply is None:
+                if reply is None or answered == self.answers:
                     continue
+                answered += 1
                 time.sleep(self.late)
                 peer.sendall(head[:4] + (len(reply) + 1).to_bytes(2, "big") + head[6:] + reply)
                 if self.hangs_up:
                     peer.shutdown(socket.SHUT_RDWR)
+        except TimeoutError:
+            peer.shutdown(socket.SHUT_RDWR)
         except OSError:
             pass

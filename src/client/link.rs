@@ -10,6 +10,9 @@ pub const IDLE_DELAY: u32 = millis(1000);
 /// The time between two looks at a connection that is being made, in microseconds.
 pub const CONNECT_DELAY: u32 = millis(50);
 
+/// The greatest value of [`Link::replace_after`].
+pub const MOST_REPLACE_AFTER: u8 = 100;
+
 /// What a link needs of its user.
 pub trait LinkHooks {
     /// Closes the link, if it is open.
@@ -74,6 +77,23 @@ pub struct Link {
     pub has_timed_out: bool,
     /// Requests wait for the link instead of failing.
     pub keeps_requests: bool,
+    /// The device has fallen silent, so the link is closed.
+    is_silent: bool,
+    /// Bytes have arrived since the link was opened, and since [`Link::close_if_silent`].
+    has_received: bool,
+    is_heard: bool,
+    /// The link was good until it was lost: a request opens it without a wait, and waits for that
+    /// attempt, as long as its response timeout.
+    reopens: bool,
+    /// The peer has closed the link while no request was there, and has done so twice in a row
+    /// without any byte between: only a request opens it.
+    was_idle: bool,
+    rests: bool,
+    /// After so many requests in a row without any byte the link is closed and opened anew, 1 to
+    /// [`MOST_REPLACE_AFTER`]; 0 for never.
+    pub replace_after: u8,
+    /// Requests since the last byte that the program cancelled.
+    pub cancelled: u8,
     /// The wait before an attempt, its growth and jitter.
     pub policy: Policy,
     /// How long a connection may take to be made, in microseconds; 0 for no limit.
@@ -81,6 +101,8 @@ pub struct Link {
     /// The time at which the state began, and how long it lasts.
     since: u32,
     wait: u32,
+    /// No request was in flight, or a byte arrived, at this time or later.
+    heard: u32,
 }
 
 impl Link {
@@ -105,7 +127,46 @@ impl Link {
 
     /// True if pending requests end now, because there is no link.
     pub fn fails_requests(&self) -> bool {
-        self.state == LinkState::Down && !self.keeps_requests && !self.at_once
+        self.state == LinkState::Down && !self.keeps_requests && !self.at_once && !self.reopens
+    }
+
+    /// Since when requests wait for a link that is opened again for them; `None` if they wait for
+    /// as long as it takes.
+    pub fn waits_since(&self) -> Option<u32> {
+        let waits = self.state == LinkState::Connecting && self.reopens && !self.keeps_requests;
+        waits.then_some(self.since)
+    }
+
+    /// Notes that bytes have arrived.
+    pub fn received(&mut self) {
+        self.has_received = true;
+        self.is_heard = true;
+        self.cancelled = 0;
+    }
+
+    /// Closes the link if the device has fallen silent: `unanswered` requests in a row have ended
+    /// without any byte. Cancelled requests count too, once nothing was heard for the response
+    /// timeout `timeout`. If others are in flight, which may still be answered, the link stays
+    /// open for 16 more.
+    pub fn close_if_silent(&mut self, unanswered: i8, in_flight: u8, timeout: u32, now: u32) {
+        const MORE: u8 = 16;
+        let has_none = unanswered <= 0 && self.cancelled == 0 && in_flight == 0;
+        if self.is_heard || has_none {
+            self.heard = now;
+        }
+        self.is_heard = false;
+        let limit = match in_flight {
+            0 => self.replace_after,
+            _ => self.replace_after.saturating_add(MORE),
+        };
+        let unanswered = unanswered.max(0) as u8;
+        let is_silent = unanswered >= limit
+            || unanswered.saturating_add(self.cancelled) >= limit
+                && has_elapsed(timeout, now, self.heard);
+        if is_silent && self.replace_after > 0 {
+            self.is_silent = true;
+            self.is_lost = true;
+        }
     }
 
     /// Closes the link and opens it again without a wait.
@@ -124,31 +185,48 @@ impl Link {
     }
 
     /// Does what is due at the time `now`, and returns what has happened, with its status. An
-    /// attempt is made only if `fresh`, so at most once in each poll.
+    /// attempt is made only if `fresh`, so at most once in each poll. `is_wanted` says that a
+    /// request waits.
     pub fn step(
         &mut self,
         now: u32,
         fresh: bool,
+        is_wanted: bool,
         hooks: &mut impl LinkHooks,
     ) -> Option<(LinkEvent, Status)> {
         let is_over = has_elapsed(self.wait, now, self.since);
         let status = match self.state {
             LinkState::Up => {
-                if self.is_lost {
-                    return self.fail(LinkEvent::Lost, Status::LINK_LOST, now, hooks);
-                }
-                if is_over {
+                let was_good = is_over || self.has_received;
+                if was_good {
                     self.attempts = 0;
                 }
-                return None;
+                if !self.is_lost {
+                    return None;
+                }
+                let status = match self.is_silent {
+                    true => Status::RESPONSE_TIMED_OUT,
+                    false => Status::LINK_LOST,
+                };
+                self.reopens = was_good;
+                let was_idle = was_good && !is_wanted && !self.is_silent;
+                self.rests = was_idle && self.was_idle && !self.has_received;
+                self.was_idle = was_idle;
+                return self.fail(LinkEvent::Lost, status, now, hooks);
             }
             LinkState::Down => {
                 if self.is_to_close {
                     self.is_to_close = false;
                     hooks.disconnect();
                 }
-                if !fresh || !is_over {
+                let is_needed = is_wanted && self.reopens;
+                let is_due = is_over && (!self.rests || self.at_once);
+                if !fresh || !is_due && !is_needed {
                     return None;
+                }
+                self.rests = false;
+                if is_needed {
+                    self.attempts = 0;
                 }
                 self.at_once = false;
                 hooks.connect()
@@ -171,9 +249,13 @@ impl Link {
             Status::OK => {
                 self.state = LinkState::Up;
                 self.is_lost = false;
+                self.has_received = false;
+                self.reopens = false;
+                self.cancelled = 0;
                 self.since = now;
+                self.heard = now;
                 // The time for which the link must be open before the waits start anew.
-                self.wait = self.policy.wait(self.attempts, || 0);
+                self.wait = self.policy.wait(self.attempts.max(1), || 0);
                 Some((LinkEvent::Connected, status))
             }
             Status::PENDING => {
@@ -184,7 +266,10 @@ impl Link {
                 }
                 None
             }
-            _ => self.fail(LinkEvent::Failed, status, now, hooks),
+            _ => {
+                self.reopens = false;
+                self.fail(LinkEvent::Failed, status, now, hooks)
+            }
         }
     }
 
@@ -200,6 +285,7 @@ impl Link {
         self.state = LinkState::Down;
         self.is_to_close = true;
         self.is_lost = false;
+        self.is_silent = false;
         self.has_timed_out = status == Status::CONNECT_TIMED_OUT;
         self.since = now;
         self.wait = 0;
@@ -211,8 +297,8 @@ impl Link {
     }
 
     /// Microseconds until the next step is due. While the link is open, `delay` is the delay
-    /// of the client, `u32::MAX` if it has no request.
-    pub fn delay(&self, now: u32, delay: u32) -> u32 {
+    /// of the client, `u32::MAX` if it has no request. `is_wanted` says that a request waits.
+    pub fn delay(&self, now: u32, delay: u32, is_wanted: bool) -> u32 {
         let rest = self.wait.saturating_sub(elapsed(now, self.since));
         match self.state {
             _ if self.is_lost || self.is_to_close => 0,
@@ -221,6 +307,8 @@ impl Link {
             LinkState::Up => delay,
             LinkState::Connecting if self.connect_timeout == 0 => CONNECT_DELAY,
             LinkState::Connecting => rest.min(CONNECT_DELAY),
+            LinkState::Down if is_wanted && self.reopens => 0,
+            LinkState::Down if self.rests && !self.at_once => IDLE_DELAY,
             LinkState::Down => rest,
         }
     }

@@ -19,7 +19,7 @@ mod transaction;
 mod transport;
 mod units;
 
-pub use link::{Link, LinkEvent, LinkHooks, LinkState};
+pub use link::{Link, LinkEvent, LinkHooks, LinkState, MOST_REPLACE_AFTER};
 pub use policy::{Backoff, Policy};
 pub use queue::RequestQueue;
 pub use ready::Request;
@@ -160,13 +160,20 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
         Some(request)
     }
 
+    /// Number of requests in a row that timed out, up to 127, repetitions included. An answer begins
+    /// anew with 0. A device may keep a TCP connection open on which it answers no more: a program
+    /// that finds more than one here makes a new connection, and calls [`Client::reconnect`].
+    pub fn unanswered(&self) -> u8 {
+        self.queue.unanswered.max(0) as u8
+    }
+
     /// Call this after the link was opened anew. The client discards partly received and
     /// partly sent frames. The next polls return the requests in flight with
     /// [`Status::LINK_LOST`]. Queued requests are sent over the new link.
     pub fn reconnect(&mut self) {
         self.line.release(None);
         self.queue.interrupt();
-        self.queue.connected = true;
+        self.queue.answered(0);
     }
 
     /// Leaves the line to another user of the port until [`Client::take_back`]. Returns

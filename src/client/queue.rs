@@ -7,7 +7,7 @@ use super::retry::NO_RETRIES;
 use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
 use crate::error::Status;
-use crate::time::{elapsed, LONGEST};
+use crate::time::{elapsed, has_elapsed, LONGEST};
 use heapless::Vec;
 
 /// The requests and the policy of a client.
@@ -26,6 +26,11 @@ pub struct RequestQueue<J, const N: usize> {
     pub has_transaction_ids: bool,
     /// Requests may have their own limit of retries.
     pub may_retry: bool,
+    /// Requests under way go on, but no other one is sent.
+    pub is_held: bool,
+    /// Requests in a row that timed out or that the port did not accept, up to 127. After an answer
+    /// it is the number of requests in flight below 0, since these do not count.
+    pub unanswered: i8,
     /// No request is due until `wait` microseconds have passed since `since`.
     since: u32,
     wait: u32,
@@ -46,6 +51,8 @@ impl<J, const N: usize> RequestQueue<J, N> {
             has_broadcast: false,
             has_transaction_ids: false,
             may_retry: true,
+            is_held: false,
+            unanswered: 0,
             since: 0,
             wait: u32::MAX,
             policy: Policy::DEFAULT,
@@ -153,6 +160,52 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         }
     }
 
+    /// Notes that a request was answered while `in_flight` others wait for their answer.
+    pub(super) fn answered(&mut self, in_flight: u8) {
+        self.connected = true;
+        self.unanswered = 0i8.saturating_sub_unsigned(in_flight);
+    }
+
+    /// Number of requests in flight.
+    pub fn in_flight(&self) -> u8 {
+        let queue = self.queue.iter();
+        let sent = queue.filter(|request| request.state().is_sent()).count();
+        (sent + usize::from(self.active.is_some())) as u8
+    }
+
+    /// Notes that bytes have arrived.
+    pub fn received(&mut self) {
+        self.unanswered = 0i8.saturating_sub_unsigned(self.in_flight());
+    }
+
+    /// True if a request waits to be sent.
+    pub fn has_waiting(&self) -> bool {
+        let mut queue = self.queue.iter();
+        queue.any(|request| request.state().is(Stage::Queued))
+    }
+
+    /// True if the next poll may send a request.
+    pub fn may_send(&self, now: u32) -> bool {
+        self.active.is_none() && self.delay(now) == 0
+    }
+
+    /// Marks the requests as lost that have waited for the link since `since`, as long as their
+    /// response timeout. `timeout` is that of the client.
+    pub fn fail_overdue(
+        &mut self,
+        now: u32,
+        since: u32,
+        timeout: u32,
+        storage: &mut impl ClientStorage,
+    ) {
+        self.mark_lost(|request| {
+            let state = request.state();
+            // Finds the timeout of the unit, too.
+            let _ = state.remaining_wait(now, storage);
+            has_elapsed(state.response_timeout(storage, timeout), now, since)
+        });
+    }
+
     /// Notes that the link was opened anew. The next polls end the requests in flight with
     /// [`Status::LINK_LOST`].
     pub fn interrupt(&mut self) {
@@ -227,7 +280,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         now: u32,
         storage: &mut impl ClientStorage,
     ) -> Option<J> {
-        self.changed = true;
+        self.note_end(status);
         let request = self.queue.get_mut(at)?;
         if end_or_retry(&self.policy, request, status, now, storage) {
             return self.remove(at);
@@ -244,12 +297,23 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         now: u32,
         storage: &mut impl ClientStorage,
     ) -> Option<J> {
-        self.changed = true;
+        self.note_end(status);
         if end_or_retry(&self.policy, &mut request, status, now, storage) {
             return Some(request);
         }
         self.put_first(request);
         None
+    }
+
+    /// Notes that a request ends with `status`, if only for now.
+    fn note_end(&mut self, status: Status) {
+        self.changed = true;
+        if matches!(
+            status,
+            Status::RESPONSE_TIMED_OUT | Status::LINE_BUSY | Status::CONNECT_TIMED_OUT
+        ) {
+            self.unanswered = self.unanswered.saturating_add(1);
+        }
     }
 
     /// Notes that the link is lost. The next polls end all requests with

@@ -125,7 +125,11 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
         if let Some(request) = queue.active.take() {
             self.engine.request().client_request = Some(request);
         } else {
-            let Some(request) = queue.take_due(now, &mut self.engine.storage) else {
+            let due = match queue.is_held {
+                true => None,
+                false => queue.take_due(now, &mut self.engine.storage),
+            };
+            let Some(request) = due else {
                 if fresh && !queue.queue.is_empty() {
                     self.drop_late_bytes(queue, now);
                 }
@@ -148,7 +152,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
         if status == Status::LINK_LOST {
             queue.disconnect();
         } else if is_answer(status) {
-            queue.connected = true;
+            queue.answered(0);
         }
         // The queue has space: the active request has always counted as part of it.
         queue.conclude(request, status, now, &mut self.engine.storage)

@@ -132,7 +132,7 @@ impl TransportKind {
 
     /// # Safety
     /// As for [`transport`], of this kind.
-    pub(super) unsafe fn settings<'a>(&self, object: *mut Object) -> &'a mut Settings {
+    pub(crate) unsafe fn settings<'a>(&self, object: *mut Object) -> &'a mut Settings {
         // SAFETY: as the caller promises; the offset is that of the settings.
         unsafe { &mut *object.byte_add(self.settings.into()).cast() }
     }

@@ -9,7 +9,7 @@ use crate::client::object::{self as client, LinkedKind, TransportKind};
 use crate::client::{mbm_client, mbm_linkHooks, set_backoff};
 use crate::pointers::{self, CObject as _};
 use core::ffi::c_void;
-use mbm::client::{LinkEvent, LinkState};
+use mbm::client::{LinkEvent, LinkState, MOST_REPLACE_AFTER};
 use mbm::error::Status;
 use mbm::time::timeout;
 use object::{report, Object};
@@ -23,11 +23,16 @@ pub const MBM_LINK_IS_UP: u8 = 3;
 
 /// An event of a link: it is open now. The status is MBM_OK.
 pub const MBM_LINK_EVENT_CONNECTED: u8 = 0;
-/// An event of a link: it was open and is lost. The status is MBM_LINK_LOST.
+/// An event of a link: it was open and is lost. The status is MBM_LINK_LOST, or
+/// MBM_RESPONSE_TIMED_OUT if the link has closed it since the device had fallen silent: see
+/// mbm_link_setReplaceAfter.
 pub const MBM_LINK_EVENT_LOST: u8 = 1;
 /// An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
 /// mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long.
 pub const MBM_LINK_EVENT_FAILED: u8 = 2;
+
+/// The default of mbm_link_setReplaceAfter on TCP.
+const REPLACE_AFTER: u8 = 2;
 
 const _: () = {
     assert!(MBM_LINK_IS_DOWN == LinkState::Down as u8);
@@ -42,7 +47,13 @@ const _: () = {
 /// - It notices the loss of the link also while the client has no request. For that, an idle
 ///   client reads the port in each poll and drops what it reads: late replies, noise, frames
 ///   of others. If something else reads the line, call mbm_client_suspend first.
-/// - It opens the link again, after a wait that grows with each attempt that fails.
+/// - It opens the link again: for a request at once, if the link was good until it was lost; else
+///   after a wait that grows with each attempt that fails.
+/// - A link that the peer closes twice in a row while no request is there stays closed until the
+///   next request.
+/// - It looks whether the link is still open before it sends a request. So a peer that closes idle
+///   connections costs no request.
+/// - It replaces a connection on which the device answers no more: see mbm_link_setReplaceAfter.
 /// - When the link is lost, requests under way end with MBM_LINK_LOST, because the device may
 ///   have carried them out. The others end too, or wait: see mbm_link_setRequestsWait.
 /// - Requests that are under way when the link begins go on if `status` finds the link open, and
@@ -118,6 +129,9 @@ unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHo
         (*object).request.done = Some(report);
         (*object).request.context = link.cast();
         (*object).core.begin();
+        if !(*target).queue.has_broadcast {
+            (*object).core.replace_after = REPLACE_AFTER;
+        }
         let port = port::port(object);
         (*(*transport).port(target)).copy(&port);
         (&raw mut (*object).kind).write(linked(&*transport, client));
@@ -133,6 +147,7 @@ fn linked(transport: &TransportKind, client: *mut mbm_client) -> LinkedKind {
     LinkedKind {
         kind: TransportKind {
             advance: object::advance,
+            release: object::release,
             ..*transport
         },
         delay: object::delay,
@@ -208,7 +223,8 @@ pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
 
 /// Sets the wait before an attempt to open the link. The first attempt after a loss waits for
 /// `delayMs`; each attempt that fails lets the wait grow. It starts anew when the link was open
-/// for as long as the last wait.
+/// for as long as the last wait, or bytes have arrived. A request does not wait for the first
+/// attempt after the loss of such a link: it is made at once.
 ///
 /// @param link        the object
 /// @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
@@ -273,12 +289,35 @@ pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeout
     })
 }
 
+/// Sets after how many requests in a row without any byte the link is closed and opened anew,
+/// because some devices keep a connection open on which they answer no more. Repetitions count. So
+/// do requests that you cancel while they are under way, once nothing was heard for the client's
+/// response timeout. While others are under way, which may still be answered, the link is closed
+/// 16 requests later at the most; they end with MBM_LINK_LOST. Requests that wait are sent over
+/// the new link.
+///
+/// @param link      the object
+/// @param requests  0 to 100; 0 for never. The default is 2 on TCP, and 0 on a serial line
+/// @return a status
+#[no_mangle]
+pub unsafe extern "C" fn mbm_link_setReplaceAfter(link: *mut mbm_link, requests: u8) -> u8 {
+    pointers::with(link, |object| {
+        if requests > MOST_REPLACE_AFTER {
+            return Status::INVALID_ARGUMENT;
+        }
+        (*object).core.replace_after = requests;
+        Status::OK
+    })
+}
+
 /// Sets whether requests wait for the link. By default they do not: while the link is down,
 /// every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took longer
 /// than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
 /// request again at once then polls without a pause: let it wait.) If requests wait, they stay
 /// in the queue until the link is open again or until you cancel them; their response timeout
-/// begins when they are sent. While a connection is being made, requests always wait.
+/// begins when they are sent. While a connection is being made, requests always wait; those for
+/// which a lost link is opened again end with MBM_CONNECT_TIMED_OUT if that takes as long as their
+/// response timeout.
 ///
 /// @param link  the object
 /// @param on    0 (the default) or 1

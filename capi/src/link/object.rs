@@ -20,7 +20,7 @@ pub struct mbm_link {
     /// Private.
     pointers: [*mut c_void; 32],
     /// Private.
-    words: [u32; 21],
+    words: [u32; 24],
 }
 
 /// What has happened to a link. You may read and zero the counters at any time, but not from
@@ -46,6 +46,8 @@ pub struct Object {
     /// A LinkEvent, and its status.
     pub(super) event: u8,
     pub(super) status: u8,
+    /// Bytes were read since this was last set to false.
+    pub(super) has_read: bool,
     /// What the client had before.
     pub(super) transport: *const TransportKind,
     pub(super) port: mbm_port,
@@ -198,6 +200,9 @@ unsafe fn advance_linked(
     // hooks run; the core is not used by the hooks of the link, whose calls are refused.
     unsafe {
         if (*link).core.is_up() {
+            close_if_silent(link, object, now);
+        }
+        if (*link).core.is_up() {
             let ended = advance_transport(link, object, now, fresh);
             if (*link).core.is_up() || ended.is_some() {
                 return ended;
@@ -207,12 +212,15 @@ unsafe fn advance_linked(
             hooks: (*link).hooks,
             link,
         };
-        let happened = (*link).core.step(now, fresh, &mut hooks);
+        let is_wanted = client::queue(object).has_waiting();
+        let happened = (*link).core.step(now, fresh, is_wanted, &mut hooks);
         if (*link).core.state() == LinkState::Down {
             close(link);
         }
         if let Some((event, status)) = happened {
-            client::queue(object).connected = event == LinkEvent::Connected;
+            let queue = client::queue(object);
+            queue.connected = event == LinkEvent::Connected;
+            queue.unanswered = 0;
             return note(link, event, status);
         }
         if (*link).core.is_up() {
@@ -222,6 +230,11 @@ unsafe fn advance_linked(
         let queue = client::queue(object);
         if (*link).core.fails_requests() {
             queue.fail_all();
+        } else if let (Some(since), false) = ((*link).core.waits_since(), queue.has_lost()) {
+            let transport = &*(*link).transport;
+            let timeout = transport.settings(object).response_timeout.get();
+            queue.fail_overdue(now, since, timeout, transport.storage(object));
+            (*link).core.has_timed_out = queue.has_lost();
         }
         let mut ended = queue.end_lost(now, (*(*link).transport).storage(object))?;
         if (*link).core.has_timed_out {
@@ -243,15 +256,26 @@ unsafe fn advance_transport(
 ) -> Option<RequestPtr> {
     // SAFETY: as the caller promises. The request of the link is in no queue.
     unsafe {
-        let advance = (*(*link).transport).advance;
         // The link's own step, which calls no hook while the link is up.
         let mut hooks = Hooks {
             hooks: (*link).hooks,
             link,
         };
-        (*link).core.step(now, false, &mut hooks);
+        (*link).core.step(now, false, false, &mut hooks);
         if !fresh || !client::queue(object).is_empty() {
-            let mut ended = advance(object, now, fresh)?;
+            let mut fresh = fresh;
+            if client::queue(object).may_send(now) {
+                // Whether the peer has closed the link, only reading shows. What is sent over a
+                // closed one is lost.
+                client::queue(object).is_held = true;
+                let ended = read_all(link, object, now);
+                client::queue(object).is_held = false;
+                if ended.is_some() || (*link).core.is_lost {
+                    return ended;
+                }
+                fresh = false;
+            }
+            let mut ended = advance_noting(link, object, now, fresh)?;
             if (*link).core.is_lost && ended.state().status.is_failure() {
                 ended.state_mut().status = Status::LINK_LOST;
             }
@@ -259,9 +283,80 @@ unsafe fn advance_transport(
         }
         let placeholder = RequestPtr::new(&raw mut (*link).request)?;
         client::queue(object).begin_idle(placeholder, now);
-        advance(object, now, true);
+        advance_noting(link, object, now, true);
         client::queue(object).end_idle();
         None
+    }
+}
+
+/// Reads what has arrived, also if it is more than the client's buffer holds. Returns a request
+/// that has ended.
+///
+/// # Safety
+/// As for [`advance_linked`].
+unsafe fn read_all(link: *mut Object, object: *mut client::Object, now: u32) -> Option<RequestPtr> {
+    const MOST_READS: u8 = 16;
+    // SAFETY: as the caller promises.
+    unsafe {
+        for _ in 0..MOST_READS {
+            let ended = advance_noting(link, object, now, true);
+            if ended.is_some() || !(*link).has_read {
+                return ended;
+            }
+        }
+        None
+    }
+}
+
+/// Advances the client's transport, and notes whether bytes have arrived.
+///
+/// # Safety
+/// As for [`advance_linked`].
+unsafe fn advance_noting(
+    link: *mut Object,
+    object: *mut client::Object,
+    now: u32,
+    fresh: bool,
+) -> Option<RequestPtr> {
+    // SAFETY: as the caller promises.
+    unsafe {
+        (*link).has_read = false;
+        let ended = ((*(*link).transport).advance)(object, now, fresh);
+        if (*link).has_read {
+            client::queue(object).received();
+        }
+        ended
+    }
+}
+
+/// Closes the link if the device has fallen silent.
+///
+/// # Safety
+/// As for [`advance_linked`].
+unsafe fn close_if_silent(link: *mut Object, object: *mut client::Object, now: u32) {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let queue = client::queue(object);
+        let timeout = (*(*link).transport).settings(object).response_timeout.get();
+        let (unanswered, in_flight) = (queue.unanswered, queue.in_flight());
+        (*link)
+            .core
+            .close_if_silent(unanswered, in_flight, timeout, now);
+    }
+}
+
+/// Notes that a request under way was cancelled, and discards its state.
+///
+/// # Safety
+/// As for [`TransportKind::release`]; `object` has a link.
+pub(super) unsafe fn release(object: *mut client::Object, request: Option<&RequestPtr>) {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let link = (*object).kind.cast::<Object>().cast_mut();
+        if request.is_some() {
+            (*link).core.cancelled = (*link).core.cancelled.saturating_add(1);
+        }
+        ((*(*link).transport).release)(object, request);
     }
 }
 
@@ -318,6 +413,6 @@ pub(super) unsafe fn delay(object: *mut client::Object, now: u32, delay: u32) ->
         if (*link).core.state() != LinkState::Up && (fails || queue.has_lost()) {
             return 0;
         }
-        (*link).core.delay(now, delay)
+        (*link).core.delay(now, delay, queue.has_waiting())
     }
 }

@@ -32,11 +32,17 @@ pub(super) unsafe fn port(link: *mut Object) -> mbm_port {
 // is a link that is begun, and the hooks that they call are those of a complete port.
 
 unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -> i16 {
-    // SAFETY: see above.
+    // SAFETY: see above. The core of the link is not used while the hook runs.
     unsafe {
-        moved(context, |own| {
+        let count = moved(context, |own| {
             own.read.unwrap_unchecked()(own.context, bytes, capacity)
-        })
+        });
+        if count > 0 {
+            let link = context.cast::<Object>();
+            (*link).has_read = true;
+            (*link).core.received();
+        }
+        count
     }
 }
 

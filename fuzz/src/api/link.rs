@@ -59,7 +59,7 @@ fn hooks(w: &World) -> *const mbm_linkHooks {
 
 fn set(w: &World, link: *mut mbm_link) {
     let (byte, word, more) = (w.byte(), w.word(), w.word());
-    let choice = w.byte() % 7;
+    let choice = w.byte() % 8;
     let counters: *mut mbm_linkCounters = if byte & 1 == 0 {
         null_mut()
     } else {
@@ -84,6 +84,7 @@ fn set(w: &World, link: *mut mbm_link) {
         2 => call!(w, link, mbm_link_setConnectTimeout(link, u32::from(word))),
         3 => call!(w, link, mbm_link_setRequestsWait(link, byte & 3)),
         4 => call!(w, link, mbm_link_setCounters(link, counters)),
+        5 => call!(w, link, mbm_link_setReplaceAfter(link, byte % 128)),
         _ => call!(w, link, mbm_link_setCallback(link, callback, context)),
     });
 }

@@ -33,7 +33,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             // The bytes that wait for the port may be this request: the response is a false one.
             self.remove_unsent(queue.queue.get(at)?.state().wire);
         }
-        queue.connected = true;
+        queue.answered(self.in_flight);
         if is_answer(status) {
             self.storage.count(Counter::Replies, 1);
             if status != Status::OK {

@@ -132,8 +132,14 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             let Some((at, status)) = self.advance_queue(queue, now, stuck) else {
                 break;
             };
+            let unanswered = queue.unanswered;
             if let Some(request) = self.conclude(queue, at, status, now, &mut reads_left) {
                 return Some(request);
+            }
+            let again = queue.queue.get(at).map(ClientRequest::state);
+            if queue.unanswered != unanswered && again.is_some_and(|state| state.wait == 0) {
+                // It is repeated in the next poll, since a link may be replaced first.
+                break;
             }
         }
         if !self.flush(queue) {
@@ -415,7 +421,8 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
         }
         // Bytes are read also while all requests only wait. If they stayed in the port, a
         // program that waits for bytes in select would wake up at once.
-        let mut fresh = fresh && (self.in_flight > 0 || queue.delay(now) > 0);
+        let may_wait = queue.is_held || self.in_flight > 0 || queue.delay(now) > 0;
+        let mut fresh = fresh && may_wait;
         loop {
             if self.start < self.end {
                 if let Some(request) = self.find(queue, now) {
@@ -423,7 +430,10 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
                 }
             }
             if !fresh {
-                return self.send(queue, now);
+                return match queue.is_held {
+                    true => None,
+                    false => self.send(queue, now),
+                };
             }
             if !self.read_bytes() {
                 return self.end_all_lost(queue, now);

@@ -1,0 +1,444 @@
+/* A client's link: what it does when the peer closes connections that are idle, or falls silent on
+ * one that stays open. */
+#include "linked.h"
+
+static const uint8_t streams[] = {MBM_FRAMING_TCP, MBM_FRAMING_RTU_OVER_TCP};
+
+/* A link that has been open for two seconds, over which one request was answered. */
+static void begin_good(int framing)
+{
+    begin_up(framing);
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    answer(framing);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+    run(2000);
+    m.sent_count = 0;
+    connects = disconnects = 0;
+}
+
+/* The request goes out over the open link, and is answered. */
+static void is_answered(int framing, mbm_clientRequest *which)
+{
+    memory_port_send(&m, &client);
+    assert_true(m.sent_count > 0);
+    answer(framing);
+    IS(MBM_OK, memory_port_run(&m, &client, which, 1000));
+    assert_int_equal(words[0], 0x1234);
+}
+
+static void a_request_that_finds_the_link_closed_opens_it_at_once(void **state)
+{
+    unsigned i, noticed;
+
+    (void)state;
+    for (i = 0; i < 2 * COUNT(framings); i++) {
+        const int framing = framings[i / 2];
+        uint32_t before;
+
+        noticed = i % 2;
+        begin_good(framing);
+        m.is_lost = 1;
+        if (noticed) {
+            OK(mbm_client_poll(&client));
+            assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
+            run(100);
+            assert_int_equal(connects, 0);
+        }
+        before = m.now;
+        queue_read(&request);
+        assert_int_equal(mbm_client_pollDelay(&client), 0);
+        IS(MBM_PENDING, mbm_client_poll(&client));
+        if (!noticed) {
+            /* Not a byte was lost with the old link. */
+            assert_int_equal(mbm_client_pollDelay(&client), 0);
+            IS(MBM_PENDING, mbm_client_poll(&client));
+        }
+        assert_int_equal(connects, 1);
+        assert_int_equal(connected_at, before);
+        assert_int_equal(disconnects, 1);
+        assert_string_equal(events, "LE6 C00 ");
+        is_answered(framing, &request);
+    }
+}
+
+/* A device that serves one request with each connection. */
+static void a_peer_that_closes_the_link_after_each_reply_answers_each_request(void **state)
+{
+    unsigned i, round;
+
+    (void)state;
+    for (i = 0; i < COUNT(streams); i++) {
+        begin_good(streams[i]);
+        for (round = 0; round < 20; round++) {
+            m.is_lost = 1;
+            queue_read(&request);
+            m.sent_count = 0;
+            is_answered(streams[i], &request);
+            events[0] = '\0';
+        }
+        assert_int_equal(connects, 20);
+        assert_int_equal(counters.failed, 0);
+    }
+}
+
+static void a_request_waits_for_the_opening_as_long_as_its_response_timeout(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin_good(framings[i]);
+        m.is_lost = 1;
+        connects_with = status_is = MBM_PENDING;
+        other.timeoutMs = 900;
+        queue_read(&request);
+        queue_read(&other);
+        run(299);
+        IS(MBM_PENDING, request.status);
+        run(60);
+        IS(MBM_CONNECT_TIMED_OUT, request.status);
+        IS(MBM_PENDING, other.status);
+        run(540);
+        IS(MBM_PENDING, other.status);
+        run(60);
+        IS(MBM_CONNECT_TIMED_OUT, other.status);
+        /* The attempt itself goes on. */
+        assert_int_equal(connects, 1);
+        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
+        assert_int_equal(m.sent_count, 0);
+        m.is_lost = 0;
+        status_is = MBM_OK;
+        queue_read(&request);
+        is_answered(framings[i], &request);
+    }
+}
+
+static void requests_that_wait_for_the_link_wait_longer(void **state)
+{
+    (void)state;
+    begin_good(MBM_FRAMING_TCP);
+    OK(mbm_link_setRequestsWait(&kept, 1));
+    m.is_lost = 1;
+    connects_with = status_is = MBM_PENDING;
+    queue_read(&request);
+    run(9000);
+    IS(MBM_PENDING, request.status);
+    m.is_lost = 0;
+    status_is = MBM_OK;
+    is_answered(MBM_FRAMING_TCP, &request);
+}
+
+static void only_a_failed_opening_backs_off(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin_good(framings[i]);
+        m.is_lost = 1;
+        connects_with = MBM_LINK_LOST;
+        queue_read(&request);
+        run(1);
+        IS(MBM_LINK_LOST, request.status);
+        assert_string_equal(events, "LE6 FE6 ");
+        queue_read(&request);
+        OK(mbm_client_poll(&client));
+        IS(MBM_LINK_LOST, request.status);
+        assert_int_equal(connects, 1);
+        assert_in_range(next_attempt(), 498, 500);
+        assert_int_equal(next_attempt(), 1000);
+        assert_int_equal(m.sent_count, 0);
+    }
+}
+
+static void a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_request(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    begin_good(MBM_FRAMING_TCP);
+    m.is_lost = 1;
+    for (i = 0; i < 1000; i++) {
+        queue_read(&request);
+        run(5);
+        m.is_lost = 1;
+        run(5);
+        IS(MBM_LINK_LOST, request.status);
+    }
+    /* Ten seconds: at once, and after 0.5, 1, 2 and 4 seconds. */
+    assert_in_range(connects, 4, 6);
+}
+
+static void a_request_that_was_sent_is_not_sent_again_over_the_new_link(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin_good(framings[i]);
+        OK(mbm_client_setRetries(&client, 3));
+        IS(MBM_PENDING, mbm_client_writeSingleRegister(&client, &request, 1, 2));
+        memory_port_send(&m, &client);
+        m.is_lost = 1;
+        queue_read(&other);
+        run(1);
+        IS(MBM_LINK_LOST, request.status);
+        m.sent_count = 0;
+        is_answered(framings[i], &other);
+        assert_int_equal(connects, 1);
+        assert_int_equal(m.sent[framings[i] == MBM_FRAMING_TCP ? 7 : 1],
+                         framings[i] == MBM_FRAMING_ASCII ? '0' : 3);
+        run(5000);
+        assert_int_equal(mbm_client_pending(&client), 0);
+    }
+}
+
+static void a_link_that_its_peer_closes_twice_while_idle_waits_for_a_request(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin_good(framings[i]);
+        OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 1000, 1000));
+        m.is_lost = 1;
+        OK(mbm_client_poll(&client));
+        assert_int_equal(next_attempt(), 1000);
+        run(2000);
+        m.is_lost = 1;
+        run(3600000);
+        assert_int_equal(connects, 1);
+        assert_in_range(mbm_client_pollDelay(&client), 1, 1000 * MS);
+        queue_read(&request);
+        assert_int_equal(mbm_client_pollDelay(&client), 0);
+        is_answered(framings[i], &request);
+        assert_int_equal(connects, 2);
+        /* Its answer shows that it is in use: it is opened again without a request, once. */
+        m.is_lost = 1;
+        run(2100);
+        assert_int_equal(connects, 3);
+        m.is_lost = 1;
+        run(100000);
+        assert_int_equal(connects, 3);
+        OK(mbm_link_reconnect(&kept));
+        assert_int_equal(next_attempt(), 0);
+    }
+}
+
+/* --- a device that falls silent --- */
+
+/* Sends a request that gets no byte. */
+static void is_unanswered(mbm_clientRequest *which)
+{
+    m.sent_count = 0;
+    queue_read(which);
+    IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, which, 1000));
+}
+
+static void a_silent_connection_is_replaced_after_two_requests(void **state)
+{
+    unsigned i, round;
+
+    (void)state;
+    for (i = 0; i < COUNT(streams); i++) {
+        begin_good(streams[i]);
+        for (round = 1; round < 5; round++) {
+            events[0] = '\0';
+            is_unanswered(&request);
+            assert_int_equal(connects, round - 1);
+            is_unanswered(&request);
+            m.sent_count = 0;
+            queue_read(&request);
+            is_answered(streams[i], &request);
+            assert_int_equal(connects, round);
+            assert_int_equal(disconnects, round);
+            assert_string_equal(events, "LE2 C00 ");
+            assert_int_equal(counters.lost, round);
+        }
+    }
+}
+
+static void a_repetition_goes_over_the_new_connection(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(streams); i++) {
+        begin_good(streams[i]);
+        OK(mbm_client_setRetries(&client, 2));
+        queue_read(&request);
+        run(301);
+        assert_int_equal(connects, 0);
+        m.sent_count = 0;
+        run(301);
+        assert_int_equal(connects, 1);
+        is_answered(streams[i], &request);
+    }
+}
+
+static void any_byte_begins_the_count_anew(void **state)
+{
+    static const uint8_t noise = 0xA5;
+    unsigned i, round;
+
+    (void)state;
+    for (i = 0; i < COUNT(streams); i++) {
+        begin_good(streams[i]);
+        for (round = 0; round < 20; round++) {
+            queue_read(&request);
+            memory_port_send(&m, &client);
+            if (round % 2)
+                memory_port_bytes(&m, &noise, 1);
+            (void)memory_port_run(&m, &client, &request, 1000);
+            assert_int_not_equal(request.status, MBM_OK);
+        }
+        assert_int_equal(connects, 0);
+    }
+}
+
+static void requests_of_a_program_with_limits_of_its_own_count_too(void **state)
+{
+    unsigned i, round;
+
+    (void)state;
+    for (i = 0; i < COUNT(streams); i++) {
+        begin_good(streams[i]);
+        /* Each is cancelled after 20 ms. The response timeout is 300 ms. */
+        for (round = 0; round < 15; round++) {
+            assert_int_equal(connects, 0);
+            queue_read(&request);
+            run(20);
+            OK(mbm_client_cancel(&client, &request));
+        }
+        run(100);
+        queue_read(&request);
+        run(20);
+        assert_int_equal(connects, 1);
+    }
+}
+
+static void cancelled_requests_alone_do_not_close_a_connection(void **state)
+{
+    unsigned round;
+
+    (void)state;
+    begin_good(MBM_FRAMING_TCP);
+    for (round = 0; round < 100; round++) {
+        unsigned cancelled;
+
+        for (cancelled = 0; cancelled < 5; cancelled++) {
+            queue_read(&request);
+            run(10);
+            OK(mbm_client_cancel(&client, &request));
+        }
+        queue_read(&request);
+        m.sent_count = 0;
+        is_answered(MBM_FRAMING_TCP, &request);
+    }
+    assert_int_equal(connects, 0);
+}
+
+static void the_limit_is_a_setting(void **state)
+{
+    unsigned i, round;
+
+    (void)state;
+    IS(MBM_INVALID_ARGUMENT, mbm_link_setReplaceAfter(NULL, 1));
+    begin(MBM_FRAMING_TCP);
+    IS(MBM_INVALID_ARGUMENT, mbm_link_setReplaceAfter(&kept, 101));
+    for (i = 0; i < COUNT(framings); i++) {
+        const int is_stream =
+            framings[i] == MBM_FRAMING_TCP || framings[i] == MBM_FRAMING_RTU_OVER_TCP;
+
+        begin_good(framings[i]);
+        if (is_stream)
+            OK(mbm_link_setReplaceAfter(&kept, 0));
+        for (round = 0; round < 200; round++)
+            is_unanswered(&request);
+        OK(mbm_client_poll(&client));
+        assert_int_equal(connects, 0);
+        assert_int_equal(counters.lost, 0);
+        OK(mbm_link_setReplaceAfter(&kept, 100));
+        OK(mbm_client_poll(&client));
+        assert_int_equal(counters.lost, 1);
+        OK(mbm_link_setReplaceAfter(&kept, 1));
+        is_unanswered(&request);
+        assert_int_equal(counters.lost, 2);
+    }
+}
+
+static void a_response_of_the_old_connection_is_not_taken_for_one_of_the_new(void **state)
+{
+    uint8_t late[11] = {0, 0, 0, 0, 0, 5, UNIT, 3, 2, 0x66, 0x66};
+
+    (void)state;
+    begin_good(MBM_FRAMING_TCP);
+    is_unanswered(&request);
+    m.sent_count = 0;
+    is_unanswered(&request);
+    memcpy(late, m.sent, 2);
+    m.sent_count = 0;
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    assert_int_equal(connects, 1);
+    memory_port_bytes(&m, late, sizeof late);
+    is_answered(MBM_FRAMING_TCP, &request);
+}
+
+/* Two requests time out while three that were sent later may still be answered. */
+static void requests_under_way_have_their_time_before_a_connection_is_replaced(void **state)
+{
+    static mbm_clientRequest late[3];
+    uint8_t reply[11] = {0, 0, 0, 0, 0, 5, UNIT, 3, 2, 0x12, 0x34};
+    unsigned i, answered;
+
+    (void)state;
+    for (answered = 0; answered < 2; answered++) {
+        begin_good(MBM_FRAMING_TCP);
+        queue_read(&request);
+        queue_read(&other);
+        run(100);
+        m.sent_count = 0;
+        for (i = 0; i < COUNT(late); i++) {
+            late[i] = (mbm_clientRequest){.unit = UNIT, .reply = words, .replyBytes = 2};
+            queue_read(&late[i]);
+        }
+        run(201);
+        IS(MBM_RESPONSE_TIMED_OUT, request.status);
+        IS(MBM_RESPONSE_TIMED_OUT, other.status);
+        if (answered) {
+            memcpy(reply, m.sent, 2);
+            memory_port_bytes(&m, reply, sizeof reply);
+        }
+        run(101);
+        IS(answered ? MBM_OK : MBM_RESPONSE_TIMED_OUT, late[0].status);
+        IS(MBM_RESPONSE_TIMED_OUT, late[1].status);
+        IS(MBM_RESPONSE_TIMED_OUT, late[2].status);
+        assert_int_equal(counters.lost, answered ? 0 : 1);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_request_that_finds_the_link_closed_opens_it_at_once),
+        cmocka_unit_test(a_peer_that_closes_the_link_after_each_reply_answers_each_request),
+        cmocka_unit_test(a_request_waits_for_the_opening_as_long_as_its_response_timeout),
+        cmocka_unit_test(requests_that_wait_for_the_link_wait_longer),
+        cmocka_unit_test(only_a_failed_opening_backs_off),
+        cmocka_unit_test(a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_request),
+        cmocka_unit_test(a_request_that_was_sent_is_not_sent_again_over_the_new_link),
+        cmocka_unit_test(a_link_that_its_peer_closes_twice_while_idle_waits_for_a_request),
+        cmocka_unit_test(a_silent_connection_is_replaced_after_two_requests),
+        cmocka_unit_test(a_repetition_goes_over_the_new_connection),
+        cmocka_unit_test(any_byte_begins_the_count_anew),
+        cmocka_unit_test(requests_of_a_program_with_limits_of_its_own_count_too),
+        cmocka_unit_test(cancelled_requests_alone_do_not_close_a_connection),
+        cmocka_unit_test(the_limit_is_a_setting),
+        cmocka_unit_test(a_response_of_the_old_connection_is_not_taken_for_one_of_the_new),
+        cmocka_unit_test(requests_under_way_have_their_time_before_a_connection_is_replaced),
+    };
+
+    return cmocka_run_group_tests_name("links again", tests, NULL, NULL);
+}
