@@ -29,6 +29,86 @@ static void steps_come_in_order_when_the_port_takes_bytes_one_by_one(void **stat
     assert_int_equal(s->counters.bytesSent, 8);
 }
 
+/* A port that takes a byte at every other call. */
+static void bytes_are_counted_as_they_are_sent(void **state)
+{
+    unsigned again;
+    NODE;
+
+    OK(mbm_node_setBlocking(n, 0));
+    s->write_piece = 1;
+    s->write_busy = 1;
+    s->character = 1000;
+    for (again = 0; again < 2; again++) {
+        const unsigned before = again * 8;
+
+        assert_int_equal(sim_read_one(s), MBM_PENDING);
+        while (s->counters.bytesSent < before + 8) {
+            const uint32_t sent = s->sent > again ? s->frames[again].length : 0;
+
+            assert_int_equal(s->counters.bytesSent, before + sent);
+            assert_int_equal(s->counters.requests, again + (sent > 0));
+            assert_int_equal(mbm_node_poll(n), MBM_PENDING);
+            s->now += s->idle_step;
+        }
+        /* The last byte has not left yet. The end of the request counts nothing again. */
+        assert_true(s->now < s->transmitted);
+        while (s->driver_on) {
+            assert_int_equal(mbm_node_poll(n), MBM_PENDING);
+            s->now += s->idle_step;
+        }
+        OK(mbm_node_cancel(n));
+        assert_int_equal(s->counters.bytesSent, before + 8);
+        assert_int_equal(s->counters.requests, again + 1);
+    }
+}
+
+static void a_request_of_which_the_port_takes_no_byte_is_counted(void **state)
+{
+    NODE;
+
+    OK(mbm_node_setResponseTimeout(n, 100));
+    s->write_never = 1;
+    assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
+    assert_int_equal(s->counters.requests, 1);
+    assert_int_equal(s->counters.bytesSent, 0);
+}
+
+static void a_client_counts_bytes_as_they_are_sent(void **state)
+{
+    static mbm_client client;
+    static uint8_t frame[MBM_MAX_ASCII_FRAME];
+    mbm_counters counters = {0};
+    unsigned ascii;
+    SIM;
+
+    s->write_piece = 1;
+    for (ascii = 0; ascii <= 1; ascii++) {
+        const uint32_t length = ascii ? 17 : 8;
+        mbm_clientRequest request = {.unit = 17};
+
+        memset(&client, 0, sizeof client);
+        memset(&counters, 0, sizeof counters);
+        if (ascii)
+            OK(mbm_client_beginAscii(&client, &s->port, frame, sizeof frame));
+        else
+            OK(mbm_client_beginRtu(&client, &s->port, frame, sizeof frame));
+        OK(mbm_client_setCounters(&client, &counters));
+        assert_int_equal(mbm_client_writeSingleRegister(&client, &request, 0, 1), MBM_PENDING);
+        while (counters.bytesSent < length) {
+            const uint32_t before = counters.bytesSent;
+
+            assert_int_equal(mbm_client_poll(&client), MBM_PENDING);
+            assert_in_range(counters.bytesSent, before, before + 1);
+            s->now += s->idle_step;
+        }
+        OK(mbm_client_cancel(&client, &request));
+        assert_int_equal(counters.bytesSent, length);
+        assert_int_equal(counters.requests, 1);
+        s->cut_allowed += ascii;
+    }
+}
+
 static void bytes_that_wait_in_the_receiver_are_no_part_of_the_reply(void **state)
 {
     SIM;
@@ -285,6 +365,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         SIM_TEST(steps_come_in_order),
         SIM_TEST(steps_come_in_order_when_the_port_takes_bytes_one_by_one),
+        SIM_TEST(bytes_are_counted_as_they_are_sent),
+        SIM_TEST(a_request_of_which_the_port_takes_no_byte_is_counted),
+        SIM_TEST(a_client_counts_bytes_as_they_are_sent),
         SIM_TEST(bytes_that_wait_in_the_receiver_are_no_part_of_the_reply),
         SIM_TEST(the_driver_is_switched_off_only_after_the_last_bit),
         SIM_TEST(the_driver_is_held_on_after_an_early_flush),

@@ -123,10 +123,10 @@ pub struct Engine<P, S: Storage, Q> {
     outgoing: S::Count,
     /// How many bytes of the request were sent.
     sent: S::Count,
+    /// How many of them were counted, and the request with the first of them.
+    counted: S::Count,
     /// How many frames with a right CRC were skipped that were not counted yet.
     foreign_frames: i8,
-    /// The request that is on the line was counted.
-    is_counted: bool,
     /// CRC of the bytes that have arrived since the last frame ended.
     run: Crc16,
     /// The CRC since the last frame of the bytes that were dropped from the frame buffer.

@@ -1,6 +1,6 @@
 //! Adds the attempts and the bytes on the line to the counters of the storage.
 
-use super::{Counter, Engine, Phase, Storage};
+use super::{Count, Counter, Engine, Phase, Storage};
 use crate::error::Status;
 
 impl<P, S: Storage, Q> Engine<P, S, Q> {
@@ -27,18 +27,20 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
         let foreign_frames = self.foreign_frames.max(0) - kept;
         storage.count(Counter::ForeignFrames, foreign_frames as u32);
         self.foreign_frames = kept;
-        let was_sent = self.phase > Phase::Gap;
-        if was_sent && !self.is_counted {
-            storage.count(Counter::Requests, 1);
-        }
-        self.is_counted = was_sent && status == Status::PENDING;
-        if status == Status::PENDING {
+        if self.phase <= Phase::Gap {
             return;
         }
-        if was_sent {
-            let sent: u16 = self.sent.into();
-            storage.count(Counter::BytesSent, sent.into());
+        let more: u16 = (self.sent - self.counted).into();
+        storage.count(Counter::BytesSent, more.into());
+        let is_over = status != Status::PENDING;
+        if self.counted == S::Count::ZERO && (is_over || more > 0) {
+            storage.count(Counter::Requests, 1);
         }
+        self.counted = self.sent;
+        if !is_over {
+            return;
+        }
+        self.counted = S::Count::ZERO;
         if self.phase != Phase::Reply {
             return;
         }
