@@ -1,5 +1,6 @@
 /* Requests that the client forwards as they arrived, and the replies that it accepts for
  * them, over a port in memory. */
+#include "examples.h"
 #include "memory_port.h"
 #include "test.h"
 
@@ -199,6 +200,121 @@ static void a_request_that_is_not_forwarded_is_not_queued(void **state)
     IS(MBM_NOT_INITIALISED, mbm_client_forward(&client, &request, 0x41, NULL, 0));
 }
 
+/* Forwards the bytes, and expects on the line the PDU that mbm_frame_build makes of the packet. */
+static void is_sent_as_built(int framing, const mbm_packet *packet, const uint8_t *body,
+                             uint16_t bytes)
+{
+    const mbm_function declared = {
+        packet->function, {MBM_RULE_SILENCE, 0, 0}, {MBM_RULE_SILENCE, 0, 0}};
+    uint8_t pdu[MBM_MAX_PDU];
+    uint16_t length;
+
+    begin(framing);
+    OK(mbm_frame_build(PDU(&declared, 1), packet, pdu, sizeof pdu, &length));
+    if (!body) {
+        body = pdu + 1;
+        bytes = (uint16_t)(length - 1);
+    }
+    IS(MBM_PENDING, mbm_client_forward(&client, &request, packet->function, body, bytes));
+    memory_port_send(&m, &client);
+    if (framing == MBM_FRAMING_TCP) {
+        assert_int_equal(m.sent_count, 7 + length);
+        assert_memory_equal(m.sent + 7, pdu, length);
+    } else {
+        assert_int_equal(m.sent_count, 1 + length + 2);
+        assert_memory_equal(m.sent + 1, pdu, length);
+    }
+}
+
+static void every_request_that_is_built_is_forwarded(void **state)
+{
+    unsigned i, forwarded = 0;
+    size_t k;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++)
+        for (k = 0; k < example_count; k++) {
+            uint8_t pdu[MBM_MAX_PDU];
+            mbm_packet packet;
+
+            (void)example_load(&examples[k], pdu, &packet);
+            if (example_side(&examples[k]) != MBM_PACKET_REQUEST)
+                continue;
+            is_sent_as_built(framings[i], &packet, NULL, 0);
+            forwarded++;
+        }
+    assert_true(forwarded >= 19 * COUNT(framings));
+}
+
+/* Up to as many records as a request holds, or its reply, each of `length` registers. */
+static void records_are_forwarded(int framing, uint8_t function, uint16_t length)
+{
+    static const uint8_t registers[250] = {1, 2, 3, 4};
+    uint8_t storage[251], pdu[MBM_MAX_PDU];
+    mbm_packet packet = {.kind = MBM_PACKET_REQUEST, .function = function};
+    mbm_record record = {registers, 6, 0, length};
+    uint16_t bytes;
+
+    while (mbm_packet_addRecord(&packet, storage, sizeof storage, &record) == MBM_OK &&
+           mbm_frame_build(PDU(NULL, 0), &packet, pdu, sizeof pdu, &bytes) == MBM_OK) {
+        is_sent_as_built(framing, &packet, packet.data, packet.dataLength);
+        record.record++;
+    }
+    assert_true(record.record > 0);
+}
+
+static void records_are_forwarded_as_they_were_added(void **state)
+{
+    static const uint16_t lengths[] = {1, 2, 3, 7, 60, 122};
+    unsigned i, k;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++)
+        for (k = 0; k < COUNT(lengths); k++) {
+            if (lengths[k] <= 121)
+                records_are_forwarded(framings[i], MBM_FC_READ_FILE_RECORD, lengths[k]);
+            records_are_forwarded(framings[i], MBM_FC_WRITE_FILE_RECORD, lengths[k]);
+        }
+}
+
+static void the_reply_to_records_that_were_added_is_accepted(void **state)
+{
+    static const uint8_t registers[] = {0xBE, 0xEF}, reading[] = {6, 0, 4, 0, 7, 0, 2};
+    static const uint8_t data[] = {UNIT, 0x14, 6, 5, 6, 0x12, 0x34, 0x56, 0x78},
+                         other[] = {UNIT, 0x14, 4, 3, 6, 0x12, 0x34};
+    uint8_t storage[16], written[] = {UNIT, 0x15, 9, 6, 0, 4, 0, 1, 0, 1, 0xBE, 0xEF};
+    mbm_packet packet = {.kind = MBM_PACKET_REQUEST, .function = MBM_FC_READ_FILE_RECORD};
+    mbm_record record = {registers, 4, 7, 2};
+
+    (void)state;
+    begin(MBM_FRAMING_RTU);
+    OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &record));
+    assert_memory_equal(storage, reading, sizeof reading);
+    IS(MBM_PENDING, mbm_client_forward(&client, &request, 0x14, packet.data, packet.dataLength));
+    memory_port_send(&m, &client);
+    memory_port_rtu(&m, data, sizeof data);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+    assert_int_equal(request.length, sizeof data - 2);
+    assert_memory_equal(reply, data + 2, request.length);
+
+    m.sent_count = 0;
+    IS(MBM_PENDING, mbm_client_forward(&client, &request, 0x14, packet.data, packet.dataLength));
+    memory_port_send(&m, &client);
+    memory_port_rtu(&m, other, sizeof other); /* one register instead of two */
+    assert_true(memory_port_run(&m, &client, &request, 1000) >= 0xE0);
+
+    begin(MBM_FRAMING_RTU);
+    packet.function = MBM_FC_WRITE_FILE_RECORD;
+    packet.dataLength = 0;
+    record.record = record.length = 1;
+    OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &record));
+    IS(MBM_PENDING, mbm_client_forward(&client, &request, 0x15, packet.data, packet.dataLength));
+    memory_port_send(&m, &client);
+    memory_port_rtu(&m, written, sizeof written);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+    assert_memory_equal(reply, written + 2, sizeof written - 2);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -206,6 +322,9 @@ int main(void)
         cmocka_unit_test(a_response_whose_repeated_bytes_differ_is_not_accepted),
         cmocka_unit_test(force_listen_only_mode_ends_without_a_response),
         cmocka_unit_test(a_request_that_is_not_forwarded_is_not_queued),
+        cmocka_unit_test(every_request_that_is_built_is_forwarded),
+        cmocka_unit_test(records_are_forwarded_as_they_were_added),
+        cmocka_unit_test(the_reply_to_records_that_were_added_is_accepted),
     };
 
     return cmocka_run_group_tests_name("client forward", tests, NULL, NULL);

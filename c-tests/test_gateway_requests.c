@@ -122,6 +122,11 @@ static void a_request_that_the_standard_forbids_is_refused(void **state)
     EXPECT(0, 2, 2, "\x83\x02");
     ASK(0, 3, 2, "\x00\x01");
     EXPECT(0, 3, 2, "\x80\x01");
+    /* Records without their byte count: a program may forward them, a TCP client may not. */
+    ASK(0, 4, 2, "\x14\x06\x00\x04\x00\x01\x00\x02");
+    EXPECT(0, 4, 2, "\x94\x03");
+    ASK(0, 5, 2, "\x15\x06\x00\x04\x00\x01\x00\x01\xBE\xEF");
+    EXPECT(0, 5, 2, "\x95\x03");
     SILENT(b.wires[0]);
 }
 

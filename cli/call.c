@@ -64,11 +64,15 @@ static uint8_t queue(mbm_clientRequest *request)
 {
     static const mbm_rule any_length = {.kind = MBM_RULE_SILENCE};
     const uint16_t bytes = (uint16_t)(length - 1);
-    const uint8_t status =
-        mbm_client_forward(&at.client, request, asked[MBAP], asked + MBAP + 1, bytes);
+    const uint8_t *const pdu = asked + MBAP;
+    /* A count of 6 is too small for records: mbm_client_forward would add one. */
+    const int lacks_count =
+        bytes > 0 && pdu[1] == 6 &&
+        (pdu[0] == MBM_FC_READ_FILE_RECORD || pdu[0] == MBM_FC_WRITE_FILE_RECORD);
 
-    if (status == MBM_PENDING)
-        return status;
+    if (!lacks_count &&
+        mbm_client_forward(&at.client, request, pdu[0], pdu + 1, bytes) == MBM_PENDING)
+        return MBM_PENDING;
     request->data = asked + MBAP + 1;
     return mbm_client_custom(&at.client, request, asked[MBAP], bytes, &any_length);
 }

@@ -206,8 +206,8 @@ public:
     /**
      * A request of any function as another client sent it, for gateways: `body` is the
      * 0 to 252 bytes after the function code, which must stay until the request has
-     * ended. The request's words get what follows the function code of the reply, as
-     * bytes on the wire.
+     * ended. Of 14 and 15 it may lack the byte count. The request's words get what follows
+     * the function code of the reply, as bytes on the wire.
      */
     uint8_t forward(ModbusRequest &request, uint8_t function, const uint8_t *body, uint16_t bytes)
     {

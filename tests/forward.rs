@@ -116,6 +116,43 @@ fn a_request_that_every_server_must_refuse_is_refused_with_that_exception() {
     }
 }
 
+/// Forwards the data of a request of 14 or 15 (hex) without their byte count.
+fn forward_groups(function: u8, groups: &[u8]) -> Result<Vec<u8>, Error> {
+    let mut header = RequestHeader::NONE;
+    header.forward_groups(function, groups).result()?;
+    assert!(usize::from(header.data_length()) <= groups.len());
+    let data = &groups[groups.len() - usize::from(header.data_length())..];
+    let mut sent = vec![0; usize::from(header.request_length())];
+    header.emit(&mut sent, |index| data[index]);
+    Ok(sent)
+}
+
+#[test]
+fn records_are_forwarded_with_and_without_their_byte_count() {
+    let mut count = 0;
+    for pdu in REQUESTS.iter() {
+        assert_eq!(forward_groups(pdu[0], &pdu[1..]), Ok(pdu.clone()));
+        if matches!(pdu[0], 0x14 | 0x15) {
+            assert_eq!(forward_groups(pdu[0], &pdu[2..]), Ok(pdu.clone()));
+            assert!(forward(&[&pdu[..1], &pdu[2..]].concat()).is_err());
+            count += 1;
+        }
+    }
+    assert!(count >= 4);
+    for (function, most) in [(0x14, 245), (0x15, 251)] {
+        for length in 0..3000 {
+            let groups = vec![6; length];
+            let right = match function {
+                0x14 => length > 0 && length <= most && length % 7 == 0,
+                _ => (9..=most).contains(&length),
+            };
+            // 6, 6, 6 and so on is a whole request only if no byte count is missing.
+            let taken = forward_groups(function, &groups).is_ok();
+            assert_eq!(taken, right, "{function:02X} {length}");
+        }
+    }
+}
+
 fn any_pdu() -> impl Strategy<Value = Vec<u8>> {
     let changed = (
         any::<prop::sample::Index>(),

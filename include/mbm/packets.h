@@ -371,7 +371,8 @@ uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
 
 /**
  * Adds a record to the data of a packet of function 14 or 15 (hex) that you are going to
- * build. Set the kind and the function of the packet first, and dataLength to 0.
+ * build. Set the kind and the function of the packet first, and dataLength to 0. mbm_client_forward
+ * takes the data of a request as its `body`.
  *
  * @param packet    gets the record; unchanged if the call fails
  * @param storage   receives the data of the packet; use the same storage for all its records

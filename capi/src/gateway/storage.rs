@@ -2,8 +2,8 @@
 
 use super::parts::{mbm_gatewayConfig, mbm_gatewayConnection, mbm_gatewayLine, mbm_gatewayRequest};
 use crate::client::{
-    has_tcp_frames, mbm_client, mbm_clientRequest, mbm_client_cancel, mbm_client_forward,
-    mbm_client_poll, mbm_client_pollDelay,
+    forward, has_tcp_frames, mbm_client, mbm_clientRequest, mbm_client_cancel, mbm_client_poll,
+    mbm_client_pollDelay,
 };
 use crate::framing::MBM_MAX_TCP_FRAME;
 use crate::functions::mbm_function;
@@ -187,7 +187,8 @@ impl GatewayStorage for Parts {
                 }
             }
             let function = *frame.add(BODY - 1);
-            Status::from_code(mbm_client_forward(client, request, function, body, length))
+            let queued = forward::<false>(client, request, function, body, length);
+            Status::from_code(queued)
         }
     }
 

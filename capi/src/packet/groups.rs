@@ -167,7 +167,8 @@ unsafe fn add(
 }
 
 /// Adds a record to the data of a packet of function 14 or 15 (hex) that you are going to
-/// build. Set the kind and the function of the packet first, and dataLength to 0.
+/// build. Set the kind and the function of the packet first, and dataLength to 0. mbm_client_forward
+/// takes the data of a request as its `body`.
 ///
 /// @param packet    gets the record; unchanged if the call fails
 /// @param storage   receives the data of the packet; use the same storage for all its records

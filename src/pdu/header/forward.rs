@@ -2,6 +2,7 @@
 //! unchanged.
 
 use super::super::custom::Rule;
+use super::super::files::REFERENCE_TYPE;
 use super::super::functions::{FunctionSpec, BITS, DATA, OWN, SENDS_WORDS, TAKES_WORDS};
 use super::super::{functions, identification};
 use super::RequestHeader;
@@ -23,7 +24,25 @@ impl RequestHeader {
     /// [`Status::ILLEGAL_DATA_VALUE`] or [`Status::ILLEGAL_DATA_ADDRESS`] for a
     /// length, count, quantity or range that the standard does not allow.
     pub fn forward(&mut self, function: u8, body: &[u8]) -> Status {
+        self.forward_counted(function, body, 0)
+    }
+
+    /// As [`RequestHeader::forward`], but the `body` of 14 and 15 (hex) may also be the groups alone:
+    /// it lacks the byte count before them then, which is sent too. No byte count is as small as
+    /// the reference type with which a group begins.
+    pub fn forward_groups(&mut self, function: u8, body: &[u8]) -> Status {
+        let has_groups = matches!(
+            function,
+            functions::READ_FILE_RECORD | functions::WRITE_FILE_RECORD
+        );
+        let lacks_count = has_groups && body.first() == Some(&REFERENCE_TYPE);
+        self.forward_counted(function, body, lacks_count.into())
+    }
+
+    /// As [`RequestHeader::forward`]. `missing` bytes are sent before `body`: the byte count.
+    fn forward_counted(&mut self, function: u8, body: &[u8], missing: u16) -> Status {
         let length = body.len() as u16;
+        let groups = (length + missing).saturating_sub(1);
         let word = |index: usize| match body.as_chunks().0.get(index) {
             Some(word) => u16::from_be_bytes(*word),
             None => 0,
@@ -36,8 +55,8 @@ impl RequestHeader {
                 self.follow(length.saturating_sub(2))
             }
             functions::DIAGNOSTICS => self.diagnostics(first, length.saturating_sub(2) / 2),
-            functions::READ_FILE_RECORD => self.read_file_records(length.saturating_sub(1)),
-            functions::WRITE_FILE_RECORD => self.write_file_records(length.saturating_sub(1)),
+            functions::READ_FILE_RECORD => self.read_file_records(groups),
+            functions::WRITE_FILE_RECORD => self.write_file_records(groups),
             functions::MASK_WRITE_REGISTER => self.mask_write_register(first, second, word(2)),
             functions::READ_WRITE_MULTIPLE_REGISTERS => {
                 self.read_write_registers(first, second, word(2), word(3))
@@ -65,8 +84,9 @@ impl RequestHeader {
         let data = data.and_then(|at| body.get(at..)).unwrap_or_default();
         let byte = |index: usize| data.get(index).copied().unwrap_or_default();
         // The counts in `body` must be right, and no byte may follow.
-        if usize::from(self.request_length()) == 1 + body.len()
-            && (1..)
+        let first = 1 + usize::from(missing);
+        if usize::from(self.request_length()) == first + body.len()
+            && (first..)
                 .zip(body)
                 .all(|(at, own)| self.byte_at(at, &byte) == *own)
         {

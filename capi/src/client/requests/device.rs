@@ -263,13 +263,28 @@ pub unsafe extern "C" fn mbm_client_custom(
 /// @param request   the request; if it is queued, its `data` then points into `body`
 /// @param function  the function code, 1 to 127
 /// @param body      the bytes after the function code; do not change them until the request has
-///                  ended; may be NULL if `bytes` is 0
+///                  ended; may be NULL if `bytes` is 0. Of 14 and 15 also the records alone, as
+///                  mbm_packet_addRecord builds them: the client sends their byte count before them
 /// @param bytes     the number of bytes of `body`, 0 to 252
 /// @return a status; see mbm_client_readCoils. Also those with which a server answers such a
 ///         request: MBM_ILLEGAL_DATA_VALUE if the length or a count in `body` is wrong,
 ///         MBM_ILLEGAL_FUNCTION if the function code is 0 or above 127
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_forward(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    function: u8,
+    body: *const u8,
+    bytes: u16,
+) -> u8 {
+    forward::<true>(client, request, function, body, bytes)
+}
+
+/// As [`mbm_client_forward`]. Records without a byte count are refused unless they `MAY_LACK_COUNT`.
+///
+/// # Safety
+/// As for [`mbm_client_forward`].
+pub unsafe fn forward<const MAY_LACK_COUNT: bool>(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
     function: u8,
@@ -295,7 +310,12 @@ pub unsafe extern "C" fn mbm_client_forward(
                 let Some(bytes) = array_or_empty(body, words[1]) else {
                     return Status::INVALID_ARGUMENT;
                 };
-                let status = header.forward(words[0] as u8, bytes);
+                let function = words[0] as u8;
+                let status = if MAY_LACK_COUNT {
+                    header.forward_groups(function, bytes)
+                } else {
+                    header.forward(function, bytes)
+                };
                 if status == Status::OK {
                     let head = words[1] - usize::from(header.data_length());
                     fields.data = body.wrapping_add(head);
