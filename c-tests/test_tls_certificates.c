@@ -25,6 +25,9 @@ static int end(void **state)
     return 0;
 }
 
+/* The authorities that client and server know. */
+static const char *client_knows = "authority", *server_knows = "authority";
+
 /* Shakes hands with a certificate of the client and one of the server. Neither side may send
  * a byte of what it is given to send, unless both are open. */
 static void meet(const char *client, const char *server, const char *name)
@@ -36,8 +39,8 @@ static void meet(const char *client, const char *server, const char *name)
     mbm_tls_close(&pair.server.tls);
     mbm_tls_end(&pair.client_identity);
     mbm_tls_end(&pair.server_identity);
-    tls_identify(&pair.client_identity, client, "authority", 0);
-    tls_identify(&pair.server_identity, server, "authority", 1);
+    tls_identify(&pair.client_identity, client, client_knows, 0);
+    tls_identify(&pair.server_identity, server, server_knows, 1);
     tls_pair_open(&pair, name);
     for (rounds = 0; rounds < 20; rounds++) {
         (void)pair.client.port.write(&pair.client.tls, secret, sizeof secret);
@@ -144,6 +147,33 @@ static void a_server_whose_time_is_over_is_refused(void **state)
     client_refuses("expired-server", "localhost", MBM_TLS_EXPIRED);
 }
 
+/* The peer's certificate is right. It is this side's authority whose time is over. */
+static void an_authority_of_this_side_whose_time_is_over_or_not_come_is_named(void **state)
+{
+    static const struct {
+        const char *authority;
+        uint8_t reason;
+    } dates[] = {{"expired-authority", MBM_TLS_AUTHORITY_EXPIRED},
+                 {"future-authority", MBM_TLS_AUTHORITY_NOT_YET_VALID}};
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(dates); i++) {
+        server_knows = dates[i].authority;
+        server_refuses("operator", dates[i].reason);
+        server_knows = "authority";
+        client_knows = dates[i].authority;
+        client_refuses("server", "localhost", dates[i].reason);
+        client_knows = "authority";
+    }
+    assert_non_null(strstr(mbm_tls_text(MBM_TLS_AUTHORITY_EXPIRED), "authority"));
+    /* The renewed certificate may stand beside it. */
+    server_knows = client_knows = "renewed-authority";
+    client_has_role("operator", "Operator");
+    server_refuses("expired", MBM_TLS_EXPIRED);
+    server_knows = client_knows = "authority";
+}
+
 static void a_server_of_another_name_is_refused(void **state)
 {
     (void)state;
@@ -233,6 +263,11 @@ static void what_cannot_be_read_is_named_and_changes_nothing(void **state)
     wrong.authorities = noise;
     wrong.authoritiesBytes = sizeof noise;
     assert_int_equal(mbm_tls_begin(&identity, &wrong), MBM_TLS_OWN_AUTHORITIES);
+    /* An error of Mbed TLS is negative, also if some of the certificates can be read. */
+    wrong = options_of("operator", "half-authority.pem");
+    assert_int_equal(mbm_tls_begin(&identity, &wrong), MBM_TLS_OWN_AUTHORITIES);
+    assert_true(identity.error < -1);
+    right = options_of("operator", "authority.pem");
     /* The zero at the end of PEM is part of it. */
     wrong = right;
     wrong.authoritiesBytes--;
@@ -351,6 +386,7 @@ int main(void)
         TEST(a_client_with_the_certificate_of_a_server_is_refused),
         TEST(a_server_of_another_authority_is_refused),
         TEST(a_server_whose_time_is_over_is_refused),
+        TEST(an_authority_of_this_side_whose_time_is_over_or_not_come_is_named),
         TEST(a_server_of_another_name_is_refused),
         TEST(a_revoked_certificate_is_refused),
         TEST(der_is_used_where_it_is),

@@ -123,6 +123,10 @@ static uint8_t certificate_reason(const mbm_tls *tls)
         return MBM_TLS_UNKNOWN_AUTHORITY;
     if (tls->flags & MBEDTLS_X509_BADCERT_REVOKED)
         return MBM_TLS_REVOKED;
+    if (tls->authorityFlags & MBEDTLS_X509_BADCERT_EXPIRED)
+        return MBM_TLS_AUTHORITY_EXPIRED;
+    if (tls->authorityFlags & MBEDTLS_X509_BADCERT_FUTURE)
+        return MBM_TLS_AUTHORITY_NOT_YET_VALID;
     if (tls->flags & MBEDTLS_X509_BADCERT_EXPIRED)
         return MBM_TLS_EXPIRED;
     if (tls->flags & MBEDTLS_X509_BADCERT_FUTURE)
@@ -198,6 +202,16 @@ static void fail(mbm_tls *tls, int error)
 
 /* --- the handshake --- */
 
+/* Whether a certificate is one of the authorities that this side was given. */
+static int is_own_authority(const mbm_tls_identity *identity, const mbedtls_x509_crt *certificate)
+{
+    const mbedtls_x509_crt *one = &identity->authorities;
+
+    while (one && one != certificate)
+        one = one->next;
+    return one != NULL;
+}
+
 /* Called by Mbed TLS for each certificate of the peer's chain, for its own at last. Finds the
  * role even if Mbed TLS was built not to keep the peer's certificate. */
 static int look_at_certificate(void *context, mbedtls_x509_crt *certificate, int depth,
@@ -212,6 +226,8 @@ static int look_at_certificate(void *context, mbedtls_x509_crt *certificate, int
         *flags |= MBEDTLS_X509_BADCERT_OTHER;
     }
     tls->flags |= *flags;
+    if (is_own_authority(tls->identity, certificate))
+        tls->authorityFlags |= *flags;
     return 0;
 }
 
@@ -254,7 +270,7 @@ static void begin_handshake(mbm_tls *tls)
         tls->hasAhead = 0;
     tls->isFirst = 1;
     tls->error = 0;
-    tls->flags = 0;
+    tls->flags = tls->authorityFlags = 0;
     tls->sent = tls->toSend = 0;
     memset(tls->role, 0, sizeof tls->role);
     tls->startedAt = now(tls);

@@ -94,7 +94,10 @@ enum {
     MBM_TLS_NO_MEMORY = 24,       /**< Mbed TLS got no memory */
     MBM_TLS_IN_USE = 25,          /**< the object is in use: close it first */
     MBM_TLS_INVALID_ARGUMENT = 26,
-    MBM_TLS_FAILED = 27 /**< anything else; `error` has the number of Mbed TLS */
+    MBM_TLS_FAILED = 27,            /**< anything else; `error` has the number of Mbed TLS */
+    MBM_TLS_AUTHORITY_EXPIRED = 28, /**< the authority that signed the peer's certificate is one
+                                         of the options' authorities, and valid no longer */
+    MBM_TLS_AUTHORITY_NOT_YET_VALID = 29 /**< the same, and not valid yet */
 };
 
 /** Who this device is and whom it trusts, for mbm_tls_begin. PEM, with its terminating zero
@@ -143,7 +146,9 @@ typedef struct mbm_tls {
     uint8_t alert;  /**< for MBM_TLS_REFUSED_BY_PEER: the description of the peer's alert
                          (RFC 5246, 7.2) */
     int error;      /**< the number of Mbed TLS for a connection that failed, or 0 */
-    uint32_t flags; /**< what is wrong with the peer's certificates: MBEDTLS_X509_BADCERT_... */
+    uint32_t flags; /**< what is wrong with the peer's certificates, and with the authority that
+                         signed them: MBEDTLS_X509_BADCERT_... */
+    uint32_t authorityFlags;            /**< private */
     char role[MBM_TLS_ROLE_BYTES + 1];  /**< private: see mbm_tls_role */
     uint8_t isSetUp;                    /**< private */
     uint8_t isLost;                     /**< private */

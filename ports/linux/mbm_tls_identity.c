@@ -85,9 +85,11 @@ int mbm_tls_findRole(const mbedtls_x509_buf *extensions, char *role)
 
 static int read_certificates(mbedtls_x509_crt *into, const uint8_t *bytes, size_t length)
 {
+    const int error = bytes[0] == DER ? mbedtls_x509_crt_parse_der_nocopy(into, bytes, length)
+                                      : mbedtls_x509_crt_parse(into, bytes, length);
+
     /* For PEM a positive number says how many of the certificates were not read. */
-    return bytes[0] == DER ? mbedtls_x509_crt_parse_der_nocopy(into, bytes, length)
-                           : mbedtls_x509_crt_parse(into, bytes, length);
+    return error > 0 ? MBEDTLS_ERR_X509_INVALID_FORMAT : error;
 }
 
 static int read_key(mbm_tls_identity *identity, const mbm_tls_options *options)

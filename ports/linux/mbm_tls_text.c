@@ -32,6 +32,10 @@ const char *mbm_tls_text(uint8_t status)
     case MBM_TLS_IN_USE: return "the object is in use";
     case MBM_TLS_INVALID_ARGUMENT: return "an argument is invalid";
     case MBM_TLS_FAILED: return "the TLS library failed";
+    case MBM_TLS_AUTHORITY_EXPIRED:
+        return "the authority's certificate, which this side has, has expired";
+    case MBM_TLS_AUTHORITY_NOT_YET_VALID:
+        return "the authority's certificate, which this side has, is not valid yet";
     default: return "unknown status";
     }
 }
