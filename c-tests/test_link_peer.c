@@ -111,6 +111,47 @@ static void a_connection_that_the_server_closes_is_opened_again_while_idle(void 
     assert_int_equal(counters.failed, 0);
 }
 
+static void a_request_after_the_server_has_hung_up_is_sent_once_over_a_new_connection(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 1000000, 1000000));
+    read_over_tcp(0);
+    for (i = 1; i < MANY; i++) {
+        tcp_peer_hang_up(peer);
+        /* With and without a poll between. */
+        if (i % 2)
+            UNTIL(counters.lost == i);
+        else
+            AWAIT(mbm_tcp_isConnected(&a.tcp) < 0);
+        read_over_tcp(i);
+        assert_int_equal(counters.connected, i + 1);
+        assert_int_equal(tcp_peer_count(peer).requests, i + 1);
+    }
+    assert_int_equal(counters.failed, 0);
+}
+
+static void a_server_that_answers_no_more_is_connected_to_anew(void **state)
+{
+    unsigned n;
+
+    (void)state;
+    OK(mbm_client_setResponseTimeout(&a.client, 100));
+    read_over_tcp(0);
+    tcp_peer_fault(peer, 2, FAULT_DROP, 0);
+    tcp_peer_fault(peer, 3, FAULT_DROP, 0);
+    for (n = 1; n <= 2; n++) {
+        queue_read(n);
+        UNTIL(requests[n].status != MBM_PENDING);
+        IS(MBM_RESPONSE_TIMED_OUT, requests[n].status);
+    }
+    OK(mbm_client_setResponseTimeout(&a.client, PATIENCE_MS));
+    read_over_tcp(3);
+    assert_int_equal(tcp_peer_count(peer).connections, 2);
+    assert_int_equal(tcp_peer_count(peer).requests, 4);
+}
+
 static void the_loss_wakes_a_program_that_waits_for_an_hour(void **state)
 {
     (void)state;
@@ -287,6 +328,11 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(
             a_connection_that_the_server_closes_is_opened_again_while_idle, begin_tcp, end_tcp),
+        cmocka_unit_test_setup_teardown(
+            a_request_after_the_server_has_hung_up_is_sent_once_over_a_new_connection, begin_tcp,
+            end_tcp),
+        cmocka_unit_test_setup_teardown(a_server_that_answers_no_more_is_connected_to_anew,
+                                        begin_tcp, end_tcp),
         cmocka_unit_test_setup_teardown(the_loss_wakes_a_program_that_waits_for_an_hour, begin_tcp,
                                         end_tcp),
         cmocka_unit_test_setup_teardown(a_server_that_was_away_is_found_again, begin_tcp, end_tcp),

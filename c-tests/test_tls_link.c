@@ -186,6 +186,30 @@ static void a_link_opens_a_session_anew_when_it_was_lost(void **state)
     close(reserved);
 }
 
+static void a_request_finds_the_session_closed_and_is_answered_in_a_new_one(void **state)
+{
+    static linked l;
+    mbm_tls_identity who = {0};
+    unsigned i, k;
+
+    (void)state;
+    tls_identify(&who, "operator", "authority", 0);
+    assert_int_equal(mbm_tls_listen(&listener, "127.0.0.1", "0"), 0);
+    keep(&l, &who, listener.port);
+    OK(mbm_link_setRequestsWait(&l.kept, 0));
+    OK(mbm_link_setBackoff(&l.kept, MBM_BACKOFF_FIXED, 1000000, 1000000));
+    for (i = 1; i <= 4; i++) {
+        read_by_link(&l);
+        assert_int_equal(l.counters.connected, i);
+        for (k = 0; k < PLACES; k++)
+            leave(k);
+    }
+    assert_int_equal(l.counters.failed, 0);
+    mbm_tls_close(&l.a.tls);
+    mbm_tcp_close(&l.a.tcp);
+    mbm_tls_end(&who);
+}
+
 static void a_peer_that_never_answers_is_a_timeout_of_the_connection(void **state)
 {
     const char *const reasons[] = {"the connection was not made in time",
@@ -316,6 +340,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         TEST(a_link_opens_a_session_anew_when_it_was_lost),
+        TEST(a_request_finds_the_session_closed_and_is_answered_in_a_new_one),
         TEST(a_peer_that_never_answers_is_a_timeout_of_the_connection),
         TEST(a_loop_polls_client_and_server_and_a_lost_session_comes_back),
     };

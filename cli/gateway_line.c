@@ -183,6 +183,7 @@ void gateway_line_set(gateway_line *line, const gateway_pace *pace)
 {
     if (line->place.framing == MBM_FRAMING_TCP)
         (void)mbm_client_setInFlight(&line->client, (uint8_t)pace->in_flight);
+    line->in_flight = line->place.framing == MBM_FRAMING_TCP ? pace->in_flight : 1;
     (void)mbm_client_setResponseTimeout(&line->client, pace->timeoutMs);
     (void)mbm_client_setQuietTime(&line->client, pace->quietMs);
     (void)mbm_link_setConnectTimeout(&line->link, pace->timeoutMs);
@@ -268,14 +269,15 @@ void gateway_line_watch(gateway_line *line)
     } else if (!line->is_silent && failed >= SILENT_AFTER) {
         line->is_silent = 1;
         why = received_text(&line->received);
+        report_set_in_flight(line->in_flight);
         if (damaged > 0)
             report_log(REPORT_WARNING,
                        "%s: the last %u requests got no right reply, %u of them damaged ones. %s",
                        line->place.text, failed, damaged, advice_damaged(&line->place));
         else
-            report_log(REPORT_WARNING, "%s: the last %u requests got no reply%s%s. %s",
+            report_log(REPORT_WARNING, "%s: the last %u requests got no reply%s%s. %s%s",
                        line->place.text, failed, why ? ": " : "", why ? why : "",
-                       advice_silent(&line->place));
+                       advice_silent(&line->place), report_in_flight());
     }
 }
 

@@ -27,7 +27,7 @@ typedef struct gateway_line {
     mbm_tcp_addresses addresses;
     char reason[80]; /* why it is not open, as printed */
     int reserve;     /* a descriptor that is kept for the line while it is not open; 0: none */
-    uint32_t replace_after;
+    uint32_t replace_after, in_flight;
     uint32_t tried;     /* when the last attempt began */
     uint32_t looked_up; /* when the host was last looked up and not found */
     received received;  /* since the last request */

@@ -233,7 +233,7 @@ static void begin_client(line *l)
     }
     if (l->place.framing == MBM_FRAMING_TCP) {
         (void)mbm_client_setInFlight(&l->client, options.in_flight);
-        report_in_flight = options.in_flight;
+        report_set_in_flight(options.in_flight);
     }
     (void)mbm_client_setResponseTimeout(&l->client, options.timeoutMs);
     (void)mbm_client_setRetries(&l->client, options.retries);

@@ -18,7 +18,6 @@
 
 const char *report_name = "mbm";
 int report_code;
-unsigned report_in_flight = 1;
 volatile sig_atomic_t report_stopped;
 
 const char *const report_level_names[] = {"error", "warning", "info", "debug", NULL};
@@ -180,11 +179,21 @@ const char *report_error_text(int error)
     return error == EPIPE ? "the other end has closed it" : strerror(error);
 }
 
-/* Many devices answer one request, and drop those that come meanwhile. */
-static const char *advice_in_flight(char text[96])
+static unsigned most_in_flight = 1;
+
+void report_set_in_flight(unsigned most)
 {
-    snprintf(text, 96, ". %u requests were under way at once: try --in-flight 1", report_in_flight);
-    return report_in_flight > 1 ? text : "";
+    most_in_flight = most;
+}
+
+/* Many devices answer one request, and drop those that come meanwhile. */
+const char *report_in_flight(void)
+{
+    static char text[96];
+
+    snprintf(text, sizeof text, ". Up to %u requests were under way at once: try --in-flight 1",
+             most_in_flight);
+    return most_in_flight > 1 ? text : "";
 }
 
 int report_failure(const char *who, uint8_t status, uint8_t exception, uint32_t timeoutMs,
@@ -192,7 +201,7 @@ int report_failure(const char *who, uint8_t status, uint8_t exception, uint32_t 
 {
     const int code = report_code_of(status, exception);
     const char *space = *advice ? ". " : "", *colon = why ? ": " : "";
-    char time[32], in_flight[96];
+    char time[32];
 
     if (!why)
         why = "";
@@ -203,7 +212,7 @@ int report_failure(const char *who, uint8_t status, uint8_t exception, uint32_t 
                       *why ? "no right reply from %s within %s%s%s%s%s%s"
                            : "%s did not answer within %s%s%s%s%s%s",
                       who, number_time_text(timeoutMs, time), colon, why, space, advice,
-                      advice_in_flight(in_flight));
+                      report_in_flight());
     if (status == MBM_LINK_LOST && *why)
         return report(code, "%s: the link was lost: %s%s%s", who, why, space, advice);
     return report(code, "%s: %s%s%s%s%s", who, report_words(status, exception), colon, why, space,

@@ -57,8 +57,10 @@ int report_note(int code);
 /* The exit code for the status of a request. */
 int report_code_of(uint8_t status, uint8_t exception);
 
-/* How many requests are under way at once. The advice on a missing reply names more than one. */
-extern unsigned report_in_flight;
+/* Sets how many requests may be under way at once. The advice on a missing reply names more than
+ * one: as a sentence that follows another, or an empty text. */
+void report_set_in_flight(unsigned most);
+const char *report_in_flight(void);
 
 /* Notes and reports how a request failed, and what to look at. `who` was asked, such as "unit 17",
  * and had `timeoutMs` to answer. `why` says why the link was lost, or what came in place of a

@@ -229,7 +229,8 @@ int scan_command(int argc, char **argv)
                 answering > 0 || damaged > 0 || report_stopped ? ""
                 : *came
                     ? say(", although %s. %s; --trace shows what came", came, advice_silent(&where))
-                    : say(". %s, and try a longer --timeout", advice_silent(&where)));
+                    : say(". %s, and try a longer --timeout%s", advice_silent(&where),
+                          report_in_flight()));
     if (answering == 0 && !report_stopped)
         (void)report_note(damaged > 0 ? CODE_DAMAGED : CODE_NO_REPLY);
     return report_code;
