@@ -50,7 +50,7 @@ struct mbm_line;
  */
 typedef struct mbm_client {
     /** Private. */
-    void *pointers[50];
+    void *pointers[51];
     /** Private. */
     uint32_t words[28];
 } mbm_client;

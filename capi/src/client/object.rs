@@ -28,7 +28,7 @@ pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 #[repr(C)]
 pub struct mbm_client {
     /// Private.
-    pointers: [*mut c_void; 50],
+    pointers: [*mut c_void; 51],
     /// Private.
     words: [u32; 28],
 }
