@@ -176,6 +176,9 @@ uint8_t mbm_link_setConnectTimeout(struct mbm_link *link, uint32_t timeoutMs);
  * 16 requests later at the most; they end with MBM_LINK_LOST. Requests that wait are sent over
  * the new link.
  *
+ * Some devices answer nothing in the first seconds of a connection. So each link over which no byte
+ * came has twice as many requests as the one before, up to 16 times as many and at most 100.
+ *
  * @param link      the object
  * @param requests  0 to 100; 0 for never. The default is 2 on TCP, and 0 on a serial line
  * @return a status

@@ -13,6 +13,9 @@ pub const CONNECT_DELAY: u32 = millis(50);
 /// The greatest value of [`Link::replace_after`].
 pub const MOST_REPLACE_AFTER: u8 = 100;
 
+/// The greatest value of [`Link::fruitless`]: 16 times as many requests.
+const MOST_FRUITLESS: u8 = 4;
+
 /// What a link needs of its user.
 pub trait LinkHooks {
     /// Closes the link, if it is open.
@@ -94,6 +97,9 @@ pub struct Link {
     pub replace_after: u8,
     /// Requests since the last byte that the program cancelled.
     pub cancelled: u8,
+    /// Links in a row that were closed because no byte had come over them, up to
+    /// [`MOST_FRUITLESS`].
+    fruitless: u8,
     /// The wait before an attempt, its growth and jitter.
     pub policy: Policy,
     /// How long a connection may take to be made, in microseconds; 0 for no limit.
@@ -140,6 +146,7 @@ impl Link {
     /// Notes that bytes have arrived.
     pub fn received(&mut self) {
         self.has_received = true;
+        self.fruitless = 0;
         self.is_heard = true;
         self.cancelled = 0;
     }
@@ -155,15 +162,22 @@ impl Link {
             self.heard = now;
         }
         self.is_heard = false;
+        // Some devices answer nothing in the first seconds of a link. Each link without a byte has
+        // twice as much time as the one before, so that they are heard.
+        let patience = self.replace_after.saturating_mul(1 << self.fruitless);
+        let patience = patience.min(MOST_REPLACE_AFTER);
         let limit = match in_flight {
-            0 => self.replace_after,
-            _ => self.replace_after.saturating_add(MORE),
+            0 => patience,
+            _ => patience.saturating_add(MORE),
         };
         let unanswered = unanswered.max(0) as u8;
         let is_silent = unanswered >= limit
             || unanswered.saturating_add(self.cancelled) >= limit
                 && has_elapsed(timeout, now, self.heard);
         if is_silent && self.replace_after > 0 {
+            if !self.has_received {
+                self.fruitless = (self.fruitless + 1).min(MOST_FRUITLESS);
+            }
             self.is_silent = true;
             self.is_lost = true;
         }
