@@ -144,7 +144,10 @@ void options_too_many(const struct argp_state *state, const char *text)
 
 void options_check_unit(const struct argp_state *state, const place *where, int is_write)
 {
-    if (options.unit == 0 && !(is_write && place_is_serial(where)))
+    /* In TCP frames unit 0 is a unit. */
+    const int may_be_0 = place_is_serial(where) ? is_write : where->kind != PLACE_RTU_OVER_TCP;
+
+    if (options.unit == 0 && !may_be_0)
         options_wrong(state,
                       "--unit 0 means all units, for writes on a serial line only; here 1 to 255 "
                       "is allowed");
