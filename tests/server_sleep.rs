@@ -7,7 +7,10 @@ use common::device::{sealed, Device};
 use common::line::Line;
 use mbm::error::Status;
 use mbm::frame::Framing;
-use mbm::server::{Indication, Reply, Units};
+use mbm::port::Port;
+use mbm::server::{Indication, Reply, Server, Units};
+use std::cell::Cell;
+use std::rc::Rc;
 
 const READ: [u8; 6] = [17, 3, 0, 100, 0, 1];
 const ANSWER: [u8; 5] = [17, 3, 2, 0x10, 0];
@@ -176,6 +179,107 @@ fn a_missing_echo_does_not_hide_a_request_from_a_program_that_sleeps() {
         for _ in 0..3 {
             program.line.arrive(10_000, &sealed(&READ));
             assert_eq!(program.run(), [sealed(&ANSWER)], "{polled:?}");
+        }
+    }
+}
+
+/// A port that takes a response at once, or at most `piece` bytes, and has sent it when each
+/// character has taken its time.
+struct Leaving {
+    now: Rc<Cell<u32>>,
+    request: Vec<u8>,
+    character: u32,
+    piece: usize,
+    sent: usize,
+    /// When the last bit leaves, and when the driver has gone off.
+    end: Rc<Cell<u32>>,
+    off: Rc<Cell<u32>>,
+}
+
+impl Port for Leaving {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
+        let count = bytes.len().min(self.request.len());
+        bytes[..count].copy_from_slice(&self.request[..count]);
+        self.request.drain(..count);
+        Ok(count)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
+        let count = bytes.len().min(self.piece);
+        let begin = self.end.get().max(self.now.get());
+        self.end.set(begin + count as u32 * self.character);
+        self.sent += count;
+        Ok(count)
+    }
+
+    fn micros(&mut self) -> u32 {
+        self.now.get()
+    }
+
+    fn flush(&mut self) -> bool {
+        self.sent > 0 && self.now.get() >= self.end.get()
+    }
+
+    fn post_transmission(&mut self) {
+        self.off.set(self.now.get());
+    }
+}
+
+/// Answers with a PDU of this length.
+struct Long(usize);
+
+impl Units for Long {
+    fn serve(&mut self, _: &Indication, _: &mut [u8]) -> Reply {
+        Reply::length(self.0)
+    }
+}
+
+#[test]
+fn a_program_sleeps_while_a_response_leaves() {
+    const POLL: u32 = 20;
+    // The rate that the program gives, 0 for none, is for characters of 11 bits.
+    for (baud, character, piece) in [
+        (9_600, 1_146, 256),
+        (9_600, 1_042, 256), // 8N1: ten bits
+        (9_600, 1_021, 256), // and 2 % too fast
+        (19_200, 573, 256),
+        (115_200, 85, 256),
+        (9_600, 1_042, 200),
+        (0, 85, 256),
+        (0, 1_146, 256),
+    ] {
+        for length in [1, 2, 5, 20, 100, 253] {
+            let time = || Rc::new(Cell::new(0));
+            let (now, end, off) = (time(), time(), time());
+            let port = Leaving {
+                now: now.clone(),
+                request: sealed(&[17, SLOW]),
+                character,
+                piece,
+                sent: 0,
+                end: end.clone(),
+                off: off.clone(),
+            };
+            let mut server = Server::with_framing(Framing::Rtu, port, [0; 256]);
+            server.set_baud_rate(baud);
+            let mut polls = 0;
+            while off.get() == 0 {
+                polls += 1;
+                assert_eq!(server.serve(now.get(), &mut Long(length)), Ok(()));
+                let delay = server.poll_delay(now.get());
+                assert_ne!(delay, u32::MAX);
+                now.set(now.get() + delay.max(POLL));
+            }
+            let case = format!("{baud} baud, {character} us, {piece}, {length}");
+            // The driver goes off as soon as the last bit has left.
+            assert!((end.get()..end.get() + POLL).contains(&off.get()), "{case}");
+            if baud > 0 && piece == 256 {
+                // At most an eighth of the time, two characters and the silence before the
+                // response are spent in polls.
+                let frame = length as u32 + 3;
+                let spent = (frame / 8 + 2) * character + mbm::time::silence(baud);
+                assert!(polls < spent / POLL + 20, "{polls}: {case}");
+            }
         }
     }
 }

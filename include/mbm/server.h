@@ -766,7 +766,8 @@ uint8_t mbm_server_poll(struct mbm_server *server);
 
 /**
  * Returns how long the program may sleep before the next mbm_server_poll, unless bytes
- * arrive earlier.
+ * arrive earlier. Do not sleep longer: while a response leaves on a serial line, the driver would
+ * go off late.
  *
  * @param server  the object
  * @return microseconds. 0: poll now; a call from within a hook of this server returns 0 too.

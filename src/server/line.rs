@@ -13,7 +13,7 @@ use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::Rule;
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
-use crate::time::{self, elapsed};
+use crate::time::{self, elapsed, sure_to_be_sending};
 
 /// Time until the next poll if only the port or a service can bring progress.
 const EXTERNAL_POLL_DELAY: u32 = time::millis(1);
@@ -25,6 +25,10 @@ const RECEIVE_LATENCY: u32 = time::millis(50);
 /// For how many characters a UART with a FIFO waits, after the last one, before it hands over
 /// fewer bytes than it usually does (ESP32: 10).
 const FIFO_TIMEOUT: u16 = 10;
+
+/// The length of a character in microseconds while the baud rate is unknown: a little more than
+/// that at 9600 baud, and that of no rate that is in use.
+const UNKNOWN_CHARACTER: u16 = time::DEFAULT_CHARACTER + 1;
 
 /// The storage that the caller supplies for a server.
 pub trait ServerStorage {
@@ -159,7 +163,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             sent: 0,
             echo: Crc16::START,
             missing: 0,
-            character: time::DEFAULT_CHARACTER,
+            character: UNKNOWN_CHARACTER,
             request: Indication::NONE,
             last_byte: 0,
             now: 0,
@@ -203,7 +207,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.request.again = true;
         self.has_no_echo = false;
         self.sent = 0;
-        self.character = time::DEFAULT_CHARACTER;
+        self.character = UNKNOWN_CHARACTER;
         self.receive_latency = RECEIVE_LATENCY;
         self.listen();
     }
@@ -225,7 +229,10 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// it after [`Server::with_framing`].
     pub fn set_baud_rate(&mut self, baud: u32) {
         self.silence = time::silence(baud);
-        self.character = time::character(baud);
+        self.character = match baud {
+            0 => UNKNOWN_CHARACTER,
+            baud => time::character(baud),
+        };
     }
 
     /// Sets how long the UART or an adapter may hold received bytes back on a serial line, in
@@ -355,7 +362,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Microseconds from `now` for which poll has nothing to do unless the port has bytes to read.
     /// It is 1000 while a service is not finished, or while a stream accepts no bytes of the
     /// response: poll earlier if that changes. It is 0 after that, until poll has read the port:
-    /// bytes that arrived meanwhile may have ended a wait already.
+    /// bytes that arrived meanwhile may have ended a wait already. While a response leaves on an RTU
+    /// line whose rate is known, it is a time for which characters are sure to leave, and 0 for the
+    /// last ones: the driver must go off in time.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.phase {
             ServerPhase::Listen if self.request.again => 0,
@@ -363,10 +372,19 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             ServerPhase::Listen => self
                 .longest_pause()
                 .saturating_sub(elapsed(now, self.last_byte)),
-            // On a serial line, neither the next byte nor switching off the driver may be late.
-            ServerPhase::Send if self.request.is_serial() => 0,
+            ServerPhase::Send if self.request.is_serial() => self.sending_delay(now),
             _ => EXTERNAL_POLL_DELAY,
         }
+    }
+
+    /// As [`Server::poll_delay`], while a response leaves on a serial line: neither its next byte nor
+    /// switching off the driver may be late.
+    fn sending_delay(&self, now: u32) -> u32 {
+        if self.sent < self.end || self.character == UNKNOWN_CHARACTER {
+            return 0;
+        }
+        // The response began after the last byte of the request.
+        sure_to_be_sending(self.character, self.end).saturating_sub(elapsed(now, self.last_byte))
     }
 
     /// Stores that a request was found, with a PDU of `length` bytes; 0 if it is damaged.

@@ -192,7 +192,8 @@ unsafe fn poll(core: *mut Core, mark: *const u8) -> Status {
 }
 
 /// Returns how long the program may sleep before the next mbm_server_poll, unless bytes
-/// arrive earlier.
+/// arrive earlier. Do not sleep longer: while a response leaves on a serial line, the driver would
+/// go off late.
 ///
 /// @param server  the object
 /// @return microseconds. 0: poll now; a call from within a hook of this server returns 0 too.
