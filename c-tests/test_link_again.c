@@ -259,6 +259,28 @@ static void a_silent_connection_is_replaced_after_two_requests(void **state)
     }
 }
 
+/* A unit behind a gateway is absent, and the gateway says nothing. Another one is there. */
+static void a_silent_unit_costs_the_others_no_request(void **state)
+{
+    unsigned i, round;
+
+    (void)state;
+    for (i = 0; i < COUNT(streams); i++) {
+        begin_up(streams[i]);
+        connects = 0;
+        OK(mbm_client_setResponseTimeout(&client, 20));
+        /* After 2, 4, 8 and 16 requests. */
+        for (round = 0; round < 30; round++)
+            is_unanswered(&request);
+        assert_int_equal(counters.lost, 4);
+        m.sent_count = 0;
+        queue_read(&other);
+        is_answered(streams[i], &other);
+        assert_int_equal(connects, 4);
+        assert_int_equal(counters.failed, 0);
+    }
+}
+
 static void a_repetition_goes_over_the_new_connection(void **state)
 {
     unsigned i;
@@ -431,6 +453,7 @@ int main(void)
         cmocka_unit_test(a_request_that_was_sent_is_not_sent_again_over_the_new_link),
         cmocka_unit_test(a_link_that_its_peer_closes_twice_while_idle_waits_for_a_request),
         cmocka_unit_test(a_silent_connection_is_replaced_after_two_requests),
+        cmocka_unit_test(a_silent_unit_costs_the_others_no_request),
         cmocka_unit_test(a_repetition_goes_over_the_new_connection),
         cmocka_unit_test(any_byte_begins_the_count_anew),
         cmocka_unit_test(requests_of_a_program_with_limits_of_its_own_count_too),

@@ -108,9 +108,12 @@ static int is_harmless(const gateway_line *line, uint8_t event)
             line->counters.requests == line->opened.requests);
 }
 
-/* A device has fallen silent, and is connected to anew. */
+/* A device is connected to anew, since no byte came. That is reported if it has answered over this
+ * connection: of one that never answered, gateway_line_watch reports that. */
 static void take_silence(gateway_line *line)
 {
+    if (line->counters.replies == line->opened.replies)
+        return;
     if (!line->is_replaced)
         report_log(REPORT_WARNING,
                    "%s: no byte came after %u requests in a row. The connection is made anew, now "

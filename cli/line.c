@@ -106,9 +106,12 @@ static int is_harmless(const line *l, uint8_t event)
            (now->replies != opened->replies || now->requests == opened->requests);
 }
 
-/* A device has fallen silent, and is connected to anew. */
+/* A device is connected to anew, since no byte came. That is reported if it has answered over this
+ * connection: of one that never answered, the program reports that. */
 static void take_silence(line *l)
 {
+    if (l->counters.replies == l->opened.replies)
+        return;
     if (l->is_logged && !l->is_replaced)
         report_log(REPORT_WARNING,
                    "%s: no byte came after %u requests in a row. The connection is made anew, now "

@@ -85,7 +85,7 @@ pub struct Link {
     /// Bytes have arrived since the link was opened, and since [`Link::close_if_silent`].
     has_received: bool,
     is_heard: bool,
-    /// The link was good until it was lost: a request opens it without a wait, and waits for that
+    /// The link was good until it was lost, or the device silent: a request opens it without a wait, and waits for that
     /// attempt, as long as its response timeout.
     reopens: bool,
     /// The peer has closed the link while no request was there, and has done so twice in a row
@@ -222,7 +222,8 @@ impl Link {
                     true => Status::RESPONSE_TIMED_OUT,
                     false => Status::LINK_LOST,
                 };
-                self.reopens = was_good;
+                // A silent device sets the pace of its replacements by its requests.
+                self.reopens = !self.at_once && (was_good || self.is_silent);
                 let was_idle = was_good && !is_wanted && !self.is_silent;
                 self.rests = was_idle && self.was_idle && !self.has_received;
                 self.was_idle = was_idle;
