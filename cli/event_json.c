@@ -16,12 +16,14 @@ static const char *const KINDS[] = {
 };
 
 /* Adds a number of seconds or milliseconds without rounding it to a double. */
-static void add_decimal(cJSON *object, const char *name, uint64_t value, uint64_t unit)
+static void add_decimal(cJSON *object, const char *name, int64_t value, uint64_t unit)
 {
-    char text[32];
+    const uint64_t amount = (uint64_t)(value < 0 ? -value : value);
+    char text[48];
 
-    snprintf(text, sizeof text, "%llu.%0*llu", (unsigned long long)(value / unit),
-             unit == MILLION ? 6 : 3, (unsigned long long)(value % unit));
+    snprintf(text, sizeof text, "%s%llu.%0*llu", value < 0 ? "-" : "",
+             (unsigned long long)(amount / unit), unit == MILLION ? 6 : 3,
+             (unsigned long long)(amount % unit));
     cJSON_AddRawToObject(object, name, text);
 }
 
@@ -86,7 +88,7 @@ static void add_frame(cJSON *object, const mbm_event *event)
     cJSON_AddStringToObject(object, "bytes", text);
 }
 
-void event_json_print(const mbm_event *event, uint64_t micros, uint64_t epoch)
+void event_json_print(const mbm_event *event, int64_t micros, uint64_t epoch)
 {
     const int has_unit = event->kind != MBM_EVENT_NOISE && event->kind != MBM_EVENT_BAD_CRC;
     const int is_malformed = event->status == MBM_MALFORMED_REPLY;

@@ -34,16 +34,19 @@ static uint32_t slowest;
 
 /* What the command line says. A recording has no place but its name. */
 static place where = {.text = "-", .framing = MBM_FRAMING_RTU};
-static uint32_t timeoutMs = 1000;
+static uint32_t timeoutMs = 1000, frameMs; /* 0: the default of the sniffer */
 static int is_recording, has_recording_options;
 
-static void print_text(const mbm_event *event, uint64_t time)
+static void print_text(const mbm_event *event, int64_t time)
 {
     static char text[2400];
+    const unsigned long long ms = (unsigned long long)(time < 0 ? -time : time) / 1000;
+    char seconds[32];
 
     mbm_event_text(event, text, sizeof text);
-    printf("%6llu.%03llu  ", (unsigned long long)(time / 1000000u),
-           (unsigned long long)(time / 1000u % 1000u));
+    snprintf(seconds, sizeof seconds, "%s%llu.%03llu", time < 0 && ms > 0 ? "-" : "", ms / 1000,
+             ms % 1000);
+    printf("%10s  ", seconds);
     if (event->responseTimeUs)
         printf("%6.1f ms  ", event->responseTimeUs / 1000.0);
     else
@@ -53,14 +56,17 @@ static void print_text(const mbm_event *event, uint64_t time)
 
 static void print_event(const mbm_event *event)
 {
-    const uint64_t time = now - ((uint32_t)now - event->timeUs) - first;
+    /* Of several frames that arrive in the first piece, the first ones ended before it began to be
+     * counted. A recording has no time before 1970. */
+    const int64_t time = (int64_t)(now - first) - (int64_t)((uint32_t)now - event->timeUs),
+                  since_1970 = (int64_t)epoch + time;
 
-    trace_event(event, where.framing, where.text, epoch + time);
+    trace_event(event, where.framing, where.text, since_1970 > 0 ? (uint64_t)since_1970 : 0);
     totals[event->kind]++;
     if (event->kind == MBM_EVENT_REPLY && event->responseTimeUs > slowest)
         slowest = event->responseTimeUs;
     if (options.is_json)
-        event_json_print(event, time, epoch ? epoch + time : 0);
+        event_json_print(event, time, epoch ? (uint64_t)since_1970 : 0);
     else
         print_text(event, time);
 }
@@ -155,11 +161,13 @@ static void begin(void)
     mbm_sniffer_begin(&sniffer, where.framing, buffer, sizeof buffer);
     mbm_sniffer_setBaudRate(&sniffer, where.tty.baud);
     mbm_sniffer_setResponseTimeout(&sniffer, (uint16_t)timeoutMs);
+    if (frameMs > 0)
+        mbm_sniffer_setFrameTimeout(&sniffer, frameMs);
 }
 
 /* --- the command line --- */
 
-enum { BAUD = 0x100, FRAMING, TIMEOUT };
+enum { BAUD = 0x100, FRAMING, TIMEOUT, FRAME_TIMEOUT };
 
 static void read_place(const struct argp_state *state, const char *text)
 {
@@ -189,6 +197,9 @@ static error_t parse(int key, char *text, struct argp_state *state)
         has_recording_options = 1;
         return 0;
     case TIMEOUT: timeoutMs = options_time(state, "--timeout", text, 1, UINT16_MAX); return 0;
+    case FRAME_TIMEOUT:
+        frameMs = options_time(state, "--frame-timeout", text, 1, UINT16_MAX);
+        return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0)
             options_wrong(state, "\"%s\" is one word too many: a sniffer has one LINE", text);
@@ -210,6 +221,9 @@ static const struct argp_option texts[] = {
     {"baud", BAUD, "RATE", 0, "The rate of the recorded line in bits per second (unknown)", 1},
     {"framing", FRAMING, "FRAMING", 0, "The framing of the recording: rtu, ascii or tcp (rtu)", 1},
     {"timeout", TIMEOUT, "TIME", 0, "How long a request may stay unanswered, up to 65s (1s)", 1},
+    {"frame-timeout", FRAME_TIMEOUT, "TIME", 0,
+     "How long the rest of a frame may take, up to 65s: longer than an adapter holds bytes back",
+     1},
     {NULL, 0, NULL, 0, NULL, 0}};
 
 static const struct argp_child children[] = {

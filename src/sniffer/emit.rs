@@ -150,7 +150,7 @@ impl Sniffer {
             }
             FrameRole::Reply(index) => {
                 let slot = self.requests.get(index);
-                self.requests.set_state(index, State::Free);
+                self.requests.take_reply(index, &frame, time);
                 event.asked = Some(slot.asked);
                 event.response_time = age(time, slot.time);
                 event.kind = match slot.state {

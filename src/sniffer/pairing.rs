@@ -63,6 +63,9 @@ pub(super) enum State {
     Open,
     /// The request has timed out. Its reply may still come.
     Late,
+    /// As `Late`, and its unit was asked the same function again. A frame that may also be a
+    /// request is not its reply.
+    Owed,
 }
 
 /// A request on the bus.
@@ -204,7 +207,9 @@ impl Requests {
         self.trim();
     }
 
-    /// The earliest request in a state for which `wanted` holds.
+    /// The earliest request in a state for which `wanted` holds. One that is owed is late too.
+    // Inlined, it leaves LLVM without a register for a spill on this target.
+    #[cfg_attr(target_arch = "xtensa", inline(never))]
     fn earliest(
         &self,
         now: u32,
@@ -213,7 +218,8 @@ impl Requests {
     ) -> Option<usize> {
         let mut found: Option<(usize, u32)> = None;
         for (index, slot) in self.used().iter().enumerate() {
-            if slot.state != state || !wanted(slot) {
+            let is_in = slot.state == state || (state == State::Late && slot.state == State::Owed);
+            if !is_in || !wanted(slot) {
                 continue;
             }
             let age = age(now, slot.time);
@@ -229,7 +235,7 @@ impl Requests {
         let ends = self.used().iter().map(|slot| match slot.state {
             State::Free => u32::MAX / 2,
             State::Open => timeout.saturating_sub(age(now, slot.time)),
-            State::Late => old.saturating_sub(age(now, slot.time)),
+            State::Late | State::Owed => old.saturating_sub(age(now, slot.time)),
         });
         ends.min().unwrap_or(u32::MAX / 2)
     }
@@ -242,7 +248,7 @@ impl Requests {
     /// Forgets requests that have timed out and are `old` or older.
     pub fn forget(&mut self, now: u32, old: u32) {
         for slot in self.used_mut() {
-            if slot.state == State::Late && age(now, slot.time) >= old {
+            if matches!(slot.state, State::Late | State::Owed) && age(now, slot.time) >= old {
                 slot.state = State::Free;
             }
         }
@@ -284,8 +290,10 @@ impl Requests {
                 return FrameRole::Reply(index);
             }
             // A frame that equals the request is the request again.
-            let late =
-                |slot: &OpenRequest| answered(slot) && !(frame.request && slot.is_repeated_by(pdu));
+            let late = |slot: &OpenRequest| {
+                let may_be_request = slot.state == State::Owed || slot.is_repeated_by(pdu);
+                answered(slot) && !(frame.request && may_be_request)
+            };
             if let Some(index) = self.earliest(now, State::Late, late) {
                 return FrameRole::Reply(index);
             }
@@ -301,6 +309,24 @@ impl Requests {
                     .any(|slot| slot.state == State::Open && of(slot)),
             )
         }
+    }
+
+    /// Ends the wait for the reply to the request at this index, which has just arrived. If an
+    /// earlier request is still owed a reply like it, a unit that answers in order has sent that
+    /// one, and owes the reply to this request.
+    pub fn take_reply(&mut self, index: usize, frame: &ObservedFrame, now: u32) {
+        let is_late = |slot: &OpenRequest| {
+            slot.is_of(frame.unit, frame.transaction, frame.pdu) && slot.is_answered_by(frame.pdu)
+        };
+        let owed = match self.get(index).state {
+            State::Open => self.earliest(now, State::Owed, is_late),
+            _ => None,
+        };
+        if let Some(owed) = owed {
+            self.set_state(owed, State::Free);
+        }
+        let is_owed = owed.is_some();
+        self.set_state(index, if is_owed { State::Owed } else { State::Free });
     }
 
     /// The open request that a new request ends: on a serial line any request, on TCP the one
@@ -337,7 +363,7 @@ impl Requests {
         for slot in self.used_mut() {
             let same = slot.unit == unit && slot.asked.function() == function;
             if slot.state == State::Late && same && slot.transaction == transaction {
-                slot.state = State::Free;
+                slot.state = State::Owed;
             }
         }
         if is_broadcast {

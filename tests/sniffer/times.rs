@@ -87,6 +87,87 @@ fn a_late_reply_is_unpaired_but_described_with_its_request() {
     );
 }
 
+/// A request of unit 17 for registers, and its reply.
+fn read(address: u8, quantity: u8) -> (Vec<u8>, Vec<u8>) {
+    let words: Vec<u8> = (0..quantity).flat_map(|word| [address, word]).collect();
+    let reply = [&[3, 2 * quantity], &words[..]].concat();
+    (rtu(17, &[3, 0, address, 0, quantity]), rtu(17, &reply))
+}
+
+#[test]
+fn a_late_reply_is_paired_although_its_unit_was_asked_again() {
+    // Another quantity tells the late reply from the reply to the next request.
+    let ((first, late), (second, reply)) = (read(10, 2), read(20, 3));
+    for is_first in [true, false] {
+        let mut bench = Bench::new(Framing::Rtu);
+        bench.sniffer.set_timeout(100_000);
+        bench.feed(&first);
+        bench.wait(150_000);
+        bench.feed(&second);
+        let order = if is_first {
+            [&late, &reply]
+        } else {
+            [&reply, &late]
+        };
+        for frame in order {
+            bench.wait(10_000);
+            bench.feed(frame);
+        }
+        let mut words = bench.words()[3..].to_vec();
+        words.sort();
+        assert_eq!(
+            words,
+            [
+                "unit 17  reply      03 read holding registers  20..22: 5120 5121 5122",
+                "unit 17  unpaired   03 read holding registers  10..11: 2560 2561",
+            ]
+        );
+        assert_eq!(bench.kinds()[1], EventKind::Timeout);
+    }
+}
+
+#[test]
+fn of_two_replies_to_one_open_request_the_second_is_its_own_if_one_before_is_owed() {
+    // A device answers in order, so the first of them was the late one. It came too early to say so.
+    let ((first, late), (second, reply)) = (read(10, 2), read(20, 2));
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.sniffer.set_timeout(100_000);
+    for frame in [&first, &second] {
+        bench.feed(frame);
+        bench.wait(150_000);
+    }
+    bench.feed(&second);
+    for frame in [&late, &reply, &reply] {
+        bench.wait(10_000);
+        bench.feed(frame);
+    }
+    assert_eq!(
+        bench.words()[5..],
+        [
+            "unit 17  reply      03 read holding registers  20..21: 2560 2561",
+            "unit 17  unpaired   03 read holding registers  20..21: 5120 5121",
+            "unit 17  unpaired   03 read holding registers  20..21: 5120 5121",
+        ]
+    );
+}
+
+#[test]
+fn a_reply_that_owes_nothing_leaves_no_request_behind() {
+    let (request, reply) = read(10, 2);
+    let mut bench = Bench::new(Framing::Rtu);
+    for frame in [&request, &reply, &reply] {
+        bench.feed(frame);
+        bench.wait(10_000);
+    }
+    assert_eq!(
+        bench.words()[1..],
+        [
+            "unit 17  reply      03 read holding registers  10..11: 2560 2561",
+            "unit 17  unpaired   03 read holding registers: 2560 2561",
+        ]
+    );
+}
+
 #[test]
 fn a_reply_long_after_the_timeout_is_described_without_the_request() {
     // Waits of three lengths; the longest lets the clock wrap.
