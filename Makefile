@@ -64,6 +64,7 @@ linux: $(ARCHIVE) ## Build the library for Linux on this machine with its ports,
 MCUS := $(shell scripts/build/archive --list)
 .PHONY: archives
 archives: ## Build the archives for microcontrollers, build/archives and build/minimal
+	@scripts/build/archive --packages $(MCUS)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
 	@scripts/check/archive
 	@scripts/check/stack >build/stack.txt && tail -n 1 build/stack.txt

@@ -9,12 +9,40 @@ $(MCU_BUILDS): build-archive-%:
 	+@scripts/build/archive $*
 	+@scripts/build/archive $* minimal
 
-.PHONY: dist
-dist: $(ARCHIVE) ## Write all packages to dist/, with their SHA-256 sums; builds what they contain
+# What is missing is installed or named before the first build.
+.PHONY: need-packages
+need-packages:
 	@scripts/need gcc libc6-dev libmbedtls-dev gcc-aarch64-linux-gnu libc6-dev-arm64-cross dpkg-dev
+	@scripts/build/archive --packages $(MCUS) atmega4809
+
+.PHONY: dist-parts
+dist-parts: need-packages $(ARCHIVE)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
 	@$(MAKE) --no-print-directory assembler $(INSTALLED_TOOL) man archive-aarch64
+
+.PHONY: dist
+dist: dist-parts ## Write all packages to dist/, with their SHA-256 sums; builds what they contain
 	@scripts/release/dist
+
+# What the package of each kind contains. The crates and the source have what is in the clone.
+PARTS_arduino := assembler
+PARTS_crates :=
+PARTS_debian := $(ARCHIVE) linux $(INSTALLED_TOOL) man
+PARTS_esp-idf := assembler BOARDS="riscv esp32"
+PARTS_platformio := $(ARCHIVE) assembler
+PARTS_rt-thread := assembler BOARDS="arm riscv"
+PARTS_sbom := $(ARCHIVE)
+PARTS_sdk := dist-parts
+PARTS_source :=
+PARTS_zephyr := assembler BOARDS="arm riscv"
+KIND ?=
+PACKAGE_KINDS := $(patsubst packaging/%/pack,%,$(wildcard packaging/*/pack))
+.PHONY: package
+package: ## Write the packages of one kind to dist/, KIND=arduino, crates, debian, esp-idf, platformio, rt-thread, sdk or zephyr
+	@[ -n "$(filter $(KIND),$(PACKAGE_KINDS))" ] || { echo "package: KIND is one of $(PACKAGE_KINDS)" >&2; exit 1; }
+	@$(if $(PARTS_$(KIND)),$(MAKE) --no-print-directory $(PARTS_$(KIND)))
+	@mkdir -p dist
+	@packaging/$(KIND)/pack dist
 
 KINDS ?=
 .PHONY: check-dist

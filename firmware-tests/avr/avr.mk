@@ -1,7 +1,10 @@
 # The Arduino library, and sketches on simulated AVR boards.
 
+# BOARDS names families of boards, for a library without the others and their compilers.
+assembler library arduino-zip: export MBM_BOARDS := $(BOARDS)
+
 .PHONY: assembler
-assembler: ## Write the library as assembler source, one file for each instruction set, build/assembler
+assembler: ## Write the library as assembler source, one file for each instruction set, build/assembler; BOARDS="avr esp32" for some
 	@scripts/build/assembler
 	@scripts/build/assembler minimal
 
@@ -10,7 +13,7 @@ library: assembler
 	@packaging/arduino/library
 
 .PHONY: arduino-zip
-arduino-zip: library ## Pack the Arduino libraries into two zips in dist/
+arduino-zip: library ## Pack the Arduino libraries into two zips in dist/; BOARDS=avr, arm, riscv, esp8266 or esp32 for these boards alone
 	@mkdir -p dist
 	@packaging/arduino/pack dist
 

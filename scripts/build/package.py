@@ -14,7 +14,7 @@ import tarfile
 import zipfile
 
 sys.dont_write_bytecode = True
-from project import ROOT, SETS, fact, licence, version  # noqa: E402
+from project import ROOT, SETS, fact, licence, sets, version  # noqa: E402
 
 # The time of all files in archives, 1980-01-02. Some file systems have no time before 1980.
 TIME = 315619200
@@ -146,8 +146,8 @@ def write(path: pathlib.Path, text: str) -> None:
 
 
 def boards_header() -> str:
-    conditions = " || \\\n      ".join(f"({which.guard})" for which in SETS.values())
-    names = "; ".join(which.what for which in SETS.values())
+    conditions = " || \\\n      ".join(f"({which.guard})" for which in sets().values())
+    names = "; ".join(which.what for which in sets().values())
     return f"""\
 /**
  * @file ModbusMasterBoards.h
@@ -164,18 +164,18 @@ def boards_header() -> str:
 
 
 def board_names() -> str:
-    return "\n".join(f"- {which.what}" for which in SETS.values())
+    return "\n".join(f"- {which.what}" for which in sets().values())
 
 
 def write_sources(folder: pathlib.Path, assembler: pathlib.Path) -> None:
     """Writes the headers, and the assembler source from the folder `assembler`."""
-    missing = [which for which in SETS if not (assembler / f"mbm_{which}.S").is_file()]
+    missing = [which for which in sets() if not (assembler / f"mbm_{which}.S").is_file()]
     if missing:
         sys.exit(f"package: {assembler} has no source for {', '.join(missing)}: run `make assembler`")
     for header in HEADERS:
         write(folder / header, (ROOT / "include" / header).read_text(encoding="utf-8"))
     write(folder / "ModbusMasterBoards.h", boards_header())
-    for which in SETS:
+    for which in sets():
         write(folder / f"mbm_{which}.S", (assembler / f"mbm_{which}.S").read_text(encoding="utf-8"))
 
 

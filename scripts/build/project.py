@@ -2,10 +2,12 @@
 """Facts about the project, for the scripts that write packages and pages: its version, its licence,
 the entries of packaging/project.toml, and the instruction sets for which the library has assembler source.
 
-  project.py           writes the project's address into the links to its releases and into Cargo.toml
-  project.py --check   fails if another address stands there, or if a page that must begin with a link has none
+  project.py           writes the project's address into the links to its releases and into Cargo.toml, and how a
+                       reader gets mbm into the pages that a user begins with
+  project.py --check   fails if something else stands there
 """
 
+import os
 import pathlib
 import re
 import subprocess
@@ -20,7 +22,7 @@ def version() -> str:
     return subprocess.run([ROOT / "scripts/version"], check=True, text=True, stdout=subprocess.PIPE).stdout.strip()
 
 
-def fact(key: str) -> str:
+def fact(key: str) -> str | bool:
     """An entry of packaging/project.toml."""
     return tomllib.loads((ROOT / "packaging/project.toml").read_text(encoding="utf-8"))[key]
 
@@ -69,20 +71,91 @@ SETS = {
 }
 
 
-# --- the address of the project, of which packaging/project.toml is the one setting
+# The families of boards, with the dialects of SETS that they need, and the names of their Arduino cores.
+FAMILIES = {
+    "avr": (("avr",), ["avr", "megaavr"]),
+    "arm": (("arm",), ["sam", "samd", "samd_beta", "stm32", "STM32F1", "STM32F4", "nrf52", "nRF5", "mbed", "mbed_edge",
+                       "mbed_giga", "mbed_nano", "mbed_nicla", "mbed_opta", "mbed_portenta", "mbed_rp2040", "rp2040",
+                       "renesas", "renesas_uno", "renesas_portenta", "teensy"]),
+    "riscv": (("riscv",), ["rp2040", "esp32"]),
+    "esp8266": (("xtensa",), ["esp8266"]),
+    # Some of them are RISC-V.
+    "esp32": (("bytes", "riscv"), ["esp32"]),
+}
+
+
+def families() -> list:
+    """The families of boards for which the Arduino library is built: those that MBM_BOARDS names, or all."""
+    named = os.environ.get("MBM_BOARDS", "").split()
+    for name in named:
+        if name not in FAMILIES:
+            sys.exit(f"BOARDS: \"{name}\" is no family of boards: there are {', '.join(FAMILIES)}")
+    return [name for name in FAMILIES if name in named or not named]
+
+
+def sets() -> dict:
+    """The rows of SETS of these families."""
+    kinds = [kind for name in families() for kind in FAMILIES[name][0]]
+    return {name: row for name, row in SETS.items() if row.kind in kinds}
+
+
+def architectures() -> list:
+    """The Arduino cores that are known to have boards of these families."""
+    return list(dict.fromkeys(name for family in families() for name in FAMILIES[family][1]))
+
+
+# --- the address of the project and whether it has releases, of which packaging/project.toml is the one setting
 
 ADDRESS = [(re.compile(r"https?://[^\s()]+(?=/releases/latest\b)"), ["README.md", "docs/*.md"]),
            (re.compile(r'(?<=^repository = ")[^"]+', re.M), ["Cargo.toml"])]
-# Pages that a user begins with: each has the link before its first heading of a part.
-BEGIN_WITH_LINK = ["README.md", "docs/index.md", "docs/guide-*.md"]
+
+
+class Way(NamedTuple):
+    """How a page that a user begins with says where to get mbm, before its first heading of a part: with a
+    release, and without one."""
+    published: str
+    unpublished: str
+
+    def text(self, address: str, published: bool) -> str:
+        return (self.published if published else self.unpublished).replace("ADDRESS", address)
+
+
+RELEASE = "from the [latest release](ADDRESS/releases/latest)"
+
+
+def guide(what: str, file: str, command: str, more: str = "") -> Way:
+    return Way(f"Download {what}, `{file}`,{more} {RELEASE}.",
+               f"No release is published yet: in a clone of mbm, `{command}` writes {what}, `{file}`, to the folder `dist`.")
+
+
+SDK = "mbm-sdk-VERSION.tar.gz"
+WAYS = {
+    "README.md": Way("**[Download](ADDRESS/releases/latest)**, then start with",
+                     "No release is published yet: **[make the packages from a clone](#install)**, then start with"),
+    "docs/index.md": Way("**[Download](ADDRESS/releases/latest)** then start with",
+                         "**[Make it from a clone](../README.md#install)** as no release is published yet, then start with"),
+    "docs/guide-arduino.md": guide("the library", "mbm-arduino-VERSION.zip", "make arduino-zip"),
+    "docs/guide-esp-idf.md": guide("the component", "mbm-esp-idf-VERSION.tar.gz", "make package KIND=esp-idf"),
+    "docs/guide-platformio.md": guide("the package", "mbm-platformio-VERSION.tar.gz", "make package KIND=platformio"),
+    "docs/guide-linux.md": Way(f"Download the C SDK, `{SDK}`, or the Debian package `libmbm-dev`, {RELEASE}.",
+                               "No release is published yet: in a clone of mbm, `make install` installs the library, "
+                               "`make package KIND=debian` writes the Debian package `libmbm-dev` to the folder `dist`, and "
+                               f"`make package KIND=sdk` the C SDK, `{SDK}`."),
+    "docs/guide-mcu.md": guide("the C SDK", SDK, "make package KIND=sdk"),
+    "docs/guide-rt-thread.md": guide("the package", "mbm-rt-thread-VERSION.tar.gz", "make package KIND=rt-thread"),
+    "docs/guide-rust.md": Way(f"`cargo add mbm` takes the crate. Or download `mbm-VERSION.crate` {RELEASE} and unpack it.",
+                              "No release is published yet: `cargo add mbm --path FOLDER` takes the crate from a clone of mbm, and "
+                              "`make package KIND=crates` there writes it, `mbm-VERSION.crate`, to the folder `dist`."),
+    "docs/guide-zephyr.md": guide("the module", "mbm-zephyr-VERSION.tar.gz", "make package KIND=zephyr"),
+}
 
 
 def found(root: pathlib.Path, patterns: list) -> list:
     return [path for pattern in patterns for path in sorted(root.glob(pattern))]
 
 
-def addresses(root: pathlib.Path, address: str, write: bool) -> list:
-    """Writes the address everywhere if `write` says so. Returns what is wrong."""
+def addresses(root: pathlib.Path, address: str, published: bool, write: bool, ways: dict = WAYS) -> list:
+    """Writes the address and the ways to get mbm everywhere if `write` says so. Returns what is wrong."""
     wrong = []
     for place, patterns in ADDRESS:
         for path in found(root, patterns):
@@ -92,19 +165,32 @@ def addresses(root: pathlib.Path, address: str, write: bool) -> list:
                 path.write_text(new, encoding="utf-8")
             elif new != text:
                 wrong.append(f"{path.relative_to(root)} has another address than packaging/project.toml: run `make address`")
-    link = f"]({address}/releases/latest)"
-    return wrong + [f"{path.relative_to(root)} does not begin with a link to {address}/releases/latest"
-                    for path in found(root, BEGIN_WITH_LINK)
-                    if link not in path.read_text(encoding="utf-8").partition("\n## ")[0]]
+    for path in found(root, ["README.md", "docs/index.md", "docs/guide-*.md"]):
+        name = path.relative_to(root).as_posix()
+        if name not in ways:
+            wrong.append(f"{name}: scripts/build/project.py does not say how a reader gets mbm")
+            continue
+        text = path.read_text(encoding="utf-8")
+        right, other = ways[name].text(address, published), ways[name].text(address, not published)
+        begin, heading, rest = text.partition("\n## ")
+        if write and other in begin:
+            begin = begin.replace(other, right)
+            path.write_text(begin + heading + rest, encoding="utf-8")
+        if right not in begin:
+            wrong.append(f"{name} does not begin with \"{right}\": run `make address`")
+        if not published and "/releases/latest" in begin + rest:
+            wrong.append(f"{name} has a link to a release, and none is published")
+    return wrong
 
 
 def main() -> None:
     if sys.argv[1:] not in ([], ["--check"]):
         sys.exit(__doc__)
-    wrong = addresses(ROOT, fact("repository"), not sys.argv[1:])
+    wrong = addresses(ROOT, fact("repository"), fact("published"), not sys.argv[1:])
     if wrong:
         sys.exit("\n".join(f"address: {what}" for what in wrong))
-    print(f"address: pages and Cargo.toml have {fact('repository')}")
+    print(f"address: pages and Cargo.toml have {fact('repository')}, " +
+          ("with releases" if fact("published") else "without a release"))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,9 @@ library for the SBOM."""
 import copy
 import importlib.machinery
 import importlib.util
+import os
 import pathlib
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -165,20 +167,87 @@ class Address(unittest.TestCase):
         (self.root / "docs").mkdir()
         self.guide = self.root / "docs/guide-a.md"
         self.guide.write_text("# A\n\n[Get it](https://old.example/a/releases/latest).\n\n## B\n")
+        self.ways = {"docs/guide-a.md": project.Way("[Get it](ADDRESS/releases/latest).", "Make it: `make a`.")}
         (self.root / "Cargo.toml").write_text('[package]\nrepository = "https://old.example/a"\n')
 
+    def wrong(self, address="https://old.example/a", published=True, write=False):
+        return project.addresses(self.root, address, published, write, self.ways)
+
     def test_another_address_is_found_and_then_replaced(self):
-        wrong = project.addresses(self.root, "https://new.example", write=False)
         self.assertEqual(["docs/guide-a.md has", "Cargo.toml has", "docs/guide-a.md does"],
-                         [" ".join(what.split()[:2]) for what in wrong])
-        self.assertEqual(project.addresses(self.root, "https://new.example", write=True), [])
+                         [" ".join(what.split()[:2]) for what in self.wrong("https://new.example")])
+        self.assertEqual(self.wrong("https://new.example", write=True), [])
         self.assertIn("(https://new.example/releases/latest)", self.guide.read_text())
-        self.assertEqual(project.addresses(self.root, "https://new.example", write=False), [])
+        self.assertEqual(self.wrong("https://new.example"), [])
 
     def test_a_guide_that_does_not_begin_with_the_link_is_refused(self):
         self.guide.write_text("# A\n\n## B\n\n[Get it](https://old.example/a/releases/latest).\n")
-        wrong = project.addresses(self.root, "https://old.example/a", write=False)
-        self.assertEqual(wrong, ["docs/guide-a.md does not begin with a link to https://old.example/a/releases/latest"])
+        self.assertEqual(self.wrong(), ['docs/guide-a.md does not begin with "[Get it](https://old.example/a/releases/latest).": run `make address`'])
+
+    def test_without_a_release_a_page_says_how_to_make_the_package(self):
+        self.assertEqual(len(self.wrong(published=False)), 2)
+        self.assertEqual(self.wrong(published=False, write=True), [])
+        self.assertEqual(self.guide.read_text(), "# A\n\nMake it: `make a`.\n\n## B\n")
+        self.assertEqual(self.wrong(published=True, write=True), [])
+        self.assertEqual(self.guide.read_text(), "# A\n\n[Get it](https://old.example/a/releases/latest).\n\n## B\n")
+
+    def test_without_a_release_no_page_links_to_one(self):
+        self.wrong(published=False, write=True)
+        self.guide.write_text(self.guide.read_text() + "\n[Get it](https://old.example/a/releases/latest).\n")
+        self.assertEqual(self.wrong(published=False), ["docs/guide-a.md has a link to a release, and none is published"])
+
+    def test_a_new_guide_needs_its_way(self):
+        (self.root / "docs/guide-b.md").write_text("# B\n")
+        self.assertEqual(self.wrong(), ["docs/guide-b.md: scripts/build/project.py does not say how a reader gets mbm"])
+
+
+# --- the packages and the families of boards of the Arduino library
+
+class Boards(unittest.TestCase):
+    """Runs scripts/build/assembler on a system that lacks packages: `dpkg-query` says which, and any compiler
+    that is called leaves a mark."""
+
+    def assemble(self, missing, boards=""):
+        with tempfile.TemporaryDirectory() as folder:
+            tools, mark = pathlib.Path(folder), pathlib.Path(folder) / "compiled"
+            for name, lines in {
+                "dpkg-query": [f"case {' '.join(missing)} in *$4*) exit 1 ;; esac", "echo install ok installed"],
+                "rustup": ["exit 1"], "cargo": [f"touch {mark}", "exit 7"],
+            }.items():
+                (tools / name).write_text("\n".join(["#!/bin/sh", *lines, ""]))
+                (tools / name).chmod(0o755)
+            found = subprocess.run([ROOT / "scripts/build/archive", "--packages", *(
+                row.mcu for row in project.SETS.values() if row.kind in self.kinds(boards))],
+                env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "MBM_INSTALL": "no"}, capture_output=True, text=True)
+            self.assertFalse(mark.exists())
+            return found
+
+    def kinds(self, boards):
+        with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": boards}):
+            return {row.kind for row in project.sets().values()}
+
+    def test_a_package_that_only_the_last_build_needs_is_named_before_the_first(self):
+        found = self.assemble(["llvm-22"])
+        self.assertEqual(found.returncode, 1)
+        self.assertIn("Debian packages are missing: llvm-22", found.stderr)
+
+    def test_all_missing_packages_are_named_at_once(self):
+        self.assertIn("missing: binutils-arm-none-eabi binutils-xtensa-lx106 llvm-22",
+                      self.assemble(["binutils-arm-none-eabi,binutils-xtensa-lx106,llvm-22"]).stderr)
+
+    def test_a_family_needs_no_other_familys_packages(self):
+        self.assertEqual(self.assemble(["llvm-22,binutils-arm-none-eabi,binutils-xtensa-lx106,binutils-riscv64-unknown-elf"], "avr").returncode, 0)
+        self.assertEqual(self.kinds("avr"), {"avr"})
+        self.assertEqual(self.kinds("arm esp8266"), {"arm", "xtensa"})
+        self.assertEqual(self.kinds("esp32"), {"bytes", "riscv"})
+        self.assertEqual(self.kinds(""), {row.kind for row in project.SETS.values()})
+
+    def test_every_dialect_belongs_to_a_family(self):
+        self.assertEqual({kind for kinds, _ in project.FAMILIES.values() for kind in kinds}, {row.kind for row in project.SETS.values()})
+
+    def test_a_family_that_is_not_there_is_refused(self):
+        with self.assertRaisesRegex(SystemExit, 'BOARDS: "uno" is no family of boards: there are avr, arm'):
+            self.kinds("uno")
 
 
 # --- the SBOM
