@@ -116,10 +116,10 @@ static void damaged_frames_and_noise_are_printed_as_bytes(void **)
     Bytes damaged = adu({17, 3, 0, 107, 0, 3});
     damaged[3] = 106;
     std::string text = prints(sniffer, paper, damaged, 60);
-    run_loop(sniffer, 100);
+    run_loop(sniffer, 300);
     assert_non_null(strstr(paper.text.c_str(), " bytes: 11 03 00 6A 00 03"));
     text = prints(sniffer, paper, raw({0xFF, 0xFE}), 100);
-    run_loop(sniffer, 100);
+    run_loop(sniffer, 300);
     assert_non_null(strstr(paper.text.c_str(), "noise, 2 bytes: FF FE\r\n"));
 }
 

@@ -32,10 +32,10 @@ static int setup(void **state)
 static const struct {
     uint8_t kind;
     uint32_t frameTimeout;
-} sniffers[] = {{MBM_FRAMING_RTU, 50},
+} sniffers[] = {{MBM_FRAMING_RTU, 199},
                 {MBM_FRAMING_ASCII, 1000},
                 {MBM_FRAMING_TCP, 1000},
-                {MBM_FRAMING_RTU_OVER_TCP, 50}};
+                {MBM_FRAMING_RTU_OVER_TCP, 199}};
 
 static uint32_t now; /* of the sniffer */
 
@@ -90,9 +90,9 @@ static void a_sniffer_begins_in_every_framing_or_changes_nothing(void **state)
         assert_int_equal(response_timeout(sniffers[i].kind), 1000);
         assert_int_equal(frame_timeout(sniffers[i].kind), sniffers[i].frameTimeout);
         OK(mbm_sniffer_setResponseTimeout(&s, 5));
-        OK(mbm_sniffer_setFrameTimeout(&s, 200));
+        OK(mbm_sniffer_setFrameTimeout(&s, 300));
         assert_int_equal(response_timeout(sniffers[i].kind), 5);
-        assert_int_equal(frame_timeout(sniffers[i].kind), 200);
+        assert_int_equal(frame_timeout(sniffers[i].kind), 300);
         OK(mbm_sniffer_begin(&s, sniffers[i].kind, buffer, 300));
         assert_int_equal(response_timeout(sniffers[i].kind), 1000);
         assert_int_equal(frame_timeout(sniffers[i].kind), sniffers[i].frameTimeout);
@@ -222,7 +222,7 @@ static void a_trace_begins_or_changes_nothing(void **state)
         assert_non_null(mbm_trace_port(&t));
         REFUSED(MBM_INVALID_ARGUMENT, t,
                 mbm_trace_begin(&t, MBM_PACKET_EXCEPTION, &port, &rtu, buffer, 600, hook, NULL));
-        assert_int_equal(trace_timeout(), 50);
+        assert_int_equal(trace_timeout(), 200);
         OK(mbm_trace_setFrameTimeout(&t, 65535));
         assert_int_equal(trace_timeout(), 65535);
         REFUSED(MBM_INVALID_ARGUMENT, t, mbm_trace_setFrameTimeout(&t, 0));

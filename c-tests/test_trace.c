@@ -296,7 +296,7 @@ static void a_trace_begun_again_drops_what_it_has_not_handed_out(void **state)
     /* The frame timeout is the default. */
     hooked_port_arrive(&wire, REPLY, 5);
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
-    wire.now += 50000;
+    wire.now += 200000;
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 0);
     assert_int_equal(count, 1);
 }

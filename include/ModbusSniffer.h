@@ -96,7 +96,7 @@ public:
     {
         return mbm_sniffer_setResponseTimeout(&sniffer, ms);
     }
-    /** Milliseconds that the rest of a frame may take, 1 to 65535; 50 in RTU, 1000 in ASCII at first. */
+    /** Milliseconds that the rest of a frame may take, 1 to 65535; see mbm_sniffer_setFrameTimeout. */
     uint8_t setFrameTimeout(uint32_t ms) { return mbm_sniffer_setFrameTimeout(&sniffer, ms); }
 
     /**

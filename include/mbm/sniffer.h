@@ -185,8 +185,10 @@ uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint32_t tim
 
 /**
  * Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
- * than the error of your time stamps. At first it is 50 ms in RTU and RTU over TCP,
- * which suits a USB adapter, and 1000 ms in ASCII and TCP.
+ * than the error of your time stamps. At first it is 1000 ms in ASCII and TCP. In RTU and
+ * RTU over TCP it is 50 ms, which suits a USB adapter, and the time of 130 characters, which
+ * suits a UART that hands over 120 at a time: 199 ms at 9600 baud and while the rate is
+ * unknown.
  *
  * @param sniffer    the object
  * @param timeoutMs  1 to 65535 ms

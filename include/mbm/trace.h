@@ -122,8 +122,8 @@ uint8_t mbm_trace_begin(struct mbm_trace *trace,
 const struct mbm_port *mbm_trace_port(struct mbm_trace *trace);
 
 /**
- * Sets how long the trace waits for the rest of an incomplete frame. At first it is 50 ms in
- * RTU, which suits a USB adapter, and 1000 ms in the other framings.
+ * Sets how long the trace waits for the rest of an incomplete frame. At first it is 200 ms in
+ * RTU, which suits a USB adapter and a UART with a FIFO, and 1000 ms in the other framings.
  *
  * @param trace      the object
  * @param timeoutMs  1 to 65535 ms

@@ -18,7 +18,7 @@ pub use pairing::RequestStart;
 use crate::error::Status;
 use crate::frame::{ascii, Framing};
 use crate::pdu::custom::Function;
-use crate::time::{character, silence, DEFAULT_SILENCE};
+use crate::time::{character, silence, DEFAULT_CHARACTER, DEFAULT_SILENCE};
 use find::{Candidate, Context};
 use pairing::Requests;
 use stream::{RxStream, Timing};
@@ -34,9 +34,18 @@ pub const DEFAULT_TIMEOUT: u32 = 1_000_000;
 /// like it is more likely the reply to another request.
 const LATE_TIMEOUTS: u32 = 10;
 
-/// Default time that the sniffer waits for the rest of an RTU frame, in microseconds. The time
-/// stamps of a USB adapter are wrong by 16 ms and more.
-const RTU_FRAME_TIMEOUT: u32 = 50_000;
+/// How long a USB adapter holds bytes back, in microseconds: 16 ms and more.
+const ADAPTER: u32 = 50_000;
+
+/// How many characters a UART holds back: those of an ESP32 hand over 120 at a time, and the last
+/// ones after a pause of 10.
+const HELD_BACK: u32 = 120 + 10;
+
+/// Default time that the sniffer waits for the rest of an RTU frame, in microseconds: for
+/// [`ADAPTER`] and [`HELD_BACK`] characters of this length.
+const fn rtu_frame_timeout(character: u16) -> u32 {
+    ADAPTER + HELD_BACK * character as u32
+}
 
 /// Default time that the sniffer waits for the rest of any other frame, in microseconds (serial
 /// line guide V1.02, 2.5.2.1).
@@ -59,6 +68,8 @@ pub struct Sniffer {
     framing: Framing,
     end: u8,
     is_separate: bool,
+    /// The frame timeout follows from the baud rate.
+    has_rtu_timeout: bool,
     timeout: u32,
     timing: Timing,
     streams: [RxStream; 2],
@@ -90,14 +101,17 @@ enum Step {
 impl Sniffer {
     /// A sniffer that has received nothing yet.
     pub const fn new(framing: Framing) -> Self {
-        let frame_timeout = match framing {
-            Framing::Rtu | Framing::RtuOverTcp => RTU_FRAME_TIMEOUT,
-            Framing::Ascii | Framing::Tcp => FRAME_TIMEOUT,
+        let has_rtu_timeout = matches!(framing, Framing::Rtu | Framing::RtuOverTcp);
+        let frame_timeout = if has_rtu_timeout {
+            rtu_frame_timeout(DEFAULT_CHARACTER)
+        } else {
+            FRAME_TIMEOUT
         };
         Sniffer {
             framing,
             end: ascii::END,
             is_separate: false,
+            has_rtu_timeout,
             timeout: DEFAULT_TIMEOUT,
             timing: Timing {
                 character: 0,
@@ -111,10 +125,14 @@ impl Sniffer {
         }
     }
 
-    /// Sets the baud rate. It defines the silence between frames, and the times at which the
-    /// bytes of one [`Sniffer::feed`] arrived. 0 if it is unknown.
+    /// Sets the baud rate. It defines the silence between frames, the times at which the bytes of
+    /// one [`Sniffer::feed`] arrived, and the default of [`Sniffer::set_frame_timeout`]. 0 if it is
+    /// unknown.
     pub const fn set_baud_rate(&mut self, baud: u32) {
         self.idle_for = 0;
+        if self.has_rtu_timeout {
+            self.timing.frame_timeout = rtu_frame_timeout(character(baud));
+        }
         self.timing.silence = silence(baud);
         self.timing.character = if baud == 0 { 0 } else { character(baud) as u32 };
     }
@@ -127,9 +145,10 @@ impl Sniffer {
     }
 
     /// Sets how long the sniffer waits for the rest of a frame, in microseconds. It should be
-    /// longer than the error of the time stamps.
+    /// longer than the error of the time stamps. In RTU it is 50 ms and 130 characters at first.
     pub const fn set_frame_timeout(&mut self, frame_timeout: u32) {
         self.idle_for = 0;
+        self.has_rtu_timeout = false;
         self.timing.frame_timeout = frame_timeout;
     }
 

@@ -21,8 +21,8 @@ use cutter::{Cutter, Rules};
 pub const MIN_BUFFER: usize = 32;
 
 /// Default time to wait for the rest of an RTU frame, in microseconds. A USB adapter may deliver
-/// the bytes of one frame 16 ms apart.
-const RTU_FRAME_TIMEOUT: u32 = 50_000;
+/// the bytes of one frame 16 ms apart, a UART with a FIFO 120 characters: 137 ms at 9600 baud.
+const RTU_FRAME_TIMEOUT: u32 = 200_000;
 
 /// Default time to wait for the rest of any other frame, in microseconds.
 const FRAME_TIMEOUT: u32 = 1_000_000;

@@ -100,7 +100,7 @@ fn a_damaged_frame_is_reported_and_the_next_one_is_found() {
                 bench.feed(frame);
                 bench.wait(if silent { 5_000 } else { 0 });
             }
-            bench.wait(100_000);
+            bench.wait(300_000);
             let found: Vec<_> = bench.kinds();
             use EventKind::{BadCrc, Reply, Request, Timeout, Unpaired};
             let wanted = match damaged {
@@ -186,7 +186,7 @@ fn noise_before_and_after_a_frame_is_counted() {
         bench.feed(&rtu(17, READ_REPLY));
         bench.wait(silent);
         bench.feed(&[0xFF, 0xFF]);
-        bench.wait(100_000);
+        bench.wait(300_000);
         let kinds = [
             EventKind::Noise,
             EventKind::Request,

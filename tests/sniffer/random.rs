@@ -62,7 +62,7 @@ proptest! {
             bench.feed(some);
             bench.now += 1_000;
         }
-        bench.wait(100_000);
+        bench.wait(300_000);
         prop_assert_eq!(whole_frames(&bench), wanted);
         let reported: usize = bench.events.iter().map(|event| event.length).sum();
         prop_assert_eq!(reported, bytes.len());
@@ -90,7 +90,7 @@ proptest! {
                 wanted.push((kind, pdu.to_vec()));
             }
         }
-        bench.wait(100_000);
+        bench.wait(300_000);
         prop_assume!(!is_accident(&all, &noise));
         prop_assert_eq!(whole_frames(&bench), wanted);
         let reported: usize = bench.events.iter().map(|event| event.length).sum();

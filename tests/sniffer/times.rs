@@ -337,3 +337,33 @@ fn the_times_of_frames_received_in_one_piece_follow_from_the_baud_rate() {
     assert_eq!(bench.events[0].time, 1_000_000 - 11 * 1_146);
     assert_eq!(bench.events[1].response_time, 11 * 1_146);
 }
+
+/// Feeds a request of 255 bytes as a UART hands it over that waits for 120 bytes. Returns the kinds
+/// of the events.
+fn in_blocks(baud: u32, frame_timeout: Option<u32>) -> Vec<EventKind> {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.sniffer.set_baud_rate(baud);
+    if let Some(time) = frame_timeout {
+        bench.sniffer.set_frame_timeout(time);
+    }
+    let mut pdu = vec![0x10, 0, 0, 0, 123, 246];
+    pdu.extend([0x45; 246]);
+    let character = u32::from(mbm::time::character(baud));
+    for block in rtu(17, &pdu).chunks(120) {
+        // The last ones follow after a pause of ten characters.
+        let late = if block.len() < 120 { 10 } else { 0 };
+        bench.wait((block.len() as u32 + late) * character);
+        bench.feed(block);
+    }
+    bench.wait(10_000);
+    bench.kinds()
+}
+
+#[test]
+fn a_frame_that_a_uart_hands_over_in_blocks_is_found_at_every_baud_rate() {
+    for baud in [0, 1_200, 9_600, 19_200, 115_200] {
+        assert_eq!(in_blocks(baud, None), [EventKind::Request], "{baud}");
+    }
+    // What the program sets counts, whatever the rate.
+    assert_ne!(in_blocks(9_600, Some(50_000)), [EventKind::Request]);
+}

@@ -243,7 +243,7 @@ fn a_frame_of_an_unknown_function_ends_with_silence_or_by_its_declaration() {
     let mut bench = Bench::new(Framing::Rtu, Request);
     bench.receive(&reply);
     assert_eq!(bench.taken(), []);
-    bench.pass(50_000);
+    bench.pass(200_000);
     bench.receive(&[]);
     assert_eq!(bench.taken(), expected);
 

@@ -232,8 +232,10 @@ pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
 }
 
 /// Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
-/// than the error of your time stamps. At first it is 50 ms in RTU and RTU over TCP,
-/// which suits a USB adapter, and 1000 ms in ASCII and TCP.
+/// than the error of your time stamps. At first it is 1000 ms in ASCII and TCP. In RTU and
+/// RTU over TCP it is 50 ms, which suits a USB adapter, and the time of 130 characters, which
+/// suits a UART that hands over 120 at a time: 199 ms at 9600 baud and while the rate is
+/// unknown.
 ///
 /// @param sniffer    the object
 /// @param timeoutMs  1 to 65535 ms

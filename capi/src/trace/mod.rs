@@ -345,8 +345,8 @@ pub unsafe extern "C" fn mbm_trace_port(trace: *mut mbm_trace) -> *const mbm_por
     }
 }
 
-/// Sets how long the trace waits for the rest of an incomplete frame. At first it is 50 ms in
-/// RTU, which suits a USB adapter, and 1000 ms in the other framings.
+/// Sets how long the trace waits for the rest of an incomplete frame. At first it is 200 ms in
+/// RTU, which suits a USB adapter and a UART with a FIFO, and 1000 ms in the other framings.
 ///
 /// @param trace      the object
 /// @param timeoutMs  1 to 65535 ms
