@@ -26,6 +26,8 @@ static struct {
     struct serial_rs485 state;
     uint32_t nearest; /* the rate that it sets instead of any rate without a constant; 0: the rate
                          itself */
+    int has_latency;  /* a latency timer: 1; 2: only root may set it */
+    struct serial_struct serial;
 } driver;
 
 /* TCGETS2, which <termios.h> does not define. */
@@ -48,6 +50,18 @@ int ioctl(int fd, unsigned long request, ...)
         memcpy(&driver.state, argument, sizeof driver.state);
         if (driver.state.delay_rts_before_send > driver.longest)
             driver.state.delay_rts_before_send = driver.longest;
+        return 0;
+    }
+    if (driver.has_latency && request == TIOCGSERIAL) {
+        memcpy(argument, &driver.serial, sizeof driver.serial);
+        return 0;
+    }
+    if (driver.has_latency && request == TIOCSSERIAL) {
+        if (driver.has_latency == 2) {
+            errno = EPERM;
+            return -1;
+        }
+        memcpy(&driver.serial, argument, sizeof driver.serial);
         return 0;
     }
     if (driver.nearest && request == GET_WITH_RATE) {
@@ -355,6 +369,28 @@ static void rs485_sets_up_the_driver_and_close_restores_it(void **state)
     mbm_tty_close(&tty);
 }
 
+static void received_bytes_are_handed_over_at_once_if_the_driver_can(void **state)
+{
+    const int other = (int)ASYNC_SKIP_TEST, at_once = (int)ASYNC_LOW_LATENCY;
+    mbm_tty tty;
+    int i;
+
+    (void)state;
+    driver.serial.closing_wait = 77;
+    for (i = 0; i < 4; i++) {
+        const int before = i & 1 ? other | at_once : other;
+
+        driver.has_latency = i < 2 ? 1 : 2;
+        driver.serial.flags = before;
+        assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+        assert_int_equal(driver.serial.flags, i < 2 ? other | at_once : before);
+        mbm_tty_close(&tty);
+        assert_int_equal(driver.serial.flags, before);
+        assert_int_equal(driver.serial.closing_wait, 77);
+    }
+    driver.has_latency = 0;
+}
+
 static void an_rs485_delay_that_the_driver_shortens_is_refused(void **state)
 {
     mbm_tty_options options = PLAIN;
@@ -446,6 +482,7 @@ int main(void)
         TEST(a_shared_terminal_is_open_to_others_that_share_it),
         TEST(without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed),
         TEST(rs485_sets_up_the_driver_and_close_restores_it),
+        TEST(received_bytes_are_handed_over_at_once_if_the_driver_can),
         TEST(an_rs485_delay_that_the_driver_shortens_is_refused),
         TEST(a_lost_line_is_reported_with_its_errno),
         TEST(a_full_line_accepts_no_bytes_and_is_not_lost),

@@ -116,6 +116,28 @@ fn a_damaged_echo_is_not_answered() {
 }
 
 #[test]
+fn an_echo_that_arrives_together_with_the_next_request_is_still_an_echo() {
+    for framing in [Framing::Rtu, Framing::Ascii] {
+        for damage in [0, 0x10] {
+            let mut line = line_with_echo(framing, 3 * CHARACTER, &[]);
+            line.arrive(0, &framed(framing, &READ));
+            // The UART hands over both in one block, or the end of one is damaged.
+            while line.wire.borrow().sent.is_empty() {
+                let _ = line.poll();
+                let now = line.wire.borrow().now;
+                line.wire.borrow_mut().now = now.wrapping_add(50);
+            }
+            line.wire.borrow_mut().arriving[0].1 ^= damage;
+            line.arrive(0, &framed(framing, &WRITE));
+            let sent = line.frames(300_000, 50);
+            assert_eq!(sent.len(), 2, "{framing:?}, {damage}: {sent:02X?}");
+            line.arrive(0, &framed(framing, &WRITE));
+            assert_eq!(line.frames(300_000, 50).len(), 1, "{framing:?}, {damage}");
+        }
+    }
+}
+
+#[test]
 fn the_same_write_again_is_carried_out_on_a_line_without_an_echo() {
     for framing in [Framing::Rtu, Framing::Ascii] {
         for request in REQUESTS

@@ -1,11 +1,13 @@
 //! Explores the requests of a real master. At each step an adversary chooses what arrives and
 //! how far the clock moves. The program tries every order of these events, breadth first. Its
-//! argument is the time in seconds, 300 without one. It then plays every schedule of late replies
+//! argument is the time in seconds, 300 without one. It then tries every order of requests, blocks and
+//! echoes with a server (see `server`), plays every schedule of late replies
 //! with a client (see `client`), and sends a master every stream of bytes (see `streams`), again
 //! for that time.
 
 mod client;
 mod line;
+mod server;
 mod streams;
 mod wire;
 
@@ -215,6 +217,17 @@ fn main() {
         .flat_map(|request| [Before::Nothing, Before::Timeout].map(|before| (request, before)))
     {
         if try_streams(stream, Duration::from_secs(seconds) / 4) {
+            passed += 1;
+        } else {
+            failed += 1;
+        }
+    }
+    for hearing in [
+        server::Hearing::Others,
+        server::Hearing::Itself,
+        server::Hearing::Twin,
+    ] {
+        if server::try_orders(hearing, Duration::from_secs(seconds) / 6) {
             passed += 1;
         } else {
             failed += 1;

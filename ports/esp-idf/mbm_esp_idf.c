@@ -14,6 +14,10 @@ enum { RX_BUFFER = 1024, TX_BUFFER = 1024 };
  * of 10 would delay each reply. */
 enum { RX_SILENCE = 2 };
 
+/* After so many bytes it hands them over too. Its own value of 120 would hide the silences between
+ * frames, and delay them by up to 120 characters. */
+enum { RX_THRESHOLD = 1 };
+
 /* The bits of a character: start, data, parity or a second stop bit, stop. */
 enum { BITS = 11 };
 
@@ -120,6 +124,8 @@ static esp_err_t set_line(const mbm_espIdfLine *line)
         error = uart_set_pin(line->uart, line->txPin, line->rxPin, rts, UART_PIN_NO_CHANGE);
     if (error == ESP_OK)
         error = uart_set_rx_timeout(line->uart, RX_SILENCE);
+    if (error == ESP_OK)
+        error = uart_set_rx_full_threshold(line->uart, RX_THRESHOLD);
     if (error == ESP_OK && line->driver != MBM_ESP_IDF_NO_DRIVER)
         error = set_driver(line);
     return error;

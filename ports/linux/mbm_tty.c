@@ -231,6 +231,32 @@ static int set_rate(const mbm_tty *tty, uint32_t baud)
 }
 #endif
 
+/* Asks the driver to hand over received bytes at once, and not when a timer ends: 16 ms in an
+ * adapter of FTDI. Many drivers cannot, and some leave it to root. */
+#if defined TIOCGSERIAL && defined ASYNC_LOW_LATENCY
+static int set_low_latency(int fd, int on)
+{
+    struct serial_struct serial;
+    int flags;
+
+    if (ioctl(fd, TIOCGSERIAL, &serial) < 0)
+        return 0;
+    flags = serial.flags & ~(int)ASYNC_LOW_LATENCY;
+    flags |= on ? (int)ASYNC_LOW_LATENCY : 0;
+    if (flags == serial.flags)
+        return 0;
+    serial.flags = flags;
+    return ioctl(fd, TIOCSSERIAL, &serial) == 0;
+}
+#else
+static int set_low_latency(int fd, int on)
+{
+    (void)fd;
+    (void)on;
+    return 0;
+}
+#endif
+
 /* Saves the settings of the terminal, then makes it raw and non-blocking. */
 static int take_over(mbm_tty *tty)
 {
@@ -275,6 +301,8 @@ static void release(mbm_tty *tty)
         tcsetattr(tty->fd, TCSADRAIN, &tty->before);
     if (tty->is_rs485)
         end_rs485(tty);
+    if (tty->is_hurried)
+        set_low_latency(tty->fd, 0);
     if (tty->is_locked && tty->options.exclusive)
         ioctl(tty->fd, TIOCNXCL);
     if (tty->is_locked)
@@ -371,6 +399,7 @@ static int open_noted(mbm_tty *tty, const char *path)
         close(fd);
         return refuse(error);
     }
+    tty->is_hurried = (uint8_t)set_low_latency(fd, 1);
     return 0;
 }
 

@@ -51,6 +51,7 @@ typedef struct mbm_tty {
     uint8_t has_before; /**< private */
     uint8_t is_locked;  /**< private */
     uint8_t is_rs485;   /**< private */
+    uint8_t is_hurried; /**< private */
     int flags_before;   /**< private */
     uint32_t rs485_before[8];      /**< private */
     struct termios before;         /**< private */

@@ -300,9 +300,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         rtu::find_last(self.storage.part(0, self.end.into()))
     }
 
-    /// Drops the received bytes before `start`.
+    /// Drops the received bytes before `start`. They may have been an echo, or a damaged one.
     fn keep(&mut self, start: usize) {
         let end = usize::from(self.end);
+        if start != 0 {
+            self.sent = 0;
+        }
         self.storage.keep(start, end);
         self.end = (end - start) as u16;
     }
@@ -428,9 +431,11 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                         Decoded::Valid(content) => content - 1,
                         _ => 0,
                     };
-                    if length != 0 {
-                        self.give_up_echo();
+                    // What else has arrived may have been an echo, or a damaged one.
+                    if length == 0 || crc != self.crc {
+                        self.sent = 0;
                     }
+                    self.give_up_echo();
                     return self.found(length.into());
                 }
             }

@@ -105,7 +105,7 @@ pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 /// A server on one line or connection.
 // The small fields come first: see `Engine`.
 #[repr(C)]
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Server<P, B> {
     pub(super) phase: ServerPhase,
     /// In a stream of RTU frames: the received bytes are not a frame of known length. With echo

@@ -14,6 +14,15 @@
 
 void app_main(void);
 
+/* The receiver's FIFO. It hands its bytes over once it has `threshold` of them, or when no other
+ * has arrived for the time of `silence` characters. The values are those of the driver. */
+static struct {
+    int threshold, silence;
+    uint32_t byte_us;
+    uint16_t arrived, ready; /* of the bytes that the program has not read */
+    uint32_t last_us;        /* when the last one arrived */
+} fifo = {.threshold = 120, .silence = 10};
+
 static int is_installed, is_even, rts = UART_PIN_NO_CHANGE, is_rs485, is_output;
 
 static void expect(int fact, const char *what)
@@ -61,6 +70,7 @@ esp_err_t uart_param_config(uart_port_t uart, const uart_config_t *config)
                (config->parity == UART_PARITY_DISABLE ? UART_STOP_BITS_2 : UART_STOP_BITS_1),
            "a character does not have 11 bits");
     is_even = config->parity == UART_PARITY_EVEN;
+    fifo.byte_us = 11000000u / (uint32_t)config->baud_rate;
     line_begin((uint32_t)config->baud_rate);
     return ESP_OK;
 }
@@ -85,7 +95,19 @@ esp_err_t uart_set_mode(uart_port_t uart, uart_mode_t mode)
 esp_err_t uart_set_rx_timeout(uart_port_t uart, const uint8_t characters)
 {
     (void)uart;
-    return characters > 0 && characters <= 10 ? ESP_OK : ESP_FAIL;
+    if (characters == 0 || characters > 10)
+        return ESP_FAIL;
+    fifo.silence = characters;
+    return ESP_OK;
+}
+
+esp_err_t uart_set_rx_full_threshold(uart_port_t uart, int bytes)
+{
+    expect(uart == CONFIG_METER_UART && is_installed, "no driver has a threshold");
+    if (bytes < 1 || bytes > 127)
+        return ESP_FAIL;
+    fifo.threshold = bytes;
+    return ESP_OK;
 }
 
 esp_err_t uart_wait_tx_done(uart_port_t uart, TickType_t ticks)
@@ -102,10 +124,28 @@ int uart_write_bytes(uart_port_t uart, const void *bytes, size_t length)
     return (int)length;
 }
 
+static uint16_t take_from_fifo(void *bytes, uint16_t capacity)
+{
+    const uint32_t now = line_micros();
+    const uint16_t arrived = line_received();
+    uint16_t count;
+
+    if (arrived != fifo.arrived)
+        fifo.last_us = now;
+    fifo.arrived = arrived;
+    if (arrived - fifo.ready >= fifo.threshold ||
+        now - fifo.last_us >= (uint32_t)fifo.silence * fifo.byte_us)
+        fifo.ready = arrived;
+    count = line_read(bytes, fifo.ready < capacity ? fifo.ready : capacity);
+    fifo.ready = (uint16_t)(fifo.ready - count);
+    fifo.arrived = (uint16_t)(fifo.arrived - count);
+    return count;
+}
+
 int uart_read_bytes(uart_port_t uart, void *bytes, uint32_t capacity, TickType_t ticks)
 {
     expect(uart == CONFIG_METER_UART && is_installed && ticks == 0, "the port waits");
-    return line_read(bytes, (uint16_t)capacity);
+    return take_from_fifo(bytes, (uint16_t)(capacity < UINT16_MAX ? capacity : UINT16_MAX));
 }
 
 #if defined CONFIG_METER_DRIVER_PIN
@@ -142,6 +182,7 @@ void vTaskDelay(const TickType_t ticks)
 
     expect(is_even && (DRIVER_PIN < 0 || is_output || (is_rs485 && rts == DRIVER_PIN)),
            "the line is not set");
+    expect(fifo.threshold == 1, "the FIFO holds bytes back");
     if (!is_checked)
         printf("driver: %s\n", is_rs485 ? "by the UART" : is_output ? "by a pin" : "none");
     is_checked = 1;

@@ -34,6 +34,7 @@ esp_err_t uart_param_config(uart_port_t uart, const uart_config_t *config);
 esp_err_t uart_set_pin(uart_port_t uart, int tx, int rx, int rts, int cts);
 esp_err_t uart_set_mode(uart_port_t uart, uart_mode_t mode);
 esp_err_t uart_set_rx_timeout(uart_port_t uart, const uint8_t characters);
+esp_err_t uart_set_rx_full_threshold(uart_port_t uart, int bytes);
 esp_err_t uart_wait_tx_done(uart_port_t uart, TickType_t ticks);
 int uart_write_bytes(uart_port_t uart, const void *bytes, size_t length);
 int uart_read_bytes(uart_port_t uart, void *bytes, uint32_t capacity, TickType_t ticks);
