@@ -36,6 +36,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             return false;
         }
         self.outgoing = S::Count::ZERO;
+        // A reply that silence ends may look like the echo.
+        self.content = S::Count::ZERO;
+        self.end = S::Count::ZERO;
         self.begin_frame();
         self.forget();
         true
