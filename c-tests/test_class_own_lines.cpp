@@ -9,7 +9,7 @@ static HardwareSerial other_line;
 static void objects_have_a_line_each(void **)
 {
     assert_in_range(sizeof(ModbusMaster),
-                    2 * (125 + 123) + sizeof(mbm_line) + sizeof(mbm_node) + 255, 1200);
+                    2 * (125 + 123) + sizeof(mbm_line) + sizeof(mbm_node) + 255, 1300);
 }
 
 static void two_objects_have_a_request_under_way_at_the_same_time(void **)

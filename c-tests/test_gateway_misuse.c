@@ -151,8 +151,9 @@ static void begin_again_gives_up_all_connections_and_requests(void **state)
     assert_int_equal(mbm_gateway_pollDelay(&b.gateway), UINT32_MAX);
     gateway_bench_open(&b, 0);
     ASK(0, 3, 2, "\x03\x00\x20\x00\x01");
-    ON_LINE(0, 2, "\x03\x00\x20\x00\x01");
+    OK(mbm_gateway_poll(&b.gateway));
     REPLY(0, 2, VALUE); /* late, to the request that was given up */
+    ON_LINE(0, 2, "\x03\x00\x20\x00\x01");
     REPLY(0, 2, OTHER_VALUE);
     EXPECT(0, 3, 2, OTHER_VALUE);
     /* The settings are the defaults: more than two requests, which wait for more than 20 ms. */

@@ -258,8 +258,9 @@ static void a_new_client_in_the_place_gets_only_its_own_reply(void **state)
     assert_int_equal(mbm_client_pending(&b.clients[0]), 0);
     gateway_bench_open(&b, 0);
     ASK(0, 5, 2, "\x03\x00\x20\x00\x01");
-    ON_LINE(0, 2, "\x03\x00\x20\x00\x01");
+    OK(mbm_gateway_poll(&b.gateway));
     REPLY(0, 2, VALUE);
+    ON_LINE(0, 2, "\x03\x00\x20\x00\x01");
     REPLY(0, 2, OTHER_VALUE);
     EXPECT(0, 5, 2, OTHER_VALUE);
     SILENT(b.sockets[0]);

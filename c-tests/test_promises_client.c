@@ -448,6 +448,29 @@ static void settings_have_the_ranges_of_the_header(void **state)
     }
 }
 
+static void the_response_timeout_of_a_unit_can_be_read(void **state)
+{
+    static mbm_clientUnit units[2];
+
+    (void)state;
+    memset(units, 0, sizeof units);
+    units[0].unit = 5;
+    units[0].timeoutMs = 70;
+    units[1].unit = 6;
+    assert_int_equal(mbm_client_getResponseTimeout(&c, 5), 2000);
+    OK(mbm_client_setResponseTimeout(&c, 300));
+    OK(mbm_client_setUnits(&c, units, 2));
+    assert_int_equal(mbm_client_getResponseTimeout(&c, 5), 70);
+    assert_int_equal(mbm_client_getResponseTimeout(&c, 6), 300);
+    assert_int_equal(mbm_client_getResponseTimeout(&c, 7), 300);
+    units[0].timeoutMs = 2000000;
+    assert_int_equal(mbm_client_getResponseTimeout(&c, 5), 1000000);
+    OK(mbm_client_setUnits(&c, NULL, 0));
+    assert_int_equal(mbm_client_getResponseTimeout(&c, 5), 300);
+    assert_int_equal(mbm_client_getResponseTimeout(&never, 5), 0);
+    assert_int_equal(mbm_client_getResponseTimeout(NULL, 5), 0);
+}
+
 static void a_client_that_was_never_begun_has_no_settings(void **state)
 {
     static const mbm_rule silence = {.kind = MBM_RULE_SILENCE};
@@ -570,6 +593,7 @@ int main(void)
         TEST(the_gap_is_that_of_the_header),
         TEST(a_begin_restores_the_defaults_of_the_header),
         TEST(settings_have_the_ranges_of_the_header),
+        TEST(the_response_timeout_of_a_unit_can_be_read),
         TEST(a_client_that_was_never_begun_has_no_settings),
         TEST(a_link_has_the_limits_of_the_header),
     };

@@ -172,6 +172,12 @@ impl GatewayStorage for World {
             false => 0,
         }
     }
+    fn rest(&mut self, _: u8, _: u8) -> u32 {
+        0
+    }
+    fn line_places(&self, _: u8) -> u16 {
+        16
+    }
     fn line_depth(&self, line: u8) -> u16 {
         1 + u16::from(line)
     }

@@ -38,7 +38,7 @@ void responder_pause_until_request(responder *r)
     do {
         if (pauses++ == 2000)
             abort();
-        held_clock_pass(&r->clock, 50000);
+        held_clock_pass(&r->clock, 10000);
     } while (poll(&wait, 1, 10) == 0);
 }
 

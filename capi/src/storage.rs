@@ -36,6 +36,8 @@ const _: () = assert!(size_of::<mbm_counters>() == COUNTERS * size_of::<u32>());
 pub(super) struct NodeWords {
     pub(super) response_words: u8,
     pub(super) transmit_words: u8,
+    /// The node's functions do not wait for the reply.
+    pub(super) is_non_blocking: bool,
     pub(super) response_timeout: Setting<{ millis(2000) }>,
     pub(super) response: *mut u16,
     pub(super) transmit: *mut u16,

@@ -50,9 +50,9 @@ struct mbm_line;
  */
 typedef struct mbm_client {
     /** Private. */
-    void *pointers[51];
+    void *pointers[63];
     /** Private. */
-    uint32_t words[28];
+    uint32_t words[22];
 } mbm_client;
 
 /**
@@ -991,6 +991,16 @@ uint8_t mbm_client_setCounters(struct mbm_client *client, struct mbm_counters *c
 uint8_t mbm_client_setUnits(struct mbm_client *client,
                             struct mbm_clientUnit *units,
                             uint8_t count);
+
+/**
+ * Returns the response timeout of a request to a unit that has none of its own: that of its record
+ * (mbm_client_setUnits) or of the client (mbm_client_setResponseTimeout).
+ *
+ * @param client  the object
+ * @param unit    the unit identifier
+ * @return milliseconds; 0 if the client was not begun, and from within a hook of its port
+ */
+uint32_t mbm_client_getResponseTimeout(const struct mbm_client *client, uint8_t unit);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -42,7 +42,7 @@ extern "C" {
  */
 typedef struct mbm_link {
     /** Private. */
-    void *pointers[33];
+    void *pointers[34];
     /** Private. */
     uint32_t words[24];
 } mbm_link;

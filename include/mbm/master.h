@@ -49,9 +49,9 @@ typedef struct mbm_node {
  */
 typedef struct mbm_line {
     /** Private. */
-    void *pointers[13];
+    void *pointers[25];
     /** Private. */
-    uint32_t words[20];
+    uint32_t words[14];
 } mbm_line;
 
 /**

@@ -69,15 +69,10 @@ static void rest(const mbm_caller *caller, int64_t longest)
         usleep(delay < BLIND_SLEEP ? delay : BLIND_SLEEP);
 }
 
-uint8_t mbm_call(const mbm_caller *caller, uint8_t queued)
+static uint8_t call(const mbm_caller *caller)
 {
-    int64_t end;
+    const int64_t end = end_of(caller);
 
-    if (queued != MBM_PENDING)
-        return queued;
-    if (!caller || !caller->client || !caller->wait)
-        return MBM_INVALID_ARGUMENT;
-    end = end_of(caller);
     for (;;) {
         const uint8_t polled = mbm_client_poll(caller->client);
         int64_t left;
@@ -95,4 +90,36 @@ uint8_t mbm_call(const mbm_caller *caller, uint8_t queued)
             return time_out(caller);
         rest(caller, left);
     }
+}
+
+/* Makes the limit of the call the response timeout of its request, if that is longer. So a request
+ * that the call gives up delays the next one by that time, and not by the client's timeout. */
+static void shorten_timeout(const mbm_caller *caller)
+{
+    mbm_clientRequest *request = caller->request;
+    const uint32_t limit = caller->timeoutMs;
+    uint32_t timeout = request->timeoutMs;
+
+    if (timeout == 0)
+        timeout = mbm_client_getResponseTimeout(caller->client, (uint8_t)request->unit);
+    if (limit > 0 && limit < timeout)
+        request->timeoutMs = limit;
+}
+
+uint8_t mbm_call(const mbm_caller *caller, uint8_t queued)
+{
+    uint32_t timeout;
+    uint8_t status;
+
+    if (queued != MBM_PENDING)
+        return queued;
+    if (!caller || !caller->client || !caller->wait)
+        return MBM_INVALID_ARGUMENT;
+    if (!caller->request)
+        return call(caller);
+    timeout = caller->request->timeoutMs;
+    shorten_timeout(caller);
+    status = call(caller);
+    caller->request->timeoutMs = timeout;
+    return status;
 }

@@ -62,9 +62,11 @@ typedef struct mbm_caller {
  *
  * The settings of the client say how long that takes: response timeout, retries, backoff, and
  * the requests that were queued before; and of its link, how long a connection takes. However
- * long that is, the call ends after `timeoutMs`. Only a hook that blocks can make it longer:
- * mbm_tcp_connect while it looks up a name. A signal ends the call only by `stop`. When the
- * call returns, the request is not pending any more, except in a hook of the port.
+ * long that is, the call ends after `timeoutMs`. If that is shorter than the response timeout, it
+ * is the response timeout of the request, too, so that a request that is given up delays the next
+ * one to its unit by no more than twice that time and the quiet time. Only a hook that blocks can
+ * make it longer: mbm_tcp_connect while it looks up a name. A signal ends the call only by `stop`.
+ * When the call returns, the request is not pending any more, except in a hook of the port.
  *
  * If `done` of the request queues it again, the call goes on until it has ended again. So the
  * `request` of an mbm_identification has ended when all objects are read.

@@ -28,6 +28,8 @@ pub use request::{ClientRequest, RequestState};
 pub use retry::NO_RETRIES;
 #[doc(hidden)]
 pub use retry::{again, again_when_busy};
+#[doc(hidden)]
+pub use serial::late_rest;
 pub use serial::Serial;
 pub use storage::{ClientStorage, TcpBuffers};
 pub use tcp::Tcp;
@@ -172,6 +174,9 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     /// [`Status::LINK_LOST`]. Queued requests are sent over the new link.
     pub fn reconnect(&mut self) {
         self.line.release(None);
+        if !self.queue.has_broadcast {
+            self.line.forget_late_replies();
+        }
         self.queue.interrupt();
         self.queue.answered(0);
     }

@@ -2,7 +2,7 @@
 //! streams use the same queue, so a program contains its code once.
 
 use super::policy::Policy;
-use super::request::{ClientRequest, Stage};
+use super::request::{ClientRequest, RequestState, Stage};
 use super::retry::NO_RETRIES;
 use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
@@ -249,11 +249,20 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     }
 
     /// Removes the first request that is due from the queue. If there is none, records when
-    /// the next request is due.
-    pub(super) fn take_due(&mut self, now: u32, storage: &mut impl ClientStorage) -> Option<J> {
+    /// the next request is due. `rest` returns how long the line leaves the request's unit alone.
+    pub(super) fn take_due<S: ClientStorage>(
+        &mut self,
+        now: u32,
+        storage: &mut S,
+        mut rest: impl FnMut(&RequestState, &mut S) -> u32,
+    ) -> Option<J> {
         let mut least = u32::MAX;
         let found = self.queue.iter().position(|request| {
-            let wait = request.state().remaining_wait(now, storage);
+            let state = request.state();
+            let mut wait = state.remaining_wait(now, storage);
+            if state.is(Stage::Queued) {
+                wait = wait.max(rest(state, storage));
+            }
             least = least.min(wait);
             wait == 0
         });

@@ -2,15 +2,16 @@
 //! request is in flight at a time.
 
 use super::queue::RequestQueue;
-use super::request::{is_answer, store_response, ClientRequest, Stage};
+use super::request::{is_answer, store_response, ClientRequest, RequestState, Stage};
 use super::storage::ClientStorage;
 use super::transaction::ClientEngine;
 use super::transport::Transport;
 use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
-use crate::engine::{Engine, Setting, Settings};
+use crate::engine::{clean_silence, Engine, LateUnits, Setting, Settings};
 use crate::error::Status;
 use crate::frame::{ascii, rtu};
 use crate::port::Port;
+use crate::time::elapsed;
 
 /// One request at a time, in RTU or ASCII frames.
 #[repr(C)]
@@ -68,8 +69,12 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// the port, a program that sleeps until bytes arrive would wake up at once.
     #[cold]
     fn drop_late_bytes<const N: usize>(&mut self, queue: &mut RequestQueue<J, N>, now: u32) {
-        if self.engine.drop_received(now) < 0 {
-            queue.disconnect();
+        let is_rtu = !self.engine.request().is_ascii();
+        match self.engine.drop_received(now, is_rtu) {
+            0 => {}
+            ..0 => queue.disconnect(),
+            // A unit may owe nothing any more, so a request may be due.
+            _ => queue.changed = true,
         }
     }
 
@@ -92,6 +97,27 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
         }
         let pdu = rtu::PDU as u16;
         store_response(request, self.engine.storage.slice(pdu, content - pdu))
+    }
+}
+
+/// Microseconds for which a line leaves a unit alone, because it may still answer a request that
+/// was cancelled. `now` is the time.
+pub fn late_rest<S: ClientStorage>(
+    state: &RequestState,
+    late_units: &mut LateUnits,
+    settings: &Settings,
+    storage: &mut S,
+    now: u32,
+) -> u32 {
+    if settings.quiet_time.get() == 0 || !state.has_reply() {
+        return 0;
+    }
+    match late_units.awaited_since(state.unit()) {
+        None => 0,
+        Some(since) => {
+            let timeout = state.response_timeout(storage, settings.response_timeout.get());
+            clean_silence(timeout, settings).saturating_sub(elapsed(now, since))
+        }
     }
 }
 
@@ -125,9 +151,13 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
         if let Some(request) = queue.active.take() {
             self.engine.request().client_request = Some(request);
         } else {
+            let (late_units, settings) = (&mut self.engine.late_units, &self.engine.settings);
+            let rest = |state: &RequestState, storage: &mut S| {
+                late_rest(state, late_units, settings, storage, now)
+            };
             let due = match queue.is_held {
                 true => None,
-                false => queue.take_due(now, &mut self.engine.storage),
+                false => queue.take_due(now, &mut self.engine.storage, rest),
             };
             let Some(request) = due else {
                 if fresh && !queue.queue.is_empty() {
@@ -158,8 +188,22 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
         queue.conclude(request, status, now, &mut self.engine.storage)
     }
 
-    fn release(&mut self, _: Option<&J>) {
-        self.engine.cancel();
+    fn release(&mut self, request: Option<&J>) {
+        let engine = &mut self.engine;
+        let line = engine.settings.response_timeout;
+        if let Some(request) = request {
+            // The engine does not have the request now, so it takes the timeout of the line.
+            let timeout = request
+                .state()
+                .response_timeout(&mut engine.storage, line.get());
+            engine.settings.response_timeout = Setting::new(timeout);
+        }
+        engine.cancel();
+        engine.settings.response_timeout = line;
+    }
+
+    fn forget_late_replies(&mut self) {
+        self.engine.late_units.clear();
     }
 
     fn delay(&mut self, now: u32) -> Option<u32> {

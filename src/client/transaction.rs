@@ -50,6 +50,11 @@ impl<P, S: ClientStorage, J: ClientRequest> ClientTransaction<P, S, J> {
         self.client_request = Some(client_request);
     }
 
+    /// True if the line has ASCII frames.
+    pub(super) fn is_ascii(&self) -> bool {
+        self.ascii.is_some()
+    }
+
     fn header(&self) -> &RequestHeader {
         match &self.client_request {
             Some(client_request) => &client_request.state().header,

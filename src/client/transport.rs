@@ -40,6 +40,10 @@ pub trait Transport<J> {
     /// all partly received or partly sent frames.
     fn release(&mut self, request: Option<&J>);
 
+    /// Forgets which units may still answer earlier requests: the link is a new one, on which they
+    /// cannot come.
+    fn forget_late_replies(&mut self) {}
+
     /// True if no bytes of cancelled requests wait to be sent.
     fn is_idle(&self) -> bool {
         true

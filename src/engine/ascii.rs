@@ -40,16 +40,15 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             let after = self.content + S::Count::of(after);
             if front < after && self.is_ascii_reply(front, after - front, delimiter) {
                 self.is_early = self.run_length > S::Count::ZERO;
-                if !self.is_on_probation() {
+                let end = self.end;
+                if self.take_response() {
                     return true;
                 }
-                let end = self.end;
-                self.hold_response();
                 self.end = end;
             }
             self.drop_until(after);
         }
-        if self.is_held() {
+        if self.is_held {
             self.run_length = self.end - self.content;
         }
         if self.end == self.space() {
@@ -136,6 +135,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             Outcome::MALFORMED
         };
         self.note_foreign_frame();
+        // A frame as long as the request may be its echo.
+        if length != self.sent {
+            self.note_reply_of(self.storage.byte(front));
+        }
         self.note(kind);
         false
     }

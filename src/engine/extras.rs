@@ -68,7 +68,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.retries += 1;
         self.tally(self.seen.status());
         // The damaged reply may have been noise, so the right reply may still come.
-        self.expect_late_reply();
+        self.expect_late_reply(false);
         self.since = self.now;
         self.begin() == Status::PENDING
     }

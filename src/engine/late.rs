@@ -1,100 +1,193 @@
-//! Keeps a late reply from being delivered as the answer to a later request.
+//! Keeps a late reply from being delivered as the answer to a later request, and lets the right
+//! one through again in bounded time.
 //!
 //! RTU frames carry no transaction number. A late reply to an earlier request looks like the
 //! reply if unit, function and length are the same, and a late exception looks like the reply
-//! if the function is the same. Two rules keep late replies from being delivered:
-//! - After a request without a right reply, the engine waits for the quiet time before it
-//!   sends the next request.
-//! - The next reply of that unit is on probation: the engine holds it until the line has been
-//!   silent for the response timeout.
+//! if the function is the same. So the engine counts for each unit how many replies it owes:
+//! requests that were sent, and of which no reply was seen. A frame of the unit, wanted or not,
+//! takes one away. A unit that owes none is *clean*. So is a unit that was silent for two response
+//! timeouts and the quiet time since its last request was sent.
 //!
-//! A device that answers in order, but later than the timeout, sends two replies after the
-//! next request: first the late reply, then the right one. If it answers within the response
-//! timeout, it sends the second one before the hold is over. The second right reply replaces
-//! the held one. If it arrives damaged, the request fails, because the held reply is then most
-//! likely the late one. If only damaged replies came since the last right one, the quiet time
-//! suffices as the hold, because none is late.
+//! - After a request without a right reply, the line is left alone for the quiet time.
+//! - After a request that timed out, the next one to that unit is sent. Its reply is held until
+//!   nothing has arrived for the response timeout, unless it is the last one that the unit owes. A
+//!   device that answers in order, but later than the timeout, sends two replies: first the late
+//!   one, which is held, then the right one, which is the last and is delivered at once. If the
+//!   second one arrives damaged, the request fails, because the held reply is then most likely
+//!   the late one. If only damaged replies came, the quiet time suffices as the hold.
+//! - After a request that was cancelled, the next one to that unit is sent once the unit is
+//!   clean. Its reply is delivered at once. (If it were held, a program that cancels each request
+//!   before the hold is over would never get a reply again.)
 //!
-//! A reply that arrives while no request has been sent shows that the replies are late, too.
+//! A reply that arrives while no request has been sent and the unit owes none shows that more may
+//! be late.
 
-use super::{Engine, Outcome, Phase, Probation, Storage, Transaction};
+use super::late_units::{clean_silence, LateUnit, ANY, CANCELLED, LATE_UNITS, REPLIES, SLOW};
+use super::{Engine, Outcome, Phase, Storage, Transaction, BROADCAST};
 use crate::port::Port;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
-    /// The byte of `late_units` that has the bit of the pending request's unit, and that bit.
-    fn late_unit(&mut self) -> (&mut u8, u8) {
-        // The index is in range, so the compiler leaves the check out.
-        #[allow(clippy::indexing_slicing)]
-        let byte = &mut self.late_units[usize::from(self.unit & 3)];
-        (byte, 1 << (self.unit >> 2 & 7))
+    /// Makes the wait as long as a unit has to be silent to be clean.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn wait_until_clean(&mut self) {
+        self.wait = clean_silence(Q::response_timeout(self), &self.settings);
     }
 
-    /// True if the reply to the pending request may be a late one.
-    pub(super) fn may_be_late(&mut self) -> bool {
-        let (byte, bit) = self.late_unit();
-        *byte & bit != 0 && self.settings.quiet_time.get() > 0 && !self.request.has_unique_reply()
+    /// Looks up what the unit of the pending request owes. Changes the wait.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn look_up_owed(&mut self) {
+        self.wait_until_clean();
+        self.owed = 0;
+        if let Some(&mut LateUnit { owed, since, .. }) = self.late_units.record(self.unit) {
+            let is_broadcast = self.unit == BROADCAST && self.request.may_be_broadcast();
+            if !is_broadcast && !self.has_expired_since(since) {
+                self.owed = owed;
+            }
+        }
     }
 
-    /// Notes that the reply to the pending request may come late.
-    pub(super) fn expect_late_reply(&mut self) {
-        // A damaged reply has come, so none is late.
-        let is_damaged = self.phase == Phase::Reply && self.seen == Outcome::BAD_CRC;
-        self.has_slow_unit &= self.late_units != [0; 4];
-        self.has_slow_unit |= !is_damaged;
+    /// Has the request wait until its unit is clean. False if it need not wait.
+    pub(super) fn rest(&mut self) -> bool {
+        if self.owed & CANCELLED == 0 || !self.may_be_late() {
+            return false;
+        }
+        let Some(record) = self.late_units.record(self.unit) else {
+            return false;
+        };
+        self.since = record.since;
+        self.wait_until_clean();
+        self.phase = Phase::Rest;
+        true
+    }
+
+    /// True if the unit owes a reply to an earlier request.
+    pub(super) fn owes(&self) -> bool {
+        self.owed & REPLIES != 0
+    }
+
+    /// True if the next reply may be a late one.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn may_be_late(&self) -> bool {
+        self.owes() && self.settings.quiet_time.get() > 0 && !self.request.has_unique_reply()
+    }
+
+    /// Notes that the reply to the pending request may come late. `is_cancelled` is true if the
+    /// program has cancelled it. Changes the wait.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn expect_late_reply(&mut self, is_cancelled: bool) {
         self.is_late = true;
-        let (byte, bit) = self.late_unit();
-        *byte |= bit;
+        // An earlier request may have failed as well, by a timeout or by being cancelled.
+        let mut owed = self.owed;
+        if owed & REPLIES != REPLIES {
+            owed += 1;
+        }
+        // Without a damaged reply, the right one may be late.
+        if self.phase != Phase::Reply || self.seen != Outcome::BAD_CRC {
+            owed |= SLOW;
+        }
+        if is_cancelled {
+            owed |= CANCELLED;
+        }
+        let was_heard = self.is_held || self.seen > Outcome::OTHER_UNIT;
+        // A record of the unit, else a free one: its unit has been silent for long enough. Else the
+        // last record stands for all units from now on.
+        self.wait_until_clean();
+        let (mut place, mut index) = (LATE_UNITS, LATE_UNITS);
+        while index > 0 {
+            index -= 1;
+            // The index is in range, so the compiler leaves the check out.
+            #[allow(clippy::indexing_slicing)]
+            let record = self.late_units.records[index];
+            if record.is_of(self.unit) {
+                place = index;
+                break;
+            }
+            if record.owed == 0 || self.has_expired_since(record.since) {
+                place = index;
+            }
+        }
+        #[allow(clippy::indexing_slicing)]
+        let record = &mut self.late_units.records[place.min(LATE_UNITS - 1)];
+        if place == LATE_UNITS || record.owed == ANY {
+            owed = ANY;
+        }
+        record.unit = self.unit;
+        record.owed = owed;
+        record.since = if was_heard { self.now } else { self.begun };
     }
 
     /// Notes that the pending request's unit has answered.
     pub(super) fn expect_no_late_reply(&mut self) {
-        let (byte, bit) = self.late_unit();
-        *byte &= !bit;
+        match self.late_units.record(self.unit) {
+            Some(record) if record.owed != ANY => record.owed = 0,
+            _ => {}
+        }
     }
 
-    /// The silence, in microseconds, that the next request waits for.
+    /// Notes a frame of a unit: if the unit owes replies, it owes one less.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn required_silence(&self) -> u32 {
-        if self.is_late {
-            self.settings.gap.get().max(self.settings.quiet_time.get())
-        } else {
-            self.settings.gap.get()
+    pub(super) fn note_reply_of(&mut self, unit: u8) {
+        if unit == self.unit && self.owes() {
+            self.owed -= 1;
         }
+        let Some(record) = self.late_units.record(unit) else {
+            return;
+        };
+        if record.owed == ANY {
+            return;
+        }
+        // This is the reply that the quiet time waits for.
+        self.is_late = false;
+        record.owed -= 1;
+        if record.owed & REPLIES == 0 {
+            record.owed = 0;
+        }
+    }
+
+    /// The silence of the line, in microseconds, that the next request waits for.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn line_silence(&self) -> u32 {
+        let silence = self.settings.gap.get();
+        if self.is_late {
+            silence.max(self.settings.quiet_time.get())
+        } else {
+            silence
+        }
+    }
+
+    /// True if the pending request was not sent yet because it waits until its unit is clean.
+    pub fn waits_for_unit(&self) -> bool {
+        self.phase == Phase::Rest
     }
 
     /// How long the line must be silent before a held reply is accepted.
     pub(super) fn hold(&mut self) -> u32 {
-        if self.has_slow_unit {
+        if self.owed & SLOW != 0 {
             Q::response_timeout(self)
         } else {
             self.settings.quiet_time.get()
         }
     }
 
-    /// True if the next reply is held, or one was held.
-    pub(super) fn is_on_probation(&self) -> bool {
-        self.probation != Probation::No
-    }
-
-    /// True if a reply is or was held.
-    pub(super) fn is_held(&self) -> bool {
-        self.probation == Probation::Held
-    }
-
-    /// Holds the response in `seen`, which is on probation. It replaces a response that was held
-    /// before.
-    pub(super) fn hold_response(&mut self) {
-        if self.is_held() {
+    /// Decides on the response in `seen`. True if it answers the request. If it may be a late one,
+    /// it is held. It replaces a response that was held before.
+    pub(super) fn take_response(&mut self) -> bool {
+        if self.is_held {
             self.note_foreign_frame();
         }
-        self.probation = Probation::Held;
+        if !self.may_be_late() {
+            return true;
+        }
+        self.note_reply_of(self.unit);
+        self.is_held = true;
         self.end = self.content;
         self.begin_frame();
+        false
     }
 
     /// True if the held response is not the answer: the bytes after it may have been the answer,
     /// or the line is not silent. A single byte may be noise.
     pub(super) fn is_held_in_vain(&self) -> bool {
-        self.is_held() && (self.run_length > 1u8.into() || !self.has_expired())
+        self.is_held && (self.run_length > 1u8.into() || !self.has_expired())
     }
 }

@@ -57,10 +57,10 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     fn keep(&mut self) {
         let byte = self.storage.byte(self.end - 1);
         let is_whole = self.is_whole_frame();
-        if self.awaits_end || self.is_held() {
+        let function = self.function;
+        if self.is_held || (self.awaits_end && !self.drop_deviating(byte)) {
             return;
         }
-        let function = self.function;
         if !self.request.is_read() {
             // The search has found that it is not the reply.
             if self.ends_with(self.length, function) {
@@ -99,10 +99,36 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         self.kept += 1;
     }
 
+    /// Drops a deviating reply that may be a late one if the byte begins another frame with our unit
+    /// and function: the second one is the answer, as with right replies. True if the search goes on.
+    fn drop_deviating(&mut self, byte: u8) -> bool {
+        if self.owed == 0 || !self.request.is_read() {
+            return self.owed != 0;
+        }
+        let begins = self.run_length == 2
+            && self.end >= 2
+            && self.storage.byte(self.end - 2) == self.unit
+            && byte == self.function;
+        if begins {
+            // The unit is still there from the first one.
+            self.kept = 1;
+            self.awaits_end = false;
+        }
+        begins
+    }
+
     /// Notes a deviating reply. A whole frame is not counted as one that does not answer.
     fn note_deviating(&mut self, is_whole: bool) {
         self.awaits_end = true;
         self.foreign_frames = self.foreign_frames.wrapping_sub(is_whole.into());
+        if self.may_be_late() {
+            // It is held, as a right reply would be. What seemed to lie in it is forgotten.
+            if is_whole {
+                self.see_nothing();
+            }
+            self.since = self.now;
+            self.wait = self.hold();
+        }
     }
 
     /// The kept byte at `index`.
@@ -147,7 +173,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     /// Makes a deviating reply the result of a request that would fail. Of a reply with more
     /// data than response words, the data that fill these words count.
     fn accept_deviating(&mut self) {
-        if self.awaits_end && !self.is_held() && !self.seen.is_response() {
+        if self.awaits_end && !self.is_held && !self.seen.is_response() {
             if self.request.is_read() {
                 let data = self.kept_data();
                 self.request.set_reads(data);

@@ -18,6 +18,7 @@
 pub mod ascii;
 mod extras;
 mod late;
+mod late_units;
 mod lenient;
 mod outcome;
 mod poll;
@@ -28,6 +29,8 @@ mod storage;
 mod tally;
 mod transaction;
 
+pub(crate) use late_units::clean_silence;
+pub use late_units::LateUnits;
 pub use outcome::Outcome;
 pub use settings::{Setting, Settings};
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
@@ -45,6 +48,8 @@ pub const BROADCAST: u8 = 0;
 enum Phase {
     /// No request is pending.
     Idle,
+    /// Waits until its unit owes no reply to earlier requests.
+    Rest,
     /// Waits until the line is silent.
     Gap,
     /// Waits for the reply.
@@ -57,18 +62,6 @@ enum Phase {
     Flush,
     /// Keeps the driver on for the post-flush hold.
     PostFlush,
-}
-
-/// Whether the reply to the pending request may be a late one, which is held.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[repr(u8)]
-enum Probation {
-    /// The reply is not late.
-    No,
-    /// The next reply will be held.
-    Yes,
-    /// A reply is or was held.
-    Held,
 }
 
 /// One request and its reply, over a port and in the caller's storage.
@@ -95,10 +88,11 @@ pub struct Engine<P, S: Storage, Q> {
     /// The response or damaged reply in `seen` may lie within another frame, so a silence must
     /// follow it.
     is_early: bool,
-    /// Whether the reply may be a late one, which is held.
-    probation: Probation,
-    /// One of the late units sent no reply, not only a damaged one.
-    has_slow_unit: bool,
+    /// What the unit owed when the request was begun, less the replies that have come since: see
+    /// `late`.
+    owed: u8,
+    /// A reply is or was held, because it may be a late one.
+    is_held: bool,
     /// A reply may have arrived that counts only once the bytes end: one of unknown length, or a
     /// deviating one.
     awaits_end: bool,
@@ -129,12 +123,11 @@ pub struct Engine<P, S: Storage, Q> {
     foreign_frames: i8,
     /// CRC of the bytes that have arrived since the last frame ended.
     run: Crc16,
-    /// The CRC since the last frame of the bytes that were dropped from the frame buffer.
-    before: Crc16,
-    /// The weight of `length` for [`Crc16::since_start`]; 0 if it is not computed yet.
-    weight: Crc16,
     /// How many bytes have arrived that were not counted yet.
     received: u16,
+    /// The units that owe replies.
+    #[doc(hidden)]
+    pub late_units: LateUnits,
     /// The caller's frame buffer, words and counters.
     pub storage: S,
     /// The byte stream.
@@ -153,9 +146,6 @@ pub struct Engine<P, S: Storage, Q> {
     pub(crate) request: Q,
     /// Times and options of the requests.
     pub settings: Settings,
-    /// The units that did not answer their last request. Each bit stands for the units whose
-    /// numbers are equal modulo 32.
-    late_units: [u8; 4],
     /// What the engine calls at the moments of a request: `extras`, or `lenient`, which calls
     /// `extras` in turn.
     extension: Option<Extension<P, S, Q>>,

@@ -1,6 +1,6 @@
 //! Moves a request on, from its start to its end.
 
-use super::{Count, Engine, Moment, Outcome, Phase, Probation, Settings, Storage, Transaction};
+use super::{Count, Engine, LateUnits, Moment, Outcome, Phase, Settings, Storage, Transaction};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::port::Port;
@@ -40,6 +40,7 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         for time in [&mut self.since, &mut self.begun, &mut self.now] {
             *time = 0u32.wrapping_sub(elapsed(now, *time).min(longest));
         }
+        self.late_units.rebase(now, longest);
     }
 
     /// Enters a phase, whose wait begins with the next look at the clock.
@@ -64,7 +65,13 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// True once the wait is over.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn has_expired(&self) -> bool {
-        has_elapsed(self.wait, self.now, self.since)
+        self.has_expired_since(self.since)
+    }
+
+    /// True once the wait would be over if it had begun at the time `since`.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn has_expired_since(&self, since: u32) -> bool {
+        has_elapsed(self.wait, self.now, since)
     }
 }
 
@@ -80,9 +87,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             exception: 0,
             seen: Outcome::OK,
             is_early: false,
-            probation: Probation::No,
+            owed: 0,
+            is_held: false,
             is_late: false,
-            has_slow_unit: false,
             awaits_end: false,
             has_more: false,
             run_kind: Outcome::MALFORMED,
@@ -96,15 +103,13 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             counted: S::Count::ZERO,
             foreign_frames: 0,
             run: Crc16::START,
-            before: Crc16::START,
-            weight: Crc16::RESIDUE,
             received: 0,
             storage,
             since: 0,
             wait: 0,
             begun: 0,
             now: 0,
-            late_units: [0; 4],
+            late_units: LateUnits::NONE,
             port,
             request: Q::NONE,
             tally: Some(Engine::count),
@@ -140,7 +145,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.look_at_clock(now);
         let status = match self.phase {
             Phase::Idle => return Status::OK,
-            Phase::Gap | Phase::Reply => self.listen(),
+            Phase::Rest | Phase::Gap | Phase::Reply => self.listen(),
             Phase::Turnaround if self.has_expired() => Status::OK,
             Phase::Turnaround => Status::PENDING,
             _ => self.send(),
@@ -148,7 +153,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.tally(status);
         if status != Status::PENDING {
             if status.is_failure() {
-                self.end_on_line();
+                self.end_on_line(false);
             }
             self.phase = Phase::Idle;
         }
@@ -166,11 +171,25 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         received
     }
 
-    /// Reads the received bytes at the time `now` and drops them. Negative if the link is lost.
-    pub fn drop_received(&mut self, now: u32) -> i16 {
-        let received = self.read_bytes(S::Count::ZERO, self.storage.capacity());
+    /// Reads the received bytes at the time `now` and drops them, while no request is pending. If
+    /// they are frames of RTU, notes which units have sent them. Negative if the link is lost.
+    pub fn drop_received(&mut self, now: u32, is_rtu: bool) -> i16 {
+        if has_elapsed(self.settings.silence.get(), now, self.since) || self.end == self.space() {
+            self.end = S::Count::ZERO;
+            self.begin_frame();
+        }
+        let received = self.read_bytes(self.end, self.space() - self.end);
         if received > 0 {
             self.since = now;
+            self.now = now;
+            for _ in 0..received {
+                self.end += 1u8.into();
+                if self.continue_frame() && is_rtu {
+                    let unit = self.storage.byte(self.end - self.run_length);
+                    self.note_reply_of(unit);
+                    self.begin_frame();
+                }
+            }
             self.tally(Status::PENDING);
         }
         received
@@ -201,12 +220,12 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             if received == S::Count::ZERO {
                 break;
             }
-            if self.phase == Phase::Gap {
+            if self.phase <= Phase::Gap {
                 // They overwrite the request.
                 self.outgoing = S::Count::ZERO;
             }
             if Q::search(self, first, received) {
-                if self.phase == Phase::Gap {
+                if self.phase <= Phase::Gap {
                     self.note_unexpected();
                 } else {
                     self.since = self.now;
@@ -222,18 +241,28 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.has_more = budget == S::Count::ZERO;
         let mut is_old = false;
         if budget < MOST.into() {
-            if self.phase == Phase::Gap || self.waits_for_silence() {
+            let is_before = self.phase <= Phase::Gap;
+            if is_before || self.waits_for_silence() {
                 // The search may have taken long. The silence begins after it.
                 self.now = self.port.micros();
                 self.since = self.now;
+            }
+            if is_before {
+                let silence = self.line_silence();
+                if self.wait > silence {
+                    // The request has waited for its unit. The line was not busy.
+                    self.begun = self.now;
+                }
+                self.wait = silence;
+                self.phase = Phase::Gap;
             }
             // Received bytes extend the wait, but not for ever.
             is_old = self.is_overdue(self.begun);
         }
         let is_over = !self.has_more && self.has_expired();
-        if self.phase == Phase::Gap {
+        if self.phase <= Phase::Gap {
             if is_over {
-                return self.transmit();
+                return self.leave_gap();
             }
             return if is_old {
                 Status::LINE_BUSY
@@ -262,7 +291,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// True if silence ends the wait for the reply, because it is known what the request ends with
     /// then. Sets how long the silence must last.
     fn waits_for_silence(&mut self) -> bool {
-        if self.is_held() {
+        if self.is_held {
             self.wait = self.hold();
         } else if self.is_early || self.may_end_in_silence() {
             self.wait = self.settings.silence.get();
@@ -282,13 +311,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     fn find_in_silence(&mut self) -> bool {
         self.awaits_end = false;
         let length = Q::ending_reply(self, true);
-        if length > S::Count::ZERO && self.accept(length) {
-            if !self.is_on_probation() {
-                return true;
-            }
-            self.hold_response();
+        if length > S::Count::ZERO && self.accept(length) && self.take_response() {
+            return true;
         }
-        if self.is_held() {
+        if self.is_held {
             self.wait = self.hold();
         } else if !self.is_early {
             self.since = self.begun;
@@ -319,18 +345,18 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// its reply may still come.
     pub fn cancel(&mut self) {
         self.tally(Status::CANCELLED);
-        self.end_on_line();
+        self.end_on_line(true);
         self.phase = Phase::Idle;
     }
 
     /// Ends a request without a right reply on the line: switches the driver off, and notes that
-    /// the reply may come late.
-    fn end_on_line(&mut self) {
+    /// the reply may come late. `is_cancelled` is true if the program has cancelled it.
+    fn end_on_line(&mut self, is_cancelled: bool) {
         if self.phase <= Phase::Gap {
             return;
         }
-        if self.phase != Phase::Send {
-            self.expect_late_reply();
+        if self.phase != Phase::Send && self.phase != Phase::Turnaround {
+            self.expect_late_reply(is_cancelled);
         }
         if self.phase >= Phase::Send {
             self.port.post_transmission();

@@ -21,13 +21,6 @@ use crate::port::Port;
 const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
-    /// True if the CRC of a reply is derived from the CRC of all bytes since the last frame. That
-    /// takes 340 bytes of code on an AVR, where the CRC of a long reply takes longer than a
-    /// character. (Hosts test it.)
-    pub(super) const DERIVES_CRC: bool = Q::HAS_FIXED_REPLY
-        && cfg!(feature = "diagnosis")
-        && (cfg!(target_arch = "avr") || !P::READS_SINGLE_BYTES);
-
     /// Searches the `received` bytes that the port has written to the frame buffer from `first`
     /// on. True if the request ends. The bytes after the reply are dropped then.
     pub(crate) fn search(&mut self, first: S::Count, received: S::Count) -> bool {
@@ -60,7 +53,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     fn is_reply_alone(&mut self, received: S::Count) -> bool {
         let frame = self.storage.slice(S::Count::ZERO, received);
         let start = [self.unit, self.function];
-        if self.is_on_probation()
+        if self.may_be_late()
             || self.outgoing > S::Count::ZERO
             || !frame.starts_with(&start)
             || !rtu::is_frame(frame)
@@ -93,8 +86,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             length > S::Count::ZERO && self.accept(length)
         };
         if is_response {
-            if self.is_on_probation() {
-                self.hold_response();
+            if !self.take_response() {
                 return false;
             }
             if self.content > S::Count::ZERO || !self.is_early {
@@ -108,7 +100,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Makes the exception at the end of the buffer the outcome. False if its code is invalid.
     fn accept_exception(&mut self) -> bool {
         let code = self.storage.byte(self.end - 3u8.into());
-        if !self.is_held() {
+        if !self.is_held {
             self.exception = code;
         }
         if let Status::MALFORMED_REPLY = Status::exception(code) {
@@ -187,7 +179,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         {
             return false;
         }
-        if self.is_right(front, length) {
+        if rtu::is_frame(self.storage.slice(front, length)) {
             return true;
         }
         // A damaged reply ends the request, unless it lies within the reply or another frame.
@@ -199,33 +191,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         false
     }
 
-    /// True if the CRC of the `length` bytes at `front` is right. For the reply, it follows from
-    /// the CRC of all bytes since the last frame and from that of the bytes before `front`, which
-    /// are few. So bytes that begin like the reply again and again cost little.
-    fn is_right(&mut self, front: S::Count, length: S::Count) -> bool {
-        let known = self.known();
-        if !Self::DERIVES_CRC || length != self.length || front < known {
-            return rtu::is_frame(self.storage.slice(front, length));
-        }
-        let before = self.before.with(self.storage.slice(known, front - known));
-        if before != Crc16::START && self.weight == Crc16::RESIDUE {
-            self.weight = Crc16::weight(length.into());
-        }
-        before.since_start(self.weight) == self.run
-    }
-
-    /// The index in the buffer up to which `before` is the CRC since the last frame.
-    fn known(&self) -> S::Count {
-        self.end - self.run_length.min(self.end)
-    }
-
     /// Drops the bytes before `front`.
     #[inline(always)]
     pub(super) fn drop_to(&mut self, front: S::Count) {
-        let known = self.known();
-        if Self::DERIVES_CRC && known < front {
-            self.before = self.before.with(self.storage.slice(known, front - known));
-        }
         self.content = S::Count::ZERO;
         self.end -= front;
         self.storage.move_down(front, self.end);
@@ -234,7 +202,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Notes a damaged reply. It may be the answer, so a held reply is not.
     #[inline(always)]
     pub(super) fn note_damaged(&mut self) {
-        if self.is_held() {
+        if self.is_held {
             self.seen = Outcome::BAD_CRC;
         }
         self.note(Outcome::BAD_CRC);
@@ -246,15 +214,12 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if cfg!(feature = "diagnosis") {
             self.run = Crc16::START;
         }
-        if Self::DERIVES_CRC {
-            self.before = Crc16::START;
-        }
     }
 
     /// Counts the byte as one of the frame that is being received. True if all bytes since the
     /// last frame form a frame.
     #[inline(always)]
-    fn continue_frame(&mut self) -> bool {
+    pub(super) fn continue_frame(&mut self) -> bool {
         self.run_length = self.run_length.next();
         if !cfg!(feature = "diagnosis") {
             return false;
@@ -280,8 +245,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             return true;
         }
         self.note_foreign_frame();
+        self.note_frame();
         self.begin_frame();
-        if self.is_held() {
+        if self.is_held {
             // A damaged reply that seemed to follow the held one lies in this frame.
             self.seen = if self.content > S::Count::ZERO || self.exception > 0 {
                 Outcome(self.exception)
@@ -293,6 +259,26 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
         self.note(kind);
         false
+    }
+
+    /// Notes which unit has sent the whole frame that is being skipped.
+    fn note_frame(&mut self) {
+        if self.run_length > self.end {
+            return;
+        }
+        let front = self.end - self.run_length;
+        let unit = self.storage.byte(front);
+        if self.run_kind == Outcome::MALFORMED {
+            // Not the echo of the request, nor the beginning of its reply, in which the CRC is right
+            // by chance.
+            let count = self.storage.byte(front + 2u8.into());
+            let counted = S::Count::of(usize::from(count) + rtu::OVERHEAD + 2);
+            let is_reply = self.run_length == self.length || self.run_length == counted;
+            if !is_reply || self.run_length == self.sent {
+                return;
+            }
+        }
+        self.note_reply_of(unit);
     }
 
     /// Forgets what was seen, because it lies within another frame, and waits for the reply again.

@@ -1,8 +1,8 @@
 //! Sends one request: writes the frame, waits until its last bit has left.
 
-use super::{Count, Engine, Moment, Phase, Probation, Storage, Transaction, BROADCAST};
+use super::{Count, Engine, Moment, Phase, Storage, Transaction, BROADCAST};
 use crate::error::Status;
-use crate::frame::checksum::{crc16, Crc16};
+use crate::frame::checksum::crc16;
 use crate::frame::rtu;
 use crate::port::Port;
 
@@ -36,7 +36,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     pub(super) fn begin(&mut self) -> Status {
         Q::write(self);
         self.begin_search();
-        self.wait = self.required_silence();
+        self.wait = self.line_silence();
         self.enter(Phase::Gap);
         Status::PENDING
     }
@@ -48,36 +48,42 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.end = S::Count::ZERO;
         self.content = S::Count::ZERO;
         self.length = self.request.reply_length();
-        if Self::DERIVES_CRC {
-            self.weight = Crc16::RESIDUE;
-        }
         self.see_nothing();
         self.has_more = false;
-        self.probation = if self.may_be_late() {
-            Probation::Yes
-        } else {
-            Probation::No
-        };
+        self.is_held = false;
+        self.look_up_owed();
         self.begin_frame();
     }
 
-    /// A right reply has arrived before the request was sent. It belongs to an earlier request,
-    /// so more late replies may come.
+    /// A right reply has arrived before the request was sent. It belongs to an earlier request. If
+    /// the unit owes none, more late replies may come.
     #[cold]
     pub(super) fn note_unexpected(&mut self) {
-        if self.unit != BROADCAST {
-            self.expect_late_reply();
+        if self.owes() {
+            self.note_reply_of(self.unit);
+        } else {
+            self.expect_late_reply(false);
         }
         self.begin_search();
-        self.wait = self.required_silence();
+        self.wait = self.line_silence();
+    }
+
+    /// Sends the request, now that the line is silent, unless its unit is not clean yet.
+    pub(super) fn leave_gap(&mut self) -> Status {
+        self.is_late = false;
+        self.look_up_owed();
+        if self.rest() {
+            return Status::PENDING;
+        }
+        self.wait = 0;
+        self.transmit()
     }
 
     /// Switches the driver on and begins to send.
-    pub(super) fn transmit(&mut self) -> Status {
+    fn transmit(&mut self) -> Status {
         if self.outgoing == S::Count::ZERO {
             Q::write(self);
         }
-        self.is_late = false;
         self.since = self.now;
         self.begun = self.now;
         self.phase = Phase::Send;
@@ -125,6 +131,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             Phase::Reply
         };
         self.enter(phase);
+        self.begun = self.now;
         self.wait_for_reply();
         Status::PENDING
     }

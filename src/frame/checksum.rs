@@ -1,18 +1,6 @@
 //! The CRC-16 of an RTU frame and the LRC of an ASCII frame (serial line guide
 //! V1.02, 6.2.2 and 6.2.1).
 
-/// The polynomial of the CRC-16, lowest power in the highest bit.
-const POLYNOMIAL: u16 = 0xA001;
-
-/// The CRC after one more bit, which is 0.
-const fn shifted(crc: u16) -> u16 {
-    if crc & 1 != 0 {
-        crc >> 1 ^ POLYNOMIAL
-    } else {
-        crc >> 1
-    }
-}
-
 /// The CRC after `bytes`, for hosts: by the table of the crate `crc`.
 #[cfg(not(target_os = "none"))]
 fn by_table(crc: u16, bytes: &[u8]) -> u16 {
@@ -105,33 +93,6 @@ impl Crc16 {
         }
     }
 
-    /// The weight of a frame of `length` bytes, at most 8191, for [`Crc16::since_start`].
-    #[must_use]
-    pub fn weight(length: u16) -> Crc16 {
-        let mut weight = 0x8000;
-        for _ in 0..length << 3 {
-            weight = shifted(weight);
-        }
-        Crc16(weight)
-    }
-
-    /// The CRC of a run of bytes that ends with a frame whose CRC is right. `self` is the CRC of
-    /// the bytes before that frame, `weight` the weight of the frame's length. (The CRC is
-    /// linear: the bytes before the frame add a difference, multiplied by the weight.)
-    #[must_use]
-    pub fn since_start(self, mut weight: Crc16) -> Crc16 {
-        let mut difference = self.0 ^ Crc16::START.0;
-        let mut product = 0;
-        while difference != 0 {
-            if difference & 0x8000 != 0 {
-                product ^= weight.0;
-            }
-            difference <<= 1;
-            weight.0 = shifted(weight.0);
-        }
-        Crc16(product)
-    }
-
     /// The two bytes of the CRC as they are sent, low byte first.
     pub const fn to_bytes(self) -> [u8; 2] {
         self.0.to_le_bytes()
@@ -193,15 +154,6 @@ mod tests {
             prop_assert_eq!(after.before(byte), Crc16(crc));
             prop_assert_eq!(undo_by_bits(after.0, byte), crc);
             prop_assert_eq!(undo_by_parity(after.0, byte), crc);
-        }
-
-        #[test]
-        fn since_start_predicts_the_crc_after_a_frame(noise: std::vec::Vec<u8>, frame: std::vec::Vec<u8>) {
-            let frame = frame.get(..250).unwrap_or(&frame);
-            let before = crc16(&noise);
-            let after = before.with(frame).with(&crc16(frame).to_bytes());
-            let weight = Crc16::weight(frame.len() as u16 + 2);
-            prop_assert_eq!(after, before.since_start(weight));
         }
 
         #[test]

@@ -109,23 +109,37 @@ impl<S: GatewayStorage> Gateway<S> {
     /// The request that goes to a line next; `None` if no request waits for it, or if it has
     /// as many as it may have. The connections take turns, and the oldest request of a
     /// connection is the first. Answers requests that have waited too long.
+    ///
+    /// A request whose unit is left alone for a while is not counted, so that the line is free for
+    /// other units. The line takes such requests too, as many as it has places left, because it
+    /// reads what arrives only while it has requests.
     fn next(&mut self, line: u8) -> Option<u16> {
         let last = self.storage.line(line).last;
         let mut left = self.storage.line_depth(line);
+        let mut places = self.storage.line_places(line).saturating_sub(left);
+        for request in 0..self.storage.request_count() {
+            let state = *self.storage.request(request);
+            if state.line == line && state.stage == Stage::OnLine {
+                let rests = self.storage.rest(line, state.unit) > 0;
+                let count = if rests { &mut places } else { &mut left };
+                *count = count.saturating_sub(1);
+            }
+        }
         let mut found: Option<(u8, u16)> = None;
         for request in 0..self.storage.request_count() {
             let state = *self.storage.request(request);
-            if state.line != line {
-                continue;
-            }
-            if state.stage == Stage::OnLine {
-                left = left.saturating_sub(1);
-            }
-            if state.stage != Stage::Queued {
+            if state.line != line || state.stage != Stage::Queued {
                 continue;
             }
             if self.queue_time != 0 && self.left_in_queue(request) == 0 {
                 self.give_back(request);
+                continue;
+            }
+            let has_place = match self.storage.rest(line, state.unit) {
+                0 => left > 0,
+                _ => places > 0,
+            };
+            if !has_place {
                 continue;
             }
             // 0 is the connection after the one that had the last turn.
@@ -142,7 +156,7 @@ impl<S: GatewayStorage> Gateway<S> {
                 found = Some((turn, request));
             }
         }
-        found.filter(|_| left > 0).map(|(_, request)| request)
+        found.map(|(_, request)| request)
     }
 
     /// Microseconds for which a request may still wait for its line.

@@ -32,6 +32,21 @@ impl<S: GatewayStorage> Gateway<S> {
         }
     }
 
+    /// Microseconds until a request that waits for its line has waited too long, or for its unit
+    /// long enough.
+    fn delay_in_queue(&mut self, request: u16) -> u32 {
+        let mut delay = u32::MAX;
+        if self.queue_time != 0 {
+            delay = self.left_in_queue(request);
+        }
+        let state = self.storage.request(request);
+        let (line, unit) = (state.line, state.unit);
+        match self.storage.rest(line, unit) {
+            0 => delay,
+            rest => delay.min(rest),
+        }
+    }
+
     fn send_if_open(&mut self, connection: u8) {
         if self.storage.connection(connection).is_open() {
             self.send(connection);
@@ -56,7 +71,7 @@ impl<S: GatewayStorage> Gateway<S> {
                         false => 0,
                     }
                 }
-                Stage::Queued if self.queue_time != 0 => self.left_in_queue(request),
+                Stage::Queued => self.delay_in_queue(request),
                 _ => u32::MAX,
             };
             delay = delay.min(own);

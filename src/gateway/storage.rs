@@ -57,6 +57,11 @@ pub trait GatewayStorage {
     fn line_delay(&mut self, line: u8) -> u32;
     /// How many requests of the gateway a line may have at a time.
     fn line_depth(&self, line: u8) -> u16;
+    /// How many requests a line can take, at least [`GatewayStorage::line_depth`].
+    fn line_places(&self, line: u8) -> u16;
+    /// Microseconds for which a line leaves a unit alone, because it may still answer a request
+    /// that was cancelled.
+    fn rest(&mut self, line: u8, unit: u8) -> u32;
     /// True if a line can take a request now.
     fn is_ready(&mut self, line: u8) -> bool;
     /// Gives the request in a frame, whose body has `length` bytes, to a line, for the unit

@@ -11,25 +11,38 @@ use mbm::client::{ClientEngine, Transport};
 
 const TRANSPORT: usize = offset_of!(Object, transport);
 
-const fn serial(start: unsafe fn(*mut Object), framing: u8, min_frame_bytes: u8) -> TransportKind {
+const fn serial(
+    start: unsafe fn(*mut Object),
+    release: unsafe fn(*mut Object, Option<&RequestPtr>),
+    framing: u8,
+    min_frame_bytes: u8,
+) -> TransportKind {
     type Engine = ClientEngine<mbm_port, ClientBuffers, RequestPtr>;
     let engine = TRANSPORT + offset_of!(SerialTransport, engine);
     TransportKind {
         advance: advance::<SerialTransport>,
-        release: release::<SerialTransport>,
+        release,
         start,
         port: (engine + offset_of!(Engine, port)) as u16,
         settings: (engine + offset_of!(Engine, settings)) as u16,
         storage: (engine + offset_of!(Engine, storage)) as u16,
+        late_units: (engine + offset_of!(Engine, late_units)) as u16,
         min_frame_bytes,
         framing,
     }
 }
 
-pub(super) static RTU: TransportKind = serial(start_rtu, MBM_FRAMING_RTU, 8);
-pub(super) static RTU_OVER_TCP: TransportKind = serial(start_stream, MBM_FRAMING_RTU, 8);
+pub(super) static RTU: TransportKind =
+    serial(start_rtu, release::<SerialTransport>, MBM_FRAMING_RTU, 8);
+pub(super) static RTU_OVER_TCP: TransportKind =
+    serial(start_stream, release_stream, MBM_FRAMING_RTU, 8);
 /// The shortest request and response, a function code and two words, are 17 characters.
-pub(super) static ASCII: TransportKind = serial(start_ascii, MBM_FRAMING_ASCII, 17);
+pub(super) static ASCII: TransportKind = serial(
+    start_ascii,
+    release::<SerialTransport>,
+    MBM_FRAMING_ASCII,
+    17,
+);
 pub(super) static TCP: TransportKind = TransportKind {
     advance: advance::<TcpTransport>,
     release: release::<TcpTransport>,
@@ -37,6 +50,7 @@ pub(super) static TCP: TransportKind = TransportKind {
     port: (TRANSPORT + offset_of!(TcpTransport, port)) as u16,
     settings: (TRANSPORT + offset_of!(TcpTransport, settings)) as u16,
     storage: (TRANSPORT + offset_of!(TcpTransport, storage)) as u16,
+    late_units: 0,
     min_frame_bytes: 9,
     framing: MBM_FRAMING_TCP,
 };
@@ -57,6 +71,19 @@ unsafe fn advance<T: Transport<RequestPtr>>(
 unsafe fn release<T: Transport<RequestPtr>>(object: *mut Object, request: Option<&RequestPtr>) {
     // SAFETY: as the caller promises.
     unsafe { transport::<T>(object).release(request) }
+}
+
+/// # Safety
+/// As for [`transport`].
+unsafe fn release_stream(object: *mut Object, request: Option<&RequestPtr>) {
+    // SAFETY: as the caller promises.
+    unsafe {
+        release::<SerialTransport>(object, request);
+        if request.is_none() {
+            let line = transport::<SerialTransport>(object);
+            Transport::<RequestPtr>::forget_late_replies(line);
+        }
+    }
 }
 
 /// # Safety

@@ -28,9 +28,9 @@ pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 #[repr(C)]
 pub struct mbm_client {
     /// Private.
-    pointers: [*mut c_void; 51],
+    pointers: [*mut c_void; 63],
     /// Private.
-    words: [u32; 28],
+    words: [u32; 22],
 }
 
 /// The fields in the storage of an `mbm_client`.
@@ -106,6 +106,8 @@ pub(crate) struct TransportKind {
     pub(crate) port: u16,
     pub(crate) settings: u16,
     pub(crate) storage: u16,
+    /// The offset of the units that owe replies; 0 if the transport has none.
+    pub(crate) late_units: u16,
     /// The minimum size of the frame buffer, in bytes.
     pub(crate) min_frame_bytes: u8,
     pub(crate) framing: u8,

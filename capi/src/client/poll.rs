@@ -6,7 +6,10 @@ use super::object::{
 use super::request::{mbm_clientRequest, RequestPtr};
 use super::MBM_CLIENT_DEPTH;
 use crate::{pointers, port};
-use mbm::client::{ClientRequest as _, Transport as _};
+use mbm::client::{
+    late_rest, ClientRequest as _, ClientStorage as _, RequestState, Transport as _,
+};
+use mbm::engine::LateUnits;
 use mbm::error::Status;
 
 /// The time on the clock of a client's port.
@@ -25,6 +28,36 @@ unsafe fn now(object: *mut Object) -> u32 {
 pub(crate) unsafe fn clock(client: *mut mbm_client) -> u32 {
     // SAFETY: as the caller promises.
     unsafe { pointers::with_hooks(client, || now(pointers::object(client))) }
+}
+
+/// Microseconds for which the line of a client leaves a unit alone, because it may still answer a
+/// request that was cancelled; 0 if the object is no client.
+///
+/// # Safety
+/// `client` is NULL or storage of a client, zeroed or begun.
+pub(crate) unsafe fn rest(client: *mut mbm_client, unit: u8) -> u32 {
+    // SAFETY: as the caller promises. No reference lives while the clock is read.
+    unsafe {
+        if pointers::check(client) != Status::OK {
+            return 0;
+        }
+        let object = pointers::object(client);
+        let kind = &*(*object).kind;
+        if kind.late_units == 0 {
+            return 0;
+        }
+        let late_units = object.byte_add(kind.late_units.into()).cast::<LateUnits>();
+        if (*late_units).awaited_since(unit).is_none() {
+            return 0;
+        }
+        let now = clock(client);
+        let mut state = RequestState::NONE;
+        state.unit = unit.into();
+        let (settings, storage) = (kind.settings(object), kind.storage(object));
+        // Looks up the timeout of the unit, too.
+        let _ = storage.rest(unit, now);
+        late_rest(&state, &mut *late_units, settings, storage, now)
+    }
 }
 
 /// Sends and receives for all requests, without waiting, and calls `done` of those that have

@@ -4,9 +4,10 @@ use super::object::mbm_client;
 use super::repeat::allow_retries;
 use super::settings::set;
 use super::storage::UnitRecords;
-use crate::pointers::array;
+use crate::pointers::{self, array};
 use mbm::client::{find, note, rest, ClientStorage as _, UnitRecord};
 use mbm::error::Status;
+use mbm::time::LONGEST_TIMEOUT_MS;
 
 /// The record of one unit, an item of the array for mbm_client_setUnits. You may read and
 /// zero the counters at any time, but not from an interrupt; each wraps at 2^32.
@@ -79,6 +80,24 @@ pub unsafe extern "C" fn mbm_client_setUnits(
         parts.storage.unit_timeout_ms = 0;
         allow_retries(parts);
         Status::OK
+    })
+}
+
+/// Returns the response timeout of a request to a unit that has none of its own: that of its record
+/// (mbm_client_setUnits) or of the client (mbm_client_setResponseTimeout).
+///
+/// @param client  the object
+/// @param unit    the unit identifier
+/// @return milliseconds; 0 if the client was not begun, and from within a hook of its port
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_getResponseTimeout(client: *const mbm_client, unit: u8) -> u32 {
+    pointers::read(client, 0, |object| {
+        let kind = &*(*object).kind;
+        let line = kind.settings(object).response_timeout.get() / 1000;
+        match find(kind.storage(object).units(), unit) {
+            Some(record) if record.timeout_ms > 0 => record.timeout_ms.min(LONGEST_TIMEOUT_MS),
+            _ => line,
+        }
     })
 }
 

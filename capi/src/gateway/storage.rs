@@ -2,8 +2,8 @@
 
 use super::parts::{mbm_gatewayConfig, mbm_gatewayConnection, mbm_gatewayLine, mbm_gatewayRequest};
 use crate::client::{
-    forward, has_tcp_frames, mbm_client, mbm_clientRequest, mbm_client_cancel, mbm_client_poll,
-    mbm_client_pollDelay,
+    self, forward, has_tcp_frames, mbm_client, mbm_clientRequest, mbm_client_cancel,
+    mbm_client_poll, mbm_client_pollDelay,
 };
 use crate::framing::MBM_MAX_TCP_FRAME;
 use crate::functions::mbm_function;
@@ -152,6 +152,15 @@ impl GatewayStorage for Parts {
     fn line_depth(&self, line: u8) -> u16 {
         // SAFETY: see above.
         u16::from(unsafe { (*self.line_at(line)).inFlight }).max(1)
+    }
+
+    fn line_places(&self, _: u8) -> u16 {
+        client::MBM_CLIENT_DEPTH.into()
+    }
+
+    fn rest(&mut self, line: u8, unit: u8) -> u32 {
+        // SAFETY: as for `poll_line`.
+        unsafe { client::rest(self.client(line), unit) }
     }
 
     fn is_ready(&mut self, line: u8) -> bool {

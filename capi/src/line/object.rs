@@ -13,7 +13,7 @@ use core::ffi::c_void;
 #[repr(C)]
 pub struct mbm_line {
     /// Private.
-    pointers: [*mut c_void; 13],
+    pointers: [*mut c_void; 25],
     /// Private.
-    words: [u32; 20],
+    words: [u32; 14],
 }

@@ -18,7 +18,7 @@ use mbm::error::Status;
 #[repr(C)]
 pub struct mbm_link {
     /// Private.
-    pointers: [*mut c_void; 33],
+    pointers: [*mut c_void; 34],
     /// Private.
     words: [u32; 24],
 }

@@ -24,7 +24,6 @@ use mbm::port::Port;
 #[repr(C)]
 pub(super) struct Object {
     mark: u8,
-    non_blocking: bool,
     core: Node,
     line: *mut mbm_line,
     words: NodeWords,
@@ -301,6 +300,13 @@ unsafe fn take_line(node: *mut mbm_node) -> Status {
         }
         if status == Status::OK {
             let line = pointers::object((*object).line);
+            if line.waits_for_unit()
+                && !(*object).core.is_pending()
+                && (*line.storage.words).is_non_blocking
+            {
+                // The request of another node gives way. It was not sent.
+                line.cancel();
+            }
             status = line.ready();
             if status != Status::BUSY {
                 (*object).core.end(status);
@@ -328,7 +334,7 @@ unsafe fn finish(pointer: *mut mbm_node, mut status: u8) -> u8 {
     unsafe {
         let object = pointer.cast::<Object>();
         loop {
-            if (*object).non_blocking {
+            if (*object).words.is_non_blocking {
                 break;
             }
             status = poll(pointer);

@@ -51,7 +51,7 @@ pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeou
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8 {
     with(node, |node| {
-        node.non_blocking = on == 0;
+        node.words.is_non_blocking = on == 0;
         Status::OK
     })
 }

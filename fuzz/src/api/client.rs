@@ -184,6 +184,7 @@ pub fn step_with(w: &World, client: *mut mbm_client) {
         9..=11 => poll(w, client),
         12 => {
             call!(w, client, mbm_client_pollDelay(client));
+            call!(w, client, mbm_client_getResponseTimeout(client, w.byte()));
             match w.byte() % 4 {
                 0 => {}
                 1 => identification::reply(w),

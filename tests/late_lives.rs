@@ -1,0 +1,424 @@
+//! Random lives of programs that read several units of a serial line, whose replies are late or
+//! lost. Two properties hold together, whatever limits, pauses and orders a program has:
+//! - Safety: a read that succeeds has the value of its own request.
+//! - Liveness: once a device answers each request within its latency, then after at most five
+//!   response timeouts each read of it succeeds that is given the latency, the gap and the quiet
+//!   time; twice the latency if the program has cancelled a read of it sooner.
+//!
+//! `MBM_LIVES` in the environment is the number of lives of each test, `MBM_SEED` the first one.
+
+use mbm::client::{Client, Request, Serial, Settings};
+use mbm::engine::{Buffers, Frame, Setting};
+use mbm::error::Status;
+use mbm::frame::checksum::crc16;
+use mbm::master::Master;
+use mbm::node::{Line, Node};
+use mbm::pdu::functions::FunctionSpec;
+use mbm::port::Port;
+use mbm::Error;
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// Times in microseconds.
+const MS: u32 = 1000;
+const TIMEOUT: u32 = 500 * MS;
+const QUIET: u32 = 100 * MS;
+const CHARACTER: u32 = 87;
+/// What a read needs beside latency and quiet time: gaps, characters and the steps of the test.
+const SLACK: u32 = 10 * MS;
+/// No limit.
+const NEVER: u32 = u32::MAX / 4;
+/// The reads of a life.
+const READS: u16 = 80;
+
+/// A generator of random numbers.
+struct Random(u64);
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
+    }
+
+    fn below(&mut self, limit: u32) -> u32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        ((self.0 >> 33) % u64::from(limit)) as u32
+    }
+
+    fn one_of<T: Copy>(&mut self, items: &[T]) -> T {
+        items[self.below(items.len() as u32) as usize]
+    }
+}
+
+/// What becomes of the replies of a device, counted from its first request, which is 0.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    None,
+    /// One reply comes later than the response timeout, by less than that time, its characters included.
+    Late(u16, u32),
+    /// These replies are lost: the first, and how many.
+    Lost(u16, u16),
+    /// The device never answers.
+    Dead,
+}
+
+/// A device that answers in order.
+struct Device {
+    unit: u8,
+    latency: u32,
+    fault: Fault,
+    requests: u16,
+    /// When it has sent its last reply.
+    free: u32,
+    /// From this moment on it answers each request within its latency.
+    well: u32,
+}
+
+/// The line, its devices and the clock.
+#[derive(Default)]
+struct World {
+    now: u32,
+    devices: Vec<Device>,
+    incoming: VecDeque<(u32, Vec<u8>)>,
+    sent: Vec<u8>,
+}
+
+impl World {
+    /// The device that a whole request addresses answers it.
+    fn answer(&mut self) {
+        let request = core::mem::take(&mut self.sent);
+        assert_eq!(request.len(), 8, "only whole requests are sent");
+        let now = self.now + 8 * CHARACTER;
+        let found = self.devices.iter_mut().find(|d| d.unit == request[0]);
+        let Some(device) = found else { return };
+        let number = device.requests;
+        device.requests += 1;
+        let mut latency = device.latency;
+        let mut is_lost = false;
+        match device.fault {
+            Fault::Late(at, by) if number == at => latency = TIMEOUT + by,
+            Fault::Lost(first, count) if (first..first + count).contains(&number) => {
+                is_lost = true;
+            }
+            Fault::Dead => is_lost = true,
+            _ => {}
+        }
+        let at = now.max(device.free) + latency;
+        device.free = at;
+        if latency != device.latency || is_lost {
+            device.well = at;
+        }
+        if is_lost {
+            return;
+        }
+        let mut reply = vec![request[0], 3, 2, request[2], request[3]];
+        reply.extend(crc16(&reply).to_bytes());
+        let at = at + 7 * CHARACTER;
+        let place = self.incoming.partition_point(|(other, _)| *other <= at);
+        self.incoming.insert(place, (at, reply));
+    }
+}
+
+#[derive(Clone, Default)]
+struct Wire(Rc<RefCell<World>>);
+
+impl Wire {
+    fn now(&self) -> u32 {
+        self.0.borrow().now
+    }
+
+    /// Sleeps as a program would: until a byte arrives, at most `delay`.
+    fn sleep(&self, delay: u32) {
+        let mut world = self.0.borrow_mut();
+        let mut until = world.now + delay.max(100);
+        if let Some((at, _)) = world.incoming.front() {
+            if *at > world.now {
+                until = until.min(*at);
+            }
+        }
+        world.now = until;
+    }
+
+    fn pass(&self, time: u32) {
+        self.0.borrow_mut().now += time;
+    }
+}
+
+impl Port for Wire {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
+        let mut world = self.0.borrow_mut();
+        let now = world.now;
+        let mut count = 0;
+        while count < bytes.len() {
+            match world.incoming.front_mut() {
+                Some((at, reply)) if *at <= now && !reply.is_empty() => {
+                    bytes[count] = reply.remove(0);
+                    count += 1;
+                    if reply.is_empty() {
+                        world.incoming.pop_front();
+                    }
+                }
+                _ => break,
+            }
+        }
+        Ok(count)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
+        let mut world = self.0.borrow_mut();
+        world.sent.extend(bytes);
+        world.answer();
+        Ok(bytes.len())
+    }
+
+    fn micros(&mut self) -> u32 {
+        self.now()
+    }
+}
+
+type Storage = Buffers<[u8; 64], [u16; 1], [u16; 0]>;
+
+type SerialClient<'a> = Client<Serial<Wire, Frame<[u8; 64]>, Request<'a>>, Request<'a>, 4>;
+
+/// Who reads.
+enum Reader<'a> {
+    /// A master whose unit changes.
+    Master(Master<Wire, Storage>),
+    /// Nodes on a line. Two of them may have the same unit.
+    Nodes(Line<Wire, Storage>, Vec<Node>),
+    Client(Box<SerialClient<'a>>),
+}
+
+fn set(settings: &mut Settings) {
+    settings.set_baud_rate(115_200);
+    settings.response_timeout = Setting::new(TIMEOUT);
+    settings.quiet_time = Setting::new(QUIET);
+}
+
+fn buffers() -> Storage {
+    Buffers::new([0; 64], [0], [])
+}
+
+impl Reader<'_> {
+    fn of(kind: u32, wire: &Wire, units: &[u8]) -> Self {
+        match kind {
+            0 => {
+                let mut master = Master::new(1, wire.clone(), buffers());
+                set(master.settings());
+                Reader::Master(master)
+            }
+            1 => {
+                let mut line = Line::new(wire.clone(), buffers());
+                set(&mut line.settings);
+                Reader::Nodes(line, units.iter().map(|unit| Node::new(*unit)).collect())
+            }
+            _ => {
+                let mut client = Client::new(Serial::new(wire.clone(), Frame::new([0; 64])));
+                set(client.settings());
+                Reader::Client(Box::new(client))
+            }
+        }
+    }
+
+    /// Reads a register of the unit at `index`, until `limit` has passed: then it cancels the
+    /// request.
+    fn read(&mut self, wire: &Wire, index: usize, unit: u8, address: u16, limit: u32) -> Outcome {
+        let end = wire.now().saturating_add(limit);
+        let left = |wire: &Wire| end.saturating_sub(wire.now());
+        match self {
+            Reader::Master(master) => {
+                master.set_unit(unit);
+                master.read_holding_registers(address, 1).unwrap();
+                loop {
+                    if let std::task::Poll::Ready(result) = master.poll() {
+                        let word = master.response().first().copied().unwrap_or_default();
+                        return result.map(|()| word).map_err(|error| Some(error.code()));
+                    }
+                    if left(wire) == 0 {
+                        master.cancel();
+                        return Err(None);
+                    }
+                    wire.sleep(master.poll_delay().min(left(wire)));
+                }
+            }
+            Reader::Nodes(line, nodes) => {
+                let node = &mut nodes[index];
+                assert_eq!(line.ready(), Status::OK);
+                let function = FunctionSpec::READ_HOLDING_REGISTERS.short();
+                let started = node.request(line, address, 1, function);
+                assert_eq!(started, Status::PENDING);
+                loop {
+                    let status = line.poll(wire.now());
+                    if status != Status::PENDING {
+                        let _ = node.take(status, line);
+                        return match status {
+                            Status::OK => {
+                                Ok(node.receive(mbm::engine::Words::response(&line.storage)))
+                            }
+                            status => Err(Some(status.code())),
+                        };
+                    }
+                    if left(wire) == 0 {
+                        line.cancel();
+                        node.end(Status::CANCELLED);
+                        return Err(None);
+                    }
+                    wire.sleep(line.poll_delay(wire.now()).min(left(wire)));
+                }
+            }
+            Reader::Client(client) => {
+                let words: &mut [u16] = Box::leak(Box::new([0u16]));
+                let request = Request::read_holding_registers(unit, address, words).unwrap();
+                client.queue(request).unwrap();
+                loop {
+                    if let Some(request) = client.poll(wire.now()) {
+                        assert!(client.poll(wire.now()).is_none());
+                        return match request.result() {
+                            Ok(()) => Ok(request.registers()[0]),
+                            Err(error) => Err(Some(error.code())),
+                        };
+                    }
+                    if left(wire) == 0 {
+                        assert!(client.cancel(|_| true).is_some());
+                        return Err(None);
+                    }
+                    let delay = client.poll_delay(wire.now());
+                    wire.sleep(delay.min(left(wire)));
+                }
+            }
+        }
+    }
+}
+
+/// The value, or the status; none after a limit.
+type Outcome = Result<u16, Option<u8>>;
+
+/// What a program does.
+#[derive(Debug)]
+struct Program {
+    kind: u32,
+    units: Vec<u8>,
+    limits: Vec<u32>,
+    pauses: Vec<u32>,
+    is_in_turn: bool,
+}
+
+fn fault(random: &mut Random, kind: u32) -> Fault {
+    let first = random.below(5) as u16;
+    match kind {
+        0 => Fault::None,
+        1 => Fault::Late(first, 1 + random.below(TIMEOUT - 2 * MS)),
+        2 => Fault::Lost(first, 1),
+        3 => Fault::Lost(first, 1 + random.below(12) as u16),
+        _ => Fault::Dead,
+    }
+}
+
+/// Lives one life; says what was wrong.
+fn live(seed: u64) -> Result<(), String> {
+    let mut random = Random::new(seed);
+    let wire = Wire::default();
+    wire.pass(1_000_000);
+    let sets: [&[u8]; 6] = [
+        &[1],
+        &[1, 33],
+        &[1, 33, 65, 97],
+        &[7, 7],
+        &[5, 6, 38],
+        &[9, 9, 41],
+    ];
+    let units = random.one_of(&sets).to_vec();
+    for unit in &units {
+        let mut world = wire.0.borrow_mut();
+        if world.devices.iter().all(|device| device.unit != *unit) {
+            let latency = random.one_of(&[3, 50, 105, 150, 300, 450, 490]) * MS;
+            let kind = random.below(5);
+            let fault = fault(&mut random, kind);
+            world.devices.push(Device {
+                unit: *unit,
+                latency,
+                fault,
+                requests: 0,
+                free: 0,
+                well: 0,
+            });
+        }
+    }
+    let limits = [20, 50, 100, 150, 300, 450, 600, 1200, 3000].map(|limit| limit * MS);
+    let pauses = [0, 1, 10, 30, 100, 200, 500, 700, 5000].map(|pause| pause * MS);
+    let program = Program {
+        kind: random.below(3),
+        units,
+        limits: (0..random.one_of(&[1, 1, 2, 3]))
+            .map(|_| match random.below(3) {
+                0 => NEVER,
+                _ => random.one_of(&limits),
+            })
+            .collect(),
+        pauses: (0..random.one_of(&[1, 4]))
+            .map(|_| random.one_of(&pauses))
+            .collect(),
+        is_in_turn: random.below(2) == 0,
+    };
+    let mut reader = Reader::of(program.kind, &wire, &program.units);
+    for number in 0..READS {
+        let index = match program.is_in_turn {
+            true => usize::from(number) % program.units.len(),
+            false => random.below(program.units.len() as u32) as usize,
+        };
+        let unit = program.units[index];
+        let limit = random.one_of(&program.limits);
+        let began = wire.now();
+        let outcome = reader.read(&wire, index, unit, number, limit);
+        let world = wire.0.borrow();
+        let device = world
+            .devices
+            .iter()
+            .find(|device| device.unit == unit)
+            .unwrap();
+        let what = || {
+            let faults: Vec<_> = world
+                .devices
+                .iter()
+                .map(|d| (d.unit, d.latency, d.fault))
+                .collect();
+            format!("MBM_SEED={seed}: read {number} of unit {unit} at {began}: {outcome:?}; {program:?} {faults:?}")
+        };
+        if outcome.is_ok_and(|value| value != number) {
+            return Err(format!("wrong: {}", what()));
+        }
+        // A request with a shorter limit may still keep the device from this one.
+        let needs = device.latency + QUIET + SLACK;
+        let is_short = program.limits.iter().any(|limit| *limit < needs);
+        let is_given = limit >= needs + if is_short { device.latency } else { 0 };
+        // Where a limit leaves little more than the latency, the reply to a cancelled read delays
+        // several later ones, each by less.
+        let timeouts = if limit < needs + QUIET { 8 } else { 5 };
+        let is_well = device.well.saturating_add(timeouts * TIMEOUT) <= began;
+        if outcome.is_err() && is_well && is_given {
+            return Err(format!("not heard: {}", what()));
+        }
+        drop(world);
+        wire.pass(random.one_of(&program.pauses));
+    }
+    Ok(())
+}
+
+fn variable(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| text.parse().expect("a number"))
+}
+
+#[test]
+fn no_reading_is_wrong_and_a_device_that_answers_is_heard_again() {
+    let first = variable("MBM_SEED", 0);
+    let mut found = [0; 2];
+    for seed in first..first + variable("MBM_LIVES", 4000) {
+        if let Err(text) = live(seed) {
+            println!("{text}");
+            found[usize::from(text.starts_with("wrong"))] += 1;
+        }
+    }
+    assert_eq!(found, [0, 0], "not heard, wrong");
+}
