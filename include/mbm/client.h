@@ -415,7 +415,9 @@ uint8_t mbm_client_pending(const struct mbm_client *client);
 /**
  * Cancels a request. Its status becomes MBM_CANCELLED, `done` is not called, and you may use
  * the request again at once. The device may have received the request, and may still send
- * a reply.
+ * a reply. So on a serial line the next request to its unit is sent when that reply has come,
+ * at the latest two response timeouts and the quiet time after the cancelled one was sent.
+ * Requests to other units are sent meanwhile.
  *
  * @param client   the object
  * @param request  a request that was queued on this client

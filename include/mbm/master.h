@@ -24,8 +24,10 @@ extern "C" {
  * You own the storage. Initialise it with MBM_INIT (`mbm_node meter = MBM_INIT;`) and call
  * mbm_node_begin before all else. Nodes of different lines are independent of each other. Of
  * the nodes of one line, one may have a request under way; a request of another one returns
- * MBM_BUSY meanwhile. Use a line and its nodes from one thread only, and never from an
- * interrupt. mbm_port says which functions the hooks of the port may call.
+ * MBM_BUSY meanwhile. A non-blocking request that was not sent yet, because its unit may still
+ * answer one that was cancelled, gives way to another node's: its status becomes MBM_CANCELLED.
+ * Use a line and its nodes from one thread only, and never from an interrupt. mbm_port says
+ * which functions the hooks of the port may call.
  *
  * A call that is refused changes nothing. Exceptions are the functions that make a request,
  * as mbm_node_readCoils describes.
@@ -176,20 +178,21 @@ uint8_t mbm_line_setTurnaroundDelay(struct mbm_line *line, uint32_t delayMs);
  * later request. In RTU the two cannot be distinguished if unit, function and length are the
  * same, or if the late reply is an exception to the same function.
  *
- * After a request without a right reply, the master does two things. It waits for the quiet
- * time before it sends the next request, and discards bytes that arrive meanwhile. Then it
- * holds the next reply of that unit, until no byte has arrived for the response timeout; after
- * MBM_INVALID_CRC for the quiet time, because the damaged reply is not late. A second reply
- * replaces the held one, because a device answers in order. If the second reply is damaged,
- * the request fails. A right reply that arrives before a request is sent shows that replies
- * are late; the next reply is then held for the response timeout.
+ * After a request without a right reply, the master waits for the quiet time before it sends
+ * the next request, and discards bytes that arrive meanwhile. It counts how many replies each
+ * unit owes; a frame of the unit takes one away. After a timeout it holds the next reply of
+ * that unit until no byte has arrived for the response timeout; after MBM_INVALID_CRC for the
+ * quiet time, because the damaged reply is not late. A second reply replaces the held one,
+ * because a device answers in order. If the second reply is damaged, the request fails. The
+ * last reply that the unit owes is not held. After a request that was cancelled, the next one
+ * to that unit is sent when the unit owes none, at the latest two response timeouts and the
+ * quiet time after the cancelled one was sent; meanwhile other nodes can use the line.
  *
- * So a device that answers in order and within the response timeout never gives the data of
- * another request, whatever its usual latency and however late one of its replies was. The
- * request after a timeout ends one response timeout after the last reply that arrives, and at
- * the latest three response timeouts after it was sent; all others take no longer. A wrong
- * reading remains possible if the device takes longer than the response timeout for two
- * requests in a row.
+ * So a device that answers in order never gives the data of another request if a late reply
+ * comes at most one response timeout after its request has timed out, whatever its usual
+ * latency; and it is heard again in bounded time. A request ends at the latest three response
+ * timeouts after it was sent. A wrong reading remains possible if the device takes longer than
+ * the response timeout for two requests in a row, or loses the reply after a late one.
  *
  * With a quiet time of 0 the master waits and holds nothing: a reply that is later than the
  * response timeout may be taken for the reply to the next request, and so may all that
@@ -290,7 +293,9 @@ uint32_t mbm_node_pollDelay(struct mbm_node *node);
 
 /**
  * Gives up the request under way and switches the driver off. The status of the request
- * becomes MBM_CANCELLED. If the node has no request under way, it does nothing.
+ * becomes MBM_CANCELLED. If the node has no request under way, it does nothing. If the request
+ * was sent, its reply may still come, so the next request to that unit is sent later: see
+ * mbm_line_setQuietTime.
  *
  * @param node  the object
  * @return a status

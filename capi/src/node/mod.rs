@@ -203,7 +203,9 @@ pub unsafe extern "C" fn mbm_node_pollDelay(node: *mut mbm_node) -> u32 {
 }
 
 /// Gives up the request under way and switches the driver off. The status of the request
-/// becomes MBM_CANCELLED. If the node has no request under way, it does nothing.
+/// becomes MBM_CANCELLED. If the node has no request under way, it does nothing. If the request
+/// was sent, its reply may still come, so the next request to that unit is sent later: see
+/// mbm_line_setQuietTime.
 ///
 /// @param node  the object
 /// @return a status
