@@ -47,8 +47,8 @@ static void a_request_that_the_serial_driver_hands_over_in_blocks_is_answered(vo
     server.begin(17, Serial, 19200);
     Bytes request = adu({17, 6, 0, 0, 0, 1});
     for (size_t cut = 1; cut < request.size(); cut++) {
-        Bytes front(request.begin(), request.begin() + cut),
-            rest(request.begin() + cut, request.end());
+        Bytes front(request.begin(), request.begin() + static_cast<std::ptrdiff_t>(cut)),
+            rest(request.begin() + static_cast<std::ptrdiff_t>(cut), request.end());
         registers[0] = 0;
         Serial.sent.clear();
         Serial.inject(front);

@@ -33,12 +33,13 @@ static struct {
 
 static void keep(void *context, const mbm_traceRecord *record)
 {
+    const int is_right = record->status == MBM_OK;
+
     (void)context;
-    if (record->status != MBM_OK)
-        records.others++;
-    else if (record->direction == MBM_TRACE_SENT && record->kind == MBM_PACKET_REQUEST)
+    if (is_right && record->direction == MBM_TRACE_SENT && record->kind == MBM_PACKET_REQUEST)
         records.requests++;
-    else if (record->direction == MBM_TRACE_RECEIVED && record->kind == MBM_PACKET_RESPONSE)
+    else if (is_right && record->direction == MBM_TRACE_RECEIVED &&
+             record->kind == MBM_PACKET_RESPONSE)
         records.replies++;
     else
         records.others++;

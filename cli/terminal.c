@@ -67,7 +67,7 @@ static void read_name(const char *process, holder *found)
         path[strcspn(path, "\n")] = '\0';
         snprintf(found->name, sizeof found->name, "%.31s", path);
     }
-    fclose(file);
+    (void)fclose(file);
 }
 
 /* Finds another program that has the terminal of a path open, among those whose descriptors this

@@ -77,20 +77,37 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     pub(super) fn expect_late_reply(&mut self, is_cancelled: bool) {
         self.is_late = true;
         // An earlier request may have failed as well, by a timeout or by being cancelled.
-        let mut owed = self.owed;
-        if owed & REPLIES != REPLIES {
-            owed += 1;
+        if self.owed & REPLIES != REPLIES {
+            self.owed += 1;
         }
         // Without a damaged reply, the right one may be late.
         if self.phase != Phase::Reply || self.seen != Outcome::BAD_CRC {
-            owed |= SLOW;
+            self.owed |= SLOW;
         }
         if is_cancelled {
-            owed |= CANCELLED;
+            self.owed |= CANCELLED;
         }
-        let was_heard = self.is_held || self.seen > Outcome::OTHER_UNIT;
-        // A record of the unit, else a free one: its unit has been silent for long enough. Else the
-        // last record stands for all units from now on.
+        if self.is_held || self.seen > Outcome::OTHER_UNIT {
+            // The unit was heard.
+            self.begun = self.now;
+        }
+        let place = self.place_of_record();
+        // The index is in range, so the compiler leaves the check out.
+        #[allow(clippy::indexing_slicing)]
+        let record = &mut self.late_units.records[place.min(LATE_UNITS - 1)];
+        if place == LATE_UNITS || record.owed == ANY {
+            self.owed = ANY;
+        }
+        record.unit = self.unit;
+        record.owed = self.owed;
+        record.since = self.begun;
+    }
+
+    /// The index of the record of the pending request's unit, else of a free one: its unit has been
+    /// silent for long enough. If there is none, [`LATE_UNITS`]: then the last record stands for all
+    /// units from now on.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn place_of_record(&mut self) -> usize {
         self.wait_until_clean();
         let (mut place, mut index) = (LATE_UNITS, LATE_UNITS);
         while index > 0 {
@@ -99,21 +116,13 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             #[allow(clippy::indexing_slicing)]
             let record = self.late_units.records[index];
             if record.is_of(self.unit) {
-                place = index;
-                break;
+                return index;
             }
             if record.owed == 0 || self.has_expired_since(record.since) {
                 place = index;
             }
         }
-        #[allow(clippy::indexing_slicing)]
-        let record = &mut self.late_units.records[place.min(LATE_UNITS - 1)];
-        if place == LATE_UNITS || record.owed == ANY {
-            owed = ANY;
-        }
-        record.unit = self.unit;
-        record.owed = owed;
-        record.since = if was_heard { self.now } else { self.begun };
+        place
     }
 
     /// Notes that the pending request's unit has answered.
