@@ -448,3 +448,42 @@ fn the_most_specific_fault_on_an_ascii_line_becomes_the_status() {
         assert_eq!(ended_in_ascii(line).state.status, status, "{line:?}");
     }
 }
+
+/// Sends a read of the unit and cancels it. Returns how many microseconds passed until it was sent.
+fn send_and_cancel(end: &End, client: &mut Transport, unit: u8) -> u32 {
+    let began = end.now();
+    let read: fn(&mut RequestHeader) -> Status = |o| o.set(FunctionSpec::READ_COILS, 0, 8);
+    assert!(client.queue(Task::new(unit, 1, &[], read)).is_ok());
+    // At most the silence after which a unit is clean: 4.1 s.
+    for _ in 0..42_000 {
+        assert!(client.poll(end.now()).is_none());
+        if !end.sent().is_empty() {
+            break;
+        }
+        end.pass(100);
+    }
+    assert!(client.cancel(|_| true).is_some());
+    end.now() - began
+}
+
+/// More units than there are records for: then all wait. It does not stay so.
+#[test]
+fn units_are_remembered_exactly_again_after_too_many_were_cancelled() {
+    let (end, mut client) = rtu_client();
+    let longest = |end: &End, client: &mut Transport| {
+        (1..=12)
+            .map(|unit| send_and_cancel(end, client, unit))
+            .max()
+    };
+    assert!(longest(&end, &mut client) >= Some(1_000_000));
+    for _ in 0..3 {
+        end.pass(10_000_000);
+        // After each cancelled request the line is left alone for the quiet time.
+        for unit in 1..=10 {
+            assert!(send_and_cancel(&end, &mut client, unit) <= 110_000);
+        }
+        end.pass(200_000);
+        assert!(send_and_cancel(&end, &mut client, 1) >= 1_000_000);
+        end.pass(10_000_000);
+    }
+}

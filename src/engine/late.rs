@@ -95,7 +95,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         // The index is in range, so the compiler leaves the check out.
         #[allow(clippy::indexing_slicing)]
         let record = &mut self.late_units.records[place.min(LATE_UNITS - 1)];
-        if place == LATE_UNITS || record.owed == ANY {
+        if place == LATE_UNITS {
             self.owed = ANY;
         }
         record.unit = self.unit;
@@ -109,18 +109,19 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn place_of_record(&mut self) -> usize {
         self.wait_until_clean();
-        let (mut place, mut index) = (LATE_UNITS, LATE_UNITS);
-        while index > 0 {
-            index -= 1;
+        let (mut place, mut index) = (LATE_UNITS, 0);
+        while index < LATE_UNITS {
             // The index is in range, so the compiler leaves the check out.
             #[allow(clippy::indexing_slicing)]
             let record = self.late_units.records[index];
-            if record.is_of(self.unit) {
+            let is_over = self.has_expired_since(record.since);
+            if record.is_of(self.unit) && !(record.owed == ANY && is_over) {
                 return index;
             }
-            if record.owed == 0 || self.has_expired_since(record.since) {
+            if record.owed == 0 || is_over {
                 place = index;
             }
+            index += 1;
         }
         place
     }
