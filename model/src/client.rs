@@ -1,6 +1,7 @@
 //! A client and a device with a latency. The client cannot be copied, so each schedule of late
 //! replies and pauses is played from its beginning: every latency up to the response timeout,
-//! one or two late replies, every pause between the requests.
+//! one or two late replies, every pause between the requests. In other schedules one reply is late
+//! or lost, and the program cancels each request after a limit.
 
 #[allow(dead_code)]
 #[path = "../../tests/common/wire.rs"]
@@ -25,8 +26,16 @@ const TIMEOUT: u32 = 10;
 /// How many ticks a reply may be late.
 const LATEST: u32 = 3 * TIMEOUT;
 
-/// How many requests each schedule has.
+/// How many requests each schedule has, and each with a limit.
 const REQUESTS: u8 = 12;
+const LIMITED_REQUESTS: u8 = 40;
+
+/// How long after its last fault a device has to be heard again, in ticks; the second one if a limit
+/// leaves little more than the latency.
+const HEARD_AGAIN: u32 = 5 * TIMEOUT;
+const HEARD_AGAIN_LATE: u32 = 8 * TIMEOUT;
+/// What a request needs beside latency and quiet time, in ticks: the gap, and the client's steps.
+const SLACK: u32 = SILENCE + 3;
 
 /// When replies are late, and how long the user pauses.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +50,10 @@ pub struct Schedule {
     second: (usize, u32),
     /// Ticks from the end of a request to the start of the next.
     pause: u32,
+    /// The program cancels each request after this many ticks; 0: never.
+    limit: u32,
+    /// The first late reply is lost instead.
+    is_lost: bool,
 }
 
 /// All schedules.
@@ -55,6 +68,27 @@ pub fn schedules() -> impl Iterator<Item = Schedule> {
                     first: (1, late),
                     second,
                     pause,
+                    limit: 0,
+                    is_lost: false,
+                })
+            })
+        })
+    })
+}
+
+/// Schedules with a limit. A reply is late by less than the response timeout, or lost.
+pub fn limited_schedules() -> impl Iterator<Item = Schedule> {
+    let pauses = [0, 1, 2, 4, 7, 11, 15, 25, 60];
+    (1..=TIMEOUT).flat_map(move |latency| {
+        (1..=3 * TIMEOUT).flat_map(move |limit| {
+            (0..TIMEOUT).flat_map(move |late| {
+                pauses.map(move |pause| Schedule {
+                    latency,
+                    first: (1, late.max(1)),
+                    second: (1, 0),
+                    pause,
+                    limit,
+                    is_lost: late == 0,
                 })
             })
         })
@@ -68,6 +102,9 @@ pub struct Ended {
     pub failed: u32,
     /// Requests that succeeded with the data of another request.
     pub wrong: u32,
+    /// Requests that failed though the device had answered within its latency for long enough, and
+    /// they were given time for it.
+    pub unheard: u32,
 }
 
 fn frame(pdu: &[u8]) -> Vec<u8> {
@@ -87,6 +124,11 @@ struct Device {
     left: u32,
     /// Late replies that are still to come.
     late: VecDeque<(usize, u32)>,
+    /// The next late reply is lost.
+    loses: bool,
+    /// The oldest reply that it owes is late. For how many ticks none was since the last one.
+    is_late: bool,
+    well: u32,
 }
 
 impl Device {
@@ -97,7 +139,14 @@ impl Device {
             if let Some((index, late)) = self.late.front() {
                 if usize::from(number) >= *index && *late > 0 {
                     self.left = TIMEOUT + *late;
+                    self.is_late = true;
+                    self.well = 0;
                     self.late.pop_front();
+                    if std::mem::take(&mut self.loses) {
+                        self.is_late = false;
+                        self.left = latency;
+                        return;
+                    }
                 }
             }
         }
@@ -106,12 +155,14 @@ impl Device {
 
     /// Lets a tick pass.
     fn tick(&mut self, latency: u32, end: &End) {
+        self.well += u32::from(!self.is_late);
         if self.owed.is_empty() {
             return;
         }
         self.left -= 1;
         if self.left == 0 {
             self.left = latency;
+            self.is_late = false;
             if let Some(number) = self.owed.pop_front() {
                 end.deliver(0, &frame(&[3, 2, 0, number]));
             }
@@ -131,6 +182,7 @@ pub fn play(schedule: Schedule, quiet_time: u32) -> Ended {
     let mut client: Client<_, Task, 4> = Client::new(line);
     let mut device = Device {
         late: [schedule.first, schedule.second].into(),
+        loses: schedule.is_lost,
         ..Device::default()
     };
     let mut ended = Ended::default();
@@ -138,7 +190,18 @@ pub fn play(schedule: Schedule, quiet_time: u32) -> Ended {
         end.pass(1);
         device.tick(schedule.latency, &end);
     };
-    for number in 0..REQUESTS {
+    let needs = schedule.latency + QUIET + SLACK;
+    let heard_again = match schedule.limit {
+        limit if limit > 0 && limit < needs => u32::MAX,
+        limit if limit > 0 && limit < needs + QUIET => HEARD_AGAIN_LATE,
+        _ => HEARD_AGAIN,
+    };
+    let requests = match schedule.limit {
+        0 => REQUESTS,
+        _ => LIMITED_REQUESTS,
+    };
+    for number in 0..requests {
+        let is_heard = device.well >= heard_again;
         let read = |header: &mut RequestHeader| {
             header.set(FunctionSpec::READ_HOLDING_REGISTERS, number.into(), 1)
         };
@@ -152,10 +215,17 @@ pub fn play(schedule: Schedule, quiet_time: u32) -> Ended {
             if !end.sent().is_empty() {
                 device.receive(number, schedule.latency);
             }
+            if schedule.limit > 0 && waited == schedule.limit {
+                break client.cancel(|_| true).expect("a pending request");
+            }
             tick(&mut device);
             waited += 1;
             assert!(waited < 10 * TIMEOUT, "a request does not end");
         };
+        // A fault of this request ends that time.
+        if is_heard && device.well > waited && task.state.status != Status::OK {
+            ended.unheard += 1;
+        }
         match task.state.status {
             Status::OK if task.received() == [0, number] => ended.right += 1,
             Status::OK => ended.wrong += 1,
@@ -178,6 +248,14 @@ mod tests {
             let ended = play(schedule, QUIET);
             assert_eq!(ended.wrong, 0, "{schedule:?}");
             assert!(ended.failed <= 4, "{schedule:?}: {ended:?}");
+        }
+    }
+
+    #[test]
+    fn a_program_with_a_limit_hears_a_device_again_after_a_lost_reply() {
+        for schedule in limited_schedules().filter(|schedule| schedule.is_lost) {
+            let ended = play(schedule, QUIET);
+            assert_eq!((ended.wrong, ended.unheard), (0, 0), "{schedule:?}");
         }
     }
 

@@ -11,7 +11,7 @@ mod server;
 mod streams;
 mod wire;
 
-use line::{Event, State};
+use line::{Event, Plant, Program, State};
 use stateright::{Checker, HasDiscoveries, Model, Path, Property};
 use std::time::{Duration, Instant};
 use streams::Before;
@@ -26,6 +26,12 @@ enum Adversary {
     /// The device takes the same time for each reply; every latency up to the response timeout
     /// is tried. The adversary delays two replies, and pauses between requests.
     Latency,
+    /// As `Latency`, with a program that pauses for a fixed time and cancels each request after a
+    /// limit; every second limit up to three response timeouts is tried.
+    Limit,
+    /// Several devices, whose units are equal modulo 32. The adversary chooses when each reply
+    /// arrives, loses replies, cancels requests, and chooses the device of the next one.
+    Units,
 }
 
 /// A master, and what the adversary may do to it.
@@ -37,6 +43,7 @@ struct Line {
     /// The quiet time that the master is set to.
     quiet_time: u32,
     adversary: Adversary,
+    plant: Plant,
 }
 
 impl Model for Line {
@@ -44,12 +51,28 @@ impl Model for Line {
     type Action = Event;
 
     fn init_states(&self) -> Vec<State> {
-        if self.adversary == Adversary::Latency {
-            return (1..=line::TIMEOUT)
-                .map(|latency| State::with_latency(self.buffer, self.retries, latency))
-                .collect();
-        }
-        vec![State::new(self.buffer, self.retries, self.quiet_time)]
+        let programs: Vec<Option<Program>> = match self.adversary {
+            Adversary::Latency => vec![None],
+            Adversary::Limit => (2..=3 * line::TIMEOUT)
+                .step_by(2)
+                .flat_map(|limit| [0, 3, 12, 40].map(|pause| Some(Program { limit, pause })))
+                .collect(),
+            Adversary::Units => {
+                let devices = if self.plant == Plant::None { 3 } else { 2 };
+                let Line {
+                    buffer, retries, ..
+                } = *self;
+                return vec![State::with_devices(buffer, retries, devices, self.plant)];
+            }
+            _ => return vec![State::new(self.buffer, self.retries, self.quiet_time)],
+        };
+        let latencies = 1..=line::TIMEOUT;
+        latencies
+            .flat_map(|latency| programs.iter().map(move |program| (latency, *program)))
+            .map(|(latency, program)| {
+                State::with_latency(self.buffer, self.retries, latency, program, self.plant)
+            })
+            .collect()
     }
 
     fn actions(&self, state: &State, events: &mut Vec<Event>) {
@@ -70,12 +93,13 @@ impl Model for Line {
             ),
             Property::always(
                 "only the reply to a request is its answer",
-                |_, state: &State| state.wrong.is_none(),
+                |_, state: &State| matches!(state.wrong, None | Some(line::NOT_HEARD)),
             ),
             Property::always(
-                "a clean line gives right data within two requests",
-                |line: &Line, state: &State| {
-                    line.adversary == Adversary::Latency || state.recovers()
+                "a device that answers is heard",
+                |line: &Line, state: &State| match line.adversary {
+                    Adversary::Latency | Adversary::Limit => state.wrong != Some(line::NOT_HEARD),
+                    _ => state.recovers(),
                 },
             ),
         ]
@@ -97,13 +121,22 @@ struct Explored {
 /// Explores for the given time, or until a property is broken.
 fn explore(line: Line, time: Duration) -> Explored {
     let begin = Instant::now();
-    let checker = line
-        .checker()
+    let builder = line.checker();
+    let builder = builder
         .threads(2)
         .timeout(time)
-        .finish_when(HasDiscoveries::Any)
-        .spawn_bfs()
-        .join();
+        .finish_when(HasDiscoveries::Any);
+    // The life of a program with a limit is long, but ends, and branches only at its faults.
+    if line.adversary == Adversary::Limit {
+        let checker = builder.spawn_dfs().join();
+        return Explored {
+            states: checker.unique_state_count(),
+            events: 0,
+            all: begin.elapsed() < time,
+            broken: checker.discoveries().into_iter().collect(),
+        };
+    }
+    let checker = builder.spawn_bfs().join();
     Explored {
         states: checker.unique_state_count(),
         // The first state has depth 1, and the last depth may not be complete.
@@ -145,7 +178,13 @@ fn main() {
         .and_then(|seconds| seconds.parse().ok());
     let seconds: u64 = seconds.unwrap_or(300);
     let mut lines = Vec::new();
-    for adversary in [Adversary::Latency, Adversary::Replies, Adversary::Noise] {
+    for adversary in [
+        Adversary::Latency,
+        Adversary::Limit,
+        Adversary::Units,
+        Adversary::Replies,
+        Adversary::Noise,
+    ] {
         for retries in [0, 1] {
             // The second buffer is too small for a second reply beside a held one.
             for buffer in [20, 12] {
@@ -155,6 +194,7 @@ fn main() {
                     retries,
                     quiet_time,
                     adversary,
+                    plant: Plant::None,
                 });
             }
         }
@@ -174,10 +214,12 @@ fn main() {
                 Adversary::Replies => "no noise",
                 Adversary::Noise => "with noise",
                 Adversary::Latency => "a device with a latency",
+                Adversary::Limit => "a device with a latency, a program with a limit",
+                Adversary::Units => "units equal modulo 32",
             },
             line.retries,
             line.buffer,
-            if all {
+            if all || line.adversary == Adversary::Limit {
                 "any number of events".to_owned()
             } else {
                 format!("{events} events")
@@ -193,21 +235,25 @@ fn main() {
         passed += line.properties().len() - broken.len();
     }
     let (mut schedules, mut requests) = (0u32, client::Ended::default());
-    for schedule in client::schedules() {
+    for schedule in client::schedules().chain(client::limited_schedules()) {
         let ended = client::play(schedule, client::QUIET);
         schedules += 1;
         requests.right += ended.right;
         requests.failed += ended.failed;
         requests.wrong += ended.wrong;
+        requests.unheard += ended.unheard;
         if ended.wrong > 0 {
             println!("model: broken: a late reply was taken: {schedule:?}");
         }
+        if ended.unheard > 0 {
+            println!("model: broken: a device that answers is not heard: {schedule:?}");
+        }
     }
     println!(
-        "model: a client, a device with a latency: {schedules} schedules, {} requests right, {} failed, {} wrong",
-        requests.right, requests.failed, requests.wrong
+        "model: a client, a device with a latency: {schedules} schedules, {} requests right, {} failed, {} wrong, {} not heard",
+        requests.right, requests.failed, requests.wrong, requests.unheard
     );
-    if requests.wrong > 0 {
+    if requests.wrong + requests.unheard > 0 {
         failed += 1;
     } else {
         passed += 1;
@@ -243,18 +289,46 @@ fn main() {
 mod tests {
     use super::*;
 
+    fn finds(line: Line, broken: &str) -> bool {
+        let found = explore(line, Duration::from_secs(120)).broken;
+        found.iter().any(|(name, _)| name.starts_with(broken))
+    }
+
+    const LINE: Line = Line {
+        buffer: 20,
+        retries: 0,
+        quiet_time: line::QUIET,
+        adversary: Adversary::Replies,
+        plant: Plant::None,
+    };
+
     /// Without a quiet time the master does not hold a reply, and so takes a late one.
     #[test]
     fn the_model_finds_a_late_reply_that_is_taken_for_the_right_one() {
         let line = Line {
-            buffer: 20,
-            retries: 0,
             quiet_time: 0,
-            adversary: Adversary::Replies,
+            ..LINE
         };
-        let broken = explore(line, Duration::from_secs(60)).broken;
-        assert!(broken
-            .iter()
-            .any(|(property, _)| property.starts_with("only the reply")));
+        assert!(finds(line, "only the reply"));
+    }
+
+    #[test]
+    fn the_model_finds_units_that_share_the_memory_of_late_replies() {
+        let line = Line {
+            adversary: Adversary::Units,
+            plant: Plant::Shared,
+            ..LINE
+        };
+        assert!(finds(line, "only the reply"));
+    }
+
+    #[test]
+    fn the_model_finds_a_rule_that_holds_the_reply_after_a_cancelled_request() {
+        let line = Line {
+            adversary: Adversary::Limit,
+            plant: Plant::HeldAfterCancel,
+            ..LINE
+        };
+        assert!(finds(line, "a device that answers is heard"));
     }
 }

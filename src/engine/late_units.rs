@@ -69,6 +69,15 @@ impl LateUnits {
         (record.owed & CANCELLED != 0).then_some(record.since)
     }
 
+    /// Has the next reply held after a cancelled request, as after a timeout. For model checkers, which
+    /// find that a device is not heard again then.
+    #[doc(hidden)]
+    pub fn forget_cancelled(&mut self) {
+        for record in &mut self.records {
+            record.owed &= !CANCELLED;
+        }
+    }
+
     /// No unit owes a reply any more.
     pub(crate) fn clear(&mut self) {
         *self = LateUnits::NONE;

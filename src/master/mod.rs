@@ -55,6 +55,12 @@ impl<P, S: Words> Master<P, S> {
         self.line.rebase(now, longest);
     }
 
+    /// The line of the master. For model checkers.
+    #[doc(hidden)]
+    pub fn line(&mut self) -> &mut Line<P, S> {
+        &mut self.line
+    }
+
     /// The status of the last request; [`Status::PENDING`] while it is in progress.
     pub fn status(&self) -> Status {
         self.node.status()
