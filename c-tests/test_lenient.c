@@ -1,6 +1,7 @@
 /* Devices that deviate from the standard, and mbm_node_setLenient: a reply with the
  * right unit, function and CRC is accepted if no better one comes. On the simulated
  * clock; unit 17 is 11 on the wire. */
+#include "crc.h"
 #include "sim.h"
 #include "test.h"
 
@@ -95,6 +96,34 @@ static void the_bytes_may_come_one_at_a_time_or_all_at_once(void **state)
     sim_answer(s, 1, 500, "11 03 06 00 01 00 02 00 03 + / 09 03 02 00 01 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     assert_int_equal(mbm_node_available(n), 3);
+}
+
+/* Such a reply has a right CRC one byte before its end. */
+static void a_reply_that_ends_with_the_byte_0_is_accepted(void **state)
+{
+    uint8_t read[9] = {17, 3, 4}, write[8] = {17, 6, 0, 1};
+    unsigned value, reads = 0, writes = 0;
+    LENIENT;
+
+    for (value = 1; value < 3000; value++) {
+        read[3] = write[4] = (uint8_t)(value >> 8);
+        read[4] = write[5] = (uint8_t)value;
+        (void)seal(read, 7);
+        if (read[8] == 0) {
+            sim_deliver(s, s->now + 8000, read, sizeof read);
+            OK(mbm_node_readHoldingRegisters(n, 0, 1));
+            assert_int_equal(mbm_node_available(n), 2);
+            assert_int_equal(s->response[0], value);
+            reads++;
+        }
+        (void)seal(write, 6);
+        if (write[7] == 0) {
+            sim_deliver(s, s->now + 8000, write, sizeof write);
+            OK(mbm_node_writeSingleRegister(n, 1, 0));
+            writes++;
+        }
+    }
+    assert_true(reads > 5 && writes > 5);
 }
 
 static void a_right_reply_is_better_before_and_after_it(void **state)
@@ -301,6 +330,7 @@ int main(void)
         SIM_TEST(without_it_the_same_replies_are_malformed),
         SIM_TEST(a_read_takes_the_registers_that_come),
         SIM_TEST(the_bytes_may_come_one_at_a_time_or_all_at_once),
+        SIM_TEST(a_reply_that_ends_with_the_byte_0_is_accepted),
         SIM_TEST(a_right_reply_is_better_before_and_after_it),
         SIM_TEST(half_a_reply_in_front_hides_no_right_one),
         SIM_TEST(what_is_no_reply_to_the_request_is_not_accepted),

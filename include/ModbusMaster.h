@@ -463,11 +463,19 @@ private:
         }
         if (state.stream == nullptr)
             return ku8MBNotInitialised;
-        if (mbm_line_setFrame(line(), frame, bytes) != MBM_OK)
+        // The kept frame may be in use by a request that only waits for its unit and gives way.
+        if (mbm_line_setFrame(line(), frame, bytes) != MBM_OK && Line::kept == nullptr)
             return ku8MBBusy;
+        State *const user = Line::wire.user;
+        const bool sent = Line::wire.sent;
         Line::wire.user = &state;
         Line::wire.sent = false;
-        return function(&state.node, arguments...);
+        const uint8_t status = function(&state.node, arguments...);
+        if (status == ku8MBBusy) {
+            Line::wire.user = user;
+            Line::wire.sent = sent;
+        }
+        return status;
     }
 #else
     mbm_line *line() { return &state.own.wire.line; }

@@ -71,6 +71,24 @@ void sim_deliver(sim *s, uint64_t at, const uint8_t *bytes, size_t length)
     }
 }
 
+void sim_deliver_ascii(sim *s, uint64_t at, const uint8_t *frame, size_t length)
+{
+    static const char digits[] = "0123456789ABCDEF";
+    uint8_t text[520] = ":", byte, sum = 0;
+    size_t i, count = 1;
+
+    for (i = 0; i + 1 < length; i++) {
+        /* The LRC takes the place of the CRC. */
+        byte = i + 2 < length ? frame[i] : (uint8_t)-sum;
+        sum = (uint8_t)(sum + byte);
+        text[count++] = (uint8_t)digits[byte >> 4];
+        text[count++] = (uint8_t)digits[byte & 15];
+    }
+    text[count++] = '\r';
+    text[count++] = '\n';
+    sim_deliver(s, at, text, count);
+}
+
 /* A complete request has left. From now on its answers have a time. */
 static void request_ended(sim *s, const sim_frame *frame)
 {
@@ -82,6 +100,32 @@ static void request_ended(sim *s, const sim_frame *frame)
                         s->answers[i].length);
     if (s->device)
         s->device(s, frame);
+}
+
+static int digit(char c)
+{
+    return c <= '9' ? c - '0' : (c & ~0x20) - 'A' + 10;
+}
+
+/* Converts a complete frame of ASCII with a right LRC to RTU. Returns 1 if it is one. */
+static int is_ascii(sim_frame *frame)
+{
+    uint8_t bytes[sizeof frame->bytes], sum = 0;
+    uint16_t i, count = 0;
+
+    if (frame->bytes[0] != ':' || frame->bytes[frame->length - 1] != '\n')
+        return 0;
+    for (i = 1; i + 3 < frame->length; i += 2) {
+        const char *pair = (const char *)frame->bytes + i;
+
+        bytes[count] = (uint8_t)(digit(pair[0]) << 4 | digit(pair[1]));
+        sum = (uint8_t)(sum + bytes[count++]);
+    }
+    if (sum != 0 || count < 3)
+        return 0;
+    memcpy(frame->bytes, bytes, count - 1);
+    frame->length = (uint16_t)seal(frame->bytes, count - 1);
+    return frame->ascii = 1;
 }
 
 static void byte_sent(sim *s, uint8_t byte)
@@ -104,7 +148,8 @@ static void byte_sent(sim *s, uint8_t byte)
         frame->bytes[frame->length++] = byte;
     if (s->echo)
         sim_deliver(s, start, &byte, 1);
-    if (request_parse(&parsed, frame->bytes, frame->length)) {
+    if ((frame->bytes[0] != ':' || is_ascii(frame)) &&
+        request_parse(&parsed, frame->bytes, frame->length)) {
         frame->whole = 1;
         request_ended(s, frame);
     }
@@ -230,11 +275,6 @@ int sim_teardown(void **state)
     if (cut == 0 && !end.flush_lies && !end.flush_never)
         assert_int_equal(end.post_before_last_bit, 0);
     return 0;
-}
-
-static int digit(char c)
-{
-    return c <= '9' ? c - '0' : (c & ~0x20) - 'A' + 10;
 }
 
 size_t sim_bytes(uint8_t *bytes, const char *text)

@@ -17,7 +17,8 @@ typedef struct sim_frame {
     uint64_t begin, end; /* first byte handed over; last bit sent */
     uint64_t silence;    /* from the last byte received or sent to `begin` */
     uint16_t length;
-    uint8_t whole; /* 1: a request that the standard allows, with a right CRC */
+    uint8_t whole; /* 1: a request that the standard allows, with a right CRC or LRC */
+    uint8_t ascii; /* 1: it was sent in ASCII. `bytes` has it in RTU, once it is whole */
     uint8_t bytes[256];
 } sim_frame;
 
@@ -101,6 +102,9 @@ void sim_answer(sim *s, unsigned nth, uint32_t delay, const char *text);
 /* Lets bytes arrive from time `at` on. */
 void sim_deliver(sim *s, uint64_t at, const uint8_t *bytes, size_t length);
 void sim_deliver_text(sim *s, uint64_t at, const char *text);
+
+/* Lets a frame of RTU arrive from time `at` on, in ASCII. */
+void sim_deliver_ascii(sim *s, uint64_t at, const uint8_t *frame, size_t length);
 
 /* Asserts that the frame at `index` is that of the text. */
 void sim_assert_sent(const sim *s, unsigned index, const char *text);

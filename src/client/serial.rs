@@ -203,7 +203,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
     }
 
     fn forget_late_replies(&mut self) {
-        self.engine.late_units.clear();
+        self.engine.forget_late_replies();
     }
 
     fn delay(&mut self, now: u32) -> Option<u32> {

@@ -1,7 +1,7 @@
 //! Finds the reply among the received characters of an ASCII line. Every frame begins with a
 //! colon; characters before a colon are noise.
 
-use super::{Count, Engine, Outcome, Storage, Transaction};
+use super::{Count, Engine, Outcome, Phase, Storage, Transaction};
 use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::ascii::{self, find, Decoded};
@@ -86,7 +86,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Decodes the frame of `length` characters at `front`. If it is the reply, moves it to the
-    /// front of the buffer.
+    /// front of the buffer. While no request is pending, only notes which unit has sent it.
     fn is_ascii_reply(&mut self, front: S::Count, length: S::Count, delimiter: u8) -> bool {
         let frame = self.storage.bytes(front, length);
         let content = match ascii::decode(frame, delimiter, true) {
@@ -104,6 +104,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 return false;
             }
         };
+        if self.phase == Phase::Idle {
+            self.note_reply_of(self.storage.byte(front));
+            return false;
+        }
         let function = self.storage.byte(front + 1u8.into());
         // The length of an RTU frame of this content: the LRC and one character stand for
         // the CRC.

@@ -126,6 +126,12 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         place
     }
 
+    /// Notes that no reply comes any more: the line is a new one.
+    pub fn forget_late_replies(&mut self) {
+        self.is_late = false;
+        self.late_units.clear();
+    }
+
     /// Notes that the pending request's unit has answered.
     pub(super) fn expect_no_late_reply(&mut self) {
         match self.late_units.record(self.unit) {

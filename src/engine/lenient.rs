@@ -53,20 +53,21 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     }
 
     /// Keeps the last byte if it may belong to a deviating response to a read. Notes a deviating
-    /// reply that ends with it.
-    fn keep(&mut self) {
+    /// reply that ends with it. True if its last byte has yet to come although the CRC is right: a
+    /// reply whose last byte is 0 has a right CRC without it, too.
+    fn keep(&mut self) -> bool {
         let byte = self.storage.byte(self.end - 1);
         let is_whole = self.is_whole_frame();
         let function = self.function;
         if self.is_held || (self.awaits_end && !self.drop_deviating(byte)) {
-            return;
+            return false;
         }
         if !self.request.is_read() {
             // The search has found that it is not the reply.
             if self.ends_with(self.length, function) {
                 self.note_deviating(is_whole);
             }
-            return;
+            return false;
         }
         if self.run_length == 1 {
             self.kept = 0;
@@ -80,16 +81,20 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         };
         if !is_ours {
             self.kept = 0;
-            return;
+            return false;
         }
         if is_whole && self.run_length == self.kept_length() && self.kept_data() > 0 {
             self.note_deviating(is_whole);
-            return;
+            return false;
+        }
+        if is_whole && self.run_length.wrapping_add(1) == self.kept_length() {
+            self.note(Outcome::MALFORMED);
+            return true;
         }
         let words = u16::from(self.storage.response_words());
         let space = self.space();
         if u16::from(self.kept) >= (words << 1) + u16::from(BEFORE_DATA) || space <= LEFT_FREE {
-            return;
+            return false;
         }
         // The search has taken in the last byte, so the buffer may be full.
         if self.end == space {
@@ -97,6 +102,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         }
         self.storage.set_byte(space - 1, byte);
         self.kept += 1;
+        false
     }
 
     /// Drops a deviating reply that may be a late one if the byte begins another frame with our unit
@@ -196,9 +202,9 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
 /// the next one is read.
 fn extend<P: Port, S: Words>(engine: &mut Engine<P, S, MasterRequest>, moment: Moment) -> bool {
     match moment {
-        Moment::Missed => engine.keep(),
+        Moment::Missed if engine.keep() => return true,
         Moment::End => engine.accept_deviating(),
-        Moment::Sent | Moment::Byte => {}
+        Moment::Missed | Moment::Sent | Moment::Byte => {}
     }
     engine.extras.is_some_and(|extras| extras(engine, moment))
 }

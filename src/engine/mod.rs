@@ -163,7 +163,8 @@ pub enum Moment {
     Sent,
     /// A byte has arrived. `true` if it ends the echo of the request.
     Byte,
-    /// The search has not ended with the byte that has arrived.
+    /// The search has not ended with the byte that has arrived. `true` if that ends no frame,
+    /// although the CRC is right.
     Missed,
     /// The request ends with what was seen. `true` if it is repeated.
     End,

@@ -171,8 +171,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         received
     }
 
-    /// Reads the received bytes at the time `now` and drops them, while no request is pending. If
-    /// they are frames of RTU, notes which units have sent them. Negative if the link is lost.
+    /// Reads the received bytes at the time `now` and drops them, while no request is pending. Notes
+    /// which units have sent the frames among them. Negative if the link is lost.
     pub fn drop_received(&mut self, now: u32, is_rtu: bool) -> i16 {
         if has_elapsed(self.settings.silence.get(), now, self.since) || self.end == self.space() {
             self.end = S::Count::ZERO;
@@ -182,13 +182,19 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if received > 0 {
             self.since = now;
             self.now = now;
-            for _ in 0..received {
-                self.end += 1u8.into();
-                if self.continue_frame() && is_rtu {
-                    let unit = self.storage.byte(self.end - self.run_length);
-                    self.note_reply_of(unit);
-                    self.begin_frame();
+            if is_rtu {
+                for _ in 0..received {
+                    self.end += 1u8.into();
+                    if self.continue_frame() {
+                        let unit = self.storage.byte(self.end - self.run_length);
+                        self.note_reply_of(unit);
+                        self.begin_frame();
+                    }
                 }
+            } else {
+                // The reply before has been stored by now.
+                self.content = S::Count::ZERO;
+                Q::search(self, self.end, S::Count::of(received as usize));
             }
             self.tally(Status::PENDING);
         }

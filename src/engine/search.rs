@@ -93,8 +93,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 return true;
             }
         }
-        self.has_extra(Moment::Missed);
-        is_whole && self.skip_frame()
+        let goes_on = self.has_extra(Moment::Missed);
+        is_whole && !goes_on && self.skip_frame()
     }
 
     /// Makes the exception at the end of the buffer the outcome. False if its code is invalid.

@@ -1,0 +1,918 @@
+/* A device that has lost a reply, or is late with one, is heard again in bounded time, whatever
+ * limit the program has after which it cancels a request; and no unit waits for another. Prints the
+ * third table of docs/reports/fault-table.md. On a simulated clock. */
+#include "faults.h"
+#include "sim.h"
+#include "test.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    MS = 1000,
+    TIMEOUT = 500 * MS,
+    QUIET = 100 * MS,            /* the default quiet time */
+    CLEAN = 2 * TIMEOUT + QUIET, /* the silence after which a unit owes nothing */
+    GAP = 4 * MS,                /* the default gap */
+    PROMPT = 3 * MS,             /* what most devices take for a reply */
+    EXCHANGE = 50 * MS,          /* more than a request, a reply and their gap take */
+    NEVER = 2000000000,          /* no limit */
+    UNIT = 17,
+    OTHER = 3,
+    DEVICES = 8,
+    ABSENT = 100 /* a unit without a device */
+};
+
+/* A device answers in order, in its time. Its requests are numbered from 1 on. */
+typedef struct device {
+    uint8_t unit;
+    uint32_t takes;
+    unsigned lost, losses;   /* the number of the first reply that is lost, and how many are */
+    unsigned late;           /* the number of the reply that is late */
+    uint32_t takes_for_late; /* what the device takes for it */
+    int8_t deviates;         /* how many registers more than requested its replies have */
+    uint8_t repeats_wrong;   /* 1: the reply to a write repeats another value */
+    unsigned requests;
+    uint64_t free; /* when its last reply has been sent */
+} device;
+
+typedef enum reader_kind { NODE_READS, CLIENT_READS, ASCII_CLIENT_READS, READERS } reader_kind;
+
+/* A line with devices, and the program that reads them. */
+typedef struct bench {
+    sim *s;
+    device devices[DEVICES];
+    unsigned count;
+    reader_kind kind;
+    mbm_client client;
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
+    mbm_clientRequest request;
+    uint16_t word;
+} bench;
+
+static void answer(sim *s, const sim_frame *request)
+{
+    bench *b = (bench *)s->context;
+    uint8_t frame[300], asked[8];
+    uint64_t at;
+    size_t length;
+    unsigned i;
+    device *d = NULL;
+
+    for (i = 0; i < b->count; i++)
+        if (b->devices[i].unit == request->bytes[0])
+            d = &b->devices[i];
+    if (!d || d->unit == 0)
+        return;
+    d->requests++;
+    if (d->requests >= d->lost && d->requests < d->lost + d->losses)
+        return;
+    memcpy(asked, request->bytes, sizeof asked);
+    if (asked[1] == 3)
+        asked[5] = (uint8_t)(asked[5] + d->deviates);
+    else if (d->repeats_wrong)
+        asked[5] ^= 0x55;
+    length = fault_right_reply(frame, asked);
+    at = (d->free > request->end ? d->free : request->end) +
+         (d->requests == d->late ? d->takes_for_late : d->takes);
+    if (request->ascii)
+        sim_deliver_ascii(s, at, frame, length);
+    else
+        sim_deliver(s, at, frame, length);
+    d->free = at + 2 * length * s->character;
+}
+
+static device *add(bench *b, uint8_t unit, uint32_t takes)
+{
+    device *d = &b->devices[b->count++];
+
+    assert_true(b->count <= DEVICES);
+    memset(d, 0, sizeof *d);
+    d->unit = unit;
+    d->takes = takes;
+    return d;
+}
+
+/* Loses the next replies of a device. */
+static void lose(device *d, unsigned losses)
+{
+    d->lost = d->requests + 1;
+    d->losses = losses;
+}
+
+static void be_late(device *d, uint32_t takes)
+{
+    d->late = d->requests + 1;
+    d->takes_for_late = takes;
+}
+
+/* Begins on a line that has been silent for long. */
+static void begin(bench *b, sim *s, reader_kind kind)
+{
+    memset(b, 0, sizeof *b);
+    b->s = s;
+    b->kind = kind;
+    s->device = answer;
+    s->context = b;
+    s->limit = UINT64_C(1000000000000);
+    s->first = s->last = 0;
+    s->sent = 0;
+    s->now += 100000 * MS;
+    if (kind == CLIENT_READS)
+        OK(mbm_client_beginRtu(&b->client, &s->port, b->frame, MBM_MAX_FRAME));
+    else if (kind == ASCII_CLIENT_READS)
+        OK(mbm_client_beginAscii(&b->client, &s->port, b->frame, sizeof b->frame));
+    sim_begin(s, UNIT);
+    OK(mbm_node_setBlocking(&s->node, 0));
+    OK(mbm_node_setResponseTimeout(&s->node, TIMEOUT / MS));
+    if (kind != NODE_READS)
+        OK(mbm_client_setResponseTimeout(&b->client, TIMEOUT / MS));
+}
+
+static void set_timeout(bench *b, uint32_t timeout)
+{
+    OK(mbm_node_setResponseTimeout(&b->s->node, timeout / MS));
+    if (b->kind != NODE_READS)
+        OK(mbm_client_setResponseTimeout(&b->client, (uint16_t)(timeout / MS)));
+}
+
+static void set_quiet_time(bench *b, uint32_t ms)
+{
+    if (b->kind == NODE_READS)
+        OK(mbm_line_setQuietTime(&b->s->line, (uint16_t)ms));
+    else
+        OK(mbm_client_setQuietTime(&b->client, (uint16_t)ms));
+}
+
+/* Sleeps as a program would: until a byte arrives, for at most `delay`, and not beyond `end`. */
+static void sleep_until_a_byte(sim *s, uint32_t delay, uint64_t end)
+{
+    uint64_t until = s->now + (delay > 0 ? delay : 1);
+
+    if (s->first < s->last && s->incoming[s->first].at > s->now && s->incoming[s->first].at < until)
+        until = s->incoming[s->first].at;
+    s->now = until < end ? until : end;
+}
+
+static uint8_t starts(bench *b, uint8_t unit, uint16_t address)
+{
+    if (b->s->sent > SIM_FRAMES / 2 && b->s->frames[b->s->sent - 1].whole)
+        b->s->sent = 0;
+    if (b->kind == NODE_READS) {
+        OK(mbm_node_setSlaveID(&b->s->node, unit));
+        return mbm_node_readHoldingRegisters(&b->s->node, address, 1);
+    }
+    b->request.unit = unit;
+    b->request.reply = &b->word;
+    b->request.replyBytes = sizeof b->word;
+    return mbm_client_readHoldingRegisters(&b->client, &b->request, address, 1);
+}
+
+static uint8_t polls(bench *b)
+{
+    if (b->kind == NODE_READS)
+        return mbm_node_poll(&b->s->node);
+    (void)mbm_client_poll(&b->client);
+    return b->request.status;
+}
+
+static uint32_t delay_of(bench *b)
+{
+    return b->kind == NODE_READS ? mbm_node_pollDelay(&b->s->node)
+                                 : mbm_client_pollDelay(&b->client);
+}
+
+static void cancels(bench *b)
+{
+    if (b->kind == NODE_READS)
+        OK(mbm_node_cancel(&b->s->node));
+    else
+        OK(mbm_client_cancel(&b->client, &b->request));
+}
+
+/* Goes on with a request until it has ended, or until the limit: then it is pending. */
+static uint8_t goes_on(bench *b, uint16_t address, uint32_t limit)
+{
+    uint64_t end = b->s->now + limit;
+    uint8_t status;
+
+    while ((status = polls(b)) == MBM_PENDING && b->s->now < end)
+        sleep_until_a_byte(b->s, delay_of(b), end);
+    if (status == MBM_OK)
+        assert_int_equal(b->kind == NODE_READS ? b->s->response[0] : b->word, fault_value(address));
+    return status;
+}
+
+/* Reads a register; gives up after the limit. A read that succeeds has the right value. */
+static uint8_t reads(bench *b, uint8_t unit, uint16_t address, uint32_t limit)
+{
+    uint8_t status;
+
+    IS(MBM_PENDING, starts(b, unit, address));
+    status = goes_on(b, address, limit);
+    if (status == MBM_PENDING) {
+        cancels(b);
+        status = MBM_CANCELLED;
+    }
+    return status;
+}
+
+static void reads_well(bench *b, uint8_t unit, unsigned count)
+{
+    while (count-- > 0)
+        OK(reads(b, unit, (uint16_t)(100 + count), EXCHANGE));
+}
+
+/* One reply is lost, and the program gives up after 20 ms. Returns when the request was sent. */
+static uint64_t loses_one(bench *b, device *d)
+{
+    lose(d, 1);
+    IS(MBM_CANCELLED, reads(b, d->unit, 9, 20 * MS));
+    return b->s->frames[b->s->sent - 1].begin;
+}
+
+static const uint32_t limits[] = {20, 40, 80, 160, 500, 1000, 0};
+static const uint32_t timeouts[] = {500, 2000};
+static const uint32_t pauses[] = {0, 200, 1000, 60000};
+static const unsigned losses[] = {1, 5};
+
+/* Returns how many ms pass from the begin of the first read that fails to the first good value.
+ * Afterwards all reads must succeed. */
+static unsigned time_to_the_first_value(sim *s, reader_kind kind, uint32_t limit, uint32_t timeout,
+                                        uint32_t pause, unsigned lost)
+{
+    bench b;
+    device *d;
+    uint64_t began, well;
+    uint16_t i;
+    uint8_t status;
+
+    begin(&b, s, kind);
+    set_timeout(&b, timeout);
+    d = add(&b, UNIT, PROMPT);
+    for (i = 0; i < 10; i++)
+        OK(reads(&b, UNIT, i, limit));
+    lose(d, lost);
+    began = well = s->now;
+    do {
+        uint64_t read = s->now;
+
+        status = reads(&b, UNIT, i++, limit);
+        if (d->requests < d->lost + lost)
+            well = s->now;
+        /* From the last loss on, the device answers. */
+        assert_true(status == MBM_OK || read <= well + UINT64_C(5) * timeout);
+        if (status != MBM_OK)
+            s->now += pause;
+    } while (status != MBM_OK);
+    began = (s->now - began + MS / 2) / MS;
+    for (i = 0; i < 50; i++) {
+        s->now += pause;
+        OK(reads(&b, UNIT, i, limit));
+    }
+    return (unsigned)began;
+}
+
+static void one_row(sim *s, FILE *table, uint32_t timeout, uint32_t limit, unsigned lost)
+{
+    unsigned pause, kind;
+    char text[16] = "none";
+
+    if (limit > 0)
+        (void)snprintf(text, sizeof text, "%u", (unsigned)limit);
+    if (table)
+        fprintf(table, "| %u | %s | %u |", (unsigned)timeout, text, lost);
+    for (pause = 0; pause < COUNT(pauses); pause++)
+        for (kind = NODE_READS; kind <= CLIENT_READS; kind++) {
+            unsigned ms =
+                time_to_the_first_value(s, (reader_kind)kind, limit ? limit * MS : (uint32_t)NEVER,
+                                        timeout * MS, pauses[pause] * MS, lost);
+
+            if (table)
+                fprintf(table, kind == NODE_READS ? " %u, " : "%u |", ms);
+        }
+    if (table)
+        fprintf(table, "\n");
+}
+
+static void a_device_is_heard_again_whatever_limit_and_pause_a_program_has(void **state)
+{
+    const char *path = getenv("MBM_FAULT_TABLE");
+    FILE *table = path ? fopen(path, "w") : NULL;
+    unsigned i, j, k;
+    SIM;
+
+    if (table)
+        fprintf(table,
+                "| response timeout, ms | limit, ms | lost replies | no pause | pauses of 200 ms | "
+                "pauses of 1 s | pauses of 1 min |\n|---|---|---|---|---|---|---|\n");
+    for (i = 0; i < COUNT(timeouts); i++)
+        for (j = 0; j < COUNT(limits); j++)
+            for (k = 0; k < COUNT(losses); k++)
+                one_row(s, table, timeouts[i], limits[j], losses[k]);
+    if (table)
+        (void)fclose(table);
+}
+
+/* Declares a bench and its kind of reader. */
+#define BENCH                                                                                      \
+    int kind;                                                                                      \
+    bench b;                                                                                       \
+    SIM
+#define BEGIN begin(&b, s, (reader_kind)kind)
+
+/* Cancelled while it waits for the gap. */
+static void a_request_that_is_cancelled_before_its_frame_left_changes_nothing(void **state)
+{
+    unsigned sent;
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++) {
+        BEGIN;
+        if (kind == ASCII_CLIENT_READS)
+            OK(mbm_client_setGap(&b.client, GAP));
+        add(&b, UNIT, PROMPT);
+        reads_well(&b, UNIT, 1);
+        sent = s->sent;
+        IS(MBM_CANCELLED, reads(&b, UNIT, 1, GAP / 2));
+        assert_int_equal(s->sent, sent);
+        OK(reads(&b, UNIT, 2, EXCHANGE));
+        assert_int_equal(s->sent, sent + 1);
+        sim_assert_time(s->frames[sent].silence, GAP);
+        assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
+    }
+}
+
+static void a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_nothing(void **state)
+{
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++) {
+        BEGIN;
+        add(&b, UNIT, PROMPT);
+        reads_well(&b, UNIT, 1);
+        s->now += EXCHANGE;
+        s->write_piece = 5;
+        s->write_busy = 1;
+        IS(MBM_PENDING, starts(&b, UNIT, 1));
+        while (s->sent < 2) {
+            IS(MBM_PENDING, polls(&b));
+            s->now += 10;
+        }
+        cancels(&b);
+        s->write_piece = s->write_busy = 0;
+        reads_well(&b, UNIT, 2);
+        assert_false(s->frames[1].whole);
+        assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
+        s->cut_allowed = 1; /* in the frames since `begin` */
+    }
+}
+
+/* As a program does that looks in each round whether the unit is there again. */
+static void requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer(void **state)
+{
+    uint64_t sent;
+    unsigned count;
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++) {
+        BEGIN;
+        sent = loses_one(&b, add(&b, UNIT, PROMPT));
+        count = s->sent;
+        while (s->now < sent + CLEAN - 60 * MS)
+            IS(MBM_CANCELLED, reads(&b, UNIT, 1, 30 * MS));
+        assert_int_equal(s->sent, count);
+        OK(reads(&b, UNIT, 2, 2 * EXCHANGE));
+        assert_in_range(s->frames[count].begin - sent, CLEAN, CLEAN + 20 * MS);
+        reads_well(&b, UNIT, 20);
+    }
+}
+
+static void a_request_that_waits_does_not_stop_the_clients_queue(void **state)
+{
+    mbm_clientRequest other = {0};
+    uint16_t word = 0;
+    uint64_t sent, began;
+    BENCH;
+
+    for (kind = CLIENT_READS; kind < READERS; kind++) {
+        BEGIN;
+        add(&b, OTHER, PROMPT);
+        sent = loses_one(&b, add(&b, UNIT, PROMPT));
+        s->now += QUIET;
+        IS(MBM_PENDING, starts(&b, UNIT, 1));
+        other.unit = OTHER;
+        other.reply = &word;
+        other.replyBytes = sizeof word;
+        /* The other unit is read again and again; the one that waits has its turn when it is due.
+         */
+        do {
+            IS(MBM_PENDING, mbm_client_readHoldingRegisters(&b.client, &other, 7, 1));
+            began = s->now;
+            while (mbm_client_poll(&b.client) == MBM_PENDING && other.status == MBM_PENDING)
+                sleep_until_a_byte(s, mbm_client_pollDelay(&b.client), UINT64_MAX);
+            OK(other.status);
+            assert_int_equal(word, fault_value(7));
+            assert_in_range(s->now - began, 0, 2 * EXCHANGE);
+            s->now += GAP;
+        } while (b.request.status == MBM_PENDING && s->now < sent + 2 * CLEAN);
+        OK(b.request.status);
+        assert_int_equal(b.word, fault_value(1));
+        assert_in_range(s->now - sent, CLEAN, CLEAN + 2 * EXCHANGE);
+    }
+}
+
+/* The other node, with a word of its own. */
+static mbm_node second;
+static uint16_t second_word;
+
+static void begin_second(sim *s, uint8_t unit)
+{
+    memset(&second, 0, sizeof second);
+    OK(mbm_node_begin(&second, &s->line, unit, &second_word, 1, NULL, 0));
+    OK(mbm_node_setResponseTimeout(&second, TIMEOUT / MS));
+}
+
+static void a_request_of_a_node_that_waits_gives_way_to_that_of_another_node(void **state)
+{
+    uint64_t sent, began;
+    int blocks;
+    BENCH;
+
+    kind = NODE_READS;
+    for (blocks = 0; blocks < 2; blocks++) {
+        BEGIN;
+        begin_second(s, OTHER);
+        OK(mbm_node_setBlocking(&second, (uint8_t)blocks));
+        add(&b, OTHER, PROMPT);
+        sent = loses_one(&b, add(&b, UNIT, PROMPT));
+        IS(MBM_PENDING, starts(&b, UNIT, 1));
+        IS(MBM_PENDING, goes_on(&b, 1, 2 * QUIET));
+        began = s->now;
+        IS(blocks ? MBM_OK : MBM_PENDING, mbm_node_readHoldingRegisters(&second, 5, 1));
+        IS(MBM_CANCELLED, polls(&b));
+        IS(MBM_CANCELLED, mbm_node_status(&s->node));
+        while (mbm_node_poll(&second) == MBM_PENDING)
+            sleep_until_a_byte(s, mbm_node_pollDelay(&second), UINT64_MAX);
+        OK(mbm_node_status(&second));
+        assert_int_equal(second_word, fault_value(5));
+        assert_in_range(s->now - began, 0, EXCHANGE);
+        /* It changed nothing for the node that gave way. */
+        OK(reads(&b, UNIT, 2, NEVER));
+        assert_in_range(s->frames[s->sent - 1].begin - sent, CLEAN, CLEAN + MS);
+    }
+}
+
+static unsigned refused;
+
+static void try_the_second_node(sim *s)
+{
+    /* Once the quiet time has passed, only its unit keeps the request from being sent. */
+    if (s->now < s->frames[0].begin + 2 * QUIET || s->sent > 1)
+        return;
+    IS(MBM_BUSY, mbm_node_readHoldingRegisters(&second, 5, 1));
+    refused++;
+}
+
+static void a_request_of_a_blocking_node_that_waits_does_not_give_way(void **state)
+{
+    uint64_t sent;
+    BENCH;
+
+    kind = NODE_READS;
+    BEGIN;
+    begin_second(s, OTHER);
+    add(&b, OTHER, PROMPT);
+    sent = loses_one(&b, add(&b, UNIT, PROMPT));
+    OK(mbm_node_setBlocking(&s->node, 1));
+    refused = 0;
+    s->on_idle = try_the_second_node;
+    OK(mbm_node_readHoldingRegisters(&s->node, 3, 1));
+    s->on_idle = NULL;
+    assert_true(refused > 0);
+    assert_int_equal(s->response[0], fault_value(3));
+    assert_int_equal(s->sent, 2);
+    assert_in_range(s->frames[1].begin - sent, CLEAN, CLEAN + MS);
+    OK(mbm_node_readHoldingRegisters(&second, 5, 1));
+}
+
+/* The late reply shows that the unit owes nothing any more. */
+static void a_late_reply_lets_the_request_that_waits_be_sent_at_once(void **state)
+{
+    uint64_t sent;
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++) {
+        device *d;
+
+        BEGIN;
+        d = add(&b, UNIT, PROMPT);
+        reads_well(&b, UNIT, 3);
+        be_late(d, TIMEOUT + 200 * MS);
+        IS(MBM_CANCELLED, reads(&b, UNIT, 1, 50 * MS));
+        sent = s->frames[s->sent - 1].end;
+        OK(reads(&b, UNIT, 2, NEVER));
+        assert_in_range(s->frames[s->sent - 1].begin - sent, TIMEOUT + 200 * MS,
+                        TIMEOUT + 200 * MS + EXCHANGE);
+        reads_well(&b, UNIT, 50);
+    }
+}
+
+/* It comes within the quiet time. */
+static void a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait(void **state)
+{
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++) {
+        device *d;
+
+        BEGIN;
+        d = add(&b, UNIT, PROMPT);
+        be_late(d, 60 * MS);
+        IS(MBM_CANCELLED, reads(&b, UNIT, 1, 40 * MS));
+        OK(reads(&b, UNIT, 2, 2 * EXCHANGE));
+        reads_well(&b, UNIT, 50);
+    }
+}
+
+static void a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well(void **state)
+{
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++) {
+        device *d;
+
+        BEGIN;
+        d = add(&b, UNIT, PROMPT);
+        add(&b, OTHER, 400 * MS);
+        be_late(d, 300 * MS);
+        IS(MBM_CANCELLED, reads(&b, UNIT, 1, 50 * MS));
+        OK(reads(&b, OTHER, 2, NEVER));
+        assert_in_range(s->now, d->free, d->free + TIMEOUT);
+        OK(reads(&b, UNIT, 3, EXCHANGE));
+        reads_well(&b, UNIT, 50);
+    }
+}
+
+static const uint8_t alike[] = {33, 65, 97, 129, 225, 255};
+
+/* The reply of unit 1 comes 700 ms after its timeout, and the other unit is read in between. */
+static void units_with_the_same_last_five_bits_share_no_memory(void **state)
+{
+    unsigned i;
+    uint16_t n;
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++)
+        for (i = 0; i < COUNT(alike); i++) {
+            const uint8_t unit = alike[i] == 255 ? 31 : 1;
+            device *d;
+
+            BEGIN;
+            d = add(&b, unit, 100 * MS);
+            add(&b, alike[i], 5 * MS);
+            for (n = 0; n < 100; n++) {
+                const uint8_t status = reads(&b, unit, n, NEVER);
+
+                if (n == 1)
+                    be_late(d, 1200 * MS);
+                if (n == 10)
+                    lose(d, 1);
+                assert_true(status == MBM_OK || n == 2 || n == 3 || n == 11);
+                OK(reads(&b, alike[i], (uint16_t)(1000 + n), NEVER));
+            }
+        }
+}
+
+static void a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits(void **state)
+{
+    unsigned i, n;
+    int is_cancelled;
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++)
+        for (i = 0; i < COUNT(alike); i++)
+            for (is_cancelled = 0; is_cancelled < 2; is_cancelled++) {
+                BEGIN;
+                add(&b, alike[i], 5 * MS);
+                for (n = 0; n < 10; n++) {
+                    if (is_cancelled)
+                        IS(MBM_CANCELLED, reads(&b, 1, 0, 50 * MS));
+                    else
+                        IS(MBM_RESPONSE_TIMED_OUT, reads(&b, 1, 0, NEVER));
+                    OK(reads(&b, alike[i], 4, QUIET + EXCHANGE));
+                    reads_well(&b, alike[i], 5);
+                }
+            }
+}
+
+/* What one of them has cancelled, or waited for in vain, the other one must know. */
+static void two_nodes_of_one_unit_know_of_each_others_late_replies(void **state)
+{
+    static const uint32_t with[] = {50 * MS, NEVER};
+    unsigned i, n;
+    BENCH;
+
+    kind = NODE_READS;
+    for (i = 0; i < COUNT(with); i++) {
+        device *d;
+
+        BEGIN;
+        begin_second(s, UNIT);
+        d = add(&b, UNIT, PROMPT);
+        be_late(d, TIMEOUT + 300 * MS);
+        assert_int_not_equal(reads(&b, UNIT, 1, with[i]), MBM_OK);
+        for (n = 2; n < 50; n++) {
+            OK(mbm_node_readHoldingRegisters(&second, (uint16_t)(500 + n), 1));
+            assert_int_equal(second_word, fault_value(500 + n));
+            OK(reads(&b, UNIT, (uint16_t)n, EXCHANGE));
+        }
+    }
+}
+
+static void a_node_that_has_changed_its_unit_does_not_forget_the_late_reply(void **state)
+{
+    static const uint32_t with[] = {50 * MS, NEVER};
+    unsigned i, begins;
+    BENCH;
+
+    kind = NODE_READS;
+    for (i = 0; i < COUNT(with); i++)
+        for (begins = 0; begins < 2; begins++) {
+            device *d;
+
+            BEGIN;
+            d = add(&b, UNIT, PROMPT);
+            add(&b, OTHER, PROMPT);
+            be_late(d, TIMEOUT + 300 * MS);
+            assert_int_not_equal(reads(&b, UNIT, 1, with[i]), MBM_OK);
+            if (begins)
+                sim_node(s, OTHER);
+            /* Its new unit is clean. */
+            OK(reads(&b, OTHER, 2, QUIET + EXCHANGE));
+            if (begins)
+                sim_node(s, UNIT);
+            OK(reads(&b, UNIT, 3, NEVER));
+            reads_well(&b, UNIT, 50);
+        }
+}
+
+/* Broadcasts 06, and returns after how long it left. */
+static uint64_t broadcasts(bench *b)
+{
+    const uint64_t began = b->s->now;
+    const uint16_t word = 7;
+
+    if (b->kind == NODE_READS) {
+        OK(mbm_node_setSlaveID(&b->s->node, 0));
+        IS(MBM_PENDING, mbm_node_writeSingleRegister(&b->s->node, 1, word));
+    } else {
+        memset(&b->request, 0, sizeof b->request);
+        IS(MBM_PENDING, mbm_client_writeSingleRegister(&b->client, &b->request, 1, word));
+    }
+    OK(goes_on(b, 0, NEVER));
+    assert_int_equal(b->s->frames[b->s->sent - 1].bytes[0], 0);
+    return b->s->frames[b->s->sent - 1].begin - began;
+}
+
+static void broadcast(bench *b)
+{
+    const uint16_t before = b->word;
+
+    /* `goes_on` compares with the value of register 0. */
+    b->word = b->s->response[0] = fault_value(0);
+    assert_in_range(broadcasts(b), 0, QUIET + GAP + MS);
+    b->word = before;
+}
+
+/* Even if more units owe replies than are remembered one by one. */
+static void a_broadcast_does_not_wait_after_a_cancelled_request(void **state)
+{
+    uint8_t unit;
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++) {
+        BEGIN;
+        (void)loses_one(&b, add(&b, UNIT, PROMPT));
+        broadcast(&b);
+        for (unit = ABSENT; unit < ABSENT + 20; unit++)
+            (void)reads(&b, unit, 0, QUIET + 40 * MS);
+        broadcast(&b);
+        /* And it lets no reply be late. */
+        s->now += CLEAN;
+        reads_well(&b, UNIT, 1);
+        broadcast(&b);
+        reads_well(&b, UNIT, 5);
+    }
+}
+
+/* More units than are remembered one by one. */
+static void a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones(void **state)
+{
+    uint64_t last;
+    uint8_t unit;
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++) {
+        BEGIN;
+        add(&b, UNIT, PROMPT);
+        reads_well(&b, UNIT, 3);
+        for (unit = ABSENT; unit < ABSENT + 20; unit++)
+            (void)reads(&b, unit, 0, QUIET + 40 * MS);
+        last = s->frames[s->sent - 1].begin;
+        while (reads(&b, UNIT, 1, QUIET + EXCHANGE) != MBM_OK)
+            assert_true(s->now < last + UINT64_C(5) * TIMEOUT);
+        reads_well(&b, UNIT, 50);
+    }
+}
+
+static void a_quiet_time_of_0_gives_it_all_up(void **state)
+{
+    device *d;
+    BENCH;
+
+    for (kind = 0; kind < READERS; kind++) {
+        BEGIN;
+        set_quiet_time(&b, 0);
+        d = add(&b, UNIT, PROMPT);
+        (void)loses_one(&b, d);
+        reads_well(&b, UNIT, 50);
+        lose(d, 1);
+        IS(MBM_RESPONSE_TIMED_OUT, reads(&b, UNIT, 1, NEVER));
+        reads_well(&b, UNIT, 50);
+    }
+}
+
+static void a_device_whose_replies_always_deviate_is_heard_again(void **state)
+{
+    static const uint32_t with[] = {50 * MS, NEVER};
+    static const int8_t by[] = {1, -1, 20};
+    unsigned i, j, n;
+    BENCH;
+
+    kind = NODE_READS;
+    for (i = 0; i < COUNT(with); i++)
+        for (j = 0; j < COUNT(by); j++) {
+            device *d;
+            uint64_t began;
+
+            BEGIN;
+            OK(mbm_node_setLenient(&s->node, 1));
+            d = add(&b, UNIT, PROMPT);
+            d->deviates = by[j];
+            for (n = 0; n < 20; n++) {
+                const uint16_t address = (uint16_t)(40 * n);
+
+                if (n == 5)
+                    lose(d, 1);
+                began = s->now;
+                IS(MBM_PENDING, mbm_node_readHoldingRegisters(&s->node, address, 2));
+                if (n != 5) {
+                    OK(goes_on(&b, address, NEVER));
+                    assert_int_equal(mbm_node_available(&s->node), 2 + by[j]);
+                    assert_in_range(s->now - began, 0, 4 * TIMEOUT);
+                    continue;
+                }
+                assert_int_not_equal(goes_on(&b, address, with[i]), MBM_OK);
+                cancels(&b);
+            }
+        }
+}
+
+static void a_device_that_always_repeats_another_value_is_heard_again(void **state)
+{
+    static const uint32_t with[] = {50 * MS, NEVER};
+    unsigned i, n;
+    BENCH;
+
+    kind = NODE_READS;
+    for (i = 0; i < COUNT(with); i++) {
+        device *d;
+
+        BEGIN;
+        OK(mbm_node_setLenient(&s->node, 1));
+        d = add(&b, UNIT, PROMPT);
+        d->repeats_wrong = 1;
+        s->response[0] = fault_value(0);
+        for (n = 0; n < 20; n++) {
+            if (n == 5)
+                lose(d, 1);
+            IS(MBM_PENDING, mbm_node_writeSingleRegister(&s->node, 1, (uint16_t)n));
+            if (n != 5) {
+                OK(goes_on(&b, 0, NEVER));
+                continue;
+            }
+            assert_int_not_equal(goes_on(&b, 0, with[i]), MBM_OK);
+            cancels(&b);
+        }
+    }
+}
+
+/* A late reply to a read of more registers, to a lenient node that reads fewer, and the reverse.
+ * All replies deviate. */
+static void no_late_reply_that_deviates_is_taken_for_the_next_one(void **state)
+{
+    static const uint32_t with[] = {50 * MS, NEVER};
+    unsigned i, n, first;
+    BENCH;
+
+    kind = NODE_READS;
+    for (i = 0; i < COUNT(with); i++)
+        for (first = 0; first < 2; first++) {
+            device *d;
+
+            BEGIN;
+            OK(mbm_node_setLenient(&s->node, 1));
+            d = add(&b, UNIT, PROMPT);
+            d->deviates = 1;
+            be_late(d, TIMEOUT + 300 * MS);
+            for (n = 0; n < 20; n++) {
+                const uint16_t address = (uint16_t)(40 * n), quantity = (n + first) % 2 ? 1 : 9;
+
+                IS(MBM_PENDING, mbm_node_readHoldingRegisters(&s->node, address, quantity));
+                /* `goes_on` compares the first register. */
+                if (goes_on(&b, address, n == 0 ? with[i] : (uint32_t)NEVER) != MBM_OK) {
+                    assert_int_equal(n, 0);
+                    cancels(&b);
+                }
+            }
+        }
+}
+
+static uint8_t connect_again(void *context)
+{
+    ((sim *)context)->read_dead = 0;
+    return MBM_OK;
+}
+
+static void disconnect(void *context)
+{
+    (void)context;
+}
+
+/* A new connection has no replies of the old one. A serial line that was opened again may. */
+static void a_new_connection_of_rtu_over_tcp_owes_nothing(void **state)
+{
+    mbm_link link = MBM_INIT;
+    mbm_linkHooks hooks = {0};
+    uint64_t sent;
+    int is_tcp;
+    BENCH;
+
+    hooks.context = s;
+    hooks.connect = connect_again;
+    hooks.disconnect = disconnect;
+    kind = CLIENT_READS;
+    for (is_tcp = 0; is_tcp < 2; is_tcp++) {
+        BEGIN;
+        memset(&b.client, 0, sizeof b.client);
+        if (is_tcp)
+            OK(mbm_client_beginRtuOverTcp(&b.client, &s->port, b.frame, MBM_MAX_FRAME));
+        else
+            OK(mbm_client_beginRtu(&b.client, &s->port, b.frame, MBM_MAX_FRAME));
+        OK(mbm_client_setResponseTimeout(&b.client, TIMEOUT / MS));
+        OK(mbm_link_begin(&link, &b.client, &hooks));
+        add(&b, UNIT, PROMPT);
+        reads_well(&b, UNIT, 3);
+        sent = loses_one(&b, &b.devices[0]);
+        s->read_dead = 1;
+        (void)mbm_client_poll(&b.client);
+        OK(reads(&b, UNIT, 1, NEVER));
+        assert_int_equal(s->read_dead, 0);
+        if (is_tcp)
+            assert_in_range(s->frames[s->sent - 1].begin - sent, 0, EXCHANGE);
+        else
+            assert_in_range(s->frames[s->sent - 1].begin - sent, CLEAN, CLEAN + EXCHANGE);
+        OK(mbm_link_end(&link));
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        SIM_TEST(a_device_is_heard_again_whatever_limit_and_pause_a_program_has),
+        SIM_TEST(a_request_that_is_cancelled_before_its_frame_left_changes_nothing),
+        SIM_TEST(a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_nothing),
+        SIM_TEST(requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer),
+        SIM_TEST(a_request_that_waits_does_not_stop_the_clients_queue),
+        SIM_TEST(a_request_of_a_node_that_waits_gives_way_to_that_of_another_node),
+        SIM_TEST(a_request_of_a_blocking_node_that_waits_does_not_give_way),
+        SIM_TEST(a_late_reply_lets_the_request_that_waits_be_sent_at_once),
+        SIM_TEST(a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait),
+        SIM_TEST(a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well),
+        SIM_TEST(units_with_the_same_last_five_bits_share_no_memory),
+        SIM_TEST(a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits),
+        SIM_TEST(two_nodes_of_one_unit_know_of_each_others_late_replies),
+        SIM_TEST(a_node_that_has_changed_its_unit_does_not_forget_the_late_reply),
+        SIM_TEST(a_broadcast_does_not_wait_after_a_cancelled_request),
+        SIM_TEST(a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones),
+        SIM_TEST(a_quiet_time_of_0_gives_it_all_up),
+        SIM_TEST(a_device_whose_replies_always_deviate_is_heard_again),
+        SIM_TEST(a_device_that_always_repeats_another_value_is_heard_again),
+        SIM_TEST(no_late_reply_that_deviates_is_taken_for_the_next_one),
+        SIM_TEST(a_new_connection_of_rtu_over_tcp_owes_nothing),
+    };
+
+    return cmocka_run_group_tests_name("heard again", tests, NULL, NULL);
+}
