@@ -200,12 +200,12 @@ model: ## Try every order of events around a request, then every stream of bytes
 	@$(CARGO) test $(MODEL) >$(BUILD)/model.log 2>&1 || { cat $(BUILD)/model.log; exit 1; }
 	@$(CARGO) run $(MODEL) -- $(MODEL_SECONDS)
 
-FAULT_TABLES := $(patsubst %,$(BUILD)/plain/test_%,bad_wire slow_devices server_blocks)
+FAULT_TABLES := $(patsubst %,$(BUILD)/plain/test_%,bad_wire slow_devices heard_again server_blocks)
 .PHONY: fault-table
 fault-table: need-test ## Generate docs/reports/fault-table.md and the table of docs/server.md from the tests' results
 	@$(MAKE) --no-print-directory $(FAULT_TABLES)
 	@scripts/check/run-c-tests $(FAULT_TABLES)
-	@for table in bad_wire slow_devices; do scripts/fill docs/reports/fault-table.md $$table <$(BUILD)/plain/test_$$table.rows || exit 1; done
+	@for table in bad_wire slow_devices heard_again; do scripts/fill docs/reports/fault-table.md $$table <$(BUILD)/plain/test_$$table.rows || exit 1; done
 	@scripts/fill docs/server.md server_blocks <$(BUILD)/plain/test_server_blocks.rows
 	@scripts/build/pictures
 

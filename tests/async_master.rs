@@ -379,6 +379,82 @@ fn a_late_reply_to_a_dropped_request_is_not_taken_for_the_next_one() {
     assert_eq!(words, [0x1005]);
 }
 
+/// Polls a future until it ends or the time has passed, as a program with a timeout does.
+fn run_for<F: Future>(bench: &mut Bench, future: F, limit: u32) -> Option<F::Output> {
+    let end = bench.wire.borrow().now + limit;
+    let mut future = pin!(future);
+    while bench.wire.borrow().now < end {
+        if let Poll::Ready(output) = poll(future.as_mut()) {
+            return Some(output);
+        }
+        bench.pass();
+    }
+    None
+}
+
+#[test]
+fn a_device_that_has_lost_a_reply_is_heard_again_by_futures_under_a_timeout() {
+    const TIMEOUT: u32 = 100_000; // the response timeout of `master`
+    for limit in [20_000, 40_000, 80_000, 150_000, 500_000] {
+        for pause in [0, 50_000, 60_000_000] {
+            let mut bench = Bench::new();
+            let mut master = master(&bench);
+            let mut words = [0];
+            let mut read = |bench: &mut Bench, address: u16| {
+                let read = master.read_holding_registers(address, &mut words);
+                let result = run_for(bench, read, limit);
+                bench.wire.borrow_mut().now += pause;
+                let is_read = result == Some(Ok(()));
+                assert!(!is_read || words == [0x1000 + address - 100]);
+                is_read
+            };
+            assert!((0..10).all(|at| read(&mut bench, 100 + at)));
+            bench.wire.borrow_mut().is_cut = true;
+            assert!(!read(&mut bench, 100));
+            bench.wire.borrow_mut().is_cut = false;
+            let well = bench.wire.borrow().now;
+            loop {
+                let begun = bench.wire.borrow().now;
+                if read(&mut bench, 105) {
+                    break;
+                }
+                assert!(begun - well < 5 * TIMEOUT, "limit {limit}, pause {pause}");
+            }
+            assert!((0..50).all(|at| read(&mut bench, 100 + at % 10)));
+        }
+    }
+}
+
+#[test]
+fn a_future_that_waits_for_its_unit_is_not_sent_when_it_is_dropped() {
+    let mut bench = Bench::new();
+    let mut master = master(&bench);
+    let mut words = [0];
+    bench.wire.borrow_mut().is_cut = true;
+    let read = master.read_holding_registers(100, &mut words);
+    assert!(run_for(&mut bench, read, 20_000).is_none());
+    bench.wire.borrow_mut().is_cut = false;
+    let sent = bench.wire.borrow().sent.len();
+    let end = bench.wire.borrow().now + 250_000;
+    while bench.wire.borrow().now < end {
+        let read = master.read_holding_registers(100, &mut words);
+        assert!(run_for(&mut bench, read, 20_000).is_none());
+    }
+    assert_eq!(bench.wire.borrow().sent.len(), sent);
+    let read = master.read_holding_registers(103, &mut words);
+    assert_eq!(bench.run(read), Ok(()));
+    assert_eq!(words, [0x1003]);
+    // Another unit need not wait.
+    bench.wire.borrow_mut().is_cut = true;
+    master.set_unit(18);
+    let read = master.read_holding_registers(100, &mut words);
+    assert!(run_for(&mut bench, read, 20_000).is_none());
+    bench.wire.borrow_mut().is_cut = false;
+    master.set_unit(17);
+    let read = master.read_holding_registers(104, &mut words);
+    assert_eq!(run_for(&mut bench, read, 120_000), Some(Ok(())));
+}
+
 #[test]
 fn a_request_that_is_dropped_at_any_time_leaves_the_master_usable() {
     let mut bench = Bench::new();

@@ -352,7 +352,8 @@ def check_terminal(mbm, files):
 
 
 class Serial:
-    """A device in RTU on a pseudo terminal, whose registers are all 7. It answers, is silent, answers with damage, or is pulled out."""
+    """A device in RTU on a pseudo terminal, whose registers are all 7. It answers, is silent, loses one reply, answers with damage, or is
+    pulled out."""
 
     def __init__(self, folder):
         self.path, self.mood = os.path.join(folder, "tty"), "right"
@@ -389,8 +390,10 @@ class Serial:
             request, checksum = b"", crc(reply)
             if self.mood == "damaged":
                 checksum = bytes([checksum[0] ^ 1, checksum[1]])
-            if self.mood != "silent":
+            if self.mood not in ("silent", "loses one"):
                 os.write(master, reply + checksum)
+            if self.mood == "loses one":
+                self.mood = "right"
         os.close(wake)
         os.close(master)
 
@@ -436,6 +439,57 @@ def check_drill(mbm, files):
     gateway.expect_line("the device", r"^info: tcp://.*: the line is open again\.$", since)
     gateway.end()
     other.go()
+
+
+def check_impatient_clients(mbm, files):
+    """A device loses one reply, once. Its client has less patience than the gateway: it closes its connection, connects
+    again and asks again."""
+    serials = []
+    lines = []
+    for unit in (1, 2, 3):
+        folder = os.path.join(files.folder, str(unit))
+        os.mkdir(folder)
+        serials.append(Serial(folder))
+        lines.append(files.line(f"rtu:{serials[-1].path}?baud=115200", unit))
+    # All else as it is by default.
+    files.write(*lines, head="listen: tcp://127.0.0.1:0\n")
+    gateway = Service(mbm, "gateway", files.path, ready=READY)
+
+    def asks(unit, patience):
+        client = Client(gateway.port)
+        client.socket.settimeout(patience)
+        try:
+            return client.ask(unit) == number(7)
+        except (TimeoutError, AssertionError):
+            return False
+        finally:
+            client.socket.close()
+
+    def lives(unit, patience, found):
+        serial = serials[unit - 1]
+        if not wait(lambda: asks(unit, PATIENCE)):
+            return
+        serial.mood = "loses one"
+        found["lost"] = not asks(unit, patience)
+        for found["rounds"] in range(1, int(PATIENCE / patience)):
+            if asks(unit, patience):
+                break
+        # The device itself is as fast as the machine.
+        found["heard"] = wait(lambda: asks(unit, patience), 10) and serial.mood == "right"
+
+    programs = []
+    for unit, patience in ((1, 0.2), (2, 0.5), (3, 1.0)):
+        found = {}
+        thread = threading.Thread(target=lives, args=(unit, patience, found), daemon=True)
+        thread.start()
+        programs.append((patience, thread, found))
+    for patience, thread, found in programs:
+        thread.join(2 * PATIENCE)
+        expect(f"a client that reconnects after {patience} s is answered again after one lost reply",
+               found.get("lost") and found.get("heard"), found)
+        # Two response timeouts of 1 s and the quiet time, after the request.
+        print(f"    after {found.get('rounds')} connections of {patience} s")
+    gateway.end()
 
 
 def check_connections(mbm, files):
@@ -493,5 +547,5 @@ def check_service(mbm):
     with tempfile.TemporaryDirectory() as folder:
         files = Files(folder)
         for check in (check_wrong_files, check_reload, check_stats, check_metrics, check_log, check_terminal, check_drill,
-                      check_connections, check_crowd, check_example):
+                      check_impatient_clients, check_connections, check_crowd, check_example):
             check(mbm, files)
