@@ -174,7 +174,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Reads the received bytes at the time `now` and drops them, while no request is pending. Notes
     /// which units have sent the frames among them. Negative if the link is lost.
     pub fn drop_received(&mut self, now: u32, is_rtu: bool) -> i16 {
-        if has_elapsed(self.settings.silence.get(), now, self.since) || self.end == self.space() {
+        // Bytes of the frame that is being received may have been dropped.
+        if has_elapsed(self.settings.silence.get(), now, self.since)
+            || self.end == self.space()
+            || self.run_length > self.end
+        {
             self.end = S::Count::ZERO;
             self.begin_frame();
         }
