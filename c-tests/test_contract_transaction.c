@@ -102,6 +102,8 @@ static void a_client_counts_bytes_as_they_are_sent(void **state)
             assert_in_range(counters.bytesSent, before, before + 1);
             s->now += s->idle_step;
         }
+        /* The request ends when its last bit has left. */
+        s->now += 20 * s->character;
         OK(mbm_client_cancel(&client, &request));
         assert_int_equal(counters.bytesSent, length);
         assert_int_equal(counters.requests, 1);
