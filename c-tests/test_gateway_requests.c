@@ -276,6 +276,22 @@ static void a_broadcast_to_all_lines_reaches_each(void **state)
     assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
 }
 
+static void a_broadcast_to_all_lines_of_a_gateway_without_lines_ends(void **state)
+{
+    static const mbm_gatewayRoute all[] = {{0, 0, MBM_GATEWAY_ALL_LINES, 0}};
+
+    (void)state;
+    gateway_bench_start(&b, all, COUNT(all));
+    b.config.lineCount = 0;
+    OK(mbm_gateway_begin(&b.gateway, &b.config));
+    gateway_bench_open(&b, 0);
+    ASK(0, 1, 0, WRITE);
+    (void)gateway_bench_step(&b);
+    assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
+    assert_int_equal(mbm_gateway_pollDelay(&b.gateway), UINT32_MAX);
+    SILENT(b.sockets[0]);
+}
+
 static void a_function_that_cannot_be_broadcast_gets_01(void **state)
 {
     static const mbm_gatewayRoute all[] = {{0, 0, MBM_GATEWAY_ALL_LINES, 0}};
@@ -309,6 +325,7 @@ int main(void)
         TEST(the_longest_request_and_reply_pass),
         TEST(a_broadcast_goes_to_its_line_and_gets_no_response),
         TEST(a_broadcast_to_all_lines_reaches_each),
+        TEST(a_broadcast_to_all_lines_of_a_gateway_without_lines_ends),
         TEST(a_function_that_cannot_be_broadcast_gets_01),
     };
 

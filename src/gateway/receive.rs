@@ -101,6 +101,7 @@ impl<S: GatewayStorage> Gateway<S> {
             0 => 0,
             _ => self.storage.now(connection),
         };
+        let lines = self.storage.line_count();
         let state = self.storage.request(request);
         state.unit = to.unit;
         state.order = order;
@@ -110,6 +111,9 @@ impl<S: GatewayStorage> Gateway<S> {
         if to.line == LOCAL {
             state.stage = Stage::Local;
             self.serve(request);
+        } else if lines == 0 {
+            // A broadcast to all lines, of which there are none.
+            self.release(request);
         } else {
             state.stage = Stage::Queued;
         }
