@@ -42,12 +42,14 @@ impl Limits {
         // The silence that the engine keeps after a failure, and after which it takes a held
         // reply. It may depend on how long earlier replies took.
         let hold = self.quiet.max(2 * self.timeout) + self.gap;
+        // A unit that may still answer a cancelled request is left alone until it is clean.
+        let late = 2 * self.timeout + self.quiet;
         // While the line is never silent, or the port takes nothing, an attempt ends after the
         // timeout. A byte that the port takes begins the time anew.
         let sending = 40 * (self.timeout + hold) + 300 * self.character;
         // The second is the silence that ends an ASCII frame.
         let reply = 2 * self.timeout + hold + self.turnaround + 1_000_000;
-        hold + sending + reply + self.backoff + self.rest
+        late + hold + sending + reply + self.backoff + self.rest
     }
 
     /// The longest time until a request has ended that has `ahead` others before it, while the

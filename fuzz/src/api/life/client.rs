@@ -299,7 +299,14 @@ pub fn lend(life: &Life, at: usize) {
         assert_eq!(status, OK, "a line without a request");
         for node in life.masters[index].nodes {
             let (read, write) = (words, words.wrapping_add(16));
-            call!(w, node, mbm_node_begin(node, own, 1, read, 16, write, 16));
+            // Two nodes of one unit, or two units that are equal modulo 32.
+            let unit = if w.byte() & 1 == 0 { 1 } else { 33 };
+            let begun = call!(
+                w,
+                node,
+                mbm_node_begin(node, own, unit, read, 16, write, 16)
+            );
+            assert_eq!(begun, OK, "a node without a request");
             call!(w, node, mbm_node_setBlocking(node, 0));
             call!(w, node, mbm_node_setResponseTimeout(node, 200));
         }
@@ -357,11 +364,44 @@ pub fn master_request(life: &Life) {
         .iter()
         .any(|line| line.borrower.get() == Some(index));
     let asker = usize::from(w.byte() & 1);
-    let node = own.nodes[asker];
+    request_of(life, own, asker, has_port);
+    if life.inside.get() > 0 || !has_port || w.byte() & 3 != 0 {
+        return;
+    }
+    // Cancelled, perhaps after it was sent: the next one waits for its unit, until another node has
+    // a request.
+    super::pass_times(life, w.byte() % 8);
     if own.pending.get().is_some() {
-        let status = call!(w, node, mbm_node_readHoldingRegisters(node, 0, 2));
+        cancel_master(life, own);
+    }
+    for asker in [asker, 1 - asker] {
+        request_of(life, own, asker, has_port);
+        super::pass_times(life, w.byte() % 4);
+    }
+}
+
+/// Makes a request with a node, which may be refused.
+fn request_of(life: &Life, own: &Master, asker: usize, has_port: bool) {
+    let w = &life.w;
+    let node = own.nodes[asker];
+    if let Some((before, _)) = own.pending.get() {
+        let id = life.id();
+        let status = call!(w, node, mbm_node_readHoldingRegisters(node, id, 2));
+        if status == PENDING {
+            // The request of the other node has waited for its unit, and gives way.
+            let other = own.nodes[own.asker.get()];
+            assert!(other != node, "a second request of a node");
+            let status = call!(w, other, mbm_node_poll(other));
+            assert_eq!(status, MBM_CANCELLED, "a request that has given way");
+            life.ends(before);
+            life.w.note(|| "a request has given way".to_string());
+            own.pending.set(Some((id, life.now.get())));
+            own.asker.set(asker);
+            life.begins(id);
+            return;
+        }
         assert_eq!(status, MBM_BUSY, "a second request on a line");
-        if w.byte() & 3 == 0 {
+        if w.byte() & 1 == 0 {
             cancel_master(life, own);
         }
         return;

@@ -86,6 +86,13 @@ fn pass(life: &Life) {
     check(life);
 }
 
+/// Lets the time pass a few times.
+fn pass_times(life: &Life, times: u8) {
+    for _ in 0..times {
+        pass(life);
+    }
+}
+
 fn poll(life: &Life) {
     life.plan.poll(life);
     for at in 0..LINES {
