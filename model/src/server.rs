@@ -106,6 +106,8 @@ struct State {
     due: u32,
     /// The last request has other bytes than the response before it.
     is_other: bool,
+    /// Since the last response, bytes have arrived that may be a damaged echo of it.
+    may_be_damaged: bool,
     /// The server cannot know yet that the line has no echo.
     may_be_echo: bool,
     last_response: Vec<u8>,
@@ -124,6 +126,7 @@ impl State {
             alone: true,
             due: 0,
             is_other: false,
+            may_be_damaged: false,
             may_be_echo: true,
             last_response: Vec::new(),
             since_response: LONG,
@@ -199,6 +202,8 @@ impl State {
                 let is_same = bytes == self.last_response && self.since_response < 2 * LONG / 10;
                 // Other bytes may be in front, and be lost with it or not.
                 let is_due = self.alone && !(is_same && self.may_be_echo);
+                self.is_other = !is_same && self.sent > 0 && !self.may_be_damaged;
+                self.may_be_damaged = false;
                 self.requests += 1;
                 if matches!(event, Event::Blocks(_)) {
                     let (first, second) = bytes.split_at(bytes.len() / 2);
@@ -210,11 +215,11 @@ impl State {
                 }
                 self.due = if is_due { self.sent + 1 } else { 0 };
                 self.alone = false;
-                self.is_other = !is_same && self.sent > 0;
             }
             Event::Cut(number) => {
                 let bytes = frame(REQUESTS[number].0);
                 self.arrive(&bytes[..5]);
+                self.may_be_damaged = true;
                 self.due = 0;
                 self.alone = false;
             }
