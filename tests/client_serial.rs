@@ -487,3 +487,83 @@ fn units_are_remembered_exactly_again_after_too_many_were_cancelled() {
         end.pass(10_000_000);
     }
 }
+
+/// Queues a read of the unit's exception status, with a timeout of its own.
+fn queue_read(client: &mut Transport, unit: u8, timeout_ms: u32) {
+    let read: fn(&mut RequestHeader) -> Status =
+        |o| o.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0);
+    let mut task = Task::new(unit, 1, &[], read);
+    task.state.timeout_ms = timeout_ms;
+    assert!(client.queue(task).is_ok());
+}
+
+/// Unit 1 answers the first read only after the second one of it was sent, and this one as well. The
+/// second read must have the second answer, whatever timeouts it and a read of unit 2 have.
+fn second_answer_after_a_late_one(timeout_ms: u32, is_other_read: bool) -> Task {
+    let (end, mut client) = rtu_client();
+    queue_read(&mut client, 1, 1000);
+    assert_eq!(
+        run(&end, &mut client).state.status,
+        Status::RESPONSE_TIMED_OUT
+    );
+    if is_other_read {
+        queue_read(&mut client, 2, 20);
+        let status = run(&end, &mut client).state.status;
+        assert_eq!(status, Status::RESPONSE_TIMED_OUT);
+    }
+    end.sent();
+    queue_read(&mut client, 1, timeout_ms);
+    sent(&end, &mut client);
+    end.deliver(2_000, &frame(1, &[7, 0x11]));
+    end.deliver(10_000, &frame(1, &[7, 0x22]));
+    run(&end, &mut client)
+}
+
+#[test]
+fn a_request_with_a_shorter_timeout_takes_no_late_reply_to_an_earlier_one() {
+    let task = second_answer_after_a_late_one(20, false);
+    assert_eq!(
+        (task.state.status, task.received()),
+        (Status::OK, &[0x22][..])
+    );
+}
+
+#[test]
+fn a_short_timeout_of_one_unit_does_not_end_the_memory_of_another() {
+    let task = second_answer_after_a_late_one(1000, true);
+    assert_eq!(
+        (task.state.status, task.received()),
+        (Status::OK, &[0x22][..])
+    );
+}
+
+/// The next request to a unit waits after a cancelled one, until the reply to that one comes.
+fn is_sent_once_the_reply_has_come(client: &mut Transport, end: &End, before: &[u8], reply: &[u8]) {
+    queue_read(client, 1, 1000);
+    sent(end, client);
+    assert!(client.cancel(|_| true).is_some());
+    queue_read(client, 2, 1000);
+    sent(end, client);
+    // The other unit answers at once, and the late reply follows it at once.
+    end.deliver(100, before);
+    assert_eq!(run(end, client).state.status, Status::OK);
+    queue_read(client, 1, 1000);
+    end.deliver(1_000, reply);
+    let began = end.now();
+    sent(end, client);
+    assert!(end.now() - began < 20_000);
+}
+
+#[test]
+fn a_unit_is_clean_once_its_late_reply_has_come_behind_that_of_another_unit() {
+    let (end, mut client) = rtu_client();
+    let reply = |unit| frame(unit, &[7, 0x11]);
+    is_sent_once_the_reply_has_come(&mut client, &end, &reply(2), &reply(1));
+}
+
+#[test]
+fn a_unit_on_an_ascii_line_is_clean_once_its_late_reply_has_come() {
+    let (end, mut client) = ascii_client();
+    let reply = |unit| characters(unit, &[7, 0x11]);
+    is_sent_once_the_reply_has_come(&mut client, &end, &reply(2), &reply(1));
+}

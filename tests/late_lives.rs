@@ -18,6 +18,7 @@ use mbm::port::Port;
 use mbm::Error;
 use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::fmt::Write as _;
 use std::rc::Rc;
 
 /// Times in microseconds.
@@ -31,6 +32,10 @@ const SLACK: u32 = 10 * MS;
 const NEVER: u32 = u32::MAX / 4;
 /// The reads of a life.
 const READS: u16 = 80;
+/// How many units a master remembers exactly on a host, and how often in a row a device is not heard
+/// if there are more that do not answer.
+const EXACT: usize = 10;
+const MOST_UNHEARD: u32 = 4;
 
 /// A generator of random numbers.
 struct Random(u64);
@@ -56,7 +61,8 @@ impl Random {
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     None,
-    /// One reply comes later than the response timeout, by less than that time, its characters included.
+    /// One reply comes later than the response timeout of its request, by this part of 256 of the
+    /// shortest response timeout, its characters included.
     Late(u16, u32),
     /// These replies are lost: the first, and how many.
     Lost(u16, u16),
@@ -83,12 +89,45 @@ struct World {
     devices: Vec<Device>,
     incoming: VecDeque<(u32, Vec<u8>)>,
     sent: Vec<u8>,
+    /// The response timeout of the request that is being made.
+    timeout: u32,
+    /// The shortest one of all requests.
+    shortest: u32,
+    is_ascii: bool,
+}
+
+/// The bytes of an ASCII frame.
+fn ascii(content: &[u8]) -> Vec<u8> {
+    let sum = content
+        .iter()
+        .fold(0u8, |sum, byte| sum.wrapping_add(*byte));
+    let mut text = String::from(":");
+    for byte in content.iter().chain(&[sum.wrapping_neg()]) {
+        write!(text, "{byte:02X}").expect("a string");
+    }
+    text.push_str("\r\n");
+    text.into_bytes()
+}
+
+/// The content of an ASCII frame.
+fn content(frame: &[u8]) -> Vec<u8> {
+    let digits = frame[1..frame.len() - 2].chunks(2);
+    digits
+        .map(|pair| {
+            let text = core::str::from_utf8(pair).expect("digits");
+            u8::from_str_radix(text, 16).expect("digits")
+        })
+        .collect()
 }
 
 impl World {
     /// The device that a whole request addresses answers it.
     fn answer(&mut self) {
-        let request = core::mem::take(&mut self.sent);
+        let mut request = core::mem::take(&mut self.sent);
+        if self.is_ascii {
+            request = content(&request);
+            request.push(0);
+        }
         assert_eq!(request.len(), 8, "only whole requests are sent");
         let now = self.now + 8 * CHARACTER;
         let found = self.devices.iter_mut().find(|d| d.unit == request[0]);
@@ -98,7 +137,9 @@ impl World {
         let mut latency = device.latency;
         let mut is_lost = false;
         match device.fault {
-            Fault::Late(at, by) if number == at => latency = TIMEOUT + by,
+            Fault::Late(at, by) if number == at => {
+                latency = self.timeout + (self.shortest / 256 * by).saturating_sub(2 * MS);
+            }
             Fault::Lost(first, count) if (first..first + count).contains(&number) => {
                 is_lost = true;
             }
@@ -114,7 +155,11 @@ impl World {
             return;
         }
         let mut reply = vec![request[0], 3, 2, request[2], request[3]];
-        reply.extend(crc16(&reply).to_bytes());
+        if self.is_ascii {
+            reply = ascii(&reply);
+        } else {
+            reply.extend(crc16(&reply).to_bytes());
+        }
         let at = at + 7 * CHARACTER;
         let place = self.incoming.partition_point(|(other, _)| *other <= at);
         self.incoming.insert(place, (at, reply));
@@ -192,7 +237,6 @@ enum Reader<'a> {
 }
 
 fn set(settings: &mut Settings) {
-    settings.set_baud_rate(115_200);
     settings.response_timeout = Setting::new(TIMEOUT);
     settings.quiet_time = Setting::new(QUIET);
 }
@@ -206,16 +250,27 @@ impl Reader<'_> {
         match kind {
             0 => {
                 let mut master = Master::new(1, wire.clone(), buffers());
+                master.settings().set_baud_rate(115_200);
                 set(master.settings());
                 Reader::Master(master)
             }
             1 => {
                 let mut line = Line::new(wire.clone(), buffers());
+                line.settings.set_baud_rate(115_200);
                 set(&mut line.settings);
                 Reader::Nodes(line, units.iter().map(|unit| Node::new(*unit)).collect())
             }
             _ => {
-                let mut client = Client::new(Serial::new(wire.clone(), Frame::new([0; 64])));
+                wire.0.borrow_mut().is_ascii = kind == 3;
+                let (end, frame) = (wire.clone(), Frame::new([0; 64]));
+                let mut client = match kind {
+                    3 => Client::new(Serial::ascii(end, frame)),
+                    4 => Client::over_tcp(end, frame),
+                    _ => Client::new(Serial::new(end, frame)),
+                };
+                if kind == 2 {
+                    client.settings().set_baud_rate(115_200);
+                }
                 set(client.settings());
                 Reader::Client(Box::new(client))
             }
@@ -225,11 +280,13 @@ impl Reader<'_> {
     /// Reads a register of the unit at `index`, until `limit` has passed: then it cancels the
     /// request.
     fn read(&mut self, wire: &Wire, index: usize, unit: u8, address: u16, limit: u32) -> Outcome {
+        let timeout = wire.0.borrow().timeout;
         let end = wire.now().saturating_add(limit);
         let left = |wire: &Wire| end.saturating_sub(wire.now());
         match self {
             Reader::Master(master) => {
                 master.set_unit(unit);
+                master.settings().response_timeout = Setting::new(timeout);
                 master.read_holding_registers(address, 1).unwrap();
                 loop {
                     if let std::task::Poll::Ready(result) = master.poll() {
@@ -246,6 +303,7 @@ impl Reader<'_> {
             Reader::Nodes(line, nodes) => {
                 let node = &mut nodes[index];
                 assert_eq!(line.ready(), Status::OK);
+                line.settings.response_timeout = Setting::new(timeout);
                 let function = FunctionSpec::READ_HOLDING_REGISTERS.short();
                 let started = node.request(line, address, 1, function);
                 assert_eq!(started, Status::PENDING);
@@ -270,7 +328,8 @@ impl Reader<'_> {
             }
             Reader::Client(client) => {
                 let words: &mut [u16] = Box::leak(Box::new([0u16]));
-                let request = Request::read_holding_registers(unit, address, words).unwrap();
+                let mut request = Request::read_holding_registers(unit, address, words).unwrap();
+                request.state.timeout_ms = timeout / MS;
                 client.queue(request).unwrap();
                 loop {
                     if let Some(request) = client.poll(wire.now()) {
@@ -301,6 +360,8 @@ struct Program {
     kind: u32,
     units: Vec<u8>,
     limits: Vec<u32>,
+    /// The response timeouts of its requests.
+    timeouts: Vec<u32>,
     pauses: Vec<u32>,
     is_in_turn: bool,
 }
@@ -309,7 +370,7 @@ fn fault(random: &mut Random, kind: u32) -> Fault {
     let first = random.below(5) as u16;
     match kind {
         0 => Fault::None,
-        1 => Fault::Late(first, 1 + random.below(TIMEOUT - 2 * MS)),
+        1 => Fault::Late(first, 1 + random.below(255)),
         2 => Fault::Lost(first, 1),
         3 => Fault::Lost(first, 1 + random.below(12) as u16),
         _ => Fault::Dead,
@@ -321,13 +382,16 @@ fn live(seed: u64) -> Result<(), String> {
     let mut random = Random::new(seed);
     let wire = Wire::default();
     wire.pass(1_000_000);
-    let sets: [&[u8]; 6] = [
+    let sets: [&[u8]; 8] = [
         &[1],
         &[1, 33],
         &[1, 33, 65, 97],
         &[7, 7],
         &[5, 6, 38],
         &[9, 9, 41],
+        // More units than the master has records for.
+        &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 33, 65],
+        &[1, 33, 65, 97, 129, 161, 193, 225, 2, 34, 66, 98, 130],
     ];
     let units = random.one_of(&sets).to_vec();
     for unit in &units {
@@ -348,8 +412,24 @@ fn live(seed: u64) -> Result<(), String> {
     }
     let limits = [20, 50, 100, 150, 300, 450, 600, 1200, 3000].map(|limit| limit * MS);
     let pauses = [0, 1, 10, 30, 100, 200, 500, 700, 5000].map(|pause| pause * MS);
+    let slowest = wire
+        .0
+        .borrow()
+        .devices
+        .iter()
+        .map(|device| device.latency)
+        .max();
+    let mut timeouts = vec![TIMEOUT];
+    if random.below(3) == 0 {
+        // Requests with timeouts of their own, which are longer than the latencies.
+        timeouts = [20, 60, 120, 200, 1000, 2000]
+            .map(|time| time * MS)
+            .to_vec();
+        timeouts.retain(|time| Some(*time) > slowest.map(|time| time + SLACK));
+    }
+    wire.0.borrow_mut().shortest = *timeouts.iter().min().unwrap_or(&TIMEOUT);
     let program = Program {
-        kind: random.below(3),
+        kind: random.below(5),
         units,
         limits: (0..random.one_of(&[1, 1, 2, 3]))
             .map(|_| match random.below(3) {
@@ -357,19 +437,26 @@ fn live(seed: u64) -> Result<(), String> {
                 _ => random.one_of(&limits),
             })
             .collect(),
+        timeouts,
         pauses: (0..random.one_of(&[1, 4]))
             .map(|_| random.one_of(&pauses))
             .collect(),
         is_in_turn: random.below(2) == 0,
     };
     let mut reader = Reader::of(program.kind, &wire, &program.units);
-    for number in 0..READS {
+    // How often in a row a device was not heard, if there are more than the master remembers exactly.
+    let mut unheard = vec![0; program.units.len()];
+    let is_exact = program.units.len() <= EXACT;
+    let reads = if is_exact { READS } else { 3 * READS };
+    for number in 0..reads {
         let index = match program.is_in_turn {
             true => usize::from(number) % program.units.len(),
             false => random.below(program.units.len() as u32) as usize,
         };
         let unit = program.units[index];
         let limit = random.one_of(&program.limits);
+        let timeout = random.one_of(&program.timeouts);
+        wire.0.borrow_mut().timeout = timeout;
         let began = wire.now();
         let outcome = reader.read(&wire, index, unit, number, limit);
         let world = wire.0.borrow();
@@ -391,13 +478,22 @@ fn live(seed: u64) -> Result<(), String> {
         }
         // A request with a shorter limit may still keep the device from this one.
         let needs = device.latency + QUIET + SLACK;
-        let is_short = program.limits.iter().any(|limit| *limit < needs);
-        let is_given = limit >= needs + if is_short { device.latency } else { 0 };
+        let times = || program.limits.iter().chain(&program.timeouts);
+        let is_short = times().any(|time| *time < needs);
+        let longest = *program.timeouts.iter().max().unwrap_or(&TIMEOUT);
+        let is_given = timeout
+            >= device.latency + SLACK + if is_short { device.latency } else { 0 }
+            && limit >= needs + if is_short { device.latency } else { 0 };
         // Where a limit leaves little more than the latency, the reply to a cancelled read delays
         // several later ones, each by less.
         let timeouts = if limit < needs + QUIET { 8 } else { 5 };
-        let is_well = device.well.saturating_add(timeouts * TIMEOUT) <= began;
-        if outcome.is_err() && is_well && is_given {
+        let is_well = device.well.saturating_add(timeouts * longest) <= began;
+        if outcome.is_ok() {
+            unheard[index] = 0;
+        } else if is_well && is_given {
+            unheard[index] += 1;
+        }
+        if unheard[index] > if is_exact { 0 } else { MOST_UNHEARD } {
             return Err(format!("not heard: {}", what()));
         }
         drop(world);

@@ -254,14 +254,14 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         &mut self,
         now: u32,
         storage: &mut S,
-        mut rest: impl FnMut(&RequestState, &mut S) -> u32,
+        mut rest: impl FnMut(&RequestState) -> u32,
     ) -> Option<J> {
         let mut least = u32::MAX;
         let found = self.queue.iter().position(|request| {
             let state = request.state();
             let mut wait = state.remaining_wait(now, storage);
             if state.is(Stage::Queued) {
-                wait = wait.max(rest(state, storage));
+                wait = wait.max(rest(state));
             }
             least = least.min(wait);
             wait == 0

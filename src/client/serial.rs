@@ -7,11 +7,10 @@ use super::storage::ClientStorage;
 use super::transaction::ClientEngine;
 use super::transport::Transport;
 use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
-use crate::engine::{clean_silence, Engine, LateUnits, Setting, Settings};
+use crate::engine::{Engine, LateUnits, Setting, Settings};
 use crate::error::Status;
 use crate::frame::{ascii, rtu};
 use crate::port::Port;
-use crate::time::elapsed;
 
 /// One request at a time, in RTU or ASCII frames.
 #[repr(C)]
@@ -102,23 +101,16 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
 
 /// Microseconds for which a line leaves a unit alone, because it may still answer a request that
 /// was cancelled. `now` is the time.
-pub fn late_rest<S: ClientStorage>(
+pub fn late_rest(
     state: &RequestState,
     late_units: &mut LateUnits,
     settings: &Settings,
-    storage: &mut S,
     now: u32,
 ) -> u32 {
     if settings.quiet_time.get() == 0 || !state.has_reply() {
         return 0;
     }
-    match late_units.awaited_since(state.unit()) {
-        None => 0,
-        Some(since) => {
-            let timeout = state.response_timeout(storage, settings.response_timeout.get());
-            clean_silence(timeout, settings).saturating_sub(elapsed(now, since))
-        }
-    }
+    late_units.rest(state.unit(), now)
 }
 
 impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, J> {
@@ -152,9 +144,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
             self.engine.request().client_request = Some(request);
         } else {
             let (late_units, settings) = (&mut self.engine.late_units, &self.engine.settings);
-            let rest = |state: &RequestState, storage: &mut S| {
-                late_rest(state, late_units, settings, storage, now)
-            };
+            let rest = |state: &RequestState| late_rest(state, late_units, settings, now);
             let due = match queue.is_held {
                 true => None,
                 false => queue.take_due(now, &mut self.engine.storage, rest),

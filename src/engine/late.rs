@@ -6,7 +6,8 @@
 //! if the function is the same. So the engine counts for each unit how many replies it owes:
 //! requests that were sent, and of which no reply was seen. A frame of the unit, wanted or not,
 //! takes one away. A unit that owes none is *clean*. So is a unit that was silent for two response
-//! timeouts and the quiet time since its last request was sent.
+//! timeouts and the quiet time since its last request was sent, by the timeout of that request or
+//! that of an earlier one that lasts longer; at most 134 s.
 //!
 //! - After a request without a right reply, the line is left alone for the quiet time.
 //! - After a request that timed out, the next one to that unit is sent. Its reply is held until
@@ -22,21 +23,15 @@
 //! A reply that arrives while no request has been sent and the unit owes none shows that more may
 //! be late.
 
-use super::late_units::{clean_silence, LateUnit, ANY, CANCELLED, LATE_UNITS, REPLIES, SLOW};
+use super::late_units::{LateUnit, ANY, CANCELLED, LATE_UNITS, LONGEST, REPLIES, SLOW};
 use super::{Engine, Outcome, Phase, Storage, Transaction, BROADCAST};
 use crate::port::Port;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
-    /// Makes the wait as long as a unit has to be silent to be clean.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn wait_until_clean(&mut self) {
-        self.wait = clean_silence(Q::response_timeout(self), &self.settings);
-    }
-
     /// Looks up what the unit of the pending request owes. Changes the wait.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn look_up_owed(&mut self) {
-        self.wait_until_clean();
+        self.wait = LONGEST;
         self.owed = 0;
         if let Some(&mut LateUnit { owed, since, .. }) = self.late_units.record(self.unit) {
             let is_broadcast = self.unit == BROADCAST && self.request.may_be_broadcast();
@@ -55,7 +50,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             return false;
         };
         self.since = record.since;
-        self.wait_until_clean();
+        self.wait = LONGEST;
         self.phase = Phase::Rest;
         true
     }
@@ -92,15 +87,27 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             self.begun = self.now;
         }
         let place = self.place_of_record();
+        let timeout = Q::response_timeout(self);
+        let mut since = self.begun;
+        let left = LONGEST
+            .wrapping_sub(timeout)
+            .wrapping_sub(timeout)
+            .wrapping_sub(self.settings.quiet_time.get());
+        if (left as i32) > 0 {
+            since = since.wrapping_sub(left);
+        }
         // The index is in range, so the compiler leaves the check out.
         #[allow(clippy::indexing_slicing)]
         let record = &mut self.late_units.records[place.min(LATE_UNITS - 1)];
         if place == LATE_UNITS {
             self.owed = ANY;
         }
+        // An earlier request may have had a longer timeout.
+        if record.owed == 0 || (record.since.wrapping_sub(since) as i32) < 0 {
+            record.since = since;
+        }
         record.unit = self.unit;
         record.owed = self.owed;
-        record.since = self.begun;
     }
 
     /// The index of the record of the pending request's unit, else of a free one: its unit has been
@@ -108,17 +115,23 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// units from now on.
     #[cfg_attr(target_os = "none", inline(never))]
     fn place_of_record(&mut self) -> usize {
-        self.wait_until_clean();
+        self.wait = LONGEST;
         let (mut place, mut index) = (LATE_UNITS, 0);
         while index < LATE_UNITS {
             // The index is in range, so the compiler leaves the check out.
             #[allow(clippy::indexing_slicing)]
-            let record = self.late_units.records[index];
-            let is_over = self.has_expired_since(record.since);
-            if record.is_of(self.unit) && !(record.owed == ANY && is_over) {
+            let LateUnit { unit, since, .. } = self.late_units.records[index];
+            let is_over = self.has_expired_since(since);
+            #[allow(clippy::indexing_slicing)]
+            let record = &mut self.late_units.records[index];
+            if is_over {
+                record.owed = 0;
+            }
+            // Its own record, also if it is free: so no other record is of this unit alone.
+            if unit == self.unit || record.owed == ANY {
                 return index;
             }
-            if record.owed == 0 || is_over {
+            if record.owed == 0 {
                 place = index;
             }
             index += 1;

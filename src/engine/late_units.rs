@@ -1,6 +1,5 @@
 //! The units of a line that may still answer earlier requests. See `late`.
 
-use super::Settings;
 use crate::time::elapsed;
 
 /// How many units are remembered exactly that owe replies at the same time: 10 on a host, 4 where
@@ -20,6 +19,9 @@ pub(super) const CANCELLED: u8 = 0x40;
 /// What a record owes that stands for all units without a record of their own.
 pub(super) const ANY: u8 = 0xFF;
 
+/// The longest time in microseconds for which a unit is expected to answer late, 134 s.
+pub(super) const LONGEST: u32 = 1 << 27;
+
 /// A unit that owes replies.
 #[derive(Clone, Copy, Hash, Debug)]
 #[repr(C)]
@@ -27,7 +29,7 @@ pub struct LateUnit {
     pub(super) unit: u8,
     /// What it owes, and flags; 0: the record is free.
     pub(super) owed: u8,
-    /// When its last request was sent.
+    /// [`LONGEST`] before the time at which it is clean. Each request has its own timeout.
     pub(super) since: u32,
 }
 
@@ -63,10 +65,14 @@ impl LateUnits {
         records.find(|record| record.is_of(unit))
     }
 
-    /// When the unit was last sent a request, if the next one waits until it is clean.
-    pub fn awaited_since(&mut self, unit: u8) -> Option<u32> {
-        let record = self.record(unit)?;
-        (record.owed & CANCELLED != 0).then_some(record.since)
+    /// Microseconds after `now` for which the next request to the unit waits until it is clean.
+    pub fn rest(&mut self, unit: u8, now: u32) -> u32 {
+        match self.record(unit) {
+            Some(record) if record.owed & CANCELLED != 0 => {
+                LONGEST.saturating_sub(elapsed(now, record.since))
+            }
+            _ => 0,
+        }
     }
 
     /// Has the next reply held after a cancelled request, as after a timeout. For model checkers, which
@@ -84,20 +90,12 @@ impl LateUnits {
     }
 
     /// As [`super::Engine::rebase`].
-    pub(super) fn rebase(&mut self, now: u32, longest: u32) {
+    pub(super) fn rebase(&mut self, now: u32) {
         for record in &mut self.records {
             match record.owed {
                 0 => *record = LateUnits::NONE.records[0],
-                _ => record.since = 0u32.wrapping_sub(elapsed(now, record.since).min(longest)),
+                _ => record.since = 0u32.wrapping_sub(elapsed(now, record.since).min(LONGEST)),
             }
         }
     }
-}
-
-/// The silence of a unit, in microseconds, after which it is clean: two response timeouts and the
-/// quiet time, after which the request that follows a timeout has been sent.
-pub(crate) fn clean_silence(timeout: u32, settings: &Settings) -> u32 {
-    timeout
-        .wrapping_add(timeout)
-        .wrapping_add(settings.quiet_time.get())
 }

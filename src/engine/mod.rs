@@ -29,7 +29,6 @@ mod storage;
 mod tally;
 mod transaction;
 
-pub(crate) use late_units::clean_silence;
 pub use late_units::LateUnits;
 pub use outcome::Outcome;
 pub use settings::{Setting, Settings};

@@ -1,5 +1,6 @@
 //! Moves a request on, from its start to its end.
 
+use super::late_units::LONGEST;
 use super::{Count, Engine, LateUnits, Moment, Outcome, Phase, Settings, Storage, Transaction};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
@@ -37,10 +38,17 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// For model checkers: two engines that will behave alike become equal.
     #[doc(hidden)]
     pub fn rebase(&mut self, now: u32, longest: u32) {
-        for time in [&mut self.since, &mut self.begun, &mut self.now] {
+        // A rest counts from long ago.
+        let rests = self.phase == Phase::Rest;
+        let longest_since = if rests { LONGEST } else { longest };
+        for (time, longest) in [
+            (&mut self.since, longest_since),
+            (&mut self.begun, longest),
+            (&mut self.now, longest),
+        ] {
             *time = 0u32.wrapping_sub(elapsed(now, *time).min(longest));
         }
-        self.late_units.rebase(now, longest);
+        self.late_units.rebase(now);
     }
 
     /// Enters a phase, whose wait begins with the next look at the clock.
@@ -174,10 +182,12 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Reads the received bytes at the time `now` and drops them, while no request is pending. Notes
     /// which units have sent the frames among them. Negative if the link is lost.
     pub fn drop_received(&mut self, now: u32, is_rtu: bool) -> i16 {
-        // Bytes of the frame that is being received may have been dropped.
+        // Bytes of the frame that is being received may have been dropped. What the last request has
+        // seen is over.
         if has_elapsed(self.settings.silence.get(), now, self.since)
             || self.end == self.space()
             || self.run_length > self.end
+            || self.seen != Outcome::NOTHING
         {
             self.end = S::Count::ZERO;
             self.begin_frame();
@@ -200,6 +210,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 self.content = S::Count::ZERO;
                 Q::search(self, self.end, S::Count::of(received as usize));
             }
+            self.see_nothing();
             self.tally(Status::PENDING);
         }
         received

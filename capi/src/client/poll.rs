@@ -6,9 +6,7 @@ use super::object::{
 use super::request::{mbm_clientRequest, RequestPtr};
 use super::MBM_CLIENT_DEPTH;
 use crate::{pointers, port};
-use mbm::client::{
-    late_rest, ClientRequest as _, ClientStorage as _, RequestState, Transport as _,
-};
+use mbm::client::{late_rest, ClientRequest as _, RequestState, Transport as _};
 use mbm::engine::LateUnits;
 use mbm::error::Status;
 
@@ -47,16 +45,10 @@ pub(crate) unsafe fn rest(client: *mut mbm_client, unit: u8) -> u32 {
             return 0;
         }
         let late_units = object.byte_add(kind.late_units.into()).cast::<LateUnits>();
-        if (*late_units).awaited_since(unit).is_none() {
-            return 0;
-        }
         let now = clock(client);
         let mut state = RequestState::NONE;
         state.unit = unit.into();
-        let (settings, storage) = (kind.settings(object), kind.storage(object));
-        // Looks up the timeout of the unit, too.
-        let _ = storage.rest(unit, now);
-        late_rest(&state, &mut *late_units, settings, storage, now)
+        late_rest(&state, &mut *late_units, kind.settings(object), now)
     }
 }
 
