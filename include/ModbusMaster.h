@@ -470,12 +470,12 @@ private:
         const bool sent = Line::wire.sent;
         Line::wire.user = &state;
         Line::wire.sent = false;
-        const uint8_t status = function(&state.node, arguments...);
-        if (status == ku8MBBusy) {
+        const uint8_t result = function(&state.node, arguments...);
+        if (result == ku8MBBusy) {
             Line::wire.user = user;
             Line::wire.sent = sent;
         }
-        return status;
+        return result;
     }
 #else
     mbm_line *line() { return &state.own.wire.line; }

@@ -567,3 +567,20 @@ fn a_unit_on_an_ascii_line_is_clean_once_its_late_reply_has_come() {
     let reply = |unit| characters(unit, &[7, 0x11]);
     is_sent_once_the_reply_has_come(&mut client, &end, &reply(2), &reply(1));
 }
+
+#[test]
+fn a_pause_of_any_length_makes_a_unit_clean() {
+    // Up to the wrap of the clock after 71.6 minutes.
+    for pause_ms in (3_000..4_294_900).step_by(7_919) {
+        let (end, mut client) = rtu_client();
+        queue_read(&mut client, 1, 1000);
+        sent(&end, &mut client);
+        assert!(client.cancel(|_| true).is_some());
+        end.pass(pause_ms * 1000);
+        queue_read(&mut client, 1, 1000);
+        let began = end.now();
+        sent(&end, &mut client);
+        let waited = end.now().wrapping_sub(began);
+        assert!(waited < 300_000, "{pause_ms} ms of pause: {waited} us");
+    }
+}

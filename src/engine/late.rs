@@ -7,7 +7,7 @@
 //! requests that were sent, and of which no reply was seen. A frame of the unit, wanted or not,
 //! takes one away. A unit that owes none is *clean*. So is a unit that was silent for two response
 //! timeouts and the quiet time since its last request was sent, by the timeout of that request or
-//! that of an earlier one that lasts longer; at most 134 s.
+//! that of an earlier one that lasts longer.
 //!
 //! - After a request without a right reply, the line is left alone for the quiet time.
 //! - After a request that timed out, the next one to that unit is sent. Its reply is held until
@@ -23,20 +23,19 @@
 //! A reply that arrives while no request has been sent and the unit owes none shows that more may
 //! be late.
 
-use super::late_units::{LateUnit, ANY, CANCELLED, LATE_UNITS, LONGEST, REPLIES, SLOW};
+use super::late_units::{ANY, CANCELLED, LATE_UNITS, REPLIES, SLOW};
 use super::{Engine, Outcome, Phase, Storage, Transaction, BROADCAST};
 use crate::port::Port;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
-    /// Looks up what the unit of the pending request owes. Changes the wait.
+    /// Looks up what the unit of the pending request owes.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn look_up_owed(&mut self) {
-        self.wait = LONGEST;
         self.owed = 0;
-        if let Some(&mut LateUnit { owed, since, .. }) = self.late_units.record(self.unit) {
+        if let Some(record) = self.late_units.record(self.unit) {
             let is_broadcast = self.unit == BROADCAST && self.request.may_be_broadcast();
-            if !is_broadcast && !self.has_expired_since(since) {
-                self.owed = owed;
+            if !is_broadcast && record.left(self.now) > 0 {
+                self.owed = record.owed;
             }
         }
     }
@@ -49,8 +48,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         let Some(record) = self.late_units.record(self.unit) else {
             return false;
         };
-        self.since = record.since;
-        self.wait = LONGEST;
+        self.since = self.now;
+        self.wait = record.left(self.now);
         self.phase = Phase::Rest;
         true
     }
@@ -67,7 +66,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Notes that the reply to the pending request may come late. `is_cancelled` is true if the
-    /// program has cancelled it. Changes the wait.
+    /// program has cancelled it.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn expect_late_reply(&mut self, is_cancelled: bool) {
         self.is_late = true;
@@ -88,14 +87,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
         let place = self.place_of_record();
         let timeout = Q::response_timeout(self);
-        let mut since = self.begun;
-        let left = LONGEST
-            .wrapping_sub(timeout)
-            .wrapping_sub(timeout)
-            .wrapping_sub(self.settings.quiet_time.get());
-        if (left as i32) > 0 {
-            since = since.wrapping_sub(left);
-        }
+        let silence = timeout
+            .wrapping_add(timeout)
+            .wrapping_add(self.settings.quiet_time.get());
         // The index is in range, so the compiler leaves the check out.
         #[allow(clippy::indexing_slicing)]
         let record = &mut self.late_units.records[place.min(LATE_UNITS - 1)];
@@ -103,9 +97,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             self.owed = ANY;
         }
         // An earlier request may have had a longer timeout.
-        if record.owed == 0 || (record.since.wrapping_sub(since) as i32) < 0 {
-            record.since = since;
-        }
+        record.clean_after(silence, self.begun);
         record.unit = self.unit;
         record.owed = self.owed;
     }
@@ -115,20 +107,16 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// units from now on.
     #[cfg_attr(target_os = "none", inline(never))]
     fn place_of_record(&mut self) -> usize {
-        self.wait = LONGEST;
         let (mut place, mut index) = (LATE_UNITS, 0);
         while index < LATE_UNITS {
             // The index is in range, so the compiler leaves the check out.
             #[allow(clippy::indexing_slicing)]
-            let LateUnit { unit, since, .. } = self.late_units.records[index];
-            let is_over = self.has_expired_since(since);
-            #[allow(clippy::indexing_slicing)]
             let record = &mut self.late_units.records[index];
-            if is_over {
+            if record.left(self.now) == 0 {
                 record.owed = 0;
             }
             // Its own record, also if it is free: so no other record is of this unit alone.
-            if unit == self.unit || record.owed == ANY {
+            if record.unit == self.unit || record.owed == ANY {
                 return index;
             }
             if record.owed == 0 {

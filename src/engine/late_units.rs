@@ -1,7 +1,5 @@
 //! The units of a line that may still answer earlier requests. See `late`.
 
-use crate::time::elapsed;
-
 /// How many units are remembered exactly that owe replies at the same time: 10 on a host, 4 where
 /// pointers have 32 bits, 1 on an AVR, where each takes 6 bytes of 2048.
 pub(super) const LATE_UNITS: usize = match size_of::<usize>() {
@@ -19,9 +17,6 @@ pub(super) const CANCELLED: u8 = 0x40;
 /// What a record owes that stands for all units without a record of their own.
 pub(super) const ANY: u8 = 0xFF;
 
-/// The longest time in microseconds for which a unit is expected to answer late, 134 s.
-pub(super) const LONGEST: u32 = 1 << 27;
-
 /// A unit that owes replies.
 #[derive(Clone, Copy, Hash, Debug)]
 #[repr(C)]
@@ -29,14 +24,40 @@ pub struct LateUnit {
     pub(super) unit: u8,
     /// What it owes, and flags; 0: the record is free.
     pub(super) owed: u8,
-    /// [`LONGEST`] before the time at which it is clean. Each request has its own timeout.
-    pub(super) since: u32,
+    /// No more than so many times 2^16 microseconds are left until the unit is clean. More on the
+    /// clock mean that it has been clean for long.
+    pub(super) most: u16,
+    /// When the unit is clean: it has been silent for long enough since its last request.
+    pub(super) clean: u32,
 }
 
 impl LateUnit {
     /// True if the record says what `unit` owes.
     pub(super) fn is_of(&self, unit: u8) -> bool {
         self.owed != 0 && (self.unit == unit || self.owed == ANY)
+    }
+
+    /// Microseconds from `now` until the unit is clean.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn left(&self, now: u32) -> u32 {
+        let left = self.clean.wrapping_sub(now);
+        if (left >> 16) as u16 > self.most {
+            0
+        } else {
+            left
+        }
+    }
+
+    /// Has the unit be clean `silence` microseconds after `since`, or when it is now if that is
+    /// later.
+    #[inline(always)]
+    pub(super) fn clean_after(&mut self, silence: u32, since: u32) {
+        let clean = since.wrapping_add(silence);
+        if self.owed == 0 || (self.clean.wrapping_sub(clean) as i32) < 0 {
+            self.clean = clean;
+            // The clock may step back a little.
+            self.most = (silence >> 16) as u16 + 1;
+        }
     }
 }
 
@@ -54,7 +75,8 @@ impl LateUnits {
         records: [LateUnit {
             unit: 0,
             owed: 0,
-            since: 0,
+            most: 0,
+            clean: 0,
         }; LATE_UNITS],
     };
 
@@ -68,9 +90,7 @@ impl LateUnits {
     /// Microseconds after `now` for which the next request to the unit waits until it is clean.
     pub fn rest(&mut self, unit: u8, now: u32) -> u32 {
         match self.record(unit) {
-            Some(record) if record.owed & CANCELLED != 0 => {
-                LONGEST.saturating_sub(elapsed(now, record.since))
-            }
+            Some(record) if record.owed & CANCELLED != 0 => record.left(now),
             _ => 0,
         }
     }
@@ -94,7 +114,7 @@ impl LateUnits {
         for record in &mut self.records {
             match record.owed {
                 0 => *record = LateUnits::NONE.records[0],
-                _ => record.since = 0u32.wrapping_sub(elapsed(now, record.since).min(LONGEST)),
+                _ => record.clean = record.left(now),
             }
         }
     }

@@ -1,6 +1,5 @@
 //! Moves a request on, from its start to its end.
 
-use super::late_units::LONGEST;
 use super::{Count, Engine, LateUnits, Moment, Outcome, Phase, Settings, Storage, Transaction};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
@@ -38,14 +37,7 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// For model checkers: two engines that will behave alike become equal.
     #[doc(hidden)]
     pub fn rebase(&mut self, now: u32, longest: u32) {
-        // A rest counts from long ago.
-        let rests = self.phase == Phase::Rest;
-        let longest_since = if rests { LONGEST } else { longest };
-        for (time, longest) in [
-            (&mut self.since, longest_since),
-            (&mut self.begun, longest),
-            (&mut self.now, longest),
-        ] {
+        for time in [&mut self.since, &mut self.begun, &mut self.now] {
             *time = 0u32.wrapping_sub(elapsed(now, *time).min(longest));
         }
         self.late_units.rebase(now);
@@ -73,13 +65,7 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// True once the wait is over.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn has_expired(&self) -> bool {
-        self.has_expired_since(self.since)
-    }
-
-    /// True once the wait would be over if it had begun at the time `since`.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn has_expired_since(&self, since: u32) -> bool {
-        has_elapsed(self.wait, self.now, since)
+        has_elapsed(self.wait, self.now, self.since)
     }
 }
 
@@ -221,7 +207,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     fn listen(&mut self) -> Status {
         // All received bytes are searched, also if the port returns them one by one. If they never
         // end, the poll ends after as many as an AVR searches in 30 ms at most.
-        const MOST: u8 = 90;
+        const MOST: u8 = 80;
         let mut budget = S::Count::from(MOST);
         loop {
             if self.end == self.space() {
