@@ -355,7 +355,7 @@ pub fn take_back(life: &Life, at: usize) {
 }
 
 /// Makes a request with a node of a master, whether the master has a port or not.
-pub fn master_request(life: &Life) {
+pub fn master_request(life: &Life, pass_times: fn(&Life, u8)) {
     let w = &life.w;
     let index = usize::from(w.byte()) % life.masters.len();
     let own: &Master = &life.masters[index];
@@ -370,13 +370,13 @@ pub fn master_request(life: &Life) {
     }
     // Cancelled, perhaps after it was sent: the next one waits for its unit, until another node has
     // a request.
-    super::pass_times(life, w.byte() % 8);
+    pass_times(life, w.byte() % 8);
     if own.pending.get().is_some() {
         cancel_master(life, own);
     }
     for asker in [asker, 1 - asker] {
         request_of(life, own, asker, has_port);
-        super::pass_times(life, w.byte() % 4);
+        pass_times(life, w.byte() % 4);
     }
 }
 

@@ -27,7 +27,7 @@ fn act(life: &Life) {
         11 | 12 => client::set(life, at),
         13 => client::lend(life, at),
         14 | 15 => client::take_back(life, at),
-        16 | 17 => client::master_request(life),
+        16 | 17 => client::master_request(life, pass_times),
         18 => client::begin_again(life, at),
         19 => client::replace(life, at),
         20 | 21 => link::begin_or_end(life, at),
