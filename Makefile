@@ -45,7 +45,7 @@ help: ## List the targets
 
 .PHONY: archive
 archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm.a
-	@echo "archive: $(ARCHIVE)"
+	@echo "archive: $(ARCHIVE), by $$(cat $(dir $(ARCHIVE))compiler)"
 
 # Phony, because Cargo decides what is out of date.
 .PHONY: $(ARCHIVE) $(SANITIZED_ARCHIVE)
@@ -108,6 +108,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@$(CARGO) run --quiet -p mbm-tools --bin circles
 	@$(HEADER) --check
 	@scripts/release/version
+	@scripts/check/compiler --page
 	@scripts/check/abi --check
 	@clang-format --dry-run --Werror $(C_SOURCES)
 	@scripts/check/header
@@ -480,7 +481,7 @@ $(AARCH64_ARCHIVE):
 archive-aarch64: $(AARCH64_ARCHIVE) ## Build the library with its ports for 64-bit Arm Linux, build/machines/aarch64-linux-gnu/linux
 	@scripts/need gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 	@MBM_MACHINE=$(AARCH64) scripts/build/ports $(AARCH64_ARCHIVE) $(AARCH64_FOLDER)/linux
-	@echo "archive-aarch64: $(AARCH64_FOLDER)/linux/libmbm.a"
+	@echo "archive-aarch64: $(AARCH64_FOLDER)/linux/libmbm.a, by $$(cat $(AARCH64_FOLDER)/compiler)"
 
 # The old tag of -rpath counts for the libraries of libraries too.
 $(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_ROOT)/usr/include \

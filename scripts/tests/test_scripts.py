@@ -1,11 +1,13 @@
 """Tests of scripts that write or judge texts: scripts/check/dependencies, scripts/check/real,
-packaging/debian/changelog, scripts/build/project.py, and packaging/sbom. `make test-scripts` has the
+packaging/debian/changelog, scripts/build/project.py, and packaging/sbom; and of the choice of the compiler
+in scripts/build/archive. `make test-scripts` has the
 library for the SBOM."""
 import copy
 import importlib.machinery
 import importlib.util
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -201,26 +203,119 @@ class Address(unittest.TestCase):
         self.assertEqual(self.wrong(), ["docs/guide-b.md: scripts/build/project.py does not say how a reader gets mbm"])
 
 
+def program(path, *lines):
+    """Writes a shell script."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("\n".join(["#!/bin/sh", *lines, ""]))
+    path.chmod(0o755)
+
+
+# --- the compiler that is measured and that ships
+
+MEASURED = subprocess.run([ROOT / "scripts/build/archive", "--compiler"], check=True, capture_output=True, text=True).stdout.strip()
+OTHER = "rustc 1.42.0 (b8cedc004 2020-03-09)"
+
+
+class Compiler(unittest.TestCase):
+    """Runs scripts/build/archive and scripts/check/compiler in a folder of their own. Programs stand for the compilers,
+    that of Debian in `debian`, rustup's in the path. Each Cargo prints its name and fails, so nothing is built."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        for script in ("scripts/build/archive", "scripts/check/compiler", "scripts/need"):
+            (self.root / script).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / script, self.root / script)
+        path = self.root / "scripts/build/archive"
+        text = path.read_text()
+        self.assertIn("${MBM_RUST:-/usr/bin}", text)
+        path.write_text(text.replace("${MBM_RUST:-/usr/bin}", f"${{MBM_RUST:-{self.root}/debian}}"))
+        self.compiler("debian", MEASURED)
+        self.compiler("path", OTHER)
+        program(self.root / "path/rustup", "echo thumbv6m-none-eabi", "echo aarch64-unknown-linux-gnu", "echo rust-src")
+        program(self.root / "path/dpkg-query", "echo install ok installed")
+        for tool in ("ar", "ld", "objcopy"):
+            program(self.root / f"path/aarch64-linux-gnu-{tool}")
+
+    def compiler(self, folder, version):
+        program(self.root / folder / "rustc", f"case $1 in --version) echo '{version}' ;; *) echo '{{}}' ;; esac")
+        program(self.root / folder / "cargo", f"echo Cargo of {folder} >&2", "exit 7")
+
+    def run_script(self, *command, **more):
+        kept = {name: value for name, value in os.environ.items() if not name.startswith("MBM_")}
+        return subprocess.run(command, cwd=self.root, env={**kept, "PATH": f"{self.root}/path:{os.environ['PATH']}", **more},
+                              capture_output=True, text=True)
+
+    def build(self, **more):
+        return self.run_script("scripts/build/archive", "cortex-m0plus", **more)
+
+    def test_a_target_that_rustup_has_does_not_change_the_compiler(self):
+        self.assertEqual(self.build().stderr, "Cargo of debian\n")
+
+    def test_another_machine_has_the_same_compiler(self):
+        found = self.run_script("scripts/build/archive", "--host", "build/arm/libmbm.a", MBM_MACHINE="aarch64-linux-gnu")
+        self.assertEqual(found.stderr, "Cargo of debian\n")
+
+    def test_another_version_of_the_compiler_builds_nothing(self):
+        self.compiler("debian", OTHER)
+        for more in ({}, {"MBM_RUST": ""}):
+            found = self.build(**more)
+            self.assertEqual(found.returncode, 1)
+            self.assertIn(f"is {OTHER}, but what is measured and shipped is built by {MEASURED}", found.stderr)
+            self.assertNotIn("Cargo", found.stderr)
+
+    def test_a_compiler_that_is_missing_is_named(self):
+        shutil.rmtree(self.root / "debian")
+        found = self.build()
+        self.assertEqual(found.returncode, 1)
+        self.assertIn(f"there is no compiler {self.root}/debian/rustc", found.stderr)
+
+    def test_another_compiler_is_taken_by_its_folder_only(self):
+        self.assertEqual(self.build(MBM_RUST=str(self.root / "path")).stderr, "Cargo of path\n")
+
+    def check(self, folder, name):
+        if name:
+            (self.root / folder).mkdir(parents=True)
+            (self.root / folder / "compiler").write_text(name + "\n")
+        return self.run_script("scripts/check/compiler", *sorted(str(path) for path in (self.root / "build").glob("*/*")))
+
+    def test_the_check_refuses_the_archive_of_another_compiler(self):
+        self.assertEqual(self.check("build/archives/cortex-m0", MEASURED).returncode, 0)
+        found = self.check("build/minimal/cortex-m0", OTHER)
+        self.assertEqual(found.returncode, 1)
+        self.assertIn(f"build/minimal/cortex-m0 was built by {OTHER}, but", found.stderr)
+
+    def test_the_check_refuses_an_archive_without_the_name_of_its_compiler(self):
+        (self.root / "build/archives/cortex-m0").mkdir(parents=True)
+        self.assertIn("cortex-m0/compiler is missing", self.check("", "").stderr)
+
+    def test_the_check_of_nothing_fails(self):
+        self.assertEqual(self.check("", "").returncode, 1)
+
+    def test_the_check_refuses_a_page_of_another_compiler(self):
+        page = self.root / "docs/reports/size.md"
+        page.parent.mkdir(parents=True)
+        page.write_text(f"Measured with {MEASURED}.\n")
+        self.assertEqual(self.run_script("scripts/check/compiler", "--page").returncode, 0)
+        page.write_text(f"Measured with {OTHER}.\n")
+        found = self.run_script("scripts/check/compiler", "--page")
+        self.assertEqual(found.returncode, 1)
+        self.assertIn(f"archives are built by {MEASURED}, but docs/reports/size.md was not measured with it", found.stderr)
+
+
 # --- the packages and the families of boards of the Arduino library
 
 class Boards(unittest.TestCase):
-    """Runs scripts/build/assembler on a system that lacks packages: `dpkg-query` says which, and any compiler
-    that is called leaves a mark."""
+    """Runs scripts/build/assembler on a system that lacks packages: `dpkg-query` says which."""
 
     def assemble(self, missing, boards=""):
         with tempfile.TemporaryDirectory() as folder:
-            tools, mark = pathlib.Path(folder), pathlib.Path(folder) / "compiled"
-            for name, lines in {
-                "dpkg-query": [f"case {' '.join(missing)} in *$4*) exit 1 ;; esac", "echo install ok installed"],
-                "rustup": ["exit 1"], "cargo": [f"touch {mark}", "exit 7"],
-            }.items():
-                (tools / name).write_text("\n".join(["#!/bin/sh", *lines, ""]))
-                (tools / name).chmod(0o755)
-            found = subprocess.run([ROOT / "scripts/build/archive", "--packages", *(
+            program(pathlib.Path(folder) / "dpkg-query",
+                    f"case {' '.join(missing)} in *$4*) exit 1 ;; esac", "echo install ok installed")
+            return subprocess.run([ROOT / "scripts/build/archive", "--packages", *(
                 row.mcu for row in project.SETS.values() if row.kind in self.kinds(boards))],
                 env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "MBM_INSTALL": "no"}, capture_output=True, text=True)
-            self.assertFalse(mark.exists())
-            return found
 
     def kinds(self, boards):
         with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": boards}):
