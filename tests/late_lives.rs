@@ -502,12 +502,108 @@ fn live(seed: u64) -> Result<(), String> {
     Ok(())
 }
 
+/// Lives one life of a client with several requests in its queue, some of which are cancelled after a
+/// limit; says what was wrong.
+fn live_queued(seed: u64) -> Result<(), String> {
+    let mut random = Random::new(seed);
+    let wire = Wire::default();
+    wire.pass(1_000_000);
+    let units: &[u8] = random.one_of(&[&[1, 33], &[1, 33, 65, 97], &[1, 2, 3, 4, 5, 34, 66, 98]]);
+    for unit in units {
+        let latency = random.one_of(&[3, 50, 105, 150, 230]) * MS;
+        let kind = random.below(5);
+        let fault = fault(&mut random, kind);
+        wire.0.borrow_mut().devices.push(Device {
+            unit: *unit,
+            latency,
+            fault,
+            requests: 0,
+            free: 0,
+            well: 0,
+        });
+    }
+    {
+        let mut world = wire.0.borrow_mut();
+        (world.timeout, world.shortest) = (TIMEOUT, TIMEOUT);
+        world.is_ascii = random.below(4) == 0;
+    }
+    let is_ascii = wire.0.borrow().is_ascii;
+    let (end, frame) = (wire.clone(), Frame::new([0; 64]));
+    let mut client: Client<Serial<Wire, Frame<[u8; 64]>, Request<'_>>, Request<'_>, 8> =
+        match is_ascii {
+            true => Client::new(Serial::ascii(end, frame)),
+            false => Client::new(Serial::new(end, frame)),
+        };
+    client.settings().set_baud_rate(115_200);
+    set(client.settings());
+    let limits = [20, 50, 100, 300, 600, 1200].map(|limit| limit * MS);
+    let may_cancel = random.below(4) > 0;
+    // The address and limit of each request in the queue.
+    let mut queued: Vec<(u16, u8, u32, u32)> = Vec::new();
+    let mut number = 0;
+    while number < READS || !queued.is_empty() {
+        if number < READS && queued.len() < 8 && (queued.is_empty() || random.below(3) == 0) {
+            let unit = units[random.below(units.len() as u32) as usize];
+            let limit = match may_cancel && random.below(3) == 0 {
+                true => random.one_of(&limits),
+                false => NEVER,
+            };
+            let words: &mut [u16] = Box::leak(Box::new([0u16]));
+            let mut request = Request::read_holding_registers(unit, number, words).unwrap();
+            request.state.transaction = number + 1;
+            client.queue(request).unwrap();
+            queued.push((number, unit, wire.now(), limit));
+            number += 1;
+        }
+        let ended = match client.poll(wire.now()) {
+            Some(request) => Some((request.state.transaction - 1, Some(request))),
+            None => {
+                let now = wire.now();
+                let over = queued
+                    .iter()
+                    .find(|(_, _, since, limit)| now - since >= *limit);
+                over.map(|(address, ..)| (*address, None))
+            }
+        };
+        let Some((address, request)) = ended else {
+            let now = wire.now();
+            let left = queued
+                .iter()
+                .map(|(_, _, since, limit)| limit - (now - since))
+                .min();
+            let delay = client.poll_delay(now).min(left.unwrap_or(NEVER));
+            wire.sleep(delay.min(10 * MS));
+            continue;
+        };
+        let place = queued.iter().position(|(queued, ..)| *queued == address);
+        let (_, unit, began, limit) = queued.remove(place.expect("a queued request"));
+        let Some(request) = request else {
+            let cancelled = client.cancel(|request| request.state.transaction == address + 1);
+            assert!(cancelled.is_some());
+            continue;
+        };
+        let result = request.result();
+        let world = wire.0.borrow();
+        let device = world.devices.iter().find(|d| d.unit == unit).unwrap();
+        let is_well = device.well.saturating_add(5 * TIMEOUT) <= began;
+        let fault = match result {
+            Ok(()) if request.registers()[0] != address => "wrong",
+            Err(_) if is_well => "not heard",
+            _ => continue,
+        };
+        return Err(format!(
+            "{fault}: MBM_SEED={seed}: read {address} of unit {unit} at {began} with limit {limit}, ASCII {is_ascii}"
+        ));
+    }
+    Ok(())
+}
+
 fn variable(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| text.parse().expect("a number"))
 }
 
-#[test]
-fn no_reading_is_wrong_and_a_device_that_answers_is_heard_again() {
+/// Lives as many lives as the environment says, from its first one on.
+fn lives(live: fn(u64) -> Result<(), String>) {
     let first = variable("MBM_SEED", 0);
     let mut found = [0; 2];
     for seed in first..first + variable("MBM_LIVES", 4000) {
@@ -517,4 +613,14 @@ fn no_reading_is_wrong_and_a_device_that_answers_is_heard_again() {
         }
     }
     assert_eq!(found, [0, 0], "not heard, wrong");
+}
+
+#[test]
+fn no_reading_is_wrong_and_a_device_that_answers_is_heard_again() {
+    lives(live);
+}
+
+#[test]
+fn no_queued_reading_is_wrong_and_a_device_that_answers_is_heard_again() {
+    lives(live_queued);
 }
