@@ -189,7 +189,8 @@ static uint32_t silence_before(ModbusMaster &first, ModbusMaster &second,
 {
     port.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(first.readHoldingRegisters(0, 1), 0);
-    uint32_t end = board().now;
+    /* The last of the seven bytes has come. */
+    uint32_t end = port.sentAt + port.delay + 6 * port.character;
     port.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(second.readHoldingRegisters(0, 1), 0);
     return port.startedAt - end;

@@ -143,3 +143,53 @@ fn a_reply_at_the_end_of_the_buffer_is_not_taken_for_an_echo() {
         assert_eq!(master.response()[0], 1);
     }
 }
+
+/// A wire from which a slow program takes one byte after the other, as long as the next one arrives
+/// meanwhile: one poll receives the whole reply.
+struct SlowWire {
+    wire: Wire,
+    received: u32,
+    silence: u32,
+}
+
+impl Port for SlowWire {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
+        let count = self.wire.read(&mut bytes[..1])?;
+        if count > 0 {
+            self.wire.now += 200;
+            self.received = self.wire.now;
+        }
+        Ok(count)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
+        self.silence = self.wire.now - self.received;
+        self.wire.write(bytes)
+    }
+
+    fn micros(&mut self) -> u32 {
+        self.wire.micros()
+    }
+}
+
+#[test]
+fn the_gap_counts_from_the_last_byte_although_one_poll_receives_them_all() {
+    let wire = Wire {
+        reply: sealed(&[
+            7, 3, 20, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20,
+        ]),
+        ..Wire::default()
+    };
+    let port = SlowWire {
+        wire,
+        received: 0,
+        silence: 0,
+    };
+    let mut master = Master::new(7, port, Buffers::new([0; 256], [0; 125], [0; 123]));
+    for _ in 0..2 {
+        assert_eq!(master.read_holding_registers(0, 10), Ok(()));
+        while !master.poll().is_ready() {}
+        assert_eq!(master.status(), Status::OK);
+    }
+    assert!((4000..4400).contains(&master.port().silence));
+}
