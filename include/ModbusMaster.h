@@ -28,6 +28,7 @@
 #include "ModbusMasterLine.h"
 #include "ModbusMasterOptions.h"
 #include "ModbusMasterPorts.h"
+#include "ModbusMasterUart.h"
 #include "ModbusMasterValues.h"
 #include "ModbusStatusText.h"
 #include "mbm/master.h"
@@ -62,7 +63,7 @@ public:
     // Always inline, so that a constant port number links only that UART.
     MODBUSMASTER_INLINE ModbusMaster(uint8_t port, uint8_t slave) : ModbusMaster(slave)
     {
-        state.port = port;
+        state.port = port <= 3 ? port & 3u : 0u;
         Ports::use(port);
     }
 
@@ -106,14 +107,16 @@ public:
      *                error, the object treats it as a Stream that accepts every byte and
      *                always returns 0
      */
-    void begin(uint8_t slave, Stream &stream)
-    {
-        Line::giveUp(state.node);
-        if (attach(slave) == MBM_OK) {
-            state.stream = &stream;
-            state.forgetRate();
-        }
-    }
+    void begin(uint8_t slave, Stream &stream) { use(slave, stream, false); }
+
+#if defined(MODBUSMASTER_UART)
+    /**
+     * As begin(slave, stream), for a UART of an AVR. The silence before each request is t3.5 of
+     * the rate that the UART has at that time, unless you have called setBaudRate, setGap or
+     * begin(baud) for this object, or for one that shares its line.
+     */
+    void begin(uint8_t slave, MODBUSMASTER_UART &uart) { use(slave, uart, true); }
+#endif
 
 #if !defined(MODBUSMASTER_SHARE_LINE)
     /**
@@ -309,7 +312,7 @@ public:
     uint8_t getSlaveID() const { return mbm_node_getSlaveID(&state.node); }
     // They are static only where objects share a line.
     // NOLINTBEGIN(readability-convert-member-functions-to-static)
-    /** Bits per second, from which t3.5 follows; 0: unknown, a silence of 4 ms. The Stream stays as it is. */
+    /** Bits per second, from which t3.5 follows; 0: a silence of 4 ms. The Stream stays as it is. */
     void setBaudRate(uint32_t baud)
     {
         if (mbm_line_setBaudRate(line(), baud) == MBM_OK)
@@ -396,27 +399,56 @@ private:
         ModbusTransmissionHook onIdle;
         ModbusTransmissionHook onPre;
         ModbusTransmissionHook onPost;
-        uint8_t port;
-        uint8_t order; // of values: see setWordOrder
+        uint8_t port : 2;
+        uint8_t order : 5; // of values: see setWordOrder
+        bool isUart : 1;   // the stream is a UART whose registers tell its rate
         mbm_node node;
         uint16_t response[responseWords];
         uint16_t transmit[transmitWords];
 #if defined(MODBUSMASTER_SHARE_LINE)
         // Several ports may share the line, so that of one object says nothing of its rate.
-        static void keepRate() {}
+        static void keepRate() { Line::wire.keepsGap = true; }
         static void forgetRate() {}
+        static bool keepsGap() { return Line::wire.keepsGap; }
+        static mbm_line *line() { return &Line::wire.line; }
 #else
         Line own;
 
         void keepRate() { own.keepRate(); }
         void forgetRate() { own.forgetRate(); }
+        bool keepsGap() const { return own.isRateKept || own.forget != nullptr; }
+        mbm_line *line() { return &own.wire.line; }
 #endif
+
+        // Tells the line the silence before a request over this object's stream.
+        void tellGap()
+        {
+#if defined(MODBUSMASTER_UART)
+            typedef ModbusMasterUart<MODBUSMASTER_UART> Uart;
+            if (keepsGap())
+                return;
+            uint16_t time = Uart::unknown;
+            if (isUart)
+                time = Uart::silenceOf(*static_cast<const MODBUSMASTER_UART *>(stream));
+            mbm_line_setGap(line(), static_cast<uint32_t>(time) << 2);
+#endif
+        }
     };
 
     State state;
 
     ModbusTransmissionHook &preHookOf() { return state.onPre; }
     ModbusTransmissionHook &postHookOf() { return state.onPost; }
+
+    void use(uint8_t slave, Stream &stream, bool isUart)
+    {
+        Line::giveUp(state.node);
+        if (attach(slave) == MBM_OK) {
+            state.stream = &stream;
+            state.isUart = isUart;
+            state.forgetRate();
+        }
+    }
 
     uint8_t attach(uint8_t slave)
     {
@@ -446,6 +478,13 @@ private:
         attach(getSlaveID());
     }
 
+    // Has the line make requests of an object.
+    static void takeLine(State &user)
+    {
+        Line::wire.user = &user;
+        user.tellGap();
+    }
+
     // Makes a request that reads or writes at most `words` words, by calling `function`.
     // Not inline: the memory of the frame is free when it returns.
     template <typename... Parameters>
@@ -468,11 +507,11 @@ private:
             return ku8MBBusy;
         State *const user = Line::wire.user;
         const bool sent = Line::wire.sent;
-        Line::wire.user = &state;
+        takeLine(state);
         Line::wire.sent = false;
         const uint8_t result = function(&state.node, arguments...);
         if (result == ku8MBBusy) {
-            Line::wire.user = user;
+            takeLine(*user);
             Line::wire.sent = sent;
         }
         return result;
@@ -508,6 +547,7 @@ private:
         if (state.stream == nullptr)
             return ku8MBNotInitialised;
         ModbusMasterUse<void>::tell(*line());
+        state.tellGap();
         state.own.wire.sent = false;
         return function(&state.node, arguments...);
     }

@@ -20,7 +20,8 @@ template <typename User> struct ModbusMasterWire {
     mbm_line line;
     User *user;
     Stream *counting; // the last Stream whose write returned another number than 0
-    bool sent;        // the request is on the wire, so a reply is waited for
+    bool sent;     // the request is on the wire, so a reply is waited for
+    bool keepsGap; // the sketch has set the silence before a request
 };
 
 #if defined(MODBUSMASTER_SHARE_LINE)

@@ -31,7 +31,10 @@ class ModbusMasterValues : public ModbusWordOrder,
                            public ModbusNumbers<ModbusMasterValues<Master>> {
 public:
     /** The order of values for calls without an order; orderABCD at first. */
-    void setWordOrder(WordOrder order) { static_cast<Master *>(this)->state.order = order; }
+    void setWordOrder(WordOrder order)
+    {
+        static_cast<Master *>(this)->state.order = order <= 31 ? order & 31u : 31u;
+    }
 
     /** An integer in the response: a word, 0 to 65535; only the bytes of its order matter. */
     bool getResponseUInt16(uint8_t index, uint16_t &value, WordOrder order = orderDefault) const

@@ -53,7 +53,7 @@ TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
 AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(ARDUINO_EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
             $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
             $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
-            $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf)
+            $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf) $(AVR_OUT)/mega/Rates.elf $(AVR_OUT)/mega/Silences.elf
 # Sketches that run with the small library too.
 MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe \
                 ServeSensorAndRelay)

@@ -386,6 +386,95 @@ static void phoenix_contact_makes_its_requests(void **state)
 
 /* --- sketches that are no examples */
 
+/* The silences on a wire before the requests of a sketch, and t3.5 at its rate then. */
+typedef struct silences {
+    uint64_t kept[32], wanted[32]; /* cycles */
+    unsigned count;
+} silences;
+
+/* The program notices the last byte and the end of a silence this many cycles later at most. */
+enum { LATER = 250 * MHZ };
+
+/* 3.5 characters of 11 bits, at least 1750 us. */
+static uint64_t silence_of_rate(const wire *w)
+{
+    const uint64_t silence = w->bit * 77 / 2, least = 1750 * MHZ;
+
+    return silence > least ? silence : least;
+}
+
+static void note_silence(wire *w, const uint8_t *frame, size_t length)
+{
+    silences *s = w->context;
+
+    assert_in_range(s->count, 0, COUNT(s->kept) - 1);
+    s->wanted[s->count] = silence_of_rate(w);
+    s->kept[s->count++] = w->first_started - w->received;
+    peer_right(w, frame, length);
+}
+
+static void run_to_its_end(board *b)
+{
+    assert_true(board_run_until(b, board_symbol(b, "done"), 1, 8000 * MS));
+    assert_int_equal(board_byte(b, board_symbol(b, "failed")), 0);
+}
+
+static void rates(const kind *k)
+{
+    board *b = kind_start(k, "Rates");
+    silences s = {.count = 0};
+
+    board_uart(b, k->bus, note_silence, &s);
+    run_to_its_end(b);
+    assert_int_equal(s.count, 28);
+    /* Nothing was received before the first request. */
+    for (unsigned i = 1; i < s.count; i++)
+        assert_in_range(s.kept[i], s.wanted[i], s.wanted[i] * 26 / 25 + LATER);
+    board_free(b);
+}
+
+static void a_uart_of_an_avr_keeps_t3_5_of_its_rate_without_being_told(void **state)
+{
+    (void)state;
+    rates(&uno);
+    rates(&mega);
+}
+
+static void assert_silences(const silences *s, const unsigned *microseconds, unsigned count)
+{
+    assert_int_equal(s->count, count);
+    for (unsigned i = 1; i < count; i++)
+        if (microseconds[i] > 0)
+            assert_in_range(s->kept[i], microseconds[i] * MHZ, microseconds[i] * MHZ + LATER);
+}
+
+static void silences_of(const kind *k, const unsigned *uart, unsigned count)
+{
+    static const unsigned pins[] = {0, 4000};
+    board *b = kind_start(k, "Silences");
+    silences on_uart = {.count = 0}, on_pins = {.count = 0};
+
+    board_uart(b, '0', note_silence, &on_uart);
+    /* Pins 10 and 11 are port B, bits 2 and 3 of an Uno, bits 4 and 5 of a Mega. */
+    board_pins(b, 'B', k == &uno ? 2 : 4, k == &uno ? 3 : 5, 19200, note_silence, &on_pins);
+    run_to_its_end(b);
+    assert_silences(&on_uart, uart, count);
+    assert_silences(&on_pins, pins, COUNT(pins));
+    board_free(b);
+}
+
+static void the_silence_is_that_of_the_port_unless_the_sketch_has_set_it(void **state)
+{
+    /* The third request comes after those over the pins. On an Uno the objects share a line, so
+     * setGap of one object holds for all. */
+    static const unsigned on_uno[] = {0, 1750, 0, 1750, 1750, 4000, 1750, 9000, 9000, 9000, 4010};
+    static const unsigned on_mega[] = {0, 1750, 0, 1750, 1750, 4000, 1750, 9000, 9000, 1750, 4010};
+
+    (void)state;
+    silences_of(&uno, on_uno, COUNT(on_uno));
+    silences_of(&mega, on_mega, COUNT(on_mega));
+}
+
 static void a_bus_on_two_pins_works(void **state)
 {
     board *b = kind_start(&uno, "Soft");
@@ -492,6 +581,8 @@ int main(void)
         cmocka_unit_test(values_pass_between_sketch_and_archive),
         cmocka_unit_test(basic_counts_in_the_server),
         cmocka_unit_test(phoenix_contact_makes_its_requests),
+        cmocka_unit_test(a_uart_of_an_avr_keeps_t3_5_of_its_rate_without_being_told),
+        cmocka_unit_test(the_silence_is_that_of_the_port_unless_the_sketch_has_set_it),
         cmocka_unit_test(a_bus_on_two_pins_works),
         cmocka_unit_test(two_ports_are_polled_at_once),
         cmocka_unit_test(a_call_without_reply_takes_the_timeout_and_what_is_left_of_the_quiet_time),

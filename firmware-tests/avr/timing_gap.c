@@ -1,4 +1,4 @@
-/* The gap that a master keeps while no baud rate is set. */
+/* The gap that a master keeps while no baud rate is set: t3.5 of the rate of its UART. */
 #include "peer.h"
 #include "rows.h"
 #include "timing.h"
@@ -6,8 +6,8 @@
 /* The calls of the sketch, in order. */
 enum { AFTER_BEGIN, OTHER_AFTER_PAUSE, OTHER_AT_ONCE, SAME_AFTER_PAUSE, CALLS };
 
-/* 4 ms; the core's clock counts in steps of 4 us. */
-enum { GAP = 4 * MS, CLOCK_STEP = 4 * MHZ };
+/* 1750 us; the core's clock counts in steps of 4 us. */
+enum { GAP = 1750 * MHZ, CLOCK_STEP = 4 * MHZ };
 
 typedef struct turns {
     wire *bus;
@@ -66,7 +66,7 @@ void time_default_gap(void)
         "first byte",
         t.waited[SAME_AFTER_PAUSE], 3463);
     row_of(
-        "no baud rate set: another object's request at once, dead time with the gap of 64000 cycles",
+        "no baud rate set: another object's request at once, dead time with the gap of 28000 cycles",
         t.silence[OTHER_AT_ONCE], GAP + GAP / 20);
     board_free(b);
 }

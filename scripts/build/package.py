@@ -131,7 +131,8 @@ typedef int mbm_core_has_code;
 # --- the Arduino library and the PlatformIO package: the headers, the assembler source and the sketches
 
 HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterHelpers.h",
-           "ModbusMasterOptions.h", "ModbusMasterPorts.h", "ModbusMasterLine.h", "util/crc16.h", "util/word.h",
+           "ModbusMasterOptions.h", "ModbusMasterPorts.h", "ModbusMasterLine.h", "ModbusMasterUart.h",
+           "util/crc16.h", "util/word.h",
            "ModbusMasterValues.h", "ModbusServer.h", "ModbusServerTables.h", "ModbusStatusText.h", "mbm.h",
            *(f"mbm/{part.name}" for part in sorted((ROOT / "include/mbm").glob("*.h"))),
            "ModbusClient.h", "ModbusClientCalls.h", "ModbusRequest.h", "ModbusValues.h", "ModbusNumbers.h",
