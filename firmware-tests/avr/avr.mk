@@ -68,7 +68,7 @@ CHIP_ELFS := $(foreach chip,$(CHIPS),$(patsubst %,$(AVR_OUT)/$(chip)/%.elf,First
 WIDE_ELFS := $(AVR_OUT)/uno-125/TimeWait.elf
 # With MODBUSMASTER, the folder of that library: the sketches that measure it.
 PEER_ELFS := $(if $(MODBUSMASTER),$(patsubst %,$(AVR_OUT)/uno-peer/%.elf,TimeRead TimeBasicNoGap SizeFC03 \
-                Basic PhoenixContact))
+                Basic PhoenixContact TimeUnchanged TimeLong))
 # A copy of the libraries with which the sketches were last compiled.
 LIBRARY_STAMP := $(BUILD)/avr/library
 

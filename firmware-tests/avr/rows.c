@@ -1,4 +1,5 @@
 #include "rows.h"
+#include "board.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -100,6 +101,15 @@ void row_beside_bytes(const char *what, unsigned long ours, const unsigned long 
     printf("= | %s | bytes | %lu |", what, ours);
     if (theirs)
         printf(" %lu |\n", *theirs);
+    else
+        printf(" |\n");
+}
+
+void row_beside_time(const char *what, uint64_t ours, uint64_t theirs)
+{
+    printf("= | %s | ms | %.2f |", what, (double)ours / MS);
+    if (theirs)
+        printf(" %.2f |\n", (double)theirs / MS);
     else
         printf(" |\n");
 }

@@ -26,6 +26,10 @@ void row_mean(const char *what, const span *s, unsigned long limit);
 void row_beside(const char *what, const span *ours, const span *theirs);
 void row_beside_bytes(const char *what, unsigned long ours, const unsigned long *theirs);
 
+/* The same for a time in cycles, which is printed in milliseconds; `theirs` is 0 if it was not
+ * measured. */
+void row_beside_time(const char *what, uint64_t ours, uint64_t theirs);
+
 /* How many rows have exceeded their limit so far. */
 unsigned rows_above(void);
 

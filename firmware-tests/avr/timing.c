@@ -11,6 +11,7 @@
 int main(int count, char **arguments)
 {
     time_master(count > 1 ? arguments[1] : NULL);
+    time_unchanged(count > 1 ? arguments[1] : NULL);
     time_default_gap();
     time_master_flood();
     time_server();

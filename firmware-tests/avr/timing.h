@@ -19,6 +19,8 @@ void time_master(const char *peer);
 void time_default_gap(void);
 /* Times a master that waits for a reply while other bytes arrive. */
 void time_master_flood(void);
+/* Times sketches for the library ModbusMaster that were not changed, and measures their RAM. */
+void time_unchanged(const char *peer);
 void time_server(void);
 /* Times a server while noise arrives without silence. */
 void time_server_flood(void);

@@ -195,8 +195,73 @@ static void polls(void)
     row_cycles("poll with new bytes, 115200 baud", &o.with, 0);
     /* The cycles of a received byte, with the core's interrupt, above those of waiting. */
     per_byte = (unsigned long)((o.with.sum - o.with.count * mean(&o.without)) / o.bytes_polled);
-    row("a received byte, above waiting (one lasts 1388 at 115200 baud)", "cycles", per_byte,
-        per_byte, 0);
+    row("a received byte in a sketch that polls, above waiting (one lasts 1388 at 115200 baud)",
+        "cycles", per_byte, per_byte, 0);
+}
+
+/* A blocking sketch, which shows each look for bytes by a change of its pin. */
+typedef struct waiting {
+    wire *bus;
+    uint64_t changed;  /* the last look */
+    uint64_t before;   /* the last look before the first byte */
+    unsigned received; /* bytes at the last look */
+    unsigned due, looks;
+    span empty; /* from one look to the next, while nothing arrives */
+    span byte;  /* what a byte costs, one value for each reply */
+} waiting;
+
+static void answer_at_length(wire *w, const uint8_t *frame, size_t length)
+{
+    waiting *o = w->context;
+    uint8_t reply[FRAME];
+
+    (void)length;
+    o->due = (unsigned)peer_right_reply(reply, frame);
+    o->received = w->bytes_received = 0;
+    wire_play(w, MS, reply, o->due);
+}
+
+/* From the last look before the first byte to the last one before the last byte, the sketch has
+ * taken all bytes but the last. What these looks have taken beyond empty ones are the bytes, with
+ * the core's interrupt. */
+static void looks(void *context, int level, uint64_t cycle)
+{
+    waiting *o = context;
+    unsigned received = o->bus->bytes_received;
+
+    (void)level;
+    if (o->due && received == 0) {
+        if (o->before)
+            note(&o->empty, cycle - o->before);
+        o->before = cycle;
+        o->looks = 0;
+    } else if (o->before && received == o->due) {
+        uint64_t took = o->changed - o->before, waited = o->looks * mean(&o->empty);
+
+        if (o->bus->frames > SKIP)
+            note(&o->byte, (took - waited) / (o->due - 1));
+        o->due = 0;
+        o->before = 0;
+    } else {
+        o->looks++;
+    }
+    o->changed = cycle;
+}
+
+static void waits(void)
+{
+    board *b = timed_board("uno", "TimeIdle");
+    waiting o = {0};
+
+    o.bus = board_uart(b, '0', answer_at_length, &o);
+    board_watch_pin(b, 'B', 0, looks, &o);
+    while (o.bus->frames < SKIP + COUNTED)
+        if (!board_run(b, MS))
+            give_up("a sketch crashed");
+    row_cycles(
+        "a received byte in a sketch that waits, above waiting (one lasts 1388 at 115200 baud)",
+        &o.byte, 0);
+    board_free(b);
 }
 
 /* The same sketches on the same board with the same replies, compiled with each of the two
@@ -233,5 +298,6 @@ void time_master(const char *peer)
     print_dead_times(&ours);
     returns();
     polls();
+    waits();
     compare_with(peer, &ours);
 }
