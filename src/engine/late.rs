@@ -119,7 +119,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             if record.unit == self.unit || record.owed == ANY {
                 return index;
             }
-            if record.owed == 0 {
+            if record.owed == 0 && place == LATE_UNITS {
                 place = index;
             }
             index += 1;

@@ -35,6 +35,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn begin(&mut self) -> Status {
         Q::write(self);
+        self.look_up_owed();
         self.begin_search();
         self.wait = self.line_silence();
         self.enter(Phase::Gap);
@@ -51,7 +52,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.see_nothing();
         self.has_more = false;
         self.is_held = false;
-        self.look_up_owed();
         self.begin_frame();
     }
 
