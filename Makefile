@@ -269,6 +269,7 @@ $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value cur
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device device_file device_value yaml_file value cursor numbers report)
 $(BUILD)/$(1)/test_place: $(patsubst %,$(BUILD)/$(1)/cli/%.o,place numbers)
+$(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,ahead_port found_port)
 $(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
@@ -434,7 +435,7 @@ trace: ## Compare what mbm and examples print with --trace with what tshark read
 
 .PHONY: gateway
 gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients and devices of libmodbus and pymodbus
-	@scripts/need python3 python3-venv gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev
+	@scripts/need python3 python3-venv gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev strace
 	@$(MAKE) --no-print-directory venv tool $(BUILD)/sanitized/mbm $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain $(BUILD)/sanitized/mbm
 

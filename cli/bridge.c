@@ -26,6 +26,7 @@ static unsigned long reloads, refused_reloads;
 static uint32_t alone_since; /* since when there is no broker */
 static int is_alone;         /* and that was reported */
 static int is_check;
+static int has_events = 1; /* of the broker, as far as is known */
 
 /* --- the files again --- */
 
@@ -257,29 +258,49 @@ static uint32_t watch_broker(void)
 
 /* --- work --- */
 
-/* Sleeps until there is something to do. */
+/* Sleeps until there is something to do, and notes what it is. */
 static void rest(uint32_t micros)
 {
     static struct pollfd polls[1 + BRIDGE_LINES + SERVICE_WAITS];
-    nfds_t count = 0;
+    line *polled[1 + BRIDGE_LINES];
+    nfds_t count = 1, n;
     unsigned i;
 
-    polls[count++] = (struct pollfd){bridge.mqtt.events[0], POLLIN, 0};
-    for (i = 0; i < line_count; i++)
-        count += (nfds_t)bridge_line_polls(lines[i], &polls[count], &micros);
-    (void)service_wait(polls, count, micros);
+    polls[0] = (struct pollfd){bridge.mqtt.events[0], POLLIN, 0};
+    for (i = 0; i < line_count; i++) {
+        const uint32_t delay = bridge_line_delay(lines[i]);
+
+        if (delay < micros)
+            micros = delay;
+        polled[count] = &lines[i]->at;
+        count += (nfds_t)line_polls(polled[count], &polls[count]);
+    }
+    has_events = 1;
+    if (service_wait(polls, count, micros) < 0)
+        return;
+    has_events = polls[0].revents != 0;
+    found_port_begin_round();
+    for (n = 1; n < count; n++)
+        line_polled(polled[n], &polls[n]);
 }
 
 static void work(void)
 {
-    unsigned i;
+    unsigned i, polls;
 
     if (service_reload_is_wanted())
         reload();
     service_work();
-    take_events();
-    for (i = 0; i < line_count; i++)
-        bridge_line_poll(lines[i]);
+    if (has_events)
+        take_events();
+    for (i = 0; i < line_count; i++) {
+        polls = 0;
+        /* A poll may leave work that waits for nothing: after a reply the next read is due. */
+        do
+            bridge_line_poll(lines[i]);
+        while (++polls < SERVICE_POLLS && bridge_line_delay(lines[i]) == 0);
+    }
+    found_port_end_round();
     if (!report_stopped)
         rest(watch_broker());
 }

@@ -424,11 +424,9 @@ void bridge_line_poll(bridge_line *l)
     line_poll(&l->at);
 }
 
-int bridge_line_polls(bridge_line *l, struct pollfd *wait, uint32_t *micros)
+uint32_t bridge_line_delay(bridge_line *l)
 {
-    const uint32_t delay = mbm_plan_pollDelay(&l->plan);
+    const uint32_t plan = mbm_plan_pollDelay(&l->plan), own = line_delay(&l->at);
 
-    if (delay < *micros)
-        *micros = delay;
-    return line_polls(&l->at, wait, micros);
+    return plan < own ? plan : own;
 }

@@ -63,8 +63,8 @@ void bridge_line_end(bridge_line *l);
 
 void bridge_line_poll(bridge_line *l);
 
-/* What to poll, as of line_polls. */
-int bridge_line_polls(bridge_line *l, struct pollfd *wait, uint32_t *micros);
+/* For how many microseconds the line has nothing to do. */
+uint32_t bridge_line_delay(bridge_line *l);
 
 /* Subscribes, and publishes everything that has been read: the broker is connected. */
 void bridge_line_connected(bridge_line *l);

@@ -6,6 +6,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
+#include "ahead_port.h"
 #include "commands.h"
 #include "gateway_line.h"
 #include "options.h"
@@ -42,7 +43,9 @@ static mbm_gatewayConfig config = {
     .requests = requests,
 };
 static mbm_tcp tcps[GATEWAY_CONNECTIONS] = MBM_INIT;
+static ahead_port aheads[GATEWAY_CONNECTIONS];
 static mbm_tcp_listener listener = MBM_INIT;
+static int is_client_waiting = 1; /* at the listener, as far as is known */
 static unsigned long connected, reloads, refused_reloads;
 
 /* What the command line says, and what is in force: the same, or with what the file says. */
@@ -238,16 +241,20 @@ static void take_connections(void)
     int slot;
 
     while ((slot = mbm_tcp_accept(&listener, tcps, config.connectionCount)) >= 0) {
+        const mbm_port own = mbm_tcp_port(&tcps[slot]);
         char name[24];
         mbm_port port;
 
         connected++;
         snprintf(name, sizeof name, "client %d", slot);
         report_log(REPORT_DEBUG, "%s is connected", name);
-        port = trace_server(mbm_tcp_port(&tcps[slot]), MBM_FRAMING_TCP, name);
+        port = trace_server(ahead_port_begin(&aheads[slot], &own), MBM_FRAMING_TCP, name);
         if (mbm_gateway_open(&gateway, (uint8_t)slot, &port) != MBM_OK)
             mbm_tcp_close(&tcps[slot]);
     }
+    /* An idle connection may have been closed for them. No wait shows that. */
+    for (slot = 0; slot < config.connectionCount; slot++)
+        aheads[slot].is_ready |= mbm_tcp_isInUse(&tcps[slot]) && tcps[slot].fd < 0;
 }
 
 /* Gives the requests of a connection up, and closes it. */
@@ -272,54 +279,84 @@ static short events_of(unsigned slot)
  * refuses a list that is longer than the limit of descriptors. */
 static struct {
     struct pollfd polls[1 + GATEWAY_LINES + GATEWAY_CONNECTIONS + SERVICE_WAITS];
-    uint8_t slots[GATEWAY_CONNECTIONS]; /* of the connections */
-    nfds_t count;
+    uint8_t slots[GATEWAY_LINES + GATEWAY_CONNECTIONS]; /* of clients, and then of lines */
+    nfds_t clients, count;
 } waits;
 
-/* Sleeps until there is something to do. */
-static void wait_for_work(void)
+/* Lists the descriptors. Returns for how long to sleep at most. */
+static uint32_t list_waits(void)
 {
     uint32_t delay = mbm_gateway_pollDelay(&gateway);
-    nfds_t clients, n;
     unsigned i;
 
     waits.count = 0;
-    for (i = 0; i < config.connectionCount; i++)
-        if (mbm_tcp_isInUse(&tcps[i])) {
-            waits.slots[waits.count] = (uint8_t)i;
-            waits.polls[waits.count++] = (struct pollfd){tcps[i].fd, events_of(i), 0};
-        }
-    clients = waits.count;
-    for (i = 0; i < config.lineCount; i++)
+    for (i = 0; i < config.connectionCount; i++) {
+        struct pollfd *one = &waits.polls[waits.count];
+
+        if (!mbm_tcp_isInUse(&tcps[i]))
+            continue;
+        *one = (struct pollfd){tcps[i].fd, events_of(i), 0};
+        waits.slots[waits.count++] = (uint8_t)i;
+        if ((one->events & POLLIN) && ahead_port_has_bytes(&aheads[i]))
+            delay = 0;
+    }
+    waits.clients = waits.count;
+    for (i = 0; i < config.lineCount; i++) {
+        waits.slots[waits.count] = (uint8_t)i;
         waits.count += (nfds_t)gateway_line_wait(&lines[i], &waits.polls[waits.count]);
+    }
     if (listener.events)
-        waits.polls[waits.count++] = (struct pollfd){listener.fd, POLLIN, 0};
+        waits.polls[waits.count] = (struct pollfd){listener.fd, POLLIN, 0};
     else if (delay > MBM_TCP_RETRY)
         delay = MBM_TCP_RETRY;
-    if (service_wait(waits.polls, waits.count, delay) < 0 && errno != EINTR) {
+    return delay;
+}
+
+/* Sleeps until there is something to do, and notes what it is. */
+static void wait_for_work(void)
+{
+    const uint32_t delay = list_waits();
+    const int is_listening = listener.events != 0;
+    const int found = service_wait(waits.polls, waits.count + (nfds_t)is_listening, delay);
+    const struct pollfd *one = waits.polls;
+    nfds_t n;
+
+    if (found < 0 && errno != EINTR)
         /* The system refuses to poll: it has no memory, or the limit of descriptors was
          * lowered. */
         (void)poll(NULL, 0, NAP_MICROS / 1000);
+    /* Without a wait it is not known what has come, so all are tried. */
+    for (n = 0; n < waits.clients && found < 0; n++)
+        aheads[waits.slots[n]].is_ready = 1;
+    is_client_waiting = 1;
+    if (found < 0)
         return;
-    }
-    for (n = 0; n < clients; n++) {
-        const struct pollfd *one = &waits.polls[n];
-
+    for (n = 0; n < waits.clients; n++, one++) {
+        if (one->revents & ~POLLOUT)
+            aheads[waits.slots[n]].is_ready = 1;
         if (!(one->events & POLLIN) && (one->revents & (POLLERR | POLLHUP | POLLNVAL)))
             drop_connection(waits.slots[n]);
     }
+    found_port_begin_round();
+    for (; n < waits.count; n++, one++)
+        found_port_note(&lines[waits.slots[n]].found, one);
+    is_client_waiting = !is_listening || one->revents != 0;
 }
 
 /* One round of the loop. */
 static void work(void)
 {
-    unsigned slot;
+    unsigned slot, polls = 0;
 
     if (service_reload_is_wanted())
         reload();
     service_work();
-    take_connections();
-    mbm_gateway_poll(&gateway);
+    if (is_client_waiting)
+        take_connections();
+    /* A poll may leave work that waits for nothing: a line has got a request. */
+    do
+        mbm_gateway_poll(&gateway);
+    while (++polls < SERVICE_POLLS && mbm_gateway_pollDelay(&gateway) == 0);
     for (slot = 0; slot < config.lineCount; slot++)
         if (lines[slot].is_used)
             gateway_line_watch(&lines[slot]);
@@ -331,6 +368,7 @@ static void work(void)
         if (mbm_gateway_status(&gateway, (uint8_t)slot) != MBM_OK)
             drop_connection(slot);
     }
+    found_port_end_round();
     wait_for_work();
 }
 

@@ -157,8 +157,8 @@ static void on_link(void *context, uint8_t event, uint8_t status)
 static void begin_client(gateway_line *line)
 {
     const place *where = &line->place;
-    const mbm_port below =
-        place_is_tcp(where) ? mbm_tcp_port(&line->tcp) : mbm_tty_port(&line->tty);
+    const mbm_port own = place_is_tcp(where) ? mbm_tcp_port(&line->tcp) : mbm_tty_port(&line->tty);
+    const mbm_port below = found_port_begin(&line->found, &own);
     const mbm_port port = trace_client(received_begin(&line->received, &below, where->framing),
                                        where->framing, where->text);
     mbm_client *client = &line->client;

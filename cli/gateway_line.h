@@ -6,6 +6,7 @@
 #ifndef GATEWAY_LINE_H
 #define GATEWAY_LINE_H
 
+#include "found_port.h"
 #include "gateway_file.h"
 #include "received.h"
 
@@ -30,7 +31,8 @@ typedef struct gateway_line {
     uint32_t replace_after, in_flight;
     uint32_t tried;     /* when the last attempt began */
     uint32_t looked_up; /* when the host was last looked up and not found */
-    received received;  /* since the last request */
+    found_port found;
+    received received; /* since the last request */
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     uint8_t outgoing[MBM_MAX_TCP_FRAME]; /* of Modbus TCP */
 } gateway_line;

@@ -210,7 +210,8 @@ static mbm_port port_of(line *l)
 
 static void begin_client(line *l)
 {
-    const mbm_port below = port_of(l);
+    const mbm_port own = port_of(l);
+    const mbm_port below = found_port_begin(&l->found, &own);
     const mbm_port port = trace_client(received_begin(&l->received, &below, l->place.framing),
                                        l->place.framing, l->place.text);
 
@@ -346,14 +347,17 @@ void line_wait(line *l, int fd, uint32_t micros)
     }
 }
 
-int line_polls(line *l, struct pollfd *wait, uint32_t *micros)
+uint32_t line_delay(line *l)
 {
-    uint32_t delay = mbm_client_pollDelay(&l->client);
+    const uint32_t delay = mbm_client_pollDelay(&l->client);
 
     if (l->place.kind == PLACE_TLS && mbm_tls_pollDelay(&l->tls) < delay)
-        delay = mbm_tls_pollDelay(&l->tls);
-    if (delay < *micros)
-        *micros = delay;
+        return mbm_tls_pollDelay(&l->tls);
+    return delay;
+}
+
+int line_polls(const line *l, struct pollfd *wait)
+{
     if (l->place.kind == PLACE_UDP) {
         *wait = (struct pollfd){l->udp.fd, POLLIN, 0};
         return l->udp.port != 0 && !l->udp.isLost;
@@ -365,6 +369,13 @@ int line_polls(line *l, struct pollfd *wait, uint32_t *micros)
     /* An idle line's bytes are noise. Without events only its loss ends the sleep. */
     *wait = (struct pollfd){l->tty.fd, mbm_client_pending(&l->client) > 0 ? POLLIN : 0, 0};
     return l->tty.isOpen;
+}
+
+void line_polled(line *l, const struct pollfd *wait)
+{
+    /* TLS keeps bytes that the descriptor does not show. */
+    if (l->place.kind != PLACE_TLS)
+        found_port_note(&l->found, wait);
 }
 
 static int rest(void *context, uint32_t micros)

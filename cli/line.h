@@ -4,6 +4,7 @@
 #ifndef LINE_H
 #define LINE_H
 
+#include "found_port.h"
 #include "mbm_call.h"
 #include "mbm_tls_linux.h"
 #include "mbm_udp.h"
@@ -31,8 +32,9 @@ typedef struct line {
     uint8_t is_replaced; /* that a silent device is connected to anew was reported */
     mbm_counters opened; /* `counters` when the line was opened the last time */
     char reason[160];    /* why it was the last time */
-    received received;   /* since the last request */
-    char came[160];      /* in place of a reply, to the last request that failed */
+    found_port found;
+    received received; /* since the last request */
+    char came[160];    /* in place of a reply, to the last request that failed */
     uint8_t incoming[1024], outgoing[1024];
 } line;
 
@@ -58,9 +60,14 @@ void line_rest(line *l, uint32_t milliseconds);
  * in microseconds or a second. */
 void line_wait(line *l, int fd, uint32_t micros);
 
-/* What to poll for the line, with other descriptors. Returns 0 if it has no descriptor. Lowers the
- * time to sleep, in microseconds, to what the line admits. */
-int line_polls(line *l, struct pollfd *wait, uint32_t *micros);
+/* For how many microseconds the line has nothing to do unless bytes arrive. */
+uint32_t line_delay(line *l);
+
+/* What to poll for the line, with other descriptors. Returns 0 if it has no descriptor. */
+int line_polls(const line *l, struct pollfd *wait);
+
+/* What was found then. A round of found_port.h has begun. */
+void line_polled(line *l, const struct pollfd *wait);
 
 /* Waits for a request that was queued. Returns its status, MBM_CANCELLED after Ctrl-C. */
 uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued);

@@ -10,8 +10,10 @@
 
 #include <argp.h>
 
-/* The descriptors that service_wait adds to those of the program. */
-enum { SERVICE_WAITS = METRICS_WAITS };
+/* WAITS: the descriptors that service_wait adds to those of the program. POLLS: how often an object
+ * is polled at most in one round while its pollDelay is 0, so that the other descriptors are not
+ * forgotten. */
+enum { SERVICE_WAITS = METRICS_WAITS, SERVICE_POLLS = 4 };
 
 /* --stats, --stats-every, --metrics and --log-level. */
 extern const struct argp options_service;

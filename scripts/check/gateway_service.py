@@ -355,8 +355,8 @@ class Serial:
     """A device in RTU on a pseudo terminal, whose registers are all 7. It answers, is silent, loses one reply, answers with damage, or is
     pulled out."""
 
-    def __init__(self, folder):
-        self.path, self.mood = os.path.join(folder, "tty"), "right"
+    def __init__(self, folder, name="tty"):
+        self.path, self.mood = os.path.join(folder, name), "right"
         self.plug_in()
 
     def plug_in(self):
@@ -517,6 +517,66 @@ def check_connections(mbm, files):
     gateway.end()
     for one in idle, closing, silent, kept:
         one.go()
+
+
+def traced(mbm, folder, *arguments):
+    """A gateway whose system calls strace writes to a file."""
+    return Service("strace", "-D", "-o", os.path.join(folder, "calls"), mbm, "gateway", "tcp://127.0.0.1:0", *arguments,
+                   ready=READY)
+
+
+def end_traced(gateway, folder):
+    """Ends it, and returns its calls, one a line."""
+    gateway.end()
+    path = os.path.join(folder, "calls")
+    wait(lambda: "+++ exited" in open(path).read())
+    with open(path) as file:
+        return [line for line in file if line[0].isalpha()]
+
+
+def calls_of(mbm, folder, clients, each, others):
+    """The system calls of a gateway for each request, while clients ask one line and others are idle."""
+    serial, idle = Serial(folder, "asked"), Serial(folder, "idle")
+    gateway = traced(mbm, folder, f"rtu:{serial.path}?baud=115200", "7", f"rtu:{idle.path}?baud=115200", "8")
+    silent = [Client(gateway.port) for _ in range(others)]
+    asking = [Client(gateway.port) for _ in range(clients)]
+    expect("the device answers", [one.ask(7) for one in asking + silent] == [number(7)] * (clients + others))
+
+    def ask(one):
+        for _ in range(each):
+            expect("each request has its reply", one.ask(7) == number(7))
+
+    threads = [threading.Thread(target=ask, args=(one,)) for one in asking]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    calls, count = end_traced(gateway, folder), clients * each
+    serial.pull_out()
+    idle.pull_out()
+    sent = [at for at, call in enumerate(calls) if call.startswith("send")]
+    expect("each response is sent by one call", len(sent) == count + clients + others, len(sent))
+    return (sent[-1] - sent[-1 - count]) / count
+
+
+def check_calls(mbm):
+    """A request costs few system calls, however many connections and lines are idle."""
+    for clients, each, others in (1, 300, 0), (1, 300, 12), (10, 40, 0):
+        with tempfile.TemporaryDirectory() as folder:
+            found = calls_of(mbm, folder, clients, each, others)
+        print(f"  {clients} asking, {others} idle: {found:.2f} system calls a request")
+        expect(f"{clients} asking, {others} idle: at most 8 system calls a request", found <= 8, found)
+
+    # More requests in one segment than the gateway takes from a connection in one poll.
+    with tempfile.TemporaryDirectory() as folder:
+        gateway = traced(mbm, folder, "rtu:/dev/no-such-line", "1", "--requests", "128", "--log-level", "error")
+        client = Client(gateway.port)
+        client.socket.sendall(b"".join(frame(i, 9, READ) for i in range(100)))
+        expect("a hundred requests at once are answered", [client.take() for _ in range(100)] == [NO_PATH] * 100)
+        calls = end_traced(gateway, folder)
+    sent = [at for at, call in enumerate(calls) if call.startswith("send")]
+    expect("no sleep keeps them waiting", not [call for call in calls[sent[0] : sent[-1]] if "(Timeout)" in call and
+                                               "tv_sec=0, tv_nsec=0}" not in call], "".join(calls[sent[0] : sent[-1]]))
 
 
 def check_crowd(mbm, files):
