@@ -6,6 +6,7 @@
 #   lib             the folder of the library, below prefix
 #   up              the relative path from the folder of the CMake files to prefix
 #   pointer         the bytes of a pointer in the library
+#   link            what a linker needs beside the library: nothing, or -Wl,--gc-sections where the archive is one object
 fill() {
     version=$(scripts/version)
     major=${version%%.*}
@@ -15,7 +16,7 @@ fill() {
     sed -e "s|@PREFIX@|$prefix|g" -e "s|@INCLUDEDIR@|\${prefix}/include|g" \
         -e "s|@LIBDIR@|\${prefix}/$lib|g" -e "s|@LIB@|$lib|g" -e "s|@INCLUDE@|include|g" -e "s|@UP@|$up|g" \
         -e "s|@VERSION@|$version|g" -e "s|@MAJOR@|$major|g" -e "s|@MINOR@|$minor|g" \
-        -e "s|@POINTER@|$pointer|g" "$1" >"$2"
+        -e "s|@POINTER@|$pointer|g" -e "s|@LINK@|${link:+ $link}|g" "$1" >"$2"
     chmod 644 "$2"
 }
 

@@ -137,9 +137,9 @@ WAYS = {
     "docs/guide-arduino.md": guide("the library", "mbm-arduino-VERSION.zip", "make arduino-zip"),
     "docs/guide-esp-idf.md": guide("the component", "mbm-esp-idf-VERSION.tar.gz", "make package KIND=esp-idf"),
     "docs/guide-platformio.md": guide("the package", "mbm-platformio-VERSION.tar.gz", "make package KIND=platformio"),
-    "docs/guide-linux.md": Way(f"Download the C SDK, `{SDK}`, or the Debian package `libmbm-dev`, {RELEASE}.",
+    "docs/guide-linux.md": Way(f"Download the C SDK, `{SDK}`, or the Debian packages `libmbm-dev` and `libmbm0`, {RELEASE}.",
                                "No release is published yet: in a clone of mbm, `make install` installs the library, "
-                               "`make package KIND=debian` writes the Debian package `libmbm-dev` to the folder `dist`, and "
+                               "`make package KIND=debian` writes the Debian packages `libmbm-dev` and `libmbm0` to the folder `dist`, and "
                                f"`make package KIND=sdk` the C SDK, `{SDK}`."),
     "docs/guide-mcu.md": guide("the C SDK", SDK, "make package KIND=sdk"),
     "docs/guide-rt-thread.md": guide("the package", "mbm-rt-thread-VERSION.tar.gz", "make package KIND=rt-thread"),
