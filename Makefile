@@ -318,6 +318,9 @@ $(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client bench_floor suppor
 BENCH_SERVER := $(BUILD)/bench/bench_server
 $(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server bench_tables bench_loops linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tcp_set linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -o $@
+BENCH_GATEWAY := $(BUILD)/bench/bench_gateway
+$(BENCH_GATEWAY): $(patsubst %,$(BUILD)/bench/%.o,bench_gateway support/pty)
+	@gcc $(filter %.o,$^) -o $@
 BENCH_LOOP := $(BUILD)/bench/bench_loop
 $(BENCH_LOOP): $(patsubst %,$(BUILD)/bench/%.o,bench_loop linux/mbm_loop linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tcp_set linux/mbm_tty linux/mbm_udp) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
@@ -329,15 +332,16 @@ $(BENCH_PLAN): $(BUILD)/bench/bench_plan.o $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
-bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone of nanoMODBUS; writes docs/reports/*speed.md
-	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
+bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone of nanoMODBUS, MBUSD=mbusd; writes docs/reports/*speed.md
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind strace
 	@rm -rf $(BUILD)/bench/bench_client.o $(NANO_SOURCE)
-	@$(MAKE) --no-print-directory $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_LOOP) $(BENCH_SNIFFER) $(BENCH_PLAN)
+	@$(MAKE) --no-print-directory $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_LOOP) $(BENCH_SNIFFER) $(BENCH_PLAN) $(BENCH_GATEWAY) $(INSTALLED_TOOL)
 	@scripts/bench/speed server $(BENCH_SERVER)
 	@CARGO="$(CARGO)" scripts/bench/speed client $(BENCH_CLIENT)
 	@scripts/bench/speed loop $(BENCH_LOOP)
 	@scripts/bench/speed sniffer $(BENCH_SNIFFER)
 	@scripts/bench/speed plan $(BENCH_PLAN)
+	@MBUSD="$(MBUSD)" scripts/bench/speed gateway $(BENCH_GATEWAY) $(INSTALLED_TOOL)
 	@CARGO="$(CARGO)" scripts/bench/speed frames
 	@scripts/build/pictures
 
