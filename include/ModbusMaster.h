@@ -234,73 +234,83 @@ public:
      */
     uint8_t readCoils(uint16_t address, uint16_t quantity)
     {
-        return request(wordsOf(quantity), mbm_node_readCoils, address, quantity);
+        return request(Line::bytesOfRead(wordsOf(quantity)), mbm_node_readCoils, address,
+                       quantity);
     }
     /** Function 02: as readCoils, of 1 to 2000 discrete inputs. */
     uint8_t readDiscreteInputs(uint16_t address, uint16_t quantity)
     {
-        return request(wordsOf(quantity), mbm_node_readDiscreteInputs, address, quantity);
+        return request(Line::bytesOfRead(wordsOf(quantity)), mbm_node_readDiscreteInputs, address,
+                       quantity);
     }
     /** Function 03: reads 1 to 125 holding registers; see readCoils. */
     uint8_t readHoldingRegisters(uint16_t address, uint16_t quantity)
     {
-        return request(quantity, mbm_node_readHoldingRegisters, address, quantity);
+        return request(Line::bytesOfRead(quantity), mbm_node_readHoldingRegisters, address,
+                       quantity);
     }
     /** Function 04: reads 1 to 125 input registers; see readCoils. */
     template <typename Quantity> uint8_t readInputRegisters(uint16_t address, Quantity quantity)
     {
         const uint16_t words = static_cast<uint16_t>(quantity);
-        return request(words, mbm_node_readInputRegisters, address, words);
+        return request(Line::bytesOfRead(words), mbm_node_readInputRegisters, address, words);
     }
     /** As above, with the parameter types of ModbusMaster 2.0.1, for pointers to members. */
     uint8_t readInputRegisters(uint16_t address, uint8_t quantity)
     {
-        return request(quantity, mbm_node_readInputRegisters, address, uint16_t{quantity});
+        return request(Line::bytesOfRead(quantity), mbm_node_readInputRegisters, address,
+                       uint16_t{quantity});
     }
     /** Function 05: switches a coil; every `on` other than 0 means on. See readCoils. */
     uint8_t writeSingleCoil(uint16_t address, uint8_t on)
     {
-        return request(1, mbm_node_writeSingleCoil, address, on);
+        return request(Line::bytesOfWrite(1), mbm_node_writeSingleCoil, address, on);
     }
     /** Function 06: stores the value in word 0 and writes it. See readCoils. */
     uint8_t writeSingleRegister(uint16_t address, uint16_t value)
     {
-        return request(1, mbm_node_writeSingleRegister, address, value);
+        return request(Line::bytesOfWrite(1), mbm_node_writeSingleRegister, address, value);
     }
     /** Function 0F: writes coils from word 0 on, lowest bit first. See readCoils. */
     uint8_t writeMultipleCoils(uint16_t address, uint16_t quantity)
     {
-        return request(wordsOf(quantity), mbm_node_writeMultipleCoils, address, quantity);
+        return request(Line::bytesOfWrite(wordsOf(quantity)), mbm_node_writeMultipleCoils, address,
+                       quantity);
     }
     /** Function 0F: writes the queued bits to the last write address. */
-    uint8_t writeMultipleCoils() { return request(transmitWords, mbm_node_writeQueuedCoils); }
+    uint8_t writeMultipleCoils()
+    {
+        return request(Line::bytesOfWrite(transmitWords), mbm_node_writeQueuedCoils);
+    }
     /** Function 10: writes 1 to 123 registers from word 0 on. See readCoils. */
     uint8_t writeMultipleRegisters(uint16_t address, uint16_t quantity)
     {
-        return request(quantity, mbm_node_writeMultipleRegisters, address, quantity);
+        return request(Line::bytesOfWrite(quantity), mbm_node_writeMultipleRegisters, address,
+                       quantity);
     }
     /** Function 10: writes the queued complete words to the last write address. */
     uint8_t writeMultipleRegisters()
     {
-        return request(transmitWords, mbm_node_writeQueuedRegisters);
+        return request(Line::bytesOfWrite(transmitWords), mbm_node_writeQueuedRegisters);
     }
     /** Function 16: (register & andMask) | (orMask & ~andMask); stores the masks in words 0 and 1. */
     uint8_t maskWriteRegister(uint16_t address, uint16_t andMask, uint16_t orMask)
     {
-        return request(2, mbm_node_maskWriteRegister, address, andMask, orMask);
+        return request(Line::bytesOfWrite(2), mbm_node_maskWriteRegister, address, andMask,
+                       orMask);
     }
     /** Function 17: writes 1 to 121 registers from word 0 on, then reads 1 to 125. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity,
                                        uint16_t writeAddress, uint16_t writeQuantity)
     {
-        const uint16_t words = readQuantity > writeQuantity ? readQuantity : writeQuantity;
-        return request(words, mbm_node_readWriteMultipleRegisters, readAddress, readQuantity,
-                       writeAddress, writeQuantity);
+        return request(bytesOf(readQuantity, writeQuantity), mbm_node_readWriteMultipleRegisters,
+                       readAddress, readQuantity, writeAddress, writeQuantity);
     }
     /** Function 17: writes the queued words to the last write address, then reads. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity)
     {
-        return request(mostWords, mbm_node_readWriteQueuedRegisters, readAddress, readQuantity);
+        return request(bytesOf(readQuantity, transmitWords), mbm_node_readWriteQueuedRegisters,
+                       readAddress, readQuantity);
     }
 
     /** Milliseconds from the end of a request to the end of its reply, 0 to 1000000; 2000 at
@@ -459,6 +469,13 @@ private:
     // How many words hold `bits` bits, or one more.
     static uint16_t wordsOf(uint16_t bits) { return (bits / 16u + 1u) & 0xFFFFu; }
 
+    // The bytes of a frame that reads and writes words.
+    static uint8_t bytesOf(uint16_t read, uint16_t written)
+    {
+        const uint8_t one = Line::bytesOfRead(read), other = Line::bytesOfWrite(written);
+        return one > other ? one : other;
+    }
+
 #if defined(MODBUSMASTER_SHARE_LINE)
     static mbm_line *line() { return &Line::wire.line; }
     static Wire &wireOf(void *) { return Line::wire; }
@@ -485,19 +502,18 @@ private:
         user.tellGap();
     }
 
-    // Makes a request that reads or writes at most `words` words, by calling `function`.
+    // Makes a request whose frame has `bytes` bytes, by calling `function`.
     // Not inline: the memory of the frame is free when it returns.
     template <typename... Parameters>
-    __attribute__((noinline)) uint8_t request(uint16_t words,
+    __attribute__((noinline)) uint8_t request(uint8_t bytes,
                                               uint8_t (*function)(mbm_node *, Parameters...),
                                               Parameters... arguments)
     {
         uint8_t *frame;
-        uint8_t bytes = frameBytes;
         if (Line::kept != nullptr) {
             frame = Line::kept->frame;
+            bytes = frameBytes;
         } else {
-            bytes = Line::bytesOf(words);
             frame = static_cast<uint8_t *>(__builtin_alloca(bytes));
         }
         if (state.stream == nullptr)
@@ -541,7 +557,7 @@ private:
 
     // Makes a request by calling `function`.
     template <typename... Parameters>
-    uint8_t request(uint16_t, uint8_t (*function)(mbm_node *, Parameters...),
+    uint8_t request(uint8_t, uint8_t (*function)(mbm_node *, Parameters...),
                     Parameters... arguments)
     {
         if (state.stream == nullptr)

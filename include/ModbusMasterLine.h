@@ -57,13 +57,20 @@ public:
     // nullptr before keep.
     static Kept *kept;
 
-    // How many bytes the frame of a request needs: those of the request, or of its reply beside
-    // a late reply of the same length. `words` are those that it writes or reads, whichever are
-    // more.
-    static uint8_t bytesOf(uint16_t words)
+    // How many bytes the frame of a read of `words` words needs: those of its reply, beside another
+    // that is held without its CRC, and one, since a full buffer makes space. If that is too much,
+    // a frame of 9 bytes fits beside a held reply.
+    static uint8_t bytesOfRead(uint16_t words)
     {
-        return words < (Bytes - MBM_FRAME_BYTES(0)) / 4u
-                   ? static_cast<uint8_t>(MBM_FRAME_BYTES(2u * words))
+        return words <= (Bytes - 9u) / 4u ? static_cast<uint8_t>(4u * words + 9u)
+                                          : bytesOfWrite(words);
+    }
+
+    // The same for a write, whose replies are short.
+    static uint8_t bytesOfWrite(uint16_t words)
+    {
+        return words <= (Bytes - MBM_FRAME_BYTES(0)) / 2u
+                   ? static_cast<uint8_t>(MBM_FRAME_BYTES(words))
                    : Bytes;
     }
 
@@ -114,6 +121,8 @@ public:
     // none does not contain that function.
     uint8_t (*forget)(mbm_line *, uint32_t);
 
+    static uint8_t bytesOfRead(uint16_t) { return Bytes; }
+    static uint8_t bytesOfWrite(uint16_t) { return Bytes; }
     static void keep() {}
     static void giveUp(mbm_node &node) { mbm_node_cancel(&node); }
     static void used() { ModbusMasterUse<void>::note(); }
