@@ -374,6 +374,9 @@ static void no_hook_of_a_server_may_call_the_server(void **state)
     assert_int_equal(ASK("\x04\0\0\0\1"), 7); /* the value of the hook that is registered first */
     for (i = 0; i < HOOK_IDLE; i++)
         assert_true(wire.called[i] > 0);
+    /* After the time of an echo it sleeps. */
+    wire.now += mbm_server_pollDelay(&server);
+    OK(mbm_server_poll(&server));
     assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
     OK(mbm_server_setSilence(&server, 1000));
 }

@@ -303,24 +303,33 @@ static void libmodbus_and_mbm_answer_a_request_through_an_adapter(void **state)
 
 static void a_server_that_waits_tells_a_program_how_long(void **state)
 {
-    const uint32_t wait = (247 + 10) * (BITS * 1000000u / 9600 + 1) + 50000;
+    const uint32_t silence = 38500000 / 9600 + 1;
+    const uint32_t missing = (247 + 10) * (BITS * 1000000u / 9600 + 1);
+    static const int32_t latencies[] = {-1, 0, 20, 65535}; /* in ms; -1 is the default */
+    size_t i;
 
     (void)state;
-    begin(9600);
-    memset(&line, 0, sizeof line);
-    memcpy(line.bytes, "\x11\x10\0\0\0\x7B\xF6\0", 8);
-    line.count = 8;
-    OK(mbm_server_poll(&server));
-    line.now += 5000;
-    OK(mbm_server_poll(&server));
-    assert_int_equal(mbm_server_pollDelay(&server), wait - 5000);
-    OK(mbm_server_setReceiveLatency(&server, 0));
-    assert_int_equal(mbm_server_pollDelay(&server), wait - 55000);
-    OK(mbm_server_setReceiveLatency(&server, 65535));
-    assert_int_equal(mbm_server_pollDelay(&server), wait - 55000 + 65535000);
-    line.now += wait + 65535000;
-    OK(mbm_server_poll(&server));
-    assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFF);
+    for (i = 0; i < sizeof latencies / sizeof *latencies; i++) {
+        const uint32_t latency = 1000 * (uint32_t)(latencies[i] < 0 ? 50 : latencies[i]);
+        const uint32_t wait = silence + missing + latency;
+
+        begin(9600);
+        if (latencies[i] >= 0)
+            OK(mbm_server_setReceiveLatency(&server, (uint16_t)latencies[i]));
+        memset(&line, 0, sizeof line);
+        memcpy(line.bytes, "\x11\x10\0\0\0\x7B\xF6\0", 8);
+        line.count = 8;
+        OK(mbm_server_poll(&server));
+        line.now += 5000;
+        OK(mbm_server_poll(&server));
+        assert_int_equal(mbm_server_pollDelay(&server), wait - 5000);
+        line.now += wait - 5001;
+        OK(mbm_server_poll(&server));
+        assert_int_equal(mbm_server_pollDelay(&server), 1);
+        line.now++;
+        OK(mbm_server_poll(&server));
+        assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFF);
+    }
 }
 
 int main(void)

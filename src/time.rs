@@ -3,6 +3,8 @@
 //! All functions use only differences of two times, so the wrap of the clock at 2^32 does
 //! not matter. Two times that are compared must be less than 71 minutes apart.
 
+use core::sync::atomic::{compiler_fence, Ordering};
+
 /// How far the clock may step back, in microseconds. A clock that adds a hardware counter to
 /// millisecond ticks steps back if it is read after the counter has wrapped and before the
 /// interrupt has counted the tick.
@@ -95,6 +97,21 @@ pub const fn character(baud: u32) -> u16 {
     } else {
         time as u16 + 1
     }
+}
+
+/// The time so many characters after `start`. (A 32-bit multiplication costs 84 bytes of flash on
+/// an AVR. The fence keeps the compiler from using one.)
+#[inline(always)]
+pub fn after_characters(start: u32, count: usize, character: &u16) -> u32 {
+    if !cfg!(target_arch = "avr") {
+        return start.wrapping_add(count as u32 * u32::from(*character));
+    }
+    let mut time = start;
+    for _ in 0..count {
+        time = time.wrapping_add((*character).into());
+        compiler_fence(Ordering::SeqCst);
+    }
+    time
 }
 
 /// How long after the start of a frame of `count` characters its last bit has not left for sure, in

@@ -168,6 +168,62 @@ fn the_same_write_again_is_carried_out_after_the_time_of_an_echo() {
 }
 
 #[test]
+fn noise_after_a_response_does_not_prove_that_the_line_has_no_echo() {
+    for noise in [&[0][..], &[0xFF], &[0xFF, 0xFF], &[0, 0, 0]] {
+        let mut line = line_with_echo(Framing::Rtu, 5 * SILENCE, &[]);
+        line.arrive(0, &framed(Framing::Rtu, &WRITE));
+        while line.wire.borrow().sent.is_empty() {
+            let _ = line.poll();
+            let now = line.wire.borrow().now;
+            line.wire.borrow_mut().now = now.wrapping_add(50);
+        }
+        let now = line.wire.borrow().now;
+        for byte in noise {
+            line.wire.borrow_mut().arriving.push_front((now, *byte));
+        }
+        // The echo after the noise may be answered, but its echo is not.
+        let sent = line.frames(500_000, 50);
+        assert!(sent.len() <= 2, "{noise:02X?}: {}", sent.len());
+        line.arrive(0, &framed(Framing::Rtu, &WRITE));
+        assert_eq!(line.frames(500_000, 50).len(), 1, "{noise:02X?}");
+    }
+}
+
+#[test]
+fn a_program_that_polls_seldom_carries_each_write_out_once() {
+    for framing in [Framing::Rtu, Framing::Ascii] {
+        for echo in [true, false] {
+            let mut line = line(framing);
+            line.wire.borrow_mut().echo = echo;
+            for round in 0..5 {
+                line.arrive(0, &framed(framing, &WRITE));
+                let sent = line.frames(2_000_000, 200_000);
+                assert_eq!(sent.len(), 1, "{framing:?}, {echo}, {round}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_echo_that_is_held_back_is_dropped_if_the_program_says_that_there_is_one() {
+    for late in HELD_BACK {
+        for request in REQUESTS {
+            let mut line = line(Framing::Rtu);
+            assert!(line.server.set_echo_discard(true));
+            // A response without an echo proves nothing here.
+            line.arrive(0, &framed(Framing::Rtu, &READ));
+            assert_eq!(line.frames(300_000, 100).len(), 1);
+            line.wire.borrow_mut().echo = true;
+            line.wire.borrow_mut().echo_late = late;
+            for _ in 0..3 {
+                line.arrive(0, &framed(Framing::Rtu, request));
+                assert_eq!(line.frames(300_000, 100).len(), 1, "{late} {request:02X?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_same_write_again_is_carried_out_if_the_program_says_that_there_is_no_echo() {
     let mut line = line(Framing::Rtu);
     assert!(line.server.set_echo_discard(false));

@@ -183,6 +183,25 @@ fn a_missing_echo_does_not_hide_a_request_from_a_program_that_sleeps() {
     }
 }
 
+#[test]
+fn a_program_that_slept_for_an_hour_carries_the_same_write_out_again() {
+    let write = [17, 6, 0, 100, 1, 2];
+    for framing in [Framing::Rtu, Framing::Ascii] {
+        let mut program = Program::new(framing, Polled::AsInFirmware);
+        for round in 0..3 {
+            program.line.arrive(0, &framed(framing, &write));
+            // The bytes wake the program.
+            let wire = program.line.wire.clone();
+            let now = wire.borrow().arriving.back().unwrap().0;
+            wire.borrow_mut().now = now;
+            let expected = [framed(framing, &write)];
+            assert_eq!(program.run(), expected, "{framing:?}, {round}");
+            let now = wire.borrow().now;
+            wire.borrow_mut().now = now.wrapping_add(3_000_000_000);
+        }
+    }
+}
+
 /// A port that takes a response at once, or at most `piece` bytes, and has sent it when each
 /// character has taken its time.
 struct Leaving {

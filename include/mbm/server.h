@@ -772,7 +772,8 @@ uint8_t mbm_server_poll(struct mbm_server *server);
  * @param server  the object
  * @return microseconds. 0: poll now; a call from within a hook of this server returns 0 too.
  *         0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for a server
- *         that was never begun. 1000: a function of yours has returned MBM_REPLY_PENDING, or a
+ *         that was never begun. After a response on a serial line it is first the time in which
+ *         an echo may arrive. 1000: a function of yours has returned MBM_REPLY_PENDING, or a
  *         connection does not accept the response yet; the server receives no bytes meanwhile,
  *         so do not wait for one, but poll earlier if you know that the function or the
  *         connection is ready. Afterwards, and after a begin function, it is 0 until
@@ -807,9 +808,9 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
 /**
  * Sets how long a UART or an adapter may hold received bytes back on an RTU line: the latency
  * timer of a USB adapter, the threshold of a FIFO, the tick of a scheduler. If a request to one
- * of the units lacks bytes that its first bytes announce, the server waits for as long as the
- * missing bytes and ten more take at the baud rate, and for this time, since the last byte. A
- * longer time does not delay complete requests. The begin functions restore the default.
+ * of the units lacks bytes that its first bytes announce after t3.5, the server waits for as long
+ * as the missing bytes and ten more take at the baud rate, and for this time. A longer time does
+ * not delay complete requests. The begin functions restore the default.
  *
  * @param server     the object
  * @param latencyMs  0 to 65535 ms; 50 ms after a begin function
@@ -821,12 +822,12 @@ uint8_t mbm_server_setReceiveLatency(struct mbm_server *server, uint16_t latency
  * Says whether the receiver of an RTU line gets what the driver sends (a local echo). Without
  * this call the server finds out: it drops a frame that is byte for byte its last response,
  * until another frame, or none in time, has followed a response. A client whose very first
- * requests are the same write again and again, each less than 60 ms after the response, then
+ * requests are the same write again and again, each less than 80 ms after the response, then
  * loses some of them: say that there is no echo. mbm_server_beginRtu takes the answer back.
  *
  * @param server  the object
  * @param on      0: there is none, so no request is taken for it; anything else: there is one,
- *                so the server drops as many bytes after each response as it has sent
+ *                even if a response came without it
  * @return a status; MBM_INVALID_ARGUMENT for other framings
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);

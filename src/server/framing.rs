@@ -10,6 +10,7 @@ use crate::pdu::custom::Function;
 use crate::pdu::functions::{DIAGNOSTICS, ENCAPSULATED_INTERFACE_TRANSPORT};
 use crate::pdu::length::{self, Length};
 use crate::pdu::limits::MAX_PDU;
+use crate::pdu::EXCEPTION;
 use crate::port::Port;
 use crate::time;
 
@@ -59,6 +60,38 @@ pub(super) const fn tcp_space(buffer: usize) -> usize {
     buffer.saturating_sub(tcp::PDU)
 }
 
+/// The length of the RTU frame of a request with this function code: less than 0 if it is fixed,
+/// index of the byte count if there is one, 0 if only silence ends the frame. (The rules of
+/// [`length::request`] in the form that takes the least flash.)
+#[inline(always)]
+const fn length_rule(code: u8) -> i8 {
+    match code {
+        // Return Query Data may be longer.
+        1..=6 | DIAGNOSTICS => -8,
+        7 | 0x0B | 0x0C | 0x11 => -4,
+        0x16 => -10,
+        0x18 => -6,
+        0x0F | 0x10 => 6,
+        0x14 | 0x15 => 2,
+        0x17 => 10,
+        ENCAPSULATED_INTERFACE_TRANSPORT => -7,
+        _ => 0,
+    }
+}
+
+/// [`length_rule`] of each function code up to the last one that has a rule: 12 bytes of flash less
+/// on a Cortex-M0+. An AVR does without: there the table takes 44 bytes of RAM.
+#[allow(clippy::indexing_slicing)] // The compiler computes it.
+static LENGTH_RULES: [i8; ENCAPSULATED_INTERFACE_TRANSPORT as usize + 1] = {
+    let mut rules = [0; ENCAPSULATED_INTERFACE_TRANSPORT as usize + 1];
+    let mut code = 0;
+    while code < rules.len() {
+        rules[code] = length_rule(code as u8);
+        code += 1;
+    }
+    rules
+};
+
 impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Begins with RTU frames on a serial line, and the silence for an unknown baud rate.
     pub fn begin_rtu(&mut self) {
@@ -73,6 +106,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     pub fn begin_rtu_over_tcp(&mut self) {
         let space = rtu_space(self.storage.frame().len());
         self.begin(1, space, Self::receive_by_length, Self::encode_rtu);
+        self.crc = Crc16::START;
         self.set_silence(STREAM_TIMEOUT);
     }
 
@@ -80,6 +114,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     pub fn begin_ascii(&mut self) {
         let space = ascii_space(self.storage.frame().len());
         self.begin(1, space, Self::receive_ascii, Self::encode_ascii);
+        self.crc = Crc16::START;
         self.delimiter = ascii::END;
         self.set_silence(ASCII_TIMEOUT);
         self.request.own = SERIAL;
@@ -95,112 +130,114 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Receives an RTU frame. It ends with a silence after its last byte. A silence inside a request
     /// to one of the server's units does not end it, because a UART or an adapter may hand bytes
-    /// over in blocks: see [`Server::waits_for_rest`]. If poll is called late, the buffer may hold
+    /// over in blocks: see [`Server::end_of_block`]. If poll is called late, the buffer may hold
     /// several frames. Then the last one counts: the client no longer waits for the response to
     /// an earlier one.
     fn receive_rtu(&mut self) -> Status {
-        let end = self.end;
-        let is_silent = (end | self.sent) != 0 && self.is_silent();
-        if is_silent && end == 0 {
-            self.give_up_echo();
-        }
-        let received = self.read_bytes(usize::MAX);
+        let received = self.read_bytes(usize::MAX, false);
         if received > 0 {
             return Status::OK;
         }
-        if received < 0 {
+        if received != 0 {
             return Status::LINK_LOST;
         }
-        if end == 0 || !is_silent {
+        if !self.is_silent() {
             return Status::OK;
         }
         self.end_of_block(&B::serves)
     }
 
-    /// Handles a silence after received bytes, with which a frame or a block of it ends. `serves`
-    /// says which units the server has. As [`Server::look`].
+    /// Handles a silence, with which a frame or a block of it ends. `serves` says which units the
+    /// server has. As [`Server::look`].
     ///
-    /// If the bytes are part of a request to a unit of the server, whose other bytes have not
-    /// arrived, the server waits for them for as long as they take, and drops the bytes before the
-    /// request. But a frame that stands for itself ends the wait, because a client has begun anew
-    /// after it has cut a request off.
-    #[cfg_attr(target_os = "none", inline(always))]
+    /// If the bytes contain the start of a request to a unit of the server, whose other bytes have
+    /// not arrived, the server waits for them once, for as long as they take. But a frame that has
+    /// the length that it announces ends the wait, because a client has begun anew after it has cut
+    /// a request off. The echo of a response is missing only if a poll after its time finds no byte:
+    /// a program that polls seldom reads it late.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn end_of_block(&mut self, serves: &impl Fn(&B, u8) -> bool) -> Status {
         let end = usize::from(self.end);
-        let frame = self.find_last();
-        if self.missing == 0 {
-            let echo = self.echo.to_bytes();
-            let is_end = match self.storage.part(0, end) {
-                [.., low, high] => [*low, *high] == echo,
-                _ => false,
-            };
-            if is_end && self.drops_echo() {
-                return Status::OK;
-            }
-            let mut start = 0;
-            while start <= frame && start < end {
-                let total = self.announced(start, serves);
-                if total > end - start {
-                    if frame < end && self.announced(frame, serves) == end - frame {
-                        break;
-                    }
-                    self.missing = (total - (end - start)) as u16;
-                    self.keep(start);
-                    self.crc = Crc16::START.with(self.storage.part(0, end - start));
-                    return Status::OK;
-                }
-                start += 1;
-            }
-        }
-        self.keep(frame);
-        let status = self.found_frame();
-        if self.request.length != 0 {
+        if end == 0 {
             self.give_up_echo();
-            let length = usize::from(self.end);
-            let count = usize::from(self.storage.byte(rtu::PDU + 1));
-            let announced = self.announced(0, serves);
-            // The length is that of a response, and not the one of a request.
-            self.request.is_response = announced != 0
-                && announced != length
-                && (length == ECHOED || length == rtu::OVERHEAD + 2 + count);
+            return Status::OK;
         }
-        status
+        let start = rtu::find_last(self.storage.part(0, end));
+        let (mut first, mut awaited) = (0, 0);
+        let announced = loop {
+            let announced = self.announced_end(first, serves);
+            if awaited <= end {
+                awaited = announced;
+            }
+            if first == start {
+                break announced;
+            }
+            first += 1;
+        };
+        if awaited > end && announced != end && !self.is_waiting {
+            self.wait_for(awaited - end, self.deadline);
+            return Status::OK;
+        }
+        self.storage.keep(start, end);
+        let length = end - start;
+        let echo = self.echo.to_bytes();
+        if length == usize::from(self.sent)
+            && *self.storage.part(length - 2, length) == echo
+            && !(self.has_no_echo && length == usize::from(self.request.length) + rtu::OVERHEAD)
+        {
+            self.has_no_echo = false;
+            return self.drop_bytes();
+        }
+        let count = usize::from(self.storage.byte(rtu::PDU + 1));
+        let is_request = announced == end || announced == start;
+        if !is_request && (length == ECHOED || length == rtu::OVERHEAD + 2 + count) {
+            // The length is that of a response. So the receiver may get what the driver sends. The
+            // bit keeps the units from serving the frame.
+            self.has_no_echo = false;
+            if let [function] = self.storage.part(rtu::PDU, rtu::PDU + 1) {
+                *function |= EXCEPTION;
+            }
+        } else if start == 0 && length > rtu::OVERHEAD {
+            self.give_up_echo();
+        }
+        self.sent = 0;
+        self.found_frame(length)
     }
 
-    /// The length of the frame of a request whose first bytes are in the buffer from `start` on,
-    /// as they announce it: that of the longest frame if its byte count is missing. 0 if they are no
-    /// request to a unit of the server, or if only silence ends it. (The rules of
-    /// [`length::request`] in the form that takes the least flash.)
+    /// Index after the request whose first bytes are in the buffer from `start` on, as they announce
+    /// its length: that of the longest frame if its byte count is missing. It is `start` if they are
+    /// no request to a unit of the server, or if only silence ends it.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn announced(&mut self, start: usize, serves: &impl Fn(&B, u8) -> bool) -> usize {
+    fn announced_end(&mut self, start: usize, serves: &impl Fn(&B, u8) -> bool) -> usize {
+        let known = usize::from(self.end) - start;
         let unit = self.storage.byte(start);
         if !serves(&self.storage, unit) {
-            return 0;
+            return start;
         }
-        let known = usize::from(self.end) - start;
         if known == 1 {
-            return rtu::MAX_FRAME;
+            return start + rtu::MAX_FRAME;
         }
-        let offset = match self.storage.byte(start + 1) {
-            // Return Query Data may be longer.
-            1..=6 | DIAGNOSTICS => return 8,
-            7 | 0x0B | 0x0C | 0x11 => return 4,
-            0x16 => return 10,
-            0x18 => return 6,
-            ENCAPSULATED_INTERFACE_TRANSPORT => return 7,
-            0x0F | 0x10 => 6,
-            0x14 | 0x15 => 2,
-            0x17 => 10,
-            _ => return 0,
+        let code = self.storage.byte(start + 1);
+        let rule = if cfg!(target_arch = "avr") {
+            length_rule(code)
+        } else {
+            match LENGTH_RULES.get(usize::from(code)) {
+                Some(rule) => *rule,
+                None => return start,
+            }
         };
-        if offset >= known {
-            return rtu::MAX_FRAME;
+        if rule <= 0 {
+            return start.wrapping_sub(isize::from(rule) as usize);
         }
-        offset + rtu::OVERHEAD + usize::from(self.storage.byte(start + offset))
+        let offset = rule as usize;
+        if offset >= known {
+            return start + rtu::MAX_FRAME;
+        }
+        start + offset + rtu::OVERHEAD + usize::from(self.storage.byte(start + offset))
     }
 
     /// As the end of [`Server::receive_rtu`], for the framings other than RTU. It is not inlined.
-    fn receive_no_more_not_inlined(&mut self, received: i16) -> Status {
+    fn receive_no_more_not_inlined(&mut self, received: isize) -> Status {
         if received < 0 {
             return Status::LINK_LOST;
         }
@@ -212,6 +249,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     #[inline(never)]
     fn last_frame_not_inlined(&mut self) -> Status {
+        self.crc = Crc16::START;
         self.last_frame()
     }
 
@@ -222,49 +260,27 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.request.is_serial() && self.encode_adu.is_some_and(is_rtu)
     }
 
-    /// Says whether the receiver gets the bytes that the driver sends. If so, the server drops as many
-    /// bytes as it sent. If not, no request is ever taken for an echo. Without this call, the server
-    /// drops a frame that is byte for byte its last response, unless another frame has followed a
-    /// response before. Returns false if this is not an RTU line. (This is a function of its own, so that only programs that call
-    /// it contain it.)
+    /// Says whether the receiver gets the bytes that the driver sends. If so, the server drops a frame
+    /// that is byte for byte its last response. If not, no request is taken for an echo. Without this
+    /// call, the server drops such a frame until another frame, or none in time, has followed a
+    /// response. Returns false if this is not an RTU line. (This is a function of its own, so that
+    /// only programs that call it contain it.)
     pub fn set_echo_discard(&mut self, on: bool) -> bool {
         let without_echo: Receive<P, B> = Self::receive_rtu;
-        let after_echo: Receive<P, B> = Self::receive_after_echo;
+        let with_echo: Receive<P, B> = Self::receive_with_echo;
         let is_rtu = self.is_rtu_line();
         if is_rtu {
-            self.receive = Some(if on { after_echo } else { without_echo });
+            self.receive = Some(if on { with_echo } else { without_echo });
             self.sent = 0;
             self.has_no_echo = !on;
         }
         is_rtu
     }
 
-    /// As [`Server::receive_rtu`], but first drops the echo of the server's own response. Stops
-    /// waiting for the echo once the line has been silent for long enough.
-    fn receive_after_echo(&mut self) -> Status {
-        if self.sent == 0 {
-            return self.receive_rtu();
-        }
-        // This is the first poll after the response: the wait for the echo begins.
-        if !self.resyncing {
-            self.resyncing = true;
-            self.missing = 0;
-            self.last_byte = self.now;
-        }
-        let received = self.read_bytes_not_inlined(self.sent.into());
-        if received < 0 {
-            return Status::LINK_LOST;
-        }
-        if received > 0 {
-            self.sent -= received as u16;
-            self.listen();
-        } else if self.is_silent() {
-            self.sent = 0;
-        } else {
-            // No sleep may hide the end of the silence from the server.
-            self.request.again = true;
-        }
-        Status::OK
+    /// As [`Server::receive_rtu`], on a line that has an echo even if a response came without it.
+    fn receive_with_echo(&mut self) -> Status {
+        self.has_no_echo = false;
+        self.receive_rtu()
     }
 
     /// Drops the oldest bytes of a full buffer, and marks the request as longer than the buffer.
@@ -286,34 +302,16 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Moves the last frame of the received bytes to the front. Any other bytes are dropped.
     #[inline(always)]
     fn last_frame(&mut self) -> Status {
-        let start = self.find_last();
-        self.keep(start);
-        self.found_frame()
-    }
-
-    /// Index of the last frame of the received bytes, or of their end.
-    #[inline(always)]
-    fn find_last(&mut self) -> usize {
-        if self.crc.is_residue() && !self.request.overrun {
-            return 0;
-        }
-        rtu::find_last(self.storage.part(0, self.end.into()))
-    }
-
-    /// Drops the received bytes before `start`. They may have been an echo, or a damaged one.
-    fn keep(&mut self, start: usize) {
         let end = usize::from(self.end);
-        if start != 0 {
-            self.sent = 0;
-        }
+        let start = rtu::find_last(self.storage.part(0, end));
         self.storage.keep(start, end);
-        self.end = (end - start) as u16;
+        self.found_frame(end - start)
     }
 
-    /// The received bytes are a frame, or none are left.
+    /// The first `total` bytes are a frame, or too few for one.
     #[inline(always)]
-    fn found_frame(&mut self) -> Status {
-        let mut length = usize::from(self.end).wrapping_sub(rtu::OVERHEAD);
+    fn found_frame(&mut self, total: usize) -> Status {
+        let mut length = total.wrapping_sub(rtu::OVERHEAD);
         if length > MAX_PDU {
             length = 0;
         }
@@ -387,9 +385,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Receives an ASCII frame. Reads byte by byte, because each colon begins a new frame, and
     /// the bytes after a frame belong to the next frame.
     fn receive_ascii(&mut self) -> Status {
-        if self.sent != 0 && self.end == 0 && self.is_silent() {
-            self.give_up_echo();
-        }
         for _ in 0..MAX_BYTES_PER_POLL {
             let end = usize::from(self.end);
             if end == self.storage.capacity() {
@@ -401,7 +396,11 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                 return Status::LINK_LOST;
             }
             if received == 0 {
-                if end == 0 || !self.is_silent() {
+                if !self.is_silent() {
+                    return Status::OK;
+                }
+                if end == 0 {
+                    self.give_up_echo();
                     return Status::OK;
                 }
                 return self.found(0);
@@ -423,8 +422,13 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                 CharacterKind::End => {
                     self.end = end as u16 + 1;
                     let crc = Crc16::START.with(self.storage.part(0, end + 1));
-                    if crc == self.echo && self.drops_echo() {
-                        return Status::OK;
+                    // On a line without an echo, the bytes of the request are the same write again.
+                    let is_expected =
+                        !self.has_no_echo || end != 2 * usize::from(self.request.length) + 6;
+                    if end + 1 == usize::from(self.sent) && crc == self.echo && is_expected {
+                        self.has_no_echo = false;
+                        self.crc = Crc16::START;
+                        return self.drop_bytes();
                     }
                     let frame = self.storage.part(0, end + 1);
                     let length = match ascii::decode(frame, delimiter, true) {
@@ -432,10 +436,10 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                         _ => 0,
                     };
                     // What else has arrived may have been an echo, or a damaged one.
-                    if length == 0 || crc != self.crc {
-                        self.sent = 0;
+                    if length != 0 && crc == self.crc {
+                        self.give_up_echo();
                     }
-                    self.give_up_echo();
+                    self.sent = 0;
                     return self.found(length.into());
                 }
             }
@@ -489,12 +493,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// Stores the bytes after a frame of `length` bytes, which is shorter than [`FIRST_READ`]. They
-    /// belong to the next frame. They are stored in `last_byte`, which TCP does not use as a time.
+    /// belong to the next frame. They are stored in `receive_latency`, which TCP does not use as a time.
     #[inline(always)]
     fn keep_read_ahead(&mut self, length: usize) {
         self.read_ahead = self.end as u8 - length as u8;
         if let [a, b, c, d] = *self.storage.part(length, length + READ_AHEAD) {
-            self.last_byte = u32::from_ne_bytes([a, b, c, d]);
+            self.receive_latency = u32::from_ne_bytes([a, b, c, d]);
         }
     }
 
@@ -502,7 +506,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[inline(always)]
     fn use_read_ahead(&mut self) {
         if let Some(front) = self.storage.part(0, READ_AHEAD).first_chunk_mut() {
-            *front = self.last_byte.to_ne_bytes();
+            *front = self.receive_latency.to_ne_bytes();
         }
         self.end = self.read_ahead.into();
         self.read_ahead = 0;
@@ -547,8 +551,8 @@ mod tests {
                     }
                     let mut server = Server::new(Silent, frame);
                     server.end = known as u16;
-                    let announced = server.announced(0, &|_, unit| unit == 17);
-                    assert_eq!(server.announced(0, &|_, _| false), 0);
+                    let announced = server.announced_end(0, &|_, unit| unit == 17);
+                    assert_eq!(server.announced_end(0, &|_, _| false), 0);
                     let whole = match length::request(&frame[1..known], &[]) {
                         Length::Exactly(length) => length + rtu::OVERHEAD,
                         // A function of one length is known by its code.
@@ -562,6 +566,8 @@ mod tests {
                         Length::Unknown => 0,
                     };
                     assert_eq!(announced, whole, "{frame:02X?}, {known}");
+                    let by_table = LENGTH_RULES.get(usize::from(code)).copied();
+                    assert_eq!(by_table.unwrap_or(0), length_rule(code));
                 }
             }
         }

@@ -24,8 +24,6 @@ pub struct Indication {
     /// The exception code if no service of the unit answers: 01, or 02 as soon as a service has
     /// returned [`Reply::ABSENT`](super::Reply::ABSENT).
     pub refusal: u8,
-    /// On an RTU line: the frame has the length of a response, not of a request.
-    pub is_response: bool,
     /// Length of the PDU; 0 if the frame is damaged.
     pub length: u16,
     /// Greatest length of the response PDU.
@@ -73,7 +71,6 @@ impl Indication {
         head: 1,
         again: false,
         refusal: 1,
-        is_response: false,
         length: 0,
         space: 0,
     };
@@ -105,7 +102,7 @@ impl Indication {
     /// connection of its own, so there it is a request that is not valid.
     #[inline(always)]
     const fn is_from_server(&self, function: u8) -> bool {
-        self.is_response || function & EXCEPTION != 0 && self.head as usize == rtu::PDU
+        function & EXCEPTION != 0 && self.head as usize == rtu::PDU
     }
 
     /// True if the frame is a broadcast.

@@ -24,11 +24,11 @@ const RECEIVE_LATENCY: u32 = time::millis(50);
 
 /// For how many characters a UART with a FIFO waits, after the last one, before it hands over
 /// fewer bytes than it usually does (ESP32: 10).
-const FIFO_TIMEOUT: u16 = 10;
+const FIFO_TIMEOUT: usize = 10;
 
 /// The length of a character in microseconds while the baud rate is unknown: a little more than
-/// that at 9600 baud, and that of no rate that is in use.
-const UNKNOWN_CHARACTER: u16 = time::DEFAULT_CHARACTER + 1;
+/// that at 9600 baud, and that of no rate that is in use. (A number of few bits takes less flash.)
+const UNKNOWN_CHARACTER: u16 = 1_152;
 
 /// The storage that the caller supplies for a server.
 pub trait ServerStorage {
@@ -108,17 +108,13 @@ pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 #[derive(Clone, Debug)]
 pub struct Server<P, B> {
     pub(super) phase: ServerPhase,
-    /// In a stream of RTU frames: the received bytes are not a frame of known length. With echo
-    /// discard: the wait for the echo has begun. While a response is sent on a serial line: its
-    /// echo is not expected.
+    /// In a stream of RTU frames: the received bytes are not a frame of known length.
     pub(super) resyncing: bool,
     /// A response of the server was not the next frame that it received: the line has no echo.
     pub(super) has_no_echo: bool,
-    /// The end character of ASCII frames.
-    pub(super) delimiter: u8,
-    /// Over TCP: how many bytes of the next frame are stored in `last_byte`.
-    pub(super) read_ahead: u8,
-    /// The CRC of the received bytes.
+    /// No byte has arrived since [`Server::wait_for`]. It counts only after received bytes.
+    pub(super) is_waiting: bool,
+    /// The CRC of the received bytes, but not on an RTU line.
     pub(super) crc: Crc16,
     /// Index in the buffer after the received bytes, or after the response to send.
     pub(super) end: u16,
@@ -127,17 +123,19 @@ pub struct Server<P, B> {
     pub(super) sent: u16,
     /// The CRC of the response that may come back. In ASCII it is that of its characters.
     pub(super) echo: Crc16,
-    /// On an RTU line: how many bytes the received bytes lack that begin a request; 0 if they end
-    /// with [`Server::silence`]. On any serial line 1 while a response may come back.
-    pub(super) missing: u16,
-    /// On an RTU line: the length of a character in microseconds.
-    pub(super) character: u16,
     /// The request that was found last.
     pub request: Indication,
-    /// Time at which the last byte arrived; see [`Server::keeps_time`].
-    pub(super) last_byte: u32,
+    /// The time up to which further bytes of a frame or of an echo may arrive; see
+    /// [`Server::keeps_time`].
+    pub(super) deadline: u32,
     /// The storage that the caller supplies.
     pub storage: B,
+    /// The end character of ASCII frames.
+    pub(super) delimiter: u8,
+    /// Over TCP: how many bytes of the next frame are stored in `receive_latency`.
+    pub(super) read_ahead: u8,
+    /// On an RTU line: the length of a character in microseconds.
+    pub(super) character: u16,
     pub(super) now: u32,
     /// The silence that ends a frame. Set it with [`Server::set_silence`].
     pub silence: u32,
@@ -156,16 +154,16 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             phase: ServerPhase::Listen,
             resyncing: false,
             has_no_echo: false,
+            is_waiting: false,
             delimiter: ascii::END,
             read_ahead: 0,
             crc: Crc16::START,
             end: 0,
             sent: 0,
             echo: Crc16::START,
-            missing: 0,
             character: UNKNOWN_CHARACTER,
             request: Indication::NONE,
-            last_byte: 0,
+            deadline: 0,
             now: 0,
             silence: time::DEFAULT_SILENCE,
             receive_latency: RECEIVE_LATENCY,
@@ -200,7 +198,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     ) {
         self.request.head = head;
         self.request.own = STREAM;
-        self.request.is_response = false;
         self.request.space = space as u16;
         self.receive = Some(receive);
         self.encode_adu = Some(encode_adu);
@@ -236,10 +233,13 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// Sets how long the UART or an adapter may hold received bytes back on a serial line, in
-    /// milliseconds; 50 at first. If a request to a unit of the server lacks bytes that it announces,
-    /// the server waits for the time of those bytes and ten more at the baud rate, and for this time.
+    /// milliseconds; 50 at first. If a request to a unit of the server lacks bytes that it announces
+    /// after t3.5, the server waits for the time of those bytes and ten more at the baud rate, and for
+    /// this time.
     pub fn set_receive_latency(&mut self, milliseconds: u16) {
-        self.receive_latency = time::millis(milliseconds);
+        if self.keeps_time() {
+            self.receive_latency = time::millis(milliseconds);
+        }
     }
 
     /// Waits for the next request.
@@ -247,10 +247,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     pub(super) fn listen(&mut self) {
         self.phase = ServerPhase::Listen;
         self.end = 0;
-        self.missing = 0;
         self.request.overrun = false;
         self.resyncing = false;
-        self.crc = Crc16::START;
     }
 
     /// True if the server has begun with a framing.
@@ -310,28 +308,30 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// Reads bytes into the buffer after the received bytes, up to the index `until` or to the end
-    /// of the buffer, and updates the CRC. Returns how many, or a negative number if the link is
-    /// lost. If the buffer is full, reads one byte and drops the oldest bytes for it. They are
-    /// dropped only once such a byte arrives, because the full buffer may hold a frame.
+    /// of the buffer, and updates the CRC if it is used. Returns how many, or a negative number if
+    /// the link is lost. If the buffer is full, reads one byte and drops the oldest bytes for it.
+    /// They are dropped only once such a byte arrives, because the full buffer may hold a frame.
     #[cfg_attr(target_os = "none", inline(always))]
-    pub(super) fn read_bytes(&mut self, until: usize) -> i16 {
+    pub(super) fn read_bytes(&mut self, until: usize, uses_crc: bool) -> isize {
         let capacity = self.storage.capacity();
         let mut end = usize::from(self.end);
-        let (mut start, mut until) = (end, until.min(capacity));
-        if end == capacity {
-            (start, until) = (0, 1);
+        let mut start = end;
+        let mut until = until.min(capacity);
+        let is_full = end == capacity;
+        if is_full {
+            start = 0;
+            until = 1;
         }
-        let received = self.port.read_count(self.storage.part(start, until));
+        let received = isize::from(self.port.read_count(self.storage.part(start, until)));
         if received > 0 {
-            self.last_byte = self.now;
-            self.missing = 0;
-            if start != end {
+            self.deadline = self.now.wrapping_add(self.silence);
+            if is_full {
                 start = self.drop_oldest();
             }
             end = start + received as usize;
             self.end = end as u16;
-            // Only RTU frames have a CRC.
-            if usize::from(self.request.head) == rtu::PDU {
+            self.is_waiting = false;
+            if uses_crc {
                 self.crc = self.crc.with(self.storage.part(start, end));
             }
         }
@@ -340,22 +340,31 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// As [`Server::read_bytes`], for the framings other than RTU. It is not inlined.
     #[inline(never)]
-    pub(super) fn read_bytes_not_inlined(&mut self, until: usize) -> i16 {
-        self.read_bytes(until)
+    pub(super) fn read_bytes_not_inlined(&mut self, until: usize) -> isize {
+        self.read_bytes(until, usize::from(self.request.head) == rtu::PDU)
     }
 
-    /// True if the line has been silent for long enough to end a frame.
+    /// True if the line has been silent for long enough to end a frame. (One subtraction, because
+    /// 32-bit arithmetic costs much on an AVR.)
+    #[inline(always)]
     pub(super) fn is_silent(&self) -> bool {
-        time::has_elapsed(self.longest_pause(), self.now, self.last_byte)
+        self.now.wrapping_sub(self.deadline) as i32 >= 0
     }
 
-    /// How long the line is silent before the received bytes are all that arrive.
-    fn longest_pause(&self) -> u32 {
-        match self.missing {
-            0 => self.silence,
-            missing => {
-                u32::from(missing + FIFO_TIMEOUT) * u32::from(self.character) + self.receive_latency
-            }
+    /// Waits for so many bytes, for as long as they may take from `start` on.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn wait_for(&mut self, count: usize, start: u32) {
+        self.is_waiting = true;
+        let latest = start.wrapping_add(self.receive_latency);
+        self.deadline = time::after_characters(latest, count + FIFO_TIMEOUT, &self.character);
+    }
+
+    /// After another frame than the echo of a response, or none in time: the line has no echo.
+    #[inline(always)]
+    pub(super) fn give_up_echo(&mut self) {
+        if self.sent != 0 {
+            self.sent = 0;
+            self.has_no_echo = true;
         }
     }
 
@@ -364,17 +373,25 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// response: poll earlier if that changes. It is 0 after that, until poll has read the port:
     /// bytes that arrived meanwhile may have ended a wait already. While a response leaves on an RTU
     /// line whose rate is known, it is a time for which characters are sure to leave, and 0 for the
-    /// last ones: the driver must go off in time.
+    /// last ones: the driver must go off in time. After that it is the time in which an echo may
+    /// arrive, so that a program that sleeps until bytes arrive does not take them for it later.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.phase {
             ServerPhase::Listen if self.request.again => 0,
-            ServerPhase::Listen if self.end == 0 || !self.keeps_time() => u32::MAX,
-            ServerPhase::Listen => self
-                .longest_pause()
-                .saturating_sub(elapsed(now, self.last_byte)),
+            ServerPhase::Listen if !self.keeps_time() => u32::MAX,
+            ServerPhase::Listen if self.end == 0 && !self.awaits_echo() => u32::MAX,
+            ServerPhase::Listen => match self.deadline.wrapping_sub(now) {
+                left @ ..=time::LONGEST => left,
+                _ => 0,
+            },
             ServerPhase::Send if self.request.is_serial() => self.sending_delay(now),
             _ => EXTERNAL_POLL_DELAY,
         }
+    }
+
+    /// True while an echo of the last response may arrive.
+    fn awaits_echo(&self) -> bool {
+        self.sent != 0 && self.request.is_serial()
     }
 
     /// As [`Server::poll_delay`], while a response leaves on a serial line: neither its next byte nor
@@ -383,13 +400,14 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         if self.sent < self.end || self.character == UNKNOWN_CHARACTER {
             return 0;
         }
-        // The response began after the last byte of the request.
-        sure_to_be_sending(self.character, self.end).saturating_sub(elapsed(now, self.last_byte))
+        // The response began after the silence that ended the request.
+        sure_to_be_sending(self.character, self.end).saturating_sub(elapsed(now, self.deadline))
     }
 
     /// Stores that a request was found, with a PDU of `length` bytes; 0 if it is damaged.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn found(&mut self, length: usize) -> Status {
+        self.crc = Crc16::START;
         let unit = self.storage.byte(usize::from(self.request.head) - 1);
         self.found_for(unit, if length > MAX_PDU { 0 } else { length as u16 })
     }
@@ -419,10 +437,10 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// # Errors
     /// As [`Server::poll`].
     pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Result<(), Error> {
-        let was_missing = self.missing;
+        let (was_waiting, deadline) = (self.is_waiting, self.deadline);
         let mut status = self.look(now);
-        if was_missing == 0 && self.missing != 0 {
-            self.missing = 0;
+        if !was_waiting && self.is_waiting {
+            (self.is_waiting, self.deadline) = (false, deadline);
             status = self.end_of_block(&|_, unit| units.has(unit));
         }
         match status {
@@ -456,8 +474,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         let length = reply.write_served_exception(self.storage.part(head, head + 2));
         match self.encode_adu {
             Some(encode_adu) if length != 0 => {
-                // On a line without an echo, the same bytes are the same write again.
-                self.resyncing = self.has_no_echo && length == usize::from(self.request.length);
                 self.end = encode_adu(self, length) as u16;
                 self.sent = 0;
                 self.phase = ServerPhase::Send;
@@ -489,36 +505,16 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     fn end_transmission(&mut self) {
         self.port.post_transmission();
-        if self.request.is_serial() {
-            if self.resyncing {
-                self.sent = 0;
-            }
-            self.last_byte = self.now;
-        }
         self.listen();
-        // It is the echo that is missing.
-        self.missing = 1;
+        self.wait_for(self.sent.into(), self.now);
     }
 
-    /// After bytes that end as the last response. If they are as long as it, and no other frame has
-    /// arrived since: drops them, because the receiver gets what the driver sends, and returns
-    /// true.
-    #[inline(always)]
-    pub(super) fn drops_echo(&mut self) -> bool {
-        if self.sent == 0 || self.end < self.sent {
-            return false;
-        }
+    /// Drops the received bytes, and expects no echo any more.
+    #[cfg_attr(target_os = "none", inline(always))]
+    pub(super) fn drop_bytes(&mut self) -> Status {
+        self.end = 0;
         self.sent = 0;
-        self.has_no_echo = false;
-        self.listen();
-        true
-    }
-
-    /// After another frame than the echo, or none in time: the line has none.
-    pub(super) fn give_up_echo(&mut self) {
-        if self.sent != 0 {
-            self.sent = 0;
-            self.has_no_echo = true;
-        }
+        self.request.overrun = false;
+        Status::OK
     }
 }

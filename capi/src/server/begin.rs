@@ -220,9 +220,9 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
 
 /// Sets how long a UART or an adapter may hold received bytes back on an RTU line: the latency
 /// timer of a USB adapter, the threshold of a FIFO, the tick of a scheduler. If a request to one
-/// of the units lacks bytes that its first bytes announce, the server waits for as long as the
-/// missing bytes and ten more take at the baud rate, and for this time, since the last byte. A
-/// longer time does not delay complete requests. The begin functions restore the default.
+/// of the units lacks bytes that its first bytes announce after t3.5, the server waits for as long
+/// as the missing bytes and ten more take at the baud rate, and for this time. A longer time does
+/// not delay complete requests. The begin functions restore the default.
 ///
 /// @param server     the object
 /// @param latencyMs  0 to 65535 ms; 50 ms after a begin function
@@ -245,12 +245,12 @@ pub unsafe extern "C" fn mbm_server_setReceiveLatency(
 /// Says whether the receiver of an RTU line gets what the driver sends (a local echo). Without
 /// this call the server finds out: it drops a frame that is byte for byte its last response,
 /// until another frame, or none in time, has followed a response. A client whose very first
-/// requests are the same write again and again, each less than 60 ms after the response, then
+/// requests are the same write again and again, each less than 80 ms after the response, then
 /// loses some of them: say that there is no echo. mbm_server_beginRtu takes the answer back.
 ///
 /// @param server  the object
 /// @param on      0: there is none, so no request is taken for it; anything else: there is one,
-///                so the server drops as many bytes after each response as it has sent
+///                even if a response came without it
 /// @return a status; MBM_INVALID_ARGUMENT for other framings
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: u8) -> u8 {

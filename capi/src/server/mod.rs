@@ -96,6 +96,11 @@ impl ServerStorage for ServerBuffers {
         unsafe { from_raw_parts_mut(self.frame.add(start), end - start) }
     }
 
+    fn byte(&mut self, place: usize) -> u8 {
+        // SAFETY: as for `part`.
+        unsafe { *self.frame.add(place) }
+    }
+
     fn keep(&mut self, start: usize, end: usize) {
         // SAFETY: as for `part`.
         unsafe {
@@ -198,7 +203,8 @@ unsafe fn poll(core: *mut Core, mark: *const u8) -> Status {
 /// @param server  the object
 /// @return microseconds. 0: poll now; a call from within a hook of this server returns 0 too.
 ///         0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for a server
-///         that was never begun. 1000: a function of yours has returned MBM_REPLY_PENDING, or a
+///         that was never begun. After a response on a serial line it is first the time in which
+///         an echo may arrive. 1000: a function of yours has returned MBM_REPLY_PENDING, or a
 ///         connection does not accept the response yet; the server receives no bytes meanwhile,
 ///         so do not wait for one, but poll earlier if you know that the function or the
 ///         connection is ready. Afterwards, and after a begin function, it is 0 until
