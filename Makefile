@@ -446,7 +446,7 @@ gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients an
 .PHONY: check-serve
 check-serve: tool ## Check mbm serve, its faults, mbm poll and mbm header with other clients and compilers, also with the sanitizers
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev gcc-avr avr-libc gcc-arm-none-eabi libnewlib-arm-none-eabi \
-		mbpoll openssl
+		mbpoll openssl strace
 	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm
 	@$(BUILD)/venv/bin/python scripts/check/serve $(BUILD)/certificates $(BUILD)/plain/mbm $(BUILD)/sanitized/mbm
 

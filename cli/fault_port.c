@@ -280,6 +280,9 @@ uint32_t fault_port_delay(fault_port *port)
 {
     const uint32_t passed = port->below.micros(port->below.context) - port->since;
 
+    /* The next read says so. */
+    if (port->is_lost)
+        return 0;
     if (!is_waiting(port))
         return UINT32_MAX;
     /* The port below accepts no bytes now. */

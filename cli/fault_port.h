@@ -28,7 +28,8 @@ typedef struct fault_port {
 mbm_port fault_port_begin(fault_port *port, const mbm_port *below, uint8_t framing,
                           int is_datagrams);
 
-/* How long nothing is due, in microseconds; UINT32_MAX if nothing is to be sent. */
+/* How long nothing is due, in microseconds: 0 if the link is lost, UINT32_MAX if nothing is to be
+ * sent. */
 uint32_t fault_port_delay(fault_port *port);
 
 #endif

@@ -31,6 +31,7 @@ static int far_end = -1;   /* of a pseudo terminal, kept open so that the line d
 static char linked_to[64]; /* the pseudo terminal to which this program has made a link */
 static mbm_udp udp;
 static mbm_tcp_listener listener;
+static mbm_tcp_set set; /* of the listener and its connections; TLS does without */
 static mbm_tls_identity identity;
 static mbm_tls_files files;
 
@@ -168,7 +169,8 @@ static int open_listener(void)
                            ? mbm_tls_listen(&listener, place_host(&at), at.service)
                            : mbm_tcp_listen(&listener, place_host(&at), at.service);
 
-    if (result == 0)
+    if (result == 0 && (at.kind == PLACE_TLS ||
+                        (mbm_tcp_openSet(&set) == 0 && mbm_tcp_addListener(&set, &listener) == 0)))
         return CODE_DONE;
     return cannot_open(listener.lookupError);
 }
@@ -214,6 +216,7 @@ void serve_line_close(void)
     }
     mbm_tls_end(&identity);
     mbm_tcp_closeListener(&listener);
+    mbm_tcp_closeSet(&set);
     mbm_udp_close(&udp);
     if (at.kind == PLACE_PTY && tty.isOpen) {
         const int near_end = tty.fd;
@@ -309,7 +312,7 @@ static void rest(void)
     else if (at.kind == PLACE_TLS)
         (void)mbm_tls_wait(tlss, tcps, PLACES, &listener, -1, delay);
     else if (place_is_tcp(&at))
-        (void)mbm_tcp_wait(tcps, PLACES, &listener, -1, delay);
+        (void)mbm_tcp_waitSet(&set, delay);
     else
         (void)mbm_tty_wait(&tty, delay);
     if (far_end >= 0)
@@ -336,9 +339,24 @@ static void accept_all(served_units *units)
     }
 }
 
+/* Finds the servers to poll: of a set those whose connection is ready, or that have something due
+ * without it. */
+static void find_due(uint8_t is_due[PLACES])
+{
+    const mbm_tcp *tcp;
+    int i;
+
+    for (i = 0; i < count; i++)
+        is_due[i] = is_used(i) && (!set.isOpen || fault_port_delay(&ports[i]) != UINT32_MAX ||
+                                   mbm_server_pollDelay(&servers[i]) == 0);
+    while (set.isOpen && (tcp = mbm_tcp_nextReady(&set)))
+        is_due[tcp - tcps] = 1;
+}
+
 int serve_line_run(served_units *units)
 {
     const int is_listening = place_is_tcp(&at);
+    uint8_t is_due[PLACES];
     mbm_port port;
     int i;
 
@@ -350,8 +368,9 @@ int serve_line_run(served_units *units)
     while (!report_stopped) {
         if (is_listening)
             accept_all(units);
+        find_due(is_due);
         for (i = 0; i < count; i++) {
-            if (!is_used(i) || mbm_server_poll(&servers[i]) == MBM_OK)
+            if (!is_due[i] || mbm_server_poll(&servers[i]) == MBM_OK)
                 continue;
             if (!is_listening)
                 return report(CODE_LINE, "%s: the line was lost: %s", at.text,
