@@ -7,7 +7,7 @@ use libfuzzer_sys::fuzz_target;
 use mbm::error::Status;
 use mbm::plan::field::LONGEST_INTERVAL_MS;
 use mbm::plan::group::group;
-use mbm::plan::schedule::{self, Backoff};
+use mbm::plan::schedule::{Backoff, Schedule};
 use mbm::plan::value::{place, Words};
 use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, ReadLimits, UnitLimits};
 use mbm_fuzz::Input;
@@ -142,38 +142,39 @@ fuzz_target!(|data: &[u8]| {
         first_ms: u32_of(&mut input) % (LONGEST_INTERVAL_MS + 1),
         longest_ms: u32_of(&mut input) % (LONGEST_INTERVAL_MS + 1),
     };
-    schedule::start(reads, now);
+    let schedule = Schedule::default();
+    schedule.start(reads, now);
     let reads = &*reads;
     let mut queued: Vec<&Read> = Vec::new();
     while !input.is_empty() {
         match input.u8() % 4 {
-            0 => match schedule::next(reads, now) {
-                Ok(read) => {
+            0 => match schedule.next(reads, now) {
+                Some(read) => {
                     assert!(!queued
                         .iter()
                         .any(|other: &&Read| std::ptr::eq(*other, read)));
-                    read.begin();
+                    schedule.begin(reads);
                     queued.push(read);
                 }
-                Err(delay) => assert!(delay > 0),
+                None => assert!(schedule.idle(reads, now) > 0),
             },
             1 if !queued.is_empty() => {
                 let read = queued.remove(usize::from(input.u8()) % queued.len());
                 let status = Status::from_code(input.u8());
-                schedule::end(reads, read, status, now, &backoff);
+                schedule.end(reads, read, status, now, &backoff);
                 assert_eq!(read.status(), status);
             }
             2 => now = now.wrapping_add(1 << (input.u8() % 28)),
             _ => {
                 if let Some(read) = reads.get(usize::from(input.u8())) {
-                    schedule::hasten(read, now);
+                    schedule.hasten(reads, read, now);
                 }
             }
         }
     }
     let data: Vec<u16> = (0..total).map(|at| at as u16).collect();
-    for read in reads.iter() {
-        for own in read.fields(&positions) {
+    for (index, read) in reads.iter().enumerate() {
+        for own in Position::fields_of(&positions, index) {
             let field = &fields[own];
             for index in 0..3 {
                 let Ok((first, before)) = place(field, read.address, index) else {

@@ -1,15 +1,17 @@
 //! Division for processors without: a Cortex-M0+ lacks it, and so does the client.
 
-/// Divides, rounded down.
-pub fn quotient(mut dividend: u32, divisor: u32) -> u32 {
-    let mut result = 0;
-    for shift in (0..u32::BITS).rev() {
-        if dividend >> shift >= divisor {
-            dividend = dividend.wrapping_sub(divisor << shift);
-            result |= 1 << shift;
+/// Divides by at most 2^31: the quotient, rounded down, and the rest.
+pub fn divide(mut dividend: u32, divisor: u32) -> (u32, u32) {
+    let mut rest = 0;
+    for _ in 0..u32::BITS {
+        rest = rest << 1 | dividend >> 31;
+        dividend <<= 1;
+        if rest >= divisor {
+            rest = rest.wrapping_sub(divisor);
+            dividend |= 1;
         }
     }
-    result
+    (dividend, rest)
 }
 
 #[cfg(test)]
@@ -17,10 +19,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_quotient_is_rounded_down() {
+    fn a_quotient_is_rounded_down_and_has_a_rest() {
         for dividend in [0, 1, 9, 10, 11, 999, 1000, 86_400_000, u32::MAX] {
-            for divisor in [1, 2, 3, 10, 1000, u32::MAX - 1, u32::MAX] {
-                assert_eq!(quotient(dividend, divisor), dividend / divisor);
+            for divisor in [1, 2, 3, 10, 1000, 86_400_000, 1 << 31] {
+                let expected = (dividend / divisor, dividend % divisor);
+                assert_eq!(divide(dividend, divisor), expected);
             }
         }
     }

@@ -114,9 +114,13 @@ pub fn take_groups(
             position.field = place as u16;
             position.sum_or_read = index as i32;
         }
-        let Some(next) = read.set_up(first, (start, end - 1), quantity, offset, words) else {
+        let Some(next) = read.set_up(first, quantity, offset, words) else {
             return refused(Status::BUFFER_TOO_SMALL, start);
         };
+        // Every read has a field, so that this position is not after its first.
+        if let Some(own) = positions.get_mut(index) {
+            own.first_or_last = start as u16;
+        }
         offset = next;
         start = end;
     }
@@ -301,10 +305,13 @@ impl<'a, L: ReadLimits> Table<'a, L> {
                 let field = self.field_index(position).into();
                 self.set_sum(field, count as i32);
             }
-            let positions = (start, last.into());
             offset = read
-                .set_up(first, positions, quantity as u16, offset, words)
+                .set_up(first, quantity as u16, offset, words)
                 .ok_or(start)?;
+            // Every read has a field, so that what this replaces is known by now.
+            if let Some(own) = self.positions.get_mut(count) {
+                own.first_or_last = start as u16;
+            }
             start = usize::from(last) + 1;
             count += 1;
         }

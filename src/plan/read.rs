@@ -3,7 +3,6 @@
 use super::field::Field;
 use crate::error::Status;
 use core::cell::Cell;
-use core::ops::Range;
 
 /// One for each field. While the plan groups its fields, position `n` holds the field that is
 /// `n`th in the sorted table. Then position `n` names the read that field `n` is in.
@@ -16,7 +15,7 @@ pub struct Position {
     /// The index of the field at this place of the sorted table.
     pub(super) field: u16,
     /// The first position of the best read that ends here; then the last one of the read that
-    /// begins here.
+    /// begins here; then the first position of the read with this index.
     pub(super) first_or_last: u16,
 }
 
@@ -37,6 +36,23 @@ impl Position {
     pub const fn read(&self) -> usize {
         self.sum_or_read as usize
     }
+
+    /// The first position of the read with the index of this position.
+    pub const fn first(&self) -> usize {
+        self.first_or_last as usize
+    }
+
+    /// The index of the field at the position `place`, if it is in the read with this index.
+    pub fn field_of(positions: &[Position], read: usize, place: usize) -> Option<usize> {
+        let field = positions.get(place)?.field();
+        (positions.get(field)?.read() == read).then_some(field)
+    }
+
+    /// The indexes of the fields of the read with this index.
+    pub fn fields_of(positions: &[Position], read: usize) -> impl Iterator<Item = usize> + '_ {
+        let first = positions.get(read).map_or(0, Position::first);
+        (first..).map_while(move |place| Position::field_of(positions, read, place))
+    }
 }
 
 /// The last two reads of the unit that ended had no answer, or all since.
@@ -45,8 +61,8 @@ pub(super) const SUSPENDED: u8 = 1;
 pub(super) const DOUBTED: u8 = 2;
 /// A reply has arrived at least once.
 pub(super) const HAS_DATA: u8 = 4;
-/// The status is news for the program.
-pub(super) const NEWS: u8 = 8;
+/// Another read of its unit, which does not answer, goes before it.
+pub(super) const HELD: u8 = 8;
 /// It is queued or under way.
 pub(super) const QUEUED: u8 = 16;
 
@@ -63,9 +79,9 @@ pub struct Read {
     pub(super) read_at: Cell<u32>,
     /// The time from one read to the next, in milliseconds.
     pub interval_ms: u32,
-    /// The first and the last of its fields, as positions of the sorted table.
-    pub(super) first: u16,
-    pub(super) last: u16,
+    /// The indexes of the reads below it in a heap.
+    pub(super) left: Cell<u16>,
+    pub(super) right: Cell<u16>,
     /// The first bit or register.
     pub address: u16,
     /// The number of bits or registers.
@@ -86,24 +102,19 @@ pub struct Read {
 }
 
 impl Read {
-    /// Makes it a read of the fields at the positions from `start` to `last`, of which `first` has
-    /// the lowest address. Its data begin at `offset` of `words` words. Returns where they end;
-    /// `None` if there are too few words. (Out of line it takes 24 to 60 bytes more firmware.)
+    /// Makes it a read of fields of which `first` has the lowest address. Its data begin at `offset`
+    /// of `words` words. Returns where they end; `None` if there are too few words. (Out of line it takes 24 to 60 bytes more firmware.)
     #[inline(always)]
     pub(super) fn set_up(
         &mut self,
         first: &Field,
-        (start, last): (usize, usize),
         quantity: u16,
         offset: u16,
         words: u16,
     ) -> Option<u16> {
         // Field by field: firmware has no other use for memcpy.
-        self.not_before.set(0);
         self.read_at.set(0);
         self.interval_ms = first.interval_ms;
-        self.first = start as u16;
-        self.last = last as u16;
         self.address = first.address;
         self.quantity = quantity;
         self.offset = offset;
@@ -130,17 +141,6 @@ impl Read {
         }
     }
 
-    /// The positions of its fields: from the first to the one after the last.
-    pub fn positions(&self) -> Range<usize> {
-        self.first.into()..usize::from(self.last) + 1
-    }
-
-    /// The indexes of its fields.
-    pub fn fields<'a>(&self, positions: &'a [Position]) -> impl Iterator<Item = usize> + 'a {
-        let own = positions.get(self.positions());
-        own.unwrap_or(&[]).iter().map(Position::field)
-    }
-
     /// How it ended last; [`Status::PENDING`] before it has ended once.
     pub const fn status(&self) -> Status {
         Status::from_code(self.status.get())
@@ -156,20 +156,10 @@ impl Read {
         now.wrapping_sub(self.read_at.get())
     }
 
-    /// Notes that it is queued; [`end`](super::schedule::end) says that it has ended.
-    pub fn begin(&self) {
-        self.set(QUEUED);
-    }
-
-    /// Its fields' positions, once, after the status was set.
-    pub fn take_news(&self) -> Option<Range<usize>> {
-        let flags = self.flags.get();
-        self.flags.set(flags & !NEWS);
-        (flags & NEWS != 0).then(|| self.positions())
-    }
-
-    pub(super) const fn is(&self, flag: u8) -> bool {
-        self.flags.get() & flag != 0
+    /// Its index among all reads of its plan.
+    pub fn index(&self, reads: &[Read]) -> usize {
+        let first = reads.as_ptr().addr();
+        core::ptr::from_ref(self).addr().wrapping_sub(first) / size_of::<Read>()
     }
 
     pub(super) fn set(&self, flags: u8) {

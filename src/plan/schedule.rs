@@ -1,9 +1,16 @@
 //! Which read is due, and what its end means for the other reads of its unit. All times are in
 //! milliseconds on one clock, which may wrap.
+//!
+//! The reads are the nodes of a skew heap, whose root is the read that is due first. So to take it
+//! out and to put it back takes a number of steps that grows with the logarithm of their number.
+//! Not in the heap are the reads that are queued, those that wait after a request without an answer,
+//! and all but one of a unit that does not answer. They cost nothing until one of them may be sent:
+//! then the heap is made anew. So it is where the times of reads in it change.
 
-use super::divide::quotient;
-use super::read::{Read, DOUBTED, HAS_DATA, NEWS, QUEUED, SUSPENDED};
+use super::divide::divide;
+use super::read::{Read, DOUBTED, HAS_DATA, HELD, QUEUED, SUSPENDED};
 use crate::error::Status;
+use core::cell::Cell;
 
 /// Exceptions of a gateway (V1.1b3, 7): it does not reach the unit.
 const GATEWAY_PATH_UNAVAILABLE: Status = Status::exception(0x0A);
@@ -24,70 +31,250 @@ fn has_come(now: u32, time: u32) -> bool {
 }
 
 /// From now to `time`; 0 if it has come.
-pub fn until(time: u32, now: u32) -> u32 {
-    time.wrapping_sub(now).cast_signed().max(0).cast_unsigned()
+fn until(time: u32, now: u32) -> u32 {
+    if has_come(now, time) {
+        0
+    } else {
+        time.wrapping_sub(now)
+    }
 }
 
-/// Makes every read due at once, and spreads the following rounds: the reads of one interval
-/// are due one after the other, at equal distances.
-pub fn start(reads: &[Read], now: u32) {
-    let mut rest = reads;
-    while let Some(first) = rest.first() {
-        let interval = first.interval_ms;
-        // Reads of the same interval stand side by side.
-        let is_same = |read: &&Read| read.interval_ms == interval;
-        let count = rest.iter().take_while(is_same).count();
-        let step = quotient(interval, count as u32);
-        // The time before the first round, so that every round after it is on time.
-        let mut due = now.wrapping_sub(interval);
-        for read in rest.iter().take(count) {
-            read.due.set(due);
-            due = due.wrapping_add(step);
+/// The index of no read.
+const NONE: u16 = u16::MAX;
+
+/// Joins two heaps, and returns the root. Of reads that are due at the same time the later one
+/// comes first.
+fn merge(reads: &[Read], tree: u16, mut other: u16) -> u16 {
+    let root = Cell::new(tree);
+    // What the heap `other` joins.
+    let mut place = &root;
+    while let Some(right) = reads.get(usize::from(other)) {
+        let own = place.get();
+        let mut first = right;
+        let left = reads.get(usize::from(own));
+        let is_later = |left: &Read| {
+            let later = right.due.get().wrapping_sub(left.due.get());
+            later.cast_signed() >= i32::from(other > own)
+        };
+        match left {
+            Some(left) if is_later(left) => first = left,
+            _ => {
+                place.set(other);
+                other = own;
+            }
         }
-        rest = rest.get(count..).unwrap_or(&[]);
+        let left = first.left.replace(first.right.get());
+        first.right.set(left);
+        place = &first.left;
     }
+    root.get()
 }
 
-impl Read {
-    /// The time from which on it may be sent, in milliseconds from now; 0 if that has come.
-    fn wait(&self, now: u32) -> u32 {
-        until(self.due.get(), now).max(until(self.not_before.get(), now))
-    }
-
-    /// True if it must wait for another read: a unit that does not answer gets one at a time.
-    fn is_blocked(&self, reads: &[Read]) -> bool {
-        self.is(SUSPENDED)
-            && reads
-                .iter()
-                .any(|other| other.unit == self.unit && other.is(QUEUED))
-    }
-}
-
-/// The longest time that [`next`] returns: as long as no read ends.
+/// The longest time that [`Schedule::idle`] returns: as long as no read ends.
 pub const FOREVER: u32 = i32::MAX as u32;
 
-/// The read to send now, the one that is late the longest, and otherwise how many milliseconds
-/// none is due; [`FOREVER`] if that depends on reads that are queued.
-///
-/// # Errors
-/// That time.
-pub fn next(reads: &[Read], now: u32) -> Result<&Read, u32> {
-    let mut shortest = FOREVER;
-    let mut next = None;
-    let mut latest = 0;
-    for read in reads {
-        if read.is(QUEUED) || read.is_blocked(reads) {
-            continue;
+/// The order of the reads of a plan.
+#[repr(C)]
+#[derive(Debug, Default)]
+pub struct Schedule {
+    /// The root of the heap.
+    root: Cell<u16>,
+    /// The first time at which a read that waits may be sent.
+    wake: Cell<u32>,
+}
+
+impl Schedule {
+    /// Makes every read due at once, and spreads the following rounds: the reads of one interval
+    /// are due one after the other, at equal distances.
+    pub fn start(&self, reads: &[Read], now: u32) {
+        let mut rest = reads;
+        while let Some(first) = rest.first() {
+            let interval = first.interval_ms;
+            // Reads of the same interval stand side by side.
+            let is_same = |read: &&Read| read.interval_ms == interval;
+            let count = rest.iter().take_while(is_same).count();
+            let (step, _) = divide(interval, count as u32);
+            // The time before the first round, so that every round after it is on time.
+            let mut due = now.wrapping_sub(interval);
+            for read in rest.iter().take(count) {
+                read.due.set(due);
+                read.not_before.set(now);
+                due = due.wrapping_add(step);
+            }
+            rest = rest.get(count..).unwrap_or(&[]);
         }
-        let wait = read.wait(now);
-        shortest = shortest.min(wait);
-        let late = now.wrapping_sub(read.due.get());
-        if wait == 0 && late >= latest {
-            next = Some(read);
-            latest = late;
+        self.wake.set(now);
+    }
+
+    /// The read to send now, the one that is late the longest.
+    pub fn next<'a>(&self, reads: &'a [Read], now: u32) -> Option<&'a Read> {
+        if has_come(now, self.wake.get()) {
+            self.gather(reads, now);
+        }
+        let first = reads.get(usize::from(self.root.get()));
+        first.filter(|first| has_come(now, first.due.get()))
+    }
+
+    /// For how many milliseconds [`Schedule::next`] returns none, after it has returned none: more
+    /// than the longest interval, up to [`FOREVER`], if that depends on reads that are queued. 0 says
+    /// only that it may return one.
+    pub fn idle(&self, reads: &[Read], now: u32) -> u32 {
+        let idle = until(self.wake.get(), now);
+        let first = reads.get(usize::from(self.root.get()));
+        first.map_or(idle, |first| idle.min(until(first.due.get(), now)))
+    }
+
+    /// Notes that the read that [`Schedule::next`] returned is queued; [`Schedule::end`] says that
+    /// it has ended.
+    pub fn begin(&self, reads: &[Read]) {
+        if let Some(read) = reads.get(usize::from(self.root.get())) {
+            self.root
+                .set(merge(reads, read.left.get(), read.right.get()));
+            read.flags.set(read.flags.get() | QUEUED);
         }
     }
-    next.ok_or(shortest)
+
+    /// Takes up that a read has ended, and sets when it is next due. Returns true if its status
+    /// is news of all reads of its unit.
+    ///
+    /// A read without an answer waits as `backoff` says. After two reads of one unit in a row
+    /// without an answer all its reads wait, with this status, and then it is tried with one read
+    /// at a time. The first answer lifts that.
+    pub fn end(
+        &self,
+        reads: &[Read],
+        read: &Read,
+        status: Status,
+        now: u32,
+        backoff: &Backoff,
+    ) -> bool {
+        let mut flags = read.flags.get() & !QUEUED;
+        if status == Status::OK {
+            flags |= HAS_DATA;
+            read.read_at.set(now);
+        }
+        read.flags.set(flags);
+        read.status.set(status.code());
+        if !has_come(now, read.read_at.get()) {
+            // The age stays below 2^31 milliseconds, 24 days.
+            read.read_at.set(now.wrapping_sub(i32::MAX as u32));
+        }
+        let late = now.wrapping_sub(read.due.get());
+        if late.cast_signed() >= 0 {
+            let (_, rest) = divide(late, read.interval_ms);
+            read.due
+                .set(now.wrapping_add(read.interval_ms).wrapping_sub(rest));
+        }
+        let before = flags & (SUSPENDED | DOUBTED);
+        let (mut state, mut doublings, mut not_before) = (0, 0, now);
+        if is_silence(status) || status != Status::OK && !status.is_exception() {
+            state = before;
+            doublings = read.doublings.get();
+            if !has_come(now, read.not_before.get()) {
+                // It was under way when another read found the unit silent.
+                not_before = read.not_before.get();
+            } else if is_silence(status) {
+                let mut wait = backoff.first_ms << doublings;
+                if wait < backoff.longest_ms {
+                    doublings += 1;
+                } else {
+                    wait = backoff.longest_ms;
+                }
+                not_before = now.wrapping_add(wait);
+                state = DOUBTED;
+                if before != 0 {
+                    state = DOUBTED | SUSPENDED;
+                }
+            }
+        }
+        read.doublings.set(doublings);
+        read.not_before.set(not_before);
+        if (before | state) & SUSPENDED == 0 {
+            self.put(reads, read, now);
+        } else {
+            self.wake.set(now);
+        }
+        if before | state != 0 {
+            settle(reads, read, before, state);
+        }
+        state & !before & SUSPENDED != 0
+    }
+
+    /// Makes a read due at once, unless its unit does not answer.
+    pub fn hasten(&self, reads: &[Read], read: &Read, now: u32) {
+        if has_come(now, read.due.get()) {
+            return;
+        }
+        read.due.set(now);
+        // The heap is made anew, for this read has another place in it.
+        self.wake.set(now);
+        if read.flags.get() & HELD == 0 {
+            return;
+        }
+        // The unit is tried with this read if the one chosen before is due later.
+        let mut limit = 0;
+        for other in reads.iter().filter(|other| other.unit == read.unit) {
+            if core::ptr::eq(other, read) {
+                limit = 1;
+            }
+            let later = other.due.get().wrapping_sub(now).cast_signed();
+            if other.flags.get() & (HELD | QUEUED) == 0 && later >= limit {
+                other.set(HELD);
+                read.flags.set(read.flags.get() & !HELD);
+            }
+        }
+    }
+
+    /// Puts a read into the heap, unless it must wait.
+    fn put(&self, reads: &[Read], read: &Read, now: u32) {
+        let not_before = read.not_before.get();
+        if has_come(now, not_before) {
+            read.left.set(NONE);
+            read.right.set(NONE);
+            let index = read.index(reads) as u16;
+            self.root.set(merge(reads, self.root.get(), index));
+        } else if has_come(self.wake.get(), not_before) {
+            self.wake.set(not_before);
+        }
+    }
+
+    /// Makes the heap anew, of the reads that need not wait.
+    fn gather(&self, reads: &[Read], now: u32) {
+        self.root.set(NONE);
+        self.wake.set(now.wrapping_add(FOREVER));
+        for read in reads.iter().rev() {
+            if read.flags.get() & (QUEUED | HELD) == 0 {
+                self.put(reads, read, now);
+            }
+        }
+    }
+}
+
+/// Tells the other reads of its unit what a read has found: whether the unit is silent.
+fn settle(reads: &[Read], read: &Read, before: u8, state: u8) {
+    let (mut first, mut all) = (read, 0);
+    for other in reads.iter().filter(|other| other.unit == read.unit) {
+        let mut flags = other.flags.get() & !(SUSPENDED | DOUBTED | HELD) | state;
+        if (before | state) & SUSPENDED != 0 {
+            other.doublings.set(read.doublings.get());
+            other.not_before.set(read.not_before.get());
+        }
+        if state & SUSPENDED != 0 {
+            flags |= HELD;
+            if before & SUSPENDED == 0 {
+                other.status.set(read.status.get());
+            }
+        }
+        other.flags.set(flags);
+        all |= flags;
+        let later = first.due.get().wrapping_sub(other.due.get());
+        if later.cast_signed() >= 0 {
+            first = other;
+        }
+    }
+    if all & QUEUED == 0 {
+        first.flags.set(first.flags.get() & !HELD);
+    }
 }
 
 /// True if the unit itself, or the gateway before it, shows that it does not answer.
@@ -100,72 +287,4 @@ fn is_silence(status: Status) -> bool {
             | GATEWAY_PATH_UNAVAILABLE
             | GATEWAY_TARGET_FAILED_TO_RESPOND
     )
-}
-
-/// Takes up that a read has ended, and sets when it is next due.
-///
-/// A read without an answer waits as `backoff` says. After two reads of one unit in a row
-/// without an answer all its reads wait, with this status, and then it is tried with one read
-/// at a time. The first answer lifts that.
-pub fn end(reads: &[Read], read: &Read, status: Status, now: u32, backoff: &Backoff) {
-    let mut flags = read.flags.get() & !QUEUED | NEWS;
-    if status == Status::OK {
-        flags |= HAS_DATA;
-        read.read_at.set(now);
-    }
-    read.flags.set(flags);
-    read.status.set(status.code());
-    if !has_come(now, read.read_at.get()) {
-        // The age stays below 2^31 milliseconds, 24 days.
-        read.read_at.set(now.wrapping_sub(i32::MAX as u32));
-    }
-    let late = now.wrapping_sub(read.due.get());
-    if late.cast_signed() >= 0 {
-        let rounds = quotient(late, read.interval_ms).wrapping_add(1);
-        let passed = rounds.wrapping_mul(read.interval_ms);
-        read.due.set(read.due.get().wrapping_add(passed));
-    }
-    let (mut state, mut doublings, mut not_before) = (0, 0, now);
-    if is_silence(status) {
-        if !has_come(now, read.not_before.get()) {
-            // It was under way when another read found the unit silent.
-            return;
-        }
-        doublings = read.doublings.get();
-        let mut wait = backoff.first_ms << doublings;
-        if wait < backoff.longest_ms {
-            doublings += 1;
-        } else {
-            wait = backoff.longest_ms;
-        }
-        not_before = now.wrapping_add(wait);
-        state = DOUBTED;
-        if flags & DOUBTED != 0 {
-            state = DOUBTED | SUSPENDED;
-        }
-    } else if status != Status::OK && !status.is_exception() {
-        return;
-    }
-    read.doublings.set(doublings);
-    read.not_before.set(not_before);
-    for other in reads.iter().filter(|other| other.unit == read.unit) {
-        let flags = other.flags.get();
-        let mut others = flags & !(SUSPENDED | DOUBTED) | state;
-        if (flags | state) & SUSPENDED != 0 {
-            other.doublings.set(doublings);
-            other.not_before.set(not_before);
-        }
-        if state & !flags & SUSPENDED != 0 {
-            other.status.set(status.code());
-            others |= NEWS;
-        }
-        other.flags.set(others);
-    }
-}
-
-/// Makes a read due at once, unless its unit does not answer.
-pub fn hasten(read: &Read, now: u32) {
-    if !has_come(now, read.due.get()) {
-        read.due.set(now);
-    }
 }

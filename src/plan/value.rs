@@ -1,7 +1,7 @@
 //! Values out of the words of a read. The words of registers have the machine's byte order;
 //! bits are bytes as on the wire, the lowest bit first.
 
-use super::divide::quotient;
+use super::divide::divide;
 use super::field::{Field, BIT, DOUBLE, FLOAT, INT16, INT32, INT64, TEXT};
 use crate::data::value::{ShortDouble, Value as _};
 use crate::error::Error;
@@ -190,8 +190,7 @@ impl Words<'_> {
         }
         let (raw, is_below) = self.magnitude();
         let (multiplier, divisor) = scale(field);
-        let whole = quotient(multiplier, divisor);
-        let part = multiplier.wrapping_sub(whole.wrapping_mul(divisor));
+        let (whole, part) = divide(multiplier, divisor);
         let scaled = times(raw, whole, part, divisor).ok_or(Error::OUT_OF_RANGE)?;
         let is_below = is_below != (field.multiplier < 0);
         if scaled > i64::MAX as u64 + u64::from(is_below) {
@@ -227,10 +226,10 @@ impl Words<'_> {
         }
         let (multiplier, divisor) = scale(field);
         let half = divisor / 2;
-        if raw > quotient(u32::MAX - half, multiplier) {
+        if raw > divide(u32::MAX - half, multiplier).0 {
             return Err(Error::OUT_OF_RANGE);
         }
-        let scaled = quotient(raw * multiplier + half, divisor);
+        let (scaled, _) = divide(raw * multiplier + half, divisor);
         if scaled > i32::MAX as u32 + u32::from(is_below) {
             return Err(Error::OUT_OF_RANGE);
         }

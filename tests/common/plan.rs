@@ -42,11 +42,10 @@ pub fn grouped(fields: &[Field], limits: &Limits) -> Result<Vec<Read>, Refusal> 
 /// The same fields in the order of their reads, with the number of fields of each read, are the
 /// same reads.
 fn check_groups(fields: &[Field], positions: &[Position], reads: &[Read]) {
-    let order = reads.iter().flat_map(|read| read.fields(positions));
+    let order = (0..reads.len()).flat_map(|read| Position::fields_of(positions, read));
     let sorted: Vec<Field> = order.map(|own| fields[own]).collect();
-    let counts: Vec<u16> = reads
-        .iter()
-        .map(|read| read.positions().len() as u16)
+    let counts: Vec<u16> = (0..reads.len())
+        .map(|read| Position::fields_of(positions, read).count() as u16)
         .collect();
     let mut taken_positions = vec![Position::NONE; fields.len()];
     let mut taken = vec![Read::default(); reads.len()];
@@ -61,7 +60,7 @@ fn check_groups(fields: &[Field], positions: &[Position], reads: &[Read]) {
 fn check_positions(fields: &[Field], positions: &[Position], reads: &[Read]) {
     let mut seen = vec![false; fields.len()];
     for (index, read) in reads.iter().enumerate() {
-        for own in read.fields(positions) {
+        for own in Position::fields_of(positions, index) {
             let field = &fields[own];
             assert!(
                 !std::mem::replace(&mut seen[own], true),

@@ -8,7 +8,7 @@ use core::ptr::null_mut;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::Status;
 use mbm::plan::group::{self, Refusal};
-use mbm::plan::{schedule, Position, Read};
+use mbm::plan::{Position, Read};
 
 /// Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
 ///
@@ -162,10 +162,9 @@ unsafe fn attempt(
         (*object).client = client;
         (*object).begins = (*object).begins.wrapping_add(1);
         (*object).millis = 0;
-        (*object).idle_until = 0;
         (*object).micros = client::clock(client);
         (*object).mark = pointers::BEGUN;
-        schedule::start((*object).reads(), 0);
+        (*object).schedule.start((*object).reads(), 0);
         Status::OK
     }
 }

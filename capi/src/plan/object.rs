@@ -6,8 +6,9 @@ use crate::client::{self, mbm_client};
 use crate::pointers::{self, CObject};
 use core::slice::from_raw_parts;
 use mbm::error::Status;
-use mbm::plan::divide::quotient;
-use mbm::plan::{schedule, Read};
+use mbm::plan::divide::divide;
+use mbm::plan::schedule::Schedule;
+use mbm::plan::Read;
 
 /// What lies behind an `mbm_plan`.
 #[repr(C)]
@@ -22,9 +23,8 @@ pub struct Object {
     pub(super) micros: u32,
     /// The plan's own time in milliseconds.
     pub(super) millis: u32,
-    /// Until then no read is due, unless one ends or is hastened: a poll before it need not look
-    /// at the reads.
-    pub(super) idle_until: u32,
+    /// The order of the reads.
+    pub(super) schedule: Schedule,
 }
 
 const _: () = {
@@ -68,25 +68,6 @@ impl Object {
     }
 }
 
-/// The read to send now, as [`schedule::next`].
-///
-/// # Safety
-/// `object` is begun.
-pub(super) unsafe fn next<'a>(object: *mut Object, now: u32) -> Result<&'a Read, u32> {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let idle = schedule::until((*object).idle_until, now);
-        if idle > 0 {
-            return Err(idle);
-        }
-        let next = schedule::next((*object).reads(), now);
-        if let Err(idle) = next {
-            (*object).idle_until = now.wrapping_add(idle);
-        }
-        next
-    }
-}
-
 /// Brings the plan's time up to date and returns it, in milliseconds; as it was if the client
 /// may not be used now.
 ///
@@ -97,10 +78,11 @@ pub(super) unsafe fn time(object: *mut Object) -> u32 {
     unsafe {
         let client = (*object).client;
         if pointers::check(client) == Status::OK {
-            let passed = mbm::time::elapsed(client::clock(client), (*object).micros);
+            let now = client::clock(client);
+            let passed = mbm::time::elapsed(now, (*object).micros);
             if passed >= 1000 {
-                let millis = quotient(passed, 1000);
-                (*object).micros = (*object).micros.wrapping_add(millis * 1000);
+                let (millis, rest) = divide(passed, 1000);
+                (*object).micros = now.wrapping_sub(rest);
                 (*object).millis = (*object).millis.wrapping_add(millis);
             }
         }

@@ -1,13 +1,13 @@
 //! Sending the reads that are due, and taking their replies.
 
-use super::object::{next, time, Object};
+use super::object::{time, Object};
 use super::storage::mbm_plan;
 use super::MBM_PLAN_LONGEST_INTERVAL;
 use crate::client::{self, mbm_clientRequest, mbm_client_pending, MBM_CLIENT_DEPTH};
 use crate::pointers;
 use core::ptr::null_mut;
 use mbm::error::Status;
-use mbm::plan::{schedule, Read};
+use mbm::plan::{Position, Read};
 
 /// The longest delay in milliseconds that mbm_plan_pollDelay returns: the clock of the port
 /// must be read before it wraps.
@@ -26,27 +26,30 @@ pub unsafe extern "C" fn mbm_plan_poll(plan: *mut mbm_plan) -> u8 {
             Status::OK => {}
             refused => return refused,
         }
-        let now = time(object);
+        time(object);
         let setup = (*object).setup();
-        let mut has_news = false;
         for slot in 0..setup.requestCount {
             let request = setup.requests.add(slot.into());
             let status = Status::from_code((*request).status);
             if status == Status::PENDING {
                 continue;
             }
-            if let Some(read) = read_of(request) {
-                schedule::end((*object).reads(), read, status, now, &setup.backoff());
+            let now = (*object).millis;
+            let (reads, schedule) = ((*object).reads(), &(*object).schedule);
+            let ended = read_of(request);
+            let mut is_of_unit = false;
+            if let Some(ended) = ended {
+                is_of_unit = schedule.end(reads, ended, status, now, &setup.backoff());
                 (*request).context = null_mut();
-                (*object).idle_until = now;
-                has_news = true;
             }
-            if let Ok(read) = next(object, now) {
-                queue(object, request, read);
+            if let Some(next) = schedule.next(reads, now) {
+                queue(object, request, next);
             }
-        }
-        if has_news {
-            update(plan);
+            if let Some(ended) = ended {
+                if !update(plan, ended, is_of_unit) {
+                    break;
+                }
+            }
         }
         Status::OK
     })
@@ -61,7 +64,7 @@ unsafe fn read_of<'a>(request: *const mbm_clientRequest) -> Option<&'a Read> {
     unsafe { (*request).context.cast::<Read>().as_ref() }
 }
 
-/// Queues a read as a request.
+/// Queues a read, the next one of the schedule, as a request.
 ///
 /// # Safety
 /// `object` is begun, with this request and this read. The request is not pending.
@@ -81,40 +84,50 @@ unsafe fn queue(object: *const Object, request: *mut mbm_clientRequest, read: &R
             // If it was refused, the next poll ends the read.
             _ => {
                 (*request).context = (&raw const *read).cast_mut().cast();
-                read.begin();
+                (*object).schedule.begin((*object).reads());
             }
         }
     }
 }
 
-/// Calls `update` for the fields of each read whose status is news.
+/// Calls `update` for the fields of a read that has ended, or of all reads of its unit. Returns
+/// false if the plan has ended or was begun again meanwhile.
 ///
 /// # Safety
 /// `plan` is begun; no reference into it lives, for `update` may use it, begin it again,
 /// end it and zero it.
-unsafe fn update(plan: *mut mbm_plan) {
+unsafe fn update(plan: *mut mbm_plan, ended: *const Read, is_of_unit: bool) -> bool {
     // SAFETY: as the caller promises; looked at again after every call of `update`.
     unsafe {
         let object = pointers::object(plan);
         let begins = (*object).begins;
-        let mut index = 0;
-        while let Some(read) = (*object).reads().get(index) {
-            index += 1;
-            let Some(news) = read.take_news() else {
-                continue;
-            };
-            for position in news {
-                let setup = (*object).setup();
-                if let (Some(update), Some(position)) =
-                    (setup.update, setup.positions().get(position))
-                {
-                    update(setup.context, plan, position.field() as u16);
+        // These stay as they are until the plan ends.
+        let setup = (*object).setup;
+        let positions: *const Position = (*setup).positions.cast();
+        let reads: *const Read = (*setup).reads.cast();
+        let index = ended.offset_from(reads) as usize;
+        let mut place = if is_of_unit {
+            0
+        } else {
+            (*positions.add(index)).first()
+        };
+        while place < (*setup).fieldCount.into() {
+            let field = (*positions.add(place)).field();
+            let read = reads.add((*positions.add(field)).read());
+            if read != ended && !is_of_unit {
+                break;
+            }
+            if (*read).unit == (*ended).unit {
+                if let Some(update) = (*setup).update {
+                    update((*setup).context, plan, field as u16);
                     if pointers::check(plan) != Status::OK || (*object).begins != begins {
-                        return;
+                        return false;
                     }
                 }
             }
+            place += 1;
         }
+        true
     }
 }
 
@@ -153,9 +166,9 @@ pub unsafe extern "C" fn mbm_plan_pollDelay(plan: *mut mbm_plan) -> u32 {
     if !is_free || mbm_client_pending(client) == MBM_CLIENT_DEPTH {
         return u32::MAX;
     }
-    match next(object, now) {
-        Ok(_) => 0,
-        Err(delay) if delay > MBM_PLAN_LONGEST_INTERVAL => u32::MAX,
-        Err(delay) => delay.min(LONGEST_DELAY) * 1000,
+    let (reads, schedule) = ((*object).reads(), &(*object).schedule);
+    match schedule.idle(reads, now) {
+        idle if idle > MBM_PLAN_LONGEST_INTERVAL => u32::MAX,
+        idle => idle.min(LONGEST_DELAY) * 1000,
     }
 }

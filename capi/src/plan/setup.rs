@@ -193,15 +193,6 @@ impl mbm_planSetup {
         // SAFETY: as the caller promises. The types of C and of the core have the same layout.
         unsafe { from_raw_parts(self.fields.cast(), self.fieldCount.into()) }
     }
-
-    /// The positions of the fields.
-    ///
-    /// # Safety
-    /// As for [`mbm_planSetup::fields`].
-    pub(super) unsafe fn positions<'a>(&self) -> &'a [Position] {
-        // SAFETY: as the caller promises. The types of C and of the core have the same layout.
-        unsafe { from_raw_parts(self.positions.cast(), self.fieldCount.into()) }
-    }
 }
 
 impl ReadLimits for mbm_planSetup {

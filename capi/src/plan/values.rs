@@ -11,7 +11,7 @@ use core::slice::from_raw_parts;
 use mbm::data::value::{ShortDouble, Value as _};
 use mbm::error::{Error, Status};
 use mbm::plan::value::{place, Words};
-use mbm::plan::{schedule, Field, Position, Read};
+use mbm::plan::{Field, Position, Read};
 
 /// A read of a plan: one request that it repeats.
 #[repr(C)]
@@ -330,8 +330,8 @@ pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8
         return Status::BUSY.code();
     }
     let now = time(object);
-    schedule::hasten(read, now);
-    (*object).idle_until = now;
+    let reads = (*object).reads();
+    (*object).schedule.hasten(reads, read, now);
     Status::OK.code()
 }
 
