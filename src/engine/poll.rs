@@ -202,6 +202,13 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         received
     }
 
+    /// Notes that the line was in use until now.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn note_use(&mut self) {
+        self.now = self.port.micros();
+        self.since = self.now;
+    }
+
     /// Searches the bytes that have arrived, and ends the wait for silence or for the reply once
     /// it is over.
     fn listen(&mut self) -> Status {
@@ -236,6 +243,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                     self.note_unexpected();
                 } else {
                     self.since = self.now;
+                    if budget < MOST.into() {
+                        // The poll has begun long before the last byte came.
+                        self.note_use();
+                    }
                     return self.settle();
                 }
             }
@@ -251,8 +262,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             let is_before = self.phase <= Phase::Gap;
             if is_before || self.waits_for_silence() {
                 // The search may have taken long. The silence begins after it.
-                self.now = self.port.micros();
-                self.since = self.now;
+                self.note_use();
             }
             if is_before {
                 let silence = self.line_silence();

@@ -90,8 +90,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 return false;
             }
             if self.content > S::Count::ZERO || !self.is_early {
-                // The poll may have begun long before the last byte came.
-                self.now = self.port.micros();
                 return true;
             }
         }
