@@ -63,7 +63,7 @@ linux: $(ARCHIVE) ## Build the library for Linux on this machine with its ports,
 
 MCUS := $(shell scripts/build/archive --list)
 .PHONY: archives
-archives: ## Build the archives for microcontrollers, build/archives and build/minimal
+archives: ## Build the archives for microcontrollers, build/archives
 	@scripts/build/archive --packages $(MCUS)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
 	@scripts/check/archive
@@ -97,9 +97,8 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@for crate in fuzz bench model examples/rust; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
 	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus,$(FEATURES) -- -D warnings
 	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
-	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
 	@for feature in $(subst $(comma), ,$(FEATURES)); do \
-		$(CARGO) clippy --quiet --no-default-features --features $$feature -- -D warnings || exit 1; done
+		$(CARGO) clippy --quiet --features $$feature -- -D warnings || exit 1; done
 	@$(CARGO) clippy --quiet --manifest-path model/Cargo.toml --target-dir $(BUILD)/model --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps -p mbm --features $(FEATURES)

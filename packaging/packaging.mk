@@ -1,13 +1,12 @@
 # The packages in dist/: building, trying, and comparing them with those of another folder; and releases.
 
-# Each processor's archives, default and minimal. scripts/build/archive lets builds wait that share a
-# folder, so `make -j` builds the others at the same time. The first ones share no folder.
+# Each processor's archive. scripts/build/archive lets builds wait that share a folder, so `make -j`
+# builds the others at the same time. The first ones share no folder.
 APART := atmega328p atmega2560 cortex-m0plus cortex-m3 riscv32imc esp8266 esp32 cortex-m4 cortex-m33 riscv32imac
 MCU_BUILDS := $(patsubst %,build-archive-%,$(APART) $(filter-out $(APART),$(MCUS)))
 .PHONY: $(MCU_BUILDS)
 $(MCU_BUILDS): build-archive-%:
 	+@scripts/build/archive $*
-	+@scripts/build/archive $* minimal
 
 # What is missing is installed or named before the first build.
 .PHONY: need-packages

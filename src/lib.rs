@@ -179,7 +179,6 @@
 //!
 //! | feature | what it adds |
 //! |---|---|
-//! | `diagnosis` (default) | a failed request says why: see [`Error::INVALID_SLAVE_ID`]. Frames are counted, and deviating replies can be accepted |
 //! | `embedded-io` | `port::EmbeddedIo`, a port over embedded-io |
 //! | `embedded-io-async` | `master::AsyncMaster`, a master with futures, over embedded-io-async and embedded-hal-async |
 //! | `defmt` | `defmt::Format` for [`Status`] and [`Error`] |

@@ -80,7 +80,6 @@ fn unused_bits_of_the_last_word_are_zero_even_if_the_device_sets_them() {
     assert!(master.response_bits().eq([true; 17]));
 }
 
-#[cfg(feature = "diagnosis")]
 #[test]
 fn noise_and_a_frame_of_another_unit_are_counted_and_skipped() {
     let mut bytes = sealed(&[8, 6, 0, 1, 0, 2]);
@@ -96,7 +95,6 @@ fn noise_and_a_frame_of_another_unit_are_counted_and_skipped() {
     assert_eq!(counters[Counter::BytesReceived as usize], 19);
 }
 
-#[cfg(feature = "diagnosis")]
 #[test]
 fn data_that_look_like_a_damaged_reply_inside_a_frame_of_another_unit_do_not_end_the_wait() {
     // The frame of unit 8 contains 07 06, which looks like the start of the expected reply.

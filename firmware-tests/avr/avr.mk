@@ -6,19 +6,18 @@ assembler library arduino-zip: export MBM_BOARDS := $(BOARDS)
 .PHONY: assembler
 assembler: ## Write the library as assembler source, one file for each instruction set, build/assembler; BOARDS="avr esp32" for some
 	@scripts/build/assembler
-	@scripts/build/assembler minimal
 
 .PHONY: library
 library: assembler
 	@packaging/arduino/library
 
 .PHONY: arduino-zip
-arduino-zip: library ## Pack the Arduino libraries into two zips in dist/; BOARDS=avr, arm, riscv, esp8266 or esp32 for these boards alone
+arduino-zip: library ## Pack the Arduino library into a zip in dist/; BOARDS=avr, arm, riscv, esp8266 or esp32 for these boards alone
 	@mkdir -p dist
 	@packaging/arduino/pack dist
 
 .PHONY: arduino
-arduino: arduino-zip ## Pack the Arduino libraries, and assemble them for every processor that they serve
+arduino: arduino-zip ## Pack the Arduino library, and assemble it for every processor that it serves
 	@packaging/arduino/check
 	@scripts/check/assembler
 
@@ -54,9 +53,6 @@ AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(ARDUINO_EXAMPLES:%=$(AVR_
             $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
             $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
             $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf) $(AVR_OUT)/mega/Rates.elf $(AVR_OUT)/mega/Silences.elf
-# Sketches that run with the small library too.
-MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe \
-                ServeSensorAndRelay)
 # Sketches that run with shortened calls and jumps too.
 RELAX_ELFS := $(patsubst %,$(AVR_OUT)/uno-relax/%.elf,SizeSerial SizeFC03 Basic PhoenixContact Probe \
               ServeSensorAndRelay) \
@@ -69,18 +65,18 @@ WIDE_ELFS := $(AVR_OUT)/uno-125/TimeWait.elf
 # With MODBUSMASTER, the folder of that library: the sketches that measure it.
 PEER_ELFS := $(if $(MODBUSMASTER),$(patsubst %,$(AVR_OUT)/uno-peer/%.elf,TimeRead TimeBasicNoGap SizeFC03 \
                 Basic PhoenixContact TimeUnchanged TimeLong))
-# A copy of the libraries with which the sketches were last compiled.
+# A copy of the library with which the sketches were last compiled.
 LIBRARY_STAMP := $(BUILD)/avr/library
 
 .PHONY: library-stamp
 library-stamp: library
 	@mkdir -p $(AVR_OUT)
-	@tar --sort=name --mtime=@0 -cf $(LIBRARY_STAMP).new -C $(BUILD)/arduino mbm minimal
+	@tar --sort=name --mtime=@0 -cf $(LIBRARY_STAMP).new -C $(BUILD)/arduino mbm
 	@cmp -s $(LIBRARY_STAMP).new $(LIBRARY_STAMP) || cp $(LIBRARY_STAMP).new $(LIBRARY_STAMP)
 
 .PHONY: avr-sketches
 avr-sketches: library-stamp
-	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(RELAX_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
+	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(RELAX_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
 # The examples are compiled from their copies in the library.
 SKETCH_SOURCES := firmware-tests/avr/compile-sketch $(wildcard firmware-tests/avr/sketches/*/*.ino firmware-tests/avr/libraries/*/src/*)
@@ -95,7 +91,6 @@ $(eval $(call sketches,mega))
 # The tests do not run these, because the simulator has no USB for Serial.
 $(eval $(call sketches,leonardo))
 $(foreach chip,$(CHIPS),$(eval $(call sketches,$(chip))))
-$(eval $(call sketches,uno-minimal))
 $(eval $(call sketches,uno-125))
 $(eval $(call sketches,uno-relax))
 $(eval $(call sketches,mega-relax))

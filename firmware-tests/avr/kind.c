@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 const kind uno = {"uno", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
-const kind minimal = {"uno-minimal", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
 const kind relaxed = {"uno-relax", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
 const kind relaxed_mega = {"mega-relax", "atmega2560", '1', {'B', 7}, {'E', 4}, {'G', 5}};
 const kind mega = {"mega", "atmega2560", '1', {'B', 7}, {'E', 4}, {'G', 5}};

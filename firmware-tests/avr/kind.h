@@ -16,7 +16,7 @@ typedef struct kind {
     pin led, pin2, pin4;
 } kind;
 
-extern const kind uno, minimal, relaxed, mega, relaxed_mega, older_mega, atmega644p, atmega1284p;
+extern const kind uno, relaxed, mega, relaxed_mega, older_mega, atmega644p, atmega1284p;
 extern const kind atmega328, atmega644; /* with one UART */
 extern const kind uno_peer, mega_peer;  /* sketches with the library ModbusMaster */
 

@@ -181,7 +181,7 @@ typedef struct report {
     uint16_t words[READS][REGISTERS];
 } report;
 
-/* The folder of the sketches: with the library, its minimal variant, or shortened calls. */
+/* The folder of the sketches: plain, or with shortened calls. */
 static const char *place = "uno";
 
 static board *start(const char *sketch)
@@ -246,13 +246,6 @@ static void no_fault_costs_more_reads_than_expected(void **state)
     assert_int_equal(worse, 0);
 }
 
-static void the_minimal_library_passes_every_fault_too(void **state)
-{
-    place = "uno-minimal";
-    no_fault_costs_more_reads_than_expected(state);
-    place = "uno";
-}
-
 static void a_sketch_linked_with_mrelax_passes_every_fault_too(void **state)
 {
     place = "uno-relax";
@@ -315,7 +308,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_fault_costs_more_reads_than_expected),
-        cmocka_unit_test(the_minimal_library_passes_every_fault_too),
         cmocka_unit_test(a_sketch_linked_with_mrelax_passes_every_fault_too),
         cmocka_unit_test(an_absent_server_is_a_timeout),
         cmocka_unit_test(a_servers_exceptions_are_returned),

@@ -315,7 +315,6 @@ static void basic_counts_in_the_server(void **state)
 {
     (void)state;
     basic(&uno);
-    basic(&minimal);
     basic(&relaxed);
     basic(&mega);
     basic(&relaxed_mega);
@@ -380,7 +379,6 @@ static void phoenix_contact_makes_its_requests(void **state)
 {
     (void)state;
     phoenix_contact(&uno);
-    phoenix_contact(&minimal);
     phoenix_contact(&relaxed);
     phoenix_contact(&mega);
     phoenix_contact(&relaxed_mega);

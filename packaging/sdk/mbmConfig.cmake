@@ -3,7 +3,6 @@
 #   MBM_TARGET   a folder of lib/, for example cortex-m4. If it is not set, the compiler's macros
 #                decide. "assembler" compiles the library from asm/ instead of an archive; the
 #                project needs the language ASM.
-#   MBM_MINIMAL  ON takes the smaller library, as find_package(mbm COMPONENTS minimal) does.
 #
 # The result is mbm_TARGET; mbm_TARGETS lists all targets, and mbm_ROOT_DIR is the folder of the SDK.
 get_filename_component(mbm_ROOT_DIR "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
@@ -56,15 +55,9 @@ find_package.")
   endif()
 endif()
 
-set(_mbm_small "")
-if(MBM_MINIMAL OR "minimal" IN_LIST mbm_FIND_COMPONENTS)
-  set(_mbm_small "/minimal")
+if(mbm_FIND_COMPONENTS)
+  set(_mbm_fault "mbm has no components.")
 endif()
-foreach(_mbm_component IN LISTS mbm_FIND_COMPONENTS)
-  if(NOT _mbm_component STREQUAL "minimal")
-    set(_mbm_fault "mbm has no component ${_mbm_component}, only minimal.")
-  endif()
-endforeach()
 
 if(NOT _mbm_fault)
   if(mbm_TARGET STREQUAL "assembler")
@@ -73,8 +66,6 @@ if(NOT _mbm_fault)
     endif()
   elseif(NOT mbm_TARGET IN_LIST mbm_TARGETS)
     set(_mbm_fault "mbm has no library for the target ${mbm_TARGET}.")
-  elseif(NOT EXISTS "${mbm_ROOT_DIR}/lib/${mbm_TARGET}${_mbm_small}/libmbm.a")
-    set(_mbm_fault "mbm has no minimal library for ${mbm_TARGET}.")
   endif()
 endif()
 
@@ -83,10 +74,10 @@ if(_mbm_fault)
   string(REPLACE ";" ", " _mbm_known "${mbm_TARGETS}")
   set(mbm_NOT_FOUND_MESSAGE "${_mbm_fault}\nMBM_TARGET can be one of: ${_mbm_known}, assembler.")
 else()
-  set(_mbm_archive "${mbm_ROOT_DIR}/lib/${mbm_TARGET}${_mbm_small}/libmbm.a")
+  set(_mbm_archive "${mbm_ROOT_DIR}/lib/${mbm_TARGET}/libmbm.a")
   set(_mbm_include "${mbm_ROOT_DIR}/include")
   if(mbm_TARGET STREQUAL "assembler" AND NOT TARGET mbm::mbm)
-    file(GLOB _mbm_sources "${mbm_ROOT_DIR}/asm${_mbm_small}/*.S")
+    file(GLOB _mbm_sources "${mbm_ROOT_DIR}/asm/*.S")
     add_library(mbm_assembler STATIC EXCLUDE_FROM_ALL ${_mbm_sources})
     target_include_directories(mbm_assembler PUBLIC "${_mbm_include}")
     # A #if in each file asks for the processor, which toolchain files often give only to C.

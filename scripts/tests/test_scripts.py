@@ -282,9 +282,9 @@ class Compiler(unittest.TestCase):
 
     def test_the_check_refuses_the_archive_of_another_compiler(self):
         self.assertEqual(self.check("build/archives/cortex-m0", MEASURED).returncode, 0)
-        found = self.check("build/minimal/cortex-m0", OTHER)
+        found = self.check("build/archives/cortex-m4", OTHER)
         self.assertEqual(found.returncode, 1)
-        self.assertIn(f"build/minimal/cortex-m0 was built by {OTHER}, but", found.stderr)
+        self.assertIn(f"build/archives/cortex-m4 was built by {OTHER}, but", found.stderr)
 
     def test_the_check_refuses_an_archive_without_the_name_of_its_compiler(self):
         (self.root / "build/archives/cortex-m0").mkdir(parents=True)

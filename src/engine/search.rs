@@ -184,7 +184,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
         // A damaged reply ends the request, unless it lies within the reply or another frame.
         let is_long = self.length > S::Count::ZERO && have >= self.length;
-        if cfg!(feature = "diagnosis") && (is_long || self.run_length == length) {
+        if is_long || self.run_length == length {
             self.is_early = true;
         }
         self.note_damaged();
@@ -211,9 +211,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// The next byte begins a frame.
     pub(super) fn begin_frame(&mut self) {
         self.run_length = S::Count::ZERO;
-        if cfg!(feature = "diagnosis") {
-            self.run = Crc16::START;
-        }
+        self.run = Crc16::START;
     }
 
     /// Counts the byte as one of the frame that is being received. True if all bytes since the
@@ -221,9 +219,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     #[inline(always)]
     pub(super) fn continue_frame(&mut self) -> bool {
         self.run_length = self.run_length.next();
-        if !cfg!(feature = "diagnosis") {
-            return false;
-        }
         if self.run_length == 2u8.into() {
             self.run_kind = self.kind_of_frame();
         }
