@@ -1,6 +1,6 @@
 /* The silence that a UART of an AVR asks for, computed from registers of the test. The sketches
  * Rates and Silences of firmware-tests show it on the wire. */
-#define __AVR__
+#define __AVR__ // NOLINT(bugprone-reserved-identifier): as a compiler for AVRs does
 #define F_CPU 16000000UL
 #define HardwareSerial_h
 #define UBRR0H

@@ -262,7 +262,7 @@ static uint32_t watch_broker(void)
 static void rest(uint32_t micros)
 {
     static struct pollfd polls[1 + BRIDGE_LINES + SERVICE_WAITS];
-    line *polled[1 + BRIDGE_LINES];
+    line *polled[1 + BRIDGE_LINES] = {0};
     nfds_t count = 1, n;
     unsigned i;
 

@@ -356,7 +356,7 @@ static void find_due(uint8_t is_due[PLACES])
 int serve_line_run(served_units *units)
 {
     const int is_listening = place_is_tcp(&at);
-    uint8_t is_due[PLACES];
+    uint8_t is_due[PLACES] = {0};
     mbm_port port;
     int i;
 
