@@ -182,17 +182,26 @@ impl ClientRequest for RequestPtr {
 
     fn store(&mut self, data: &[u8], mask: u8) {
         let fields = self.fields_mut();
-        let (flip, reply) = (place(0, fields.state.header.takes_words()), fields.reply);
+        let reply = fields.reply;
         // SAFETY: the reply is not NULL and holds `capacity` bytes, and the data are not longer.
         // Of words, the client receives an even number of bytes.
         unsafe {
-            let mut last = reply;
-            for (index, byte) in data.iter().enumerate() {
-                last = reply.add(index ^ flip);
-                *last = *byte;
+            if fields.state.header.takes_words() {
+                let mut next = reply.cast::<u16>();
+                for word in data.as_chunks().0 {
+                    next.write_unaligned(u16::from_be_bytes(*word));
+                    next = next.add(1);
+                }
+                return;
             }
-            if !data.is_empty() {
-                *last &= mask;
+            let mut next = reply;
+            // Volatile: otherwise LLVM would call memcpy of libc, which costs flash.
+            for byte in data {
+                next.write_volatile(*byte);
+                next = next.add(1);
+            }
+            if next != reply {
+                *next.sub(1) &= mask;
             }
         }
     }
