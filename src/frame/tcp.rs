@@ -124,10 +124,15 @@ pub fn emit(
         return Err(Error::BUFFER_TOO_SMALL);
     };
     let length = pdu(place)?;
-    let [a, b] = transaction.to_be_bytes();
-    let [c, d] = self::length(length);
-    *header = [a, b, 0, 0, c, d, unit];
+    *header = emit_header(transaction, length, unit);
     Ok(PDU + length)
+}
+
+/// The header before a PDU of `pdu` bytes.
+pub const fn emit_header(transaction: u16, pdu: usize, unit: u8) -> [u8; PDU] {
+    let [a, b] = transaction.to_be_bytes();
+    let [c, d] = length(pdu);
+    [a, b, 0, 0, c, d, unit]
 }
 
 #[cfg(test)]

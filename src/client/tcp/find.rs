@@ -76,7 +76,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             }
             let Some((at, request)) = asked else {
                 self.skip = header.total as u16;
-                self.note_foreign_frame(queue, &header);
+                self.note_foreign_frame(queue, header.transaction);
                 continue;
             };
             let mut status = Status::BUFFER_TOO_SMALL;
@@ -123,12 +123,12 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     fn note_foreign_frame<J: ClientRequest, const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
-        header: &Header,
+        transaction: u16,
     ) {
         self.storage.count(Counter::ForeignFrames, 1);
         for request in queue.queue.iter_mut() {
             let state = request.state_mut();
-            if state.is_sent() && state.wire == header.transaction {
+            if state.is_sent() && state.wire == transaction {
                 state.note_other_unit();
             }
         }

@@ -9,7 +9,7 @@ use super::storage::ClientStorage;
 use super::transport::Transport;
 use crate::bytes::move_to_front;
 use crate::engine::{Counter, Settings};
-use crate::error::{Error, Status};
+use crate::error::Status;
 use crate::frame::tcp;
 use crate::port::Port;
 
@@ -249,21 +249,19 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             return Status::BUSY;
         }
         let begin = usize::from(self.filled);
-        let Some(space) = self.storage.outgoing().get_mut(begin..) else {
-            return Status::BUSY;
-        };
-        let length = match write_frame(request, space, self.next) {
-            Ok(length) => length,
-            Err(refused) if begin == 0 => return refused.status(),
-            Err(_) if stuck => return Status::LINE_BUSY,
-            Err(_) => return Status::BUSY,
+        let Some(end) = write_frame(request, self.storage.outgoing(), begin, self.next) else {
+            return match begin {
+                0 => Status::BUFFER_TOO_SMALL,
+                _ if stuck => Status::LINE_BUSY,
+                _ => Status::BUSY,
+            };
         };
         self.storage.count(Counter::Requests, 1);
         let wait = self.time_of(request.state());
         let state = request.state_mut();
         state.wire = self.next;
         state.enter(Stage::Sent, now, wait);
-        self.filled += length as u16;
+        self.filled = end as u16;
         self.next = self.next.wrapping_add(1);
         self.in_flight += 1;
         Status::OK
@@ -379,16 +377,21 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     }
 }
 
-/// Writes the frame of any request to the start of `place`, and returns its length.
-fn write_frame<J: ClientRequest>(request: &J, place: &mut [u8], wire: u16) -> Result<usize, Error> {
+/// Writes the frame of any request into `buffer` from the index `begin` on, and returns the index
+/// after its end; `None` if there is no space for it.
+fn write_frame<J: ClientRequest>(
+    request: &J,
+    buffer: &mut [u8],
+    begin: usize,
+    wire: u16,
+) -> Option<usize> {
     let state = request.state();
-    let header = &state.header;
-    tcp::emit(place, wire, state.unit(), |pdu| {
-        let length = usize::from(header.request_length());
-        let pdu = pdu.get_mut(..length).ok_or(Error::BUFFER_TOO_SMALL)?;
-        header.emit(pdu, data_of(request));
-        Ok(length)
-    })
+    let length = usize::from(state.header.request_length());
+    let end = begin + tcp::PDU + length;
+    let (header, pdu) = buffer.get_mut(begin..end)?.split_first_chunk_mut()?;
+    *header = tcp::emit_header(wire, length, state.unit());
+    state.header.emit(pdu, data_of(request));
+    Some(end)
 }
 
 impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
@@ -421,8 +424,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
         }
         // Bytes are read also while all requests only wait. If they stayed in the port, a
         // program that waits for bytes in select would wake up at once.
-        let may_wait = queue.is_held || self.in_flight > 0 || queue.delay(now) > 0;
-        let mut fresh = fresh && may_wait;
+        let mut fresh = fresh && (queue.is_held || self.in_flight > 0 || queue.delay(now) > 0);
         loop {
             if self.start < self.end {
                 if let Some(request) = self.find(queue, now) {
