@@ -25,6 +25,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
         self.unit = unit;
         self.function = self.request.function();
+        self.length = self.request.reply_length();
         if Q::HAS_FIXED_REPLY {
             self.retries = 0;
         }
@@ -48,7 +49,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.awaits_end = false;
         self.end = S::Count::ZERO;
         self.content = S::Count::ZERO;
-        self.length = self.request.reply_length();
         self.see_nothing();
         self.has_more = false;
         self.is_held = false;
