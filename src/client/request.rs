@@ -162,9 +162,7 @@ pub(super) fn is_answer(ended: Status) -> bool {
     ended.code() < 0x80
 }
 
-/// Stores the data of the complete response `pdu` in the request. (Not inlined: within the loop
-/// over TCP frames, the loop over the data takes a host twice the instructions.)
-#[inline(never)]
+/// Stores the data of the complete response `pdu` in the request.
 pub(super) fn store_response<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
     let at = usize::from(request.state().header.data_at());
     let data = match pdu.get(at..) {
