@@ -189,6 +189,7 @@ impl RequestHeader {
     /// begins with `pdu`. If only the end of the frame determines the length, `whole`; for 11
     /// (hex) the counted length if that is greater. More than [`MAX_PDU`] for `whole` means that
     /// the frame may go on: then no such response ends, and one of 11 ends as it counts.
+    #[inline]
     pub fn expected(&self, pdu: &[u8], whole: usize) -> Option<NonZeroU8> {
         let length = match pdu {
             [] => 2,
@@ -219,6 +220,7 @@ impl RequestHeader {
 
     /// As [`RequestHeader::expected`], for the functions 11, 18 and 2B/0E (hex), which have
     /// rules of their own, and for those whose response only the end of the frame ends.
+    #[cold]
     fn own_length(&self, pdu: &[u8], whole: usize) -> usize {
         match self.length {
             QUEUE => match *pdu {
@@ -250,6 +252,7 @@ impl RequestHeader {
     /// The status of a response: [`Status::OK`], an exception, or [`Status::MALFORMED_REPLY`] if
     /// `pdu` is no whole response to this request. `byte` returns a byte of the data that were
     /// sent.
+    #[inline]
     pub fn validate(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
         let expected = self.expected(pdu, pdu.len());
         if expected.map_or(0, |length| length.get().into()) != pdu.len() {
