@@ -163,7 +163,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     /// Notes that a request was answered while `in_flight` others wait for their answer.
     pub(super) fn answered(&mut self, in_flight: u8) {
         self.connected = true;
-        self.unanswered = 0i8.saturating_sub_unsigned(in_flight);
+        self.unanswered = below_zero(in_flight);
     }
 
     /// Number of requests in flight.
@@ -175,7 +175,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
 
     /// Notes that bytes have arrived.
     pub fn received(&mut self) {
-        self.unanswered = 0i8.saturating_sub_unsigned(self.in_flight());
+        self.unanswered = below_zero(self.in_flight());
     }
 
     /// True if a request waits to be sent.
@@ -373,6 +373,11 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         }
         self.changed = true;
     }
+}
+
+/// 0 - `count`, at least -128. (A saturating subtraction takes more flash.)
+fn below_zero(count: u8) -> i8 {
+    (count.min(128) as i8).wrapping_neg()
 }
 
 fn is_lost(request: &impl ClientRequest) -> bool {
