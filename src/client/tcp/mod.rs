@@ -424,7 +424,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
         }
         // Bytes are read also while all requests only wait. If they stayed in the port, a
         // program that waits for bytes in select would wake up at once.
-        let mut fresh = fresh && (queue.is_held || self.in_flight > 0 || queue.delay(now) > 0);
+        let mut fresh = fresh && (self.in_flight > 0 || queue.is_held || queue.delay(now) > 0);
         loop {
             if self.start < self.end {
                 if let Some(request) = self.find(queue, now) {
