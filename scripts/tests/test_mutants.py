@@ -157,6 +157,7 @@ class Verdict(unittest.TestCase):
         self.assertEqual(self.verdict({"ring": (9, self.RUST)}), "killed by ring::it_is_one_more")
         self.assertEqual(self.tree.ran, ["ring", "ring"])
         self.assertEqual(self.verdict({"test_bits": (9, self.C)}), "killed by test_bits::it_is_one_more")
+        self.assertEqual(self.verdict({"errors": (9, "thread 'deep::one' (7) panicked at a.rs:3:\n")}), "killed by errors::one")
         self.assertEqual(self.verdict({"errors": (9, "")}), "killed by errors, exit code 1")
 
     def test_a_test_that_fails_once_kills_nothing(self):
