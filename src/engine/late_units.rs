@@ -1,7 +1,7 @@
 //! The units of a line that may still answer earlier requests. See `late`.
 
 /// How many units are remembered exactly that owe replies at the same time: 10 on a host, 4 where
-/// pointers have 32 bits, 1 on an AVR, where each takes 6 bytes of 2048.
+/// pointers have 32 bits, 1 on an AVR, where each takes 8 bytes of 2048.
 pub(super) const LATE_UNITS: usize = match size_of::<usize>() {
     2 => 1,
     4 => 4,

@@ -84,8 +84,9 @@ pub fn find_first(bytes: &[u8], least: usize, step: usize) -> Option<usize> {
 }
 
 /// Index of the longest frame at the end of `bytes` whose CRC is right; that of the last byte if
-/// there is none. There is at least one byte. Goes back from the end, and undoes the CRC byte by byte: a frame begins where
-/// the CRC has its initial value. As for [`is_frame`], a frame may lack a PDU.
+/// there is none. There is at least one byte. Goes back from the end, and undoes the CRC byte by
+/// byte: a frame begins where the CRC has its initial value. As for [`is_frame`], a frame may lack a
+/// PDU.
 pub fn find_last(bytes: &[u8]) -> usize {
     // Most often all bytes are one frame. An AVR sees that forwards in a third of the time, for
     // 42 bytes of flash, and a host by its tables.

@@ -236,21 +236,25 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         start + offset + rtu::OVERHEAD + usize::from(self.storage.byte(start + offset))
     }
 
-    /// As the end of [`Server::receive_rtu`], for the framings other than RTU. It is not inlined.
-    fn receive_no_more_not_inlined(&mut self, received: isize) -> Status {
+    /// Handles that a stream or an ASCII line has no more bytes now.
+    fn receive_no_more(&mut self, received: isize) -> Status {
         if received < 0 {
             return Status::LINK_LOST;
         }
         if self.end == 0 || !self.is_silent() {
             return Status::OK;
         }
-        self.last_frame_not_inlined()
+        self.last_frame()
     }
 
+    /// Moves the last frame of the received bytes to the front. Any other bytes are dropped.
     #[inline(never)]
-    fn last_frame_not_inlined(&mut self) -> Status {
+    fn last_frame(&mut self) -> Status {
         self.crc = Crc16::START;
-        self.last_frame()
+        let end = usize::from(self.end);
+        let start = rtu::find_last(self.storage.part(0, end));
+        self.storage.keep(start, end);
+        self.found_frame(end - start)
     }
 
     /// True for RTU frames on a serial line. A silence of t3.5 ends them.
@@ -299,15 +303,6 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         place
     }
 
-    /// Moves the last frame of the received bytes to the front. Any other bytes are dropped.
-    #[inline(always)]
-    fn last_frame(&mut self) -> Status {
-        let end = usize::from(self.end);
-        let start = rtu::find_last(self.storage.part(0, end));
-        self.storage.keep(start, end);
-        self.found_frame(end - start)
-    }
-
     /// The first `total` bytes are a frame, or too few for one.
     #[inline(always)]
     fn found_frame(&mut self, total: usize) -> Status {
@@ -342,7 +337,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                 None => end > rtu::OVERHEAD,
             };
             if whole && self.crc.is_residue() {
-                return self.last_frame_not_inlined();
+                return self.last_frame();
             }
             if whole {
                 self.resyncing = true;
@@ -353,7 +348,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             };
             let received = self.read_bytes_not_inlined(until);
             if received <= 0 {
-                return self.receive_no_more_not_inlined(received);
+                return self.receive_no_more(received);
             }
             taken += received as u16;
         }
