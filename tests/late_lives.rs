@@ -82,6 +82,20 @@ struct Device {
     well: u32,
 }
 
+impl Device {
+    /// A device with one of these latencies, in milliseconds, and a fault.
+    fn new(unit: u8, latencies: &[u32], random: &mut Random) -> Self {
+        Device {
+            unit,
+            latency: random.one_of(latencies) * MS,
+            fault: fault(random),
+            requests: 0,
+            free: 0,
+            well: 0,
+        }
+    }
+}
+
 /// The line, its devices and the clock.
 #[derive(Default)]
 struct World {
@@ -366,7 +380,8 @@ struct Program {
     is_in_turn: bool,
 }
 
-fn fault(random: &mut Random, kind: u32) -> Fault {
+fn fault(random: &mut Random) -> Fault {
+    let kind = random.below(5);
     let first = random.below(5) as u16;
     match kind {
         0 => Fault::None,
@@ -397,17 +412,8 @@ fn live(seed: u64) -> Result<(), String> {
     for unit in &units {
         let mut world = wire.0.borrow_mut();
         if world.devices.iter().all(|device| device.unit != *unit) {
-            let latency = random.one_of(&[3, 50, 105, 150, 300, 450, 490]) * MS;
-            let kind = random.below(5);
-            let fault = fault(&mut random, kind);
-            world.devices.push(Device {
-                unit: *unit,
-                latency,
-                fault,
-                requests: 0,
-                free: 0,
-                well: 0,
-            });
+            let device = Device::new(*unit, &[3, 50, 105, 150, 300, 450, 490], &mut random);
+            world.devices.push(device);
         }
     }
     let limits = [20, 50, 100, 150, 300, 450, 600, 1200, 3000].map(|limit| limit * MS);
@@ -510,17 +516,8 @@ fn live_queued(seed: u64) -> Result<(), String> {
     wire.pass(1_000_000);
     let units: &[u8] = random.one_of(&[&[1, 33], &[1, 33, 65, 97], &[1, 2, 3, 4, 5, 34, 66, 98]]);
     for unit in units {
-        let latency = random.one_of(&[3, 50, 105, 150, 230]) * MS;
-        let kind = random.below(5);
-        let fault = fault(&mut random, kind);
-        wire.0.borrow_mut().devices.push(Device {
-            unit: *unit,
-            latency,
-            fault,
-            requests: 0,
-            free: 0,
-            well: 0,
-        });
+        let device = Device::new(*unit, &[3, 50, 105, 150, 230], &mut random);
+        wire.0.borrow_mut().devices.push(device);
     }
     {
         let mut world = wire.0.borrow_mut();

@@ -1,21 +1,16 @@
 //! The order in which a plan reads, held against a scan of all reads: random plans, of which units
 //! do not answer, over a clock that wraps.
 
+#[path = "common/plan.rs"]
+mod plan;
+
 use mbm::error::Status;
 use mbm::plan::field::{HOLDING_REGISTERS, INPUT_REGISTERS, UINT16};
 use mbm::plan::group::group;
 use mbm::plan::schedule::{Backoff, Schedule, FOREVER};
-use mbm::plan::{Field, Limits, Position, Read};
+use mbm::plan::{Field, Position, Read};
+use plan::LIMITS;
 use proptest::prelude::*;
-
-const LIMITS: Limits = Limits {
-    bits: 0,
-    registers: 0,
-    bit_gap: 0,
-    register_gap: 0,
-    units: &[],
-    excluded: &[],
-};
 
 /// From now to `time`; 0 if it has come.
 fn until(time: u32, now: u32) -> u32 {
