@@ -1,8 +1,9 @@
 #define _GNU_SOURCE
 #include "found_port.h"
 
+#include "clock.h"
+
 #include <string.h>
-#include <time.h>
 
 static uint64_t rounds;    /* the number of the last round */
 static uint32_t waited_at; /* when it began */
@@ -71,10 +72,7 @@ mbm_port found_port_begin(found_port *port, const mbm_port *below)
 
 void found_port_begin_round(void)
 {
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    waited_at = (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
+    waited_at = (uint32_t)clock_micros(CLOCK_MONOTONIC);
     rounds++;
     is_in_round = 1;
 }

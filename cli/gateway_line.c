@@ -2,6 +2,7 @@
 #include "gateway_line.h"
 
 #include "advice.h"
+#include "clock.h"
 #include "numbers.h"
 #include "report.h"
 #include "terminal.h"
@@ -13,7 +14,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 /* A lookup of a host may block the gateway, so there is a longer pause between two of them. */
@@ -24,10 +24,7 @@ enum { SILENT_AFTER = 5 };
 
 static uint32_t micros(void)
 {
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
+    return (uint32_t)clock_micros(CLOCK_MONOTONIC);
 }
 
 /* --- the link --- */

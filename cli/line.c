@@ -2,6 +2,7 @@
 #include "line.h"
 
 #include "advice.h"
+#include "clock.h"
 #include "numbers.h"
 #include "options.h"
 #include "report.h"
@@ -17,10 +18,7 @@
 
 uint32_t line_milliseconds(void)
 {
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint32_t)now.tv_sec * 1000u + (uint32_t)now.tv_nsec / 1000000u;
+    return (uint32_t)clock_milliseconds();
 }
 
 /* --- opening --- */

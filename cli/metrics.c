@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include "metrics.h"
 
+#include "clock.h"
 #include "numbers.h"
 
 #include <arpa/inet.h>
@@ -11,7 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 enum {
@@ -33,14 +33,6 @@ static visitor visitors[METRICS_PLACES];
 static int listener = -1, is_ready;
 static char *rendered;
 static int64_t rendered_at, tired_until; /* no connection is accepted before that time */
-
-static int64_t now(void)
-{
-    struct timespec time;
-
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return (int64_t)time.tv_sec * 1000 + time.tv_nsec / 1000000;
-}
 
 /* Reads ADDRESS:PORT. Returns NULL, or what is wrong. */
 static const char *read_address(const char *text, struct sockaddr_storage *to, socklen_t *length)
@@ -129,7 +121,7 @@ nfds_t metrics_wait(struct pollfd *waits)
 
     if (listener < 0)
         return 0;
-    if (now() >= tired_until)
+    if (clock_milliseconds() >= tired_until)
         waits[count++] = (struct pollfd){listener, POLLIN, 0};
     for (i = 0; i < METRICS_PLACES; i++)
         if (visitors[i].fd > 0)
@@ -140,7 +132,8 @@ nfds_t metrics_wait(struct pollfd *waits)
 
 uint32_t metrics_delay(void)
 {
-    uint32_t delay = listener >= 0 && now() < tired_until ? TIRED_MS * 1000 : UINT32_MAX;
+    uint32_t delay =
+        listener >= 0 && clock_milliseconds() < tired_until ? TIRED_MS * 1000 : UINT32_MAX;
     int i;
 
     for (i = 0; i < METRICS_PLACES; i++) {
@@ -148,7 +141,7 @@ uint32_t metrics_delay(void)
 
         if (visitors[i].fd <= 0)
             continue;
-        left = visitors[i].since + LIFE_MS - now();
+        left = visitors[i].since + LIFE_MS - clock_milliseconds();
         if (left < 0)
             left = 0;
         if ((uint32_t)left * 1000u < delay)
@@ -163,12 +156,12 @@ static void take_visitor(void)
     visitor *place = visitors;
     int i, fd;
 
-    if (now() < tired_until)
+    if (clock_milliseconds() < tired_until)
         return;
     fd = accept4(listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd < 0) {
         if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM)
-            tired_until = now() + TIRED_MS;
+            tired_until = clock_milliseconds() + TIRED_MS;
         return;
     }
     for (i = 1; i < METRICS_PLACES && place->fd > 0; i++)
@@ -176,7 +169,7 @@ static void take_visitor(void)
             place = &visitors[i];
     drop(place);
     place->fd = fd;
-    place->since = now();
+    place->since = clock_milliseconds();
     place->have = place->sent = place->length = 0;
 }
 
@@ -207,10 +200,10 @@ static void answer_request(visitor *one, char *(*render)(void))
         answer(one, "404 Not Found", "The numbers are at /metrics.\n");
         return;
     }
-    if (!rendered || now() - rendered_at >= RENDER_MS) {
+    if (!rendered || clock_milliseconds() - rendered_at >= RENDER_MS) {
         free(rendered);
         rendered = render();
-        rendered_at = now();
+        rendered_at = clock_milliseconds();
     }
     if (rendered)
         answer(one, "200 OK", rendered);
@@ -276,7 +269,7 @@ void metrics_work(char *(*render)(void))
             read_request(one, render);
         if (one->fd > 0 && one->reply)
             write_reply(one);
-        if (one->fd > 0 && now() - one->since >= LIFE_MS)
+        if (one->fd > 0 && clock_milliseconds() - one->since >= LIFE_MS)
             drop(one);
     }
 }

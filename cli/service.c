@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include "service.h"
 
+#include "clock.h"
 #include "options.h"
 #include "report.h"
 
@@ -101,24 +102,14 @@ void service_is_ready(void)
 
 void service_is_reloading(void)
 {
-    struct timespec now;
     char text[64];
 
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    snprintf(text, sizeof text, "RELOADING=1\nMONOTONIC_USEC=%" PRId64,
-             (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000);
+    snprintf(text, sizeof text, "RELOADING=1\nMONOTONIC_USEC=%" PRIu64,
+             clock_micros(CLOCK_MONOTONIC));
     notify(text);
 }
 
 /* --- statistics --- */
-
-static int64_t milliseconds(void)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
 
 static char *take(char *(*as_text)(const stats *from))
 {
@@ -206,7 +197,7 @@ int service_begin(void (*fill)(stats *numbers))
             return report(CODE_LINE, "--metrics %s: %s", metrics_place, strerror(errno));
         report_log(REPORT_INFO, "metrics are at port %d, /metrics", port);
     }
-    next_time = milliseconds() + every;
+    next_time = clock_milliseconds() + every;
     return CODE_DONE;
 }
 
@@ -222,7 +213,7 @@ int service_wait(struct pollfd *polls, nfds_t count, uint32_t micros)
     if (delay < micros)
         micros = delay;
     if (every > 0) {
-        const int64_t left = next_time - milliseconds();
+        const int64_t left = next_time - clock_milliseconds();
 
         if (left <= 0)
             micros = 0;
@@ -240,8 +231,8 @@ int service_wait(struct pollfd *polls, nfds_t count, uint32_t micros)
 void service_work(void)
 {
     metrics_work(render);
-    if (every > 0 && milliseconds() >= next_time) {
-        next_time = milliseconds() + every;
+    if (every > 0 && clock_milliseconds() >= next_time) {
+        next_time = clock_milliseconds() + every;
         stats_wanted = 1;
     }
     if (!stats_wanted)

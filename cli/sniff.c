@@ -2,6 +2,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
+#include "clock.h"
 #include "commands.h"
 #include "event_json.h"
 #include "line.h"
@@ -13,7 +14,6 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 /* Microseconds, except the first. A recording is looked at in short steps while requests may time
  * out, and then in long ones. */
@@ -103,15 +103,15 @@ static int watch(void)
     if (code == CODE_DONE && place_is_tcp(&where))
         code = line_connect(&at);
     port = place_is_tcp(&where) ? mbm_tcp_port(&at.tcp) : mbm_tty_port(&at.tty);
-    first = trace_micros(CLOCK_MONOTONIC);
+    first = clock_micros(CLOCK_MONOTONIC);
     if (code == CODE_DONE)
-        epoch = trace_micros(CLOCK_REALTIME);
+        epoch = clock_micros(CLOCK_REALTIME);
     while (code == CODE_DONE && !report_stopped && !ferror(stdout)) {
         int length;
 
         line_wait(&at, -1, LIVE_STEP);
         length = port.read(port.context, bytes, sizeof bytes);
-        now = trace_micros(CLOCK_MONOTONIC);
+        now = clock_micros(CLOCK_MONOTONIC);
         if (length > 0)
             feed(bytes, (uint16_t)length);
         else if (length < 0)
@@ -121,7 +121,7 @@ static int watch(void)
         report_flush();
     }
     line_close(&at);
-    print_events(trace_micros(CLOCK_MONOTONIC));
+    print_events(clock_micros(CLOCK_MONOTONIC));
     return code;
 }
 

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include "trace.h"
 
+#include "clock.h"
 #include "pcap_file.h"
 #include "report.h"
 
@@ -74,20 +75,12 @@ static void take(traced *link, const mbm_traceRecord *record, const mbm_event *e
         checked(pcap_write(pcap, &link->pcap, record, time, decoded));
 }
 
-uint64_t trace_micros(clockid_t clock)
-{
-    struct timespec now;
-
-    clock_gettime(clock, &now);
-    return (uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u;
-}
-
 /* The clock of the ports is the monotonic one. */
 static void take_frame(void *context, const mbm_traceRecord *record)
 {
-    const uint32_t age = (uint32_t)trace_micros(CLOCK_MONOTONIC) - record->timeUs;
+    const uint32_t age = (uint32_t)clock_micros(CLOCK_MONOTONIC) - record->timeUs;
 
-    take((traced *)context, record, NULL, trace_micros(CLOCK_REALTIME) - age);
+    take((traced *)context, record, NULL, clock_micros(CLOCK_REALTIME) - age);
 }
 
 static void end(void)

@@ -9,8 +9,6 @@
 
 #include "mbm.h"
 
-#include <time.h>
-
 /* Prints each frame, and writes each to a file. Call them before any port is traced. trace_write
  * returns 0, or -1 with errno set if it cannot write the file. */
 void trace_print(void);
@@ -21,9 +19,6 @@ int trace_write(const char *path);
  * before takes its place. */
 mbm_port trace_client(mbm_port port, uint8_t framing, const char *name);
 mbm_port trace_server(mbm_port port, uint8_t framing, const char *name);
-
-/* What a clock has in microseconds; CLOCK_REALTIME since 1970. */
-uint64_t trace_micros(clockid_t clock);
 
 /* Traces an event of a sniffer. `time` is in microseconds since 1970. */
 void trace_event(const mbm_event *event, uint8_t framing, const char *name, uint64_t time);
