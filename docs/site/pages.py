@@ -76,15 +76,16 @@ class Site:
         return self.resolve("\n".join(lines) + "\n", page)
 
     def field_cases(self):
-        """The table of the field cases, one row for each file."""
+        """The table of the field cases, one row for each."""
         rows = ["| report | symptom | what mbm does | case |", "|---|---|---|---|"]
         for file in sorted(name for name in self.files if name.startswith(CASES) and name.endswith(".txt")):
-            lines = (self.root / file).read_text(encoding="utf-8").splitlines()
-            head = dict(line.split(" ", 1) for line in lines if " " in line and not line.startswith((" ", "#")))
-            reports = [f"[{name}](https://github.com/{name.replace('#', '/issues/')})" if "#" in name else name
-                       for name in head["report"].split(", ")]
-            done = f"not yet: {head['pending']}" if "pending" in head else head["mbm"]
-            rows.append(f"| {', '.join(reports)} | {head['symptom']} | {done} | [{pathlib.PurePath(file).stem}](/{file}) |")
+            text = (self.root / file).read_text(encoding="utf-8")
+            for name, case in re.findall(r"^case (\w+)\n(.*?)(?=^case |\Z)", text, re.M | re.S):
+                head = dict(line.split(" ", 1) for line in case.splitlines() if " " in line and not line.startswith((" ", "#")))
+                reports = [f"[{report}](https://github.com/{report.replace('#', '/issues/')})" if "#" in report else report
+                           for report in head["report"].split(", ")]
+                done = f"not yet: {head['pending']}" if "pending" in head else head["mbm"]
+                rows.append(f"| {', '.join(reports)} | {head['symptom']} | {done} | [{name}](/{file}) |")
         return "\n".join(rows)
 
     def line(self, line, path, page):

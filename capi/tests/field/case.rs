@@ -426,7 +426,7 @@ fn step(words: &[&str]) -> Read<Step> {
     })
 }
 
-/// Reads the lines up to `end`, or to the end of the file.
+/// Reads the lines up to `end`, or to the end of the case.
 fn steps<'a>(
     lines: &mut impl Iterator<Item = (usize, &'a str)>,
     is_inner: bool,
@@ -483,7 +483,26 @@ fn block(text: &str) -> Read<Block> {
     })
 }
 
+/// The first line of a case, its head, and the lines of its steps.
+type Part<'a> = (usize, Case, Vec<(usize, &'a str)>);
+
 impl Case {
+    fn new(name: &str) -> Case {
+        Case {
+            name: name.into(),
+            report: String::new(),
+            symptom: String::new(),
+            mbm: String::new(),
+            roles: Vec::new(),
+            framing: Framing::Rtu,
+            baud: 19_200,
+            blocks: vec![Block { bytes: 1, delay: 0 }],
+            pending: None,
+            settings: Vec::new(),
+            steps: Vec::new(),
+        }
+    }
+
     fn head(&mut self, text: &str) -> Read<bool> {
         let (key, value) = text.split_once(' ').unwrap_or((text, ""));
         let value = value.trim();
@@ -511,46 +530,42 @@ impl Case {
         Ok(true)
     }
 
-    /// Reads a file.
-    pub fn read(path: &Path) -> Result<Case, String> {
-        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    /// Reads the cases of a file, each of which begins with `case NAME`.
+    pub fn read(path: &Path) -> Result<Vec<Case>, String> {
         let at = |line: usize, why: String| format!("{}:{line}: {why}", path.display());
         let text = std::fs::read_to_string(path).map_err(|why| at(0, why.to_string()))?;
-        let mut case = Case {
-            name: name.into(),
-            report: String::new(),
-            symptom: String::new(),
-            mbm: String::new(),
-            roles: Vec::new(),
-            framing: Framing::Rtu,
-            baud: 19_200,
-            blocks: vec![Block { bytes: 1, delay: 0 }],
-            pending: None,
-            settings: Vec::new(),
-            steps: Vec::new(),
-        };
-        let mut body = Vec::new();
+        let mut parts: Vec<Part> = Vec::new();
         for (index, text) in text.lines().enumerate() {
             let (line, text) = (index + 1, text.trim());
             if text.is_empty() || text.starts_with('#') {
                 continue;
             }
+            if let Some(name) = text.strip_prefix("case ") {
+                parts.push((line, Case::new(name), Vec::new()));
+                continue;
+            }
+            let (_, case, body) = parts
+                .last_mut()
+                .ok_or_else(|| at(line, "case is missing".into()))?;
             if !body.is_empty() || !case.head(text).map_err(|why| at(line, why))? {
-                body.push((line, text.to_string()));
+                body.push((line, text));
             }
         }
-        let mut lines = body.iter().map(|(line, text)| (*line, text.as_str()));
-        case.steps = steps(&mut lines, false).map_err(|(line, why)| at(line, why))?;
-        let missing = [
-            (case.report.is_empty(), "report"),
-            (case.symptom.is_empty(), "symptom"),
-            (case.mbm.is_empty(), "mbm"),
-            (case.roles.is_empty(), "role"),
-            (case.steps.is_empty(), "a step"),
-        ];
-        match missing.iter().find(|(is_missing, _)| *is_missing) {
-            Some((_, what)) => Err(at(1, format!("{what} is missing"))),
-            None => Ok(case),
-        }
+        let finish = |(line, mut case, body): Part| {
+            case.steps =
+                steps(&mut body.into_iter(), false).map_err(|(line, why)| at(line, why))?;
+            let missing = [
+                (case.report.is_empty(), "report"),
+                (case.symptom.is_empty(), "symptom"),
+                (case.mbm.is_empty(), "mbm"),
+                (case.roles.is_empty(), "role"),
+                (case.steps.is_empty(), "a step"),
+            ];
+            match missing.iter().find(|(is_missing, _)| *is_missing) {
+                Some((_, what)) => Err(at(line, format!("{what} is missing"))),
+                None => Ok(case),
+            }
+        };
+        parts.into_iter().map(finish).collect()
     }
 }

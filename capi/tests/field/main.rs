@@ -1,15 +1,15 @@
 //! The field cases: what devices, adapters, UARTs and programs of the field do, and what mbm makes
-//! of it. Each file in `cases` is one report and at least one test; `docs/field-cases.md` describes
-//! the notation. A new report is a new file.
+//! of it. Each case in the files of `cases` is one report and at least one test; `docs/field-cases.md`
+//! describes the notation.
 //!
 //! The runner plays them on a simulated line or stream with a simulated clock. It is in Rust,
 //! because it then runs with `cargo test` in seconds, and it calls the functions of the C API,
 //! because they are what all programs but those in Rust use: a case covers the core and the layer
 //! of C above it, and a gateway is the one that firmware has, with its lines.
 //!
-//! Cargo's own test runner wants a function for each test. This one makes a test of each file, role
+//! Cargo's own test runner wants a function for each test. This one makes a test of each case, role
 //! and way of handing bytes over, takes the same arguments, and prints the same lines. It fails if it
-//! finds no case. The files in `planted` expect what does not happen: each of them must fail.
+//! finds no case. The cases in `planted.txt` expect what does not happen: each of them must fail.
 
 mod case;
 mod device;
@@ -37,18 +37,29 @@ struct Test<'a> {
     is_planted: bool,
 }
 
-/// The cases in a folder, in the order of their names.
-fn cases(folder: &str) -> Result<Vec<(PathBuf, Case)>, String> {
-    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/field");
-    let entries = std::fs::read_dir(tests.join(folder)).map_err(|why| why.to_string())?;
-    let mut paths = Vec::new();
-    for entry in entries {
-        paths.push(entry.map_err(|why| why.to_string())?.path());
+/// The cases of a file, or of the files in a folder, in the order of their names.
+fn cases(place: &str) -> Result<Vec<(PathBuf, Case)>, String> {
+    let place = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/field")
+        .join(place);
+    let mut paths = vec![place.clone()];
+    if place.is_dir() {
+        let entries = std::fs::read_dir(place).map_err(|why| why.to_string())?;
+        paths = entries.flatten().map(|entry| entry.path()).collect();
+        paths.retain(|path| path.extension().is_some_and(|kind| kind == "txt"));
+        paths.sort();
     }
-    paths.retain(|path| path.extension().is_some_and(|kind| kind == "txt"));
-    paths.sort();
-    let read = |path: PathBuf| Case::read(&path).map(|case| (path, case));
-    paths.into_iter().map(read).collect()
+    let mut cases: Vec<(PathBuf, Case)> = Vec::new();
+    for path in paths {
+        for case in Case::read(&path)? {
+            if let Some((other, _)) = cases.iter().find(|(_, other)| other.name == case.name) {
+                let (path, other) = (path.display(), other.display());
+                return Err(format!("{path}: {other} has a case {} too", case.name));
+            }
+            cases.push((path.clone(), case));
+        }
+    }
+    Ok(cases)
 }
 
 /// The tests of a case.
@@ -137,7 +148,7 @@ fn run(tests: &[&Test]) -> Vec<(String, String)> {
     for test in tests {
         let result = test.run();
         if test.case.pending.is_some() {
-            let (_, count, has_failed) = pending.entry(test.path).or_insert((test.case, 0, false));
+            let (_, count, has_failed) = pending.entry(&test.case.name).or_insert((test, 0, false));
             *count += 1;
             *has_failed |= result.is_err();
         }
@@ -150,10 +161,11 @@ fn run(tests: &[&Test]) -> Vec<(String, String)> {
             }
         }
     }
-    for (path, (case, count, has_failed)) in pending {
-        if !has_failed && count == case.roles.len() * case.blocks.len() {
-            let why = format!("{}: it passes: remove its line pending", path.display());
-            failures.push((case.name.clone(), why));
+    for (name, (test, count, has_failed)) in pending {
+        if !has_failed && count == test.case.roles.len() * test.case.blocks.len() {
+            let path = test.path.display();
+            let why = format!("{path}: it passes: remove its line pending");
+            failures.push((name.clone(), why));
         }
     }
     failures
@@ -162,7 +174,7 @@ fn run(tests: &[&Test]) -> Vec<(String, String)> {
 fn main() -> ExitCode {
     let begin = Instant::now();
     let arguments = Arguments::read();
-    let (real, planted) = match (cases("cases"), cases("planted")) {
+    let (real, planted) = match (cases("cases"), cases("planted.txt")) {
         (Ok(real), Ok(planted)) if !real.is_empty() && !planted.is_empty() => (real, planted),
         (Ok(_), Ok(_)) => {
             println!("test result: FAILED. 0 passed; 1 failed; there is no case");
