@@ -102,7 +102,7 @@ check-semver: ## Check that `make semver` finds a change: try it on changed copi
 
 .PHONY: test-scripts
 test-scripts: ## Run the tests of the scripts
-	@scripts/need python3 python3-venv
+	@scripts/need git gcc libc6-dev abigail-tools python3 python3-venv
 	@scripts/venv build/sbom packaging/sbom/requirements.txt
 	@build/sbom/bin/python -m unittest discover --start-directory scripts/tests
 
