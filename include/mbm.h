@@ -10,6 +10,8 @@
  *   incomplete port, a buffer that is too short and an object of another framing;
  *   MBM_NOT_INITIALISED for an object that was never begun; MBM_BUSY if a hook calls it on the
  *   object that calls the hook (see mbm_port). A comment names only the statuses besides these.
+ * - A parameter that its comment leaves out is the object of its type, or is explained at the
+ *   function to which the comment refers. A result that it leaves out is a status.
  * - A call that is refused changes nothing, unless the comment says otherwise.
  * - A pointer is NULL or valid. For NULL a function never crashes. Data that a function only
  *   reads may be NULL if their length is 0.

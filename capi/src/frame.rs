@@ -59,14 +59,13 @@ unsafe fn format(
 ///
 /// Any thread or interrupt may call it. On a Cortex-M it takes 600 bytes of stack.
 ///
-/// @param framing   the framing of the frame
 /// @param packet    the packet, with its unit, and for TCP its transaction
 /// @param frame     receives the frame; it must not overlap the packet's data
 /// @param capacity  bytes of `frame`; MBM_MAX_FRAME suffice for RTU, MBM_MAX_TCP_FRAME for TCP,
 ///                  MBM_MAX_PDU for MBM_FRAMING_NONE, MBM_MAX_ASCII_FRAME for all
 /// @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
-/// @return a status; MBM_BUFFER_TOO_SMALL; otherwise the status that mbm_frame_parse would
-///         return for such a frame
+/// @return a status; MBM_BUFFER_TOO_SMALL; otherwise the status that mbm_frame_parse would return
+///         for such a frame
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_build(
     framing: *const mbm_framing,
@@ -106,21 +105,19 @@ pub unsafe extern "C" fn mbm_frame_build(
 ///
 /// Any thread or interrupt may call it.
 ///
-/// @param framing      the framing of the frame
 /// @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
 /// @param frame        the frame, from its first byte to its last. An ASCII frame is decoded in
 ///                     place, which overwrites it; other frames do not change
 /// @param frameLength  the number of bytes of `frame`
-/// @param packet       receives the packet. If the frame is valid but its PDU is not, it
-///                     receives only kind, unit, transaction and function. If the frame is not
-///                     valid, it receives only the kind. For MBM_INVALID_ARGUMENT it does not
-///                     change
+/// @param packet       receives the packet. If the frame is valid but its PDU is not, it receives
+///                     only kind, unit, transaction and function. If the frame is not valid, it
+///                     receives only the kind. For MBM_INVALID_ARGUMENT it does not change
 /// @return MBM_OK, also for an exception. If the frame is not valid: MBM_INCOMPLETE_FRAME,
 ///         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC. If its request is not
-///         valid, the exception that answers it: MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS
-///         or MBM_ILLEGAL_DATA_VALUE. If its response is not valid: MBM_MALFORMED_REPLY, or
-///         MBM_INVALID_FUNCTION for a function code that the standard does not define and
-///         `framing` does not declare
+///         valid, the exception that answers it: MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS or
+///         MBM_ILLEGAL_DATA_VALUE. If its response is not valid: MBM_MALFORMED_REPLY, or
+///         MBM_INVALID_FUNCTION for a function code that the standard does not define and `framing`
+///         does not declare
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_parse(
     framing: *const mbm_framing,
@@ -171,15 +168,14 @@ pub unsafe extern "C" fn mbm_frame_parse(
 ///
 /// Any thread or interrupt may call it.
 ///
-/// @param framing   the framing of the frame
 /// @param request   the request, as mbm_frame_parse filled it in
 /// @param code      the exception code, 1 to 127, for example MBM_ILLEGAL_FUNCTION
 /// @param frame     receives the frame; it may be the buffer of the request's frame
 /// @param capacity  bytes of `frame`; 11 always suffice
 /// @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
 /// @return a status; MBM_BROADCAST_NOT_ALLOWED for unit 0 on a serial line, which no device
-///         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no exception
-///         can contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT also for MBM_FRAMING_NONE
+///         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no exception can
+///         contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT also for MBM_FRAMING_NONE
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_exception(
     framing: *const mbm_framing,
@@ -214,13 +210,12 @@ pub unsafe extern "C" fn mbm_frame_exception(
 ///
 /// Any thread or interrupt may call it. On a Cortex-M it takes 500 bytes of stack.
 ///
-/// @param framing   the framing of the frame
 /// @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
 /// @param bytes     the frame's first bytes; more may follow
 /// @param have      the number of bytes; may be 0
 /// @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
-/// @return a status; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame may
-///         be as long as they say
+/// @return a status; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame may be
+///         as long as they say
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_expectedLength(
     framing: *const mbm_framing,
@@ -258,13 +253,12 @@ fn pdu_length(pdu_kind: PduKind, bytes: &[u8], own: &[Function]) -> Result<Lengt
 ///
 /// Any thread or interrupt may call it. On a Cortex-M it takes 700 bytes of stack.
 ///
-/// @param framing   the framing of the frame
 /// @param request   the request, as for mbm_frame_build
-/// @param expected  receives the length. It is MBM_LENGTH_EXACT and 0 for a request that no
-///                  device answers: a broadcast, or 08 with sub-function 04. It is
-///                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
-/// @return a status; MBM_INVALID_ARGUMENT if the packet is not a request; otherwise the status
-///         for which mbm_frame_build refuses the request
+/// @param expected  receives the length. It is MBM_LENGTH_EXACT and 0 for a request that no device
+///                  answers: a broadcast, or 08 with sub-function 04. It is MBM_LENGTH_UNKNOWN and
+///                  0 if the status is not MBM_OK
+/// @return a status; MBM_INVALID_ARGUMENT if the packet is not a request; otherwise the status for
+///         which mbm_frame_build refuses the request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_replyLength(
     framing: *const mbm_framing,

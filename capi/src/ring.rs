@@ -54,10 +54,8 @@ unsafe fn ring<'a>(ring: *const mbm_ring) -> Option<Ring<'a>> {
 /// Begins an empty ring over your storage. Neither writer nor reader may use the ring
 /// meanwhile.
 ///
-/// @param ring   the object
 /// @param bytes  your storage; it must stay valid for as long as the ring is used
 /// @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte less
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_begin(ring: *mut mbm_ring, bytes: *mut u8, size: u16) -> u8 {
     if ring.is_null() || bytes.is_null() || size < 2 || usize::from(size) > MAX_STORAGE {
@@ -76,7 +74,6 @@ pub unsafe extern "C" fn mbm_ring_begin(ring: *mut mbm_ring, bytes: *mut u8, siz
 
 /// Puts one byte in. The writer calls it, also from an interrupt.
 ///
-/// @param ring  the object
 /// @param byte  the received byte
 /// @return 1; 0 if the ring was full: mbm_ring_lost counts the byte
 #[no_mangle]
@@ -89,7 +86,6 @@ pub unsafe extern "C" fn mbm_ring_put(ring: *mut mbm_ring, byte: u8) -> u8 {
 
 /// Puts bytes in, in order. The writer calls it, also from an interrupt.
 ///
-/// @param ring    the object
 /// @param bytes   the received bytes; NULL only if `length` is 0
 /// @param length  the number of bytes
 /// @return the number of bytes that the ring took; mbm_ring_lost counts the others
@@ -106,7 +102,6 @@ pub unsafe extern "C" fn mbm_ring_write(ring: *mut mbm_ring, bytes: *const u8, l
 
 /// Takes bytes out, in order, without waiting. The reader calls it.
 ///
-/// @param ring      the object
 /// @param bytes     receives the bytes; NULL only if `capacity` is 0
 /// @param capacity  the number of bytes that `bytes` can hold
 /// @return the number of bytes taken out; 0 if the ring was empty
@@ -123,7 +118,6 @@ pub unsafe extern "C" fn mbm_ring_read(ring: *mut mbm_ring, bytes: *mut u8, capa
 
 /// Returns how many bytes mbm_ring_read can take out now. The reader calls it.
 ///
-/// @param ring  the object
 /// @return the number of bytes; 0 also if the ring was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_available(ring: *const mbm_ring) -> u16 {
@@ -133,7 +127,6 @@ pub unsafe extern "C" fn mbm_ring_available(ring: *const mbm_ring) -> u16 {
 /// Returns how many bytes were lost because the ring was full, since mbm_ring_begin.
 /// Writer and reader may call it.
 ///
-/// @param ring  the object
 /// @return the number of bytes; it wraps at 65536, on an AVR at 256
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_lost(ring: *const mbm_ring) -> u16 {

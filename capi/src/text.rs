@@ -36,7 +36,6 @@ pub(super) fn outcome(written: Result<TextWriter, Error>) -> u8 {
 ///
 /// Any thread or interrupt may call it. On a Cortex-M it takes 1000 bytes of stack.
 ///
-/// @param framing      the framing of the frame
 /// @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
 /// @param frame        the frame, from its first byte to its last
 /// @param frameLength  the number of bytes of `frame`

@@ -216,9 +216,7 @@ typedef struct mbm_port {
     void (*idle)(void *context, struct mbm_node *node);
 } mbm_port;
 
-/**
- * Counters of what happened on the line since you zeroed them. Each wraps at 2^32.
- */
+/** Counters of what happened on the line since you zeroed them. Each wraps at 2^32. */
 typedef struct mbm_counters {
     /** Requests sent, including retries. */
     uint32_t requests;

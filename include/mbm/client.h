@@ -130,18 +130,18 @@ typedef struct mbm_identification {
      *  MBM_MALFORMED_REPLY also for a reply whose objects are not whole, and for one with
      *  another object than the one that was requested alone; otherwise as of
      *  mbm_client_readCoils. Objects that were handed out before a failure are sound. */
-    struct mbm_clientRequest request;
+    mbm_clientRequest request;
     /** Optional: mbm_client_poll calls it for each object. `object` and its data are valid
      *  during the call. It may call what `done` of a request may call: it may queue
      *  requests, and cancel, also this one, which ends the calls. */
-    void (*object)(void *context, const struct mbm_object *object);
+    void (*object)(void *context, const mbm_object *object);
     /** Optional: mbm_client_poll calls it when the identification has ended, as it calls
      *  `done` of a request. It may read the next identification with the same storage. */
     void (*done)(void *context, struct mbm_identification *identification);
     /** Your pointer, passed to both; may be NULL. */
     void *context;
     /** Private. */
-    struct mbm_client *client;
+    mbm_client *client;
     /** How many objects `object` was called for, or would have been. */
     uint16_t count;
     /** The conformity level in the last reply, by the standard 01 to 03 or 81 to 83 (hex). It
@@ -214,15 +214,12 @@ typedef struct mbm_clientUnit {
  * their status is MBM_CANCELLED and `done` is not called. All settings return to their
  * defaults. A call that is refused changes nothing.
  *
- * @param client      the object; initialised with MBM_INIT before the first call
  * @param port        the port, which is copied; read, write and micros must not be NULL
  * @param frame       the buffer of one frame, valid for as long as the client is used
  * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
  * @return a status; MBM_BUSY also while the client is suspended
  */
-uint8_t mbm_client_beginRtu(struct mbm_client *client,
-                            const struct mbm_port *port,
-                            uint8_t *frame,
+uint8_t mbm_client_beginRtu(mbm_client *client, const mbm_port *port, uint8_t *frame,
                             uint16_t frameBytes);
 
 /**
@@ -230,30 +227,19 @@ uint8_t mbm_client_beginRtu(struct mbm_client *client,
  * keeps no gap between frames. If no character arrives for one second, the client discards
  * an incomplete frame.
  *
- * @param client      the object; initialised with MBM_INIT before the first call
- * @param port        the port, which is copied; read, write and micros must not be NULL
- * @param frame       the buffer of one frame, valid for as long as the client is used
  * @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
- * @return a status; MBM_BUSY also while the client is suspended
+ * @return as mbm_client_beginRtu
  */
-uint8_t mbm_client_beginAscii(struct mbm_client *client,
-                              const struct mbm_port *port,
-                              uint8_t *frame,
+uint8_t mbm_client_beginAscii(mbm_client *client, const mbm_port *port, uint8_t *frame,
                               uint16_t frameBytes);
 
 /**
  * Begins a client that sends RTU frames through a TCP stream, for converters that pass
  * bytes from TCP to a serial line unchanged. It keeps no gap and does not broadcast.
  *
- * @param client      the object; initialised with MBM_INIT before the first call
- * @param port        the port, which is copied; read, write and micros must not be NULL
- * @param frame       the buffer of one frame, valid for as long as the client is used
- * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
- * @return a status; MBM_BUSY also while the client is suspended
+ * @return as mbm_client_beginRtu
  */
-uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
-                                   const struct mbm_port *port,
-                                   uint8_t *frame,
+uint8_t mbm_client_beginRtuOverTcp(mbm_client *client, const mbm_port *port, uint8_t *frame,
                                    uint16_t frameBytes);
 
 /**
@@ -262,22 +248,16 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
  * allows more. The client matches responses to requests by the transaction identifier, in any
  * order.
  *
- * @param client         the object; initialised with MBM_INIT before the first call
- * @param port           the port, which is copied; read, write and micros must not be NULL
  * @param incoming       the buffer of received bytes, valid for as long as the client is used
- * @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger buffer
- *                       takes more responses from one read
+ * @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger buffer takes
+ *                       more responses from one read
  * @param outgoing       the buffer of bytes to send, valid for as long as the client is used
  * @param outgoingBytes  bytes of `outgoing`, at least 12; 260 hold any frame. A larger buffer
  *                       collects more requests for one write
- * @return a status; MBM_BUSY also while the client is suspended
+ * @return as mbm_client_beginRtu
  */
-uint8_t mbm_client_beginTcp(struct mbm_client *client,
-                            const struct mbm_port *port,
-                            uint8_t *incoming,
-                            uint16_t incomingBytes,
-                            uint8_t *outgoing,
-                            uint16_t outgoingBytes);
+uint8_t mbm_client_beginTcp(mbm_client *client, const mbm_port *port, uint8_t *incoming,
+                            uint16_t incomingBytes, uint8_t *outgoing, uint16_t outgoingBytes);
 
 /**
  * Sets the character that ends ASCII frames after CR, instead of LF, in both
@@ -290,7 +270,7 @@ uint8_t mbm_client_beginTcp(struct mbm_client *client,
  * @param character  1 to 127, except CR, the colon and hexadecimal digits
  * @return a status; MBM_BUSY while a request is under way
  */
-uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
+uint8_t mbm_client_setDelimiter(mbm_client *client, uint8_t character);
 
 /**
  * Sets how many requests may be under way at once on TCP. More are faster, if the server accepts
@@ -298,11 +278,9 @@ uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
  * one at a time: they drop a request that arrives before they have answered the last one, or
  * in one segment with another. The queue always holds 16.
  *
- * @param client  the object
- * @param most    1 (the default) to 16. On a serial line and in RTU over TCP only 1 is accepted
- * @return a status
+ * @param most  1 (the default) to 16. On a serial line and in RTU over TCP only 1 is accepted
  */
-uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
+uint8_t mbm_client_setInFlight(mbm_client *client, uint8_t most);
 
 /**
  * Begins to read the objects of a device.
@@ -322,23 +300,20 @@ uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
  *         MBM_ILLEGAL_DATA_VALUE for another `code`; MBM_INVALID_ARGUMENT if `request.reply` is
  *         NULL; or another status of mbm_client_readCoils
  */
-uint8_t mbm_identification_read(struct mbm_identification *identification,
-                                struct mbm_client *client,
-                                uint8_t code,
-                                uint8_t object);
+uint8_t mbm_identification_read(mbm_identification *identification, mbm_client *client,
+                                uint8_t code, uint8_t object);
 
 /**
  * Closes the link and opens it again. The client discards an incomplete response. Requests
  * that were under way end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
  * that were not sent yet are sent over the new link.
  *
- * @param client  the object
- * @param link    your hooks, used during this call only; NULL if you have opened the link again
- *                already
+ * @param link  your hooks, used during this call only; NULL if you have opened the link again
+ *              already
  * @return what `connect` returns, or MBM_OK without `connect`; MBM_BUSY while the client is
  *         suspended
  */
-uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_linkHooks *link);
+uint8_t mbm_client_reconnect(mbm_client *client, const mbm_linkHooks *link);
 
 /**
  * Returns whether the link works, as far as the client knows.
@@ -347,12 +322,11 @@ uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_linkHoo
  * a reply arrives. Do not reconnect again while the connection is still being made. The
  * port knows whether it is: for example, call mbm_tcp_isConnected.
  *
- * @param client  the object
  * @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives or
- *         mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first request. With
- *         a link: 0 from each loss of it until it is open again
+ *         mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first request. With a
+ *         link: 0 from each loss of it until it is open again
  */
-uint8_t mbm_client_isConnected(const struct mbm_client *client);
+uint8_t mbm_client_isConnected(const mbm_client *client);
 
 /**
  * Suspends the client, so that a line can use its port. The client's requests wait until
@@ -364,18 +338,17 @@ uint8_t mbm_client_isConnected(const struct mbm_client *client);
  *                way
  * @return a status; MBM_BUSY if a request is under way or the client is suspended already
  */
-uint8_t mbm_client_suspend(struct mbm_client *client, struct mbm_line *line);
+uint8_t mbm_client_suspend(mbm_client *client, struct mbm_line *line);
 
 /**
  * Resumes the client. The line then has no port: requests of its nodes return
  * MBM_NOT_INITIALISED. A line that was begun on another port meanwhile keeps that port.
  *
- * @param client  the object
- * @param line    the line that was passed to mbm_client_suspend; NULL if none was
- * @return a status; MBM_BUSY while a request is under way on the line; MBM_INVALID_ARGUMENT if
- *         the client was not suspended, and for any other line
+ * @param line  the line that was passed to mbm_client_suspend; NULL if none was
+ * @return a status; MBM_BUSY while a request is under way on the line; MBM_INVALID_ARGUMENT if the
+ *         client was not suspended, and for any other line
  */
-uint8_t mbm_client_resume(struct mbm_client *client, struct mbm_line *line);
+uint8_t mbm_client_resume(mbm_client *client, struct mbm_line *line);
 
 /**
  * Sends and receives for all requests, without waiting, and calls `done` of those that have
@@ -384,11 +357,10 @@ uint8_t mbm_client_resume(struct mbm_client *client, struct mbm_line *line);
  *
  * Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
  *
- * @param client  the object
  * @return MBM_PENDING while requests are pending; MBM_OK if none is; MBM_BUSY also from within
  *         `done`, and while the client is suspended
  */
-uint8_t mbm_client_poll(struct mbm_client *client);
+uint8_t mbm_client_poll(mbm_client *client);
 
 /**
  * Returns how long mbm_client_poll will have nothing to do unless a byte arrives. A program
@@ -397,20 +369,18 @@ uint8_t mbm_client_poll(struct mbm_client *client);
  * a request is pending, or if it has a link (mbm_link_begin). With a link the delay also ends
  * when the link is to be opened again, and is at most one second while the client is idle.
  *
- * @param client  the object
  * @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF means
  *         that no request is pending. While a TCP port accepts no bytes to send it is 1000: to
  *         poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
  */
-uint32_t mbm_client_pollDelay(struct mbm_client *client);
+uint32_t mbm_client_pollDelay(mbm_client *client);
 
 /**
  * Returns how many requests are pending: queued or under way.
  *
- * @param client  the object
  * @return 0 to 16
  */
-uint8_t mbm_client_pending(const struct mbm_client *client);
+uint8_t mbm_client_pending(const mbm_client *client);
 
 /**
  * Cancels a request. Its status becomes MBM_CANCELLED, `done` is not called, and you may use
@@ -419,12 +389,10 @@ uint8_t mbm_client_pending(const struct mbm_client *client);
  * at the latest two response timeouts and the quiet time after the cancelled one was sent.
  * Requests to other units are sent meanwhile.
  *
- * @param client   the object
  * @param request  a request that was queued on this client
- * @return a status; MBM_NOT_PENDING for a request that has ended already or was never queued
- *         here
+ * @return a status; MBM_NOT_PENDING for a request that has ended already or was never queued here
  */
-uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
+uint8_t mbm_client_cancel(mbm_client *client, mbm_clientRequest *request);
 
 /**
  * Returns the transaction identifier on the wire: that of the TCP frame in which the client
@@ -434,7 +402,7 @@ uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *r
  * @return the identifier; 0 in other framings, for a request that was never sent, and for NULL.
  *         0 may also be the identifier of a frame
  */
-uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
+uint16_t mbm_client_wireTransaction(const mbm_clientRequest *request);
 
 /**
  * Sets how often the client repeats a request whose response is missing, damaged or
@@ -443,11 +411,9 @@ uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
  * interrupted, or one whose response is too long for a buffer. `retryLimit` of a request or
  * of a unit replaces this number.
  *
- * @param client   the object
  * @param retries  0 to 255; the default is 0
- * @return a status
  */
-uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
+uint8_t mbm_client_setRetries(mbm_client *client, uint8_t retries);
 
 /**
  * Sets that the client repeats a request that a busy device refuses: one that the device
@@ -464,47 +430,35 @@ uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
  * These repetitions are counted apart from those of mbm_client_setRetries. Meanwhile the
  * client sends other requests, also to this unit.
  *
- * @param client   the object
- * @param retries  the most repetitions of one request for this reason, 0 (the default) to 255;
- *                 the request then ends with the status 5 or 6
+ * @param retries  the most repetitions of one request for this reason, 0 (the default) to 255; the
+ *                 request then ends with the status 5 or 6
  * @param waitMs   the wait before each repetition in milliseconds, 0 to 65535
- * @return a status
  */
-uint8_t mbm_client_setBusyRetries(struct mbm_client *client,
-                                  uint8_t retries,
-                                  uint32_t waitMs);
+uint8_t mbm_client_setBusyRetries(mbm_client *client, uint8_t retries, uint32_t waitMs);
 
 /**
  * Sets how long a request waits before the client repeats it. Meanwhile the client sends
  * other requests.
  *
- * @param client      the object
  * @param backoff     MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
  * @param delayMs     the wait before the first repetition, in milliseconds, 0 to 1000000
  * @param maxDelayMs  the longest wait, in milliseconds, 0 to 1000000
- * @return a status
  */
-uint8_t mbm_client_setBackoff(struct mbm_client *client,
-                              uint8_t backoff,
-                              uint32_t delayMs,
+uint8_t mbm_client_setBackoff(mbm_client *client, uint8_t backoff, uint32_t delayMs,
                               uint32_t maxDelayMs);
 
 /**
  * Shortens each wait before a repetition by a random part, so that several clients do not
  * repeat their requests at the same time.
  *
- * @param client   the object
  * @param percent  0 (the default) to 100: the largest part of the wait by which the client
  *                 shortens it
  * @param random   returns a new random number at each call, for example that of rand(). It may
- *                 have 32 bits, 15 bits, or random bits in its upper half only. A function that
- *                 it calls on the client returns MBM_BUSY. NULL only if `percent` is 0
+ *                 have 32 bits, 15 bits, or random bits in its upper half only. A function that it
+ *                 calls on the client returns MBM_BUSY. NULL only if `percent` is 0
  * @param context  your pointer, passed to `random`; may be NULL
- * @return a status
  */
-uint8_t mbm_client_setJitter(struct mbm_client *client,
-                             uint8_t percent,
-                             uint32_t (*random)(void *context),
+uint8_t mbm_client_setJitter(mbm_client *client, uint8_t percent, uint32_t (*random)(void *context),
                              void *context);
 
 /**
@@ -539,10 +493,8 @@ uint8_t mbm_client_setJitter(struct mbm_client *client,
  *         a request that was never queued, one that no device answers: a broadcast, or
  *         sub-function 04 of 08, and a write to unit 0 in TCP frames
  */
-uint8_t mbm_client_reply(const struct mbm_clientRequest *request,
-                         uint8_t *pdu,
-                         uint16_t capacity,
-                         struct mbm_packet *packet);
+uint8_t mbm_client_reply(const mbm_clientRequest *request, uint8_t *pdu, uint16_t capacity,
+                         mbm_packet *packet);
 
 /**
  * Function 01: reads coils into the bytes of `reply`, eight in each byte. The first coil is
@@ -555,208 +507,153 @@ uint8_t mbm_client_reply(const struct mbm_clientRequest *request,
  * MBM_LINE_BUSY, MBM_CONNECT_TIMED_OUT, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes
  * only if it is MBM_OK.
  *
- * @param client    the object
- * @param request   the request
  * @param address   the first coil, 0 to 65535, as on the wire
  * @param quantity  the number of coils, 1 to 2000
  * @return MBM_PENDING if the request is queued. Otherwise nothing was queued, and the request's
- *         `status` is the same: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for a
- *         request that no device could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
+ *         `status` is the same: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for a request
+ *         that no device could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
  *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` cannot hold the data,
- *         MBM_INVALID_ARGUMENT if `data` is NULL. With the request unchanged: MBM_BUSY also if
- *         the request is pending already
+ *         MBM_INVALID_ARGUMENT if `data` is NULL. With the request unchanged: MBM_BUSY also if the
+ *         request is pending already
  */
-uint8_t mbm_client_readCoils(struct mbm_client *client,
-                             struct mbm_clientRequest *request,
-                             uint16_t address,
+uint8_t mbm_client_readCoils(mbm_client *client, mbm_clientRequest *request, uint16_t address,
                              uint16_t quantity);
 
 /**
  * Function 02: reads discrete inputs into the bytes of `reply`, as mbm_client_readCoils
  * does (V1.1b3, 6.2).
  *
- * @param client    the object
- * @param request   the request
  * @param address   the first input, 0 to 65535, as on the wire
  * @param quantity  the number of inputs, 1 to 2000
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_readDiscreteInputs(struct mbm_client *client,
-                                      struct mbm_clientRequest *request,
-                                      uint16_t address,
-                                      uint16_t quantity);
+uint8_t mbm_client_readDiscreteInputs(mbm_client *client, mbm_clientRequest *request,
+                                      uint16_t address, uint16_t quantity);
 
 /**
  * Function 03: reads holding registers into the words of `reply` (V1.1b3, 6.3).
  *
- * @param client    the object
- * @param request   the request
  * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_readHoldingRegisters(struct mbm_client *client,
-                                        struct mbm_clientRequest *request,
-                                        uint16_t address,
-                                        uint16_t quantity);
+uint8_t mbm_client_readHoldingRegisters(mbm_client *client, mbm_clientRequest *request,
+                                        uint16_t address, uint16_t quantity);
 
 /**
  * Function 04: reads input registers into the words of `reply` (V1.1b3, 6.4).
  *
- * @param client    the object
- * @param request   the request
  * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_readInputRegisters(struct mbm_client *client,
-                                      struct mbm_clientRequest *request,
-                                      uint16_t address,
-                                      uint16_t quantity);
+uint8_t mbm_client_readInputRegisters(mbm_client *client, mbm_clientRequest *request,
+                                      uint16_t address, uint16_t quantity);
 
 /**
  * Function 05: switches one coil on or off (V1.1b3, 6.5).
  *
- * @param client   the object
- * @param request  the request
  * @param address  the coil, 0 to 65535, as on the wire
  * @param on       0 is off, any other value is on
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
-                                   struct mbm_clientRequest *request,
-                                   uint16_t address,
+uint8_t mbm_client_writeSingleCoil(mbm_client *client, mbm_clientRequest *request, uint16_t address,
                                    uint8_t on);
 
 /**
  * Function 06: writes one holding register (V1.1b3, 6.6).
  *
- * @param client   the object
- * @param request  the request
  * @param address  the register, 0 to 65535, as on the wire
  * @param value    its new value
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
-                                       struct mbm_clientRequest *request,
-                                       uint16_t address,
-                                       uint16_t value);
+uint8_t mbm_client_writeSingleRegister(mbm_client *client, mbm_clientRequest *request,
+                                       uint16_t address, uint16_t value);
 
 /**
  * Function 0F: writes coils from the bytes of `data`, eight in each byte. The first coil is
  * the lowest bit (V1.1b3, 6.11).
  *
- * @param client    the object
- * @param request   the request
  * @param address   the first coil, 0 to 65535, as on the wire
  * @param quantity  the number of coils, 1 to 1968
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
-                                      struct mbm_clientRequest *request,
-                                      uint16_t address,
-                                      uint16_t quantity);
+uint8_t mbm_client_writeMultipleCoils(mbm_client *client, mbm_clientRequest *request,
+                                      uint16_t address, uint16_t quantity);
 
 /**
  * Function 10: writes the words of `data` to holding registers (V1.1b3, 6.12).
  *
- * @param client    the object
- * @param request   the request
  * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 123
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
-                                          struct mbm_clientRequest *request,
-                                          uint16_t address,
-                                          uint16_t quantity);
+uint8_t mbm_client_writeMultipleRegisters(mbm_client *client, mbm_clientRequest *request,
+                                          uint16_t address, uint16_t quantity);
 
 /**
  * Function 16: sets a holding register to (register & andMask) | (orMask & ~andMask)
  * (V1.1b3, 6.16).
  *
- * @param client   the object
- * @param request  the request
  * @param address  the register, 0 to 65535, as on the wire
  * @param andMask  1 for each bit of the register to keep
  * @param orMask   the new value of the bits that are not kept
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
-                                     struct mbm_clientRequest *request,
-                                     uint16_t address,
-                                     uint16_t andMask,
-                                     uint16_t orMask);
+uint8_t mbm_client_maskWriteRegister(mbm_client *client, mbm_clientRequest *request,
+                                     uint16_t address, uint16_t andMask, uint16_t orMask);
 
 /**
  * Function 17: the device writes the words of `data` to holding registers first. Then it
  * reads holding registers, which arrive in the words of `reply` (V1.1b3, 6.17).
  *
- * @param client         the object
- * @param request        the request
  * @param readAddress    the first register to read, 0 to 65535
  * @param readQuantity   the number of registers to read, 1 to 125
  * @param writeAddress   the first register to write, 0 to 65535
  * @param writeQuantity  the number of registers to write, 1 to 121
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
-                                              struct mbm_clientRequest *request,
-                                              uint16_t readAddress,
-                                              uint16_t readQuantity,
-                                              uint16_t writeAddress,
-                                              uint16_t writeQuantity);
+uint8_t mbm_client_readWriteMultipleRegisters(mbm_client *client, mbm_clientRequest *request,
+                                              uint16_t readAddress, uint16_t readQuantity,
+                                              uint16_t writeAddress, uint16_t writeQuantity);
 
 /**
  * Function 07: reads the eight exception status outputs into one byte of `reply` (V1.1b3,
  * 6.7).
  *
- * @param client   the object
- * @param request  the request
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_readExceptionStatus(struct mbm_client *client,
-                                       struct mbm_clientRequest *request);
+uint8_t mbm_client_readExceptionStatus(mbm_client *client, mbm_clientRequest *request);
 
 /**
  * Function 08: sends the words of `data`, and reads the same number of words into `reply`
  * (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
  *
- * @param client       the object
- * @param request      the request
- * @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which
- *                     the standard reserves, and expects a response of one word; for a response
- *                     of another length use mbm_client_custom
+ * @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which the
+ *                     standard reserves, and expects a response of one word; for a response of
+ *                     another length use mbm_client_custom
  * @param words        the number of words of `data`: 1; for sub-function 0, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_diagnostics(struct mbm_client *client,
-                               struct mbm_clientRequest *request,
-                               uint16_t subFunction,
+uint8_t mbm_client_diagnostics(mbm_client *client, mbm_clientRequest *request, uint16_t subFunction,
                                uint16_t words);
 
 /**
  * Function 0B: reads the status word and the event count into two words of `reply` (V1.1b3,
  * 6.9).
  *
- * @param client   the object
- * @param request  the request
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_getCommEventCounter(struct mbm_client *client,
-                                       struct mbm_clientRequest *request);
+uint8_t mbm_client_getCommEventCounter(mbm_client *client, mbm_clientRequest *request);
 
 /**
  * Function 0C: reads status, event count and message count, and then up to 64 events, into
  * the bytes of `reply`. The first three have two bytes each, the high byte first. An event
  * is one byte; the latest event is first (V1.1b3, 6.10).
  *
- * @param client   the object
- * @param request  the request
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
-                                   struct mbm_clientRequest *request);
+uint8_t mbm_client_getCommEventLog(mbm_client *client, mbm_clientRequest *request);
 
 /**
  * Function 11: reads the server id, whose format is specific to the device (V1.1b3, 6.13).
@@ -764,93 +661,67 @@ uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
  * more bytes: `reply` receives those too. In RTU frames silence ends such a reply. The
  * client does not wait for silence if the byte count is right.
  *
- * @param client   the object
- * @param request  the request
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_reportServerId(struct mbm_client *client,
-                                  struct mbm_clientRequest *request);
+uint8_t mbm_client_reportServerId(mbm_client *client, mbm_clientRequest *request);
 
 /**
  * Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
  * 6.14).
  *
- * @param client    the object
- * @param request   the request
  * @param file      the file number, 1 to 65535
  * @param record    the first record, 0 to 9999
  * @param quantity  the number of records, 1 to 121
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_readFileRecord(struct mbm_client *client,
-                                  struct mbm_clientRequest *request,
-                                  uint16_t file,
-                                  uint16_t record,
-                                  uint16_t quantity);
+uint8_t mbm_client_readFileRecord(mbm_client *client, mbm_clientRequest *request, uint16_t file,
+                                  uint16_t record, uint16_t quantity);
 
 /**
  * Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
  * 6.15).
  *
- * @param client    the object
- * @param request   the request
  * @param file      the file number, 1 to 65535
  * @param record    the first record, 0 to 9999
  * @param quantity  the number of records, 1 to 122
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_writeFileRecord(struct mbm_client *client,
-                                   struct mbm_clientRequest *request,
-                                   uint16_t file,
-                                   uint16_t record,
-                                   uint16_t quantity);
+uint8_t mbm_client_writeFileRecord(mbm_client *client, mbm_clientRequest *request, uint16_t file,
+                                   uint16_t record, uint16_t quantity);
 
 /**
  * Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
  * 6.18).
  *
- * @param client   the object
- * @param request  the request
  * @param address  the FIFO pointer address of the queue, 0 to 65535
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_readFifoQueue(struct mbm_client *client,
-                                 struct mbm_clientRequest *request,
-                                 uint16_t address);
+uint8_t mbm_client_readFifoQueue(mbm_client *client, mbm_clientRequest *request, uint16_t address);
 
 /**
  * Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` receives,
  * as on the wire: the conformity level, more follows (0 or FF), the next object id, the
  * number of objects, and of each object its id, length and value.
  *
- * @param client   the object
- * @param request  the request
- * @param code     the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
- * @param object   the id of the first object to read
+ * @param code    the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
+ * @param object  the id of the first object to read
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
-                                            struct mbm_clientRequest *request,
-                                            uint8_t code,
-                                            uint8_t object);
+uint8_t mbm_client_readDeviceIdentification(mbm_client *client, mbm_clientRequest *request,
+                                            uint8_t code, uint8_t object);
 
 /**
  * Any function code: sends the bytes of `data` after the function code, and reads the bytes
  * after the function code of the response into `reply`. There may be none: `length` is 0 then.
  * The length rule holds for every function code, also for one of the standard.
  *
- * @param client    the object
- * @param request   the request
  * @param function  the function code, 1 to 127
  * @param bytes     the number of bytes of `data`, 0 to 252
  * @param response  the length rule of the response; used during this call only
  * @return a status; see mbm_client_readCoils
  */
-uint8_t mbm_client_custom(struct mbm_client *client,
-                          struct mbm_clientRequest *request,
-                          uint8_t function,
-                          uint16_t bytes,
-                          const struct mbm_rule *response);
+uint8_t mbm_client_custom(mbm_client *client, mbm_clientRequest *request, uint8_t function,
+                          uint16_t bytes, const mbm_rule *response);
 
 /**
  * Forwards a request that arrived from another client: sends `function` and the bytes of
@@ -867,7 +738,6 @@ uint8_t mbm_client_custom(struct mbm_client *client,
  * No device responds to 08 with sub-function 04: the request ends with MBM_OK and `length` 0
  * after the turnaround delay.
  *
- * @param client    the object
  * @param request   the request; if it is queued, its `data` then points into `body`
  * @param function  the function code, 1 to 127
  * @param body      the bytes after the function code; do not change them until the request has
@@ -878,11 +748,8 @@ uint8_t mbm_client_custom(struct mbm_client *client,
  *         request: MBM_ILLEGAL_DATA_VALUE if the length or a count in `body` is wrong,
  *         MBM_ILLEGAL_FUNCTION if the function code is 0 or above 127
  */
-uint8_t mbm_client_forward(struct mbm_client *client,
-                           struct mbm_clientRequest *request,
-                           uint8_t function,
-                           const uint8_t *body,
-                           uint16_t bytes);
+uint8_t mbm_client_forward(mbm_client *client, mbm_clientRequest *request, uint8_t function,
+                           const uint8_t *body, uint16_t bytes);
 
 /**
  * Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the
@@ -890,44 +757,36 @@ uint8_t mbm_client_forward(struct mbm_client *client,
  * the outgoing buffer, also if the port accepts it later. `timeoutMs` of a request or of a unit
  * replaces this time.
  *
- * @param client     the object
  * @param timeoutMs  milliseconds, 0 to 1000000 (16 minutes); the default is 2000
- * @return a status
  */
-uint8_t mbm_client_setResponseTimeout(struct mbm_client *client, uint32_t timeoutMs);
+uint8_t mbm_client_setResponseTimeout(mbm_client *client, uint32_t timeoutMs);
 
 /**
  * Sets the baud rate from which the client computes the gap before an RTU request (t3.5,
  * serial line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure
  * the serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
  *
- * @param client  the object
- * @param baud    bits per second; 0 (the default): unknown
- * @return a status
+ * @param baud  bits per second; 0 (the default): unknown
  */
-uint8_t mbm_client_setBaudRate(struct mbm_client *client, uint32_t baud);
+uint8_t mbm_client_setBaudRate(mbm_client *client, uint32_t baud);
 
 /**
  * Sets the silence before a request, instead of t3.5. A later call of
  * mbm_client_setBaudRate sets it back to t3.5. It has no effect on TCP.
  *
- * @param client  the object
- * @param gapUs   microseconds from the last byte received or sent; a value above 2^31 (36
- *                minutes) means 2^31
- * @return a status
+ * @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36 minutes)
+ *               means 2^31
  */
-uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t gapUs);
+uint8_t mbm_client_setGap(mbm_client *client, uint32_t gapUs);
 
 /**
  * Sets the turnaround delay: how long the client waits after a request that no device
  * answers. These requests are a broadcast (serial line guide V1.02, 2.4.1), and 08 with
  * sub-function 04.
  *
- * @param client   the object
  * @param delayMs  milliseconds, 0 to 65535; the default is 100
- * @return a status
  */
-uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint32_t delayMs);
+uint8_t mbm_client_setTurnaroundDelay(mbm_client *client, uint32_t delayMs);
 
 /**
  * Sets the quiet time of a serial line. It prevents that the client accepts a late reply as
@@ -938,33 +797,27 @@ uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint32_t delayM
  * repeats data of your choice. If no other request has the same data, no late reply can be
  * taken for it, and after its reply the next replies of that unit are not held either.
  *
- * @param client   the object
  * @param quietMs  milliseconds, 0 to 65535; the default is 100; 0 holds no reply
- * @return a status
  */
-uint8_t mbm_client_setQuietTime(struct mbm_client *client, uint32_t quietMs);
+uint8_t mbm_client_setQuietTime(mbm_client *client, uint32_t quietMs);
 
 /**
  * Switches echo discarding on or off. Switch it on if the receiver also receives what the
  * driver sends: then the client discards the copy of each request that arrives before the
  * reply. It has no effect on TCP.
  *
- * @param client  the object
- * @param on      0 (the default) or 1
- * @return a status
+ * @param on  0 (the default) or 1
  */
-uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
+uint8_t mbm_client_setEchoDiscard(mbm_client *client, uint8_t on);
 
 /**
  * Sets how long the driver stays on after the port's flush, for platforms whose flush
  * returns before the last bit was sent. It has no effect on TCP.
  *
- * @param client      the object
  * @param characters  the time in characters at the baud rate of mbm_client_setBaudRate (without
  *                    one, at 9600); the default is 0
- * @return a status
  */
-uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t characters);
+uint8_t mbm_client_setPostFlushHold(mbm_client *client, uint8_t characters);
 
 /**
  * Sets your storage for counters, in which the client counts from now on. You may read and
@@ -972,37 +825,31 @@ uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t character
  * counts frames whose transaction identifier and unit match no pending request, and
  * resynchronisations counts sequences of bytes that were not a frame.
  *
- * @param client    the object
  * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
- * @return a status
  */
-uint8_t mbm_client_setCounters(struct mbm_client *client, struct mbm_counters *counters);
+uint8_t mbm_client_setCounters(mbm_client *client, mbm_counters *counters);
 
 /**
  * Sets the records of units. In a record the client counts the requests to its unit. The
  * record's `delayUs` sets the minimum time between two requests to the unit; its `timeoutMs`
  * and `retryLimit` replace those of the client. You may change these three at any time.
  *
- * @param client  the object
- * @param units   your array of records, initialised with MBM_INIT except for the fields that
- *                you set; NULL for none
- * @param count   the number of records, 0 to 255
+ * @param units  your array of records, initialised with MBM_INIT except for the fields that you
+ *               set; NULL for none
+ * @param count  the number of records, 0 to 255
  * @return a status; MBM_INVALID_ARGUMENT for a record with a `unit` above 255 or a `timeoutMs`
  *         above 1000000
  */
-uint8_t mbm_client_setUnits(struct mbm_client *client,
-                            struct mbm_clientUnit *units,
-                            uint8_t count);
+uint8_t mbm_client_setUnits(mbm_client *client, mbm_clientUnit *units, uint8_t count);
 
 /**
  * Returns the response timeout of a request to a unit that has none of its own: that of its record
  * (mbm_client_setUnits) or of the client (mbm_client_setResponseTimeout).
  *
- * @param client  the object
- * @param unit    the unit identifier
+ * @param unit  the unit identifier
  * @return milliseconds; 0 if the client was not begun, and from within a hook of its port
  */
-uint32_t mbm_client_getResponseTimeout(const struct mbm_client *client, uint8_t unit);
+uint32_t mbm_client_getResponseTimeout(const mbm_client *client, uint8_t unit);
 
 #ifdef __cplusplus
 }  // extern "C"

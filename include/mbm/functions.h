@@ -144,9 +144,9 @@ typedef struct mbm_function {
     /** The function code, 1 to 127. */
     uint8_t code;
     /** The length of its requests. */
-    struct mbm_rule request;
+    mbm_rule request;
     /** The length of its responses. */
-    struct mbm_rule response;
+    mbm_rule response;
 } mbm_function;
 
 /**
@@ -155,7 +155,7 @@ typedef struct mbm_function {
  */
 typedef struct mbm_framing {
     /** The declarations of your own functions; may be NULL if `functionCount` is 0. */
-    const struct mbm_function *functions;
+    const mbm_function *functions;
     /** The number of declarations in `functions`. */
     uint8_t functionCount;
     /** MBM_FRAMING_RTU, _ASCII, _TCP, _RTU_OVER_TCP or _NONE. */

@@ -68,15 +68,13 @@ typedef struct mbm_gatewayRoute {
     uint16_t unit;
 } mbm_gatewayRoute;
 
-/**
- * A line of a gateway. Initialise it with MBM_INIT, then set the fields that you need.
- */
+/** A line of a gateway. Initialise it with MBM_INIT, then set the fields that you need. */
 typedef struct mbm_gatewayLine {
     /** The client of the line, in any framing. Begin it before the gateway, with a frame
      *  buffer that holds every frame. Its settings hold: response timeout, retries, quiet
      *  time. You may send requests of your own with it. Do not replace it by another client
      *  while the gateway has open connections. */
-    struct mbm_client *client;
+    mbm_client *client;
     /** Your pointer, passed to `isReady`; may be NULL. */
     void *context;
     /** Optional: called before each request to the line. Returns 1 if the line can take it, 0
@@ -93,12 +91,10 @@ typedef struct mbm_gatewayLine {
     uint8_t last;
 } mbm_gatewayLine;
 
-/**
- * A place for a TCP connection.
- */
+/** A place for a TCP connection. */
 typedef struct mbm_gatewayConnection {
     /** Private. */
-    struct mbm_port port;
+    mbm_port port;
     /** Private. */
     uint32_t words[3];
 } mbm_gatewayConnection;
@@ -109,28 +105,26 @@ typedef struct mbm_gatewayConnection {
  */
 typedef struct mbm_gatewayRequest {
     /** Private. */
-    struct mbm_clientRequest request;
+    mbm_clientRequest request;
     /** Private. */
     uint32_t words[5];
     /** Private. */
     uint8_t frame[MBM_MAX_TCP_FRAME];
 } mbm_gatewayRequest;
 
-/**
- * What a gateway consists of. The gateway copies this struct, but not what it points to.
- */
+/** What a gateway consists of. The gateway copies this struct, but not what it points to. */
 typedef struct mbm_gatewayConfig {
     /** The map of units. It may be in flash. A program may also change it between two calls of
      *  the gateway: then it holds for the requests that are received later. Each route must be
      *  valid; one whose `last` is below its `first` leads nowhere. */
-    const struct mbm_gatewayRoute *routes;
+    const mbm_gatewayRoute *routes;
     /** The lines; may be NULL if `lineCount` is 0. */
-    struct mbm_gatewayLine *lines;
+    mbm_gatewayLine *lines;
     /** The places for connections. The index in this array is the connection's number. */
-    struct mbm_gatewayConnection *connections;
+    mbm_gatewayConnection *connections;
     /** The places for requests. Each connection always has one. Connections that send several
      *  requests without waiting for the replies share the others. */
-    struct mbm_gatewayRequest *requests;
+    mbm_gatewayRequest *requests;
     /** The number of `requests`, at least `connectionCount` and below 65535. */
     uint16_t requestCount;
     /** The number of `routes`, at least 1. */
@@ -148,74 +142,65 @@ typedef struct mbm_gatewayConfig {
  * connections and their requests; it cancels those that a line has, and its settings return
  * to their defaults. A call that is refused changes nothing.
  *
- * @param gateway  the object; initialised with MBM_INIT before the first call
- * @param config   what the gateway consists of. What it points to must stay valid, and must be
- *                 used by one gateway only, for as long as the gateway is used; lines,
- *                 connections and requests are initialised with MBM_INIT
+ * @param config  what the gateway consists of. What it points to must stay valid, and must be used
+ *                by one gateway only, for as long as the gateway is used; lines, connections and
+ *                requests are initialised with MBM_INIT
  * @return a status; MBM_INVALID_ARGUMENT for fewer requests than connections, a route to a line
  *         that does not exist or to a unit id above 255, and a line without client;
- *         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within
- *         a hook of a client of its lines
+ *         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within a
+ *         hook of a client of its lines
  */
-uint8_t mbm_gateway_begin(struct mbm_gateway *gateway,
-                          const struct mbm_gatewayConfig *config);
+uint8_t mbm_gateway_begin(mbm_gateway *gateway, const mbm_gatewayConfig *config);
 
 /**
  * Gives the gateway an accepted TCP connection. mbm_gateway_poll then reads its requests and
  * writes their responses. The gateway never opens or closes the socket itself.
  *
- * @param gateway     the object
  * @param connection  the number of a free place, below `connectionCount`
- * @param port        the connection; is copied. Its hooks read, write and micros are required.
- *                    The clocks of all connections count the same time
+ * @param port        the connection; is copied. Its hooks read, write and micros are required. The
+ *                    clocks of all connections count the same time
  * @return a status; MBM_BUSY if the place has an open connection
  */
-uint8_t mbm_gateway_open(struct mbm_gateway *gateway,
-                         uint8_t connection,
-                         const struct mbm_port *port);
+uint8_t mbm_gateway_open(mbm_gateway *gateway, uint8_t connection, const mbm_port *port);
 
 /**
  * Gives up a connection and its requests. A request that a line has is cancelled: the device
  * may have received it, and the gateway discards its reply. The place is free then.
  *
- * @param gateway     the object
  * @param connection  the number of the place; nothing happens if it is free already
  * @return a status; MBM_BUSY also from within a hook of a port of its lines
  */
-uint8_t mbm_gateway_close(struct mbm_gateway *gateway, uint8_t connection);
+uint8_t mbm_gateway_close(mbm_gateway *gateway, uint8_t connection);
 
 /**
  * Returns how a connection is. Call it after mbm_gateway_poll for each connection: if the
  * connection is lost, close its socket, and call mbm_gateway_close or mbm_gateway_open.
  *
- * @param gateway     the object
  * @param connection  the number of the place
  * @return MBM_OK while the connection is open; MBM_LINK_LOST if its port reported that the
  *         connection is lost; MBM_MALFORMED_FRAME if it sent bytes that are not Modbus TCP;
  *         MBM_NOT_INITIALISED for a free place
  */
-uint8_t mbm_gateway_status(const struct mbm_gateway *gateway, uint8_t connection);
+uint8_t mbm_gateway_status(const mbm_gateway *gateway, uint8_t connection);
 
 /**
  * Returns how many requests of a connection are under way: complete, but not answered yet.
  * The connection is not idle while it has one.
  *
- * @param gateway     the object
  * @param connection  the number of the place
  * @return the number of requests; 0 for a free place and for a number out of range
  */
-uint16_t mbm_gateway_pending(const struct mbm_gateway *gateway, uint8_t connection);
+uint16_t mbm_gateway_pending(const mbm_gateway *gateway, uint8_t connection);
 
 /**
  * Returns whether the next mbm_gateway_poll reads bytes from a connection. If not, the
  * connection has as many requests under way as it may have, and its next requests wait in its
  * socket: do not wait for bytes of it.
  *
- * @param gateway     the object
  * @param connection  the number of the place
  * @return 1 or 0
  */
-uint8_t mbm_gateway_isReading(const struct mbm_gateway *gateway, uint8_t connection);
+uint8_t mbm_gateway_isReading(const mbm_gateway *gateway, uint8_t connection);
 
 /**
  * Polls the clients of all lines, receives requests, passes them on, and sends responses.
@@ -223,35 +208,29 @@ uint8_t mbm_gateway_isReading(const struct mbm_gateway *gateway, uint8_t connect
  *
  * Call it often. You need not poll the clients of the lines; you may.
  *
- * @param gateway  the object
  * @return a status; MBM_BUSY also from within a hook of a port of its lines
  */
-uint8_t mbm_gateway_poll(struct mbm_gateway *gateway);
+uint8_t mbm_gateway_poll(mbm_gateway *gateway);
 
 /**
  * Returns for how long mbm_gateway_poll will have nothing to do, unless a byte arrives on a
  * line whose client has requests, or on a connection that the gateway reads (see
  * mbm_gateway_isReading), or a connection is lost.
  *
- * @param gateway  the object
- * @return microseconds; 0 means poll now, also from within a hook of the gateway; 0xFFFFFFFF
- *         means that no request is under way. While a connection does not accept a response,
- *         and while a function of the gateway's own units returns MBM_REPLY_PENDING, it is at
- *         most 1000
+ * @return microseconds; 0 means poll now, also from within a hook of the gateway; 0xFFFFFFFF means
+ *         that no request is under way. While a connection does not accept a response, and while a
+ *         function of the gateway's own units returns MBM_REPLY_PENDING, it is at most 1000
  */
-uint32_t mbm_gateway_pollDelay(struct mbm_gateway *gateway);
+uint32_t mbm_gateway_pollDelay(mbm_gateway *gateway);
 
 /**
  * Sets how many requests of one connection may be under way at once
  * (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 4.4.1). The next
  * requests of the connection wait in its socket.
  *
- * @param gateway  the object
- * @param most     1 to 65535; the default is 65535. Fewer if there are not enough places for
- *                 requests
- * @return a status
+ * @param most  1 to 65535; the default is 65535. Fewer if there are not enough places for requests
  */
-uint8_t mbm_gateway_setInFlight(struct mbm_gateway *gateway, uint16_t most);
+uint8_t mbm_gateway_setInFlight(mbm_gateway *gateway, uint16_t most);
 
 /**
  * Sets for how long a request may wait until its line is free. After that time the gateway
@@ -259,12 +238,10 @@ uint8_t mbm_gateway_setInFlight(struct mbm_gateway *gateway, uint16_t most);
  * TCP wait, less the response timeout of the line: then no device carries out a request that
  * its client has given up.
  *
- * @param gateway  the object
- * @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait
- *                 for any time
- * @return a status
+ * @param timeMs  milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait for
+ *                any time
  */
-uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway, uint32_t timeMs);
+uint8_t mbm_gateway_setQueueTime(mbm_gateway *gateway, uint32_t timeMs);
 
 /**
  * Serves units of the gateway itself: those that a route to MBM_GATEWAY_LOCAL leads to. The
@@ -274,29 +251,24 @@ uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway, uint32_t timeMs);
  * A function of a unit that returns MBM_REPLY_PENDING is called again at each
  * mbm_gateway_poll. Other requests go on meanwhile, also those for the same unit.
  *
- * @param gateway  the object
- * @param units    one unit, or an array of units; must stay valid for as long as the gateway is
- *                 used. Servers may serve the same units. NULL only if `count` is 0
- * @param count    how many units
+ * @param units  one unit, or an array of units; must stay valid for as long as the gateway is
+ *               used. Servers may serve the same units. NULL only if `count` is 0
+ * @param count  how many units
  * @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
  */
-uint8_t mbm_gateway_serveUnits(struct mbm_gateway *gateway,
-                               struct mbm_unit *units,
-                               uint8_t count);
+uint8_t mbm_gateway_serveUnits(mbm_gateway *gateway, struct mbm_unit *units, uint8_t count);
 
 /**
  * Declares functions of your own. The gateway passes on every function. If one of your own is
  * declared, the gateway also checks the length of its requests, and knows on RTU when its
  * replies end without waiting for a silence.
  *
- * @param gateway    the object
  * @param functions  the declarations; they must stay valid for as long as the gateway is used.
  *                   NULL only if `count` is 0
  * @param count      how many declarations
  * @return a status; MBM_INVALID_ARGUMENT for a declaration that is not valid
  */
-uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
-                                 const struct mbm_function *functions,
+uint8_t mbm_gateway_setFunctions(mbm_gateway *gateway, const mbm_function *functions,
                                  uint8_t count);
 
 #ifdef __cplusplus

@@ -92,16 +92,13 @@ typedef struct mbm_linkCounters {
  * All settings of the link return to their defaults. The call may be repeated at any time,
  * also with another client. A begin function of the client ends the link.
  *
- * @param link    the object; initialised with MBM_INIT before the first call
  * @param client  the client, begun; it must not have another link
- * @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
- *                hooks must not use the client or the link: each function returns MBM_BUSY
+ * @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The hooks
+ *                must not use the client or the link: each function returns MBM_BUSY
  * @return a status; MBM_NOT_INITIALISED if the client was not begun; MBM_BUSY also while the
  *         client is suspended, and if it has another link
  */
-uint8_t mbm_link_begin(struct mbm_link *link,
-                       struct mbm_client *client,
-                       const struct mbm_linkHooks *hooks);
+uint8_t mbm_link_begin(mbm_link *link, mbm_client *client, const mbm_linkHooks *hooks);
 
 /**
  * Ends a link. The client and its requests stay; the link itself stays open or closed as it
@@ -111,17 +108,14 @@ uint8_t mbm_link_begin(struct mbm_link *link,
  * @param link  the object; the client's storage must still be valid
  * @return a status; MBM_BUSY also while the client is suspended
  */
-uint8_t mbm_link_end(struct mbm_link *link);
+uint8_t mbm_link_end(mbm_link *link);
 
 /**
  * Closes the link and opens it again, at the next poll of the client and without a wait. Call
  * it when you know better than the link: the network is back, the address has changed. Requests
  * that are under way end with MBM_LINK_LOST; queued ones wait for this attempt.
- *
- * @param link  the object
- * @return a status
  */
-uint8_t mbm_link_reconnect(struct mbm_link *link);
+uint8_t mbm_link_reconnect(mbm_link *link);
 
 /**
  * Sets the wait before an attempt to open the link. The first attempt after a loss waits for
@@ -129,44 +123,33 @@ uint8_t mbm_link_reconnect(struct mbm_link *link);
  * for as long as the last wait, or bytes have arrived. A request does not wait for the first
  * attempt after the loss of such a link: it is made at once.
  *
- * @param link        the object
  * @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
  *                    mbm_client_setBackoff
  * @param delayMs     the first wait in milliseconds, 0 to 1000000; the default is 500
  * @param maxDelayMs  the longest wait in milliseconds, 0 to 1000000; the default is 30000
- * @return a status
  */
-uint8_t mbm_link_setBackoff(struct mbm_link *link,
-                            uint8_t backoff,
-                            uint32_t delayMs,
-                            uint32_t maxDelayMs);
+uint8_t mbm_link_setBackoff(mbm_link *link, uint8_t backoff, uint32_t delayMs, uint32_t maxDelayMs);
 
 /**
  * Shortens each wait before an attempt by a random part, so that many clients that lost their
  * server together do not connect at the same time.
  *
- * @param link     the object
  * @param percent  0 (the default) to 100: the largest part of the wait that is taken off
  * @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only if
  *                 `percent` is 0
  * @param context  your pointer, passed to `random`; may be NULL
- * @return a status
  */
-uint8_t mbm_link_setJitter(struct mbm_link *link,
-                           uint8_t percent,
-                           uint32_t (*random)(void *context),
+uint8_t mbm_link_setJitter(mbm_link *link, uint8_t percent, uint32_t (*random)(void *context),
                            void *context);
 
 /**
  * Sets how long a connection may take to be made. Then the attempt has failed, with
  * MBM_CONNECT_TIMED_OUT.
  *
- * @param link       the object
  * @param timeoutMs  milliseconds, 1 to 1000000 (16 minutes); 0: as long as `status` returns
  *                   MBM_PENDING. The default is 10000
- * @return a status
  */
-uint8_t mbm_link_setConnectTimeout(struct mbm_link *link, uint32_t timeoutMs);
+uint8_t mbm_link_setConnectTimeout(mbm_link *link, uint32_t timeoutMs);
 
 /**
  * Sets after how many requests in a row without any byte the link is closed and opened anew,
@@ -179,11 +162,9 @@ uint8_t mbm_link_setConnectTimeout(struct mbm_link *link, uint32_t timeoutMs);
  * Some devices answer nothing in the first seconds of a connection. So each link over which no byte
  * came has twice as many requests as the one before, up to 16 times as many and at most 100.
  *
- * @param link      the object
  * @param requests  0 to 100; 0 for never. The default is 2 on TCP, and 0 on a serial line
- * @return a status
  */
-uint8_t mbm_link_setReplaceAfter(struct mbm_link *link, uint8_t requests);
+uint8_t mbm_link_setReplaceAfter(mbm_link *link, uint8_t requests);
 
 /**
  * Sets whether requests wait for the link. By default they do not: while the link is down,
@@ -195,43 +176,36 @@ uint8_t mbm_link_setReplaceAfter(struct mbm_link *link, uint8_t requests);
  * which a lost link is opened again end with MBM_CONNECT_TIMED_OUT if that takes as long as their
  * response timeout.
  *
- * @param link  the object
- * @param on    0 (the default) or 1
- * @return a status
+ * @param on  0 (the default) or 1
  */
-uint8_t mbm_link_setRequestsWait(struct mbm_link *link, uint8_t on);
+uint8_t mbm_link_setRequestsWait(mbm_link *link, uint8_t on);
 
 /**
  * Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
  * attempt has failed.
  *
- * @param link      the object
  * @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
  *                  request may, and call every function on the link; NULL for none
  * @param context   your pointer, passed to `callback`; may be NULL
- * @return a status
  */
-uint8_t mbm_link_setCallback(struct mbm_link *link,
+uint8_t mbm_link_setCallback(mbm_link *link,
                              void (*callback)(void *context, uint8_t event, uint8_t status),
                              void *context);
 
 /**
  * Sets your storage for counters, in which the link counts from now on.
  *
- * @param link      the object
  * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
- * @return a status
  */
-uint8_t mbm_link_setCounters(struct mbm_link *link, struct mbm_linkCounters *counters);
+uint8_t mbm_link_setCounters(mbm_link *link, mbm_linkCounters *counters);
 
 /**
  * Returns what a link is doing.
  *
- * @param link  the object
- * @return MBM_LINK_IS_DOWN, MBM_LINK_IS_CONNECTING or MBM_LINK_IS_UP; 0 before the first poll,
- *         and for an object that was never begun
+ * @return MBM_LINK_IS_DOWN, MBM_LINK_IS_CONNECTING or MBM_LINK_IS_UP; 0 before the first poll, and
+ *         for an object that was never begun
  */
-uint8_t mbm_link_state(const struct mbm_link *link);
+uint8_t mbm_link_state(const mbm_link *link);
 
 #ifdef __cplusplus
 }  // extern "C"

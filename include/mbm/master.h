@@ -63,16 +63,13 @@ typedef struct mbm_line {
  * this is cheap. Settings stay. It does not open the port: that must be open already. The first
  * request waits for no gap, unless bytes arrive or mbm_line_used was called.
  *
- * @param line        the object; initialised with MBM_INIT before the first call
- * @param port        the port. It is not copied: it must stay valid and unchanged for as long
- *                    as the object is used. read, write and micros must not be NULL
+ * @param port        the port. It is not copied: it must stay valid and unchanged for as long as
+ *                    the object is used. read, write and micros must not be NULL
  * @param frame       as for mbm_line_setFrame; also NULL, if you call that function later
  * @param frameBytes  as for mbm_line_setFrame; 0 if `frame` is NULL
  * @return a status; MBM_BUSY while a request is under way
  */
-uint8_t mbm_line_beginRtu(struct mbm_line *line,
-                          const struct mbm_port *port,
-                          uint8_t *frame,
+uint8_t mbm_line_beginRtu(mbm_line *line, const mbm_port *port, uint8_t *frame,
                           uint16_t frameBytes);
 
 /**
@@ -85,7 +82,6 @@ uint8_t mbm_line_beginRtu(struct mbm_line *line,
  * The words must not overlap, and must stay valid for as long as the object is used. Any number
  * of nodes may share words. Keep a node until its request has ended.
  *
- * @param node           the object; initialised with MBM_INIT before the first call
  * @param line           the line, which must stay valid for as long as the object is used
  * @param unit           the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
  *                       2.2). Requests to 248 to 255, which the standard reserves, are sent too
@@ -95,24 +91,16 @@ uint8_t mbm_line_beginRtu(struct mbm_line *line,
  * @param transmitWords  0 to 255; 123 hold any request
  * @return a status; MBM_BUSY while a request of the node is under way
  */
-uint8_t mbm_node_begin(struct mbm_node *node,
-                       struct mbm_line *line,
-                       uint8_t unit,
-                       uint16_t *response,
-                       uint16_t responseWords,
-                       uint16_t *transmit,
-                       uint16_t transmitWords);
+uint8_t mbm_node_begin(mbm_node *node, mbm_line *line, uint8_t unit, uint16_t *response,
+                       uint16_t responseWords, uint16_t *transmit, uint16_t transmitWords);
 
 /**
  * Sets the write address and empties the queue of mbm_node_send. The transmit words do not
  * change.
  *
- * @param node     the object
- * @param address  the address to which the functions with Queued in their name write, 0 to
- *                 65535
- * @return a status
+ * @param address  the address to which the functions with Queued in their name write, 0 to 65535
  */
-uint8_t mbm_node_beginTransmission(struct mbm_node *node, uint16_t address);
+uint8_t mbm_node_beginTransmission(mbm_node *node, uint16_t address);
 
 /**
  * Sets the buffer of one frame. The line uses it only while a request is under way. So in
@@ -123,55 +111,45 @@ uint8_t mbm_node_beginTransmission(struct mbm_node *node, uint16_t address);
  * right one. If a request or a reply does not fit, the function that makes the request returns
  * a status. Data are never cut off.
  *
- * @param line        the object; initialised with MBM_INIT before the first call
  * @param frame       the buffer. Its content is not used between requests
  * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
  * @return a status; MBM_BUSY while a request is under way
  */
-uint8_t mbm_line_setFrame(struct mbm_line *line, uint8_t *frame, uint16_t frameBytes);
+uint8_t mbm_line_setFrame(mbm_line *line, uint8_t *frame, uint16_t frameBytes);
 
 /**
  * Gives up the request under way, whichever node has made it, and switches the driver off. The
  * status of that node becomes MBM_CANCELLED when you poll it. Call it if the node is lost.
  * If no request is under way, it does nothing.
- *
- * @param line  the object
- * @return a status
  */
-uint8_t mbm_line_cancel(struct mbm_line *line);
+uint8_t mbm_line_cancel(mbm_line *line);
 
 /**
  * Sets the baud rate from which the master computes the gap before a request (t3.5, serial
  * line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure the
  * serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
  *
- * @param line  the object
  * @param baud  bits per second; 0 (the default): unknown
- * @return a status
  */
-uint8_t mbm_line_setBaudRate(struct mbm_line *line, uint32_t baud);
+uint8_t mbm_line_setBaudRate(mbm_line *line, uint32_t baud);
 
 /**
  * Sets the silence before a request, instead of t3.5. Use 0 if no device on the line needs
  * the gap, and more than t3.5 for devices that need longer before they can receive again.
  * A later call of mbm_line_setBaudRate sets it back to t3.5.
  *
- * @param line   the object
- * @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36
- *               minutes) means 2^31
- * @return a status
+ * @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36 minutes)
+ *               means 2^31
  */
-uint8_t mbm_line_setGap(struct mbm_line *line, uint32_t gapUs);
+uint8_t mbm_line_setGap(mbm_line *line, uint32_t gapUs);
 
 /**
  * Sets the turnaround delay: how long the master waits after a broadcast, which no device
  * answers (serial line guide V1.02, 2.4.1).
  *
- * @param line     the object
  * @param delayMs  milliseconds, 0 to 65535; the default is 100
- * @return a status
  */
-uint8_t mbm_line_setTurnaroundDelay(struct mbm_line *line, uint32_t delayMs);
+uint8_t mbm_line_setTurnaroundDelay(mbm_line *line, uint32_t delayMs);
 
 /**
  * Sets the quiet time. It prevents that the master accepts a late reply as the reply to a
@@ -198,74 +176,59 @@ uint8_t mbm_line_setTurnaroundDelay(struct mbm_line *line, uint32_t delayMs);
  * response timeout may be taken for the reply to the next request, and so may all that
  * follow.
  *
- * @param line     the object
  * @param quietMs  milliseconds, 0 to 65535; the default is 100
- * @return a status
  */
-uint8_t mbm_line_setQuietTime(struct mbm_line *line, uint32_t quietMs);
+uint8_t mbm_line_setQuietTime(mbm_line *line, uint32_t quietMs);
 
 /**
  * Sets how often the master repeats a request whose reply is missing, damaged or malformed.
  * It does not repeat a request that was answered with an exception.
  *
- * @param line     the object
  * @param retries  0 to 255; the default is 0
- * @return a status
  */
-uint8_t mbm_line_setRetries(struct mbm_line *line, uint8_t retries);
+uint8_t mbm_line_setRetries(mbm_line *line, uint8_t retries);
 
 /**
  * Switches echo discarding on or off. Switch it on if the receiver also receives what the
  * driver sends: then the master discards the copy of each request that arrives before the
  * reply.
  *
- * @param line  the object
- * @param on    0 (the default) or 1
- * @return a status
+ * @param on  0 (the default) or 1
  */
-uint8_t mbm_line_setEchoDiscard(struct mbm_line *line, uint8_t on);
+uint8_t mbm_line_setEchoDiscard(mbm_line *line, uint8_t on);
 
 /**
  * Sets how long the driver stays on after the port's flush, for platforms whose flush
  * returns before the last bit was sent.
  *
- * @param line        the object
- * @param characters  the time in characters at the baud rate of mbm_line_setBaudRate (without
- *                    one, at 9600); the default is 0
- * @return a status
+ * @param characters  the time in characters at the baud rate of mbm_line_setBaudRate (without one,
+ *                    at 9600); the default is 0
  */
-uint8_t mbm_line_setPostFlushHold(struct mbm_line *line, uint8_t characters);
+uint8_t mbm_line_setPostFlushHold(mbm_line *line, uint8_t characters);
 
 /**
  * Sets your storage for counters, in which the master counts from now on. You may read and
  * zero the counters at any time, but not from an interrupt.
  *
- * @param line      the object
  * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
- * @return a status
  */
-uint8_t mbm_line_setCounters(struct mbm_line *line, struct mbm_counters *counters);
+uint8_t mbm_line_setCounters(mbm_line *line, mbm_counters *counters);
 
 /**
  * Reports when another user of the wire, for example another object, used it last.
  * The gap before the next request counts from that time. A time before the last use that
  * the object knows changes nothing.
  *
- * @param line    the object
  * @param timeUs  the time in microseconds on the clock of the object's port, at most 2^31
  *                microseconds (36 minutes) ago
- * @return a status
  */
-uint8_t mbm_line_usedAt(struct mbm_line *line, uint32_t timeUs);
+uint8_t mbm_line_usedAt(mbm_line *line, uint32_t timeUs);
 
 /**
  * Reports that another user of the wire has just used it: as mbm_line_usedAt with the
  * present time.
- *
- * @param line  the object
- * @return a status
  */
-uint8_t mbm_line_used(struct mbm_line *line);
+uint8_t mbm_line_used(mbm_line *line);
 
 /**
  * Sends and receives for a non-blocking request, without waiting.
@@ -273,11 +236,10 @@ uint8_t mbm_line_used(struct mbm_line *line);
  * Call it as often as you like. If your port does not buffer received bytes, call it at
  * least once in the time of a character.
  *
- * @param node  the object
- * @return MBM_PENDING until the request has ended. Then, at every call, the status of the
- *         request. MBM_OK if there was no request yet
+ * @return MBM_PENDING until the request has ended. Then, at every call, the status of the request.
+ *         MBM_OK if there was no request yet
  */
-uint8_t mbm_node_poll(struct mbm_node *node);
+uint8_t mbm_node_poll(mbm_node *node);
 
 /**
  * Returns how long mbm_node_poll will have nothing to do unless a byte arrives. A program
@@ -285,40 +247,33 @@ uint8_t mbm_node_poll(struct mbm_node *node);
  * from this call, so sleeping makes no timeout longer. Do not sleep longer: while a frame leaves,
  * the driver would go off late.
  *
- * @param node  the object
  * @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
  *         0xFFFFFFFF means that the node has no request under way
  */
-uint32_t mbm_node_pollDelay(struct mbm_node *node);
+uint32_t mbm_node_pollDelay(mbm_node *node);
 
 /**
  * Gives up the request under way and switches the driver off. The status of the request
  * becomes MBM_CANCELLED. If the node has no request under way, it does nothing. If the request
  * was sent, its reply may still come, so the next request to that unit is sent later: see
  * mbm_line_setQuietTime.
- *
- * @param node  the object
- * @return a status
  */
-uint8_t mbm_node_cancel(struct mbm_node *node);
+uint8_t mbm_node_cancel(mbm_node *node);
 
 /**
  * Returns the status of the last request.
  *
- * @param node  the object
- * @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
- *         request
+ * @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no request
  */
-uint8_t mbm_node_status(const struct mbm_node *node);
+uint8_t mbm_node_status(const mbm_node *node);
 
 /**
  * Returns the exception code of the last reply as received, also a code that the standard
  * does not allow (V1.1b3, 7).
  *
- * @param node  the object
  * @return the code; 0 if the last request ended without an exception
  */
-uint8_t mbm_node_getExceptionCode(const struct mbm_node *node);
+uint8_t mbm_node_getExceptionCode(const mbm_node *node);
 
 /**
  * Function 01: reads coils into the response words, 16 in each word. The first coil is the
@@ -337,206 +292,168 @@ uint8_t mbm_node_getExceptionCode(const struct mbm_node *node);
  * standard forbids or addresses beyond 65535. The status is then the exception with which a
  * device would answer.
  *
- * @param node      the object
  * @param address   the first coil, 0 to 65535, as on the wire
  * @param quantity  the number of coils, 1 to 2000
- * @return a status; MBM_PENDING in non-blocking mode; an exception of the device (0x01 to
- *         0x7F); MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC, MBM_MALFORMED_REPLY,
- *         MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST, MBM_LINE_BUSY,
- *         MBM_BUFFER_TOO_SMALL, MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a
- *         request is under way on the line; MBM_NOT_INITIALISED if the line has no port or no
- *         frame buffer
+ * @return a status; MBM_PENDING in non-blocking mode; an exception of the device (0x01 to 0x7F);
+ *         MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC, MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID,
+ *         MBM_INVALID_FUNCTION, MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
+ *         MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a request is under way on the
+ *         line; MBM_NOT_INITIALISED if the line has no port or no frame buffer
  */
-uint8_t mbm_node_readCoils(struct mbm_node *node, uint16_t address, uint16_t quantity);
+uint8_t mbm_node_readCoils(mbm_node *node, uint16_t address, uint16_t quantity);
 
 /**
  * Function 02: reads discrete inputs into the response words, 16 in each word. The first
  * input is the lowest bit; the last word is padded with zeros (V1.1b3, 6.2).
  *
- * @param node      the object
  * @param address   the first input, 0 to 65535, as on the wire
  * @param quantity  the number of inputs, 1 to 2000
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_readDiscreteInputs(struct mbm_node *node,
-                                    uint16_t address,
-                                    uint16_t quantity);
+uint8_t mbm_node_readDiscreteInputs(mbm_node *node, uint16_t address, uint16_t quantity);
 
 /**
  * Function 03: reads holding registers into the response words (V1.1b3, 6.3).
  *
- * @param node      the object
  * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_readHoldingRegisters(struct mbm_node *node,
-                                      uint16_t address,
-                                      uint16_t quantity);
+uint8_t mbm_node_readHoldingRegisters(mbm_node *node, uint16_t address, uint16_t quantity);
 
 /**
  * Function 04: reads input registers into the response words (V1.1b3, 6.4).
  *
- * @param node      the object
  * @param address   the first register, 0 to 65535, as on the wire
  * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_readInputRegisters(struct mbm_node *node,
-                                    uint16_t address,
-                                    uint16_t quantity);
+uint8_t mbm_node_readInputRegisters(mbm_node *node, uint16_t address, uint16_t quantity);
 
 /**
  * Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
  *
- * @param node     the object
  * @param address  the coil, 0 to 65535; becomes the write address
  * @param state    0 is off, any other value is on
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_writeSingleCoil(struct mbm_node *node, uint16_t address, uint8_t state);
+uint8_t mbm_node_writeSingleCoil(mbm_node *node, uint16_t address, uint8_t state);
 
 /**
  * Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
  *
- * @param node     the object
  * @param address  the register, 0 to 65535; becomes the write address
  * @param value    its value; also becomes transmit word 0
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_writeSingleRegister(struct mbm_node *node,
-                                     uint16_t address,
-                                     uint16_t value);
+uint8_t mbm_node_writeSingleRegister(mbm_node *node, uint16_t address, uint16_t value);
 
 /**
  * Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
  * the lowest bit (V1.1b3, 6.11). With unit 0 it is a broadcast.
  *
- * @param node      the object
  * @param address   the first coil, 0 to 65535; becomes the write address
  * @param quantity  the number of coils, 1 to 1968, and not more than the transmit words hold
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_writeMultipleCoils(struct mbm_node *node,
-                                    uint16_t address,
-                                    uint16_t quantity);
+uint8_t mbm_node_writeMultipleCoils(mbm_node *node, uint16_t address, uint16_t quantity);
 
 /**
  * Function 0F: writes the queued bits to coils, starting at the last write address. Call
  * mbm_node_beginTransmission and mbm_node_sendBit before.
  *
- * @param node  the object
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_writeQueuedCoils(struct mbm_node *node);
+uint8_t mbm_node_writeQueuedCoils(mbm_node *node);
 
 /**
  * Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
  * With unit 0 it is a broadcast.
  *
- * @param node      the object
  * @param address   the first register, 0 to 65535; becomes the write address
  * @param quantity  the number of registers, 1 to 123, and not more than the transmit words
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_writeMultipleRegisters(struct mbm_node *node,
-                                        uint16_t address,
-                                        uint16_t quantity);
+uint8_t mbm_node_writeMultipleRegisters(mbm_node *node, uint16_t address, uint16_t quantity);
 
 /**
  * Function 10: writes the queued complete words to registers, starting at the last write
  * address. Call mbm_node_beginTransmission and mbm_node_send before.
  *
- * @param node  the object
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_writeQueuedRegisters(struct mbm_node *node);
+uint8_t mbm_node_writeQueuedRegisters(mbm_node *node);
 
 /**
  * Function 16: the device sets a register to
  * (register AND andMask) OR (orMask AND NOT andMask) (V1.1b3, 6.16).
  * With unit 0 it is a broadcast.
  *
- * @param node     the object
  * @param address  the register, 0 to 65535; becomes the write address
  * @param andMask  1 for each bit of the register to keep; also becomes transmit word 0
  * @param orMask   the new value of the bits that are not kept; also becomes transmit word 1
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_maskWriteRegister(struct mbm_node *node,
-                                   uint16_t address,
-                                   uint16_t andMask,
+uint8_t mbm_node_maskWriteRegister(mbm_node *node, uint16_t address, uint16_t andMask,
                                    uint16_t orMask);
 
 /**
  * Function 17: the device writes the transmit words to registers first. Then it reads
  * registers, which arrive in the response words. Both in one request (V1.1b3, 6.17).
  *
- * @param node           the object
  * @param readAddress    the first register to read, 0 to 65535
  * @param readQuantity   the number of registers to read, 1 to 125
  * @param writeAddress   the first register to write, 0 to 65535; becomes the write address
- * @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
- *                       transmit words
+ * @param writeQuantity  the number of registers to write, 1 to 121, and not more than the transmit
+ *                       words
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_readWriteMultipleRegisters(struct mbm_node *node,
-                                            uint16_t readAddress,
-                                            uint16_t readQuantity,
-                                            uint16_t writeAddress,
+uint8_t mbm_node_readWriteMultipleRegisters(mbm_node *node, uint16_t readAddress,
+                                            uint16_t readQuantity, uint16_t writeAddress,
                                             uint16_t writeQuantity);
 
 /**
  * Function 17: as mbm_node_readWriteMultipleRegisters, but writes the queued complete
  * words, starting at the last write address.
  *
- * @param node          the object
  * @param readAddress   the first register to read, 0 to 65535
  * @param readQuantity  the number of registers to read, 1 to 125
  * @return a status; see mbm_node_readCoils
  */
-uint8_t mbm_node_readWriteQueuedRegisters(struct mbm_node *node,
-                                          uint16_t readAddress,
+uint8_t mbm_node_readWriteQueuedRegisters(mbm_node *node, uint16_t readAddress,
                                           uint16_t readQuantity);
 
 /**
  * Sets the unit to which the master sends later requests.
  *
- * @param node   the object
  * @param slave  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
  *               255, which the standard reserves
- * @return a status
  */
-uint8_t mbm_node_setSlaveID(struct mbm_node *node, uint8_t slave);
+uint8_t mbm_node_setSlaveID(mbm_node *node, uint8_t slave);
 
 /**
  * Returns the unit to which the master sends requests.
  *
- * @param node  the object
  * @return the unit identifier, 1 by default; 0 for an object that was never begun
  */
-uint8_t mbm_node_getSlaveID(const struct mbm_node *node);
+uint8_t mbm_node_getSlaveID(const mbm_node *node);
 
 /**
  * Sets the response timeout: the maximum time from the last bit of the request to the last
  * byte of the reply.
  *
- * @param node       the object
  * @param timeoutMs  milliseconds, 0 to 1000000 (16 minutes); the default is 2000
- * @return a status
  */
-uint8_t mbm_node_setResponseTimeout(struct mbm_node *node, uint32_t timeoutMs);
+uint8_t mbm_node_setResponseTimeout(mbm_node *node, uint32_t timeoutMs);
 
 /**
  * Switches between blocking and non-blocking mode. In blocking mode, the default, a function
  * that makes a request returns when the request has ended. In non-blocking mode it returns
  * MBM_PENDING at once, and you call mbm_node_poll until the request has ended.
  *
- * @param node  the object
- * @param on    1 blocking, 0 non-blocking; it applies from the next request on
- * @return a status
+ * @param on  1 blocking, 0 non-blocking; it applies from the next request on
  */
-uint8_t mbm_node_setBlocking(struct mbm_node *node, uint8_t on);
+uint8_t mbm_node_setBlocking(mbm_node *node, uint8_t on);
 
 /**
  * Accepts replies of devices that deviate from the standard. It has these effects:
@@ -551,46 +468,41 @@ uint8_t mbm_node_setBlocking(struct mbm_node *node, uint8_t on);
  * Set a short response timeout (mbm_node_setResponseTimeout) if the device deviates in
  * every reply.
  *
- * @param node  the object
- * @param on    0 (the default) or 1
+ * @param on  0 (the default) or 1
  * @return a status; MBM_BUSY while a request is under way
  */
-uint8_t mbm_node_setLenient(struct mbm_node *node, uint8_t on);
+uint8_t mbm_node_setLenient(mbm_node *node, uint8_t on);
 
 /**
  * Queues a word after the words queued before. If the last word holds queued bits, the new
  * word goes into the next one.
  *
- * @param node  the object
  * @param word  the word
  * @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
  */
-uint8_t mbm_node_send(struct mbm_node *node, uint16_t word);
+uint8_t mbm_node_send(mbm_node *node, uint16_t word);
 
 /**
  * Queues a bit after the bits queued before, starting at the lowest bit of a word.
  *
- * @param node  the object
- * @param on    0 is off, any other value is on
+ * @param on  0 is off, any other value is on
  * @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
  */
-uint8_t mbm_node_sendBit(struct mbm_node *node, uint8_t on);
+uint8_t mbm_node_sendBit(mbm_node *node, uint8_t on);
 
 /**
  * Returns how many words of the last successful read mbm_node_receive has not returned yet.
  *
- * @param node  the object
  * @return 0 to 125
  */
-uint8_t mbm_node_available(const struct mbm_node *node);
+uint8_t mbm_node_available(const mbm_node *node);
 
 /**
  * Returns the next word of the last successful read.
  *
- * @param node  the object
  * @return the word; 0xFFFF if no word is left
  */
-uint16_t mbm_node_receive(struct mbm_node *node);
+uint16_t mbm_node_receive(mbm_node *node);
 
 #ifdef __cplusplus
 }  // extern "C"

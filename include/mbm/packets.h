@@ -36,9 +36,7 @@ extern "C" {
  *  silence. `bytes` is 0. */
 #define MBM_LENGTH_UNKNOWN 3u
 
-/**
- * An object of a device identification.
- */
+/** An object of a device identification. */
 typedef struct mbm_object {
     /** The value, usually text, without a NUL. */
     const uint8_t *data;
@@ -146,9 +144,7 @@ typedef struct mbm_packet {
     uint8_t objectCount;
 } mbm_packet;
 
-/**
- * The length of a PDU or frame, as far as it is known.
- */
+/** The length of a PDU or frame, as far as it is known. */
 typedef struct mbm_length {
     /** The length in bytes from the first byte on; `kind` says how to read it. */
     uint16_t bytes;
@@ -156,9 +152,7 @@ typedef struct mbm_length {
     uint8_t kind;
 } mbm_length;
 
-/**
- * Registers of a file: one group of function 14 or 15 (hex), in a request or a response.
- */
+/** Registers of a file: one group of function 14 or 15 (hex), in a request or a response. */
 typedef struct mbm_record {
     /** The registers, the high byte of each first; 2 * length bytes. A request of
      *  function 14 reads registers and has no data: NULL after parsing, ignored for
@@ -179,20 +173,16 @@ typedef struct mbm_record {
  *
  * Any thread or interrupt may call it. On a Cortex-M it takes 600 bytes of stack.
  *
- * @param framing   the framing of the frame
  * @param packet    the packet, with its unit, and for TCP its transaction
  * @param frame     receives the frame; it must not overlap the packet's data
  * @param capacity  bytes of `frame`; MBM_MAX_FRAME suffice for RTU, MBM_MAX_TCP_FRAME for TCP,
  *                  MBM_MAX_PDU for MBM_FRAMING_NONE, MBM_MAX_ASCII_FRAME for all
  * @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
- * @return a status; MBM_BUFFER_TOO_SMALL; otherwise the status that mbm_frame_parse would
- *         return for such a frame
+ * @return a status; MBM_BUFFER_TOO_SMALL; otherwise the status that mbm_frame_parse would return
+ *         for such a frame
  */
-uint8_t mbm_frame_build(const struct mbm_framing *framing,
-                        const struct mbm_packet *packet,
-                        uint8_t *frame,
-                        uint16_t capacity,
-                        uint16_t *length);
+uint8_t mbm_frame_build(const mbm_framing *framing, const mbm_packet *packet, uint8_t *frame,
+                        uint16_t capacity, uint16_t *length);
 
 /**
  * Parses a frame into a packet. The packet's data point into the frame.
@@ -202,27 +192,22 @@ uint8_t mbm_frame_build(const struct mbm_framing *framing,
  *
  * Any thread or interrupt may call it.
  *
- * @param framing      the framing of the frame
  * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
  * @param frame        the frame, from its first byte to its last. An ASCII frame is decoded in
  *                     place, which overwrites it; other frames do not change
  * @param frameLength  the number of bytes of `frame`
- * @param packet       receives the packet. If the frame is valid but its PDU is not, it
- *                     receives only kind, unit, transaction and function. If the frame is not
- *                     valid, it receives only the kind. For MBM_INVALID_ARGUMENT it does not
- *                     change
+ * @param packet       receives the packet. If the frame is valid but its PDU is not, it receives
+ *                     only kind, unit, transaction and function. If the frame is not valid, it
+ *                     receives only the kind. For MBM_INVALID_ARGUMENT it does not change
  * @return MBM_OK, also for an exception. If the frame is not valid: MBM_INCOMPLETE_FRAME,
  *         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC. If its request is not
- *         valid, the exception that answers it: MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS
- *         or MBM_ILLEGAL_DATA_VALUE. If its response is not valid: MBM_MALFORMED_REPLY, or
- *         MBM_INVALID_FUNCTION for a function code that the standard does not define and
- *         `framing` does not declare
+ *         valid, the exception that answers it: MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS or
+ *         MBM_ILLEGAL_DATA_VALUE. If its response is not valid: MBM_MALFORMED_REPLY, or
+ *         MBM_INVALID_FUNCTION for a function code that the standard does not define and `framing`
+ *         does not declare
  */
-uint8_t mbm_frame_parse(const struct mbm_framing *framing,
-                        uint8_t kind,
-                        uint8_t *frame,
-                        uint16_t frameLength,
-                        struct mbm_packet *packet);
+uint8_t mbm_frame_parse(const mbm_framing *framing, uint8_t kind, uint8_t *frame,
+                        uint16_t frameLength, mbm_packet *packet);
 
 /**
  * Writes the frame of the exception that answers a request. Pass the status of
@@ -231,22 +216,17 @@ uint8_t mbm_frame_parse(const struct mbm_framing *framing,
  *
  * Any thread or interrupt may call it.
  *
- * @param framing   the framing of the frame
  * @param request   the request, as mbm_frame_parse filled it in
  * @param code      the exception code, 1 to 127, for example MBM_ILLEGAL_FUNCTION
  * @param frame     receives the frame; it may be the buffer of the request's frame
  * @param capacity  bytes of `frame`; 11 always suffice
  * @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
  * @return a status; MBM_BROADCAST_NOT_ALLOWED for unit 0 on a serial line, which no device
- *         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no exception
- *         can contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT also for MBM_FRAMING_NONE
+ *         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no exception can
+ *         contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT also for MBM_FRAMING_NONE
  */
-uint8_t mbm_frame_exception(const struct mbm_framing *framing,
-                            const struct mbm_packet *request,
-                            uint8_t code,
-                            uint8_t *frame,
-                            uint16_t capacity,
-                            uint16_t *length);
+uint8_t mbm_frame_exception(const mbm_framing *framing, const mbm_packet *request, uint8_t code,
+                            uint8_t *frame, uint16_t capacity, uint16_t *length);
 
 /**
  * Computes the length of a frame from its first bytes.
@@ -260,19 +240,15 @@ uint8_t mbm_frame_exception(const struct mbm_framing *framing,
  *
  * Any thread or interrupt may call it. On a Cortex-M it takes 500 bytes of stack.
  *
- * @param framing   the framing of the frame
  * @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
  * @param bytes     the frame's first bytes; more may follow
  * @param have      the number of bytes; may be 0
  * @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
- * @return a status; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame may
- *         be as long as they say
+ * @return a status; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame may be
+ *         as long as they say
  */
-uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
-                                 uint8_t kind,
-                                 const uint8_t *bytes,
-                                 uint16_t have,
-                                 struct mbm_length *expected);
+uint8_t mbm_frame_expectedLength(const mbm_framing *framing, uint8_t kind, const uint8_t *bytes,
+                                 uint16_t have, mbm_length *expected);
 
 /**
  * Computes the length of the response frame to a request. If the device refuses the
@@ -281,17 +257,15 @@ uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
  *
  * Any thread or interrupt may call it. On a Cortex-M it takes 700 bytes of stack.
  *
- * @param framing   the framing of the frame
  * @param request   the request, as for mbm_frame_build
- * @param expected  receives the length. It is MBM_LENGTH_EXACT and 0 for a request that no
- *                  device answers: a broadcast, or 08 with sub-function 04. It is
- *                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
- * @return a status; MBM_INVALID_ARGUMENT if the packet is not a request; otherwise the status
- *         for which mbm_frame_build refuses the request
+ * @param expected  receives the length. It is MBM_LENGTH_EXACT and 0 for a request that no device
+ *                  answers: a broadcast, or 08 with sub-function 04. It is MBM_LENGTH_UNKNOWN and
+ *                  0 if the status is not MBM_OK
+ * @return a status; MBM_INVALID_ARGUMENT if the packet is not a request; otherwise the status for
+ *         which mbm_frame_build refuses the request
  */
-uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
-                              const struct mbm_packet *request,
-                              struct mbm_length *expected);
+uint8_t mbm_frame_replyLength(const mbm_framing *framing, const mbm_packet *request,
+                              mbm_length *expected);
 
 /**
  * Decides whether bytes look like the start of a Modbus TCP frame, a request or a
@@ -309,9 +283,7 @@ uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
  * @return a status; MBM_INCOMPLETE_FRAME if more bytes are needed to decide;
  *         MBM_MALFORMED_FRAME if the bytes are not a Modbus TCP frame
  */
-uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
-                               uint16_t have,
-                               uint8_t allowUnknown,
+uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes, uint16_t have, uint8_t allowUnknown,
                                uint16_t *expected);
 
 /**
@@ -349,9 +321,7 @@ uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
  * @return 1 if there is a record. 0, with `cursor` and `record` unchanged, if there are no more
  *         records, and for NULL
  */
-uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
-                              uint16_t *cursor,
-                              struct mbm_record *record);
+uint8_t mbm_packet_nextRecord(const mbm_packet *packet, uint16_t *cursor, mbm_record *record);
 
 /**
  * Reads the objects of a device identification one by one, as mbm_packet_nextRecord
@@ -365,9 +335,7 @@ uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
  * @return 1 if there is an object. 0, with `cursor` and `object` unchanged, if there are no
  *         more objects, and for NULL
  */
-uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
-                              uint16_t *cursor,
-                              struct mbm_object *object);
+uint8_t mbm_packet_nextObject(const mbm_packet *packet, uint16_t *cursor, mbm_object *object);
 
 /**
  * Adds a record to the data of a packet of function 14 or 15 (hex) that you are going to
@@ -383,10 +351,8 @@ uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
  *         MBM_INVALID_ARGUMENT for an exception packet, record data that overlap `storage`, or
  *         packet data that are not in `storage`
  */
-uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
-                             uint8_t *storage,
-                             uint16_t capacity,
-                             const struct mbm_record *record);
+uint8_t mbm_packet_addRecord(mbm_packet *packet, uint8_t *storage, uint16_t capacity,
+                             const mbm_record *record);
 
 /**
  * Adds an object to the data of a response of function 2B/0E (hex) that you are going to
@@ -402,10 +368,8 @@ uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
  *         packet is no such response; MBM_INVALID_ARGUMENT for object data that overlap
  *         `storage`, or packet data that are not in `storage`
  */
-uint8_t mbm_packet_addObject(struct mbm_packet *packet,
-                             uint8_t *storage,
-                             uint16_t capacity,
-                             const struct mbm_object *object);
+uint8_t mbm_packet_addObject(mbm_packet *packet, uint8_t *storage, uint16_t capacity,
+                             const mbm_object *object);
 
 /**
  * Describes a frame in one line of words, for example
@@ -414,7 +378,6 @@ uint8_t mbm_packet_addObject(struct mbm_packet *packet,
  *
  * Any thread or interrupt may call it. On a Cortex-M it takes 1000 bytes of stack.
  *
- * @param framing      the framing of the frame
  * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
  * @param frame        the frame, from its first byte to its last
  * @param frameLength  the number of bytes of `frame`
@@ -423,12 +386,8 @@ uint8_t mbm_packet_addObject(struct mbm_packet *packet,
  * @return a status; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
  *         MBM_INVALID_ARGUMENT for MBM_FRAMING_NONE
  */
-uint8_t mbm_frame_text(const struct mbm_framing *framing,
-                       uint8_t kind,
-                       const uint8_t *frame,
-                       uint16_t frameLength,
-                       char *text,
-                       uint16_t size);
+uint8_t mbm_frame_text(const mbm_framing *framing, uint8_t kind, const uint8_t *frame,
+                       uint16_t frameLength, char *text, uint16_t size);
 
 #ifdef __cplusplus
 }  // extern "C"

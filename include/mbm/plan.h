@@ -102,25 +102,19 @@ typedef struct mbm_planField {
     int32_t divisor;
 } mbm_planField;
 
-/**
- * Storage of a plan, one for each field.
- */
+/** Storage of a plan, one for each field. */
 typedef struct mbm_planPosition {
     /** Private. */
     uint32_t words[2];
 } mbm_planPosition;
 
-/**
- * Storage of a plan, one for each read.
- */
+/** Storage of a plan, one for each read. */
 typedef struct mbm_planRead {
     /** Private. */
     uint32_t words[8];
 } mbm_planRead;
 
-/**
- * How much one read of a unit may request, if not as much as the plan's other reads.
- */
+/** How much one read of a unit may request, if not as much as the plan's other reads. */
 typedef struct mbm_planUnitLimits {
     /** Bits, 1 to 2000; 0 means as `bitsPerRead` of the plan. */
     uint16_t bitsPerRead;
@@ -130,9 +124,7 @@ typedef struct mbm_planUnitLimits {
     uint16_t unit;
 } mbm_planUnitLimits;
 
-/**
- * Addresses that no read of a plan may touch.
- */
+/** Addresses that no read of a plan may touch. */
 typedef struct mbm_planExcludedRange {
     /** The first address. */
     uint16_t first;
@@ -150,25 +142,25 @@ typedef struct mbm_planExcludedRange {
  */
 typedef struct mbm_planSetup {
     /** The fields, in any order. */
-    const struct mbm_planField *fields;
+    const mbm_planField *fields;
     /** Storage: as many as fields. */
-    struct mbm_planPosition *positions;
+    mbm_planPosition *positions;
     /** Storage: as many as reads; there are never more reads than fields. */
-    struct mbm_planRead *reads;
+    mbm_planRead *reads;
     /** Storage: the registers of all reads and the bits of all reads, 16 to a word. */
     uint16_t *data;
     /** Storage: the requests with which the plan reads, initialised with MBM_INIT; they are the
      *  plan's alone. With one it sends one read after the other; more are for Modbus TCP, where
      *  several may be under way at once. */
-    struct mbm_clientRequest *requests;
+    mbm_clientRequest *requests;
     /** Units with limits of their own; NULL for none. */
-    const struct mbm_planUnitLimits *units;
+    const mbm_planUnitLimits *units;
     /** Addresses that no read may touch; NULL for none. */
-    const struct mbm_planExcludedRange *excluded;
+    const mbm_planExcludedRange *excluded;
     /** Optional: called by mbm_plan_poll for each field of a read that has ended, and for each
      *  field of a unit that the plan takes for silent. It may call every function on the plan
      *  and on the client. */
-    void (*update)(void *context, struct mbm_plan *plan, uint16_t field);
+    void (*update)(void *context, mbm_plan *plan, uint16_t field);
     /** Handed to `update`. Yours, may be NULL. */
     void *context;
     /** How long the plan leaves a unit alone after a first request without an answer, in
@@ -198,9 +190,7 @@ typedef struct mbm_planSetup {
     uint8_t excludedCount;
 } mbm_planSetup;
 
-/**
- * A read of a plan: one request that it repeats.
- */
+/** A read of a plan: one request that it repeats. */
 typedef struct mbm_planReadInfo {
     /** The time from one read to the next, in milliseconds. */
     uint32_t intervalMs;
@@ -230,24 +220,20 @@ typedef struct mbm_planReadInfo {
  * count out of range, a unit above 255 of limits or of an excluded range, or a client that was
  * never begun.
  *
- * @param plan    the object; initialised with MBM_INIT before the first call
  * @param client  the client that sends the reads, begun; the program may use it too, and other
  *                plans
  * @param setup   table, limits and storage; it stays valid and as it is until the plan ends
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
- * @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or
- *         order, a type that the table does not have, bits beyond those of a register, a unit
- *         above 255, an interval out of range, a negative divisor or a scale of a text;
- *         MBM_BROADCAST_NOT_ALLOWED for unit 0; MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
- *         address 65535 or into an excluded range; MBM_ILLEGAL_DATA_VALUE if it is longer than a
- *         read may be; MBM_BUFFER_TOO_SMALL for the first without storage for its read or its
- *         data. After such a status the plan has ended, and `positions` and `reads` may be
- *         changed. MBM_INVALID_ARGUMENT also for a unit above 255 of limits or of an excluded
- *         range
+ * @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or order,
+ *         a type that the table does not have, bits beyond those of a register, a unit above 255,
+ *         an interval out of range, a negative divisor or a scale of a text;
+ *         MBM_BROADCAST_NOT_ALLOWED for unit 0; MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address
+ *         65535 or into an excluded range; MBM_ILLEGAL_DATA_VALUE if it is longer than a read may
+ *         be; MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data. After
+ *         such a status the plan has ended, and `positions` and `reads` may be changed.
+ *         MBM_INVALID_ARGUMENT also for a unit above 255 of limits or of an excluded range
  */
-uint8_t mbm_plan_begin(struct mbm_plan *plan,
-                       struct mbm_client *client,
-                       const struct mbm_planSetup *setup,
+uint8_t mbm_plan_begin(mbm_plan *plan, mbm_client *client, const mbm_planSetup *setup,
                        uint16_t *field);
 
 /**
@@ -259,71 +245,56 @@ uint8_t mbm_plan_begin(struct mbm_plan *plan,
  * first, and have the same unit, table and interval. `setup->readCount` is the number of reads.
  * The limits, gaps and excluded ranges of `setup` have no meaning.
  *
- * @param plan    the object; initialised with MBM_INIT before the first call
  * @param client  as for mbm_plan_begin
  * @param setup   table and storage; it stays valid and as it is until the plan ends
  * @param counts  how many fields each read has: `setup->readCount` numbers, each at least 1,
  *                `setup->fieldCount` in total; used during the call
  * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
- * @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not fit into its read:
- *         it differs from the first one in unit, table or interval, has a lower address, or makes
- *         the read longer than 125 registers or 2000 bits; for counts of 0 or with another
+ * @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not fit into its
+ *         read: it differs from the first one in unit, table or interval, has a lower address, or
+ *         makes the read longer than 125 registers or 2000 bits; for counts of 0 or with another
  *         total; and for more fields than MBM_PLAN_MAX_FIELDS
  */
-uint8_t mbm_plan_beginGrouped(struct mbm_plan *plan,
-                              struct mbm_client *client,
-                              const struct mbm_planSetup *setup,
-                              const uint16_t *counts,
-                              uint16_t *field);
+uint8_t mbm_plan_beginGrouped(mbm_plan *plan, mbm_client *client, const mbm_planSetup *setup,
+                              const uint16_t *counts, uint16_t *field);
 
-/**
- * Ends a plan: gives its requests up and lets go of its storage.
- *
- * @param plan  the object
- * @return a status
- */
-uint8_t mbm_plan_end(struct mbm_plan *plan);
+/** Ends a plan: gives its requests up and lets go of its storage. */
+uint8_t mbm_plan_end(mbm_plan *plan);
 
 /**
  * Takes the replies that have arrived, calls `update` for the fields of each read that has
  * ended, and queues the reads that are due, as far as there are requests for them. It does not
  * poll the client: call mbm_client_poll after it.
- *
- * @param plan  the object
- * @return a status
  */
-uint8_t mbm_plan_poll(struct mbm_plan *plan);
+uint8_t mbm_plan_poll(mbm_plan *plan);
 
 /**
  * How long mbm_plan_poll has nothing to do, so that a program may sleep until then or until
  * mbm_client_pollDelay is over, whichever comes first.
  *
- * @param plan  the object
  * @return microseconds; 0 means poll now, and is returned within a hook of the client's port;
- *         0xFFFFFFFF if there is nothing to do before a request of the client has ended, and
- *         for an object that was never begun
+ *         0xFFFFFFFF if there is nothing to do before a request of the client has ended, and for
+ *         an object that was never begun
  */
-uint32_t mbm_plan_pollDelay(struct mbm_plan *plan);
+uint32_t mbm_plan_pollDelay(mbm_plan *plan);
 
 /**
  * How the last read of a field ended, and how old its value is. The functions that get a value
  * return the last one that was read, also after a read has failed: this says whether it is
  * still worth something.
  *
- * @param plan   the object
  * @param field  the index of the field
  * @param ageMs  gets the milliseconds since the value arrived, 2147483647 (24 days) at most;
  *               0xFFFFFFFF if none ever did; may be NULL
- * @return MBM_PENDING before the first read has ended, then as it ended: MBM_OK, an exception
- *         of the device, or a failure such as MBM_RESPONSE_TIMED_OUT
+ * @return MBM_PENDING before the first read has ended, then as it ended: MBM_OK, an exception of
+ *         the device, or a failure such as MBM_RESPONSE_TIMED_OUT
  */
-uint8_t mbm_plan_getStatus(struct mbm_plan *plan, uint16_t field, uint32_t *ageMs);
+uint8_t mbm_plan_getStatus(mbm_plan *plan, uint16_t field, uint32_t *ageMs);
 
 /**
  * A value as an integer: multiplied and divided as its field says, rounded to the nearest,
  * halves away from 0.
  *
- * @param plan   the object
  * @param field  the index of the field, of a bit or an integer
  * @param index  which of its values, 0 for the first
  * @param value  gets the number
@@ -331,107 +302,72 @@ uint8_t mbm_plan_getStatus(struct mbm_plan *plan, uint16_t field, uint32_t *ageM
  *         for a float or a text; if no value has arrived yet the status that mbm_plan_getStatus
  *         returns
  */
-uint8_t mbm_plan_getInteger(const struct mbm_plan *plan,
-                            uint16_t field,
-                            uint16_t index,
-                            int64_t *value);
+uint8_t mbm_plan_getInteger(const mbm_plan *plan, uint16_t field, uint16_t index, int64_t *value);
 
 /**
  * As mbm_plan_getInteger, but with 32 bits throughout: less code on a microcontroller.
  *
- * @param plan   the object
  * @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
- * @param index  which of its values, 0 for the first
- * @param value  gets the number
- * @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half of
- *         the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of 64
- *         bits
+ * @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half of the
+ *         divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of 64 bits
  */
-uint8_t mbm_plan_getInt32(const struct mbm_plan *plan,
-                          uint16_t field,
-                          uint16_t index,
-                          int32_t *value);
+uint8_t mbm_plan_getInt32(const mbm_plan *plan, uint16_t field, uint16_t index, int32_t *value);
 
 /**
  * A bit, an integer or a float as a double: multiplied and divided as its field says, and
  * rounded once, to the nearest. On AVR, where C's double has 32 bits, it is rounded to these after
  * that.
  *
- * @param plan   the object
- * @param field  the index of the field
- * @param index  which of its values, 0 for the first
  * @param value  gets the number; a float that is infinite or not a number stays so
  * @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text
  */
-uint8_t mbm_plan_getNumber(const struct mbm_plan *plan,
-                           uint16_t field,
-                           uint16_t index,
-                           double *value);
+uint8_t mbm_plan_getNumber(const mbm_plan *plan, uint16_t field, uint16_t index, double *value);
 
 /**
  * A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
  * to the nearest; without the scale of its field.
  *
- * @param plan   the object
- * @param field  the index of the field
- * @param index  which of its values, 0 for the first
- * @param value  gets the number
  * @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT for other types
  */
-uint8_t mbm_plan_getFloat(const struct mbm_plan *plan,
-                          uint16_t field,
-                          uint16_t index,
-                          float *value);
+uint8_t mbm_plan_getFloat(const mbm_plan *plan, uint16_t field, uint16_t index, float *value);
 
 /**
  * A text, which ends at its first NUL or with its field. In an order with the low byte first,
  * the first of two characters is a register's low byte.
  *
- * @param plan      the object
  * @param field     the index of the field, of type MBM_TYPE_TEXT
  * @param text      gets the text and a NUL
  * @param capacity  bytes of `text`; the field's count and one are always enough
  * @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL if the text does not fit
  */
-uint8_t mbm_plan_getText(const struct mbm_plan *plan,
-                         uint16_t field,
-                         char *text,
-                         uint16_t capacity);
+uint8_t mbm_plan_getText(const mbm_plan *plan, uint16_t field, char *text, uint16_t capacity);
 
 /**
  * The registers of a field as they were read, for mbm_registers_get... functions, in the order
  * of the field. It copies nothing: the next reply changes what it sees.
  *
- * @param plan       the object
  * @param field      the index of the field, of registers
  * @param registers  the view to fill in
  * @return as mbm_plan_getInteger
  */
-uint8_t mbm_plan_getRegisters(const struct mbm_plan *plan,
-                              uint16_t field,
-                              struct mbm_registers *registers);
+uint8_t mbm_plan_getRegisters(const mbm_plan *plan, uint16_t field, mbm_registers *registers);
 
 /**
  * Makes the read of a field due at once, for a value that is wanted now. A unit that does not
  * answer is left alone all the same.
  *
- * @param plan   the object
  * @param field  the index of the field
- * @return a status
  */
-uint8_t mbm_plan_refresh(struct mbm_plan *plan, uint16_t field);
+uint8_t mbm_plan_refresh(mbm_plan *plan, uint16_t field);
 
 /**
  * The reads that the plan has made of the fields: one request each.
  *
- * @param plan   the object
  * @param index  0 for the first read
  * @param read   gets the read
  * @return a status; MBM_INVALID_ARGUMENT behind the last read
  */
-uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
-                         uint16_t index,
-                         struct mbm_planReadInfo *read);
+uint8_t mbm_plan_getRead(const mbm_plan *plan, uint16_t index, mbm_planReadInfo *read);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -39,58 +39,51 @@ typedef struct mbm_ring {
  * Begins an empty ring over your storage. Neither writer nor reader may use the ring
  * meanwhile.
  *
- * @param ring   the object
  * @param bytes  your storage; it must stay valid for as long as the ring is used
  * @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte less
- * @return a status
  */
-uint8_t mbm_ring_begin(struct mbm_ring *ring, uint8_t *bytes, uint16_t size);
+uint8_t mbm_ring_begin(mbm_ring *ring, uint8_t *bytes, uint16_t size);
 
 /**
  * Puts one byte in. The writer calls it, also from an interrupt.
  *
- * @param ring  the object
  * @param byte  the received byte
  * @return 1; 0 if the ring was full: mbm_ring_lost counts the byte
  */
-uint8_t mbm_ring_put(struct mbm_ring *ring, uint8_t byte);
+uint8_t mbm_ring_put(mbm_ring *ring, uint8_t byte);
 
 /**
  * Puts bytes in, in order. The writer calls it, also from an interrupt.
  *
- * @param ring    the object
  * @param bytes   the received bytes; NULL only if `length` is 0
  * @param length  the number of bytes
  * @return the number of bytes that the ring took; mbm_ring_lost counts the others
  */
-uint16_t mbm_ring_write(struct mbm_ring *ring, const uint8_t *bytes, uint16_t length);
+uint16_t mbm_ring_write(mbm_ring *ring, const uint8_t *bytes, uint16_t length);
 
 /**
  * Takes bytes out, in order, without waiting. The reader calls it.
  *
- * @param ring      the object
  * @param bytes     receives the bytes; NULL only if `capacity` is 0
  * @param capacity  the number of bytes that `bytes` can hold
  * @return the number of bytes taken out; 0 if the ring was empty
  */
-uint16_t mbm_ring_read(struct mbm_ring *ring, uint8_t *bytes, uint16_t capacity);
+uint16_t mbm_ring_read(mbm_ring *ring, uint8_t *bytes, uint16_t capacity);
 
 /**
  * Returns how many bytes mbm_ring_read can take out now. The reader calls it.
  *
- * @param ring  the object
  * @return the number of bytes; 0 also if the ring was never begun
  */
-uint16_t mbm_ring_available(const struct mbm_ring *ring);
+uint16_t mbm_ring_available(const mbm_ring *ring);
 
 /**
  * Returns how many bytes were lost because the ring was full, since mbm_ring_begin.
  * Writer and reader may call it.
  *
- * @param ring  the object
  * @return the number of bytes; it wraps at 65536, on an AVR at 256
  */
-uint16_t mbm_ring_lost(const struct mbm_ring *ring);
+uint16_t mbm_ring_lost(const mbm_ring *ring);
 
 #ifdef __cplusplus
 }  // extern "C"

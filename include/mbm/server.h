@@ -32,9 +32,7 @@ extern "C" {
  *  mbm_unit_serve function. */
 #define MBM_MAX_SERVICES 16
 
-/**
- * The head of each record that a mbm_unit_serve function takes. Private.
- */
+/** The head of each record that a mbm_unit_serve function takes. Private. */
 typedef struct mbm_service {
     /** Serves a request if its function belongs to this record. NULL in a zeroed record,
      *  which serves nothing. */
@@ -50,7 +48,7 @@ typedef struct mbm_service {
  */
 typedef struct mbm_diagnostics {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** Optional: called when the client restarts the communications (sub-function 01).
      *  `clearLog` is 1 if the client cleared the event log too, else 0. */
     void (*restart)(void *context, uint8_t clearLog);
@@ -101,14 +99,14 @@ typedef struct mbm_diagnostics {
 typedef struct mbm_unit {
     /** Private: the records in the order in which the unit calls them. NULL follows the
      *  last one. */
-    struct mbm_service *services[MBM_MAX_SERVICES];
+    mbm_service *services[MBM_MAX_SERVICES];
     /** Private: NULL in a unit without diagnostics. */
     size_t (*monitor)(struct mbm_unit *unit,
                       const void *info,
                       uint8_t addressing,
                       uint8_t *pdu);
     /** Private. */
-    struct mbm_diagnostics *diagnostics;
+    mbm_diagnostics *diagnostics;
     /** The unit id, 1 to 247 (serial line guide V1.02, 2.2). The ids 248 to 255, which
      *  the standard reserves, are accepted. 0 answers to every id. A unit without any
      *  record does not answer. A begin function of a server refuses a greater id
@@ -161,19 +159,17 @@ typedef struct mbm_accessHooks {
     void *context;
     /** Called before cells are read. It may refresh them. Returns 0 to allow the read, or an
      *  exception code to refuse the whole request; a number above 127 becomes exception 04. */
-    uint8_t (*beforeRead)(void *context, const struct mbm_access *access);
+    uint8_t (*beforeRead)(void *context, const mbm_access *access);
     /** Called before cells are written. Returns as beforeRead. */
-    uint8_t (*beforeWrite)(void *context, const struct mbm_access *access);
+    uint8_t (*beforeWrite)(void *context, const mbm_access *access);
     /** Called after cells were written. */
-    void (*afterWrite)(void *context, const struct mbm_access *access);
+    void (*afterWrite)(void *context, const mbm_access *access);
 } mbm_accessHooks;
 
-/**
- * The hooks of a record. Private.
- */
+/** The hooks of a record. Private. */
 typedef struct mbm_recordHooks {
     /** The hooks. */
-    const struct mbm_accessHooks *hooks;
+    const mbm_accessHooks *hooks;
     /** Calls the hooks. NULL if there are none. A program in which no record has hooks does
      *  not contain the function. */
     void (*call)(void);
@@ -186,7 +182,7 @@ typedef struct mbm_recordHooks {
  */
 typedef struct mbm_dataCallbacks {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** Passed to each function. Any value; may be NULL. */
     void *context;
     /** Optional; NULL if every address exists. Otherwise returns 1 if this address
@@ -201,12 +197,10 @@ typedef struct mbm_dataCallbacks {
      *  later record serves these functions. */
     void (*set)(void *context, uint16_t address, uint16_t value);
     /** Private: see mbm_dataCallbacks_setHooks. */
-    struct mbm_recordHooks hooks;
+    mbm_recordHooks hooks;
 } mbm_dataCallbacks;
 
-/**
- * A request for a function of yours.
- */
+/** A request for a function of yours. */
 typedef struct mbm_request {
     /** The data of the request: the bytes after the function code. */
     const uint8_t *data;
@@ -234,14 +228,14 @@ typedef struct mbm_request {
  */
 typedef struct mbm_custom {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** Carries out a request and writes the data of the response, without the function
      *  code, to `response`. `capacity` is the space in bytes that the frame buffer has
      *  after the request; the server sends at most 252 bytes. Returns the number of bytes
      *  written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, MBM_REPLY_PENDING or
      *  MBM_REPLY_DECLINED. */
     uint16_t (*serve)(void *context,
-                      const struct mbm_request *request,
+                      const mbm_request *request,
                       uint8_t *response,
                       uint16_t capacity);
     /** Passed to `serve`. Any value; may be NULL. */
@@ -251,7 +245,7 @@ typedef struct mbm_custom {
     uint8_t code;
     /** The length of the request PDUs, which a server of RTU over TCP needs. If it is
      *  zeroed, a request is complete when its CRC is right. */
-    struct mbm_rule length;
+    mbm_rule length;
 } mbm_custom;
 
 /**
@@ -260,14 +254,12 @@ typedef struct mbm_custom {
  */
 typedef struct mbm_functionMask {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** Private. */
     uint8_t off[16];
 } mbm_functionMask;
 
-/**
- * One file: an array of records. A record is one register.
- */
+/** One file: an array of records. A record is one register. */
 typedef struct mbm_file {
     /** The records, starting with record 0. */
     uint16_t *records;
@@ -283,18 +275,16 @@ typedef struct mbm_file {
  */
 typedef struct mbm_files {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** The files: an array of `count` elements. */
-    const struct mbm_file *files;
+    const mbm_file *files;
     /** How many files. */
     uint16_t count;
     /** Private: see mbm_files_setHooks. */
-    struct mbm_recordHooks hooks;
+    mbm_recordHooks hooks;
 } mbm_files;
 
-/**
- * One FIFO queue of registers.
- */
+/** One FIFO queue of registers. */
 typedef struct mbm_fifo {
     /** The registers, the oldest first. */
     const uint16_t *words;
@@ -311,10 +301,10 @@ typedef struct mbm_fifo {
  */
 typedef struct mbm_fifos {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** The queues: an array of `count` elements. A read leaves the registers in the
      *  queue. */
-    const struct mbm_fifo *fifos;
+    const mbm_fifo *fifos;
     /** How many queues. */
     uint16_t count;
 } mbm_fifos;
@@ -325,7 +315,7 @@ typedef struct mbm_fifos {
  */
 typedef struct mbm_exceptionStatus {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** The outputs, one bit each. You may change them at any time. */
     uint8_t outputs;
 } mbm_exceptionStatus;
@@ -339,7 +329,7 @@ typedef struct mbm_exceptionStatus {
  */
 typedef struct mbm_serverId {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** The server id; NULL only if idLength is 0. */
     const uint8_t *id;
     /** The data after the run indicator; NULL only if additionalLength is 0. */
@@ -358,12 +348,12 @@ typedef struct mbm_serverId {
  */
 typedef struct mbm_serverIdentification {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** The objects, in any order. Every device has the ids 0 (vendor name), 1 (product
      *  code) and 2 (revision). Optional are 3 (vendor URL), 4 (product name), 5 (model
      *  name) and 6 (application name), and from 0x80 on your own. An object has at most
      *  244 bytes. */
-    const struct mbm_object *objects;
+    const mbm_object *objects;
     /** How many objects. */
     uint16_t count;
 } mbm_serverIdentification;
@@ -378,7 +368,7 @@ typedef struct mbm_serverIdentification {
  */
 typedef struct mbm_registerTable {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** The registers: `size` words. */
     uint16_t *words;
     /** Optional; NULL if every register exists. Otherwise a bitmap with one bit for each
@@ -386,7 +376,7 @@ typedef struct mbm_registerTable {
      *  bit is 0 is answered with exception 02. */
     const uint8_t *valid;
     /** Private: see mbm_registerTable_setHooks. */
-    struct mbm_recordHooks hooks;
+    mbm_recordHooks hooks;
     /** The address of the first register. */
     uint16_t base;
     /** How many registers there are. */
@@ -400,13 +390,13 @@ typedef struct mbm_registerTable {
  */
 typedef struct mbm_bitTable {
     /** Private. */
-    struct mbm_service service;
+    mbm_service service;
     /** The bits: `size` bits, in (size + 7) / 8 bytes. */
     uint8_t *bits;
     /** As in mbm_registerTable. */
     const uint8_t *valid;
     /** Private: see mbm_bitTable_setHooks. */
-    struct mbm_recordHooks hooks;
+    mbm_recordHooks hooks;
     /** The address of the first bit. */
     uint16_t base;
     /** How many bits there are. */
@@ -416,52 +406,41 @@ typedef struct mbm_bitTable {
 /**
  * Serves cells that your functions get and set.
  *
- * @param unit   the unit
  * @param cells  must stay valid for as long as the unit is used
- * @param table  the table, named by the function that reads it: 1 coils (functions 01, 05, 0F),
- *               2 discrete inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
- *               registers (04); functions in hex
+ * @param table  the table, named by the function that reads it: 1 coils (functions 01, 05, 0F), 2
+ *               discrete inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input registers
+ *               (04); functions in hex
  * @return a status; see mbm_unit_serveCoils. MBM_INVALID_ARGUMENT for a NULL `get`
  */
-uint8_t mbm_unit_serveCallbacks(struct mbm_unit *unit,
-                                struct mbm_dataCallbacks *cells,
-                                uint8_t table);
+uint8_t mbm_unit_serveCallbacks(mbm_unit *unit, mbm_dataCallbacks *cells, uint8_t table);
 
 /**
  * Sets the functions that are called around a read or a write of cells, or removes them.
  *
  * @param cells  the cells, registered already or not. Zeroing the struct removes the hooks
  * @param hooks  must stay valid for as long as the cells are served; NULL for no hooks
- * @return a status
  */
-uint8_t mbm_dataCallbacks_setHooks(struct mbm_dataCallbacks *cells,
-                                   const struct mbm_accessHooks *hooks);
+uint8_t mbm_dataCallbacks_setHooks(mbm_dataCallbacks *cells, const mbm_accessHooks *hooks);
 
 /**
  * Serves a function of yours, in every framing.
  *
- * @param unit    the unit
- * @param custom  must stay valid for as long as the unit is used
- * @return a status; see mbm_unit_serveFiles. MBM_INVALID_ARGUMENT for a NULL `serve`, a code
- *         above 127 or an invalid `length`
+ * @return a status; see mbm_unit_serveFiles. MBM_INVALID_ARGUMENT for a NULL `serve`, a code above
+ *         127 or an invalid `length`
  */
-uint8_t mbm_unit_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
+uint8_t mbm_unit_serveCustom(mbm_unit *unit, mbm_custom *custom);
 
 /**
  * Switches a function of a unit off or on. The unit answers a function that is off with
  * exception 01, even if a record serves it.
  *
- * @param unit  the unit
- * @param mask  must stay valid for as long as the unit is used; initialised with MBM_INIT.
- *              Units that share a mask have the same functions off
+ * @param mask  must stay valid for as long as the unit is used; initialised with MBM_INIT. Units
+ *              that share a mask have the same functions off
  * @param code  the function code, 1 to 127
  * @param on    0 switches the function off, anything else switches it on
  * @return a status; see mbm_unit_serveFiles
  */
-uint8_t mbm_unit_switchFunction(struct mbm_unit *unit,
-                                struct mbm_functionMask *mask,
-                                uint8_t code,
-                                uint8_t on);
+uint8_t mbm_unit_switchFunction(mbm_unit *unit, mbm_functionMask *mask, uint8_t code, uint8_t on);
 
 /**
  * Serves diagnostics: functions 08, 0B and 0C (hex). Function 08 has the sub-functions
@@ -469,24 +448,20 @@ uint8_t mbm_unit_switchFunction(struct mbm_unit *unit,
  * (illegal function). After this call the unit counts the frames on its lines and logs
  * events, and a client can force it into listen only mode.
  *
- * @param unit         the unit
  * @param diagnostics  must stay valid for as long as the unit is used. Use one struct for each
  *                     unit: a shared one counts for all units that share it
  * @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
  */
-uint8_t mbm_unit_serveDiagnostics(struct mbm_unit *unit,
-                                  struct mbm_diagnostics *diagnostics);
+uint8_t mbm_unit_serveDiagnostics(mbm_unit *unit, mbm_diagnostics *diagnostics);
 
 /**
  * Serves files: functions 14 and 15 (hex), Read File Record and Write File Record. A
  * request is carried out completely or not at all. Serving a request takes 250 bytes of
  * stack.
  *
- * @param unit   the unit
- * @param files  must stay valid for as long as the unit is used
  * @return a status; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES records already
  */
-uint8_t mbm_unit_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
+uint8_t mbm_unit_serveFiles(mbm_unit *unit, mbm_files *files);
 
 /**
  * Sets the functions that are called around a read or a write of records, or removes them.
@@ -494,37 +469,29 @@ uint8_t mbm_unit_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
  *
  * @param files  the files, registered already or not. Zeroing the struct removes the hooks
  * @param hooks  must stay valid for as long as the files are served; NULL for no hooks
- * @return a status
  */
-uint8_t mbm_files_setHooks(struct mbm_files *files, const struct mbm_accessHooks *hooks);
+uint8_t mbm_files_setHooks(mbm_files *files, const mbm_accessHooks *hooks);
 
 /**
  * Serves FIFO queues: function 18 (hex), Read FIFO Queue.
  *
- * @param unit   the unit
- * @param fifos  must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveFiles
  */
-uint8_t mbm_unit_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
+uint8_t mbm_unit_serveFifos(mbm_unit *unit, mbm_fifos *fifos);
 
 /**
  * Serves function 07, Read Exception Status.
  *
- * @param unit    the unit
- * @param status  must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
  */
-uint8_t mbm_unit_serveExceptionStatus(struct mbm_unit *unit,
-                                      struct mbm_exceptionStatus *status);
+uint8_t mbm_unit_serveExceptionStatus(mbm_unit *unit, mbm_exceptionStatus *status);
 
 /**
  * Serves function 11 (hex), Report Server ID.
  *
- * @param unit  the unit
- * @param id    must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
  */
-uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
+uint8_t mbm_unit_serveServerId(mbm_unit *unit, mbm_serverId *id);
 
 /**
  * Serves function 2B/0E (hex), Read Device Identification: streams of objects, and
@@ -532,12 +499,9 @@ uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
  * with further requests. The server computes the conformity level from the objects that
  * exist.
  *
- * @param unit            the unit
- * @param identification  must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
  */
-uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
-                                     struct mbm_serverIdentification *identification);
+uint8_t mbm_unit_serveIdentification(mbm_unit *unit, mbm_serverIdentification *identification);
 
 /**
  * Answers one request without a server: reads a request frame from a buffer and writes
@@ -559,74 +523,54 @@ uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
  *         request into `frame` again before the next call; MBM_INVALID_ARGUMENT for a unit with
  *         an id above 255
  */
-uint8_t mbm_unit_respond(struct mbm_unit *units,
-                         uint8_t count,
-                         void *connection,
-                         const struct mbm_framing *framing,
-                         uint8_t *frame,
-                         uint16_t length,
-                         uint16_t capacity,
-                         uint16_t *response);
+uint8_t mbm_unit_respond(mbm_unit *units, uint8_t count, void *connection,
+                         const mbm_framing *framing, uint8_t *frame, uint16_t length,
+                         uint16_t capacity, uint16_t *response);
 
 /**
  * Sets the functions that are called around a read or a write of registers, or removes them.
  *
  * @param table  the table, registered already or not. Zeroing the struct removes the hooks
  * @param hooks  must stay valid for as long as the table is served; NULL for no hooks
- * @return a status
  */
-uint8_t mbm_registerTable_setHooks(struct mbm_registerTable *table,
-                                   const struct mbm_accessHooks *hooks);
+uint8_t mbm_registerTable_setHooks(mbm_registerTable *table, const mbm_accessHooks *hooks);
 
 /**
  * Sets the functions that are called around a read or a write of bits, or removes them.
  *
  * @param table  the table, registered already or not. Zeroing the struct removes the hooks
  * @param hooks  must stay valid for as long as the table is served; NULL for no hooks
- * @return a status
  */
-uint8_t mbm_bitTable_setHooks(struct mbm_bitTable *table,
-                              const struct mbm_accessHooks *hooks);
+uint8_t mbm_bitTable_setHooks(mbm_bitTable *table, const mbm_accessHooks *hooks);
 
 /**
  * Serves coils: functions 01, 05 and 0F (hex).
  *
- * @param unit   the unit
- * @param table  must stay valid for as long as the unit is used
- * @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another
- *         kind
+ * @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another kind
  */
-uint8_t mbm_unit_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table);
+uint8_t mbm_unit_serveCoils(mbm_unit *unit, mbm_bitTable *table);
 
 /**
  * Serves discrete inputs: function 02.
  *
- * @param unit   the unit
- * @param table  must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveCoils
  */
-uint8_t mbm_unit_serveDiscreteInputs(struct mbm_unit *unit, struct mbm_bitTable *table);
+uint8_t mbm_unit_serveDiscreteInputs(mbm_unit *unit, mbm_bitTable *table);
 
 /**
  * Serves holding registers: functions 03, 06 and 10 (hex). For functions 16 and 17 too,
  * call mbm_registerTable_serveMaskAndReadWrite afterwards.
  *
- * @param unit   the unit
- * @param table  must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveCoils
  */
-uint8_t mbm_unit_serveHoldingRegisters(struct mbm_unit *unit,
-                                       struct mbm_registerTable *table);
+uint8_t mbm_unit_serveHoldingRegisters(mbm_unit *unit, mbm_registerTable *table);
 
 /**
  * Serves input registers: function 04.
  *
- * @param unit   the unit
- * @param table  must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveCoils
  */
-uint8_t mbm_unit_serveInputRegisters(struct mbm_unit *unit,
-                                     struct mbm_registerTable *table);
+uint8_t mbm_unit_serveInputRegisters(mbm_unit *unit, mbm_registerTable *table);
 
 /**
  * Adds functions 16 and 17 (hex), Mask Write Register and Read/Write Multiple Registers,
@@ -637,7 +581,7 @@ uint8_t mbm_unit_serveInputRegisters(struct mbm_unit *unit,
  * @param table  holding registers that mbm_unit_serveHoldingRegisters accepted
  * @return a status; MBM_INVALID_ARGUMENT for any other table
  */
-uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table);
+uint8_t mbm_registerTable_serveMaskAndReadWrite(mbm_registerTable *table);
 
 /* ==== Server: answers requests on a line or connection ============================== */
 
@@ -672,61 +616,39 @@ typedef struct mbm_server {
  * stay valid, at the same address, for as long as the server is used. Several servers
  * may share units. The buffer holds no data between requests.
  *
- * @param server  the object; initialised with MBM_INIT before the first call
- * @param port    is copied; its hooks read, write and micros are required
- * @param units   the units to serve: one unit, or an array of units
- * @param count   how many units
- * @param frame   buffer for one frame, a request or a response
- * @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame. The
- *                server ignores a longer request, and answers exception 04 in place of a longer
- *                response
+ * @param port   is copied; its hooks read, write and micros are required
+ * @param units  the units to serve: one unit, or an array of units
+ * @param count  how many units
+ * @param frame  buffer for one frame, a request or a response
+ * @param bytes  size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame. The server
+ *               ignores a longer request, and answers exception 04 in place of a longer response
  * @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
  */
-uint8_t mbm_server_beginRtu(struct mbm_server *server,
-                            const struct mbm_port *port,
-                            struct mbm_unit *units,
-                            uint8_t count,
-                            uint8_t *frame,
-                            uint16_t bytes);
+uint8_t mbm_server_beginRtu(mbm_server *server, const mbm_port *port, mbm_unit *units,
+                            uint8_t count, uint8_t *frame, uint16_t bytes);
 
 /**
  * Begins a server for ASCII on a serial line (serial line guide V1.02, 2.5.2). The
  * server drops a frame if the next character takes longer than one second.
  *
- * @param server  see mbm_server_beginRtu
- * @param port    see mbm_server_beginRtu
- * @param units   see mbm_server_beginRtu
- * @param count   see mbm_server_beginRtu
- * @param frame   see mbm_server_beginRtu
- * @param bytes   size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every frame
+ * @param bytes  size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every frame
  * @return a status; see mbm_server_beginRtu
  */
-uint8_t mbm_server_beginAscii(struct mbm_server *server,
-                              const struct mbm_port *port,
-                              struct mbm_unit *units,
-                              uint8_t count,
-                              uint8_t *frame,
-                              uint16_t bytes);
+uint8_t mbm_server_beginAscii(mbm_server *server, const mbm_port *port, mbm_unit *units,
+                              uint8_t count, uint8_t *frame, uint16_t bytes);
 
 /**
  * Begins a server on an accepted TCP connection. If several requests are in the stream,
  * the server answers them in order.
  *
- * @param server  see mbm_server_beginRtu; one for each connection
- * @param port    see mbm_server_beginRtu; its hooks read and write the connection and give the
- *                time
- * @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
- * @param count   see mbm_server_beginRtu
- * @param frame   see mbm_server_beginRtu; one for each connection
- * @param bytes   size of `frame` in bytes, at least MBM_MAX_TCP_FRAME
+ * @param port   see mbm_server_beginRtu; its hooks read and write the connection and give the time
+ * @param units  see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
+ * @param frame  see mbm_server_beginRtu; one for each connection
+ * @param bytes  size of `frame` in bytes, at least MBM_MAX_TCP_FRAME
  * @return a status; see mbm_server_beginRtu
  */
-uint8_t mbm_server_beginTcp(struct mbm_server *server,
-                            const struct mbm_port *port,
-                            struct mbm_unit *units,
-                            uint8_t count,
-                            uint8_t *frame,
-                            uint16_t bytes);
+uint8_t mbm_server_beginTcp(mbm_server *server, const mbm_port *port, mbm_unit *units,
+                            uint8_t count, uint8_t *frame, uint16_t bytes);
 
 /**
  * Begins a server for a stream of RTU frames without timing: a TCP connection that
@@ -734,20 +656,13 @@ uint8_t mbm_server_beginTcp(struct mbm_server *server,
  * end of a frame from its bytes. After a damaged frame, half a second of silence ends
  * the damaged bytes.
  *
- * @param server  see mbm_server_beginRtu; one for each connection
- * @param port    see mbm_server_beginRtu
- * @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
- * @param count   see mbm_server_beginRtu
- * @param frame   see mbm_server_beginRtu; one for each connection
- * @param bytes   size of `frame` in bytes, at least 16; MBM_MAX_FRAME holds every frame
+ * @param units  see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
+ * @param frame  see mbm_server_beginRtu; one for each connection
+ * @param bytes  size of `frame` in bytes, at least 16; MBM_MAX_FRAME holds every frame
  * @return a status; see mbm_server_beginRtu
  */
-uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
-                                   const struct mbm_port *port,
-                                   struct mbm_unit *units,
-                                   uint8_t count,
-                                   uint8_t *frame,
-                                   uint16_t bytes);
+uint8_t mbm_server_beginRtuOverTcp(mbm_server *server, const mbm_port *port, mbm_unit *units,
+                                   uint8_t count, uint8_t *frame, uint16_t bytes);
 
 /**
  * Polls the server, without waiting: receives bytes, carries out a complete request, and
@@ -757,53 +672,46 @@ uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
  * received bytes. On a serial line the response starts with the first call after the
  * line has been silent for t3.5.
  *
- * @param server  the object
  * @return a status; MBM_LINK_LOST if the port reported that the connection is lost: close it;
- *         MBM_MALFORMED_FRAME if the bytes received over TCP are not Modbus: close the
- *         connection
+ *         MBM_MALFORMED_FRAME if the bytes received over TCP are not Modbus: close the connection
  */
-uint8_t mbm_server_poll(struct mbm_server *server);
+uint8_t mbm_server_poll(mbm_server *server);
 
 /**
  * Returns how long the program may sleep before the next mbm_server_poll, unless bytes
  * arrive earlier. Do not sleep longer: while a response leaves on a serial line, the driver would
  * go off late.
  *
- * @param server  the object
  * @return microseconds. 0: poll now; a call from within a hook of this server returns 0 too.
- *         0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for a server
- *         that was never begun. After a response on a serial line it is first the time in which
- *         an echo may arrive. 1000: a function of yours has returned MBM_REPLY_PENDING, or a
- *         connection does not accept the response yet; the server receives no bytes meanwhile,
- *         so do not wait for one, but poll earlier if you know that the function or the
- *         connection is ready. Afterwards, and after a begin function, it is 0 until
- *         mbm_server_poll has read the port, so bytes that arrived meanwhile need not end a
- *         sleep
+ *         0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for a server that
+ *         was never begun. After a response on a serial line it is first the time in which an echo
+ *         may arrive. 1000: a function of yours has returned MBM_REPLY_PENDING, or a connection
+ *         does not accept the response yet; the server receives no bytes meanwhile, so do not wait
+ *         for one, but poll earlier if you know that the function or the connection is ready.
+ *         Afterwards, and after a begin function, it is 0 until mbm_server_poll has read the port,
+ *         so bytes that arrived meanwhile need not end a sleep
  */
-uint32_t mbm_server_pollDelay(const struct mbm_server *server);
+uint32_t mbm_server_pollDelay(const mbm_server *server);
 
 /**
  * Sets the silence that ends a frame. In RTU it is t3.5, in ASCII the longest time
  * between two characters, in RTU over TCP the silence after a damaged frame. It has no
  * effect in TCP. The begin functions restore the default.
  *
- * @param server     the object
  * @param silenceUs  microseconds since the last received byte; a value above 2^31 (36 minutes)
  *                   counts as 2^31
- * @return a status
  */
-uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
+uint8_t mbm_server_setSilence(mbm_server *server, uint32_t silenceUs);
 
 /**
  * Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
  * 2.5.1.1), and how long missing bytes of a request take. It does not change the rate of the
  * line. Other framings do not use t3.5: see mbm_server_setSilence.
  *
- * @param server  the object
- * @param baud    bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
+ * @param baud  bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
  * @return a status; MBM_INVALID_ARGUMENT for other framings
  */
-uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
+uint8_t mbm_server_setBaudRate(mbm_server *server, uint32_t baud);
 
 /**
  * Sets how long a UART or an adapter may hold received bytes back on an RTU line: the latency
@@ -812,11 +720,9 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
  * as the missing bytes and ten more take at the baud rate, and for this time. A longer time does
  * not delay complete requests. The begin functions restore the default.
  *
- * @param server     the object
  * @param latencyMs  0 to 65535 ms; 50 ms after a begin function
- * @return a status
  */
-uint8_t mbm_server_setReceiveLatency(struct mbm_server *server, uint16_t latencyMs);
+uint8_t mbm_server_setReceiveLatency(mbm_server *server, uint16_t latencyMs);
 
 /**
  * Says whether the receiver of an RTU line gets what the driver sends (a local echo). Without
@@ -825,12 +731,11 @@ uint8_t mbm_server_setReceiveLatency(struct mbm_server *server, uint16_t latency
  * requests are the same write again and again, each less than 80 ms after the response, then
  * loses some of them: say that there is no echo. mbm_server_beginRtu takes the answer back.
  *
- * @param server  the object
- * @param on      0: there is none, so no request is taken for it; anything else: there is one,
- *                even if a response came without it
+ * @param on  0: there is none, so no request is taken for it; anything else: there is one, even if
+ *            a response came without it
  * @return a status; MBM_INVALID_ARGUMENT for other framings
  */
-uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
+uint8_t mbm_server_setEchoDiscard(mbm_server *server, uint8_t on);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -74,7 +74,7 @@ typedef struct mbm_event {
     /** The fields of the PDU, as mbm_frame_parse sets them. If the PDU is malformed, and
      *  for MBM_EVENT_TIMEOUT, MBM_EVENT_BAD_CRC and MBM_EVENT_NOISE, only kind, unit,
      *  transaction and function are set. */
-    struct mbm_packet packet;
+    mbm_packet packet;
     /** When the last byte arrived, in microseconds; for MBM_EVENT_TIMEOUT when the
      *  timeout ended. */
     uint32_t timeUs;
@@ -118,11 +118,10 @@ typedef struct mbm_event {
  * You may call it again at any time. The sniffer then discards received bytes and
  * unanswered requests without an event, and its settings return to their defaults.
  *
- * @param sniffer  the object; initialised with MBM_INIT before the first call
  * @param framing  MBM_FRAMING_RTU or MBM_FRAMING_ASCII for a serial line, MBM_FRAMING_TCP or
  *                 MBM_FRAMING_RTU_OVER_TCP for a stream
- * @param buffer   holds received bytes until the sniffer has reported them; must stay valid for
- *                 as long as the sniffer is used
+ * @param buffer   holds received bytes until the sniffer has reported them; must stay valid for as
+ *                 long as the sniffer is used
  * @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER. MBM_MAX_FRAME,
  *                 MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every frame; with separate
  *                 directions use twice as much. A longer frame becomes an event of kind
@@ -130,45 +129,35 @@ typedef struct mbm_event {
  * @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for
  *         another framing
  */
-uint8_t mbm_sniffer_begin(struct mbm_sniffer *sniffer,
-                          uint8_t framing,
-                          uint8_t *buffer,
-                          uint16_t size);
+uint8_t mbm_sniffer_begin(mbm_sniffer *sniffer, uint8_t framing, uint8_t *buffer, uint16_t size);
 
 /**
  * Declares functions that the standard does not define, in place of those declared
  * before. The sniffer does not know the length of an undeclared function: silence then
  * ends an RTU frame.
  *
- * @param sniffer    the object
  * @param functions  an array that is copied; may be NULL if `count` is 0
  * @param count      how many functions, at most MBM_MAX_SNIFFER_FUNCTIONS
- * @return a status
  */
-uint8_t mbm_sniffer_setFunctions(struct mbm_sniffer *sniffer,
-                                 const struct mbm_function *functions,
+uint8_t mbm_sniffer_setFunctions(mbm_sniffer *sniffer, const mbm_function *functions,
                                  uint8_t count);
 
 /**
  * Sets the character that ends an ASCII frame after CR, LF at first; as
  * mbm_client_setDelimiter. It has no effect in other framings.
  *
- * @param sniffer    the object
  * @param character  1 to 127, except CR, the colon and hexadecimal digits
- * @return a status
  */
-uint8_t mbm_sniffer_setDelimiter(struct mbm_sniffer *sniffer, uint8_t character);
+uint8_t mbm_sniffer_setDelimiter(mbm_sniffer *sniffer, uint8_t character);
 
 /**
  * Sets the baud rate of a serial line. From it the sniffer computes the silence between
  * RTU frames, and the arrival time of each byte if you feed several at once. Without it
  * the silence is 4 ms, and all bytes of one feed count as received at the same time.
  *
- * @param sniffer  the object
- * @param baud     bits per second; 0, the default, if the rate is unknown
- * @return a status
+ * @param baud  bits per second; 0, the default, if the rate is unknown
  */
-uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
+uint8_t mbm_sniffer_setBaudRate(mbm_sniffer *sniffer, uint32_t baud);
 
 /**
  * Sets how long the sniffer waits for the reply to a request before it reports
@@ -177,11 +166,9 @@ uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
  * requests. For ten times the timeout, a reply to a request that has timed out is
  * reported as MBM_EVENT_UNPAIRED with the start of that request (requestHead).
  *
- * @param sniffer    the object
  * @param timeoutMs  1 to 65535 ms
- * @return a status
  */
-uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint32_t timeoutMs);
+uint8_t mbm_sniffer_setResponseTimeout(mbm_sniffer *sniffer, uint32_t timeoutMs);
 
 /**
  * Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
@@ -190,33 +177,27 @@ uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint32_t tim
  * suits a UART that hands over 120 at a time: 199 ms at 9600 baud and while the rate is
  * unknown.
  *
- * @param sniffer    the object
  * @param timeoutMs  1 to 65535 ms
- * @return a status
  */
-uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint32_t timeoutMs);
+uint8_t mbm_sniffer_setFrameTimeout(mbm_sniffer *sniffer, uint32_t timeoutMs);
 
 /**
  * Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.
  * If the sniffer did not accept all bytes, feed the rest now with the same time; no byte
  * is lost.
  *
- * @param sniffer    the object
  * @param direction  MBM_DIRECTION_BOTH; MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER if you
  *                   receive the directions separately. Do not mix MBM_DIRECTION_BOTH with the
- *                   other two: on a change the sniffer discards the bytes that it has not
- *                   reported yet
+ *                   other two: on a change the sniffer discards the bytes that it has not reported
+ *                   yet
  * @param bytes      the received bytes; NULL only if `length` is 0
  * @param length     how many bytes
  * @param nowUs      arrival time of the last of the bytes, in microseconds; may wrap
- * @return how many bytes the sniffer accepted; 0 also for a sniffer that was never begun, or
- *         for an invalid argument
+ * @return how many bytes the sniffer accepted; 0 also for a sniffer that was never begun, or for
+ *         an invalid argument
  */
-uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
-                          uint8_t direction,
-                          const uint8_t *bytes,
-                          uint16_t length,
-                          uint32_t nowUs);
+uint16_t mbm_sniffer_feed(mbm_sniffer *sniffer, uint8_t direction, const uint8_t *bytes,
+                          uint16_t length, uint32_t nowUs);
 
 /**
  * Returns the next event on the bus, in order of time. Call it after each feed until it
@@ -225,16 +206,13 @@ uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
  *
  * On a Cortex-M it takes 750 bytes of stack.
  *
- * @param sniffer  the object
- * @param nowUs    the time now, in microseconds; may wrap
- * @param event    receives the event; the data that it points to are valid until the next call
- *                 with this sniffer
- * @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for NULL,
- *         and for a sniffer that was never begun
+ * @param nowUs  the time now, in microseconds; may wrap
+ * @param event  receives the event; the data that it points to are valid until the next call with
+ *               this sniffer
+ * @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for NULL, and
+ *         for a sniffer that was never begun
  */
-uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
-                         uint32_t nowUs,
-                         struct mbm_event *event);
+uint8_t mbm_sniffer_next(mbm_sniffer *sniffer, uint32_t nowUs, mbm_event *event);
 
 /**
  * Writes an event as one line of text, for example
@@ -248,7 +226,7 @@ uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
  * @param size   size of `text` in bytes; 200 are enough for most events, 2400 for all
  * @return a status; MBM_BUFFER_TOO_SMALL if the line was cut
  */
-uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
+uint8_t mbm_event_text(const mbm_event *event, char *text, uint16_t size);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -42,9 +42,7 @@ typedef struct mbm_trace {
     uint32_t words[9];
 } mbm_trace;
 
-/**
- * One frame on a line or connection, or bytes that are no frame.
- */
+/** One frame on a line or connection, or bytes that are no frame. */
 typedef struct mbm_traceRecord {
     /** The bytes as they are on the line. Of a sniffer's event in ASCII they are decoded, from
      *  the unit to the LRC. */
@@ -83,15 +81,14 @@ typedef struct mbm_traceRecord {
  * You may call this function again at any time, but not from within the hook. The trace then
  * drops the bytes that it has not handed out, and its frame timeout is the default.
  *
- * @param trace    the object; initialised with MBM_INIT before the first call
  * @param sends    what the object that will use the port sends: MBM_PACKET_REQUEST for a line or
  *                 client, MBM_PACKET_RESPONSE for a server
- * @param port     is copied; its hooks read, write and micros are required. Its optional hooks
- *                 are passed on. It must not be the port of this trace, nor that of a trace
- *                 that passes everything on to this one
- * @param framing  the framing of the object that will use the port, and the declarations of
- *                 your own functions, which must stay valid and unchanged. Without a
- *                 declaration, the end of a received RTU frame is not known from its bytes
+ * @param port     is copied; its hooks read, write and micros are required. Its optional hooks are
+ *                 passed on. It must not be the port of this trace, nor that of a trace that
+ *                 passes everything on to this one
+ * @param framing  the framing of the object that will use the port, and the declarations of your
+ *                 own functions, which must stay valid and unchanged. Without a declaration, the
+ *                 end of a received RTU frame is not known from its bytes
  * @param buffer   holds incomplete frames: one half of it those that are sent, the other those
  *                 that are received. It must stay valid for as long as the trace is used
  * @param size     size of `buffer` in bytes, at least MBM_MIN_TRACE_BUFFER. Two times
@@ -99,48 +96,37 @@ typedef struct mbm_traceRecord {
  *                 longer one is handed out in pieces
  * @param hook     is called for each frame
  * @param context  your pointer, passed to `hook`: for example the link or its name
- * @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for
- *         a framing or `sends` that is not valid
+ * @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for a
+ *         framing or `sends` that is not valid
  */
-uint8_t mbm_trace_begin(struct mbm_trace *trace,
-                        uint8_t sends,
-                        const struct mbm_port *port,
-                        const struct mbm_framing *framing,
-                        uint8_t *buffer,
-                        uint16_t size,
-                        void (*hook)(void *context, const struct mbm_traceRecord *record),
-                        void *context);
+uint8_t mbm_trace_begin(mbm_trace *trace, uint8_t sends, const mbm_port *port,
+                        const mbm_framing *framing, uint8_t *buffer, uint16_t size,
+                        void (*hook)(void *context, const mbm_traceRecord *record), void *context);
 
 /**
  * Returns the port that passes everything on to the port of the trace. Pass it to the begin
  * function of a node, client or server.
  *
- * @param trace  the object
  * @return the port, which is valid for as long as the trace is used. NULL for a trace that was
  *         never begun, and from within its hook: the begin functions refuse it
  */
-const struct mbm_port *mbm_trace_port(struct mbm_trace *trace);
+const mbm_port *mbm_trace_port(mbm_trace *trace);
 
 /**
  * Sets how long the trace waits for the rest of an incomplete frame. At first it is 200 ms in
  * RTU, which suits a USB adapter and a UART with a FIFO, and 1000 ms in the other framings.
  *
- * @param trace      the object
  * @param timeoutMs  1 to 65535 ms
- * @return a status
  */
-uint8_t mbm_trace_setFrameTimeout(struct mbm_trace *trace, uint32_t timeoutMs);
+uint8_t mbm_trace_setFrameTimeout(mbm_trace *trace, uint32_t timeoutMs);
 
 /**
  * Calls the hook for the bytes that wait for the rest of their frame: before the program
  * ends, or before a link is closed.
  *
  * On a Cortex-M it takes 850 bytes of stack, as every traced frame does.
- *
- * @param trace  the object
- * @return a status
  */
-uint8_t mbm_trace_flush(struct mbm_trace *trace);
+uint8_t mbm_trace_flush(mbm_trace *trace);
 
 /**
  * Makes the record of an event of a sniffer, so that one hook serves what this program sends
@@ -151,7 +137,7 @@ uint8_t mbm_trace_flush(struct mbm_trace *trace);
  * @param record  receives the record; its bytes are valid as long as those of the event
  * @return a status; MBM_INVALID_ARGUMENT for MBM_EVENT_TIMEOUT, which has no bytes
  */
-uint8_t mbm_trace_ofEvent(const struct mbm_event *event, struct mbm_traceRecord *record);
+uint8_t mbm_trace_ofEvent(const struct mbm_event *event, mbm_traceRecord *record);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -80,10 +80,7 @@ typedef struct mbm_registers {
  * @param length    the number of bytes that `bytes` can hold
  * @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
  */
-uint8_t mbm_bits_pack(const uint8_t *coils,
-                      uint16_t quantity,
-                      uint8_t *bytes,
-                      uint16_t length);
+uint8_t mbm_bits_pack(const uint8_t *coils, uint16_t quantity, uint8_t *bytes, uint16_t length);
 
 /**
  * Unpacks the coils or discrete inputs that a read returned in bytes (V1.1b3, 6.1).
@@ -94,10 +91,7 @@ uint8_t mbm_bits_pack(const uint8_t *coils,
  * @param quantity  the number of coils, 0 to 65535
  * @return a status; MBM_ILLEGAL_DATA_ADDRESS if `bytes` has fewer bits than `quantity`
  */
-uint8_t mbm_bits_unpack(const uint8_t *bytes,
-                        uint16_t length,
-                        uint8_t *coils,
-                        uint16_t quantity);
+uint8_t mbm_bits_unpack(const uint8_t *bytes, uint16_t length, uint8_t *coils, uint16_t quantity);
 
 /**
  * Gets the state of one coil or discrete input of a read, by its address in the device.
@@ -110,10 +104,7 @@ uint8_t mbm_bits_unpack(const uint8_t *bytes,
  * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
  *         passes address 65535
  */
-uint8_t mbm_bits_isSet(const uint8_t *bytes,
-                       uint16_t first,
-                       uint16_t quantity,
-                       uint16_t address,
+uint8_t mbm_bits_isSet(const uint8_t *bytes, uint16_t first, uint16_t quantity, uint16_t address,
                        uint8_t *on);
 
 /**
@@ -127,10 +118,7 @@ uint8_t mbm_bits_isSet(const uint8_t *bytes,
  * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
  *         passes address 65535
  */
-uint8_t mbm_bits_set(uint8_t *bytes,
-                     uint16_t first,
-                     uint16_t quantity,
-                     uint16_t address,
+uint8_t mbm_bits_set(uint8_t *bytes, uint16_t first, uint16_t quantity, uint16_t address,
                      uint8_t on);
 
 /**
@@ -144,11 +132,8 @@ uint8_t mbm_bits_set(uint8_t *bytes,
  * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
  *         passes address 65535
  */
-uint8_t mbm_bits_isSetInWords(const uint16_t *words,
-                              uint16_t first,
-                              uint16_t quantity,
-                              uint16_t address,
-                              uint8_t *on);
+uint8_t mbm_bits_isSetInWords(const uint16_t *words, uint16_t first, uint16_t quantity,
+                              uint16_t address, uint8_t *on);
 
 /**
  * As mbm_bits_set, but in words, for example the transmit words of a node.
@@ -161,10 +146,7 @@ uint8_t mbm_bits_isSetInWords(const uint16_t *words,
  * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
  *         passes address 65535
  */
-uint8_t mbm_bits_setInWords(uint16_t *words,
-                            uint16_t first,
-                            uint16_t quantity,
-                            uint16_t address,
+uint8_t mbm_bits_setInWords(uint16_t *words, uint16_t first, uint16_t quantity, uint16_t address,
                             uint8_t on);
 
 /**
@@ -179,9 +161,7 @@ uint8_t mbm_bits_setInWords(uint16_t *words,
  * @param first      the device's address of the first register, 0 to 65535
  * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535
  */
-uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
-                              const uint16_t *words,
-                              uint16_t count,
+uint8_t mbm_registers_ofWords(mbm_registers *registers, const uint16_t *words, uint16_t count,
                               uint16_t first);
 
 /**
@@ -194,9 +174,7 @@ uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
  * @param first      the device's address of the first register, 0 to 65535
  * @return a status; see mbm_registers_ofWords. MBM_INVALID_ARGUMENT for an odd length
  */
-uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
-                              const uint8_t *bytes,
-                              uint16_t length,
+uint8_t mbm_registers_ofBytes(mbm_registers *registers, const uint8_t *bytes, uint16_t length,
                               uint16_t first);
 
 /**
@@ -209,9 +187,7 @@ uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
  * @param first      the device's address of the first register, 0 to 65535
  * @return a status; see mbm_registers_ofWords
  */
-uint8_t mbm_registers_intoWords(struct mbm_registers *registers,
-                                uint16_t *words,
-                                uint16_t count,
+uint8_t mbm_registers_intoWords(mbm_registers *registers, uint16_t *words, uint16_t count,
                                 uint16_t first);
 
 /**
@@ -223,98 +199,66 @@ uint8_t mbm_registers_intoWords(struct mbm_registers *registers,
  * @param first      the device's address of the first register, 0 to 65535
  * @return a status; see mbm_registers_ofBytes
  */
-uint8_t mbm_registers_intoBytes(struct mbm_registers *registers,
-                                uint8_t *bytes,
-                                uint16_t length,
+uint8_t mbm_registers_intoBytes(mbm_registers *registers, uint8_t *bytes, uint16_t length,
                                 uint16_t first);
 
 /**
  * Reads one bit of a register.
  *
- * @param registers  the registers
- * @param address    the device's address of the register
- * @param bit        0, the least significant, to 15
- * @param on         receives 0 or 1
+ * @param address  the device's address of the register
+ * @param bit      0, the least significant, to 15
+ * @param on       receives 0 or 1
  * @return a status; see mbm_registers
  */
-uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
-                             uint16_t address,
-                             uint8_t bit,
+uint8_t mbm_registers_getBit(const mbm_registers *registers, uint16_t address, uint8_t bit,
                              uint8_t *on);
 
 /**
  * Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
  * int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.
  *
- * @param registers  the registers
- * @param address    the device's address of the register
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param value      receives the number
+ * @param address  the device's address of its first register
+ * @param order    one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value    receives the number
  * @return a status; see mbm_registers
  */
-uint8_t mbm_registers_getUint16(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint8_t order,
+uint8_t mbm_registers_getUint16(const mbm_registers *registers, uint16_t address, uint8_t order,
                                 uint16_t *value);
 
 /**
  * Reads a number of two registers, 0 to 4294967295. For a signed number (two's
  * complement), pass a pointer to an int32_t, cast to uint32_t *.
  *
- * @param registers  the registers
- * @param address    the device's address of the first of its registers
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param value      receives the number
- * @return a status; see mbm_registers
+ * @return as mbm_registers_getUint16
  */
-uint8_t mbm_registers_getUint32(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint8_t order,
+uint8_t mbm_registers_getUint32(const mbm_registers *registers, uint16_t address, uint8_t order,
                                 uint32_t *value);
 
 /**
  * Reads a number of four registers. For a signed number, pass a pointer to an int64_t,
  * cast to uint64_t *.
  *
- * @param registers  the registers
- * @param address    the device's address of the first of its registers
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param value      receives the number
- * @return a status; see mbm_registers
+ * @return as mbm_registers_getUint16
  */
-uint8_t mbm_registers_getUint64(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint8_t order,
+uint8_t mbm_registers_getUint64(const mbm_registers *registers, uint16_t address, uint8_t order,
                                 uint64_t *value);
 
 /**
  * Reads a float of two registers, an IEEE 754 binary32. Its bits are copied, also those
  * of a NaN.
  *
- * @param registers  the registers
- * @param address    the device's address of the first of its registers
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param value      receives the number
- * @return a status; see mbm_registers
+ * @return as mbm_registers_getUint16
  */
-uint8_t mbm_registers_getFloat(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
+uint8_t mbm_registers_getFloat(const mbm_registers *registers, uint16_t address, uint8_t order,
                                float *value);
 
 /**
  * Reads a double of four registers, an IEEE 754 binary64. Its bits are copied. On AVR,
  * where a double of C has 32 bits (-mdouble=32), the number is rounded to the nearest.
  *
- * @param registers  the registers
- * @param address    the device's address of the first of its registers
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param value      receives the number
- * @return a status; see mbm_registers
+ * @return as mbm_registers_getUint16
  */
-uint8_t mbm_registers_getDouble(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint8_t order,
+uint8_t mbm_registers_getDouble(const mbm_registers *registers, uint16_t address, uint8_t order,
                                 double *value);
 
 /**
@@ -324,39 +268,30 @@ uint8_t mbm_registers_getDouble(const struct mbm_registers *registers,
  * byte first, the first of two characters is the low byte of a register. Characters are
  * copied without a check, also if they are not ASCII.
  *
- * @param registers  the registers
- * @param address    the device's address of the first register of the field
- * @param length     length of the field in bytes, two for each register; an odd length ends
- *                   with the first character of a register
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param text       receives the text and a NUL
- * @param capacity   size of `text` in bytes; `length + 1` are always enough
+ * @param address   the device's address of the first register of the field
+ * @param length    length of the field in bytes, two for each register; an odd length ends with
+ *                  the first character of a register
+ * @param order     one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param text      receives the text and a NUL
+ * @param capacity  size of `text` in bytes; `length + 1` are always enough
  * @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if `text` is
  */
-uint8_t mbm_registers_getString(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint16_t length,
-                                uint8_t order,
-                                char *text,
-                                uint16_t capacity);
+uint8_t mbm_registers_getString(const mbm_registers *registers, uint16_t address, uint16_t length,
+                                uint8_t order, char *text, uint16_t capacity);
 
 /**
  * Reads raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register
  * is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a
  * device that swaps the bytes of its registers.
  *
- * @param registers  the registers
- * @param address    the device's address of the first register
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param bytes      receives the bytes; must not overlap the registers
- * @param length     how many bytes, two for each register; may be odd
+ * @param address  the device's address of the first register
+ * @param order    one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param bytes    receives the bytes; must not overlap the registers
+ * @param length   how many bytes, two for each register; may be odd
  * @return a status; see mbm_registers
  */
-uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
-                               uint8_t *bytes,
-                               uint16_t length);
+uint8_t mbm_registers_getBytes(const mbm_registers *registers, uint16_t address, uint8_t order,
+                               uint8_t *bytes, uint16_t length);
 
 /**
  * Writes one bit of a register; the other bits do not change.
@@ -367,9 +302,7 @@ uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
  * @param on         0 for off, anything else for on
  * @return a status; see mbm_registers
  */
-uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
-                             uint16_t address,
-                             uint8_t bit,
+uint8_t mbm_registers_setBit(const mbm_registers *registers, uint16_t address, uint8_t bit,
                              uint8_t on);
 
 /**
@@ -377,71 +310,48 @@ uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
  * bytes has.
  *
  * @param registers  the registers, of a kind that may be written
- * @param address    the device's address of the register
+ * @param address    the device's address of its first register
  * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      the number
  * @return a status; see mbm_registers
  */
-uint8_t mbm_registers_setUint16(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint8_t order,
+uint8_t mbm_registers_setUint16(const mbm_registers *registers, uint16_t address, uint8_t order,
                                 uint16_t value);
 
 /**
  * Writes a number into two registers.
  *
- * @param registers  the registers, of a kind that may be written
- * @param address    the device's address of the first of its registers
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param value      the number
- * @return a status; see mbm_registers
+ * @return as mbm_registers_setUint16
  */
-uint8_t mbm_registers_setUint32(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint8_t order,
+uint8_t mbm_registers_setUint32(const mbm_registers *registers, uint16_t address, uint8_t order,
                                 uint32_t value);
 
 /**
  * Writes a number into four registers.
  *
- * @param registers  the registers, of a kind that may be written
- * @param address    the device's address of the first of its registers
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param value      points to the number
- * @return a status; see mbm_registers
+ * @param value  points to the number
+ * @return as mbm_registers_setUint16
  */
-uint8_t mbm_registers_setUint64(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint8_t order,
+uint8_t mbm_registers_setUint64(const mbm_registers *registers, uint16_t address, uint8_t order,
                                 const uint64_t *value);
 
 /**
  * Writes a float into two registers, as an IEEE 754 binary32. Its bits are copied.
  *
- * @param registers  the registers, of a kind that may be written
- * @param address    the device's address of the first of its registers
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param value      points to the number
- * @return a status; see mbm_registers
+ * @param value  points to the number
+ * @return as mbm_registers_setUint16
  */
-uint8_t mbm_registers_setFloat(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
+uint8_t mbm_registers_setFloat(const mbm_registers *registers, uint16_t address, uint8_t order,
                                const float *value);
 
 /**
  * Writes a double into four registers, as an IEEE 754 binary64. On AVR, where a double
  * of C has 32 bits (-mdouble=32), it is converted without loss.
  *
- * @param registers  the registers, of a kind that may be written
- * @param address    the device's address of the first of its registers
- * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
- * @param value      points to the number
- * @return a status; see mbm_registers
+ * @param value  points to the number
+ * @return as mbm_registers_setUint16
  */
-uint8_t mbm_registers_setDouble(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint8_t order,
+uint8_t mbm_registers_setDouble(const mbm_registers *registers, uint16_t address, uint8_t order,
                                 const double *value);
 
 /**
@@ -457,11 +367,8 @@ uint8_t mbm_registers_setDouble(const struct mbm_registers *registers,
  * @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if the text is longer than the
  *         field
  */
-uint8_t mbm_registers_setString(const struct mbm_registers *registers,
-                                uint16_t address,
-                                uint16_t length,
-                                uint8_t order,
-                                const char *text);
+uint8_t mbm_registers_setString(const mbm_registers *registers, uint16_t address, uint16_t length,
+                                uint8_t order, const char *text);
 
 /**
  * Writes raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each
@@ -476,11 +383,8 @@ uint8_t mbm_registers_setString(const struct mbm_registers *registers,
  *                   last register does not change
  * @return a status; see mbm_registers
  */
-uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
-                               const uint8_t *bytes,
-                               uint16_t length);
+uint8_t mbm_registers_setBytes(const mbm_registers *registers, uint16_t address, uint8_t order,
+                               const uint8_t *bytes, uint16_t length);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -90,7 +90,6 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
 /// their status is MBM_CANCELLED and `done` is not called. All settings return to their
 /// defaults. A call that is refused changes nothing.
 ///
-/// @param client      the object; initialised with MBM_INIT before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
 /// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
@@ -109,11 +108,8 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
 /// keeps no gap between frames. If no character arrives for one second, the client discards
 /// an incomplete frame.
 ///
-/// @param client      the object; initialised with MBM_INIT before the first call
-/// @param port        the port, which is copied; read, write and micros must not be NULL
-/// @param frame       the buffer of one frame, valid for as long as the client is used
 /// @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
-/// @return a status; MBM_BUSY also while the client is suspended
+/// @return as mbm_client_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginAscii(
     client: *mut mbm_client,
@@ -151,11 +147,7 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
 /// Begins a client that sends RTU frames through a TCP stream, for converters that pass
 /// bytes from TCP to a serial line unchanged. It keeps no gap and does not broadcast.
 ///
-/// @param client      the object; initialised with MBM_INIT before the first call
-/// @param port        the port, which is copied; read, write and micros must not be NULL
-/// @param frame       the buffer of one frame, valid for as long as the client is used
-/// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
-/// @return a status; MBM_BUSY also while the client is suspended
+/// @return as mbm_client_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
     client: *mut mbm_client,
@@ -171,15 +163,13 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
 /// allows more. The client matches responses to requests by the transaction identifier, in any
 /// order.
 ///
-/// @param client         the object; initialised with MBM_INIT before the first call
-/// @param port           the port, which is copied; read, write and micros must not be NULL
 /// @param incoming       the buffer of received bytes, valid for as long as the client is used
-/// @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger buffer
-///                       takes more responses from one read
+/// @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger buffer takes
+///                       more responses from one read
 /// @param outgoing       the buffer of bytes to send, valid for as long as the client is used
 /// @param outgoingBytes  bytes of `outgoing`, at least 12; 260 hold any frame. A larger buffer
 ///                       collects more requests for one write
-/// @return a status; MBM_BUSY also while the client is suspended
+/// @return as mbm_client_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginTcp(
     client: *mut mbm_client,
@@ -209,9 +199,7 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
 /// one at a time: they drop a request that arrives before they have answered the last one, or
 /// in one segment with another. The queue always holds 16.
 ///
-/// @param client  the object
-/// @param most    1 (the default) to 16. On a serial line and in RTU over TCP only 1 is accepted
-/// @return a status
+/// @param most  1 (the default) to 16. On a serial line and in RTU over TCP only 1 is accepted
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
     pointers::with(client, |object| match ((*(*object).kind).framing, most) {

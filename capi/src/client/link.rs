@@ -31,9 +31,8 @@ pub struct mbm_linkHooks {
 /// that were under way end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
 /// that were not sent yet are sent over the new link.
 ///
-/// @param client  the object
-/// @param link    your hooks, used during this call only; NULL if you have opened the link again
-///                already
+/// @param link  your hooks, used during this call only; NULL if you have opened the link again
+///              already
 /// @return what `connect` returns, or MBM_OK without `connect`; MBM_BUSY while the client is
 ///         suspended
 #[no_mangle]
@@ -77,10 +76,9 @@ pub unsafe extern "C" fn mbm_client_reconnect(
 /// a reply arrives. Do not reconnect again while the connection is still being made. The
 /// port knows whether it is: for example, call mbm_tcp_isConnected.
 ///
-/// @param client  the object
 /// @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives or
-///         mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first request. With
-///         a link: 0 from each loss of it until it is open again
+///         mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first request. With a
+///         link: 0 from each loss of it until it is open again
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     pointers::read(client, 0, |object| queue(object).connected.into())
@@ -128,10 +126,9 @@ pub unsafe extern "C" fn mbm_client_suspend(client: *mut mbm_client, line: *mut 
 /// Resumes the client. The line then has no port: requests of its nodes return
 /// MBM_NOT_INITIALISED. A line that was begun on another port meanwhile keeps that port.
 ///
-/// @param client  the object
-/// @param line    the line that was passed to mbm_client_suspend; NULL if none was
-/// @return a status; MBM_BUSY while a request is under way on the line; MBM_INVALID_ARGUMENT if
-///         the client was not suspended, and for any other line
+/// @param line  the line that was passed to mbm_client_suspend; NULL if none was
+/// @return a status; MBM_BUSY while a request is under way on the line; MBM_INVALID_ARGUMENT if the
+///         client was not suspended, and for any other line
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, line: *mut mbm_line) -> u8 {
     pointers::with(client, |object| {

@@ -58,7 +58,6 @@ pub(crate) unsafe fn rest(client: *mut mbm_client, unit: u8) -> u32 {
 ///
 /// Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
 ///
-/// @param client  the object
 /// @return MBM_PENDING while requests are pending; MBM_OK if none is; MBM_BUSY also from within
 ///         `done`, and while the client is suspended
 #[no_mangle]
@@ -112,7 +111,6 @@ unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
 /// a request is pending, or if it has a link (mbm_link_begin). With a link the delay also ends
 /// when the link is to be opened again, and is at most one second while the client is idle.
 ///
-/// @param client  the object
 /// @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF means
 ///         that no request is pending. While a TCP port accepts no bytes to send it is 1000: to
 ///         poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
@@ -136,7 +134,6 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
 
 /// Returns how many requests are pending: queued or under way.
 ///
-/// @param client  the object
 /// @return 0 to 16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
@@ -149,10 +146,8 @@ pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
 /// at the latest two response timeouts and the quiet time after the cancelled one was sent.
 /// Requests to other units are sent meanwhile.
 ///
-/// @param client   the object
 /// @param request  a request that was queued on this client
-/// @return a status; MBM_NOT_PENDING for a request that has ended already or was never queued
-///         here
+/// @return a status; MBM_NOT_PENDING for a request that has ended already or was never queued here
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_cancel(
     client: *mut mbm_client,

@@ -38,9 +38,7 @@ const _: () = {
 /// interrupted, or one whose response is too long for a buffer. `retryLimit` of a request or
 /// of a unit replaces this number.
 ///
-/// @param client   the object
 /// @param retries  0 to 255; the default is 0
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries: u8) -> u8 {
     set(client, |parts| {
@@ -84,11 +82,9 @@ fn again_after_failure(
 /// These repetitions are counted apart from those of mbm_client_setRetries. Meanwhile the
 /// client sends other requests, also to this unit.
 ///
-/// @param client   the object
-/// @param retries  the most repetitions of one request for this reason, 0 (the default) to 255;
-///                 the request then ends with the status 5 or 6
+/// @param retries  the most repetitions of one request for this reason, 0 (the default) to 255; the
+///                 request then ends with the status 5 or 6
 /// @param waitMs   the wait before each repetition in milliseconds, 0 to 65535
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setBusyRetries(
     client: *mut mbm_client,
@@ -113,11 +109,9 @@ pub unsafe extern "C" fn mbm_client_setBusyRetries(
 /// Sets how long a request waits before the client repeats it. Meanwhile the client sends
 /// other requests.
 ///
-/// @param client      the object
 /// @param backoff     MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
 /// @param delayMs     the wait before the first repetition, in milliseconds, 0 to 1000000
 /// @param maxDelayMs  the longest wait, in milliseconds, 0 to 1000000
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setBackoff(
     client: *mut mbm_client,
@@ -145,14 +139,12 @@ pub(crate) fn set_backoff(policy: &mut Policy, backoff: u8, delay_ms: u32, most_
 /// Shortens each wait before a repetition by a random part, so that several clients do not
 /// repeat their requests at the same time.
 ///
-/// @param client   the object
 /// @param percent  0 (the default) to 100: the largest part of the wait by which the client
 ///                 shortens it
 /// @param random   returns a new random number at each call, for example that of rand(). It may
-///                 have 32 bits, 15 bits, or random bits in its upper half only. A function that
-///                 it calls on the client returns MBM_BUSY. NULL only if `percent` is 0
+///                 have 32 bits, 15 bits, or random bits in its upper half only. A function that it
+///                 calls on the client returns MBM_BUSY. NULL only if `percent` is 0
 /// @param context  your pointer, passed to `random`; may be NULL
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setJitter(
     client: *mut mbm_client,

@@ -60,9 +60,7 @@ unsafe fn set_extra(client: *mut mbm_client, change: impl FnOnce(&mut Settings))
 /// the outgoing buffer, also if the port accepts it later. `timeoutMs` of a request or of a unit
 /// replaces this time.
 ///
-/// @param client     the object
 /// @param timeoutMs  milliseconds, 0 to 1000000 (16 minutes); the default is 2000
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setResponseTimeout(
     client: *mut mbm_client,
@@ -81,9 +79,7 @@ pub unsafe extern "C" fn mbm_client_setResponseTimeout(
 /// serial line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure
 /// the serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
 ///
-/// @param client  the object
-/// @param baud    bits per second; 0 (the default): unknown
-/// @return a status
+/// @param baud  bits per second; 0 (the default): unknown
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u32) -> u8 {
     set(client, |parts| {
@@ -95,10 +91,8 @@ pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u
 /// Sets the silence before a request, instead of t3.5. A later call of
 /// mbm_client_setBaudRate sets it back to t3.5. It has no effect on TCP.
 ///
-/// @param client  the object
-/// @param gapUs   microseconds from the last byte received or sent; a value above 2^31 (36
-///                minutes) means 2^31
-/// @return a status
+/// @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36 minutes)
+///               means 2^31
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, gapUs: u32) -> u8 {
     set(client, |parts| {
@@ -111,9 +105,7 @@ pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, gapUs: u32) 
 /// answers. These requests are a broadcast (serial line guide V1.02, 2.4.1), and 08 with
 /// sub-function 04.
 ///
-/// @param client   the object
 /// @param delayMs  milliseconds, 0 to 65535; the default is 100
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
     client: *mut mbm_client,
@@ -132,9 +124,7 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
 /// repeats data of your choice. If no other request has the same data, no late reply can be
 /// taken for it, and after its reply the next replies of that unit are not held either.
 ///
-/// @param client   the object
 /// @param quietMs  milliseconds, 0 to 65535; the default is 100; 0 holds no reply
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietMs: u32) -> u8 {
     set(client, |parts| {
@@ -146,9 +136,7 @@ pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietM
 /// driver sends: then the client discards the copy of each request that arrives before the
 /// reply. It has no effect on TCP.
 ///
-/// @param client  the object
-/// @param on      0 (the default) or 1
-/// @return a status
+/// @param on  0 (the default) or 1
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setEchoDiscard(client: *mut mbm_client, on: u8) -> u8 {
     set_extra(client, |settings| settings.echo_discard = on != 0)
@@ -157,10 +145,8 @@ pub unsafe extern "C" fn mbm_client_setEchoDiscard(client: *mut mbm_client, on: 
 /// Sets how long the driver stays on after the port's flush, for platforms whose flush
 /// returns before the last bit was sent. It has no effect on TCP.
 ///
-/// @param client      the object
 /// @param characters  the time in characters at the baud rate of mbm_client_setBaudRate (without
 ///                    one, at 9600); the default is 0
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setPostFlushHold(
     client: *mut mbm_client,
@@ -174,9 +160,7 @@ pub unsafe extern "C" fn mbm_client_setPostFlushHold(
 /// counts frames whose transaction identifier and unit match no pending request, and
 /// resynchronisations counts sequences of bytes that were not a frame.
 ///
-/// @param client    the object
 /// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setCounters(
     client: *mut mbm_client,

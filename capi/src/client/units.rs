@@ -57,10 +57,9 @@ const _: () = {
 /// record's `delayUs` sets the minimum time between two requests to the unit; its `timeoutMs`
 /// and `retryLimit` replace those of the client. You may change these three at any time.
 ///
-/// @param client  the object
-/// @param units   your array of records, initialised with MBM_INIT except for the fields that
-///                you set; NULL for none
-/// @param count   the number of records, 0 to 255
+/// @param units  your array of records, initialised with MBM_INIT except for the fields that you
+///               set; NULL for none
+/// @param count  the number of records, 0 to 255
 /// @return a status; MBM_INVALID_ARGUMENT for a record with a `unit` above 255 or a `timeoutMs`
 ///         above 1000000
 #[no_mangle]
@@ -86,8 +85,7 @@ pub unsafe extern "C" fn mbm_client_setUnits(
 /// Returns the response timeout of a request to a unit that has none of its own: that of its record
 /// (mbm_client_setUnits) or of the client (mbm_client_setResponseTimeout).
 ///
-/// @param client  the object
-/// @param unit    the unit identifier
+/// @param unit  the unit identifier
 /// @return milliseconds; 0 if the client was not begun, and from within a hook of its port
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getResponseTimeout(client: *const mbm_client, unit: u8) -> u32 {

@@ -11,14 +11,13 @@ use mbm::error::Status;
 /// connections and their requests; it cancels those that a line has, and its settings return
 /// to their defaults. A call that is refused changes nothing.
 ///
-/// @param gateway  the object; initialised with MBM_INIT before the first call
-/// @param config   what the gateway consists of. What it points to must stay valid, and must be
-///                 used by one gateway only, for as long as the gateway is used; lines,
-///                 connections and requests are initialised with MBM_INIT
+/// @param config  what the gateway consists of. What it points to must stay valid, and must be used
+///                by one gateway only, for as long as the gateway is used; lines, connections and
+///                requests are initialised with MBM_INIT
 /// @return a status; MBM_INVALID_ARGUMENT for fewer requests than connections, a route to a line
 ///         that does not exist or to a unit id above 255, and a line without client;
-///         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within
-///         a hook of a client of its lines
+///         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within a
+///         hook of a client of its lines
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_begin(
     gateway: *mut mbm_gateway,

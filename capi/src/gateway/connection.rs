@@ -49,10 +49,9 @@ unsafe fn read_place<T>(
 /// Gives the gateway an accepted TCP connection. mbm_gateway_poll then reads its requests and
 /// writes their responses. The gateway never opens or closes the socket itself.
 ///
-/// @param gateway     the object
 /// @param connection  the number of a free place, below `connectionCount`
-/// @param port        the connection; is copied. Its hooks read, write and micros are required.
-///                    The clocks of all connections count the same time
+/// @param port        the connection; is copied. Its hooks read, write and micros are required. The
+///                    clocks of all connections count the same time
 /// @return a status; MBM_BUSY if the place has an open connection
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_open(
@@ -81,7 +80,6 @@ pub unsafe extern "C" fn mbm_gateway_open(
 /// Gives up a connection and its requests. A request that a line has is cancelled: the device
 /// may have received it, and the gateway discards its reply. The place is free then.
 ///
-/// @param gateway     the object
 /// @param connection  the number of the place; nothing happens if it is free already
 /// @return a status; MBM_BUSY also from within a hook of a port of its lines
 #[no_mangle]
@@ -98,7 +96,6 @@ pub unsafe extern "C" fn mbm_gateway_close(gateway: *mut mbm_gateway, connection
 /// Returns how a connection is. Call it after mbm_gateway_poll for each connection: if the
 /// connection is lost, close its socket, and call mbm_gateway_close or mbm_gateway_open.
 ///
-/// @param gateway     the object
 /// @param connection  the number of the place
 /// @return MBM_OK while the connection is open; MBM_LINK_LOST if its port reported that the
 ///         connection is lost; MBM_MALFORMED_FRAME if it sent bytes that are not Modbus TCP;
@@ -117,7 +114,6 @@ pub unsafe extern "C" fn mbm_gateway_status(gateway: *const mbm_gateway, connect
 /// Returns how many requests of a connection are under way: complete, but not answered yet.
 /// The connection is not idle while it has one.
 ///
-/// @param gateway     the object
 /// @param connection  the number of the place
 /// @return the number of requests; 0 for a free place and for a number out of range
 #[no_mangle]
@@ -129,7 +125,6 @@ pub unsafe extern "C" fn mbm_gateway_pending(gateway: *const mbm_gateway, connec
 /// connection has as many requests under way as it may have, and its next requests wait in its
 /// socket: do not wait for bytes of it.
 ///
-/// @param gateway     the object
 /// @param connection  the number of the place
 /// @return 1 or 0
 #[no_mangle]

@@ -9,7 +9,6 @@ use mbm::error::Status;
 ///
 /// Call it often. You need not poll the clients of the lines; you may.
 ///
-/// @param gateway  the object
 /// @return a status; MBM_BUSY also from within a hook of a port of its lines
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_poll(gateway: *mut mbm_gateway) -> u8 {
@@ -29,11 +28,9 @@ pub unsafe extern "C" fn mbm_gateway_poll(gateway: *mut mbm_gateway) -> u8 {
 /// line whose client has requests, or on a connection that the gateway reads (see
 /// mbm_gateway_isReading), or a connection is lost.
 ///
-/// @param gateway  the object
-/// @return microseconds; 0 means poll now, also from within a hook of the gateway; 0xFFFFFFFF
-///         means that no request is under way. While a connection does not accept a response,
-///         and while a function of the gateway's own units returns MBM_REPLY_PENDING, it is at
-///         most 1000
+/// @return microseconds; 0 means poll now, also from within a hook of the gateway; 0xFFFFFFFF means
+///         that no request is under way. While a connection does not accept a response, and while a
+///         function of the gateway's own units returns MBM_REPLY_PENDING, it is at most 1000
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_pollDelay(gateway: *mut mbm_gateway) -> u32 {
     // SAFETY: as the header demands. No reference includes the mark.

@@ -20,10 +20,7 @@ use mbm::time::timeout;
 /// (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 4.4.1). The next
 /// requests of the connection wait in its socket.
 ///
-/// @param gateway  the object
-/// @param most     1 to 65535; the default is 65535. Fewer if there are not enough places for
-///                 requests
-/// @return a status
+/// @param most  1 to 65535; the default is 65535. Fewer if there are not enough places for requests
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most: u16) -> u8 {
     pointers::with(gateway, |core| {
@@ -40,10 +37,8 @@ pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most
 /// TCP wait, less the response timeout of the line: then no device carries out a request that
 /// its client has given up.
 ///
-/// @param gateway  the object
-/// @param timeMs   milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait
-///                 for any time
-/// @return a status
+/// @param timeMs  milliseconds, 1 to 1000000 (16 minutes); 0, the default, lets requests wait for
+///                any time
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, timeMs: u32) -> u8 {
     pointers::with(gateway, |core| {
@@ -62,10 +57,9 @@ pub unsafe extern "C" fn mbm_gateway_setQueueTime(gateway: *mut mbm_gateway, tim
 /// A function of a unit that returns MBM_REPLY_PENDING is called again at each
 /// mbm_gateway_poll. Other requests go on meanwhile, also those for the same unit.
 ///
-/// @param gateway  the object
-/// @param units    one unit, or an array of units; must stay valid for as long as the gateway is
-///                 used. Servers may serve the same units. NULL only if `count` is 0
-/// @param count    how many units
+/// @param units  one unit, or an array of units; must stay valid for as long as the gateway is
+///               used. Servers may serve the same units. NULL only if `count` is 0
+/// @param count  how many units
 /// @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_serveUnits(
@@ -119,7 +113,6 @@ unsafe fn serve(
 /// declared, the gateway also checks the length of its requests, and knows on RTU when its
 /// replies end without waiting for a silence.
 ///
-/// @param gateway    the object
 /// @param functions  the declarations; they must stay valid for as long as the gateway is used.
 ///                   NULL only if `count` is 0
 /// @param count      how many declarations

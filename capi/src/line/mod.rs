@@ -93,9 +93,8 @@ pub(crate) unsafe fn core_of(line: *mut mbm_line) -> *mut Core {
 /// this is cheap. Settings stay. It does not open the port: that must be open already. The first
 /// request waits for no gap, unless bytes arrive or mbm_line_used was called.
 ///
-/// @param line        the object; initialised with MBM_INIT before the first call
-/// @param port        the port. It is not copied: it must stay valid and unchanged for as long
-///                    as the object is used. read, write and micros must not be NULL
+/// @param port        the port. It is not copied: it must stay valid and unchanged for as long as
+///                    the object is used. read, write and micros must not be NULL
 /// @param frame       as for mbm_line_setFrame; also NULL, if you call that function later
 /// @param frameBytes  as for mbm_line_setFrame; 0 if `frame` is NULL
 /// @return a status; MBM_BUSY while a request is under way
@@ -134,7 +133,6 @@ fn is_frame_refused(frame: *mut u8, bytes: u16) -> bool {
 /// right one. If a request or a reply does not fit, the function that makes the request returns
 /// a status. Data are never cut off.
 ///
-/// @param line        the object; initialised with MBM_INIT before the first call
 /// @param frame       the buffer. Its content is not used between requests
 /// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
 /// @return a status; MBM_BUSY while a request is under way
@@ -160,9 +158,6 @@ pub unsafe extern "C" fn mbm_line_setFrame(
 /// Gives up the request under way, whichever node has made it, and switches the driver off. The
 /// status of that node becomes MBM_CANCELLED when you poll it. Call it if the node is lost.
 /// If no request is under way, it does nothing.
-///
-/// @param line  the object
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_cancel(line: *mut mbm_line) -> u8 {
     let status = pointers::check(line);

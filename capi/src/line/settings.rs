@@ -10,9 +10,7 @@ use mbm::port::Port;
 /// line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure the
 /// serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
 ///
-/// @param line  the object
 /// @param baud  bits per second; 0 (the default): unknown
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setBaudRate(line: *mut mbm_line, baud: u32) -> u8 {
     with(line, |line| {
@@ -25,10 +23,8 @@ pub unsafe extern "C" fn mbm_line_setBaudRate(line: *mut mbm_line, baud: u32) ->
 /// the gap, and more than t3.5 for devices that need longer before they can receive again.
 /// A later call of mbm_line_setBaudRate sets it back to t3.5.
 ///
-/// @param line   the object
-/// @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36
-///               minutes) means 2^31
-/// @return a status
+/// @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36 minutes)
+///               means 2^31
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setGap(line: *mut mbm_line, gapUs: u32) -> u8 {
     with(line, |line| {
@@ -40,9 +36,7 @@ pub unsafe extern "C" fn mbm_line_setGap(line: *mut mbm_line, gapUs: u32) -> u8 
 /// Sets the turnaround delay: how long the master waits after a broadcast, which no device
 /// answers (serial line guide V1.02, 2.4.1).
 ///
-/// @param line     the object
 /// @param delayMs  milliseconds, 0 to 65535; the default is 100
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setTurnaroundDelay(line: *mut mbm_line, delayMs: u32) -> u8 {
     with(line, |line| {
@@ -74,9 +68,7 @@ pub unsafe extern "C" fn mbm_line_setTurnaroundDelay(line: *mut mbm_line, delayM
 /// response timeout may be taken for the reply to the next request, and so may all that
 /// follow.
 ///
-/// @param line     the object
 /// @param quietMs  milliseconds, 0 to 65535; the default is 100
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setQuietTime(line: *mut mbm_line, quietMs: u32) -> u8 {
     with(line, |line| {
@@ -87,9 +79,7 @@ pub unsafe extern "C" fn mbm_line_setQuietTime(line: *mut mbm_line, quietMs: u32
 /// Sets how often the master repeats a request whose reply is missing, damaged or malformed.
 /// It does not repeat a request that was answered with an exception.
 ///
-/// @param line     the object
 /// @param retries  0 to 255; the default is 0
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setRetries(line: *mut mbm_line, retries: u8) -> u8 {
     with(line, |line| {
@@ -103,9 +93,7 @@ pub unsafe extern "C" fn mbm_line_setRetries(line: *mut mbm_line, retries: u8) -
 /// driver sends: then the master discards the copy of each request that arrives before the
 /// reply.
 ///
-/// @param line  the object
-/// @param on    0 (the default) or 1
-/// @return a status
+/// @param on  0 (the default) or 1
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setEchoDiscard(line: *mut mbm_line, on: u8) -> u8 {
     with(line, |line| {
@@ -118,10 +106,8 @@ pub unsafe extern "C" fn mbm_line_setEchoDiscard(line: *mut mbm_line, on: u8) ->
 /// Sets how long the driver stays on after the port's flush, for platforms whose flush
 /// returns before the last bit was sent.
 ///
-/// @param line        the object
-/// @param characters  the time in characters at the baud rate of mbm_line_setBaudRate (without
-///                    one, at 9600); the default is 0
-/// @return a status
+/// @param characters  the time in characters at the baud rate of mbm_line_setBaudRate (without one,
+///                    at 9600); the default is 0
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setPostFlushHold(line: *mut mbm_line, characters: u8) -> u8 {
     with(line, |line| {
@@ -134,9 +120,7 @@ pub unsafe extern "C" fn mbm_line_setPostFlushHold(line: *mut mbm_line, characte
 /// Sets your storage for counters, in which the master counts from now on. You may read and
 /// zero the counters at any time, but not from an interrupt.
 ///
-/// @param line      the object
 /// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setCounters(
     line: *mut mbm_line,
@@ -153,10 +137,8 @@ pub unsafe extern "C" fn mbm_line_setCounters(
 /// The gap before the next request counts from that time. A time before the last use that
 /// the object knows changes nothing.
 ///
-/// @param line    the object
 /// @param timeUs  the time in microseconds on the clock of the object's port, at most 2^31
 ///                microseconds (36 minutes) ago
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_usedAt(line: *mut mbm_line, timeUs: u32) -> u8 {
     note_use(line, |core| core.line_used_at(timeUs))
@@ -164,9 +146,6 @@ pub unsafe extern "C" fn mbm_line_usedAt(line: *mut mbm_line, timeUs: u32) -> u8
 
 /// Reports that another user of the wire has just used it: as mbm_line_usedAt with the
 /// present time.
-///
-/// @param line  the object
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_used(line: *mut mbm_line) -> u8 {
     note_use(line, |core| core.line_used())

@@ -72,10 +72,9 @@ const _: () = {
 /// All settings of the link return to their defaults. The call may be repeated at any time,
 /// also with another client. A begin function of the client ends the link.
 ///
-/// @param link    the object; initialised with MBM_INIT before the first call
 /// @param client  the client, begun; it must not have another link
-/// @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The
-///                hooks must not use the client or the link: each function returns MBM_BUSY
+/// @param hooks   how the link is opened and closed; copied. `connect` must not be NULL. The hooks
+///                must not use the client or the link: each function returns MBM_BUSY
 /// @return a status; MBM_NOT_INITIALISED if the client was not begun; MBM_BUSY also while the
 ///         client is suspended, and if it has another link
 #[no_mangle]
@@ -210,9 +209,6 @@ pub unsafe extern "C" fn mbm_link_end(link: *mut mbm_link) -> u8 {
 /// Closes the link and opens it again, at the next poll of the client and without a wait. Call
 /// it when you know better than the link: the network is back, the address has changed. Requests
 /// that are under way end with MBM_LINK_LOST; queued ones wait for this attempt.
-///
-/// @param link  the object
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
     pointers::with(link, |object| {
@@ -226,12 +222,10 @@ pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
 /// for as long as the last wait, or bytes have arrived. A request does not wait for the first
 /// attempt after the loss of such a link: it is made at once.
 ///
-/// @param link        the object
 /// @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
 ///                    mbm_client_setBackoff
 /// @param delayMs     the first wait in milliseconds, 0 to 1000000; the default is 500
 /// @param maxDelayMs  the longest wait in milliseconds, 0 to 1000000; the default is 30000
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setBackoff(
     link: *mut mbm_link,
@@ -248,12 +242,10 @@ pub unsafe extern "C" fn mbm_link_setBackoff(
 /// Shortens each wait before an attempt by a random part, so that many clients that lost their
 /// server together do not connect at the same time.
 ///
-/// @param link     the object
 /// @param percent  0 (the default) to 100: the largest part of the wait that is taken off
 /// @param random   as of mbm_client_setJitter; must not use the client or the link. NULL only if
 ///                 `percent` is 0
 /// @param context  your pointer, passed to `random`; may be NULL
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setJitter(
     link: *mut mbm_link,
@@ -274,10 +266,8 @@ pub unsafe extern "C" fn mbm_link_setJitter(
 /// Sets how long a connection may take to be made. Then the attempt has failed, with
 /// MBM_CONNECT_TIMED_OUT.
 ///
-/// @param link       the object
 /// @param timeoutMs  milliseconds, 1 to 1000000 (16 minutes); 0: as long as `status` returns
 ///                   MBM_PENDING. The default is 10000
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeoutMs: u32) -> u8 {
     pointers::with(link, |object| {
@@ -299,9 +289,7 @@ pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeout
 /// Some devices answer nothing in the first seconds of a connection. So each link over which no byte
 /// came has twice as many requests as the one before, up to 16 times as many and at most 100.
 ///
-/// @param link      the object
 /// @param requests  0 to 100; 0 for never. The default is 2 on TCP, and 0 on a serial line
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setReplaceAfter(link: *mut mbm_link, requests: u8) -> u8 {
     pointers::with(link, |object| {
@@ -322,9 +310,7 @@ pub unsafe extern "C" fn mbm_link_setReplaceAfter(link: *mut mbm_link, requests:
 /// which a lost link is opened again end with MBM_CONNECT_TIMED_OUT if that takes as long as their
 /// response timeout.
 ///
-/// @param link  the object
-/// @param on    0 (the default) or 1
-/// @return a status
+/// @param on  0 (the default) or 1
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setRequestsWait(link: *mut mbm_link, on: u8) -> u8 {
     pointers::with(link, |object| {
@@ -336,11 +322,9 @@ pub unsafe extern "C" fn mbm_link_setRequestsWait(link: *mut mbm_link, on: u8) -
 /// Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
 /// attempt has failed.
 ///
-/// @param link      the object
 /// @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
 ///                  request may, and call every function on the link; NULL for none
 /// @param context   your pointer, passed to `callback`; may be NULL
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setCallback(
     link: *mut mbm_link,
@@ -356,9 +340,7 @@ pub unsafe extern "C" fn mbm_link_setCallback(
 
 /// Sets your storage for counters, in which the link counts from now on.
 ///
-/// @param link      the object
 /// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setCounters(
     link: *mut mbm_link,
@@ -372,9 +354,8 @@ pub unsafe extern "C" fn mbm_link_setCounters(
 
 /// Returns what a link is doing.
 ///
-/// @param link  the object
-/// @return MBM_LINK_IS_DOWN, MBM_LINK_IS_CONNECTING or MBM_LINK_IS_UP; 0 before the first poll,
-///         and for an object that was never begun
+/// @return MBM_LINK_IS_DOWN, MBM_LINK_IS_CONNECTING or MBM_LINK_IS_UP; 0 before the first poll, and
+///         for an object that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_state(link: *const mbm_link) -> u8 {
     pointers::read(link, 0, |object| (*object).core.state() as u8)

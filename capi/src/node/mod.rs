@@ -65,7 +65,6 @@ unsafe impl CObject for mbm_node {
 /// The words must not overlap, and must stay valid for as long as the object is used. Any number
 /// of nodes may share words. Keep a node until its request has ended.
 ///
-/// @param node           the object; initialised with MBM_INIT before the first call
 /// @param line           the line, which must stay valid for as long as the object is used
 /// @param unit           the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
 ///                       2.2). Requests to 248 to 255, which the standard reserves, are sent too
@@ -136,9 +135,8 @@ unsafe fn has_line(object: *mut Object) -> bool {
 /// Call it as often as you like. If your port does not buffer received bytes, call it at
 /// least once in the time of a character.
 ///
-/// @param node  the object
-/// @return MBM_PENDING until the request has ended. Then, at every call, the status of the
-///         request. MBM_OK if there was no request yet
+/// @return MBM_PENDING until the request has ended. Then, at every call, the status of the request.
+///         MBM_OK if there was no request yet
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_poll(node: *mut mbm_node) -> u8 {
     poll(node)
@@ -184,7 +182,6 @@ unsafe extern "C" fn poll(node: *mut mbm_node) -> u8 {
 /// from this call, so sleeping makes no timeout longer. Do not sleep longer: while a frame leaves,
 /// the driver would go off late.
 ///
-/// @param node  the object
 /// @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
 ///         0xFFFFFFFF means that the node has no request under way
 #[no_mangle]
@@ -206,9 +203,6 @@ pub unsafe extern "C" fn mbm_node_pollDelay(node: *mut mbm_node) -> u32 {
 /// becomes MBM_CANCELLED. If the node has no request under way, it does nothing. If the request
 /// was sent, its reply may still come, so the next request to that unit is sent later: see
 /// mbm_line_setQuietTime.
-///
-/// @param node  the object
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
     // SAFETY: as the header demands. No reference to the node lives while hooks run.
@@ -230,9 +224,7 @@ pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
 
 /// Returns the status of the last request.
 ///
-/// @param node  the object
-/// @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
-///         request
+/// @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_status(node: *const mbm_node) -> u8 {
     // SAFETY: as the header demands; every object is writable storage.
@@ -247,7 +239,6 @@ pub unsafe extern "C" fn mbm_node_status(node: *const mbm_node) -> u8 {
 /// Returns the exception code of the last reply as received, also a code that the standard
 /// does not allow (V1.1b3, 7).
 ///
-/// @param node  the object
 /// @return the code; 0 if the last request ended without an exception
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_getExceptionCode(node: *const mbm_node) -> u8 {

@@ -19,15 +19,13 @@ use mbm::pdu::functions::FunctionSpec;
 /// standard forbids or addresses beyond 65535. The status is then the exception with which a
 /// device would answer.
 ///
-/// @param node      the object
 /// @param address   the first coil, 0 to 65535, as on the wire
 /// @param quantity  the number of coils, 1 to 2000
-/// @return a status; MBM_PENDING in non-blocking mode; an exception of the device (0x01 to
-///         0x7F); MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC, MBM_MALFORMED_REPLY,
-///         MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST, MBM_LINE_BUSY,
-///         MBM_BUFFER_TOO_SMALL, MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a
-///         request is under way on the line; MBM_NOT_INITIALISED if the line has no port or no
-///         frame buffer
+/// @return a status; MBM_PENDING in non-blocking mode; an exception of the device (0x01 to 0x7F);
+///         MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC, MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID,
+///         MBM_INVALID_FUNCTION, MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
+///         MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a request is under way on the
+///         line; MBM_NOT_INITIALISED if the line has no port or no frame buffer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_readCoils(
     node: *mut mbm_node,
@@ -40,7 +38,6 @@ pub unsafe extern "C" fn mbm_node_readCoils(
 /// Function 02: reads discrete inputs into the response words, 16 in each word. The first
 /// input is the lowest bit; the last word is padded with zeros (V1.1b3, 6.2).
 ///
-/// @param node      the object
 /// @param address   the first input, 0 to 65535, as on the wire
 /// @param quantity  the number of inputs, 1 to 2000
 /// @return a status; see mbm_node_readCoils
@@ -60,7 +57,6 @@ pub unsafe extern "C" fn mbm_node_readDiscreteInputs(
 
 /// Function 03: reads holding registers into the response words (V1.1b3, 6.3).
 ///
-/// @param node      the object
 /// @param address   the first register, 0 to 65535, as on the wire
 /// @param quantity  the number of registers, 1 to 125
 /// @return a status; see mbm_node_readCoils
@@ -80,7 +76,6 @@ pub unsafe extern "C" fn mbm_node_readHoldingRegisters(
 
 /// Function 04: reads input registers into the response words (V1.1b3, 6.4).
 ///
-/// @param node      the object
 /// @param address   the first register, 0 to 65535, as on the wire
 /// @param quantity  the number of registers, 1 to 125
 /// @return a status; see mbm_node_readCoils
@@ -100,7 +95,6 @@ pub unsafe extern "C" fn mbm_node_readInputRegisters(
 
 /// Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
 ///
-/// @param node     the object
 /// @param address  the coil, 0 to 65535; becomes the write address
 /// @param state    0 is off, any other value is on
 /// @return a status; see mbm_node_readCoils
@@ -117,7 +111,6 @@ pub unsafe extern "C" fn mbm_node_writeSingleCoil(
 
 /// Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
 ///
-/// @param node     the object
 /// @param address  the register, 0 to 65535; becomes the write address
 /// @param value    its value; also becomes transmit word 0
 /// @return a status; see mbm_node_readCoils
@@ -135,7 +128,6 @@ pub unsafe extern "C" fn mbm_node_writeSingleRegister(
 /// Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
 /// the lowest bit (V1.1b3, 6.11). With unit 0 it is a broadcast.
 ///
-/// @param node      the object
 /// @param address   the first coil, 0 to 65535; becomes the write address
 /// @param quantity  the number of coils, 1 to 1968, and not more than the transmit words hold
 /// @return a status; see mbm_node_readCoils
@@ -156,7 +148,6 @@ pub unsafe extern "C" fn mbm_node_writeMultipleCoils(
 /// Function 0F: writes the queued bits to coils, starting at the last write address. Call
 /// mbm_node_beginTransmission and mbm_node_sendBit before.
 ///
-/// @param node  the object
 /// @return a status; see mbm_node_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_writeQueuedCoils(node: *mut mbm_node) -> u8 {
@@ -166,7 +157,6 @@ pub unsafe extern "C" fn mbm_node_writeQueuedCoils(node: *mut mbm_node) -> u8 {
 /// Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
 /// With unit 0 it is a broadcast.
 ///
-/// @param node      the object
 /// @param address   the first register, 0 to 65535; becomes the write address
 /// @param quantity  the number of registers, 1 to 123, and not more than the transmit words
 /// @return a status; see mbm_node_readCoils
@@ -187,7 +177,6 @@ pub unsafe extern "C" fn mbm_node_writeMultipleRegisters(
 /// Function 10: writes the queued complete words to registers, starting at the last write
 /// address. Call mbm_node_beginTransmission and mbm_node_send before.
 ///
-/// @param node  the object
 /// @return a status; see mbm_node_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_writeQueuedRegisters(node: *mut mbm_node) -> u8 {
@@ -198,7 +187,6 @@ pub unsafe extern "C" fn mbm_node_writeQueuedRegisters(node: *mut mbm_node) -> u
 /// (register AND andMask) OR (orMask AND NOT andMask) (V1.1b3, 6.16).
 /// With unit 0 it is a broadcast.
 ///
-/// @param node     the object
 /// @param address  the register, 0 to 65535; becomes the write address
 /// @param andMask  1 for each bit of the register to keep; also becomes transmit word 0
 /// @param orMask   the new value of the bits that are not kept; also becomes transmit word 1
@@ -218,12 +206,11 @@ pub unsafe extern "C" fn mbm_node_maskWriteRegister(
 /// Function 17: the device writes the transmit words to registers first. Then it reads
 /// registers, which arrive in the response words. Both in one request (V1.1b3, 6.17).
 ///
-/// @param node           the object
 /// @param readAddress    the first register to read, 0 to 65535
 /// @param readQuantity   the number of registers to read, 1 to 125
 /// @param writeAddress   the first register to write, 0 to 65535; becomes the write address
-/// @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
-///                       transmit words
+/// @param writeQuantity  the number of registers to write, 1 to 121, and not more than the transmit
+///                       words
 /// @return a status; see mbm_node_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_readWriteMultipleRegisters(
@@ -242,7 +229,6 @@ pub unsafe extern "C" fn mbm_node_readWriteMultipleRegisters(
 /// Function 17: as mbm_node_readWriteMultipleRegisters, but writes the queued complete
 /// words, starting at the last write address.
 ///
-/// @param node          the object
 /// @param readAddress   the first register to read, 0 to 65535
 /// @param readQuantity  the number of registers to read, 1 to 125
 /// @return a status; see mbm_node_readCoils

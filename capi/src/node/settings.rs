@@ -7,10 +7,8 @@ use mbm::error::Status;
 
 /// Sets the unit to which the master sends later requests.
 ///
-/// @param node   the object
 /// @param slave  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
 ///               255, which the standard reserves
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, slave: u8) -> u8 {
     with(node, |node| {
@@ -21,7 +19,6 @@ pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, slave: u8) -> 
 
 /// Returns the unit to which the master sends requests.
 ///
-/// @param node  the object
 /// @return the unit identifier, 1 by default; 0 for an object that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_getSlaveID(node: *const mbm_node) -> u8 {
@@ -31,9 +28,7 @@ pub unsafe extern "C" fn mbm_node_getSlaveID(node: *const mbm_node) -> u8 {
 /// Sets the response timeout: the maximum time from the last bit of the request to the last
 /// byte of the reply.
 ///
-/// @param node       the object
 /// @param timeoutMs  milliseconds, 0 to 1000000 (16 minutes); the default is 2000
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeoutMs: u32) -> u8 {
     with(node, |node| {
@@ -45,9 +40,7 @@ pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeou
 /// that makes a request returns when the request has ended. In non-blocking mode it returns
 /// MBM_PENDING at once, and you call mbm_node_poll until the request has ended.
 ///
-/// @param node  the object
-/// @param on    1 blocking, 0 non-blocking; it applies from the next request on
-/// @return a status
+/// @param on  1 blocking, 0 non-blocking; it applies from the next request on
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8 {
     with(node, |node| {
@@ -68,8 +61,7 @@ pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8
 /// Set a short response timeout (mbm_node_setResponseTimeout) if the device deviates in
 /// every reply.
 ///
-/// @param node  the object
-/// @param on    0 (the default) or 1
+/// @param on  0 (the default) or 1
 /// @return a status; MBM_BUSY while a request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setLenient(node: *mut mbm_node, on: u8) -> u8 {

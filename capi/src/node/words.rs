@@ -8,10 +8,7 @@ use mbm::node::NO_WORD;
 /// Sets the write address and empties the queue of mbm_node_send. The transmit words do not
 /// change.
 ///
-/// @param node     the object
-/// @param address  the address to which the functions with Queued in their name write, 0 to
-///                 65535
-/// @return a status
+/// @param address  the address to which the functions with Queued in their name write, 0 to 65535
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_beginTransmission(node: *mut mbm_node, address: u16) -> u8 {
     with(node, |node| {
@@ -32,7 +29,6 @@ fn queued(fits: bool) -> Status {
 /// Queues a word after the words queued before. If the last word holds queued bits, the new
 /// word goes into the next one.
 ///
-/// @param node  the object
 /// @param word  the word
 /// @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
 #[no_mangle]
@@ -44,8 +40,7 @@ pub unsafe extern "C" fn mbm_node_send(node: *mut mbm_node, word: u16) -> u8 {
 
 /// Queues a bit after the bits queued before, starting at the lowest bit of a word.
 ///
-/// @param node  the object
-/// @param on    0 is off, any other value is on
+/// @param on  0 is off, any other value is on
 /// @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_sendBit(node: *mut mbm_node, on: u8) -> u8 {
@@ -56,7 +51,6 @@ pub unsafe extern "C" fn mbm_node_sendBit(node: *mut mbm_node, on: u8) -> u8 {
 
 /// Returns how many words of the last successful read mbm_node_receive has not returned yet.
 ///
-/// @param node  the object
 /// @return 0 to 125
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_available(node: *const mbm_node) -> u8 {
@@ -65,7 +59,6 @@ pub unsafe extern "C" fn mbm_node_available(node: *const mbm_node) -> u8 {
 
 /// Returns the next word of the last successful read.
 ///
-/// @param node  the object
 /// @return the word; 0xFFFF if no word is left
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_receive(node: *mut mbm_node) -> u16 {

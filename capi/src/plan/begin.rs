@@ -23,20 +23,18 @@ use mbm::plan::{Position, Read};
 /// count out of range, a unit above 255 of limits or of an excluded range, or a client that was
 /// never begun.
 ///
-/// @param plan    the object; initialised with MBM_INIT before the first call
 /// @param client  the client that sends the reads, begun; the program may use it too, and other
 ///                plans
 /// @param setup   table, limits and storage; it stays valid and as it is until the plan ends
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
-/// @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or
-///         order, a type that the table does not have, bits beyond those of a register, a unit
-///         above 255, an interval out of range, a negative divisor or a scale of a text;
-///         MBM_BROADCAST_NOT_ALLOWED for unit 0; MBM_ILLEGAL_DATA_ADDRESS if it goes beyond
-///         address 65535 or into an excluded range; MBM_ILLEGAL_DATA_VALUE if it is longer than a
-///         read may be; MBM_BUFFER_TOO_SMALL for the first without storage for its read or its
-///         data. After such a status the plan has ended, and `positions` and `reads` may be
-///         changed. MBM_INVALID_ARGUMENT also for a unit above 255 of limits or of an excluded
-///         range
+/// @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or order,
+///         a type that the table does not have, bits beyond those of a register, a unit above 255,
+///         an interval out of range, a negative divisor or a scale of a text;
+///         MBM_BROADCAST_NOT_ALLOWED for unit 0; MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address
+///         65535 or into an excluded range; MBM_ILLEGAL_DATA_VALUE if it is longer than a read may
+///         be; MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data. After
+///         such a status the plan has ended, and `positions` and `reads` may be changed.
+///         MBM_INVALID_ARGUMENT also for a unit above 255 of limits or of an excluded range
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_begin(
     plan: *mut mbm_plan,
@@ -64,15 +62,14 @@ pub unsafe extern "C" fn mbm_plan_begin(
 /// first, and have the same unit, table and interval. `setup->readCount` is the number of reads.
 /// The limits, gaps and excluded ranges of `setup` have no meaning.
 ///
-/// @param plan    the object; initialised with MBM_INIT before the first call
 /// @param client  as for mbm_plan_begin
 /// @param setup   table and storage; it stays valid and as it is until the plan ends
 /// @param counts  how many fields each read has: `setup->readCount` numbers, each at least 1,
 ///                `setup->fieldCount` in total; used during the call
 /// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
-/// @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not fit into its read:
-///         it differs from the first one in unit, table or interval, has a lower address, or makes
-///         the read longer than 125 registers or 2000 bits; for counts of 0 or with another
+/// @return as mbm_plan_begin; MBM_INVALID_ARGUMENT also for a field that does not fit into its
+///         read: it differs from the first one in unit, table or interval, has a lower address, or
+///         makes the read longer than 125 registers or 2000 bits; for counts of 0 or with another
 ///         total; and for more fields than MBM_PLAN_MAX_FIELDS
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_beginGrouped(
@@ -170,9 +167,6 @@ unsafe fn attempt(
 }
 
 /// Ends a plan: gives its requests up and lets go of its storage.
-///
-/// @param plan  the object
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_end(plan: *mut mbm_plan) -> u8 {
     pointers::with(plan, |object| {

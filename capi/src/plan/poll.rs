@@ -16,9 +16,6 @@ const LONGEST_DELAY: u32 = 30 * 60 * 1000;
 /// Takes the replies that have arrived, calls `update` for the fields of each read that has
 /// ended, and queues the reads that are due, as far as there are requests for them. It does not
 /// poll the client: call mbm_client_poll after it.
-///
-/// @param plan  the object
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_poll(plan: *mut mbm_plan) -> u8 {
     pointers::with(plan, |object| {
@@ -134,10 +131,9 @@ unsafe fn update(plan: *mut mbm_plan, ended: *const Read, is_of_unit: bool) -> b
 /// How long mbm_plan_poll has nothing to do, so that a program may sleep until then or until
 /// mbm_client_pollDelay is over, whichever comes first.
 ///
-/// @param plan  the object
 /// @return microseconds; 0 means poll now, and is returned within a hook of the client's port;
-///         0xFFFFFFFF if there is nothing to do before a request of the client has ended, and
-///         for an object that was never begun
+///         0xFFFFFFFF if there is nothing to do before a request of the client has ended, and for
+///         an object that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_pollDelay(plan: *mut mbm_plan) -> u32 {
     if pointers::check(plan) != Status::OK {

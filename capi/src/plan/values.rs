@@ -132,12 +132,11 @@ unsafe fn get<T>(
 /// return the last one that was read, also after a read has failed: this says whether it is
 /// still worth something.
 ///
-/// @param plan   the object
 /// @param field  the index of the field
 /// @param ageMs  gets the milliseconds since the value arrived, 2147483647 (24 days) at most;
 ///               0xFFFFFFFF if none ever did; may be NULL
-/// @return MBM_PENDING before the first read has ended, then as it ended: MBM_OK, an exception
-///         of the device, or a failure such as MBM_RESPONSE_TIMED_OUT
+/// @return MBM_PENDING before the first read has ended, then as it ended: MBM_OK, an exception of
+///         the device, or a failure such as MBM_RESPONSE_TIMED_OUT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getStatus(
     plan: *mut mbm_plan,
@@ -165,7 +164,6 @@ pub unsafe extern "C" fn mbm_plan_getStatus(
 /// A value as an integer: multiplied and divided as its field says, rounded to the nearest,
 /// halves away from 0.
 ///
-/// @param plan   the object
 /// @param field  the index of the field, of a bit or an integer
 /// @param index  which of its values, 0 for the first
 /// @param value  gets the number
@@ -184,13 +182,9 @@ pub unsafe extern "C" fn mbm_plan_getInteger(
 
 /// As mbm_plan_getInteger, but with 32 bits throughout: less code on a microcontroller.
 ///
-/// @param plan   the object
 /// @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
-/// @param index  which of its values, 0 for the first
-/// @param value  gets the number
-/// @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half of
-///         the divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of 64
-///         bits
+/// @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half of the
+///         divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of 64 bits
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getInt32(
     plan: *const mbm_plan,
@@ -205,9 +199,6 @@ pub unsafe extern "C" fn mbm_plan_getInt32(
 /// rounded once, to the nearest. On AVR, where C's double has 32 bits, it is rounded to these after
 /// that.
 ///
-/// @param plan   the object
-/// @param field  the index of the field
-/// @param index  which of its values, 0 for the first
 /// @param value  gets the number; a float that is infinite or not a number stays so
 /// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text
 #[no_mangle]
@@ -234,10 +225,6 @@ pub unsafe extern "C" fn mbm_plan_getNumber(
 /// A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
 /// to the nearest; without the scale of its field.
 ///
-/// @param plan   the object
-/// @param field  the index of the field
-/// @param index  which of its values, 0 for the first
-/// @param value  gets the number
 /// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT for other types
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getFloat(
@@ -253,7 +240,6 @@ pub unsafe extern "C" fn mbm_plan_getFloat(
 /// A text, which ends at its first NUL or with its field. In an order with the low byte first,
 /// the first of two characters is a register's low byte.
 ///
-/// @param plan      the object
 /// @param field     the index of the field, of type MBM_TYPE_TEXT
 /// @param text      gets the text and a NUL
 /// @param capacity  bytes of `text`; the field's count and one are always enough
@@ -288,7 +274,6 @@ pub unsafe extern "C" fn mbm_plan_getText(
 /// The registers of a field as they were read, for mbm_registers_get... functions, in the order
 /// of the field. It copies nothing: the next reply changes what it sees.
 ///
-/// @param plan       the object
 /// @param field      the index of the field, of registers
 /// @param registers  the view to fill in
 /// @return as mbm_plan_getInteger
@@ -315,9 +300,7 @@ pub unsafe extern "C" fn mbm_plan_getRegisters(
 /// Makes the read of a field due at once, for a value that is wanted now. A unit that does not
 /// answer is left alone all the same.
 ///
-/// @param plan   the object
 /// @param field  the index of the field
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8 {
     let mut found = MaybeUninit::uninit();
@@ -337,7 +320,6 @@ pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8
 
 /// The reads that the plan has made of the fields: one request each.
 ///
-/// @param plan   the object
 /// @param index  0 for the first read
 /// @param read   gets the read
 /// @return a status; MBM_INVALID_ARGUMENT behind the last read

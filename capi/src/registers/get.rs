@@ -50,10 +50,9 @@ unsafe fn get(
 
 /// Reads one bit of a register.
 ///
-/// @param registers  the registers
-/// @param address    the device's address of the register
-/// @param bit        0, the least significant, to 15
-/// @param on         receives 0 or 1
+/// @param address  the device's address of the register
+/// @param bit      0, the least significant, to 15
+/// @param on       receives 0 or 1
 /// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getBit(
@@ -70,10 +69,9 @@ pub unsafe extern "C" fn mbm_registers_getBit(
 /// Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
 /// int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.
 ///
-/// @param registers  the registers
-/// @param address    the device's address of the register
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      receives the number
+/// @param address  the device's address of its first register
+/// @param order    one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param value    receives the number
 /// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint16(
@@ -88,11 +86,7 @@ pub unsafe extern "C" fn mbm_registers_getUint16(
 /// Reads a number of two registers, 0 to 4294967295. For a signed number (two's
 /// complement), pass a pointer to an int32_t, cast to uint32_t *.
 ///
-/// @param registers  the registers
-/// @param address    the device's address of the first of its registers
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      receives the number
-/// @return a status; see mbm_registers
+/// @return as mbm_registers_getUint16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint32(
     registers: *const mbm_registers,
@@ -106,11 +100,7 @@ pub unsafe extern "C" fn mbm_registers_getUint32(
 /// Reads a number of four registers. For a signed number, pass a pointer to an int64_t,
 /// cast to uint64_t *.
 ///
-/// @param registers  the registers
-/// @param address    the device's address of the first of its registers
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      receives the number
-/// @return a status; see mbm_registers
+/// @return as mbm_registers_getUint16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint64(
     registers: *const mbm_registers,
@@ -124,11 +114,7 @@ pub unsafe extern "C" fn mbm_registers_getUint64(
 /// Reads a float of two registers, an IEEE 754 binary32. Its bits are copied, also those
 /// of a NaN.
 ///
-/// @param registers  the registers
-/// @param address    the device's address of the first of its registers
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      receives the number
-/// @return a status; see mbm_registers
+/// @return as mbm_registers_getUint16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getFloat(
     registers: *const mbm_registers,
@@ -142,11 +128,7 @@ pub unsafe extern "C" fn mbm_registers_getFloat(
 /// Reads a double of four registers, an IEEE 754 binary64. Its bits are copied. On AVR,
 /// where a double of C has 32 bits (-mdouble=32), the number is rounded to the nearest.
 ///
-/// @param registers  the registers
-/// @param address    the device's address of the first of its registers
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      receives the number
-/// @return a status; see mbm_registers
+/// @return as mbm_registers_getUint16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getDouble(
     registers: *const mbm_registers,
@@ -179,13 +161,12 @@ pub unsafe extern "C" fn mbm_registers_getDouble(
 /// byte first, the first of two characters is the low byte of a register. Characters are
 /// copied without a check, also if they are not ASCII.
 ///
-/// @param registers  the registers
-/// @param address    the device's address of the first register of the field
-/// @param length     length of the field in bytes, two for each register; an odd length ends
-///                   with the first character of a register
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param text       receives the text and a NUL
-/// @param capacity   size of `text` in bytes; `length + 1` are always enough
+/// @param address   the device's address of the first register of the field
+/// @param length    length of the field in bytes, two for each register; an odd length ends with
+///                  the first character of a register
+/// @param order     one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param text      receives the text and a NUL
+/// @param capacity  size of `text` in bytes; `length + 1` are always enough
 /// @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if `text` is
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getString(
@@ -215,11 +196,10 @@ pub unsafe extern "C" fn mbm_registers_getString(
 /// is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a
 /// device that swaps the bytes of its registers.
 ///
-/// @param registers  the registers
-/// @param address    the device's address of the first register
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param bytes      receives the bytes; must not overlap the registers
-/// @param length     how many bytes, two for each register; may be odd
+/// @param address  the device's address of the first register
+/// @param order    one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param bytes    receives the bytes; must not overlap the registers
+/// @param length   how many bytes, two for each register; may be odd
 /// @return a status; see mbm_registers
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getBytes(

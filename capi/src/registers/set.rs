@@ -68,7 +68,7 @@ pub unsafe extern "C" fn mbm_registers_setBit(
 /// bytes has.
 ///
 /// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of the register
+/// @param address    the device's address of its first register
 /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      the number
 /// @return a status; see mbm_registers
@@ -85,11 +85,7 @@ pub unsafe extern "C" fn mbm_registers_setUint16(
 
 /// Writes a number into two registers.
 ///
-/// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of the first of its registers
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      the number
-/// @return a status; see mbm_registers
+/// @return as mbm_registers_setUint16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setUint32(
     registers: *const mbm_registers,
@@ -103,11 +99,8 @@ pub unsafe extern "C" fn mbm_registers_setUint32(
 
 /// Writes a number into four registers.
 ///
-/// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of the first of its registers
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      points to the number
-/// @return a status; see mbm_registers
+/// @param value  points to the number
+/// @return as mbm_registers_setUint16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setUint64(
     registers: *const mbm_registers,
@@ -120,11 +113,8 @@ pub unsafe extern "C" fn mbm_registers_setUint64(
 
 /// Writes a float into two registers, as an IEEE 754 binary32. Its bits are copied.
 ///
-/// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of the first of its registers
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      points to the number
-/// @return a status; see mbm_registers
+/// @param value  points to the number
+/// @return as mbm_registers_setUint16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setFloat(
     registers: *const mbm_registers,
@@ -138,11 +128,8 @@ pub unsafe extern "C" fn mbm_registers_setFloat(
 /// Writes a double into four registers, as an IEEE 754 binary64. On AVR, where a double
 /// of C has 32 bits (-mdouble=32), it is converted without loss.
 ///
-/// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of the first of its registers
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      points to the number
-/// @return a status; see mbm_registers
+/// @param value  points to the number
+/// @return as mbm_registers_setUint16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setDouble(
     registers: *const mbm_registers,

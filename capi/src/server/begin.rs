@@ -71,14 +71,12 @@ unsafe fn begin(
 /// stay valid, at the same address, for as long as the server is used. Several servers
 /// may share units. The buffer holds no data between requests.
 ///
-/// @param server  the object; initialised with MBM_INIT before the first call
-/// @param port    is copied; its hooks read, write and micros are required
-/// @param units   the units to serve: one unit, or an array of units
-/// @param count   how many units
-/// @param frame   buffer for one frame, a request or a response
-/// @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame. The
-///                server ignores a longer request, and answers exception 04 in place of a longer
-///                response
+/// @param port   is copied; its hooks read, write and micros are required
+/// @param units  the units to serve: one unit, or an array of units
+/// @param count  how many units
+/// @param frame  buffer for one frame, a request or a response
+/// @param bytes  size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame. The server
+///               ignores a longer request, and answers exception 04 in place of a longer response
 /// @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginRtu(
@@ -95,12 +93,7 @@ pub unsafe extern "C" fn mbm_server_beginRtu(
 /// Begins a server for ASCII on a serial line (serial line guide V1.02, 2.5.2). The
 /// server drops a frame if the next character takes longer than one second.
 ///
-/// @param server  see mbm_server_beginRtu
-/// @param port    see mbm_server_beginRtu
-/// @param units   see mbm_server_beginRtu
-/// @param count   see mbm_server_beginRtu
-/// @param frame   see mbm_server_beginRtu
-/// @param bytes   size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every frame
+/// @param bytes  size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every frame
 /// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginAscii(
@@ -120,13 +113,10 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
 /// Begins a server on an accepted TCP connection. If several requests are in the stream,
 /// the server answers them in order.
 ///
-/// @param server  see mbm_server_beginRtu; one for each connection
-/// @param port    see mbm_server_beginRtu; its hooks read and write the connection and give the
-///                time
-/// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
-/// @param count   see mbm_server_beginRtu
-/// @param frame   see mbm_server_beginRtu; one for each connection
-/// @param bytes   size of `frame` in bytes, at least MBM_MAX_TCP_FRAME
+/// @param port   see mbm_server_beginRtu; its hooks read and write the connection and give the time
+/// @param units  see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
+/// @param frame  see mbm_server_beginRtu; one for each connection
+/// @param bytes  size of `frame` in bytes, at least MBM_MAX_TCP_FRAME
 /// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginTcp(
@@ -148,12 +138,9 @@ pub unsafe extern "C" fn mbm_server_beginTcp(
 /// end of a frame from its bytes. After a damaged frame, half a second of silence ends
 /// the damaged bytes.
 ///
-/// @param server  see mbm_server_beginRtu; one for each connection
-/// @param port    see mbm_server_beginRtu
-/// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
-/// @param count   see mbm_server_beginRtu
-/// @param frame   see mbm_server_beginRtu; one for each connection
-/// @param bytes   size of `frame` in bytes, at least 16; MBM_MAX_FRAME holds every frame
+/// @param units  see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
+/// @param frame  see mbm_server_beginRtu; one for each connection
+/// @param bytes  size of `frame` in bytes, at least 16; MBM_MAX_FRAME holds every frame
 /// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
@@ -183,10 +170,8 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
 /// between two characters, in RTU over TCP the silence after a damaged frame. It has no
 /// effect in TCP. The begin functions restore the default.
 ///
-/// @param server     the object
 /// @param silenceUs  microseconds since the last received byte; a value above 2^31 (36 minutes)
 ///                   counts as 2^31
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceUs: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -203,8 +188,7 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceU
 /// 2.5.1.1), and how long missing bytes of a request take. It does not change the rate of the
 /// line. Other framings do not use t3.5: see mbm_server_setSilence.
 ///
-/// @param server  the object
-/// @param baud    bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
+/// @param baud  bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
 /// @return a status; MBM_INVALID_ARGUMENT for other framings
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u32) -> u8 {
@@ -224,9 +208,7 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
 /// as the missing bytes and ten more take at the baud rate, and for this time. A longer time does
 /// not delay complete requests. The begin functions restore the default.
 ///
-/// @param server     the object
 /// @param latencyMs  0 to 65535 ms; 50 ms after a begin function
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setReceiveLatency(
     server: *mut mbm_server,
@@ -248,9 +230,8 @@ pub unsafe extern "C" fn mbm_server_setReceiveLatency(
 /// requests are the same write again and again, each less than 80 ms after the response, then
 /// loses some of them: say that there is no echo. mbm_server_beginRtu takes the answer back.
 ///
-/// @param server  the object
-/// @param on      0: there is none, so no request is taken for it; anything else: there is one,
-///                even if a response came without it
+/// @param on  0: there is none, so no request is taken for it; anything else: there is one, even if
+///            a response came without it
 /// @return a status; MBM_INVALID_ARGUMENT for other framings
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: u8) -> u8 {

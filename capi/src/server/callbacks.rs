@@ -153,11 +153,10 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
 
 /// Serves cells that your functions get and set.
 ///
-/// @param unit   the unit
 /// @param cells  must stay valid for as long as the unit is used
-/// @param table  the table, named by the function that reads it: 1 coils (functions 01, 05, 0F),
-///               2 discrete inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
-///               registers (04); functions in hex
+/// @param table  the table, named by the function that reads it: 1 coils (functions 01, 05, 0F), 2
+///               discrete inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input registers
+///               (04); functions in hex
 /// @return a status; see mbm_unit_serveCoils. MBM_INVALID_ARGUMENT for a NULL `get`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCallbacks(
@@ -175,7 +174,6 @@ pub unsafe extern "C" fn mbm_unit_serveCallbacks(
 ///
 /// @param cells  the cells, registered already or not. Zeroing the struct removes the hooks
 /// @param hooks  must stay valid for as long as the cells are served; NULL for no hooks
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_dataCallbacks_setHooks(
     cells: *mut mbm_dataCallbacks,

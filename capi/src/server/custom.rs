@@ -128,10 +128,8 @@ pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Op
 
 /// Serves a function of yours, in every framing.
 ///
-/// @param unit    the unit
-/// @param custom  must stay valid for as long as the unit is used
-/// @return a status; see mbm_unit_serveFiles. MBM_INVALID_ARGUMENT for a NULL `serve`, a code
-///         above 127 or an invalid `length`
+/// @return a status; see mbm_unit_serveFiles. MBM_INVALID_ARGUMENT for a NULL `serve`, a code above
+///         127 or an invalid `length`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCustom(unit: *mut mbm_unit, custom: *mut mbm_custom) -> u8 {
     if custom.is_null()
@@ -177,9 +175,8 @@ unsafe fn mask_byte(mask: *mut mbm_functionMask, code: u8) -> *mut u8 {
 /// Switches a function of a unit off or on. The unit answers a function that is off with
 /// exception 01, even if a record serves it.
 ///
-/// @param unit  the unit
-/// @param mask  must stay valid for as long as the unit is used; initialised with MBM_INIT.
-///              Units that share a mask have the same functions off
+/// @param mask  must stay valid for as long as the unit is used; initialised with MBM_INIT. Units
+///              that share a mask have the same functions off
 /// @param code  the function code, 1 to 127
 /// @param on    0 switches the function off, anything else switches it on
 /// @return a status; see mbm_unit_serveFiles

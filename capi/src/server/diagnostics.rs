@@ -74,7 +74,6 @@ unsafe extern "C" fn monitor(
 /// (illegal function). After this call the unit counts the frames on its lines and logs
 /// events, and a client can force it into listen only mode.
 ///
-/// @param unit         the unit
 /// @param diagnostics  must stay valid for as long as the unit is used. Use one struct for each
 ///                     unit: a shared one counts for all units that share it
 /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record

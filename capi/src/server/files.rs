@@ -210,8 +210,6 @@ unsafe extern "C" fn serve_fifos(
 /// request is carried out completely or not at all. Serving a request takes 250 bytes of
 /// stack.
 ///
-/// @param unit   the unit
-/// @param files  must stay valid for as long as the unit is used
 /// @return a status; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveFiles(unit: *mut mbm_unit, files: *mut mbm_files) -> u8 {
@@ -223,7 +221,6 @@ pub unsafe extern "C" fn mbm_unit_serveFiles(unit: *mut mbm_unit, files: *mut mb
 ///
 /// @param files  the files, registered already or not. Zeroing the struct removes the hooks
 /// @param hooks  must stay valid for as long as the files are served; NULL for no hooks
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_files_setHooks(
     files: *mut mbm_files,
@@ -241,8 +238,6 @@ pub unsafe extern "C" fn mbm_files_setHooks(
 
 /// Serves FIFO queues: function 18 (hex), Read FIFO Queue.
 ///
-/// @param unit   the unit
-/// @param fifos  must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveFiles
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveFifos(unit: *mut mbm_unit, fifos: *mut mbm_fifos) -> u8 {

@@ -133,8 +133,6 @@ unsafe extern "C" fn serve_identification(
 
 /// Serves function 07, Read Exception Status.
 ///
-/// @param unit    the unit
-/// @param status  must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
@@ -146,8 +144,6 @@ pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
 
 /// Serves function 11 (hex), Report Server ID.
 ///
-/// @param unit  the unit
-/// @param id    must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mbm_serverId) -> u8 {
@@ -159,8 +155,6 @@ pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mb
 /// with further requests. The server computes the conformity level from the objects that
 /// exist.
 ///
-/// @param unit            the unit
-/// @param identification  must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveIdentification(

@@ -150,10 +150,8 @@ unsafe impl CObject for mbm_server {
 /// received bytes. On a serial line the response starts with the first call after the
 /// line has been silent for t3.5.
 ///
-/// @param server  the object
 /// @return a status; MBM_LINK_LOST if the port reported that the connection is lost: close it;
-///         MBM_MALFORMED_FRAME if the bytes received over TCP are not Modbus: close the
-///         connection
+///         MBM_MALFORMED_FRAME if the bytes received over TCP are not Modbus: close the connection
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
     let status = check_once(server);
@@ -200,16 +198,14 @@ unsafe fn poll(core: *mut Core, mark: *const u8) -> Status {
 /// arrive earlier. Do not sleep longer: while a response leaves on a serial line, the driver would
 /// go off late.
 ///
-/// @param server  the object
 /// @return microseconds. 0: poll now; a call from within a hook of this server returns 0 too.
-///         0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for a server
-///         that was never begun. After a response on a serial line it is first the time in which
-///         an echo may arrive. 1000: a function of yours has returned MBM_REPLY_PENDING, or a
-///         connection does not accept the response yet; the server receives no bytes meanwhile,
-///         so do not wait for one, but poll earlier if you know that the function or the
-///         connection is ready. Afterwards, and after a begin function, it is 0 until
-///         mbm_server_poll has read the port, so bytes that arrived meanwhile need not end a
-///         sleep
+///         0xFFFFFFFF: sleep until the port has bytes to read; also for NULL and for a server that
+///         was never begun. After a response on a serial line it is first the time in which an echo
+///         may arrive. 1000: a function of yours has returned MBM_REPLY_PENDING, or a connection
+///         does not accept the response yet; the server receives no bytes meanwhile, so do not wait
+///         for one, but poll earlier if you know that the function or the connection is ready.
+///         Afterwards, and after a begin function, it is 0 until mbm_server_poll has read the port,
+///         so bytes that arrived meanwhile need not end a sleep
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 {
     // SAFETY: as the header requires; no reference lives while the clock is read.

@@ -80,7 +80,6 @@ fn table_hooks(hooks: *const mbm_accessHooks) -> mbm_recordHooks {
 ///
 /// @param table  the table, registered already or not. Zeroing the struct removes the hooks
 /// @param hooks  must stay valid for as long as the table is served; NULL for no hooks
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registerTable_setHooks(
     table: *mut mbm_registerTable,
@@ -100,7 +99,6 @@ pub unsafe extern "C" fn mbm_registerTable_setHooks(
 ///
 /// @param table  the table, registered already or not. Zeroing the struct removes the hooks
 /// @param hooks  must stay valid for as long as the table is served; NULL for no hooks
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bitTable_setHooks(
     table: *mut mbm_bitTable,

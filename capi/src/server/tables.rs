@@ -255,10 +255,7 @@ unsafe extern "C" fn add_table(
 
 /// Serves coils: functions 01, 05 and 0F (hex).
 ///
-/// @param unit   the unit
-/// @param table  must stay valid for as long as the unit is used
-/// @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another
-///         kind
+/// @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another kind
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCoils(unit: *mut mbm_unit, table: *mut mbm_bitTable) -> u8 {
     add_table(unit, table.cast(), TableKind::COILS)
@@ -266,8 +263,6 @@ pub unsafe extern "C" fn mbm_unit_serveCoils(unit: *mut mbm_unit, table: *mut mb
 
 /// Serves discrete inputs: function 02.
 ///
-/// @param unit   the unit
-/// @param table  must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveDiscreteInputs(
@@ -280,8 +275,6 @@ pub unsafe extern "C" fn mbm_unit_serveDiscreteInputs(
 /// Serves holding registers: functions 03, 06 and 10 (hex). For functions 16 and 17 too,
 /// call mbm_registerTable_serveMaskAndReadWrite afterwards.
 ///
-/// @param unit   the unit
-/// @param table  must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveHoldingRegisters(
@@ -293,8 +286,6 @@ pub unsafe extern "C" fn mbm_unit_serveHoldingRegisters(
 
 /// Serves input registers: function 04.
 ///
-/// @param unit   the unit
-/// @param table  must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveInputRegisters(

@@ -120,11 +120,10 @@ fn convert(functions: &[mbm_function]) -> Result<[Function; FUNCTIONS], Error> {
 /// You may call it again at any time. The sniffer then discards received bytes and
 /// unanswered requests without an event, and its settings return to their defaults.
 ///
-/// @param sniffer  the object; initialised with MBM_INIT before the first call
 /// @param framing  MBM_FRAMING_RTU or MBM_FRAMING_ASCII for a serial line, MBM_FRAMING_TCP or
 ///                 MBM_FRAMING_RTU_OVER_TCP for a stream
-/// @param buffer   holds received bytes until the sniffer has reported them; must stay valid for
-///                 as long as the sniffer is used
+/// @param buffer   holds received bytes until the sniffer has reported them; must stay valid for as
+///                 long as the sniffer is used
 /// @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER. MBM_MAX_FRAME,
 ///                 MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every frame; with separate
 ///                 directions use twice as much. A longer frame becomes an event of kind
@@ -162,10 +161,8 @@ pub unsafe extern "C" fn mbm_sniffer_begin(
 /// before. The sniffer does not know the length of an undeclared function: silence then
 /// ends an RTU frame.
 ///
-/// @param sniffer    the object
 /// @param functions  an array that is copied; may be NULL if `count` is 0
 /// @param count      how many functions, at most MBM_MAX_SNIFFER_FUNCTIONS
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setFunctions(
     sniffer: *mut mbm_sniffer,
@@ -187,9 +184,7 @@ pub unsafe extern "C" fn mbm_sniffer_setFunctions(
 /// Sets the character that ends an ASCII frame after CR, LF at first; as
 /// mbm_client_setDelimiter. It has no effect in other framings.
 ///
-/// @param sniffer    the object
 /// @param character  1 to 127, except CR, the colon and hexadecimal digits
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setDelimiter(sniffer: *mut mbm_sniffer, character: u8) -> u8 {
     if !is_delimiter(character) {
@@ -202,9 +197,7 @@ pub unsafe extern "C" fn mbm_sniffer_setDelimiter(sniffer: *mut mbm_sniffer, cha
 /// RTU frames, and the arrival time of each byte if you feed several at once. Without it
 /// the silence is 4 ms, and all bytes of one feed count as received at the same time.
 ///
-/// @param sniffer  the object
-/// @param baud     bits per second; 0, the default, if the rate is unknown
-/// @return a status
+/// @param baud  bits per second; 0, the default, if the rate is unknown
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setBaudRate(sniffer: *mut mbm_sniffer, baud: u32) -> u8 {
     with(sniffer, |core| core.set_baud_rate(baud))
@@ -216,9 +209,7 @@ pub unsafe extern "C" fn mbm_sniffer_setBaudRate(sniffer: *mut mbm_sniffer, baud
 /// requests. For ten times the timeout, a reply to a request that has timed out is
 /// reported as MBM_EVENT_UNPAIRED with the start of that request (requestHead).
 ///
-/// @param sniffer    the object
 /// @param timeoutMs  1 to 65535 ms
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
     sniffer: *mut mbm_sniffer,
@@ -237,9 +228,7 @@ pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
 /// suits a UART that hands over 120 at a time: 199 ms at 9600 baud and while the rate is
 /// unknown.
 ///
-/// @param sniffer    the object
 /// @param timeoutMs  1 to 65535 ms
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
     sniffer: *mut mbm_sniffer,
@@ -256,16 +245,15 @@ pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
 /// If the sniffer did not accept all bytes, feed the rest now with the same time; no byte
 /// is lost.
 ///
-/// @param sniffer    the object
 /// @param direction  MBM_DIRECTION_BOTH; MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER if you
 ///                   receive the directions separately. Do not mix MBM_DIRECTION_BOTH with the
-///                   other two: on a change the sniffer discards the bytes that it has not
-///                   reported yet
+///                   other two: on a change the sniffer discards the bytes that it has not reported
+///                   yet
 /// @param bytes      the received bytes; NULL only if `length` is 0
 /// @param length     how many bytes
 /// @param nowUs      arrival time of the last of the bytes, in microseconds; may wrap
-/// @return how many bytes the sniffer accepted; 0 also for a sniffer that was never begun, or
-///         for an invalid argument
+/// @return how many bytes the sniffer accepted; 0 also for a sniffer that was never begun, or for
+///         an invalid argument
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_feed(
     sniffer: *mut mbm_sniffer,
@@ -299,12 +287,11 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
 ///
 /// On a Cortex-M it takes 750 bytes of stack.
 ///
-/// @param sniffer  the object
-/// @param nowUs    the time now, in microseconds; may wrap
-/// @param event    receives the event; the data that it points to are valid until the next call
-///                 with this sniffer
-/// @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for NULL,
-///         and for a sniffer that was never begun
+/// @param nowUs  the time now, in microseconds; may wrap
+/// @param event  receives the event; the data that it points to are valid until the next call with
+///               this sniffer
+/// @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for NULL, and
+///         for a sniffer that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_next(
     sniffer: *mut mbm_sniffer,

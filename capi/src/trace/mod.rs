@@ -297,15 +297,14 @@ fn code(result: Result<(), Error>) -> u8 {
 /// You may call this function again at any time, but not from within the hook. The trace then
 /// drops the bytes that it has not handed out, and its frame timeout is the default.
 ///
-/// @param trace    the object; initialised with MBM_INIT before the first call
 /// @param sends    what the object that will use the port sends: MBM_PACKET_REQUEST for a line or
 ///                 client, MBM_PACKET_RESPONSE for a server
-/// @param port     is copied; its hooks read, write and micros are required. Its optional hooks
-///                 are passed on. It must not be the port of this trace, nor that of a trace
-///                 that passes everything on to this one
-/// @param framing  the framing of the object that will use the port, and the declarations of
-///                 your own functions, which must stay valid and unchanged. Without a
-///                 declaration, the end of a received RTU frame is not known from its bytes
+/// @param port     is copied; its hooks read, write and micros are required. Its optional hooks are
+///                 passed on. It must not be the port of this trace, nor that of a trace that
+///                 passes everything on to this one
+/// @param framing  the framing of the object that will use the port, and the declarations of your
+///                 own functions, which must stay valid and unchanged. Without a declaration, the
+///                 end of a received RTU frame is not known from its bytes
 /// @param buffer   holds incomplete frames: one half of it those that are sent, the other those
 ///                 that are received. It must stay valid for as long as the trace is used
 /// @param size     size of `buffer` in bytes, at least MBM_MIN_TRACE_BUFFER. Two times
@@ -313,8 +312,8 @@ fn code(result: Result<(), Error>) -> u8 {
 ///                 longer one is handed out in pieces
 /// @param hook     is called for each frame
 /// @param context  your pointer, passed to `hook`: for example the link or its name
-/// @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for
-///         a framing or `sends` that is not valid
+/// @return a status; MBM_BUFFER_TOO_SMALL for a size that is too small; MBM_INVALID_ARGUMENT for a
+///         framing or `sends` that is not valid
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_begin(
     trace: *mut mbm_trace,
@@ -334,7 +333,6 @@ pub unsafe extern "C" fn mbm_trace_begin(
 /// Returns the port that passes everything on to the port of the trace. Pass it to the begin
 /// function of a node, client or server.
 ///
-/// @param trace  the object
 /// @return the port, which is valid for as long as the trace is used. NULL for a trace that was
 ///         never begun, and from within its hook: the begin functions refuse it
 #[no_mangle]
@@ -348,9 +346,7 @@ pub unsafe extern "C" fn mbm_trace_port(trace: *mut mbm_trace) -> *const mbm_por
 /// Sets how long the trace waits for the rest of an incomplete frame. At first it is 200 ms in
 /// RTU, which suits a USB adapter and a UART with a FIFO, and 1000 ms in the other framings.
 ///
-/// @param trace      the object
 /// @param timeoutMs  1 to 65535 ms
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeoutMs: u32) -> u8 {
     let timeout = match u16::try_from(timeoutMs) {
@@ -370,9 +366,6 @@ pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeou
 /// ends, or before a link is closed.
 ///
 /// On a Cortex-M it takes 850 bytes of stack, as every traced frame does.
-///
-/// @param trace  the object
-/// @return a status
 #[no_mangle]
 pub unsafe extern "C" fn mbm_trace_flush(trace: *mut mbm_trace) -> u8 {
     code(with_core(trace, Core::hand_out_rest))

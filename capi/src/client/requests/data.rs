@@ -15,16 +15,14 @@ use mbm::pdu::functions::{coil_value, FunctionSpec};
 /// MBM_LINE_BUSY, MBM_CONNECT_TIMED_OUT, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes
 /// only if it is MBM_OK.
 ///
-/// @param client    the object
-/// @param request   the request
 /// @param address   the first coil, 0 to 65535, as on the wire
 /// @param quantity  the number of coils, 1 to 2000
 /// @return MBM_PENDING if the request is queued. Otherwise nothing was queued, and the request's
-///         `status` is the same: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for a
-///         request that no device could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
+///         `status` is the same: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for a request
+///         that no device could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
 ///         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` cannot hold the data,
-///         MBM_INVALID_ARGUMENT if `data` is NULL. With the request unchanged: MBM_BUSY also if
-///         the request is pending already
+///         MBM_INVALID_ARGUMENT if `data` is NULL. With the request unchanged: MBM_BUSY also if the
+///         request is pending already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readCoils(
     client: *mut mbm_client,
@@ -38,8 +36,6 @@ pub unsafe extern "C" fn mbm_client_readCoils(
 /// Function 02: reads discrete inputs into the bytes of `reply`, as mbm_client_readCoils
 /// does (V1.1b3, 6.2).
 ///
-/// @param client    the object
-/// @param request   the request
 /// @param address   the first input, 0 to 65535, as on the wire
 /// @param quantity  the number of inputs, 1 to 2000
 /// @return a status; see mbm_client_readCoils
@@ -61,8 +57,6 @@ pub unsafe extern "C" fn mbm_client_readDiscreteInputs(
 
 /// Function 03: reads holding registers into the words of `reply` (V1.1b3, 6.3).
 ///
-/// @param client    the object
-/// @param request   the request
 /// @param address   the first register, 0 to 65535, as on the wire
 /// @param quantity  the number of registers, 1 to 125
 /// @return a status; see mbm_client_readCoils
@@ -84,8 +78,6 @@ pub unsafe extern "C" fn mbm_client_readHoldingRegisters(
 
 /// Function 04: reads input registers into the words of `reply` (V1.1b3, 6.4).
 ///
-/// @param client    the object
-/// @param request   the request
 /// @param address   the first register, 0 to 65535, as on the wire
 /// @param quantity  the number of registers, 1 to 125
 /// @return a status; see mbm_client_readCoils
@@ -107,8 +99,6 @@ pub unsafe extern "C" fn mbm_client_readInputRegisters(
 
 /// Function 05: switches one coil on or off (V1.1b3, 6.5).
 ///
-/// @param client   the object
-/// @param request  the request
 /// @param address  the coil, 0 to 65535, as on the wire
 /// @param on       0 is off, any other value is on
 /// @return a status; see mbm_client_readCoils
@@ -130,8 +120,6 @@ pub unsafe extern "C" fn mbm_client_writeSingleCoil(
 
 /// Function 06: writes one holding register (V1.1b3, 6.6).
 ///
-/// @param client   the object
-/// @param request  the request
 /// @param address  the register, 0 to 65535, as on the wire
 /// @param value    its new value
 /// @return a status; see mbm_client_readCoils
@@ -154,8 +142,6 @@ pub unsafe extern "C" fn mbm_client_writeSingleRegister(
 /// Function 0F: writes coils from the bytes of `data`, eight in each byte. The first coil is
 /// the lowest bit (V1.1b3, 6.11).
 ///
-/// @param client    the object
-/// @param request   the request
 /// @param address   the first coil, 0 to 65535, as on the wire
 /// @param quantity  the number of coils, 1 to 1968
 /// @return a status; see mbm_client_readCoils
@@ -177,8 +163,6 @@ pub unsafe extern "C" fn mbm_client_writeMultipleCoils(
 
 /// Function 10: writes the words of `data` to holding registers (V1.1b3, 6.12).
 ///
-/// @param client    the object
-/// @param request   the request
 /// @param address   the first register, 0 to 65535, as on the wire
 /// @param quantity  the number of registers, 1 to 123
 /// @return a status; see mbm_client_readCoils
@@ -201,8 +185,6 @@ pub unsafe extern "C" fn mbm_client_writeMultipleRegisters(
 /// Function 16: sets a holding register to (register & andMask) | (orMask & ~andMask)
 /// (V1.1b3, 6.16).
 ///
-/// @param client   the object
-/// @param request  the request
 /// @param address  the register, 0 to 65535, as on the wire
 /// @param andMask  1 for each bit of the register to keep
 /// @param orMask   the new value of the bits that are not kept
@@ -227,8 +209,6 @@ pub unsafe extern "C" fn mbm_client_maskWriteRegister(
 /// Function 17: the device writes the words of `data` to holding registers first. Then it
 /// reads holding registers, which arrive in the words of `reply` (V1.1b3, 6.17).
 ///
-/// @param client         the object
-/// @param request        the request
 /// @param readAddress    the first register to read, 0 to 65535
 /// @param readQuantity   the number of registers to read, 1 to 125
 /// @param writeAddress   the first register to write, 0 to 65535

@@ -13,8 +13,6 @@ use mbm::pdu::limits::MAX_PDU;
 /// Function 07: reads the eight exception status outputs into one byte of `reply` (V1.1b3,
 /// 6.7).
 ///
-/// @param client   the object
-/// @param request  the request
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readExceptionStatus(
@@ -27,11 +25,9 @@ pub unsafe extern "C" fn mbm_client_readExceptionStatus(
 /// Function 08: sends the words of `data`, and reads the same number of words into `reply`
 /// (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
 ///
-/// @param client       the object
-/// @param request      the request
-/// @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which
-///                     the standard reserves, and expects a response of one word; for a response
-///                     of another length use mbm_client_custom
+/// @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which the
+///                     standard reserves, and expects a response of one word; for a response of
+///                     another length use mbm_client_custom
 /// @param words        the number of words of `data`: 1; for sub-function 0, 1 to 125
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
@@ -56,8 +52,6 @@ pub unsafe extern "C" fn mbm_client_diagnostics(
 /// Function 0B: reads the status word and the event count into two words of `reply` (V1.1b3,
 /// 6.9).
 ///
-/// @param client   the object
-/// @param request  the request
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getCommEventCounter(
@@ -71,8 +65,6 @@ pub unsafe extern "C" fn mbm_client_getCommEventCounter(
 /// the bytes of `reply`. The first three have two bytes each, the high byte first. An event
 /// is one byte; the latest event is first (V1.1b3, 6.10).
 ///
-/// @param client   the object
-/// @param request  the request
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getCommEventLog(
@@ -87,8 +79,6 @@ pub unsafe extern "C" fn mbm_client_getCommEventLog(
 /// more bytes: `reply` receives those too. In RTU frames silence ends such a reply. The
 /// client does not wait for silence if the byte count is right.
 ///
-/// @param client   the object
-/// @param request  the request
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_reportServerId(
@@ -101,8 +91,6 @@ pub unsafe extern "C" fn mbm_client_reportServerId(
 /// Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
 /// 6.14).
 ///
-/// @param client    the object
-/// @param request   the request
 /// @param file      the file number, 1 to 65535
 /// @param record    the first record, 0 to 9999
 /// @param quantity  the number of records, 1 to 121
@@ -127,8 +115,6 @@ pub unsafe extern "C" fn mbm_client_readFileRecord(
 /// Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
 /// 6.15).
 ///
-/// @param client    the object
-/// @param request   the request
 /// @param file      the file number, 1 to 65535
 /// @param record    the first record, 0 to 9999
 /// @param quantity  the number of records, 1 to 122
@@ -153,8 +139,6 @@ pub unsafe extern "C" fn mbm_client_writeFileRecord(
 /// Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
 /// 6.18).
 ///
-/// @param client   the object
-/// @param request  the request
 /// @param address  the FIFO pointer address of the queue, 0 to 65535
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
@@ -170,10 +154,8 @@ pub unsafe extern "C" fn mbm_client_readFifoQueue(
 /// as on the wire: the conformity level, more follows (0 or FF), the next object id, the
 /// number of objects, and of each object its id, length and value.
 ///
-/// @param client   the object
-/// @param request  the request
-/// @param code     the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
-/// @param object   the id of the first object to read
+/// @param code    the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
+/// @param object  the id of the first object to read
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
@@ -196,8 +178,6 @@ pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
 /// after the function code of the response into `reply`. There may be none: `length` is 0 then.
 /// The length rule holds for every function code, also for one of the standard.
 ///
-/// @param client    the object
-/// @param request   the request
 /// @param function  the function code, 1 to 127
 /// @param bytes     the number of bytes of `data`, 0 to 252
 /// @param response  the length rule of the response; used during this call only
@@ -259,7 +239,6 @@ pub unsafe extern "C" fn mbm_client_custom(
 /// No device responds to 08 with sub-function 04: the request ends with MBM_OK and `length` 0
 /// after the turnaround delay.
 ///
-/// @param client    the object
 /// @param request   the request; if it is queued, its `data` then points into `body`
 /// @param function  the function code, 1 to 127
 /// @param body      the bytes after the function code; do not change them until the request has
