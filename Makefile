@@ -37,7 +37,6 @@ TOOL_LIBS := -Wl,--gc-sections -lmbedtls -lmbedx509 -lmbedcrypto -lcjson -lyaml 
 # formatted by hand.
 C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'cli/*.[ch]' 'examples/*.[ch]' 'ports/*.[ch]' 'firmware-tests/*.[ch]' \
     'packaging/*.[ch]')
-HEADERS := $(wildcard include/*.h include/mbm/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* ports/linux/*.h examples/linux/*.h cli/*.h)
 
 .PHONY: help
 help: ## List the targets
@@ -235,24 +234,32 @@ need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
 		perl valgrind mbpoll libmbedtls-dev libyaml-dev libcjson-dev libmosquitto-dev openssl
 
+# With each object the compiler writes a list of the headers that it includes.
+DEPENDS := -MMD -MP
+OBJECTS := $(wildcard $(foreach folder,plain sanitized coverage aarch64 bench avr-tests,$(addprefix $(BUILD)/$(folder)/,*.o */*.o)))
+-include $(wildcard $(OBJECTS:.o=.d))
+# An object without its list is compiled again.
+.PHONY: without-list
+$(filter-out $(patsubst %.d,%.o,$(wildcard $(OBJECTS:.o=.d))),$(OBJECTS)): without-list
+
 # The test programs, one folder for each variant: $(1) name, $(2) C compiler, $(3) C++ compiler,
 # $(4) flags, $(5) archive
 define variant
-$(BUILD)/$(1)/%.o: c-tests/%.c $(HEADERS)
+$(BUILD)/$(1)/%.o: c-tests/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
-$(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+$(BUILD)/$(1)/%.o: c-tests/%.cpp
 	@mkdir -p $$(@D)
-	@$(3) $(CXXFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
-$(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
+	@$(3) $(DEPENDS) $(CXXFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+$(BUILD)/$(1)/%.o: examples/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
-$(BUILD)/$(1)/cli/%.o: cli/%.c $(HEADERS)
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+$(BUILD)/$(1)/cli/%.o: cli/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
-$(BUILD)/$(1)/%.o: ports/%.c $(HEADERS)
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+$(BUILD)/$(1)/%.o: ports/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
 $(BUILD)/$(1)/mbm: $(TOOL:%.c=$(BUILD)/$(1)/%.o) $(TOOL_PORTS:ports/%.c=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(TOOL_LIBS) -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
@@ -278,9 +285,6 @@ $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS),$(SANITIZED_ARCHIVE)
 COUNTERS := --coverage -Wl$(comma)-u$(comma)__llvm_profile_runtime -Wl$(comma)--defsym$(comma)rust_eh_personality=0
 $(eval $(call variant,coverage,gcc,g++,$(COUNTERS),$(BUILD)/coverage/libmbm.a))
 .SECONDARY:
-# It includes sketches.
-$(BUILD)/plain/test_class_examples.o $(BUILD)/sanitized/test_class_examples.o $(BUILD)/coverage/test_class_examples.o: \
-    $(wildcard examples/arduino/Tcp*/*.ino)
 
 # mbm's server, for the tests with pymodbus's client.
 SERVE := $(BUILD)/plain/serve

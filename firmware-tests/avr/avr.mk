@@ -127,14 +127,13 @@ $(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S $(wil
 AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer sketch server pty tcp_server)
 AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))
 AVR_FLAGS = -std=c11 -O2 -g $(WARNINGS) -Ifirmware-tests/avr -Ic-tests/support -Iinclude -isystem /usr/include/simavr $(MODBUS)
-AVR_HEADERS := $(wildcard firmware-tests/avr/*.h c-tests/support/*.h)
 
-$(BUILD)/avr-tests/%.o: firmware-tests/avr/%.c $(AVR_HEADERS)
+$(BUILD)/avr-tests/%.o: firmware-tests/avr/%.c
 	@mkdir -p $(@D)
-	@gcc $(AVR_FLAGS) -c $< -o $@
-$(BUILD)/avr-tests/%.o: c-tests/support/%.c $(AVR_HEADERS)
+	@gcc $(DEPENDS) $(AVR_FLAGS) -c $< -o $@
+$(BUILD)/avr-tests/%.o: c-tests/support/%.c
 	@mkdir -p $(@D)
-	@gcc $(AVR_FLAGS) -c $< -o $@
+	@gcc $(DEPENDS) $(AVR_FLAGS) -c $< -o $@
 TIMING := $(BUILD)/avr-tests/timing
 TIMING_PARTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%.o,$(wildcard firmware-tests/avr/timing_*.c)) \
                 $(BUILD)/avr-tests/rows.o
