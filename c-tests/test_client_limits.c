@@ -311,7 +311,7 @@ static void a_busy_device_gets_its_request_again_after_the_wait(void **state)
         assert_int_equal(refusals(framings[i], 3, ACKNOWLEDGE, WAIT), 4);
         /* The device carries the write out, so it must not be sent again. */
         assert_int_equal(refusals(framings[i], 6, ACKNOWLEDGE, WAIT), 1);
-        assert_int_equal(refusals(framings[i], 3, MBM_SLAVE_DEVICE_FAILURE, WAIT), 1);
+        assert_int_equal(refusals(framings[i], 3, MBM_SERVER_DEVICE_FAILURE, WAIT), 1);
         /* The setting stays if that of other repetitions changes. */
         OK(mbm_client_setRetries(&client, 0));
         assert_int_equal(refusals(framings[i], 3, SERVER_DEVICE_BUSY, WAIT), 4);

@@ -338,7 +338,7 @@ static void a_failed_transaction_empties_the_queue_and_rewinds_receive(void **st
     mbm_node_beginTransmission(n, 5);
     mbm_node_send(n, 0x1234);
     sim_answer(s, 1, 100, "11 86 04 +");
-    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 2), MBM_SLAVE_DEVICE_FAILURE);
+    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 2), MBM_SERVER_DEVICE_FAILURE);
     assert_int_equal(mbm_node_receive(n), 1);
     assert_int_equal(mbm_node_writeQueuedRegisters(n), MBM_ILLEGAL_DATA_VALUE);
 }

@@ -173,7 +173,7 @@ static void damaged_and_malformed_replies_are_retried_exceptions_are_not(void **
     OK(sim_read_one(s));
     assert_int_equal(s->sent, 4);
     sim_answer(s, 1, 500, "11 83 06 +");
-    assert_int_equal(sim_read_one(s), MBM_SLAVE_DEVICE_BUSY);
+    assert_int_equal(sim_read_one(s), MBM_SERVER_DEVICE_BUSY);
     assert_int_equal(s->sent, 5);
 }
 

@@ -101,7 +101,7 @@ static void a_refused_call_changes_nothing(void **state)
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_open(&b.gateway, BENCH_CONNECTIONS, &port));
     REFUSED(MBM_BUSY, b, mbm_gateway_open(&b.gateway, 0, &port));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_close(&b.gateway, BENCH_CONNECTIONS));
-    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setInFlight(&b.gateway, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setMaxPending(&b.gateway, 0));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_serveUnits(&b.gateway, NULL, 1));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_serveUnits(&b.gateway, &beyond, 1));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setFunctions(&b.gateway, NULL, 1));
@@ -122,7 +122,7 @@ static void an_object_that_was_never_begun_does_nothing(void **state)
     IS(MBM_NOT_INITIALISED, mbm_gateway_close(&none, 0));
     IS(MBM_NOT_INITIALISED, mbm_gateway_status(&none, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_gateway_status(NULL, 0));
-    IS(MBM_NOT_INITIALISED, mbm_gateway_setInFlight(&none, 1));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_setMaxPending(&none, 1));
     IS(MBM_NOT_INITIALISED, mbm_gateway_setQueueTime(&none, 1));
     IS(MBM_NOT_INITIALISED, mbm_gateway_serveUnits(&none, NULL, 0));
     IS(MBM_NOT_INITIALISED, mbm_gateway_setFunctions(&none, NULL, 0));
@@ -137,7 +137,7 @@ static void an_object_that_was_never_begun_does_nothing(void **state)
 static void begin_again_gives_up_all_connections_and_requests(void **state)
 {
     (void)state;
-    OK(mbm_gateway_setInFlight(&b.gateway, 2));
+    OK(mbm_gateway_setMaxPending(&b.gateway, 2));
     OK(mbm_gateway_setQueueTime(&b.gateway, 20));
     ASK(0, 1, 2, READ);
     ASK(0, 2, 2, READ);
@@ -216,7 +216,7 @@ static void every_call_is_busy(void)
     IS(MBM_BUSY, mbm_gateway_status(&b.gateway, 0));
     assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
     assert_int_equal(mbm_gateway_isReading(&b.gateway, 0), 0);
-    IS(MBM_BUSY, mbm_gateway_setInFlight(&b.gateway, 1));
+    IS(MBM_BUSY, mbm_gateway_setMaxPending(&b.gateway, 1));
     IS(MBM_BUSY, mbm_gateway_setQueueTime(&b.gateway, 1));
     IS(MBM_BUSY, mbm_gateway_serveUnits(&b.gateway, &unit, 1));
     IS(MBM_BUSY, mbm_gateway_setFunctions(&b.gateway, NULL, 0));

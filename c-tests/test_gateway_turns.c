@@ -78,8 +78,8 @@ static void requests_with_the_same_transaction_id_are_all_answered(void **state)
 static void a_connection_has_as_many_requests_as_the_setting_allows(void **state)
 {
     (void)state;
-    IS(MBM_INVALID_ARGUMENT, mbm_gateway_setInFlight(&b.gateway, 0));
-    OK(mbm_gateway_setInFlight(&b.gateway, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_gateway_setMaxPending(&b.gateway, 0));
+    OK(mbm_gateway_setMaxPending(&b.gateway, 2));
     ASK(0, 1, 2, READ);
     ASK(0, 2, 3, READ);
     ASK(0, 3, 4, READ);

@@ -289,7 +289,7 @@ static void a_connection_that_takes_too_long_has_failed(void **state)
     run(1000000);
     assert_int_equal(counters.failed, 3);
     assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
-    status_is = MBM_SLAVE_DEVICE_FAILURE;
+    status_is = MBM_SERVER_DEVICE_FAILURE;
     OK(mbm_client_poll(&client));
     assert_int_equal(counters.failed, 4);
     /* This attempt has failed for another reason. */

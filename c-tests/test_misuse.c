@@ -66,7 +66,7 @@ static void answers_with_exception_04(uint8_t framing, mbm_unit *unit, const cha
     assert_true(response <= capacity);
     assert_int_equal(response, framing == MBM_FRAMING_TCP ? 9 : 5);
     assert_int_equal(frame[pdu], (uint8_t)request[pdu] | 0x80);
-    assert_int_equal(frame[pdu + 1], MBM_SLAVE_DEVICE_FAILURE);
+    assert_int_equal(frame[pdu + 1], MBM_SERVER_DEVICE_FAILURE);
     free(frame);
 }
 

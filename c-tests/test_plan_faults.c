@@ -85,7 +85,7 @@ static void an_exception_is_an_answer(void **state)
     d.answers[1] = EXCEPTION;
     plan_device_start(&d);
     plan_device_run(&d, 10 * SECOND);
-    IS(MBM_SLAVE_DEVICE_FAILURE, status(0));
+    IS(MBM_SERVER_DEVICE_FAILURE, status(0));
     assert_in_range(d.requested, 49, 51);
 }
 

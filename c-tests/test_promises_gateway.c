@@ -55,7 +55,7 @@ static void requests_are_counted_until_they_are_answered(void **state)
     assert_int_equal(mbm_gateway_pollDelay(&b.gateway), UINT32_MAX);
     assert_int_equal(mbm_gateway_isReading(&b.gateway, 0), 1);
     assert_int_equal(mbm_gateway_isReading(&b.gateway, FREE), 0);
-    OK(mbm_gateway_setInFlight(&b.gateway, 1));
+    OK(mbm_gateway_setMaxPending(&b.gateway, 1));
     ASK(0, 1, 2, READ);
     ON_LINE(0, 2, READ);
     assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 1);
@@ -75,8 +75,8 @@ static void settings_have_the_defaults_and_ranges_of_the_header(void **state)
     static mbm_unit unit;
 
     (void)state;
-    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setInFlight(&b.gateway, 0));
-    OK(mbm_gateway_setInFlight(&b.gateway, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setMaxPending(&b.gateway, 0));
+    OK(mbm_gateway_setMaxPending(&b.gateway, 1));
     OK(mbm_gateway_setQueueTime(&b.gateway, 1000000));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setQueueTime(&b.gateway, 1000001));
     OK(mbm_gateway_setFunctions(&b.gateway, &right, 1));
@@ -106,7 +106,7 @@ static void what_was_never_begun_is_refused(void **state)
         IS(status, mbm_gateway_open(both[i], 0, &port));
         IS(status, mbm_gateway_close(both[i], 0));
         IS(status, mbm_gateway_status(both[i], 0));
-        IS(status, mbm_gateway_setInFlight(both[i], 1));
+        IS(status, mbm_gateway_setMaxPending(both[i], 1));
         IS(status, mbm_gateway_setQueueTime(both[i], 1));
         IS(status, mbm_gateway_serveUnits(both[i], NULL, 0));
         IS(status, mbm_gateway_setFunctions(both[i], NULL, 0));

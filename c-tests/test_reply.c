@@ -208,7 +208,7 @@ static void check_exception(uint8_t kind, const mbm_packet *asked, const mbm_pac
 {
     const mbm_packet refusal = {.kind = MBM_PACKET_EXCEPTION,
                                 .function = asked->function,
-                                .exceptionCode = MBM_SLAVE_DEVICE_FAILURE};
+                                .exceptionCode = MBM_SERVER_DEVICE_FAILURE};
     uint8_t received[MBM_MAX_ASCII_FRAME];
     mbm_packet wanted;
 
@@ -217,9 +217,9 @@ static void check_exception(uint8_t kind, const mbm_packet *asked, const mbm_pac
     (void)bytes;
     request.reply = NULL;
     IS(MBM_PENDING, ask(asked));
-    IS(MBM_SLAVE_DEVICE_FAILURE, answer(kind, &refusal, received, &wanted));
+    IS(MBM_SERVER_DEVICE_FAILURE, answer(kind, &refusal, received, &wanted));
     assert_reply_is(&wanted);
-    assert_int_equal(wanted.exceptionCode, MBM_SLAVE_DEVICE_FAILURE);
+    assert_int_equal(wanted.exceptionCode, MBM_SERVER_DEVICE_FAILURE);
 }
 
 static void the_reply_of_a_refused_request_is_an_exception_packet(void **state)

@@ -192,9 +192,9 @@ static const char *on_exception(int about, uint8_t exception)
                : about == ADVICE_CALL
                    ? "Check HEX against the device's manual"
                    : "Check the count and the values against the device's manual";
-    case MBM_SLAVE_DEVICE_FAILURE:
+    case MBM_SERVER_DEVICE_FAILURE:
         return "The device failed at it: its own display or log may say why";
-    case MBM_SLAVE_DEVICE_BUSY: return "Try again later";
+    case MBM_SERVER_DEVICE_BUSY: return "Try again later";
     case MBM_GATEWAY_PATH_UNAVAILABLE: return "Check the gateway's settings for this unit";
     case MBM_GATEWAY_TARGET_FAILED_TO_RESPOND:
         return "Check the unit's number, and the line behind the gateway";

@@ -11,7 +11,7 @@
 
 enum {
     BRIDGE_LINES = 32,
-    BRIDGE_WRITES = 8,       /* writes of a line that wait or are under way */
+    BRIDGE_WRITES = 8,       /* writes of a line that are pending */
     BRIDGE_TOPIC_BYTES = 100 /* of the topic of a line */
 };
 

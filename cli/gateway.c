@@ -100,7 +100,7 @@ static int begin_line(unsigned index)
 /* Sets what a reload may change of the whole gateway. */
 static void set_gateway(void)
 {
-    (void)mbm_gateway_setInFlight(&gateway, (uint16_t)setup.requests);
+    (void)mbm_gateway_setMaxPending(&gateway, (uint16_t)setup.requests);
     (void)mbm_gateway_setQueueTime(&gateway, setup.queueMs);
     listener.idleTimeMs = setup.idleMs;
 }
@@ -495,13 +495,11 @@ static error_t parse(int key, char *text, struct argp_state *state)
 static const struct argp_option texts[] = {
     {"connections", 'c', "N", 0,
      "Places for clients, 1 to 255 (16). A client that finds no place is disconnected at once", 1},
-    {"requests", REQUESTS, "N", 0,
-     "Requests of one connection that are under way at once, 1 to 128 (8)", 1},
+    {"requests", REQUESTS, "N", 0, "Pending requests of one connection at once, 1 to 128 (8)", 1},
     {"idle", IDLE, "TIME", 0,
      "How long a connection is idle before it may be closed for a new client (1m); 0s for never",
      1},
-    {"in-flight", IN_FLIGHT, "N", 0,
-     "Requests that are under way at once on a line tcp://, 1 to 16 (1)", 2},
+    {"in-flight", IN_FLIGHT, "N", 0, "Requests in flight at once on a line tcp://, 1 to 16 (1)", 2},
     {"replace-after", REPLACE_AFTER, "N", 0,
      "Requests in a row without any byte after which the connection to a device is made anew, 0 to 100 "
      "(2); 0 for never",

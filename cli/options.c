@@ -204,7 +204,7 @@ static const struct argp_option request_texts[] = {
     {"retries", RETRIES, "N", 0,
      "How often a request without a right reply is repeated, 0 to 254 (0)", 2},
     {"in-flight", IN_FLIGHT, "N", 0,
-     "Requests under way at once on Modbus TCP, 1 to 16 (1). More are faster, but many devices take "
+     "Requests in flight at once on Modbus TCP, 1 to 16 (1). More are faster, but many devices take "
      "one at a time",
      2},
     {"replace-after", REPLACE_AFTER, "N", 0,

@@ -152,7 +152,7 @@ static int begin_plan(void)
     setup.fieldCount = setup.readCount = count;
     setup.bitGap = wanted.gap;
     setup.registerGap = wanted.gap < MBM_MAX_READ_REGISTERS ? wanted.gap : MBM_MAX_READ_REGISTERS;
-    /* Only on Modbus TCP several requests may be under way. */
+    /* Only on Modbus TCP several requests may be in flight. */
     setup.requestCount = where.framing == MBM_FRAMING_TCP ? options.in_flight : 1;
     status = mbm_plan_begin(&plan, &at.client, &setup, &wrong);
     if (status != MBM_OK && wrong < count)

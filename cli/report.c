@@ -191,7 +191,7 @@ const char *report_in_flight(void)
 {
     static char text[96];
 
-    snprintf(text, sizeof text, ". Up to %u requests were under way at once: try --in-flight 1",
+    snprintf(text, sizeof text, ". Up to %u requests were in flight at once: try --in-flight 1",
              most_in_flight);
     return most_in_flight > 1 ? text : "";
 }

@@ -57,7 +57,7 @@ int report_note(int code);
 /* The exit code for the status of a request. */
 int report_code_of(uint8_t status, uint8_t exception);
 
-/* Sets how many requests may be under way at once. The advice on a missing reply names more than
+/* Sets how many requests may be in flight at once. The advice on a missing reply names more than
  * one: as a sentence that follows another, or an empty text. */
 void report_set_in_flight(unsigned most);
 const char *report_in_flight(void);

@@ -64,7 +64,7 @@
 /** @endcond */
 
 /**
- * A client of one serial line, in RTU or ASCII frames. One request at a time is under way.
+ * A client of one serial line, in RTU or ASCII frames. One request at a time is in flight.
  * poll waits in one case: at the end of a request, until the Stream's flush returns.
  */
 class ModbusSerialClient : public ModbusClient,
@@ -168,7 +168,7 @@ private:
 
 /**
  * A client of one TCP connection of an Ethernet or WiFi library. Up to 16 requests are
- * under way at once. The device at the other end of the connection is unit 255; other units
+ * pending at once. The device at the other end of the connection is unit 255; other units
  * are behind a gateway.
  */
 class ModbusTcpClient : public ModbusClient {
@@ -204,10 +204,10 @@ public:
     }
 
     /**
-     * Closes the connection, if it is open, and connects to a device with the
-     * Client's own connect, which may wait as long as its library does. Requests
-     * that were under way end with MBM_LINK_LOST at the next poll; those that had not
-     * been sent go over the new connection.
+     * Closes the connection, if it is open, and connects to a device with the Client's own
+     * connect, which may wait as long as its library does. Requests that were in flight end
+     * with MBM_LINK_LOST at the next poll; those that had not been sent go over the new
+     * connection.
      *
      * @param host  an argument of the Client's connect: an IPAddress or a name
      * @param port  502 for most devices
@@ -232,7 +232,7 @@ public:
             link->stop();
     }
 
-    /** How many requests are under way at once, 1 (the default) to 16. More are faster, but many
+    /** How many requests are in flight at once, 1 (the default) to 16. More are faster, but many
      *  devices take one at a time. */
     uint8_t setInFlight(uint8_t most) { return mbm_client_setInFlight(&client, most); }
 

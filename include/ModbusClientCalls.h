@@ -41,7 +41,7 @@ public:
      * Continues all requests, without waiting, and calls the callbacks of those that have
      * ended.
      *
-     * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are none;
+     * @return MBM_PENDING while requests are pending, MBM_OK if there are none;
      *         MBM_BUSY from within a callback; MBM_NOT_INITIALISED before begin
      */
     uint8_t poll() { return mbm_client_poll(&client); }
@@ -68,7 +68,7 @@ public:
      * 0xFFFFFFFF without a request, 1000 while a TCP connection takes no bytes.
      */
     uint32_t pollDelay() { return mbm_client_pollDelay(&client); }
-    /** How many requests wait or are under way, 0 to 16. */
+    /** How many requests are pending, 0 to 16. */
     uint8_t pending() const { return mbm_client_pending(&client); }
     /**
      * Cancels a request: its status becomes MBM_CANCELLED and its callback is not called.

@@ -68,16 +68,15 @@ public:
     }
 
     /**
-     * A copy has its own buffers, with the same words, settings, callbacks
-     * and Stream. Its queue of send is empty. A request under way belongs to the
-     * original only. Copy between requests only, or the RS-485 driver may stay on.
-     * If you copy within preTransmission or postTransmission, the copy returns ku8MBBusy
-     * for every call.
+     * A copy has its own buffers, with the same words, settings, callbacks and Stream. Its
+     * queue of send is empty. A pending request belongs to the original only. Copy between
+     * requests only, or the RS-485 driver may stay on. If you copy within preTransmission or
+     * postTransmission, the copy returns ku8MBBusy for every call.
      */
     ModbusMaster(const ModbusMaster &other) : state(other.state) { adoptCopy(); }
 
     /**
-     * Copies as the constructor does, and cancels this object's request under way.
+     * Copies as the constructor does, and cancels this object's pending request.
      * Within preTransmission and postTransmission of either object it changes nothing.
      */
     ModbusMaster &operator=(const ModbusMaster &other)
@@ -91,14 +90,14 @@ public:
     }
 
 #if defined(MODBUSMASTER_SHARE_LINE)
-    /** Cancels a request under way. */
+    /** Cancels a pending request. */
     ~ModbusMaster() { Line::giveUp(state.node); }
 #endif
 
     /**
      * Sends later requests to a slave, over a Stream that is already open. It takes little
      * time, so a sketch may call it before each request. It keeps callbacks, settings and
-     * words, empties the queue of send, and cancels a request under way.
+     * words, empties the queue of send, and cancels a pending request.
      *
      * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
      * @param stream  must outlive its use here; its read() returns -1 if no byte has
@@ -211,7 +210,7 @@ public:
      * Reads 1 to 125 holding registers, which receive then returns one by one.
      *
      * @return how many words receive will return; 0 if the request failed (status
-     *         returns the reason), or if it is still under way in non-blocking mode
+     *         returns the reason), or if it is still pending in non-blocking mode
      */
     uint8_t requestFrom(uint16_t address, uint16_t quantity)
     {
@@ -375,7 +374,7 @@ public:
     uint8_t poll() { return mbm_node_poll(&state.node); }
     /** Cancels a non-blocking request and switches the driver off. */
     void cancel() { mbm_node_cancel(&state.node); }
-    /** The status of the last request; ku8MBPending while it is under way. */
+    /** The status of the last request; ku8MBPending while it is pending. */
     uint8_t status() const { return mbm_node_status(&state.node); }
     /** The raw exception code of the last reply; 0 if it was no exception. */
     uint8_t getExceptionCode() const { return mbm_node_getExceptionCode(&state.node); }
@@ -488,7 +487,7 @@ private:
         mbm_line_beginRtu(line(), &hooks, nullptr, 0);
     }
 
-    // After a copy: a request under way stays that of the original.
+    // After a copy: a pending request stays that of the original.
     void adoptCopy()
     {
         Line::giveUp(state.node);
@@ -546,7 +545,7 @@ private:
         mbm_line_beginRtu(&wire.line, &state.own.port, state.own.frame, frameBytes);
     }
 
-    // After a copy: a request under way stays that of the original.
+    // After a copy: a pending request stays that of the original.
     void adoptCopy()
     {
         cancel();

@@ -25,7 +25,7 @@ public:
     /** Exception 03: the device refuses the quantity or value. */
     static const uint8_t ku8MBIllegalDataValue = MBM_ILLEGAL_DATA_VALUE;
     /** Exception 04: the device failed. */
-    static const uint8_t ku8MBSlaveDeviceFailure = MBM_SLAVE_DEVICE_FAILURE;
+    static const uint8_t ku8MBSlaveDeviceFailure = MBM_SERVER_DEVICE_FAILURE;
     /** The call succeeded. */
     static const uint8_t ku8MBSuccess = MBM_OK;
     /** Only other units replied. */
@@ -38,7 +38,7 @@ public:
     static const uint8_t ku8MBInvalidCRC = MBM_INVALID_CRC;
     /** The reply does not answer the request. */
     static const uint8_t ku8MBMalformedReply = MBM_MALFORMED_REPLY;
-    /** A request of this object is under way, or a callback called; nothing was changed. */
+    /** A request of this object is pending, or a callback called; nothing was changed. */
     static const uint8_t ku8MBBusy = MBM_BUSY;
     /** A function that reads cannot be broadcast; nothing was sent. */
     static const uint8_t ku8MBBroadcastNotAllowed = MBM_BROADCAST_NOT_ALLOWED;
@@ -46,7 +46,7 @@ public:
     static const uint8_t ku8MBBufferTooSmall = MBM_BUFFER_TOO_SMALL;
     /** begin has not been called. */
     static const uint8_t ku8MBNotInitialised = MBM_NOT_INITIALISED;
-    /** The request is under way: call poll again. */
+    /** The request is pending: call poll again. */
     static const uint8_t ku8MBPending = MBM_PENDING;
     /** The line never fell silent, or the port took no bytes. */
     static const uint8_t ku8MBLineBusy = MBM_LINE_BUSY;

@@ -15,7 +15,7 @@
 #include "mbm/master.h"
 
 /** @cond private to ModbusMaster */
-// What the hooks of the port need. `User` is the object whose request is under way.
+// What the hooks of the port need. `User` is the object whose request is pending.
 template <typename User> struct ModbusMasterWire {
     mbm_line line;
     User *user;

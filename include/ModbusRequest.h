@@ -95,7 +95,7 @@ public:
      * no reply (0xE0 and up). MBM_PENDING until it has ended, MBM_OK before the first call.
      */
     uint8_t status() const { return request.status; }
-    /** Whether it waits in the queue or is under way. */
+    /** Whether it waits in the queue or is in flight. */
     bool pending() const { return request.status == MBM_PENDING; }
     /** The raw exception code of the reply; 0 if it was no exception. */
     uint8_t getExceptionCode() const { return request.exception; }

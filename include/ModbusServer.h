@@ -174,10 +174,10 @@ public:
     ModbusServer() : state() {}
 
     /**
-     * Answers as unit `id` over a Stream that is already open. May be called
-     * again: a request under way is dropped; the unit keeps its tables and functions.
-     * If the Stream has setRxFIFOFull, as on an ESP32, the receiver hands over each byte at
-     * once from then on.
+     * Answers as unit `id` over a Stream that is already open. May be called again: a request
+     * that it has not answered is dropped; the unit keeps its tables and functions. If the
+     * Stream has setRxFIFOFull, as on an ESP32, the receiver hands over each byte at once from
+     * then on.
      *
      * @param id      1 to 247
      * @param stream  must outlive its use here

@@ -31,12 +31,12 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
         return F("exception 02: illegal data address");
     case MBM_ILLEGAL_DATA_VALUE:
         return F("exception 03: illegal data value");
-    case MBM_SLAVE_DEVICE_FAILURE:
-        return F("exception 04: slave device failure");
+    case MBM_SERVER_DEVICE_FAILURE:
+        return F("exception 04: server device failure");
     case MBM_ACKNOWLEDGE:
         return F("exception 05: acknowledge, the request takes long");
-    case MBM_SLAVE_DEVICE_BUSY:
-        return F("exception 06: slave device busy");
+    case MBM_SERVER_DEVICE_BUSY:
+        return F("exception 06: server device busy");
     case MBM_MEMORY_PARITY_ERROR:
         return F("exception 08: memory parity error");
     case MBM_GATEWAY_PATH_UNAVAILABLE:
@@ -58,7 +58,7 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
     case MBM_LINK_LOST:
         return F("the port reported a lost link");
     case MBM_BUSY:
-        return F("in use: a request is under way, or a hook of the object called");
+        return F("in use: a request is pending, or a hook of the object called");
     case MBM_BROADCAST_NOT_ALLOWED:
         return F("a read cannot be broadcast");
     case MBM_BUFFER_TOO_SMALL:
@@ -66,7 +66,7 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
     case MBM_NOT_INITIALISED:
         return F("the object was never begun or has no buffers");
     case MBM_PENDING:
-        return F("under way, poll again");
+        return F("pending, poll again");
     case MBM_LINE_BUSY:
         return F("the line never fell silent or the port took no bytes");
     case MBM_CANCELLED:

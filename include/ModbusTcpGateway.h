@@ -41,7 +41,7 @@ struct ModbusTcpPassed {};
  * returns the replies. It forwards any function. It is an mbm_gateway with one line.
  *
  * A client that sends several requests without waiting for the replies has more than one
- * under way if `Requests` is greater than `Connections`. When the line is free, the clients
+ * pending if `Requests` is greater than `Connections`. When the line is free, the clients
  * take turns.
  *
  * Without a reply of a device, the gateway answers with an exception (V1.1b3, 7): 0A for a

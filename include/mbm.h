@@ -21,7 +21,7 @@
  *   comment allows it. You may use any number of objects side by side, each from one thread.
  * - You may call a begin function again at any time, but not from a hook of the object. The
  *   object then gives up what was pending; requests get the status MBM_CANCELLED. Only a line
- *   and a node refuse it with MBM_BUSY while a request is under way.
+ *   and a node refuse it with MBM_BUSY while a request is pending.
  *
  * A unit id and a time that you pass have a wider type than they need, so that a number that is
  * too large is refused and not narrowed. Other numbers, such as retries, the length of an array,

@@ -89,11 +89,11 @@ errors {
     /// the standard does not allow, to which every device would answer this exception.
     ILLEGAL_DATA_VALUE = 0x03, "exception 03: illegal data value";
     /// Exception 04 of the remote device.
-    SLAVE_DEVICE_FAILURE = 0x04, "exception 04: slave device failure";
+    SERVER_DEVICE_FAILURE = 0x04, "exception 04: server device failure";
     /// Exception 05 of the remote device: it carries the request out, which takes long.
     ACKNOWLEDGE = 0x05, "exception 05: acknowledge, the request takes long";
     /// Exception 06 of the remote device: it is busy and refused the request.
-    SERVER_DEVICE_BUSY = 0x06, "exception 06: slave device busy";
+    SERVER_DEVICE_BUSY = 0x06, "exception 06: server device busy";
     /// Exception 08 of the remote device: the memory of a file failed its consistency check.
     MEMORY_PARITY_ERROR = 0x08, "exception 08: memory parity error";
     /// Exception 0A of a gateway: it has no path to the device.
@@ -115,9 +115,9 @@ errors {
     MALFORMED_REPLY = 0xE5, "the reply does not answer the request";
     /// The port reported that the link is lost.
     LINK_LOST = 0xE6, "the port reported a lost link";
-    /// The object is in use: a request is in progress, or the call came from one of its
+    /// The object is in use: a request is pending, or the call came from one of its
     /// hooks.
-    BUSY = 0xE7, "in use: a request is under way, or a hook of the object called";
+    BUSY = 0xE7, "in use: a request is pending, or a hook of the object called";
     /// The request cannot be broadcast: a read, for example, or any request on TCP.
     BROADCAST_NOT_ALLOWED = 0xE8, "a read cannot be broadcast";
     /// The caller's buffers cannot hold the request or the reply.
@@ -148,7 +148,7 @@ errors {
 }
 others {
     0x00 => "success";
-    0xEB => "under way, poll again";
+    0xEB => "pending, poll again";
     0x01..=0x7F => "the device sent an exception code that the standard does not name";
     _ => "not a status";
 }
@@ -165,7 +165,7 @@ const fn c_text(text: &'static str) -> &'static CStr {
 impl Status {
     /// The call or request succeeded.
     pub const OK: Status = Status(0x00);
-    /// The request is in progress. Call poll again.
+    /// The request is pending. Call poll again.
     pub const PENDING: Status = Status(0xEB);
 
     /// The status for an exception code of the remote device.
@@ -203,7 +203,7 @@ impl Status {
         }
     }
 
-    /// The result of a request, or [`Poll::Pending`] while it is in progress.
+    /// The result of a request, or [`Poll::Pending`] while it is pending.
     pub const fn poll(self) -> Poll<Result<(), Error>> {
         match self {
             Status::PENDING => Poll::Pending,

@@ -92,7 +92,7 @@
 //! # fn main() -> Result<(), mbm::Error> {
 //! # let uart = uart();
 //! let mut words = [0; 2];
-//! // Up to four requests are queued or in flight.
+//! // Up to four requests are pending.
 //! let mut client: Client<_, _, 4> = Client::new(Serial::new(uart, Frame::new([0; 256])));
 //! client.settings().set_baud_rate(9600);
 //! client.queue(Request::read_holding_registers(17, 107, &mut words)?)?;

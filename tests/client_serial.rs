@@ -203,7 +203,7 @@ fn requests_are_sent_one_after_the_other_and_in_order() {
     for number in 1..=4u8 {
         let request = sent(&end, &mut client);
         assert_eq!(request[0], number);
-        // Nothing else is sent while this one is under way.
+        // Nothing else is sent while this one is in flight.
         end.pass(5_000);
         assert!(client.poll(end.now()).is_none());
         assert!(end.sent().is_empty());

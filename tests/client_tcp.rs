@@ -20,7 +20,7 @@ fn assert_right(task: &Task) {
 }
 
 #[test]
-fn all_requests_are_under_way_at_once_and_answered_in_any_order() {
+fn all_requests_are_in_flight_at_once_and_answered_in_any_order() {
     let (end, mut client) = client();
     for number in 1..=16 {
         assert!(client.queue(read(1, number)).is_ok());

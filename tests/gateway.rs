@@ -316,7 +316,7 @@ fn every_response_belongs_to_a_request_of_its_connection() {
         let mut gateway = gateway(seed);
         let mut asked: [Asked; CONNECTIONS] = Default::default();
         if seed % 3 == 0 {
-            gateway.set_most_requests(2);
+            gateway.set_max_pending(2);
         }
         if seed % 4 == 0 {
             gateway.set_queue_time(3000);

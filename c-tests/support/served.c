@@ -49,7 +49,7 @@ static uint16_t echo(void *context, const mbm_request *request, uint8_t *respons
     if (request->length == 0)
         return MBM_REPLY_EXCEPTION | MBM_ILLEGAL_DATA_VALUE;
     if (request->length > capacity)
-        return MBM_REPLY_EXCEPTION | MBM_SLAVE_DEVICE_FAILURE;
+        return MBM_REPLY_EXCEPTION | MBM_SERVER_DEVICE_FAILURE;
     memcpy(response, request->data, request->length);
     return request->length;
 }

@@ -16,7 +16,7 @@ use mbm::port::{result, Port};
 /// A hook must not use the object that calls it. If it calls a function on that object, the
 /// function returns MBM_BUSY and changes nothing; a getter returns what it returns for an
 /// object that was never begun. So it is with a line, and with the request of a node that is
-/// under way; the words and the settings of a node may be used. The hook `idle` is the exception:
+/// pending; the words and the settings of a node may be used. The hook `idle` is the exception:
 /// it may call every function, but one that starts a request returns MBM_BUSY.
 #[repr(C)]
 #[derive(Clone, Copy)]

@@ -22,11 +22,11 @@ pub const MBM_ILLEGAL_DATA_ADDRESS: u8 = 0x02;
 /// the transmit buffer holds.
 pub const MBM_ILLEGAL_DATA_VALUE: u8 = 0x03;
 /// Exception of the device: it failed while it executed the request.
-pub const MBM_SLAVE_DEVICE_FAILURE: u8 = 0x04;
+pub const MBM_SERVER_DEVICE_FAILURE: u8 = 0x04;
 /// Exception of the device: it accepted the request and needs a long time for it.
 pub const MBM_ACKNOWLEDGE: u8 = 0x05;
 /// Exception of the device: it is busy. Send the request again later.
-pub const MBM_SLAVE_DEVICE_BUSY: u8 = 0x06;
+pub const MBM_SERVER_DEVICE_BUSY: u8 = 0x06;
 /// Exception of the device: the memory of a file failed its consistency check.
 pub const MBM_MEMORY_PARITY_ERROR: u8 = 0x08;
 /// Exception of a gateway: it has no path to the device.
@@ -53,7 +53,7 @@ pub const MBM_INVALID_ARGUMENT: u8 = 0xE4;
 pub const MBM_MALFORMED_REPLY: u8 = 0xE5;
 /// The port's read or write reported that the link is lost.
 pub const MBM_LINK_LOST: u8 = 0xE6;
-/// The object is in use: it has a request under way, or the call came from a hook that the
+/// The object is in use: it has a pending request, or the call came from a hook that the
 /// object called, or the object is a record that serves in another way. The call changed
 /// nothing.
 pub const MBM_BUSY: u8 = 0xE7;
@@ -65,7 +65,7 @@ pub const MBM_BROADCAST_NOT_ALLOWED: u8 = 0xE8;
 pub const MBM_BUFFER_TOO_SMALL: u8 = 0xE9;
 /// The object was never begun, or has no buffers.
 pub const MBM_NOT_INITIALISED: u8 = 0xEA;
-/// The request is under way: call mbm_node_poll again.
+/// The request is pending: call mbm_node_poll again.
 pub const MBM_PENDING: u8 = 0xEB;
 /// The line was not silent, or the port accepted no bytes, for as long as the response
 /// timeout.
@@ -97,9 +97,9 @@ statuses! {
     MBM_ILLEGAL_FUNCTION = Status::ILLEGAL_FUNCTION;
     MBM_ILLEGAL_DATA_ADDRESS = Status::ILLEGAL_DATA_ADDRESS;
     MBM_ILLEGAL_DATA_VALUE = Status::ILLEGAL_DATA_VALUE;
-    MBM_SLAVE_DEVICE_FAILURE = Status::SLAVE_DEVICE_FAILURE;
+    MBM_SERVER_DEVICE_FAILURE = Status::SERVER_DEVICE_FAILURE;
     MBM_ACKNOWLEDGE = Status::ACKNOWLEDGE;
-    MBM_SLAVE_DEVICE_BUSY = Status::SERVER_DEVICE_BUSY;
+    MBM_SERVER_DEVICE_BUSY = Status::SERVER_DEVICE_BUSY;
     MBM_MEMORY_PARITY_ERROR = Status::MEMORY_PARITY_ERROR;
     MBM_GATEWAY_PATH_UNAVAILABLE = Status::GATEWAY_PATH_UNAVAILABLE;
     MBM_GATEWAY_TARGET_FAILED_TO_RESPOND = Status::GATEWAY_TARGET_FAILED_TO_RESPOND;

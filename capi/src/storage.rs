@@ -58,7 +58,7 @@ impl NodeWords {
 }
 
 /// The frame buffer and the counters of a line, and the words of the node whose request is
-/// under way.
+/// pending.
 // The order of the fields saves flash: see `Engine`.
 #[repr(C)]
 pub(super) struct LineStorage {
@@ -162,7 +162,7 @@ impl Storage for LineStorage {
     }
 }
 
-// SAFETY, below: a request is under way, so `words` points to those of its node. The engine keeps
+// SAFETY, below: a request is pending, so `words` points to those of its node. The engine keeps
 // every index below the number of words, too.
 impl Words for LineStorage {
     fn response_timeout(&self, _settings: &Settings) -> u32 {

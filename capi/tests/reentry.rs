@@ -174,7 +174,7 @@ fn hooks_use_the_trace_that_called_them() {
         (*state).received = vec![17, 3];
         let status = mbm_node_readHoldingRegisters(line.node, 0, 1);
         assert_eq!(status, MBM_RESPONSE_TIMED_OUT);
-        // No request is under way when the trace calls the hook now.
+        // No request is pending when the trace calls the hook now.
         (*state).line = null_mut();
         assert_eq!(mbm_trace_flush(trace), MBM_OK);
         assert_eq!((*state).done, 2);

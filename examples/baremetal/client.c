@@ -23,7 +23,7 @@ static mbm_counters counters = MBM_INIT;
 static mbm_clientRequest requests[STEPS + 1] = MBM_INIT;
 static uint8_t frame[MBM_MAX_FRAME];
 
-/* One buffer for all replies: a serial line has one request under way at a time, and the
+/* One buffer for all replies: a serial line has one request in flight at a time, and the
  * reply is noted before the next request begins. */
 static uint16_t reply[MBM_MAX_READ_REGISTERS];
 

@@ -34,7 +34,7 @@ static uint16_t serve_read(void *context, const mbm_request *request, uint8_t *r
         return MBM_REPLY_EXCEPTION | MBM_ILLEGAL_DATA_ADDRESS;
     bytes = 2 * word_at(data + 2);
     if (3 + bytes > capacity)
-        return MBM_REPLY_EXCEPTION | MBM_SLAVE_DEVICE_FAILURE;
+        return MBM_REPLY_EXCEPTION | MBM_SERVER_DEVICE_FAILURE;
     response[0] = data[0];
     response[1] = data[1];
     response[2] = (uint8_t)bytes;

@@ -155,7 +155,7 @@ static const fault faults[] = {
     {"a reply of another function, then ours", reply_of_another_function, ".....", MBM_OK},
     {"late reply of another length, then ours", late_reply_of_another_length, ".....", MBM_OK},
     {"cut in two by a pause of 30 ms", a_pause_inside, ".....", MBM_OK},
-    {"exception 06", exception_06, "F....", MBM_SLAVE_DEVICE_BUSY},
+    {"exception 06", exception_06, "F....", MBM_SERVER_DEVICE_BUSY},
     {"no reply", no_reply, "F....", MBM_RESPONSE_TIMED_OUT},
     {"bad CRC", bad_crc, "F....", MBM_INVALID_CRC},
     {"truncated", truncated, "F....", MBM_RESPONSE_TIMED_OUT},

@@ -75,11 +75,11 @@ const char *mbm_version(void);
  *  the transmit buffer holds. */
 #define MBM_ILLEGAL_DATA_VALUE 3u
 /** Exception of the device: it failed while it executed the request. */
-#define MBM_SLAVE_DEVICE_FAILURE 4u
+#define MBM_SERVER_DEVICE_FAILURE 4u
 /** Exception of the device: it accepted the request and needs a long time for it. */
 #define MBM_ACKNOWLEDGE 5u
 /** Exception of the device: it is busy. Send the request again later. */
-#define MBM_SLAVE_DEVICE_BUSY 6u
+#define MBM_SERVER_DEVICE_BUSY 6u
 /** Exception of the device: the memory of a file failed its consistency check. */
 #define MBM_MEMORY_PARITY_ERROR 8u
 /** Exception of a gateway: it has no path to the device. */
@@ -104,7 +104,7 @@ const char *mbm_version(void);
 #define MBM_MALFORMED_REPLY 229u
 /** The port's read or write reported that the link is lost. */
 #define MBM_LINK_LOST 230u
-/** The object is in use: it has a request under way, or the call came from a hook that the
+/** The object is in use: it has a pending request, or the call came from a hook that the
  *  object called, or the object is a record that serves in another way. The call changed
  *  nothing. */
 #define MBM_BUSY 231u
@@ -116,7 +116,7 @@ const char *mbm_version(void);
 #define MBM_BUFFER_TOO_SMALL 233u
 /** The object was never begun, or has no buffers. */
 #define MBM_NOT_INITIALISED 234u
-/** The request is under way: call mbm_node_poll again. */
+/** The request is pending: call mbm_node_poll again. */
 #define MBM_PENDING 235u
 /** The line was not silent, or the port accepted no bytes, for as long as the response
  *  timeout. */
@@ -185,7 +185,7 @@ const char *mbm_status_textOf(uint8_t status, uint8_t exceptionCode);
  * A hook must not use the object that calls it. If it calls a function on that object, the
  * function returns MBM_BUSY and changes nothing; a getter returns what it returns for an
  * object that was never begun. So it is with a line, and with the request of a node that is
- * under way; the words and the settings of a node may be used. The hook `idle` is the exception:
+ * pending; the words and the settings of a node may be used. The hook `idle` is the exception:
  * it may call every function, but one that starts a request returns MBM_BUSY.
  */
 typedef struct mbm_port {

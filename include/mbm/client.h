@@ -244,7 +244,7 @@ uint8_t mbm_client_beginRtuOverTcp(mbm_client *client, const mbm_port *port, uin
 
 /**
  * Begins a client of a TCP stream with frames that have the MBAP header (messaging on
- * TCP/IP guide V1.0b, 3.1.3). One request is under way at a time, unless mbm_client_setInFlight
+ * TCP/IP guide V1.0b, 3.1.3). One request is in flight at a time, unless mbm_client_setInFlight
  * allows more. The client matches responses to requests by the transaction identifier, in any
  * order.
  *
@@ -268,12 +268,12 @@ uint8_t mbm_client_beginTcp(mbm_client *client, const mbm_port *port, uint8_t *i
  *
  * @param client     the object, begun with mbm_client_beginAscii
  * @param character  1 to 127, except CR, the colon and hexadecimal digits
- * @return a status; MBM_BUSY while a request is under way
+ * @return a status; MBM_BUSY while a request is in flight
  */
 uint8_t mbm_client_setDelimiter(mbm_client *client, uint8_t character);
 
 /**
- * Sets how many requests may be under way at once on TCP. More are faster, if the server accepts
+ * Sets how many requests may be in flight at once on TCP. More are faster, if the server accepts
  * them (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to 16). Many take
  * one at a time: they drop a request that arrives before they have answered the last one, or
  * in one segment with another. The queue always holds 16.
@@ -305,7 +305,7 @@ uint8_t mbm_identification_read(mbm_identification *identification, mbm_client *
 
 /**
  * Closes the link and opens it again. The client discards an incomplete response. Requests
- * that were under way end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
+ * in flight end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
  * that were not sent yet are sent over the new link.
  *
  * @param link  your hooks, used during this call only; NULL if you have opened the link again
@@ -336,7 +336,7 @@ uint8_t mbm_client_isConnected(const mbm_client *client);
  * @param client  the object. If `line` is not NULL, it must use RTU or RTU over TCP
  * @param line    a line, which then uses the client's port; NULL if you use the wire in another
  *                way
- * @return a status; MBM_BUSY if a request is under way or the client is suspended already
+ * @return a status; MBM_BUSY if a request is in flight or the client is suspended already
  */
 uint8_t mbm_client_suspend(mbm_client *client, struct mbm_line *line);
 
@@ -345,7 +345,7 @@ uint8_t mbm_client_suspend(mbm_client *client, struct mbm_line *line);
  * MBM_NOT_INITIALISED. A line that was begun on another port meanwhile keeps that port.
  *
  * @param line  the line that was passed to mbm_client_suspend; NULL if none was
- * @return a status; MBM_BUSY while a request is under way on the line; MBM_INVALID_ARGUMENT if the
+ * @return a status; MBM_BUSY while a request of the line is pending; MBM_INVALID_ARGUMENT if the
  *         client was not suspended, and for any other line
  */
 uint8_t mbm_client_resume(mbm_client *client, struct mbm_line *line);
@@ -376,7 +376,7 @@ uint8_t mbm_client_poll(mbm_client *client);
 uint32_t mbm_client_pollDelay(mbm_client *client);
 
 /**
- * Returns how many requests are pending: queued or under way.
+ * Returns how many requests are pending: queued or in flight.
  *
  * @return 0 to 16
  */

@@ -84,7 +84,7 @@ typedef struct mbm_gatewayLine {
     uint8_t (*isReady)(void *context);
     /** The most requests that the gateway queues in the client at a time, 1 to 16; 0 means 1.
      *  With 1, the clients on TCP take turns with every request. A line that is a TCP connection to
-     *  a device that takes several at once can have more under way, as many as
+     *  a device that takes several at once can have more in flight, as many as
      *  mbm_client_setInFlight allows its client. */
     uint8_t inFlight;
     /** Private. */
@@ -184,7 +184,7 @@ uint8_t mbm_gateway_close(mbm_gateway *gateway, uint8_t connection);
 uint8_t mbm_gateway_status(const mbm_gateway *gateway, uint8_t connection);
 
 /**
- * Returns how many requests of a connection are under way: complete, but not answered yet.
+ * Returns how many requests of a connection are pending: complete, but not answered yet.
  * The connection is not idle while it has one.
  *
  * @param connection  the number of the place
@@ -194,7 +194,7 @@ uint16_t mbm_gateway_pending(const mbm_gateway *gateway, uint8_t connection);
 
 /**
  * Returns whether the next mbm_gateway_poll reads bytes from a connection. If not, the
- * connection has as many requests under way as it may have, and its next requests wait in its
+ * connection has as many pending requests as it may have, and its next requests wait in its
  * socket: do not wait for bytes of it.
  *
  * @param connection  the number of the place
@@ -218,19 +218,19 @@ uint8_t mbm_gateway_poll(mbm_gateway *gateway);
  * mbm_gateway_isReading), or a connection is lost.
  *
  * @return microseconds; 0 means poll now, also from within a hook of the gateway; 0xFFFFFFFF means
- *         that no request is under way. While a connection does not accept a response, and while a
+ *         that no request is pending. While a connection does not accept a response, and while a
  *         function of the gateway's own units returns MBM_REPLY_PENDING, it is at most 1000
  */
 uint32_t mbm_gateway_pollDelay(mbm_gateway *gateway);
 
 /**
- * Sets how many requests of one connection may be under way at once
+ * Sets how many requests of one connection may be pending at once
  * (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 4.4.1). The next
  * requests of the connection wait in its socket.
  *
  * @param most  1 to 65535; the default is 65535. Fewer if there are not enough places for requests
  */
-uint8_t mbm_gateway_setInFlight(mbm_gateway *gateway, uint16_t most);
+uint8_t mbm_gateway_setMaxPending(mbm_gateway *gateway, uint16_t most);
 
 /**
  * Sets for how long a request may wait until its line is free. After that time the gateway

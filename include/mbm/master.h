@@ -23,7 +23,7 @@ extern "C" {
  *
  * You own the storage. Initialise it with MBM_INIT (`mbm_node meter = MBM_INIT;`) and call
  * mbm_node_begin before all else. Nodes of different lines are independent of each other. Of
- * the nodes of one line, one may have a request under way; a request of another one returns
+ * the nodes of one line, one may have a pending request; a request of another one returns
  * MBM_BUSY meanwhile. A non-blocking request that was not sent yet, because its unit may still
  * answer one that was cancelled, gives way to another node's: its status becomes MBM_CANCELLED.
  * Use a line and its nodes from one thread only, and never from an interrupt. mbm_port says
@@ -40,7 +40,7 @@ typedef struct mbm_node {
 } mbm_node;
 
 /**
- * A serial line with RTU frames: a port, a frame buffer, settings, and the request under way.
+ * A serial line with RTU frames: a port, a frame buffer, settings, and the pending request.
  * The nodes on the line use it, one request at a time: see mbm_node.
  *
  * You own the storage. Initialise it with MBM_INIT (`mbm_line line = MBM_INIT;`). Use a line
@@ -59,7 +59,7 @@ typedef struct mbm_line {
 /**
  * Begins a line with RTU frames on a port.
  *
- * It may be called again, for another port or frame buffer, whenever no request is under way;
+ * It may be called again, for another port or frame buffer, whenever no request is pending;
  * this is cheap. Settings stay. It does not open the port: that must be open already. The first
  * request waits for no gap, unless bytes arrive or mbm_line_used was called.
  *
@@ -67,7 +67,7 @@ typedef struct mbm_line {
  *                    the object is used. read, write and micros must not be NULL
  * @param frame       as for mbm_line_setFrame; also NULL, if you call that function later
  * @param frameBytes  as for mbm_line_setFrame; 0 if `frame` is NULL
- * @return a status; MBM_BUSY while a request is under way
+ * @return a status; MBM_BUSY while a request is pending
  */
 uint8_t mbm_line_beginRtu(mbm_line *line, const mbm_port *port, uint8_t *frame,
                           uint16_t frameBytes);
@@ -75,8 +75,8 @@ uint8_t mbm_line_beginRtu(mbm_line *line, const mbm_port *port, uint8_t *frame,
 /**
  * Begins a node: a unit on a line, with your words for its requests and replies.
  *
- * It may be called again, for another unit, line or words, whenever the node has no request
- * under way; this is cheap. Settings and the content of the words stay. The node discards what
+ * It may be called again, for another unit, line or words, whenever the node has no pending
+ * request; this is cheap. Settings and the content of the words stay. The node discards what
  * mbm_node_send queued. The line may be begun before or afterwards.
  *
  * The words must not overlap, and must stay valid for as long as the object is used. Any number
@@ -89,7 +89,7 @@ uint8_t mbm_line_beginRtu(mbm_line *line, const mbm_port *port, uint8_t *frame,
  * @param responseWords  0 to 255; 125 hold any reply
  * @param transmit       the words that writes send; NULL only if `transmitWords` is 0
  * @param transmitWords  0 to 255; 123 hold any request
- * @return a status; MBM_BUSY while a request of the node is under way
+ * @return a status; MBM_BUSY while a request of the node is pending
  */
 uint8_t mbm_node_begin(mbm_node *node, mbm_line *line, uint8_t unit, uint16_t *response,
                        uint16_t responseWords, uint16_t *transmit, uint16_t transmitWords);
@@ -103,7 +103,7 @@ uint8_t mbm_node_begin(mbm_node *node, mbm_line *line, uint8_t unit, uint16_t *r
 uint8_t mbm_node_beginTransmission(mbm_node *node, uint16_t address);
 
 /**
- * Sets the buffer of one frame. The line uses it only while a request is under way. So in
+ * Sets the buffer of one frame. The line uses it only while a request is pending. So in
  * blocking mode it may lie on the stack of a function that sets it and makes the request.
  *
  * A frame buffer of MBM_FRAME_BYTES(words) bytes suffices for every request and reply with
@@ -113,14 +113,14 @@ uint8_t mbm_node_beginTransmission(mbm_node *node, uint16_t address);
  *
  * @param frame       the buffer. Its content is not used between requests
  * @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
- * @return a status; MBM_BUSY while a request is under way
+ * @return a status; MBM_BUSY while a request is pending
  */
 uint8_t mbm_line_setFrame(mbm_line *line, uint8_t *frame, uint16_t frameBytes);
 
 /**
- * Gives up the request under way, whichever node has made it, and switches the driver off. The
+ * Gives up the pending request, whichever node has made it, and switches the driver off. The
  * status of that node becomes MBM_CANCELLED when you poll it. Call it if the node is lost.
- * If no request is under way, it does nothing.
+ * If no request is pending, it does nothing.
  */
 uint8_t mbm_line_cancel(mbm_line *line);
 
@@ -248,13 +248,13 @@ uint8_t mbm_node_poll(mbm_node *node);
  * the driver would go off late.
  *
  * @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
- *         0xFFFFFFFF means that the node has no request under way
+ *         0xFFFFFFFF means that the node has no pending request
  */
 uint32_t mbm_node_pollDelay(mbm_node *node);
 
 /**
- * Gives up the request under way and switches the driver off. The status of the request
- * becomes MBM_CANCELLED. If the node has no request under way, it does nothing. If the request
+ * Gives up the pending request and switches the driver off. The status of the request
+ * becomes MBM_CANCELLED. If the node has no pending request, it does nothing. If the request
  * was sent, its reply may still come, so the next request to that unit is sent later: see
  * mbm_line_setQuietTime.
  */
@@ -263,7 +263,7 @@ uint8_t mbm_node_cancel(mbm_node *node);
 /**
  * Returns the status of the last request.
  *
- * @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no request
+ * @return the status: MBM_PENDING while the request is pending, MBM_OK if there was no request
  */
 uint8_t mbm_node_status(const mbm_node *node);
 
@@ -297,7 +297,7 @@ uint8_t mbm_node_getExceptionCode(const mbm_node *node);
  * @return a status; MBM_PENDING in non-blocking mode; an exception of the device (0x01 to 0x7F);
  *         MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC, MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID,
  *         MBM_INVALID_FUNCTION, MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
- *         MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a request is under way on the
+ *         MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a request is pending on the
  *         line; MBM_NOT_INITIALISED if the line has no port or no frame buffer
  */
 uint8_t mbm_node_readCoils(mbm_node *node, uint16_t address, uint16_t quantity);
@@ -469,7 +469,7 @@ uint8_t mbm_node_setBlocking(mbm_node *node, uint8_t on);
  * every reply.
  *
  * @param on  0 (the default) or 1
- * @return a status; MBM_BUSY while a request is under way
+ * @return a status; MBM_BUSY while a request is pending
  */
 uint8_t mbm_node_setLenient(mbm_node *node, uint8_t on);
 

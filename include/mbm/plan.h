@@ -151,7 +151,7 @@ typedef struct mbm_planSetup {
     uint16_t *data;
     /** Storage: the requests with which the plan reads, initialised with MBM_INIT; they are the
      *  plan's alone. With one it sends one read after the other; more are for Modbus TCP, where
-     *  several may be under way at once. */
+     *  several may be in flight at once. */
     mbm_clientRequest *requests;
     /** Units with limits of their own; NULL for none. */
     const mbm_planUnitLimits *units;

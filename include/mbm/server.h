@@ -609,12 +609,12 @@ typedef struct mbm_server {
  * Begins a server for RTU on a serial line. The baud rate is unknown at first, so 4 ms
  * of silence end a frame: see mbm_server_setBaudRate.
  *
- * You may call it again at any time, but not from within a hook of the server. The
- * server then drops the request or response in progress; if it was sending, it calls
- * postTransmission of the previous port to switch the driver off. A call that fails
- * changes nothing. The function does not open the port. The units and the buffer must
- * stay valid, at the same address, for as long as the server is used. Several servers
- * may share units. The buffer holds no data between requests.
+ * You may call it again at any time, but not from within a hook of the server. The server then
+ * drops the request that it serves and the response that it sends; if it was sending, it calls
+ * postTransmission of the previous port to switch the driver off. A call that fails changes
+ * nothing. The function does not open the port. The units and the buffer must stay valid, at
+ * the same address, for as long as the server is used. Several servers may share units. The
+ * buffer holds no data between requests.
  *
  * @param port   is copied; its hooks read, write and micros are required
  * @param units  the units to serve: one unit, or an array of units

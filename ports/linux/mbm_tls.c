@@ -236,7 +236,7 @@ static uint32_t now(const mbm_tls *tls)
     return tls->below.micros(tls->below.context);
 }
 
-/* For how many microseconds the handshake has been under way. A clock that steps back is not far
+/* For how many microseconds the handshake has gone on. A clock that steps back is not far
  * ahead. */
 static uint32_t age_of(const mbm_tls *tls)
 {
@@ -321,8 +321,8 @@ static void push(mbm_tls *tls)
     tls->sent = tls->toSend = 0;
 }
 
-/* Moves on what is under way. Returns 1 if the session is open, 0 if it may become open, -1 if
- * it is over. */
+/* Carries on with the handshake or the records. Returns 1 if the session is open, 0 if it may
+ * become open, -1 if it is over. */
 static int advance(mbm_tls *tls)
 {
     if (tls->status == MBM_TLS_HANDSHAKE)

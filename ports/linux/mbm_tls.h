@@ -60,7 +60,7 @@ extern "C" {
 /** What mbm_tls.status says, and what functions return. */
 enum {
     MBM_TLS_CLOSED = 0,    /**< not opened, or closed by this side; a function's success */
-    MBM_TLS_HANDSHAKE = 1, /**< the handshake is under way */
+    MBM_TLS_HANDSHAKE = 1, /**< the handshake goes on */
     MBM_TLS_OPEN = 2,      /**< both sides are authenticated; Modbus may flow */
     MBM_TLS_CLOSING = 3,   /**< this side's close_notify is not sent yet */
 

@@ -5,7 +5,7 @@ const char *mbm_tls_text(uint8_t status)
 {
     switch (status) {
     case MBM_TLS_CLOSED: return "closed";
-    case MBM_TLS_HANDSHAKE: return "the handshake is under way";
+    case MBM_TLS_HANDSHAKE: return "the handshake goes on";
     case MBM_TLS_OPEN: return "open";
     case MBM_TLS_CLOSING: return "the end of the session is not sent yet";
     case MBM_TLS_PEER_CLOSED: return "the peer ended the session";

@@ -367,7 +367,7 @@ def check_reload(bench):
     result(bench, subscriber, "hall/north/pump/level", "33", "there is no such field")
     expect("both lines keep their connections", (len(one.device.peers), len(two.device.peers)) == connections)
 
-    # A line is removed and another added, while a write is under way.
+    # A line is removed and another added, while a write is pending.
     two.mood = "silent"
     wait(lambda: subscriber.last.get("hall/north/pump/unit/2/status") == "offline")
     bridge_file(bench, (three.line, "file: pump.yaml, topic: south/pump"), (one.line, "file: meter.yaml"),

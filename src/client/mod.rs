@@ -57,7 +57,7 @@ pub const ASCII_SILENCE: u32 = millis(1000);
 /// all bytes.
 const WRITE_RETRY_DELAY: u32 = millis(1);
 
-/// A client on a [`Transport`], for up to `N` requests that are queued or in flight.
+/// A client on a [`Transport`], for up to `N` pending requests.
 #[derive(Debug)]
 pub struct Client<L, J, const N: usize> {
     queue: RequestQueue<J, N>,
@@ -84,7 +84,7 @@ impl<L, J, const N: usize> Client<L, J, N> {
         self.queue.suspended = false;
     }
 
-    /// Number of requests that are queued or in flight.
+    /// Number of pending requests: queued or in flight.
     pub fn pending(&self) -> usize {
         self.queue.pending()
     }

@@ -26,7 +26,7 @@ pub struct RequestQueue<J, const N: usize> {
     pub has_transaction_ids: bool,
     /// Requests may have their own limit of retries.
     pub may_retry: bool,
-    /// Requests under way go on, but no other one is sent.
+    /// Requests in flight go on, but no other one is sent.
     pub is_held: bool,
     /// Requests in a row that timed out or that the port did not accept, up to 127. After an answer
     /// it is the number of requests in flight below 0, since these do not count.
@@ -61,17 +61,17 @@ impl<J, const N: usize> RequestQueue<J, N> {
         }
     }
 
-    /// True if no request is queued or in flight.
+    /// True if no request is pending.
     pub fn is_empty(&self) -> bool {
         self.queue.is_empty() && self.active.is_none()
     }
 
-    /// Number of requests that are queued or in flight.
+    /// Number of pending requests: queued or in flight.
     pub fn pending(&self) -> usize {
         self.queue.len() + usize::from(self.active.is_some())
     }
 
-    /// True if `matches` returns true for a request that is queued or in flight.
+    /// True if `matches` returns true for a pending request.
     pub fn holds(&self, matches: impl Fn(&J) -> bool) -> bool {
         self.active.as_ref().is_some_and(&matches) || self.queue.iter().any(&matches)
     }
@@ -344,7 +344,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         self.queue.iter().any(is_lost)
     }
 
-    /// Marks all requests, none of which is under way, as lost.
+    /// Marks all requests, none of which is in flight, as lost.
     pub fn fail_all(&mut self) {
         self.mark_lost(|_| true);
     }

@@ -284,7 +284,7 @@ impl<'a> Request<'a> {
     /// The result of a request that the client has returned.
     ///
     /// # Errors
-    /// Why it failed; `PENDING` while it is in progress.
+    /// Why it failed; `PENDING` while it is pending.
     pub fn result(&self) -> Result<(), Error> {
         self.state.status.result()
     }

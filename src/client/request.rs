@@ -34,7 +34,7 @@ pub struct RequestState {
     pub transaction: u16,
     /// The unit that the request is for. A client refuses one above 255.
     pub unit: u16,
-    /// [`Status::PENDING`] while the request is queued or in flight, then its result.
+    /// [`Status::PENDING`] while the request is pending, then its result.
     pub status: Status,
     /// The exception code of the response as received; 0 if it was no exception.
     pub exception: u8,

@@ -1,7 +1,7 @@
 //! The gateway: takes requests from Modbus TCP connections, passes each to the line of its
 //! unit, and sends the reply back.
 //!
-//! A connection may have several requests under way. The replies go back in the order in
+//! A connection may have several pending requests. The replies go back in the order in
 //! which they are known, each with the transaction identifier of its request. The requests
 //! for one line wait in a queue. When the line is free, the connections take turns, and the
 //! oldest request of a connection goes first. So one client that floods the gateway does not

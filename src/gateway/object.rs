@@ -57,8 +57,8 @@ impl<S: GatewayStorage> Gateway<S> {
         }
     }
 
-    /// Sets how many requests of one connection may be under way, at least 1.
-    pub fn set_most_requests(&mut self, most: u16) {
+    /// Sets how many requests of one connection may be pending, at least 1.
+    pub fn set_max_pending(&mut self, most: u16) {
         self.most = most;
     }
 
@@ -96,8 +96,8 @@ impl<S: GatewayStorage> Gateway<S> {
         state.requests.saturating_sub(receiving)
     }
 
-    /// True if the next poll reads bytes from a connection. Otherwise it has as many requests
-    /// under way as it may have.
+    /// True if the next poll reads bytes from a connection. Otherwise it has as many pending
+    /// requests as it may have.
     pub fn is_reading(&mut self, connection: u8) -> bool {
         let state = *self.storage.connection(connection);
         state.is_open() && (state.receiving != NONE || self.may_have_more(connection))

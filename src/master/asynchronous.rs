@@ -432,7 +432,7 @@ where
     }
 }
 
-/// A request in progress. If the future that has it is dropped, the request is cancelled.
+/// A pending request. If the future that has it is dropped, the request is cancelled.
 struct Running<'a, D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)>(
     &'a mut AsyncMaster<D, C, T, S, E>,
 );

@@ -61,7 +61,7 @@ impl<P, S: Words> Master<P, S> {
         &mut self.line
     }
 
-    /// The status of the last request; [`Status::PENDING`] while it is in progress.
+    /// The status of the last request; [`Status::PENDING`] while it is pending.
     pub fn status(&self) -> Status {
         self.node.status()
     }
@@ -76,7 +76,7 @@ impl<P, S: Words> Master<P, S> {
         self.line.is_waiting()
     }
 
-    /// True while a request is in progress.
+    /// True while a request is pending.
     pub fn is_pending(&self) -> bool {
         self.line.is_pending()
     }
@@ -133,12 +133,12 @@ impl<P: Port, S: Words> Master<P, S> {
     /// Sets whether a reply that deviates from the standard is accepted if no right reply has
     /// arrived within the response timeout, and whether reads are sent to unit 0. A deviating reply
     /// has the right unit, function and CRC, and repeats another address, value or quantity, or has
-    /// more or fewer data than were requested. Call it only while no request is in progress.
+    /// more or fewer data than were requested. Call it only while no request is pending.
     pub fn set_lenient(&mut self, on: bool) {
         self.line.set_lenient(Line::<P, S>::lenient(on));
     }
 
-    /// Cancels the request in progress, if there is one. Its status becomes
+    /// Cancels the pending request, if there is one. Its status becomes
     /// [`Status::CANCELLED`].
     pub fn cancel(&mut self) {
         if self.node.is_pending() {
@@ -147,7 +147,7 @@ impl<P: Port, S: Words> Master<P, S> {
         }
     }
 
-    /// Advances the request in progress, without waiting. Returns [`Poll::Pending`] until
+    /// Advances the pending request, without waiting. Returns [`Poll::Pending`] until
     /// the request has ended, then its result.
     pub fn poll(&mut self) -> Poll<Result<(), Error>> {
         if self.node.is_pending() {
@@ -167,7 +167,7 @@ impl<P: Port, S: Words> Master<P, S> {
         }
     }
 
-    /// Polls until the request in progress has ended, and calls `idle` between the polls.
+    /// Polls until the pending request has ended, and calls `idle` between the polls.
     ///
     /// # Errors
     /// The error with which the request has ended.
@@ -209,7 +209,7 @@ impl<P: Port, S: Words> Master<P, S> {
     /// 01: reads 1 to 2000 coils into the response words.
     ///
     /// # Errors
-    /// Nothing is sent then: [`Error::BUSY`] while a request is in progress;
+    /// Nothing is sent then: [`Error::BUSY`] while a request is pending;
     /// [`Error::ILLEGAL_DATA_VALUE`] for a quantity that the standard or the buffers do not
     /// allow; [`Error::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535;
     /// [`Error::BUFFER_TOO_SMALL`]; [`Error::BROADCAST_NOT_ALLOWED`];

@@ -13,7 +13,7 @@ use crate::port::Port;
 /// The value returned for a word that does not exist.
 pub const NO_WORD: u16 = 0xFFFF;
 
-/// A serial line: its port, its buffers and its settings, and the request under way. Any number
+/// A serial line: its port, its buffers and its settings, and the pending request. Any number
 /// of nodes use it, one request after the other.
 pub type Line<P, S> = Engine<P, S, MasterRequest>;
 
@@ -64,7 +64,7 @@ impl Node {
         self.unit
     }
 
-    /// The status of the last request; [`Status::PENDING`] while it is in progress.
+    /// The status of the last request; [`Status::PENDING`] while it is pending.
     pub fn status(&self) -> Status {
         self.status
     }
@@ -74,7 +74,7 @@ impl Node {
         self.exception
     }
 
-    /// True while a request of this node is in progress.
+    /// True while a request of this node is pending.
     pub fn is_pending(&self) -> bool {
         self.status == Status::PENDING
     }

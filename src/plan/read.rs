@@ -63,7 +63,7 @@ pub(super) const DOUBTED: u8 = 2;
 pub(super) const HAS_DATA: u8 = 4;
 /// Another read of its unit, which does not answer, goes before it.
 pub(super) const HELD: u8 = 8;
-/// It is queued or under way.
+/// It is queued or in flight.
 pub(super) const QUEUED: u8 = 16;
 
 /// One request that the plan repeats, and what came of it. (What changes is in cells: the reads

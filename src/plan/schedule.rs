@@ -171,7 +171,7 @@ impl Schedule {
             state = before;
             doublings = read.doublings.get();
             if !has_come(now, read.not_before.get()) {
-                // It was under way when another read found the unit silent.
+                // It was in flight when another read found the unit silent.
                 not_before = read.not_before.get();
             } else if is_silence(status) {
                 let mut wait = backoff.first_ms << doublings;

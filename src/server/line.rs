@@ -187,7 +187,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         server
     }
 
-    /// Sets the framing and waits for a request. A request in progress is dropped.
+    /// Sets the framing and waits for a request. A request that has arrived in part is dropped.
     #[inline(always)]
     pub(super) fn begin(
         &mut self,

@@ -162,7 +162,7 @@ pub(super) struct ObservedFrame<'a> {
     pub response: bool,
 }
 
-/// How many requests may be open at once: as many as a TCP server may have in progress
+/// How many requests may be open at once: as many as a TCP server may serve at once
 /// (messaging on TCP/IP guide V1.0b, 4.4.1.3).
 pub(super) const SLOTS: usize = 16;
 

@@ -128,7 +128,7 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
 ///
 /// @param client     the object, begun with mbm_client_beginAscii
 /// @param character  1 to 127, except CR, the colon and hexadecimal digits
-/// @return a status; MBM_BUSY while a request is under way
+/// @return a status; MBM_BUSY while a request is in flight
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, character: u8) -> u8 {
     pointers::with(client, |object| {
@@ -159,7 +159,7 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
 }
 
 /// Begins a client of a TCP stream with frames that have the MBAP header (messaging on
-/// TCP/IP guide V1.0b, 3.1.3). One request is under way at a time, unless mbm_client_setInFlight
+/// TCP/IP guide V1.0b, 3.1.3). One request is in flight at a time, unless mbm_client_setInFlight
 /// allows more. The client matches responses to requests by the transaction identifier, in any
 /// order.
 ///
@@ -194,7 +194,7 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
     }
 }
 
-/// Sets how many requests may be under way at once on TCP. More are faster, if the server accepts
+/// Sets how many requests may be in flight at once on TCP. More are faster, if the server accepts
 /// them (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to 16). Many take
 /// one at a time: they drop a request that arrives before they have answered the last one, or
 /// in one segment with another. The queue always holds 16.

@@ -28,7 +28,7 @@ pub struct mbm_linkHooks {
 }
 
 /// Closes the link and opens it again. The client discards an incomplete response. Requests
-/// that were under way end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
+/// in flight end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
 /// that were not sent yet are sent over the new link.
 ///
 /// @param link  your hooks, used during this call only; NULL if you have opened the link again
@@ -91,7 +91,7 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
 /// @param client  the object. If `line` is not NULL, it must use RTU or RTU over TCP
 /// @param line    a line, which then uses the client's port; NULL if you use the wire in another
 ///                way
-/// @return a status; MBM_BUSY if a request is under way or the client is suspended already
+/// @return a status; MBM_BUSY if a request is in flight or the client is suspended already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_suspend(client: *mut mbm_client, line: *mut mbm_line) -> u8 {
     let status = pointers::with(client, |object| {
@@ -127,7 +127,7 @@ pub unsafe extern "C" fn mbm_client_suspend(client: *mut mbm_client, line: *mut 
 /// MBM_NOT_INITIALISED. A line that was begun on another port meanwhile keeps that port.
 ///
 /// @param line  the line that was passed to mbm_client_suspend; NULL if none was
-/// @return a status; MBM_BUSY while a request is under way on the line; MBM_INVALID_ARGUMENT if the
+/// @return a status; MBM_BUSY while a request of the line is pending; MBM_INVALID_ARGUMENT if the
 ///         client was not suspended, and for any other line
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, line: *mut mbm_line) -> u8 {

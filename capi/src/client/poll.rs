@@ -132,7 +132,7 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
     }
 }
 
-/// Returns how many requests are pending: queued or under way.
+/// Returns how many requests are pending: queued or in flight.
 ///
 /// @return 0 to 16
 #[no_mangle]

@@ -111,7 +111,7 @@ pub unsafe extern "C" fn mbm_gateway_status(gateway: *const mbm_gateway, connect
     .code()
 }
 
-/// Returns how many requests of a connection are under way: complete, but not answered yet.
+/// Returns how many requests of a connection are pending: complete, but not answered yet.
 /// The connection is not idle while it has one.
 ///
 /// @param connection  the number of the place
@@ -122,7 +122,7 @@ pub unsafe extern "C" fn mbm_gateway_pending(gateway: *const mbm_gateway, connec
 }
 
 /// Returns whether the next mbm_gateway_poll reads bytes from a connection. If not, the
-/// connection has as many requests under way as it may have, and its next requests wait in its
+/// connection has as many pending requests as it may have, and its next requests wait in its
 /// socket: do not wait for bytes of it.
 ///
 /// @param connection  the number of the place

@@ -29,7 +29,7 @@ pub unsafe extern "C" fn mbm_gateway_poll(gateway: *mut mbm_gateway) -> u8 {
 /// mbm_gateway_isReading), or a connection is lost.
 ///
 /// @return microseconds; 0 means poll now, also from within a hook of the gateway; 0xFFFFFFFF means
-///         that no request is under way. While a connection does not accept a response, and while a
+///         that no request is pending. While a connection does not accept a response, and while a
 ///         function of the gateway's own units returns MBM_REPLY_PENDING, it is at most 1000
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_pollDelay(gateway: *mut mbm_gateway) -> u32 {

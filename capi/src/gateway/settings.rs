@@ -16,18 +16,18 @@ use mbm::pdu::is_public;
 use mbm::pdu::length::{self, Length};
 use mbm::time::timeout;
 
-/// Sets how many requests of one connection may be under way at once
+/// Sets how many requests of one connection may be pending at once
 /// (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 4.4.1). The next
 /// requests of the connection wait in its socket.
 ///
 /// @param most  1 to 65535; the default is 65535. Fewer if there are not enough places for requests
 #[no_mangle]
-pub unsafe extern "C" fn mbm_gateway_setInFlight(gateway: *mut mbm_gateway, most: u16) -> u8 {
+pub unsafe extern "C" fn mbm_gateway_setMaxPending(gateway: *mut mbm_gateway, most: u16) -> u8 {
     pointers::with(gateway, |core| {
         if most == 0 {
             return Status::INVALID_ARGUMENT;
         }
-        (*core).set_most_requests(most);
+        (*core).set_max_pending(most);
         Status::OK
     })
 }

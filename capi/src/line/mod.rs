@@ -47,7 +47,7 @@ unsafe impl CObject for mbm_line {
 }
 
 /// Whether the port and the buffers of the line may be changed: [`Status::OK`];
-/// [`Status::BUSY`] while a request is under way; [`Status::INVALID_ARGUMENT`] for NULL. Makes
+/// [`Status::BUSY`] while a request is pending; [`Status::INVALID_ARGUMENT`] for NULL. Makes
 /// zeroed storage a line with default settings, without port and frame buffer.
 ///
 /// # Safety
@@ -89,7 +89,7 @@ pub(crate) unsafe fn core_of(line: *mut mbm_line) -> *mut Core {
 
 /// Begins a line with RTU frames on a port.
 ///
-/// It may be called again, for another port or frame buffer, whenever no request is under way;
+/// It may be called again, for another port or frame buffer, whenever no request is pending;
 /// this is cheap. Settings stay. It does not open the port: that must be open already. The first
 /// request waits for no gap, unless bytes arrive or mbm_line_used was called.
 ///
@@ -97,7 +97,7 @@ pub(crate) unsafe fn core_of(line: *mut mbm_line) -> *mut Core {
 ///                    the object is used. read, write and micros must not be NULL
 /// @param frame       as for mbm_line_setFrame; also NULL, if you call that function later
 /// @param frameBytes  as for mbm_line_setFrame; 0 if `frame` is NULL
-/// @return a status; MBM_BUSY while a request is under way
+/// @return a status; MBM_BUSY while a request is pending
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_beginRtu(
     line: *mut mbm_line,
@@ -125,7 +125,7 @@ fn is_frame_refused(frame: *mut u8, bytes: u16) -> bool {
     frame.is_null() || bytes < 8
 }
 
-/// Sets the buffer of one frame. The line uses it only while a request is under way. So in
+/// Sets the buffer of one frame. The line uses it only while a request is pending. So in
 /// blocking mode it may lie on the stack of a function that sets it and makes the request.
 ///
 /// A frame buffer of MBM_FRAME_BYTES(words) bytes suffices for every request and reply with
@@ -135,7 +135,7 @@ fn is_frame_refused(frame: *mut u8, bytes: u16) -> bool {
 ///
 /// @param frame       the buffer. Its content is not used between requests
 /// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
-/// @return a status; MBM_BUSY while a request is under way
+/// @return a status; MBM_BUSY while a request is pending
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setFrame(
     line: *mut mbm_line,
@@ -155,9 +155,9 @@ pub unsafe extern "C" fn mbm_line_setFrame(
     }
 }
 
-/// Gives up the request under way, whichever node has made it, and switches the driver off. The
+/// Gives up the pending request, whichever node has made it, and switches the driver off. The
 /// status of that node becomes MBM_CANCELLED when you poll it. Call it if the node is lost.
-/// If no request is under way, it does nothing.
+/// If no request is pending, it does nothing.
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_cancel(line: *mut mbm_line) -> u8 {
     let status = pointers::check(line);

@@ -2,7 +2,7 @@
 
 use core::ffi::c_void;
 
-/// A serial line with RTU frames: a port, a frame buffer, settings, and the request under way.
+/// A serial line with RTU frames: a port, a frame buffer, settings, and the pending request.
 /// The nodes on the line use it, one request at a time: see mbm_node.
 ///
 /// You own the storage. Initialise it with MBM_INIT (`mbm_line line = MBM_INIT;`). Use a line

@@ -54,9 +54,9 @@ const _: () = {
 /// - It looks whether the link is still open before it sends a request. So a peer that closes idle
 ///   connections costs no request.
 /// - It replaces a connection on which the device answers no more: see mbm_link_setReplaceAfter.
-/// - When the link is lost, requests under way end with MBM_LINK_LOST, because the device may
+/// - When the link is lost, requests in flight end with MBM_LINK_LOST, because the device may
 ///   have carried them out. The others end too, or wait: see mbm_link_setRequestsWait.
-/// - Requests that are under way when the link begins go on if `status` finds the link open, and
+/// - Requests that are in flight when the link begins go on if `status` finds the link open, and
 ///   end with MBM_LINK_LOST if not. No byte of an ended request is sent over a new link.
 ///
 /// mbm_client_pollDelay returns when the next poll is due, for an idle client at most one
@@ -208,7 +208,7 @@ pub unsafe extern "C" fn mbm_link_end(link: *mut mbm_link) -> u8 {
 
 /// Closes the link and opens it again, at the next poll of the client and without a wait. Call
 /// it when you know better than the link: the network is back, the address has changed. Requests
-/// that are under way end with MBM_LINK_LOST; queued ones wait for this attempt.
+/// in flight end with MBM_LINK_LOST; queued ones wait for this attempt.
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
     pointers::with(link, |object| {
@@ -281,8 +281,8 @@ pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeout
 
 /// Sets after how many requests in a row without any byte the link is closed and opened anew,
 /// because some devices keep a connection open on which they answer no more. Repetitions count. So
-/// do requests that you cancel while they are under way, once nothing was heard for the client's
-/// response timeout. While others are under way, which may still be answered, the link is closed
+/// do requests that you cancel while they are in flight, once nothing was heard for the client's
+/// response timeout. While others are in flight, which may still be answered, the link is closed
 /// 16 requests later at the most; they end with MBM_LINK_LOST. Requests that wait are sent over
 /// the new link.
 ///

@@ -137,7 +137,7 @@ impl LinkHooks for Hooks {
 }
 
 /// Gives up what the client has sent and received in part, because bytes of it must not get into
-/// the next connection. Its requests under way end with [`Status::LINK_LOST`].
+/// the next connection. Its requests in flight end with [`Status::LINK_LOST`].
 ///
 /// # Safety
 /// `link` is that of its client; the port's hooks that this calls must not use either.
@@ -345,7 +345,7 @@ unsafe fn close_if_silent(link: *mut Object, object: *mut client::Object, now: u
     }
 }
 
-/// Notes that a request under way was cancelled, and discards its state.
+/// Notes that a request in flight was cancelled, and discards its state.
 ///
 /// # Safety
 /// As for [`TransportKind::release`]; `object` has a link.

@@ -58,8 +58,8 @@ unsafe impl CObject for mbm_node {
 
 /// Begins a node: a unit on a line, with your words for its requests and replies.
 ///
-/// It may be called again, for another unit, line or words, whenever the node has no request
-/// under way; this is cheap. Settings and the content of the words stay. The node discards what
+/// It may be called again, for another unit, line or words, whenever the node has no pending
+/// request; this is cheap. Settings and the content of the words stay. The node discards what
 /// mbm_node_send queued. The line may be begun before or afterwards.
 ///
 /// The words must not overlap, and must stay valid for as long as the object is used. Any number
@@ -72,7 +72,7 @@ unsafe impl CObject for mbm_node {
 /// @param responseWords  0 to 255; 125 hold any reply
 /// @param transmit       the words that writes send; NULL only if `transmitWords` is 0
 /// @param transmitWords  0 to 255; 123 hold any request
-/// @return a status; MBM_BUSY while a request of the node is under way
+/// @return a status; MBM_BUSY while a request of the node is pending
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_begin(
     node: *mut mbm_node,
@@ -121,7 +121,7 @@ unsafe fn check_line(object: *mut Object) -> Status {
     unsafe { pointers::check_mark((*object).line) }
 }
 
-/// True if the request under way on the line is that of the node.
+/// True if the pending request of the line is that of the node.
 ///
 /// # Safety
 /// [`check_line`] returned [`Status::OK`] for the node.
@@ -183,7 +183,7 @@ unsafe extern "C" fn poll(node: *mut mbm_node) -> u8 {
 /// the driver would go off late.
 ///
 /// @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
-///         0xFFFFFFFF means that the node has no request under way
+///         0xFFFFFFFF means that the node has no pending request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_pollDelay(node: *mut mbm_node) -> u32 {
     let object = node.cast::<Object>();
@@ -199,8 +199,8 @@ pub unsafe extern "C" fn mbm_node_pollDelay(node: *mut mbm_node) -> u32 {
     }
 }
 
-/// Gives up the request under way and switches the driver off. The status of the request
-/// becomes MBM_CANCELLED. If the node has no request under way, it does nothing. If the request
+/// Gives up the pending request and switches the driver off. The status of the request
+/// becomes MBM_CANCELLED. If the node has no pending request, it does nothing. If the request
 /// was sent, its reply may still come, so the next request to that unit is sent later: see
 /// mbm_line_setQuietTime.
 #[no_mangle]
@@ -224,7 +224,7 @@ pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
 
 /// Returns the status of the last request.
 ///
-/// @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no request
+/// @return the status: MBM_PENDING while the request is pending, MBM_OK if there was no request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_status(node: *const mbm_node) -> u8 {
     // SAFETY: as the header demands; every object is writable storage.

@@ -7,7 +7,7 @@ use core::ffi::c_void;
 ///
 /// You own the storage. Initialise it with MBM_INIT (`mbm_node meter = MBM_INIT;`) and call
 /// mbm_node_begin before all else. Nodes of different lines are independent of each other. Of
-/// the nodes of one line, one may have a request under way; a request of another one returns
+/// the nodes of one line, one may have a pending request; a request of another one returns
 /// MBM_BUSY meanwhile. A non-blocking request that was not sent yet, because its unit may still
 /// answer one that was cancelled, gives way to another node's: its status becomes MBM_CANCELLED.
 /// Use a line and its nodes from one thread only, and never from an interrupt. mbm_port says

@@ -24,7 +24,7 @@ use mbm::pdu::functions::FunctionSpec;
 /// @return a status; MBM_PENDING in non-blocking mode; an exception of the device (0x01 to 0x7F);
 ///         MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC, MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID,
 ///         MBM_INVALID_FUNCTION, MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
-///         MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a request is under way on the
+///         MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a request is pending on the
 ///         line; MBM_NOT_INITIALISED if the line has no port or no frame buffer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_readCoils(

@@ -62,7 +62,7 @@ pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8
 /// every reply.
 ///
 /// @param on  0 (the default) or 1
-/// @return a status; MBM_BUSY while a request is under way
+/// @return a status; MBM_BUSY while a request is pending
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setLenient(node: *mut mbm_node, on: u8) -> u8 {
     with(node, |node| {

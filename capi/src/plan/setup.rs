@@ -92,7 +92,7 @@ pub struct mbm_planSetup {
     pub data: *mut u16,
     /// Storage: the requests with which the plan reads, initialised with MBM_INIT; they are the
     /// plan's alone. With one it sends one read after the other; more are for Modbus TCP, where
-    /// several may be under way at once.
+    /// several may be in flight at once.
     pub requests: *mut mbm_clientRequest,
     /// Units with limits of their own; NULL for none.
     pub units: *const mbm_planUnitLimits,

@@ -24,7 +24,7 @@ const GAP: u64 = 5_000;
 
 type Outcome = Result<(), (usize, String)>;
 
-/// A response that is under way.
+/// A response that a device will send.
 struct Due {
     at: u64,
     pause: u64,

@@ -76,7 +76,7 @@ pub unsafe fn use_objects(context: *mut c_void) {
     }
 }
 
-/// Calls the functions of a line whose node has a request under way, and those of its nodes.
+/// Calls the functions of a line whose node has a pending request, and those of its nodes.
 unsafe fn use_line(context: *mut c_void) {
     unsafe {
         let (line, node, other) = {

@@ -140,7 +140,7 @@ fn set(w: &World, gateway: *mut mbm_gateway) {
     };
     refused_changes_nothing(w, &[span(gateway)], "mbm_gateway_set", || {
         match byte >> 2 & 3 {
-            0 => call!(w, gateway, mbm_gateway_setInFlight(gateway, word % 8)),
+            0 => call!(w, gateway, mbm_gateway_setMaxPending(gateway, word % 8)),
             1 => call!(
                 w,
                 gateway,

@@ -134,7 +134,7 @@ fn request(w: &World, node: *mut mbm_node) {
     }
 }
 
-/// While a request of the node is under way, the line takes none of another node, and neither
+/// While a request of the node is pending, the line takes none of another node, and neither
 /// the line nor the node can be begun again.
 fn changes_are_refused(w: &World, node: *mut mbm_node) {
     let line = w.line_of(node);
@@ -159,7 +159,7 @@ fn changes_are_refused(w: &World, node: *mut mbm_node) {
             1 => call!(w, line, mbm_line_beginRtu(line, port, frame, 256)),
             _ => call!(w, line, mbm_line_setFrame(line, frame, 256)),
         });
-        assert_eq!(status, MBM_BUSY, "a change while a request is under way");
+        assert_eq!(status, MBM_BUSY, "a change while a request is pending");
     }
 }
 

@@ -1,7 +1,7 @@
 /* A clock made from a counter of any rate. Dividing the count would make the clock wrap too
  * early, so the microseconds that have passed are added up. This needs no interrupt, but
  * the clock must be read at least once in each turn of the counter, or that turn is lost.
- * mbm reads the clock all the time while a request is under way; between requests a lost
+ * mbm reads the clock all the time while a request is pending; between requests a lost
  * turn does no harm.
  * Licence: MIT OR Apache-2.0. */
 #include "counter.h"

@@ -22,7 +22,7 @@ ModbusServer server;
 
 uint8_t beforeWrite(const mbm_access &access) {
   report.beforeCalls++;
-  return access.quantity == 1 && access.data[0] == 0xFF ? MBM_SLAVE_DEVICE_BUSY : 0;
+  return access.quantity == 1 && access.data[0] == 0xFF ? MBM_SERVER_DEVICE_BUSY : 0;
 }
 
 void afterWrite(const mbm_access &access) {

@@ -1,5 +1,5 @@
 // Two slaves on two ports, with requests at the same time. The sketch counts how often both
-// requests were under way together.
+// requests were pending together.
 #include <ModbusMaster.h>
 
 ModbusMaster left, right;
@@ -19,7 +19,7 @@ void prepare(ModbusMaster &node, uint8_t slave, HardwareSerial &port) {
   node.setBlocking(false);
 }
 
-// True while the request is under way.
+// True while the request is pending.
 bool moveOn(ModbusMaster &node, uint8_t which) {
   uint8_t status = node.poll();
   if (status == node.ku8MBPending)

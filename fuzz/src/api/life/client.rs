@@ -439,7 +439,7 @@ pub fn poll_master(life: &Life, own: &Master) {
     };
     let [asker, other] = [own.asker.get(), 1 - own.asker.get()].map(|index| own.nodes[index]);
     let status = call!(&life.w, other, mbm_node_poll(other));
-    assert!(status != PENDING, "two nodes have a request under way");
+    assert!(status != PENDING, "two nodes have a pending request");
     if call!(&life.w, asker, mbm_node_poll(asker)) != PENDING {
         own.pending.set(None);
         life.ends(id);

@@ -240,7 +240,7 @@ pub fn act(life: &Life) {
         }
         6 => {
             let most = 1 + u16::from(w.byte()) % 6;
-            call!(w, gateway, mbm_gateway_setInFlight(gateway, most));
+            call!(w, gateway, mbm_gateway_setMaxPending(gateway, most));
         }
         7 => socket
             .takes
