@@ -2,8 +2,8 @@
  * @file ModbusClient.h
  * @brief Modbus clients for Arduino sketches that never wait: RTU, ASCII and TCP.
  *
- * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap. Addresses are those
- * on the wire, from 0. What a sketch does not call takes no flash.
+ * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap. Addresses are those on the wire,
+ * from 0. Functions that a sketch does not call take no flash.
  *
  *     ModbusSerialClient client;
  *     ModbusRequestOf<2> volts(17); // unit 17, two words

@@ -204,10 +204,10 @@ public:
                    : refuse(request);
     }
     /**
-     * A request of any function as another client sent it, for gateways: `body` is the
-     * 0 to 252 bytes after the function code, which must stay until the request has
-     * ended. Of 14 and 15 it may lack the byte count. The request's words get what follows
-     * the function code of the reply, as bytes on the wire.
+     * A request of any function as another client sent it, for gateways: `body` is the 0 to 252
+     * bytes after the function code, which must stay until the request has ended. For 14 and 15
+     * it may lack the byte count. The request's words get the bytes that follow the function
+     * code of the reply, in the order of the wire.
      */
     uint8_t forward(ModbusRequest &request, uint8_t function, const uint8_t *body, uint16_t bytes)
     {
@@ -278,7 +278,7 @@ protected:
     /** @endcond */
 
 private:
-    // Whether the request's words hold `quantity` items, of which a word holds `perWord`.
+    // Whether the request's words hold `quantity` items; a word holds `perWord` of them.
     static bool holds(const ModbusRequest &request, uint8_t perWord, uint16_t quantity)
     {
         return quantity / perWord + (quantity % perWord != 0) <= request.size();

@@ -344,7 +344,7 @@ public:
     /**
      * Accepts replies that deviate from the standard if no correct one arrives in time:
      * another echoed address or value, another number of registers. A read of more words
-     * than the response buffer holds fills the buffer. Unit 0 may be read. Off at first.
+     * than the response buffer holds fills the buffer. Unit 0 may be read. It is off at first.
      */
     void setLenient(bool on)
     {

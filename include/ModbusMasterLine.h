@@ -34,7 +34,7 @@ template <typename User, uint8_t Bytes> class ModbusMasterLine {
 public:
     static ModbusMasterWire<User> wire;
 
-    // What requests need that may outlive the function that makes them.
+    // The data of a request that may outlive the function that makes the request.
     struct Kept {
         uint8_t (*cancel)(mbm_node *);
         uint8_t frame[Bytes];

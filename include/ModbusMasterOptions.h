@@ -11,10 +11,10 @@
  * - MODBUSMASTER_TRANSMIT_WORDS  words that a write sends, 2 to 123; 64 on AVR,
  *   else 123. A longer write returns ku8MBIllegalDataValue.
  * - MODBUSMASTER_SHARE_LINE  one line for all objects, with one set of settings, and no frame
- *   buffer: while a function waits, the frame is on its stack. It is defined on AVR boards of at
- *   most 2.5 KB of RAM. A request while another object's request is pending returns ku8MBBusy.
- *   Of the settings, only the response timeout, setLenient, setBlocking and setWordOrder belong
- *   to one object. Do not define it if several threads use objects.
+ *   buffer: while a function waits, the frame is on its stack. It is defined on AVR boards of
+ *   at most 2.5 KB of RAM. A request while another object's request is pending returns
+ *   ku8MBBusy. Only four settings belong to one object: the response timeout, setLenient,
+ *   setBlocking and setWordOrder. Do not define it if several threads use objects.
  * - MODBUSMASTER_OWN_LINES  a line and a frame buffer in each object on those boards too, so that
  *   several objects may have a pending request at the same time, and have their own settings.
  * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  the UARTs that begin(baud) opens, if

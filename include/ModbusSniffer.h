@@ -100,8 +100,8 @@ public:
     uint8_t setFrameTimeout(uint32_t ms) { return mbm_sniffer_setFrameTimeout(&sniffer, ms); }
 
     /**
-     * Reads the bytes that have arrived, prints new events and calls the callback for each.
-     * Before begin it does nothing.
+     * Reads the bytes that have arrived, prints new events and calls the callback for each. It
+     * does nothing before begin.
      */
     void poll()
     {

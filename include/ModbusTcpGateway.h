@@ -33,7 +33,7 @@
 #include "ModbusTcpConnections.h"
 #include "mbm/gateway.h"
 
-/** What a gateway keeps of one connection beside its mbm_gateway: nothing. */
+/** The state of one connection beside its mbm_gateway: none. */
 struct ModbusTcpPassed {};
 
 /**

@@ -88,9 +88,9 @@ public:
     }
 
     /**
-     * Accepts a new connection. Of each connection it receives bytes, executes a complete
-     * request and sends the response. Closes a connection that the client has closed, or
-     * whose bytes are not Modbus TCP.
+     * Accepts a new connection. For each connection it receives bytes, executes a complete
+     * request and sends the response. Closes a connection that the client has closed, or whose
+     * bytes are not Modbus TCP.
      *
      * @return MBM_OK; MBM_NOT_INITIALISED before begin; MBM_BUSY from within a hook or
      *         function of this server

@@ -139,7 +139,7 @@ errors {
     DUPLICATE_TRANSACTION = 0xF1, "another pending request has this transaction id";
     /// The request is not pending: it has ended, or was never queued.
     NOT_PENDING = 0xF2, "the request is not pending";
-    /// A device says that more follows, but what it sends or names does not come next.
+    /// A device says that more objects follow, but sends or names one that does not come next.
     NO_PROGRESS = 0xF4, "the device repeats itself without an end";
     /// A value does not fit into the type that the caller asked for.
     OUT_OF_RANGE = 0xF6, "the value is out of the range of its type";

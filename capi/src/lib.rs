@@ -1,8 +1,8 @@
 //! The C ABI of mbm, and its only unsafe code.
 //!
 //! Rules of every function here:
-//! - A pointer is NULL, or points to what the function's comment says. For NULL, and for
-//!   an object that was never begun, the function returns a status.
+//! - A pointer is NULL, or points to an object of the kind that the function's comment names.
+//!   For NULL, and for an object that was never begun, the function returns a status.
 //! - Objects are the caller's storage, zeroed before first use.
 //! - Arguments and results are integers and pointers only: no enum, no bool, no float by
 //!   value.

@@ -73,8 +73,7 @@ pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
     Status::OK.code()
 }
 
-/// As [`put`], for a length. Of an error, it writes the length 0 and returns the code of
-/// that error.
+/// As [`put`], for a length. For an error it writes the length 0 and returns the code of the error.
 ///
 /// # Safety
 /// As for [`put`].
@@ -307,8 +306,7 @@ pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a
 
 /// The characters of a C string, without the NUL that ends it.
 ///
-/// It reads at most `most + 1` characters. Of a longer string it returns the first
-/// `most + 1`.
+/// It reads and returns at most `most + 1` characters.
 ///
 /// # Safety
 /// `text` is NULL or points to characters that a NUL ends.

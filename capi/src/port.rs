@@ -1,4 +1,4 @@
-//! The port: what the C program supplies for a line.
+//! The port: the functions that the C program supplies for a line.
 
 use super::node::object::mbm_node;
 use core::ffi::c_void;
@@ -6,7 +6,7 @@ use core::ptr::null;
 use mbm::error::Error;
 use mbm::port::{result, Port};
 
-/// What your firmware supplies: a byte stream, a clock, and optional hooks.
+/// The functions that your firmware supplies: a byte stream, a clock, and optional hooks.
 ///
 /// A line keeps a pointer to its port. The port must stay valid and unchanged for as long
 /// as the line is used; it may be a constant. A client and a server copy their port.
@@ -14,10 +14,10 @@ use mbm::port::{result, Port};
 /// not called.
 ///
 /// A hook must not use the object that calls it. If it calls a function on that object, the
-/// function returns MBM_BUSY and changes nothing; a getter returns what it returns for an
-/// object that was never begun. So it is with a line, and with the request of a node that is
-/// pending; the words and the settings of a node may be used. The hook `idle` is the exception:
-/// it may call every function, but one that starts a request returns MBM_BUSY.
+/// function returns MBM_BUSY and changes nothing; a getter returns its value for an object that
+/// was never begun. For a line this rule covers the line itself and the node whose request is
+/// pending; the words and the settings of that node may be used. The hook `idle` is the
+/// exception: it may call every function, but one that starts a request returns MBM_BUSY.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_port {
@@ -75,8 +75,8 @@ impl mbm_port {
     }
 }
 
-/// Reads the clock of a port. No reference to the port, nor to the object that
-/// holds it, lives while the hook runs.
+/// Reads the clock of a port. No reference to the port or to the object that holds it lives
+/// while the hook runs.
 ///
 /// # Safety
 /// `port` points to a complete port.

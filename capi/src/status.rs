@@ -88,8 +88,8 @@ pub const MBM_NOT_PENDING: u8 = 0xF2;
 pub const MBM_NO_PROGRESS: u8 = 0xF4;
 /// A value is out of the range of the type in which the program reads it.
 pub const MBM_OUT_OF_RANGE: u8 = 0xF6;
-/// The connection was not made in time. Of a link: within its connect timeout. Of a request on
-/// Modbus TCP without a link: the port accepted no byte within the response timeout.
+/// The connection was not made in time: that of a link within its connect timeout. For a
+/// request on Modbus TCP without a link: the port accepted no byte within the response timeout.
 pub const MBM_CONNECT_TIMED_OUT: u8 = 0xF7;
 
 statuses! {

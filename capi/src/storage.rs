@@ -4,7 +4,7 @@ use core::slice::from_raw_parts_mut;
 use mbm::engine::{Setting, Settings, Storage, Words, COUNTERS};
 use mbm::time::millis;
 
-/// Counters of what happened on the line since you zeroed them. Each wraps at 2^32.
+/// Counters of the events on the line since you zeroed them. Each wraps at 2^32.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_counters {

@@ -139,8 +139,8 @@ const char *mbm_version(void);
 #define MBM_NO_PROGRESS 244u
 /** A value is out of the range of the type in which the program reads it. */
 #define MBM_OUT_OF_RANGE 246u
-/** The connection was not made in time. Of a link: within its connect timeout. Of a request on
- *  Modbus TCP without a link: the port accepted no byte within the response timeout. */
+/** The connection was not made in time: that of a link within its connect timeout. For a
+ *  request on Modbus TCP without a link: the port accepted no byte within the response timeout. */
 #define MBM_CONNECT_TIMED_OUT 247u
 
 /**
@@ -175,7 +175,7 @@ const char *mbm_status_textOf(uint8_t status, uint8_t exceptionCode);
 /* ==== Port: your line: read, write, clock, driver; counters ========================= */
 
 /**
- * What your firmware supplies: a byte stream, a clock, and optional hooks.
+ * The functions that your firmware supplies: a byte stream, a clock, and optional hooks.
  *
  * A line keeps a pointer to its port. The port must stay valid and unchanged for as long
  * as the line is used; it may be a constant. A client and a server copy their port.
@@ -183,10 +183,10 @@ const char *mbm_status_textOf(uint8_t status, uint8_t exceptionCode);
  * not called.
  *
  * A hook must not use the object that calls it. If it calls a function on that object, the
- * function returns MBM_BUSY and changes nothing; a getter returns what it returns for an
- * object that was never begun. So it is with a line, and with the request of a node that is
- * pending; the words and the settings of a node may be used. The hook `idle` is the exception:
- * it may call every function, but one that starts a request returns MBM_BUSY.
+ * function returns MBM_BUSY and changes nothing; a getter returns its value for an object that
+ * was never begun. For a line this rule covers the line itself and the node whose request is
+ * pending; the words and the settings of that node may be used. The hook `idle` is the
+ * exception: it may call every function, but one that starts a request returns MBM_BUSY.
  */
 typedef struct mbm_port {
     /** Your pointer, passed to every hook; may be NULL. */
@@ -216,7 +216,7 @@ typedef struct mbm_port {
     void (*idle)(void *context, struct mbm_node *node);
 } mbm_port;
 
-/** Counters of what happened on the line since you zeroed them. Each wraps at 2^32. */
+/** Counters of the events on the line since you zeroed them. Each wraps at 2^32. */
 typedef struct mbm_counters {
     /** Requests sent, including retries. */
     uint32_t requests;

@@ -45,8 +45,7 @@ struct mbm_line;
  * The `done` function of a request may call every function on the client that calls it,
  * except mbm_client_poll, which then returns MBM_BUSY. A hook of the port, and the `random`
  * function of mbm_client_setJitter, must not use the client: each function returns MBM_BUSY
- * and changes nothing, and a getter returns what it returns for an object that was never
- * begun.
+ * and changes nothing, and a getter returns its value for an object that was never begun.
  */
 typedef struct mbm_client {
     /** Private. */
@@ -59,8 +58,8 @@ typedef struct mbm_client {
  * A request to a device, and its result. You own the storage. Initialise it with MBM_INIT,
  * then set the fields that you need. You may use it for any number of requests.
  *
- * From the call that queues it until it has ended, do not use or change it, nor what it
- * points to. It has ended when `done` is called, or when `status` is no longer MBM_PENDING.
+ * Do not use or change it, or the memory that it points to, from the call that queues it until
+ * it has ended. It has ended when `done` is called, or when `status` is no longer MBM_PENDING.
  *
  * If a function transfers registers, `data` and `reply` are words in the machine's byte
  * order. If it transfers coils or bytes, they are bytes as on the wire; the first coil is
@@ -116,8 +115,8 @@ typedef struct mbm_clientRequest {
  * `reply` and `replyBytes` of `request`, and `object`, and pass it to
  * mbm_identification_read. You may use it for any number of devices.
  *
- * From that call until `request.status` is no longer MBM_PENDING, do not change it, nor what
- * it points to. To give it up, pass `request` to mbm_client_cancel.
+ * From that call until `request.status` is no longer MBM_PENDING, do not change it or the
+ * memory that it points to. To give it up, pass `request` to mbm_client_cancel.
  */
 typedef struct mbm_identification {
     /** The request for one part of the objects. Set its `unit`. Its `reply` receives one
@@ -741,8 +740,9 @@ uint8_t mbm_client_custom(mbm_client *client, mbm_clientRequest *request, uint8_
  * @param request   the request; if it is queued, its `data` then points into `body`
  * @param function  the function code, 1 to 127
  * @param body      the bytes after the function code; do not change them until the request has
- *                  ended; may be NULL if `bytes` is 0. Of 14 and 15 also the records alone, as
- *                  mbm_packet_addRecord builds them: the client sends their byte count before them
+ *                  ended; may be NULL if `bytes` is 0. For 14 and 15 it may be the records
+ *                  alone, as mbm_packet_addRecord builds them: the client sends their byte
+ *                  count before them
  * @param bytes     the number of bytes of `body`, 0 to 252
  * @return a status; see mbm_client_readCoils. Also those with which a server answers such a
  *         request: MBM_ILLEGAL_DATA_VALUE if the length or a count in `body` is wrong,

@@ -34,8 +34,8 @@ struct mbm_unit;
  * mbm_gateway_poll calls the hooks of the connections' ports and of the lines' ports,
  * `isReady` of the lines, and the functions of the gateway's own units. If one of them calls a
  * function on the gateway, the function returns MBM_BUSY and changes nothing; a getter returns
- * what it returns for an object that was never begun. The same holds for the `done` function
- * of a request of your own that mbm_gateway_poll ends.
+ * its value for an object that was never begun. The same holds for the `done` function of a
+ * request of your own that mbm_gateway_poll ends.
  */
 typedef struct mbm_gateway {
     /** Private. */
@@ -112,7 +112,7 @@ typedef struct mbm_gatewayRequest {
     uint8_t frame[MBM_MAX_TCP_FRAME];
 } mbm_gatewayRequest;
 
-/** What a gateway consists of. The gateway copies this struct, but not what it points to. */
+/** The parts of a gateway. The gateway copies this struct, but not the arrays that it points to. */
 typedef struct mbm_gatewayConfig {
     /** The map of units. It may be in flash. A program may also change it between two calls of
      *  the gateway: then it holds for the requests that are received later. Each route must be
@@ -142,9 +142,9 @@ typedef struct mbm_gatewayConfig {
  * connections and their requests; it cancels those that a line has, and its settings return
  * to their defaults. A call that is refused changes nothing.
  *
- * @param config  what the gateway consists of. What it points to must stay valid, and must be used
- *                by one gateway only, for as long as the gateway is used; lines, connections and
- *                requests are initialised with MBM_INIT
+ * @param config  the parts of the gateway. All memory that it points to must stay valid, and
+ *                must be used by this gateway only, for as long as the gateway is used; lines,
+ *                connections and requests are initialised with MBM_INIT
  * @return a status; MBM_INVALID_ARGUMENT for fewer requests than connections, a route to a line
  *         that does not exist or to a unit id above 255, and a line without client;
  *         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within a

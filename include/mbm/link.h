@@ -48,7 +48,7 @@ typedef struct mbm_link {
 } mbm_link;
 
 /**
- * What has happened to a link. You may read and zero the counters at any time, but not from
+ * Counters of a link. You may read and zero them at any time, but not from
  * an interrupt; each wraps at 2^32.
  */
 typedef struct mbm_linkCounters {

@@ -98,7 +98,8 @@ typedef struct mbm_planField {
     /** mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
      *  It is 0 for a text. */
     int32_t multiplier;
-    /** They divide by this after that; 0 means 1. Not negative; 0 for a text. */
+    /** They divide by this after that; 0 means 1. It must not be negative, and must be 0 for a
+     *  text. */
     int32_t divisor;
 } mbm_planField;
 
@@ -137,8 +138,8 @@ typedef struct mbm_planExcludedRange {
 } mbm_planExcludedRange;
 
 /**
- * What a plan is made of. It may be constant. It stays valid and as it is, with everything
- * that it points to, for as long as the plan is used.
+ * The parts of a plan. The struct may be constant. It must stay valid and unchanged, with
+ * everything that it points to, for as long as the plan is used.
  */
 typedef struct mbm_planSetup {
     /** The fields, in any order. */
@@ -210,10 +211,10 @@ typedef struct mbm_planReadInfo {
  * Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
  *
  * Fields with the same unit, table and interval are read together, and may overlap: what
- * several of them share is read once. Of all ways to cover them within the limits, the plan
- * takes one with the fewest reads, and of these one with the fewest bits or registers. All reads
- * are due at once; the rounds after the first are spread, so that reads of one interval follow
- * each other at equal distances.
+ * several of them share is read once. The plan covers them within the limits by the fewest
+ * reads, and among such plans by the fewest bits or registers. All reads are due at once; the
+ * rounds after the first are spread, so that reads of one interval follow each other at equal
+ * distances.
  *
  * You may call it again at any time, also from `update`, but not from a hook of the client's
  * port. The plan then first ends, as by mbm_plan_end, unless the call is refused for NULL, a

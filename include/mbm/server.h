@@ -81,8 +81,8 @@ typedef struct mbm_diagnostics {
 } mbm_diagnostics;
 
 /**
- * A unit that servers answer for. Initialise it with MBM_INIT, set `id`, and call the
- * mbm_unit_serve functions, for example mbm_unit_serveCoils, for what it serves.
+ * A unit that servers answer for. Initialise it with MBM_INIT, set `id`, and call an
+ * mbm_unit_serve function, for example mbm_unit_serveCoils, for everything that it serves.
  *
  * Each mbm_unit_serve function takes a record: a struct of yours, which must stay valid
  * for as long as the unit is used. A unit has places for MBM_MAX_SERVICES records; one

@@ -44,12 +44,12 @@ typedef struct mbm_trace {
 
 /** One frame on a line or connection, or bytes that are no frame. */
 typedef struct mbm_traceRecord {
-    /** The bytes as they are on the line. Of a sniffer's event in ASCII they are decoded, from
+    /** The bytes as they are on the line. For a sniffer's event in ASCII they are decoded, from
      *  the unit to the LRC. */
     const uint8_t *bytes;
-    /** When the first byte was sent or read, in microseconds by the clock of the port. The
-     *  time of a frame that followed other bytes without a pause is estimated. Of a sniffer's
-     *  event: when the last byte arrived. */
+    /** When the first byte was sent or read, in microseconds by the clock of the port. The time
+     *  of a frame that followed other bytes without a pause is estimated. For a sniffer's event
+     *  it is the time at which the last byte arrived. */
     uint32_t timeUs;
     /** The number of bytes. */
     uint16_t length;
@@ -70,21 +70,21 @@ typedef struct mbm_traceRecord {
  * Begins the trace of a line, client or server. Then begin that line, client or server with
  * mbm_trace_port.
  *
- * The hook is called from within the functions of the node, client or server, when the last byte
- * of a frame was sent or read. Bytes that are not followed by the rest of a frame are handed
- * out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a serial
- * line when the next frame is sent, when the link is lost, or by mbm_trace_flush. `record`
- * and its bytes are valid until the hook returns. The hook must not use this trace, nor the
- * object that uses its port: such a call returns MBM_BUSY and changes nothing. On a serial
+ * The hook is called from within the functions of the node, client or server, when the last
+ * byte of a frame was sent or read. Bytes that are not followed by the rest of a frame are
+ * handed out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a
+ * serial line when the next frame is sent, when the link is lost, or by mbm_trace_flush.
+ * `record` and its bytes are valid until the hook returns. The hook must not use this trace or
+ * the object that uses its port: such a call returns MBM_BUSY and changes nothing. On a serial
  * line it should not take longer than a character.
  *
  * You may call this function again at any time, but not from within the hook. The trace then
  * drops the bytes that it has not handed out, and its frame timeout is the default.
  *
- * @param sends    what the object that will use the port sends: MBM_PACKET_REQUEST for a line or
+ * @param sends    the frames that the object on the port sends: MBM_PACKET_REQUEST for a line or
  *                 client, MBM_PACKET_RESPONSE for a server
- * @param port     is copied; its hooks read, write and micros are required. Its optional hooks are
- *                 passed on. It must not be the port of this trace, nor that of a trace that
+ * @param port     is copied; its hooks read, write and micros are required. Its optional hooks
+ *                 are passed on. It must not be the port of this trace or of a trace that
  *                 passes everything on to this one
  * @param framing  the framing of the object that will use the port, and the declarations of your
  *                 own functions, which must stay valid and unchanged. Without a declaration, the
@@ -129,9 +129,9 @@ uint8_t mbm_trace_setFrameTimeout(mbm_trace *trace, uint32_t timeoutMs);
 uint8_t mbm_trace_flush(mbm_trace *trace);
 
 /**
- * Makes the record of an event of a sniffer, so that one hook serves what this program sends
- * and what it overhears. The direction is MBM_TRACE_RECEIVED; `kind` says whether a client or
- * a server sent the frame.
+ * Makes the record of an event of a sniffer, so that one hook serves the frames that this
+ * program sends and those that it overhears. The direction is MBM_TRACE_RECEIVED; `kind` says
+ * whether a client or a server sent the frame.
  *
  * @param event   an event that mbm_sniffer_next returned
  * @param record  receives the record; its bytes are valid as long as those of the event

@@ -16,7 +16,7 @@ pub const MOST_REPLACE_AFTER: u8 = 100;
 /// The greatest value of [`Link::fruitless`]: 16 times as many requests.
 const MOST_FRUITLESS: u8 = 4;
 
-/// What a link needs of its user.
+/// The functions that a link needs of its user.
 pub trait LinkHooks {
     /// Closes the link, if it is open.
     fn disconnect(&mut self);
@@ -198,7 +198,7 @@ impl Link {
         }
     }
 
-    /// Does what is due at the time `now`, and returns what has happened, with its status. An
+    /// Takes the step that is due at the time `now`, and returns the event, with its status. An
     /// attempt is made only if `fresh`, so at most once in each poll. `is_wanted` says that a
     /// request waits.
     pub fn step(

@@ -116,9 +116,9 @@ impl Policy {
     }
 }
 
-/// Mixes `random` into 16 bits, each of which depends on all lower bits of `random`. So
-/// the result covers its whole range, whichever bits of `random` vary. (The factor is 2^32
-/// divided by the golden ratio, which spreads consecutive numbers evenly.)
+/// Mixes `random` into 16 bits. Each of them depends on all lower bits of `random`, so the
+/// result covers its whole range, whichever bits of `random` vary. (The factor is 2^32 divided
+/// by the golden ratio, which spreads consecutive numbers evenly.)
 fn mix_bits(random: u32) -> u16 {
     (random.wrapping_mul(0x9E37_79B1) >> 16) as u16
 }

@@ -344,7 +344,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         self.queue.iter().any(is_lost)
     }
 
-    /// Marks all requests, none of which is in flight, as lost.
+    /// Marks all requests as lost. None of them is in flight.
     pub fn fail_all(&mut self) {
         self.mark_lost(|_| true);
     }

@@ -1,4 +1,4 @@
-//! What a client returns instead of queueing a request.
+//! The value that a client returns if it does not queue a request.
 
 use super::request::ClientRequest;
 use crate::error::Error;

@@ -1,4 +1,4 @@
-//! What few programs ask for: retries, echo discarding, and the post-flush hold.
+//! Settings that few programs use: retries, echo discarding, and the post-flush hold.
 //!
 //! Only [`Engine::use_extras`] names this module. A program that sets none of the three in C
 //! contains none of this code.

@@ -4,10 +4,10 @@
 //! RTU frames carry no transaction number. A late reply to an earlier request looks like the
 //! reply if unit, function and length are the same, and a late exception looks like the reply
 //! if the function is the same. So the engine counts for each unit how many replies it owes:
-//! requests that were sent, and of which no reply was seen. A frame of the unit, wanted or not,
-//! takes one away. A unit that owes none is *clean*. So is a unit that was silent for two response
-//! timeouts and the quiet time since its last request was sent, by the timeout of that request or
-//! that of an earlier one that lasts longer.
+//! the requests that were sent and whose reply was not seen. A frame of the unit, wanted or
+//! not, takes one away. A unit that owes none is *clean*. A unit is also clean once it was
+//! silent for two response timeouts and the quiet time since its last request was sent. If an
+//! earlier request has a longer timeout, that one counts.
 //!
 //! - After a request without a right reply, the line is left alone for the quiet time.
 //! - After a request that timed out, the next one to that unit is sent. Its reply is held until
@@ -28,7 +28,7 @@ use super::{Engine, Outcome, Phase, Storage, Transaction, BROADCAST};
 use crate::port::Port;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
-    /// Looks up what the unit of the pending request owes.
+    /// Looks up how many replies the unit of the pending request owes.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn look_up_owed(&mut self) {
         self.owed = 0;
@@ -40,7 +40,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Has the request wait until its unit is clean. False if it need not wait.
+    /// Makes the request wait until its unit is clean. Returns false if it need not wait.
     pub(super) fn rest(&mut self) -> bool {
         if self.owed & CANCELLED == 0 || !self.may_be_late() {
             return false;

@@ -14,7 +14,7 @@ pub(super) const REPLIES: u8 = 0x1F;
 pub(super) const SLOW: u8 = 0x20;
 /// A request was cancelled, so the next one waits until the unit is clean.
 pub(super) const CANCELLED: u8 = 0x40;
-/// What a record owes that stands for all units without a record of their own.
+/// The `owed` of the record that stands for all units without a record of their own.
 pub(super) const ANY: u8 = 0xFF;
 
 /// A unit that owes replies.
@@ -22,7 +22,7 @@ pub(super) const ANY: u8 = 0xFF;
 #[repr(C)]
 pub struct LateUnit {
     pub(super) unit: u8,
-    /// What it owes, and flags; 0: the record is free.
+    /// How many replies it owes, and flags; 0: the record is free.
     pub(super) owed: u8,
     /// No more than so many times 2^16 microseconds are left until the unit is clean. More on the
     /// clock mean that it has been clean for long.
@@ -48,8 +48,8 @@ impl LateUnit {
         }
     }
 
-    /// Has the unit be clean `silence` microseconds after `since`, or when it is now if that is
-    /// later.
+    /// Sets the time at which the unit is clean to `silence` microseconds after `since`, unless
+    /// it is later already.
     #[inline(always)]
     pub(super) fn clean_after(&mut self, silence: u32, since: u32) {
         let clean = since.wrapping_add(silence);
@@ -80,7 +80,7 @@ impl LateUnits {
         }; LATE_UNITS],
     };
 
-    /// The record that says what the unit owes.
+    /// The record of the replies that the unit owes.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn record(&mut self, unit: u8) -> Option<&mut LateUnit> {
         let records = self.records.iter_mut();
@@ -97,8 +97,9 @@ impl LateUnits {
         }
     }
 
-    /// Has the next reply held after a cancelled request, as after a timeout. For model checkers, which
-    /// find that a device is not heard again then.
+    /// Makes the engine hold the next reply after a cancelled request, as after a timeout. It
+    /// is for model checkers: they find that the master then never gets a reply of the device
+    /// again.
     #[doc(hidden)]
     pub fn forget_cancelled(&mut self) {
         for record in &mut self.records {

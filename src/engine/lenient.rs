@@ -42,7 +42,7 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
 }
 
 impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
-    /// What [`Engine::set_lenient`] takes so that a deviating reply is accepted, if `on`. A read
+    /// The argument for [`Engine::set_lenient`]: deviating replies are accepted if `on`. A read
     /// may then be sent to unit 0, which has to reply.
     pub const fn lenient(on: bool) -> Option<Extension<P, S, MasterRequest>> {
         if on {
@@ -75,7 +75,8 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         let is_ours = match self.run_length {
             1 => byte == self.unit,
             2 => self.kept == 1 && byte == function,
-            // What begins as the expected reply needs no copy, if the search has space for it.
+            // A reply that begins as the expected one needs no copy, if the search has space
+            // for it.
             3 if byte == self.request.reads() && self.length <= self.storage.capacity() => false,
             _ => self.kept > 0,
         };
@@ -128,7 +129,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         self.awaits_end = true;
         self.foreign_frames = self.foreign_frames.wrapping_sub(is_whole.into());
         if self.may_be_late() {
-            // It is held, as a right reply would be. What seemed to lie in it is forgotten.
+            // It is held, as a right reply would be. A fault that seemed to lie in it is forgotten.
             if is_whole {
                 self.see_nothing();
             }
@@ -176,8 +177,8 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         }
     }
 
-    /// Makes a deviating reply the result of a request that would fail. Of a reply with more
-    /// data than response words, the data that fill these words count.
+    /// Makes a deviating reply the result of a request that would fail. If the reply has more
+    /// data than there are response words, only the data that fill these words count.
     fn accept_deviating(&mut self) {
         if self.awaits_end && !self.is_held && !self.seen.is_response() {
             if self.request.is_read() {

@@ -87,8 +87,8 @@ pub struct Engine<P, S: Storage, Q> {
     /// The response or damaged reply in `seen` may lie within another frame, so a silence must
     /// follow it.
     is_early: bool,
-    /// What the unit owed when the request was begun, less the replies that have come since: see
-    /// `late`.
+    /// How many replies the unit owed when the request was begun, less the replies that have
+    /// come since: see `late`.
     owed: u8,
     /// A reply is or was held, because it may be a late one.
     is_held: bool,
@@ -97,8 +97,8 @@ pub struct Engine<P, S: Storage, Q> {
     awaits_end: bool,
     /// The last poll may have left bytes unread.
     has_more: bool,
-    /// What the frame that is being received is if it ends with a right CRC, from its second byte
-    /// on: see `kind_of_frame`.
+    /// The kind of the frame that is being received, if it ends with a right CRC. It is known
+    /// from its second byte on: see `kind_of_frame`.
     run_kind: Outcome,
     /// How many bytes have arrived since the last frame ended.
     run_length: S::Count,
@@ -145,8 +145,8 @@ pub struct Engine<P, S: Storage, Q> {
     pub(crate) request: Q,
     /// Times and options of the requests.
     pub settings: Settings,
-    /// What the engine calls at the moments of a request: `extras`, or `lenient`, which calls
-    /// `extras` in turn.
+    /// The function that the engine calls at the moments of a request: `extras`, or `lenient`,
+    /// which calls `extras` in turn.
     extension: Option<Extension<P, S, Q>>,
     /// Retries, echo discarding and the post-flush hold (see `extras`).
     extras: Option<Extension<P, S, Q>>,
@@ -165,6 +165,6 @@ pub enum Moment {
     /// The search has not ended with the byte that has arrived. `true` if that ends no frame,
     /// although the CRC is right.
     Missed,
-    /// The request ends with what was seen. `true` if it is repeated.
+    /// The request ends with the outcome in `seen`. `true` if it is repeated.
     End,
 }

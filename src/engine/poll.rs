@@ -132,7 +132,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Does what the request has to do at the time `now`, without waiting. Returns
+    /// Moves the request on at the time `now`, without waiting. Returns
     /// [`Status::PENDING`] until the request has ended, then its status.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn poll(&mut self, now: u32) -> Status {
@@ -168,8 +168,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Reads the received bytes at the time `now` and drops them, while no request is pending. Notes
     /// which units have sent the frames among them. Negative if the link is lost.
     pub fn drop_received(&mut self, now: u32, is_rtu: bool) -> i16 {
-        // Bytes of the frame that is being received may have been dropped. What the last request has
-        // seen is over.
+        // Bytes of the frame that is being received may have been dropped. The frames that the
+        // last request saw do not matter any more.
         if has_elapsed(self.settings.silence.get(), now, self.since)
             || self.end == self.space()
             || self.run_length > self.end
@@ -340,7 +340,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.has_expired()
     }
 
-    /// Ends the request with what was seen.
+    /// Ends the request with the outcome in `seen`.
     fn settle(&mut self) -> Status {
         if self.has_extra(Moment::End) {
             return Status::PENDING;

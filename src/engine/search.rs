@@ -2,12 +2,12 @@
 //!
 //! The request determines its reply: unit, function code, length, and the byte count or the
 //! repeated head. So each received byte may be the last one of the reply: the reply ends there
-//! if the bytes before it begin as the reply does and have a right CRC. What precedes them, noise,
-//! frames of other units, late replies or an echo, does not matter. The same question is asked
-//! for an exception to the request, which has five bytes, and for the echo of the request.
+//! if the bytes before it begin as the reply does and have a right CRC. Bytes that precede them
+//! do not matter: noise, frames of other units, late replies or an echo. An exception to the
+//! request, which has five bytes, and the echo of the request are found in the same way.
 //!
-//! Beside that, the engine computes the CRC of all bytes since the last frame ended. If it is
-//! right, these bytes were a whole frame. If that frame is not the reply, it is skipped, and an
+//! The engine also computes the CRC of all bytes since the last frame ended. If it is right,
+//! these bytes were a whole frame. If that frame is not the reply, it is skipped, and an
 //! exception or a damaged reply that seemed to lie in it is forgotten.
 
 use super::{Count, Engine, Moment, Outcome, Phase, Storage, Transaction};
@@ -127,7 +127,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// What a frame is that begins with the last two bytes, if it is not the reply.
+    /// The kind of a frame that begins with the last two bytes and is not the reply.
     fn kind_of_frame(&self) -> Outcome {
         // Bytes that were dropped were not of our unit.
         if self.end < 2u8.into() {
@@ -264,8 +264,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         let front = self.end - self.run_length;
         let unit = self.storage.byte(front);
         if self.run_kind == Outcome::MALFORMED {
-            // Not the echo of the request, nor the beginning of its reply, in which the CRC is right
-            // by chance.
+            // It is neither the echo of the request nor the beginning of its reply, in which
+            // the CRC is right by chance.
             let count = self.storage.byte(front + 2u8.into());
             let counted = S::Count::of(usize::from(count) + rtu::OVERHEAD + 2);
             let is_reply = self.run_length == self.length || self.run_length == counted;
@@ -276,7 +276,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.note_reply_of(unit);
     }
 
-    /// Forgets what was seen, because it lies within another frame, and waits for the reply again.
+    /// Forgets the exception or fault in `seen`, because it lies within another frame, and
+    /// waits for the reply again.
     pub(super) fn forget(&mut self) {
         self.see_nothing();
         if self.phase == Phase::Reply {
@@ -285,7 +286,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Makes the outcome what the request ends with if no bytes arrive.
+    /// Sets the outcome of a request for which no bytes arrive.
     pub(super) fn see_nothing(&mut self) {
         self.is_early = false;
         self.exception = 0;
@@ -315,7 +316,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Makes space in a full frame buffer. A held reply is dropped, because too many bytes
-    /// follow it. Of the other bytes those stay with which the reply may begin.
+    /// follow it. The last bytes stay, because the reply may begin with them.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn make_space(&mut self) {
         let mut keep = self.end - self.content;

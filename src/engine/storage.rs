@@ -198,10 +198,11 @@ pub struct Buffers<F, R, T> {
 }
 
 impl<F, R, T> Buffers<F, R, T> {
-    /// Takes a frame buffer of at least 8 bytes, of which at most 255 are used, response words,
-    /// which a read fills, and transmit words, which a write sends, also one of a single register.
-    /// A frame buffer of 13 + 2 N bytes holds every request and reply with N words, one of 13 + 4 N
-    /// bytes also a late reply beside the right one. The words of what no request does may be `[]`.
+    /// Takes a frame buffer of at least 8 bytes, of which at most 255 are used; response words,
+    /// which a read fills; and transmit words, which a write sends, also a write of a single
+    /// register. A frame buffer of 13 + 2 N bytes holds every request and reply with N words,
+    /// one of 13 + 4 N bytes also a late reply beside the right one. Response words may be `[]`
+    /// if no request reads, transmit words if none writes.
     pub const fn new(frame: F, response: R, transmit: T) -> Self {
         Buffers {
             frame: Frame::new(frame),

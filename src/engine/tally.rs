@@ -9,8 +9,9 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
         self.tally = Some(Engine::count);
     }
 
-    /// Counts what has happened since it last did, if the engine counts: the request, bytes that
-    /// have arrived, and an attempt that ends with `status`, if that is not [`Status::PENDING`].
+    /// Counts the events since its last call, if the engine counts: the request, the bytes that
+    /// have arrived, and, if `status` is not [`Status::PENDING`], the attempt that ends with
+    /// it.
     pub(super) fn tally(&mut self, status: Status) {
         if let Some(tally) = self.tally {
             tally(self, status);

@@ -7,7 +7,7 @@
 #[allow(clippy::indexing_slicing)] // A byte is in range, so the compiler leaves the checks out.
 fn by_table(crc: u16, bytes: &[u8]) -> u16 {
     const ONE: [u16; 256] = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS).table()[0];
-    /// What the last byte of a step contributes to the CRC, and what the byte before it does.
+    /// The contribution of the last byte of a step to the CRC, and that of the byte before it.
     static TABLES: [[u16; 256]; 2] = {
         let mut before = ONE;
         let mut index = 0;

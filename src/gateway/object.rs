@@ -135,8 +135,8 @@ impl<S: GatewayStorage> Gateway<S> {
         self.storage.connection(connection).clear(false, status);
     }
 
-    /// The connection of a request. It is checked: if the caller lets two gateways use the same
-    /// requests, one finds there what the other wrote.
+    /// The connection of a request. It is checked, because the caller may let two gateways use
+    /// the same requests: then one finds the number that the other wrote.
     pub(super) fn connection_of(&mut self, request: u16) -> u8 {
         let last = self.storage.connection_count().saturating_sub(1);
         self.storage.request(request).connection.min(last)

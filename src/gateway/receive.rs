@@ -112,7 +112,7 @@ impl<S: GatewayStorage> Gateway<S> {
             state.stage = Stage::Local;
             self.serve(request);
         } else if lines == 0 {
-            // A broadcast to all lines, of which there are none.
+            // A broadcast, but there is no line.
             self.release(request);
         } else {
             state.stage = Stage::Queued;

@@ -29,8 +29,8 @@ impl<S: GatewayStorage> Gateway<S> {
         }
     }
 
-    /// The response of a connection to send next: the one of which a part was sent, else the
-    /// one that was known first.
+    /// The response of a connection to send next: one that was sent in part, else the one that
+    /// was known first.
     fn next_response(&mut self, connection: u8) -> Option<u16> {
         let sending = self.storage.connection(connection).sending;
         if sending < self.storage.request_count() {

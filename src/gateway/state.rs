@@ -1,4 +1,4 @@
-//! What the gateway keeps for each request, each connection and each line.
+//! The state of each request, each connection and each line of the gateway.
 
 use crate::error::Status;
 

@@ -1,4 +1,4 @@
-//! What the caller of the gateway supplies: memory, connections, lines and units.
+//! The parts that the caller supplies to the gateway: memory, connections, lines and units.
 
 use super::route::Route;
 use super::state::{ConnectionState, LineState, Transaction};

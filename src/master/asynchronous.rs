@@ -36,7 +36,7 @@ struct Bridge<C, E> {
     outgoing: Outgoing,
     is_lost: bool,
     received: [u8; PIECE],
-    /// Of `received`, the bytes that the engine has not read yet.
+    /// The range of `received` that the engine has not read yet.
     start: usize,
     end: usize,
 }
@@ -281,11 +281,11 @@ where
     /// 01: reads 1 to 2000 coils, as many as `coils` has.
     ///
     /// # Errors
-    /// Of this and the other functions: an exception of the device, for example
+    /// This and the other functions return an exception of the device, for example
     /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::RESPONSE_TIMED_OUT`], [`Error::INVALID_CRC`],
-    /// [`Error::LINK_LOST`] or another error of the line. Refused without sending are a quantity
-    /// or addresses that the standard does not allow ([`Error::ILLEGAL_DATA_VALUE`],
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]), and what the buffers cannot hold
+    /// [`Error::LINK_LOST`] or another error of the line. They send nothing if the standard
+    /// does not allow the quantity or the addresses ([`Error::ILLEGAL_DATA_VALUE`],
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]), or if the buffers cannot hold the data
     /// ([`Error::BUFFER_TOO_SMALL`], [`Error::ILLEGAL_DATA_VALUE`]).
     pub async fn read_coils(&mut self, address: u16, coils: &mut [bool]) -> Result<(), Error> {
         let quantity = super::quantity(coils.len());

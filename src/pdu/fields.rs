@@ -79,7 +79,7 @@ impl Flag {
     }
 }
 
-/// What data consist of.
+/// The kind of items that data consist of.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Data {
     /// Bits, the first one in the lowest bit of the first byte.
@@ -88,11 +88,11 @@ pub enum Data {
     Registers,
     /// Bytes whose meaning the function or the device defines.
     Bytes,
-    /// Bytes of which some are characters.
+    /// Bytes; some of them are characters.
     Characters,
 }
 
-/// A count of what follows up to the end of a PDU.
+/// A count of the items that follow, up to the end of a PDU.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Count {
     /// One byte counts bytes.
@@ -103,9 +103,9 @@ pub enum Count {
     Registers,
 }
 
-/// Where the fields of a PDU come from, or where they go: its bytes, a packet of C, a description in
-/// words. Each request and response passes its fields through one of these in the order of the wire.
-/// What takes the fields leaves them as they are.
+/// The source or the destination of a PDU's fields: its bytes, a packet of C, a description in
+/// words. Each request and response passes its fields through one of these in the order of the
+/// wire. A destination leaves the fields unchanged.
 pub trait Fields<'a> {
     /// True if the fields come from here.
     const IS_SOURCE: bool;

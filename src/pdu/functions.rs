@@ -74,7 +74,7 @@ macro_rules! functions {
             }
         }
 
-        /// What a function does. [`Direction::Either`] for an unknown one.
+        /// The direction of a function's data. [`Direction::Either`] for an unknown function.
         pub const fn direction(function: u8) -> Direction {
             match function {
                 $($constant => Direction::$direction,)*
@@ -251,8 +251,9 @@ pub(super) const KIND: u32 = 3 << 17;
 /// The lowest of three bits: the length of the head.
 pub(super) const HEAD_LENGTH: u32 = 19;
 /// The lowest of three bits: the length of the response, or the index of the byte that counts.
-/// Of [`OWN`]: which function's rule holds, named by the least length of its response, or 0 for
-/// the end of the frame. (The function code does not say it: a user may give it another rule.)
+/// For [`OWN`] it says which function's rule holds, named by the least length of its response;
+/// 0 means the end of the frame. (The function code does not say it: a user may give it another
+/// rule.)
 pub(super) const LENGTH: u32 = 22;
 /// The rule of 11 (hex).
 pub(super) const SERVER_ID: u8 = 2;

@@ -20,7 +20,7 @@ pub const EXTENDED: u8 = 3;
 /// Read device id code: one object.
 pub const INDIVIDUAL: u8 = 4;
 
-/// What a response to Read Device Identification has after its code.
+/// The fields of a response to Read Device Identification after its code.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct IdentificationReply<'a> {
     /// The conformity level, not checked.
@@ -45,9 +45,9 @@ impl<'a> IdentificationReply<'a> {
     }
 }
 
-/// Checks the code, more follows and the number of objects of a response. The conformity level is
-/// not checked, nor the next object if none follows: some devices send wrong values there, and
-/// nothing depends on them.
+/// Checks the code, more follows and the number of objects of a response. It checks neither the
+/// conformity level nor, if no object follows, the next object: some devices send wrong values
+/// there, and nothing depends on them.
 pub(super) fn check_head(code: u8, more: bool, count: u8) -> Result<(), Error> {
     expect(match (code, more) {
         (BASIC..=EXTENDED, _) => true,

@@ -4,7 +4,7 @@
 use super::identification::{IdentificationReply, INDIVIDUAL};
 use crate::error::Error;
 
-/// What follows a reply.
+/// The request that follows a reply.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Next {
     /// Nothing: all objects were read.

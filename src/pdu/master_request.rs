@@ -58,7 +58,7 @@ pub struct MasterRequest {
     reads: u8,
     /// A mask of the bits that are used in the last byte of data.
     mask: u8,
-    /// The data are bits, of which the low byte of 16 travels first.
+    /// The data are bits. The low byte of each 16 travels first.
     has_bits: bool,
     head: [u8; HEAD],
 }
@@ -153,7 +153,7 @@ impl MasterRequest {
         }
     }
 
-    /// Appends what is written, to a request that reads: address and quantity.
+    /// Appends the address and quantity of the write to a request that reads.
     pub fn append_write(&mut self, address: u16, quantity: u16) -> Status {
         self.append_word(address);
         self.append_word(quantity);
@@ -191,8 +191,8 @@ impl MasterRequest {
         self.head_length
     }
 
-    /// True if the data are registers, which travel high byte first; false if they
-    /// are bits, of which the low byte of 16 travels first.
+    /// True if the data are registers, which travel high byte first. False if they are bits:
+    /// the low byte of each 16 travels first.
     pub const fn has_registers(&self) -> bool {
         !self.has_bits
     }

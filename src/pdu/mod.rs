@@ -1,9 +1,9 @@
 //! Protocol data units (PDUs): a function code and its data, without framing (application
 //! protocol V1.1b3, clause 6).
 //!
-//! [`functions`] is the table of the functions. [`request`] and [`response`] take PDUs apart and
-//! write them, from [`fields`]. [`header`] and [`master_request`] are what a client and a master keep of a request
-//! that they send.
+//! [`functions`] is the table of the functions. [`request`] and [`response`] take PDUs apart
+//! and write them, from [`fields`]. A client keeps a [`header`] of each request that it sends,
+//! a master a [`master_request`].
 
 pub mod custom;
 pub mod diagnostics;

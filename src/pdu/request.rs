@@ -315,8 +315,9 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Checks what the standard says of the fields. The PDU has all of them, and nothing follows.
-    /// A server checks lengths and quantities before addresses (figures 11 and following).
+    /// Checks the fields by the rules of the standard. The PDU has all of them, and nothing
+    /// follows. A server checks lengths and quantities before addresses (figures 11 and
+    /// following).
     fn check(&self, pdu: &[u8], functions: &[custom::Function]) -> Result<(), Error> {
         match *self {
             Request::ReadBits {

@@ -345,7 +345,8 @@ impl<'a> Response<'a> {
         }
     }
 
-    /// Checks what the standard says of the fields. The PDU has all of them, and nothing follows.
+    /// Checks the fields by the rules of the standard. The PDU has all of them, and nothing
+    /// follows.
     fn check(&self, pdu: &[u8], functions: &[custom::Function]) -> Result<(), Error> {
         match *self {
             Response::ReadBits { data, .. } => {

@@ -1,4 +1,4 @@
-//! A field of the table, and what is wrong with it.
+//! A field of the table, and the errors that it may have.
 
 use crate::error::Status;
 

@@ -20,9 +20,8 @@ pub const MAX_FIELDS: usize = 16_383;
 /// Groups `fields` into `reads`, with their data in `words` words. Fields are in one read only
 /// if they have the same unit, table and interval; they may overlap. Returns the number of reads.
 ///
-/// Of every way to cover all fields within the limits, the result has the fewest reads, and
-/// among those with so few the fewest bits and registers. The time that it takes grows with
-/// n log n.
+/// The result covers all fields within the limits by the fewest reads, and among such results
+/// by the fewest bits and registers. The time that it takes grows with n log n.
 ///
 /// # Errors
 /// As [`ReadLimits::check`]; [`Status::BUFFER_TOO_SMALL`] if `positions`, `reads` or `words` do
@@ -202,10 +201,10 @@ impl<'a, L: ReadLimits> Table<'a, L> {
     /// Finds for each position the best read that ends there: the reads before it are known by
     /// then. Its first position is kept in `first_or_last`.
     ///
-    /// A longer read never needs more reads before it. So the best one is among those before
-    /// which the fewest reads are needed: it begins at a position from `start`, where the longest
-    /// read begins, up to `end`. Of these the best is that with the least length of all reads
-    /// before it, less its own place.
+    /// A longer read never needs more reads before it. So the best read begins at a position
+    /// from `start`, where the longest read begins, up to `end`: all these need the fewest
+    /// reads before them. The best one is that for which the length of all reads before it,
+    /// less its own place, is least.
     ///
     /// A field that lies within an earlier one is in the read of that one at no cost.
     fn find_best(&mut self) {
@@ -236,7 +235,7 @@ impl<'a, L: ReadLimits> Table<'a, L> {
                     end = index + 1;
                     self.keep_least(start, end);
                 }
-                // Of two that are as good, the later one leaves the longer reads before it.
+                // If two are equally good, the later one leaves the longer reads before it.
                 if start > best {
                     best = start;
                 }

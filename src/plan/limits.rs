@@ -1,4 +1,4 @@
-//! What a read may be: how long, over which gaps, and where not.
+//! The limits of a read: its length, the gaps in it, and the addresses that it must not contain.
 
 use super::field::{place, Field};
 use crate::error::Status;
@@ -39,7 +39,7 @@ pub struct ExcludedRange {
     pub table: u8,
 }
 
-/// What a read may be. [`Limits`] has it; the caller may have it otherwise.
+/// The limits of a read. [`Limits`] implements it; a caller may implement it in another way.
 pub trait ReadLimits {
     /// The most bits that one read requests; 0 or more than 2000 mean 2000.
     fn bits(&self) -> u16;

@@ -6,7 +6,7 @@ use super::value::{scale, Words};
 use crate::error::Error;
 
 const SIGN: u64 = 1 << 63;
-/// The exponent of infinity and of what is no number.
+/// The exponent of infinity and of a NaN.
 const MAX_EXPONENT: i32 = 0x7FF;
 /// Added to the exponent of a float.
 const BIAS: i32 = 1023;
@@ -15,8 +15,9 @@ const FRACTION: u32 = 52;
 
 impl Words<'_> {
     /// The bits of a value as a float of 64 bits: a bit, an integer or a float, multiplied and
-    /// divided as the field says. The result is the float nearest to the exact one, of two the
-    /// even one. Infinities and what is no number have no scale but its sign.
+    /// divided as the field says. The result is the float nearest to the exact value, and if
+    /// two are equally near, the even one. For infinities and NaN only the sign of the scale
+    /// counts.
     ///
     /// # Errors
     /// [`Error::INVALID_ARGUMENT`] for a text.

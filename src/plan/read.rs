@@ -9,8 +9,8 @@ use core::cell::Cell;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Position {
-    /// While grouping, what a read that begins here adds to; see `find_best`. Then the read that
-    /// the field with this index is in.
+    /// While grouping: the sum to which a read that begins here adds; see `find_best`. Then:
+    /// the read that the field with this index is in.
     pub(super) sum_or_read: i32,
     /// The index of the field at this place of the sorted table.
     pub(super) field: u16,
@@ -66,8 +66,8 @@ pub(super) const HELD: u8 = 8;
 /// It is queued or in flight.
 pub(super) const QUEUED: u8 = 16;
 
-/// One request that the plan repeats, and what came of it. (What changes is in cells: the reads
-/// of a unit change each other.)
+/// One request that the plan repeats, and its result. (The changing fields are cells, because
+/// the reads of a unit change each other.)
 #[repr(C)]
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Read {
@@ -102,8 +102,9 @@ pub struct Read {
 }
 
 impl Read {
-    /// Makes it a read of fields of which `first` has the lowest address. Its data begin at `offset`
-    /// of `words` words. Returns where they end; `None` if there are too few words. (Out of line it takes 24 to 60 bytes more firmware.)
+    /// Makes it a read of fields; `first` has the lowest address. Its data begin at `offset` of
+    /// `words` words. Returns where they end; `None` if there are too few words. (Out of line
+    /// it takes 24 to 60 bytes more firmware.)
     #[inline(always)]
     pub(super) fn set_up(
         &mut self,

@@ -1,11 +1,11 @@
-//! Which read is due, and what its end means for the other reads of its unit. All times are in
+//! Says which read is due, and how its end changes the other reads of its unit. All times are in
 //! milliseconds on one clock, which may wrap.
 //!
-//! The reads are the nodes of a skew heap, whose root is the read that is due first. So to take it
-//! out and to put it back takes a number of steps that grows with the logarithm of their number.
-//! Not in the heap are the reads that are queued, those that wait after a request without an answer,
-//! and all but one of a unit that does not answer. They cost nothing until one of them may be sent:
-//! then the heap is made anew. So it is where the times of reads in it change.
+//! The reads are the nodes of a skew heap, whose root is the read that is due first. The steps
+//! to take it out and to put it back grow with the logarithm of the number of reads. These
+//! reads are not in the heap: those that are queued, those that wait after a request without an
+//! answer, and all but one of a unit that does not answer. They cost nothing until one of them
+//! may be sent. Then the heap is made anew, and also when the times of reads in it change.
 
 use super::divide::divide;
 use super::read::{Read, DOUBTED, HAS_DATA, HELD, QUEUED, SUSPENDED};
@@ -42,11 +42,11 @@ fn until(time: u32, now: u32) -> u32 {
 /// The index of no read.
 const NONE: u16 = u16::MAX;
 
-/// Joins two heaps, and returns the root. Of reads that are due at the same time the later one
+/// Joins two heaps, and returns the root. If two reads are due at the same time, the later one
 /// comes first.
 fn merge(reads: &[Read], tree: u16, mut other: u16) -> u16 {
     let root = Cell::new(tree);
-    // What the heap `other` joins.
+    // The place where the heap `other` is joined.
     let mut place = &root;
     while let Some(right) = reads.get(usize::from(other)) {
         let own = place.get();
@@ -250,7 +250,7 @@ impl Schedule {
     }
 }
 
-/// Tells the other reads of its unit what a read has found: whether the unit is silent.
+/// Passes to the other reads of its unit whether the unit is silent.
 fn settle(reads: &[Read], read: &Read, before: u8, state: u8) {
     let (mut first, mut all) = (read, 0);
     for other in reads.iter().filter(|other| other.unit == read.unit) {

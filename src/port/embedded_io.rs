@@ -41,8 +41,8 @@ impl<D, C> EmbeddedIo<D, C> {
         }
     }
 
-    /// A port of a socket or a USB serial port. Every error, and the end of what can be read, mean
-    /// that the link is lost.
+    /// A port of a socket or a USB serial port. An error, or the end of the stream, means that
+    /// the link is lost.
     pub const fn stream(socket: D, clock: C) -> Self {
         EmbeddedIo {
             device: socket,

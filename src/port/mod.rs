@@ -11,9 +11,9 @@ use crate::error::Error;
 /// A byte stream and a clock. No function may block.
 pub trait Port {
     /// True if a master and a client's line read one byte at a time: that takes less code, 56
-    /// bytes on a Cortex-M0+ and 140 on an AVR. If false, they read what has arrived in one call,
-    /// and compare a whole reply before they search it, which saves a host system calls and two
-    /// instructions of three.
+    /// bytes on a Cortex-M0+ and 140 on an AVR. If false, they read all bytes that have arrived
+    /// in one call, and compare a whole reply before they search it. That saves a host system
+    /// calls and two instructions of three.
     const READS_SINGLE_BYTES: bool = cfg!(any(target_os = "none", mbm_reads_single_bytes));
 
     /// True if the port can be used. Otherwise no other function is called.
@@ -81,7 +81,7 @@ fn count(result: Result<usize, Error>, most: usize) -> i16 {
     result.map_or(-1, |count| count.min(most) as i16)
 }
 
-/// What [`Port::read`] returns where [`Port::read_count`] returns `count`.
+/// The result of [`Port::read`] if [`Port::read_count`] returns `count`.
 #[doc(hidden)]
 pub fn result(count: i16) -> Result<usize, Error> {
     count.try_into().map_err(|_| Error::LINK_LOST)

@@ -32,7 +32,7 @@ pub fn serve(
     Reply::length(1 + bytes)
 }
 
-/// What the handler of a user-defined function did with a request.
+/// The result of the handler of a user-defined function.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Outcome {
     /// A response with this number of data bytes.

@@ -191,8 +191,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         let count = usize::from(self.storage.byte(rtu::PDU + 1));
         let is_request = announced == end || announced == start;
         if !is_request && (length == ECHOED || length == rtu::OVERHEAD + 2 + count) {
-            // The length is that of a response. So the receiver may get what the driver sends. The
-            // bit keeps the units from serving the frame.
+            // The length is that of a response. So the receiver may get the bytes that the
+            // driver sends. The bit keeps the units from serving the frame.
             self.has_no_echo = false;
             if let [function] = self.storage.part(rtu::PDU, rtu::PDU + 1) {
                 *function |= EXCEPTION;
@@ -430,7 +430,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                         Decoded::Valid(content) => content - 1,
                         _ => 0,
                     };
-                    // What else has arrived may have been an echo, or a damaged one.
+                    // Other bytes that have arrived may have been an echo, or a damaged one.
                     if length != 0 && crc == self.crc {
                         self.give_up_echo();
                     }

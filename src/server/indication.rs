@@ -1,4 +1,4 @@
-//! Which unit a received frame is addressed to.
+//! Finds the unit to which a received frame is addressed.
 
 use super::table::MachineByte;
 use crate::frame::rtu;
@@ -96,10 +96,10 @@ impl Indication {
         }
     }
 
-    /// True for a response, whose sender is another server, or this one, if its receiver gets what
-    /// the driver sends. It is never answered. The function codes from 80 (hex) on are those of
-    /// exception responses (application protocol V1.1b3, 4.1). In Modbus TCP each client has a
-    /// connection of its own, so there it is a request that is not valid.
+    /// True for a response. Its sender is another server, or this one if its receiver gets the
+    /// bytes that the driver sends. It is never answered. The function codes from 80 (hex) on
+    /// are those of exception responses (application protocol V1.1b3, 4.1). In Modbus TCP each
+    /// client has a connection of its own, so there it is a request that is not valid.
     #[inline(always)]
     const fn is_from_server(&self, function: u8) -> bool {
         function & EXCEPTION != 0 && self.head as usize == rtu::PDU

@@ -3,7 +3,7 @@
 
 use crate::pdu::EXCEPTION;
 
-/// What a service did with a request.
+/// The result of a service that was called with a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct Reply(usize);

@@ -151,8 +151,8 @@ impl<T: DataModel> TableAccess for T {
 /// The response of a write repeats the first five bytes of the request.
 pub const WRITTEN: Reply = Reply::length(5);
 
-/// What a request does to a table. The number is the index of the data in the PDU, for a read
-/// in the PDU of the response.
+/// The action of a request on a table. The number is the index of the data in the PDU, for a
+/// read in the PDU of the response.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct TableOperation(MachineByte);
@@ -197,7 +197,7 @@ impl TableOperation {
 const _: () = assert!(MAX_READ_REGISTERS * 16 == MAX_READ_BITS);
 const _: () = assert!(MAX_WRITE_REGISTERS * 16 == MAX_WRITE_BITS);
 
-/// What a function does to this table.
+/// The action of a function on this table.
 #[inline(always)]
 pub const fn operation(kind: TableKind, function: u8) -> TableOperation {
     if function == kind.0 {
@@ -227,7 +227,7 @@ pub fn serve(
     serve_as(operation(kind, function), kind, cells, pdu, length)
 }
 
-/// As [`serve`], once it is known what the function does to the table.
+/// As [`serve`], with the action of the function.
 #[inline(always)]
 pub fn serve_as(
     operation: TableOperation,

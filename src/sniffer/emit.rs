@@ -1,4 +1,4 @@
-//! Turns what the sniffer found into events.
+//! Makes events of the frames and noise that the sniffer finds.
 
 use super::event::{Event, EventKind};
 use super::find::{Context, MIN_RTU};

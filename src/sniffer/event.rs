@@ -46,9 +46,9 @@ pub struct Event<'a> {
     pub response_time: u32,
     /// The transaction identifier of a TCP frame; otherwise 0.
     pub transaction: u16,
-    /// The unit id. Of a damaged frame, the byte in its place.
+    /// The unit id; for a damaged frame the byte in its place.
     pub unit: u8,
-    /// The function code without the exception bit. Of a damaged frame, the byte in its place.
+    /// The function code without the exception bit; for a damaged frame the byte in its place.
     pub function: u8,
     /// The frame; empty for a timeout. An ASCII frame is decoded, from the unit to the LRC.
     pub frame: &'a [u8],

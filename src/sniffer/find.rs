@@ -11,7 +11,7 @@ use crate::pdu::functions::{DIAGNOSTICS, REPORT_SERVER_ID};
 use crate::pdu::length::Length;
 use crate::pdu::EXCEPTION;
 
-/// What the bytes at the place of the search are.
+/// The kind of the bytes at the place of the search.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Candidate {
     /// A frame: its length in bytes, whether it may be a request, and whether it may be a
@@ -31,7 +31,7 @@ pub(super) enum Candidate {
 /// Bytes of the shortest RTU frame.
 pub(super) const MIN_RTU: usize = rtu::MIN_FRAME as usize;
 
-/// What the search depends on, apart from the bytes of the stream.
+/// The inputs of the search, apart from the bytes of the stream.
 #[derive(Clone, Copy)]
 pub(super) struct Context<'a> {
     pub requests: &'a Requests,

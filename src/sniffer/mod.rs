@@ -80,7 +80,7 @@ pub struct Sniffer {
     idle_for: u32,
 }
 
-/// What the next event covers, as lengths in the stream.
+/// The lengths in the stream that the next event covers.
 #[derive(Clone, Copy)]
 enum Step {
     /// A frame of `total` bytes, which are `content` bytes once decoded. `roles` says whether it
@@ -177,7 +177,7 @@ impl Sniffer {
         half.unwrap_or_default()
     }
 
-    /// Takes bytes, the last of which arrived at `now` (microseconds). Returns how many fitted
+    /// Takes bytes; the last one arrived at `now` (microseconds). Returns how many fitted
     /// into the buffer. Call [`Sniffer::next`] until it returns `None`, then feed the other bytes
     /// with the same time. Feed either both directions together or each direction separately: a
     /// change from one to the other discards the bytes that were not reported yet.
@@ -242,7 +242,7 @@ impl Sniffer {
         None
     }
 
-    /// True if [`Sniffer::next`] has no event and need not search. That is so after most bytes
+    /// True if [`Sniffer::next`] has no event and need not search. This holds after most bytes
     /// that are fed one by one.
     #[inline]
     pub fn is_idle(&self, now: u32) -> bool {

@@ -102,7 +102,8 @@ impl OpenRequest {
                 .is_some_and(|code| code & !EXCEPTION == self.asked.function())
     }
 
-    /// True if this PDU has the length of the reply and repeats what the reply must repeat.
+    /// True if this PDU has the length of the reply and repeats the fields that the reply must
+    /// repeat.
     fn is_answered_by(&self, pdu: &[u8]) -> bool {
         if pdu.first().is_some_and(|code| code & EXCEPTION != 0) {
             return pdu.len() == 2;
@@ -140,7 +141,7 @@ pub(super) fn age(now: u32, time: u32) -> u32 {
     }
 }
 
-/// What a PDU is to the requests on the bus.
+/// The relation of a PDU to the requests on the bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum FrameRole {
     Request,

@@ -116,7 +116,7 @@ impl RxStream {
         self.count = self.count.saturating_sub(1);
     }
 
-    /// Takes bytes, the last of which arrived now. Returns how many fitted into the buffer.
+    /// Takes bytes; the last one arrived now. Returns how many fitted into the buffer.
     pub fn feed(&mut self, buffer: &mut [u8], bytes: &[u8], now: u32, timing: &Timing) -> usize {
         if bytes.is_empty() {
             return 0;

@@ -221,7 +221,8 @@ pub fn request(line: &mut TextWriter, pdu: &[u8]) {
     }
 }
 
-/// The first record of a request of 14. Of the records of others, only the data are written.
+/// The first record of a request of function 14. For other functions only the data of the
+/// records are written.
 fn first_record(head: &[u8]) -> Option<Record> {
     match head {
         [READ_FILE_RECORD, _, groups @ ..] => Reads::new(groups).ok()?.iter().next(),
@@ -361,7 +362,7 @@ impl<'a> Fields<'a> for Words<'_, '_> {
     }
 }
 
-/// Describes a request PDU of which only the head is known.
+/// Describes a request PDU by its head, if the rest is not known.
 pub fn head(line: &mut TextWriter, head: &[u8]) {
     let Some(code) = head.first() else {
         return;

@@ -10,7 +10,7 @@ use crate::pdu::length::Length;
 use crate::time::elapsed;
 use core::cell::Cell;
 
-/// What the frames of one direction are like.
+/// The form of the frames of one direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rules {
     pub framing: Framing,
@@ -24,7 +24,7 @@ pub(super) struct Rules {
     pub both: bool,
 }
 
-/// What the bytes at one place are.
+/// The kind of the bytes at one place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Candidate {
     /// A frame of this length, whose check is right or wrong.
@@ -120,7 +120,7 @@ impl Rules {
         found
     }
 
-    /// Says what is wrong with bytes that are no valid frame.
+    /// The fault of bytes that are not a valid frame.
     fn fault(&self, bytes: &[u8], observer: &impl Observer) -> Status {
         let least = usize::from(rtu::MIN_FRAME);
         match self.length(self.kind, bytes, observer) {

@@ -1,10 +1,10 @@
 //! The trace: a port that passes everything on to another port, and hands out each frame that is
 //! sent and received. A master, a client or a server uses it in place of its port.
 //!
-//! Sent frames are joined if the port accepts them in parts. Received bytes are cut into frames by
-//! the length of their functions and the CRC, by the characters of ASCII, or by the header of TCP.
-//! What is left is handed out once the line is silent, the next frame is sent, the link is lost,
-//! or the buffer is full: damaged frames, and bytes that are no frame.
+//! Sent frames are joined if the port accepts them in parts. Received bytes are cut into frames
+//! by the length of their functions and the CRC, by the characters of ASCII, or by the header
+//! of TCP. Bytes that form no valid frame are handed out once the line is silent, the next
+//! frame is sent, the link is lost, or the buffer is full.
 
 mod cutter;
 mod record;
@@ -96,7 +96,7 @@ impl<P, B, O> Trace<P, B, O> {
 }
 
 impl<P, B: AsMut<[u8]>, O: Observer> Trace<P, B, O> {
-    /// Takes bytes of a direction; `None` ends what was taken before.
+    /// Takes bytes of a direction; `None` ends the frame that was taken before.
     fn take(&mut self, direction: Direction, bytes: Option<&[u8]>, now: u32) {
         let rules = self.rules(direction);
         let buffer = self.buffer.as_mut();

@@ -1,4 +1,4 @@
-//! What a trace hands out.
+//! The record that a trace hands out.
 
 use crate::error::Status;
 use crate::packet::PduKind;
@@ -34,7 +34,7 @@ pub struct Record<'a> {
     pub bytes: &'a [u8],
 }
 
-/// Takes what a trace hands out. A closure `FnMut(&Record)` is one.
+/// Takes the records of a trace. A closure `FnMut(&Record)` is one.
 pub trait Observer {
     /// Takes a frame. It is called from within the functions of the port.
     fn frame(&mut self, record: &Record<'_>);

@@ -18,8 +18,8 @@ use mbm::pdu::identification_stream::{Next, ObjectStream};
 /// `reply` and `replyBytes` of `request`, and `object`, and pass it to
 /// mbm_identification_read. You may use it for any number of devices.
 ///
-/// From that call until `request.status` is no longer MBM_PENDING, do not change it, nor what
-/// it points to. To give it up, pass `request` to mbm_client_cancel.
+/// From that call until `request.status` is no longer MBM_PENDING, do not change it or the
+/// memory that it points to. To give it up, pass `request` to mbm_client_cancel.
 #[repr(C)]
 pub struct mbm_identification {
     /// The request for one part of the objects. Set its `unit`. Its `reply` receives one

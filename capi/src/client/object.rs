@@ -23,8 +23,7 @@ pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 /// The `done` function of a request may call every function on the client that calls it,
 /// except mbm_client_poll, which then returns MBM_BUSY. A hook of the port, and the `random`
 /// function of mbm_client_setJitter, must not use the client: each function returns MBM_BUSY
-/// and changes nothing, and a getter returns what it returns for an object that was never
-/// begun.
+/// and changes nothing, and a getter returns its value for an object that was never begun.
 #[repr(C)]
 pub struct mbm_client {
     /// Private.

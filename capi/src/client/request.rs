@@ -8,8 +8,8 @@ use mbm::client::{ClientRequest, RequestState};
 /// A request to a device, and its result. You own the storage. Initialise it with MBM_INIT,
 /// then set the fields that you need. You may use it for any number of requests.
 ///
-/// From the call that queues it until it has ended, do not use or change it, nor what it
-/// points to. It has ended when `done` is called, or when `status` is no longer MBM_PENDING.
+/// Do not use or change it, or the memory that it points to, from the call that queues it until
+/// it has ended. It has ended when `done` is called, or when `status` is no longer MBM_PENDING.
 ///
 /// If a function transfers registers, `data` and `reply` are words in the machine's byte
 /// order. If it transfers coils or bytes, they are bytes as on the wire; the first coil is
@@ -175,16 +175,16 @@ impl ClientRequest for RequestPtr {
     fn byte(&self, index: usize) -> u8 {
         let fields = self.fields();
         let at = place(index, fields.state.header.sends_words());
-        // SAFETY: a queued request has as many data bytes as its header says. Of words, that
-        // number is even.
+        // SAFETY: a queued request has as many data bytes as its header says. That number is
+        // even if the data are words.
         unsafe { *fields.data.add(at) }
     }
 
     fn store(&mut self, data: &[u8], mask: u8) {
         let fields = self.fields_mut();
         let reply = fields.reply;
-        // SAFETY: the reply is not NULL and holds `capacity` bytes, and the data are not longer.
-        // Of words, the client receives an even number of bytes.
+        // SAFETY: the reply is not NULL and holds `capacity` bytes, and the data are not
+        // longer. If they are words, the client receives an even number of bytes.
         unsafe {
             if fields.state.header.takes_words() {
                 let mut next = reply.cast::<u16>();

@@ -11,9 +11,9 @@ use mbm::error::Status;
 /// connections and their requests; it cancels those that a line has, and its settings return
 /// to their defaults. A call that is refused changes nothing.
 ///
-/// @param config  what the gateway consists of. What it points to must stay valid, and must be used
-///                by one gateway only, for as long as the gateway is used; lines, connections and
-///                requests are initialised with MBM_INIT
+/// @param config  the parts of the gateway. All memory that it points to must stay valid, and
+///                must be used by this gateway only, for as long as the gateway is used; lines,
+///                connections and requests are initialised with MBM_INIT
 /// @return a status; MBM_INVALID_ARGUMENT for fewer requests than connections, a route to a line
 ///         that does not exist or to a unit id above 255, and a line without client;
 ///         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within a

@@ -14,8 +14,8 @@ use mbm::gateway::Gateway;
 /// mbm_gateway_poll calls the hooks of the connections' ports and of the lines' ports,
 /// `isReady` of the lines, and the functions of the gateway's own units. If one of them calls a
 /// function on the gateway, the function returns MBM_BUSY and changes nothing; a getter returns
-/// what it returns for an object that was never begun. The same holds for the `done` function
-/// of a request of your own that mbm_gateway_poll ends.
+/// its value for an object that was never begun. The same holds for the `done` function of a
+/// request of your own that mbm_gateway_poll ends.
 #[repr(C)]
 pub struct mbm_gateway {
     /// Private.

@@ -1,4 +1,5 @@
-//! What the program supplies to a gateway: routes, lines, places for connections and requests.
+//! The parts that the program supplies to a gateway: routes, lines, places for connections and
+//! requests.
 
 use crate::client::{mbm_client, mbm_clientRequest};
 use crate::framing::MBM_MAX_TCP_FRAME;
@@ -84,7 +85,7 @@ pub struct mbm_gatewayRequest {
     pub(super) frame: [u8; MBM_MAX_TCP_FRAME as usize],
 }
 
-/// What a gateway consists of. The gateway copies this struct, but not what it points to.
+/// The parts of a gateway. The gateway copies this struct, but not the arrays that it points to.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_gatewayConfig {

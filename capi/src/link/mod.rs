@@ -163,7 +163,7 @@ unsafe fn is_of(link: *mut Object, client: *mut client::Object) -> bool {
     unsafe { (*client).linked && (*client).kind.cast::<Object>() == link.cast_const() }
 }
 
-/// Gives the client back what it had before.
+/// Restores the client as it was before the link began.
 ///
 /// # Safety
 /// `link` is begun, and its client's storage is valid.

@@ -23,7 +23,7 @@ pub struct mbm_link {
     words: [u32; 24],
 }
 
-/// What has happened to a link. You may read and zero the counters at any time, but not from
+/// Counters of a link. You may read and zero them at any time, but not from
 /// an interrupt; each wraps at 2^32.
 #[repr(C)]
 pub struct mbm_linkCounters {
@@ -48,7 +48,7 @@ pub struct Object {
     pub(super) status: u8,
     /// Bytes were read since this was last set to false.
     pub(super) has_read: bool,
-    /// What the client had before.
+    /// The client's transport before the link began.
     pub(super) transport: *const TransportKind,
     pub(super) port: mbm_port,
     pub(super) hooks: mbm_linkHooks,
@@ -136,8 +136,8 @@ impl LinkHooks for Hooks {
     }
 }
 
-/// Gives up what the client has sent and received in part, because bytes of it must not get into
-/// the next connection. Its requests in flight end with [`Status::LINK_LOST`].
+/// Gives up the frames that the client has sent or received in part, because their bytes must
+/// not get into the next connection. Its requests in flight end with [`Status::LINK_LOST`].
 ///
 /// # Safety
 /// `link` is that of its client; the port's hooks that this calls must not use either.
@@ -265,8 +265,8 @@ unsafe fn advance_transport(
         if !fresh || !client::queue(object).is_empty() {
             let mut fresh = fresh;
             if client::queue(object).may_send(now) {
-                // Whether the peer has closed the link, only reading shows. What is sent over a
-                // closed one is lost.
+                // Only reading shows whether the peer has closed the link. Bytes that are sent
+                // over a closed link are lost.
                 client::queue(object).is_held = true;
                 let ended = read_all(link, object, now);
                 client::queue(object).is_held = false;
@@ -289,8 +289,8 @@ unsafe fn advance_transport(
     }
 }
 
-/// Reads what has arrived, also if it is more than the client's buffer holds. Returns a request
-/// that has ended.
+/// Reads all bytes that have arrived, also if they are more than the client's buffer holds.
+/// Returns a request that has ended.
 ///
 /// # Safety
 /// As for [`advance_linked`].

@@ -27,7 +27,7 @@ pub(super) struct Object {
     core: Node,
     line: *mut mbm_line,
     words: NodeWords,
-    /// What the line's engine gets: a function if deviating replies are accepted.
+    /// The engine's extension: a function if deviating replies are accepted.
     lenient: Option<Extension<PortRef, LineStorage, MasterRequest>>,
 }
 
@@ -40,8 +40,8 @@ const _: () = {
     assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
 };
 
-// SAFETY: the mark is a field of its own. No function changes it while the object is used: what a
-// hook may not do meanwhile, the mark of the line refuses.
+// SAFETY: the mark is a field of its own. No function changes it while the object is used: the
+// mark of the line refuses the calls that a hook must not make.
 unsafe impl CObject for mbm_node {
     type Access<'a> = &'a mut Object;
 

@@ -13,10 +13,10 @@ use mbm::plan::{Position, Read};
 /// Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
 ///
 /// Fields with the same unit, table and interval are read together, and may overlap: what
-/// several of them share is read once. Of all ways to cover them within the limits, the plan
-/// takes one with the fewest reads, and of these one with the fewest bits or registers. All reads
-/// are due at once; the rounds after the first are spread, so that reads of one interval follow
-/// each other at equal distances.
+/// several of them share is read once. The plan covers them within the limits by the fewest
+/// reads, and among such plans by the fewest bits or registers. All reads are due at once; the
+/// rounds after the first are spread, so that reads of one interval follow each other at equal
+/// distances.
 ///
 /// You may call it again at any time, also from `update`, but not from a hook of the client's
 /// port. The plan then first ends, as by mbm_plan_end, unless the call is refused for NULL, a

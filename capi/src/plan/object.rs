@@ -1,4 +1,4 @@
-//! What lies behind a plan of C, and its clock.
+//! The object behind `mbm_plan`, and its clock.
 
 use super::setup::mbm_planSetup;
 use super::storage::mbm_plan;
@@ -10,7 +10,7 @@ use mbm::plan::divide::divide;
 use mbm::plan::schedule::Schedule;
 use mbm::plan::Read;
 
-/// What lies behind an `mbm_plan`.
+/// The object behind an `mbm_plan`.
 #[repr(C)]
 pub struct Object {
     pub(super) mark: u8,

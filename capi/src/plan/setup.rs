@@ -1,4 +1,4 @@
-//! What C hands to a plan: its table, its limits and its storage.
+//! The arguments of a plan in C: its table, its limits and its storage.
 
 use super::storage::mbm_plan;
 use crate::client::mbm_clientRequest;
@@ -36,7 +36,8 @@ pub struct mbm_planField {
     /// mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
     /// It is 0 for a text.
     pub multiplier: i32,
-    /// They divide by this after that; 0 means 1. Not negative; 0 for a text.
+    /// They divide by this after that; 0 means 1. It must not be negative, and must be 0 for a
+    /// text.
     pub divisor: i32,
 }
 
@@ -78,8 +79,8 @@ pub struct mbm_planRead {
     words: [u32; 8],
 }
 
-/// What a plan is made of. It may be constant. It stays valid and as it is, with everything
-/// that it points to, for as long as the plan is used.
+/// The parts of a plan. The struct may be constant. It must stay valid and unchanged, with
+/// everything that it points to, for as long as the plan is used.
 #[repr(C)]
 pub struct mbm_planSetup {
     /// The fields, in any order.

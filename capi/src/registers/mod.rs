@@ -110,8 +110,8 @@ impl RegisterBytesMut for BorrowedRegisters {
 /// The registers of an `mbm_registers`, with the order of this call.
 ///
 /// # Safety
-/// `registers` is NULL or points to an `mbm_registers`. Its `data` is NULL or points to what
-/// the other fields say, which nothing else uses while the result lives.
+/// `registers` is NULL or points to an `mbm_registers`. Its `data` is NULL or points to as many
+/// words as the other fields say. Nothing else uses these words while the result lives.
 unsafe fn view(
     registers: *const mbm_registers,
     call_order: u8,

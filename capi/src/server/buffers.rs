@@ -1,4 +1,4 @@
-//! What a server of C is made of. A file of its own, below those that a server calls.
+//! The parts of a server in C. They have their own file, below the files that a server calls.
 
 use super::units::mbm_unit;
 use crate::port::mbm_port;

@@ -172,7 +172,7 @@ pub(super) unsafe fn connection(info: *const c_void) -> *mut c_void {
 /// known from `info`. Returns 0, or the exception code with which the hook refuses the request.
 ///
 /// # Safety
-/// `hooks` and `access` are valid, and the functions do what the header says; `info` is as
+/// `hooks` and `access` are valid, and the functions behave as the header says; `info` is as
 /// for [`connection`].
 pub(super) unsafe extern "C" fn call_hook(
     hooks: *const mbm_accessHooks,

@@ -1,4 +1,4 @@
-//! What a device reports about itself: exception status, server id and device
+//! The data with which a device describes itself: exception status, server id and device
 //! identification.
 
 use super::units::{add_only, request};

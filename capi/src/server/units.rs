@@ -11,8 +11,8 @@ use mbm::server::{dispatch, only_writes, Addressing, Dispatch, Indication, Reply
 /// mbm_unit_serve function.
 pub const MBM_MAX_SERVICES: u8 = 16;
 
-/// A unit that servers answer for. Initialise it with MBM_INIT, set `id`, and call the
-/// mbm_unit_serve functions, for example mbm_unit_serveCoils, for what it serves.
+/// A unit that servers answer for. Initialise it with MBM_INIT, set `id`, and call an
+/// mbm_unit_serve function, for example mbm_unit_serveCoils, for everything that it serves.
 ///
 /// Each mbm_unit_serve function takes a record: a struct of yours, which must stay valid
 /// for as long as the unit is used. A unit has places for MBM_MAX_SERVICES records; one
@@ -97,8 +97,8 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
     unsafe { add_as(unit, service, 1, serve) }.code()
 }
 
-/// As [`add`], for a family of which a unit serves one record: the unit would never call a second
-/// one. Returns [`Status::BUSY`] for it.
+/// As [`add`], for a family of records of which a unit serves only one: the unit would never
+/// call a second one. Returns [`Status::BUSY`] for it.
 ///
 /// # Safety
 /// As for [`add`].
@@ -255,7 +255,7 @@ const _: () = {
     assert!(offset_of!(mbm_unit, monitor) == end);
 };
 
-/// Has one service handle a request. A zeroed record has no function and handles nothing.
+/// Passes a request to one service. A zeroed record has no function and handles nothing.
 ///
 /// # Safety
 /// As for [`Serve`].

@@ -149,7 +149,7 @@ unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) 
     result.unwrap_or_else(unusable)
 }
 
-/// What the port of a trace returns that must not be used now.
+/// The return value of a trace's port while the port must not be used.
 fn unusable(error: Error) -> i16 {
     if error == Error::BUSY {
         0
@@ -286,21 +286,21 @@ fn code(result: Result<(), Error>) -> u8 {
 /// Begins the trace of a line, client or server. Then begin that line, client or server with
 /// mbm_trace_port.
 ///
-/// The hook is called from within the functions of the node, client or server, when the last byte
-/// of a frame was sent or read. Bytes that are not followed by the rest of a frame are handed
-/// out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a serial
-/// line when the next frame is sent, when the link is lost, or by mbm_trace_flush. `record`
-/// and its bytes are valid until the hook returns. The hook must not use this trace, nor the
-/// object that uses its port: such a call returns MBM_BUSY and changes nothing. On a serial
+/// The hook is called from within the functions of the node, client or server, when the last
+/// byte of a frame was sent or read. Bytes that are not followed by the rest of a frame are
+/// handed out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a
+/// serial line when the next frame is sent, when the link is lost, or by mbm_trace_flush.
+/// `record` and its bytes are valid until the hook returns. The hook must not use this trace or
+/// the object that uses its port: such a call returns MBM_BUSY and changes nothing. On a serial
 /// line it should not take longer than a character.
 ///
 /// You may call this function again at any time, but not from within the hook. The trace then
 /// drops the bytes that it has not handed out, and its frame timeout is the default.
 ///
-/// @param sends    what the object that will use the port sends: MBM_PACKET_REQUEST for a line or
+/// @param sends    the frames that the object on the port sends: MBM_PACKET_REQUEST for a line or
 ///                 client, MBM_PACKET_RESPONSE for a server
-/// @param port     is copied; its hooks read, write and micros are required. Its optional hooks are
-///                 passed on. It must not be the port of this trace, nor that of a trace that
+/// @param port     is copied; its hooks read, write and micros are required. Its optional hooks
+///                 are passed on. It must not be the port of this trace or of a trace that
 ///                 passes everything on to this one
 /// @param framing  the framing of the object that will use the port, and the declarations of your
 ///                 own functions, which must stay valid and unchanged. Without a declaration, the

@@ -1,4 +1,4 @@
-//! What a trace hands to its hook, and the same of a sniffer's event.
+//! The record that a trace passes to its hook, and the same record for a sniffer's event.
 
 use crate::functions::{declared, mbm_function};
 use crate::packet::{MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
@@ -24,12 +24,12 @@ const _: () = {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_traceRecord {
-    /// The bytes as they are on the line. Of a sniffer's event in ASCII they are decoded, from
+    /// The bytes as they are on the line. For a sniffer's event in ASCII they are decoded, from
     /// the unit to the LRC.
     pub bytes: *const u8,
-    /// When the first byte was sent or read, in microseconds by the clock of the port. The
-    /// time of a frame that followed other bytes without a pause is estimated. Of a sniffer's
-    /// event: when the last byte arrived.
+    /// When the first byte was sent or read, in microseconds by the clock of the port. The time
+    /// of a frame that followed other bytes without a pause is estimated. For a sniffer's event
+    /// it is the time at which the last byte arrived.
     pub timeUs: u32,
     /// The number of bytes.
     pub length: u16,
@@ -84,9 +84,9 @@ impl Observer for CObserver {
     }
 }
 
-/// Makes the record of an event of a sniffer, so that one hook serves what this program sends
-/// and what it overhears. The direction is MBM_TRACE_RECEIVED; `kind` says whether a client or
-/// a server sent the frame.
+/// Makes the record of an event of a sniffer, so that one hook serves the frames that this
+/// program sends and those that it overhears. The direction is MBM_TRACE_RECEIVED; `kind` says
+/// whether a client or a server sent the frame.
 ///
 /// @param event   an event that mbm_sniffer_next returned
 /// @param record  receives the record; its bytes are valid as long as those of the event

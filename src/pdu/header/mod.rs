@@ -30,12 +30,13 @@ const HEAD: usize = 10;
 #[derive(Clone, Copy, Debug)]
 pub struct RequestHeader {
     spec: FunctionSpec,
-    /// What precedes the caller's data, with their byte count if the function has one.
+    /// The bytes that precede the caller's data, with their byte count if the function has one.
     head: [u8; HEAD],
     head_length: u8,
     /// Bytes of the caller's data.
     data_length: u8,
-    /// Length of the response PDU, or the index of the byte that counts. Of [`OWN`]: the rule, as [`QUEUE`].
+    /// Length of the response PDU, or the index of the byte that counts. For [`OWN`] it is the
+    /// rule, as [`QUEUE`].
     length: u8,
     /// Bytes after the counted ones.
     more: u8,
@@ -157,7 +158,7 @@ impl RequestHeader {
         for (index, place) in pdu.iter_mut().enumerate() {
             *place = self.byte_at(index, &byte);
         }
-        // Of bits to write, the last byte may be used in part.
+        // Bits to write may use only a part of the last byte.
         if self.data_length > 0 {
             if let Some(last) = pdu.last_mut() {
                 *last &= self.mask();

@@ -67,7 +67,7 @@ impl RequestHeader {
         Ok(length)
     }
 
-    /// The bytes of the response before its data, of which there are `stored`.
+    /// The bytes of the response before its data; the data have `stored` bytes.
     fn before_data(&self, stored: u8) -> [u8; BEFORE_DATA] {
         let [function, first, second, ..] = self.head;
         match self.data_at() {

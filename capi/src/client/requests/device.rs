@@ -242,8 +242,9 @@ pub unsafe extern "C" fn mbm_client_custom(
 /// @param request   the request; if it is queued, its `data` then points into `body`
 /// @param function  the function code, 1 to 127
 /// @param body      the bytes after the function code; do not change them until the request has
-///                  ended; may be NULL if `bytes` is 0. Of 14 and 15 also the records alone, as
-///                  mbm_packet_addRecord builds them: the client sends their byte count before them
+///                  ended; may be NULL if `bytes` is 0. For 14 and 15 it may be the records
+///                  alone, as mbm_packet_addRecord builds them: the client sends their byte
+///                  count before them
 /// @param bytes     the number of bytes of `body`, 0 to 252
 /// @return a status; see mbm_client_readCoils. Also those with which a server answers such a
 ///         request: MBM_ILLEGAL_DATA_VALUE if the length or a count in `body` is wrong,
