@@ -27,6 +27,25 @@
 #[cfg(feature = "capi")]
 extern crate std;
 
+/// A table of exported functions, one of C in each row: its comment, its name, its arguments after
+/// `$objects`, and the function that it calls with `$objects` and the arguments that follow. All
+/// return a status.
+///
+/// cbindgen sees no macros: `rows` in `scripts/build/header` expands the tables for it.
+macro_rules! functions {
+    ($objects:tt $($(#[$comment:meta])* fn $name:ident $given:tt = $call:ident $passed:tt;)*) => {
+        $(functions! { @ $objects $(#[$comment])* $name $given $call $passed })*
+    };
+    (@ ($($object:ident: $kind:ty),*) $(#[$comment:meta])* $name:ident ($($given:ident: $type:ty),*)
+        $call:ident ($($passed:expr),* $(,)?)) => {
+        $(#[$comment])*
+        #[no_mangle]
+        pub unsafe extern "C" fn $name($($object: $kind,)* $($given: $type),*) -> u8 {
+            $call($($object,)* $($passed),*)
+        }
+    };
+}
+
 mod bits;
 mod client;
 mod frame;

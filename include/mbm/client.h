@@ -508,12 +508,12 @@ uint8_t mbm_client_reply(const mbm_clientRequest *request, uint8_t *pdu, uint16_
  *
  * @param address   the first coil, 0 to 65535, as on the wire
  * @param quantity  the number of coils, 1 to 2000
- * @return MBM_PENDING if the request is queued. Otherwise nothing was queued, and the request's
- *         `status` is the same: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for a request
- *         that no device could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
- *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` cannot hold the data,
- *         MBM_INVALID_ARGUMENT if `data` is NULL. With the request unchanged: MBM_BUSY also if the
- *         request is pending already
+ * @return MBM_PENDING if the request is queued. Otherwise nothing was queued, and the
+ *         request's `status` is the same: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS
+ *         for a request that no device could accept, MBM_BROADCAST_NOT_ALLOWED,
+ *         MBM_QUEUE_FULL, MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` cannot
+ *         hold the data, MBM_INVALID_ARGUMENT if `data` is NULL. With the request unchanged:
+ *         MBM_BUSY also if the request is pending already
  */
 uint8_t mbm_client_readCoils(mbm_client *client, mbm_clientRequest *request, uint16_t address,
                              uint16_t quantity);
@@ -628,9 +628,9 @@ uint8_t mbm_client_readExceptionStatus(mbm_client *client, mbm_clientRequest *re
  * Function 08: sends the words of `data`, and reads the same number of words into `reply`
  * (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
  *
- * @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which the
- *                     standard reserves, and expects a response of one word; for a response of
- *                     another length use mbm_client_custom
+ * @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which
+ *                     the standard reserves, and expects a response of one word; for a
+ *                     response of another length use mbm_client_custom
  * @param words        the number of words of `data`: 1; for sub-function 0, 1 to 125
  * @return a status; see mbm_client_readCoils
  */

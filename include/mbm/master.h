@@ -294,11 +294,12 @@ uint8_t mbm_node_getExceptionCode(const mbm_node *node);
  *
  * @param address   the first coil, 0 to 65535, as on the wire
  * @param quantity  the number of coils, 1 to 2000
- * @return a status; MBM_PENDING in non-blocking mode; an exception of the device (0x01 to 0x7F);
- *         MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC, MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID,
- *         MBM_INVALID_FUNCTION, MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
- *         MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a request is pending on the
- *         line; MBM_NOT_INITIALISED if the line has no port or no frame buffer
+ * @return a status; MBM_PENDING in non-blocking mode; an exception of the device (0x01 to
+ *         0x7F); MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC, MBM_MALFORMED_REPLY,
+ *         MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST, MBM_LINE_BUSY,
+ *         MBM_BUFFER_TOO_SMALL, MBM_BROADCAST_NOT_ALLOWED or MBM_CANCELLED; MBM_BUSY while a
+ *         request is pending on the line; MBM_NOT_INITIALISED if the line has no port or no
+ *         frame buffer
  */
 uint8_t mbm_node_readCoils(mbm_node *node, uint16_t address, uint16_t quantity);
 
@@ -404,8 +405,8 @@ uint8_t mbm_node_maskWriteRegister(mbm_node *node, uint16_t address, uint16_t an
  * @param readAddress    the first register to read, 0 to 65535
  * @param readQuantity   the number of registers to read, 1 to 125
  * @param writeAddress   the first register to write, 0 to 65535; becomes the write address
- * @param writeQuantity  the number of registers to write, 1 to 121, and not more than the transmit
- *                       words
+ * @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
+ *                       transmit words
  * @return a status; see mbm_node_readCoils
  */
 uint8_t mbm_node_readWriteMultipleRegisters(mbm_node *node, uint16_t readAddress,

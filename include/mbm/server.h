@@ -546,7 +546,8 @@ uint8_t mbm_bitTable_setHooks(mbm_bitTable *table, const mbm_accessHooks *hooks)
 /**
  * Serves coils: functions 01, 05 and 0F (hex).
  *
- * @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another kind
+ * @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another
+ *         kind
  */
 uint8_t mbm_unit_serveCoils(mbm_unit *unit, mbm_bitTable *table);
 

@@ -48,81 +48,48 @@ unsafe fn get(
     })
 }
 
-/// Reads one bit of a register.
-///
-/// @param address  the device's address of the register
-/// @param bit      0, the least significant, to 15
-/// @param on       receives 0 or 1
-/// @return a status; see mbm_registers
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getBit(
-    registers: *const mbm_registers,
-    address: u16,
-    bit: u8,
-    on: *mut u8,
-) -> u8 {
-    get_value(registers, on, |registers| {
-        registers.bit(address, bit).map(u8::from)
-    })
-}
+functions! {
+    (registers: *const mbm_registers)
 
-/// Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
-/// int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.
-///
-/// @param address  the device's address of its first register
-/// @param order    one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value    receives the number
-/// @return a status; see mbm_registers
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getUint16(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *mut u16,
-) -> u8 {
-    get(registers, address, order, value.cast(), 2)
-}
+    /// Reads one bit of a register.
+    ///
+    /// @param address  the device's address of the register
+    /// @param bit      0, the least significant, to 15
+    /// @param on       receives 0 or 1
+    /// @return a status; see mbm_registers
+    fn mbm_registers_getBit(address: u16, bit: u8, on: *mut u8)
+        = get_value(on, |registers| registers.bit(address, bit).map(u8::from));
 
-/// Reads a number of two registers, 0 to 4294967295. For a signed number (two's
-/// complement), pass a pointer to an int32_t, cast to uint32_t *.
-///
-/// @return as mbm_registers_getUint16
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getUint32(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *mut u32,
-) -> u8 {
-    get(registers, address, order, value.cast(), 4)
-}
+    /// Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
+    /// int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.
+    ///
+    /// @param address  the device's address of its first register
+    /// @param order    one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+    /// @param value    receives the number
+    /// @return a status; see mbm_registers
+    fn mbm_registers_getUint16(address: u16, order: u8, value: *mut u16)
+        = get(address, order, value.cast(), 2);
 
-/// Reads a number of four registers. For a signed number, pass a pointer to an int64_t,
-/// cast to uint64_t *.
-///
-/// @return as mbm_registers_getUint16
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getUint64(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *mut u64,
-) -> u8 {
-    get(registers, address, order, value.cast(), 8)
-}
+    /// Reads a number of two registers, 0 to 4294967295. For a signed number (two's
+    /// complement), pass a pointer to an int32_t, cast to uint32_t *.
+    ///
+    /// @return as mbm_registers_getUint16
+    fn mbm_registers_getUint32(address: u16, order: u8, value: *mut u32)
+        = get(address, order, value.cast(), 4);
 
-/// Reads a float of two registers, an IEEE 754 binary32. Its bits are copied, also those
-/// of a NaN.
-///
-/// @return as mbm_registers_getUint16
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getFloat(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *mut f32,
-) -> u8 {
-    get(registers, address, order, value.cast(), 4)
+    /// Reads a number of four registers. For a signed number, pass a pointer to an int64_t,
+    /// cast to uint64_t *.
+    ///
+    /// @return as mbm_registers_getUint16
+    fn mbm_registers_getUint64(address: u16, order: u8, value: *mut u64)
+        = get(address, order, value.cast(), 8);
+
+    /// Reads a float of two registers, an IEEE 754 binary32. Its bits are copied, also those
+    /// of a NaN.
+    ///
+    /// @return as mbm_registers_getUint16
+    fn mbm_registers_getFloat(address: u16, order: u8, value: *mut f32)
+        = get(address, order, value.cast(), 4);
 }
 
 /// Reads a double of four registers, an IEEE 754 binary64. Its bits are copied. On AVR,

@@ -196,99 +196,51 @@ unsafe fn fill(
     status.code()
 }
 
-/// Fills in a view of words that were read as registers. The order is MBM_ORDER_ABCD
-/// until you set `registers->order`. Nothing is copied: the view always shows the present
-/// words.
-///
-/// @param registers  the view to fill in; without data after an error
-/// @param words      the words, for example the response words of mbm_node; must stay valid
-///                   while the view is used. NULL only if `count` is 0
-/// @param count      how many words
-/// @param first      the device's address of the first register, 0 to 65535
-/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_ofWords(
-    registers: *mut mbm_registers,
-    words: *const u16,
-    count: u16,
-    first: u16,
-) -> u8 {
-    fill(
-        registers,
-        words.cast(),
-        MBM_REGISTERS_OF_WORDS,
-        count,
-        first,
-    )
-}
+functions! {
+    (registers: *mut mbm_registers)
 
-/// As mbm_registers_ofWords, for the data bytes of a reply or a request.
-///
-/// @param registers  the view to fill in; without data after an error
-/// @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must stay
-///                   valid while the view is used
-/// @param length     how many bytes, an even number
-/// @param first      the device's address of the first register, 0 to 65535
-/// @return a status; see mbm_registers_ofWords. MBM_INVALID_ARGUMENT for an odd length
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_ofBytes(
-    registers: *mut mbm_registers,
-    bytes: *const u8,
-    length: u16,
-    first: u16,
-) -> u8 {
-    fill(
-        registers,
-        bytes.cast(),
-        MBM_REGISTERS_OF_BYTES,
-        length,
-        first,
-    )
-}
+    /// Fills in a view of words that were read as registers. The order is MBM_ORDER_ABCD
+    /// until you set `registers->order`. Nothing is copied: the view always shows the present
+    /// words.
+    ///
+    /// @param registers  the view to fill in; without data after an error
+    /// @param words      the words, for example the response words of mbm_node; must stay valid
+    ///                   while the view is used. NULL only if `count` is 0
+    /// @param count      how many words
+    /// @param first      the device's address of the first register, 0 to 65535
+    /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535
+    fn mbm_registers_ofWords(words: *const u16, count: u16, first: u16)
+        = fill(words.cast(), MBM_REGISTERS_OF_WORDS, count, first);
 
-/// As mbm_registers_ofWords, for words that you also write, for example the transmit
-/// words of mbm_node.
-///
-/// @param registers  the view to fill in; without data after an error
-/// @param words      the words to write; must stay valid while the view is used
-/// @param count      how many words
-/// @param first      the device's address of the first register, 0 to 65535
-/// @return a status; see mbm_registers_ofWords
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_intoWords(
-    registers: *mut mbm_registers,
-    words: *mut u16,
-    count: u16,
-    first: u16,
-) -> u8 {
-    fill(
-        registers,
-        words.cast(),
-        MBM_REGISTERS_INTO_WORDS,
-        count,
-        first,
-    )
-}
+    /// As mbm_registers_ofWords, for the data bytes of a reply or a request.
+    ///
+    /// @param registers  the view to fill in; without data after an error
+    /// @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must stay
+    ///                   valid while the view is used
+    /// @param length     how many bytes, an even number
+    /// @param first      the device's address of the first register, 0 to 65535
+    /// @return a status; see mbm_registers_ofWords. MBM_INVALID_ARGUMENT for an odd length
+    fn mbm_registers_ofBytes(bytes: *const u8, length: u16, first: u16)
+        = fill(bytes.cast(), MBM_REGISTERS_OF_BYTES, length, first);
 
-/// As mbm_registers_ofBytes, for bytes that you also write.
-///
-/// @param registers  the view to fill in; without data after an error
-/// @param bytes      the bytes to write; must stay valid while the view is used
-/// @param length     how many bytes, an even number
-/// @param first      the device's address of the first register, 0 to 65535
-/// @return a status; see mbm_registers_ofBytes
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_intoBytes(
-    registers: *mut mbm_registers,
-    bytes: *mut u8,
-    length: u16,
-    first: u16,
-) -> u8 {
-    fill(
-        registers,
-        bytes.cast(),
-        MBM_REGISTERS_INTO_BYTES,
-        length,
-        first,
-    )
+    /// As mbm_registers_ofWords, for words that you also write, for example the transmit
+    /// words of mbm_node.
+    ///
+    /// @param registers  the view to fill in; without data after an error
+    /// @param words      the words to write; must stay valid while the view is used
+    /// @param count      how many words
+    /// @param first      the device's address of the first register, 0 to 65535
+    /// @return a status; see mbm_registers_ofWords
+    fn mbm_registers_intoWords(words: *mut u16, count: u16, first: u16)
+        = fill(words.cast(), MBM_REGISTERS_INTO_WORDS, count, first);
+
+    /// As mbm_registers_ofBytes, for bytes that you also write.
+    ///
+    /// @param registers  the view to fill in; without data after an error
+    /// @param bytes      the bytes to write; must stay valid while the view is used
+    /// @param length     how many bytes, an even number
+    /// @param first      the device's address of the first register, 0 to 65535
+    /// @return a status; see mbm_registers_ofBytes
+    fn mbm_registers_intoBytes(bytes: *mut u8, length: u16, first: u16)
+        = fill(bytes.cast(), MBM_REGISTERS_INTO_BYTES, length, first);
 }

@@ -45,84 +45,49 @@ unsafe fn set(
     }
 }
 
-/// Writes one bit of a register; the other bits do not change.
-///
-/// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of the register
-/// @param bit        0, the least significant, to 15
-/// @param on         0 for off, anything else for on
-/// @return a status; see mbm_registers
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setBit(
-    registers: *const mbm_registers,
-    address: u16,
-    bit: u8,
-    on: u8,
-) -> u8 {
-    with(registers, MBM_ORDER_DEFAULT, |registers| {
-        registers.set_bit(address, bit, on != 0)
-    })
-}
+functions! {
+    (registers: *const mbm_registers)
 
-/// Writes a number into one register. The order of words has no effect; the order of
-/// bytes has.
-///
-/// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of its first register
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param value      the number
-/// @return a status; see mbm_registers
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setUint16(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: u16,
-) -> u8 {
-    // SAFETY: as the header demands; the number is there.
-    unsafe { set(registers, address, order, (&raw const value).cast(), 2) }
-}
+    /// Writes one bit of a register; the other bits do not change.
+    ///
+    /// @param registers  the registers, of a kind that may be written
+    /// @param address    the device's address of the register
+    /// @param bit        0, the least significant, to 15
+    /// @param on         0 for off, anything else for on
+    /// @return a status; see mbm_registers
+    fn mbm_registers_setBit(address: u16, bit: u8, on: u8)
+        = with(MBM_ORDER_DEFAULT, |registers| registers.set_bit(address, bit, on != 0));
 
-/// Writes a number into two registers.
-///
-/// @return as mbm_registers_setUint16
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setUint32(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: u32,
-) -> u8 {
-    // SAFETY: as the header demands; the number is there.
-    unsafe { set(registers, address, order, (&raw const value).cast(), 4) }
-}
+    /// Writes a number into one register. The order of words has no effect; the order of
+    /// bytes has.
+    ///
+    /// @param registers  the registers, of a kind that may be written
+    /// @param address    the device's address of its first register
+    /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+    /// @param value      the number
+    /// @return a status; see mbm_registers
+    fn mbm_registers_setUint16(address: u16, order: u8, value: u16)
+        = set(address, order, (&raw const value).cast(), 2);
 
-/// Writes a number into four registers.
-///
-/// @param value  points to the number
-/// @return as mbm_registers_setUint16
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setUint64(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *const u64,
-) -> u8 {
-    set(registers, address, order, value.cast(), 8)
-}
+    /// Writes a number into two registers.
+    ///
+    /// @return as mbm_registers_setUint16
+    fn mbm_registers_setUint32(address: u16, order: u8, value: u32)
+        = set(address, order, (&raw const value).cast(), 4);
 
-/// Writes a float into two registers, as an IEEE 754 binary32. Its bits are copied.
-///
-/// @param value  points to the number
-/// @return as mbm_registers_setUint16
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setFloat(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *const f32,
-) -> u8 {
-    set(registers, address, order, value.cast(), 4)
+    /// Writes a number into four registers.
+    ///
+    /// @param value  points to the number
+    /// @return as mbm_registers_setUint16
+    fn mbm_registers_setUint64(address: u16, order: u8, value: *const u64)
+        = set(address, order, value.cast(), 8);
+
+    /// Writes a float into two registers, as an IEEE 754 binary32. Its bits are copied.
+    ///
+    /// @param value  points to the number
+    /// @return as mbm_registers_setUint16
+    fn mbm_registers_setFloat(address: u16, order: u8, value: *const f32)
+        = set(address, order, value.cast(), 4);
 }
 
 /// Writes a double into four registers, as an IEEE 754 binary64. On AVR, where a double

@@ -131,35 +131,26 @@ unsafe extern "C" fn serve_identification(
     identity::serve_identification(&CObjects(service.cast()), pdu, length).code()
 }
 
-/// Serves function 07, Read Exception Status.
-///
-/// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
-#[no_mangle]
-pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
-    unit: *mut mbm_unit,
-    status: *mut mbm_exceptionStatus,
-) -> u8 {
-    add_only(unit, status.cast(), serve_exception_status)
-}
+functions! {
+    (unit: *mut mbm_unit)
 
-/// Serves function 11 (hex), Report Server ID.
-///
-/// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
-#[no_mangle]
-pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mbm_serverId) -> u8 {
-    add_only(unit, id.cast(), serve_server_id)
-}
+    /// Serves function 07, Read Exception Status.
+    ///
+    /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
+    fn mbm_unit_serveExceptionStatus(status: *mut mbm_exceptionStatus)
+        = add_only(status.cast(), serve_exception_status);
 
-/// Serves function 2B/0E (hex), Read Device Identification: streams of objects, and
-/// single objects. If the objects do not fit into one response, the client reads the rest
-/// with further requests. The server computes the conformity level from the objects that
-/// exist.
-///
-/// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
-#[no_mangle]
-pub unsafe extern "C" fn mbm_unit_serveIdentification(
-    unit: *mut mbm_unit,
-    identification: *mut mbm_serverIdentification,
-) -> u8 {
-    add_only(unit, identification.cast(), serve_identification)
+    /// Serves function 11 (hex), Report Server ID.
+    ///
+    /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
+    fn mbm_unit_serveServerId(id: *mut mbm_serverId) = add_only(id.cast(), serve_server_id);
+
+    /// Serves function 2B/0E (hex), Read Device Identification: streams of objects, and
+    /// single objects. If the objects do not fit into one response, the client reads the rest
+    /// with further requests. The server computes the conformity level from the objects that
+    /// exist.
+    ///
+    /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
+    fn mbm_unit_serveIdentification(identification: *mut mbm_serverIdentification)
+        = add_only(identification.cast(), serve_identification);
 }

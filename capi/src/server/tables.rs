@@ -253,46 +253,33 @@ unsafe extern "C" fn add_table(
     unsafe { add_as(unit, table.cast(), kind.code(), serve) }.code()
 }
 
-/// Serves coils: functions 01, 05 and 0F (hex).
-///
-/// @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another kind
-#[no_mangle]
-pub unsafe extern "C" fn mbm_unit_serveCoils(unit: *mut mbm_unit, table: *mut mbm_bitTable) -> u8 {
-    add_table(unit, table.cast(), TableKind::COILS)
-}
+functions! {
+    (unit: *mut mbm_unit)
 
-/// Serves discrete inputs: function 02.
-///
-/// @return a status; see mbm_unit_serveCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_unit_serveDiscreteInputs(
-    unit: *mut mbm_unit,
-    table: *mut mbm_bitTable,
-) -> u8 {
-    add_table(unit, table.cast(), TableKind::DISCRETE_INPUTS)
-}
+    /// Serves coils: functions 01, 05 and 0F (hex).
+    ///
+    /// @return a status; see mbm_unit_serveFiles. MBM_BUSY for a table that is served as another
+    ///         kind
+    fn mbm_unit_serveCoils(table: *mut mbm_bitTable) = add_table(table.cast(), TableKind::COILS);
 
-/// Serves holding registers: functions 03, 06 and 10 (hex). For functions 16 and 17 too,
-/// call mbm_registerTable_serveMaskAndReadWrite afterwards.
-///
-/// @return a status; see mbm_unit_serveCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_unit_serveHoldingRegisters(
-    unit: *mut mbm_unit,
-    table: *mut mbm_registerTable,
-) -> u8 {
-    add_table(unit, table, TableKind::HOLDING_REGISTERS)
-}
+    /// Serves discrete inputs: function 02.
+    ///
+    /// @return a status; see mbm_unit_serveCoils
+    fn mbm_unit_serveDiscreteInputs(table: *mut mbm_bitTable)
+        = add_table(table.cast(), TableKind::DISCRETE_INPUTS);
 
-/// Serves input registers: function 04.
-///
-/// @return a status; see mbm_unit_serveCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_unit_serveInputRegisters(
-    unit: *mut mbm_unit,
-    table: *mut mbm_registerTable,
-) -> u8 {
-    add_table(unit, table, TableKind::INPUT_REGISTERS)
+    /// Serves holding registers: functions 03, 06 and 10 (hex). For functions 16 and 17 too,
+    /// call mbm_registerTable_serveMaskAndReadWrite afterwards.
+    ///
+    /// @return a status; see mbm_unit_serveCoils
+    fn mbm_unit_serveHoldingRegisters(table: *mut mbm_registerTable)
+        = add_table(table, TableKind::HOLDING_REGISTERS);
+
+    /// Serves input registers: function 04.
+    ///
+    /// @return a status; see mbm_unit_serveCoils
+    fn mbm_unit_serveInputRegisters(table: *mut mbm_registerTable)
+        = add_table(table, TableKind::INPUT_REGISTERS);
 }
 
 /// Adds functions 16 and 17 (hex), Mask Write Register and Read/Write Multiple Registers,

@@ -10,168 +10,91 @@ use mbm::pdu::functions::{FunctionSpec, COUNTS, FIXED, OWN};
 use mbm::pdu::header::{RequestHeader, GROUP};
 use mbm::pdu::limits::MAX_PDU;
 
-/// Function 07: reads the eight exception status outputs into one byte of `reply` (V1.1b3,
-/// 6.7).
-///
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readExceptionStatus(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-) -> u8 {
-    code_only(client, request, FunctionSpec::READ_EXCEPTION_STATUS)
-}
+functions! {
+    (client: *mut mbm_client, request: *mut mbm_clientRequest)
 
-/// Function 08: sends the words of `data`, and reads the same number of words into `reply`
-/// (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
-///
-/// @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which the
-///                     standard reserves, and expects a response of one word; for a response of
-///                     another length use mbm_client_custom
-/// @param words        the number of words of `data`: 1; for sub-function 0, 1 to 125
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_diagnostics(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    subFunction: u16,
-    words: u16,
-) -> u8 {
-    with_more(
-        client,
-        request,
-        FunctionSpec::DIAGNOSTICS,
-        [subFunction.into(), words.into(), 0, 0],
-        Some(|fields, words, _| {
-            let header = &mut fields.state.header;
-            header.add_words(words[0] as u16, words[1] as u16)
-        }),
-    )
-}
+    /// Function 07: reads the eight exception status outputs into one byte of `reply` (V1.1b3,
+    /// 6.7).
+    ///
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_readExceptionStatus() = code_only(FunctionSpec::READ_EXCEPTION_STATUS);
 
-/// Function 0B: reads the status word and the event count into two words of `reply` (V1.1b3,
-/// 6.9).
-///
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_getCommEventCounter(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-) -> u8 {
-    code_only(client, request, FunctionSpec::GET_COMM_EVENT_COUNTER)
-}
+    /// Function 08: sends the words of `data`, and reads the same number of words into `reply`
+    /// (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
+    ///
+    /// @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others, which
+    ///                     the standard reserves, and expects a response of one word; for a
+    ///                     response of another length use mbm_client_custom
+    /// @param words        the number of words of `data`: 1; for sub-function 0, 1 to 125
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_diagnostics(subFunction: u16, words: u16)
+        = with_more(
+            FunctionSpec::DIAGNOSTICS, [subFunction.into(), words.into(), 0, 0], Some(add_words));
 
-/// Function 0C: reads status, event count and message count, and then up to 64 events, into
-/// the bytes of `reply`. The first three have two bytes each, the high byte first. An event
-/// is one byte; the latest event is first (V1.1b3, 6.10).
-///
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_getCommEventLog(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-) -> u8 {
-    code_only(client, request, FunctionSpec::GET_COMM_EVENT_LOG)
-}
+    /// Function 0B: reads the status word and the event count into two words of `reply` (V1.1b3,
+    /// 6.9).
+    ///
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_getCommEventCounter() = code_only(FunctionSpec::GET_COMM_EVENT_COUNTER);
 
-/// Function 11: reads the server id, whose format is specific to the device (V1.1b3, 6.13).
-/// `reply` receives all bytes after the byte count. Some devices count only the id and send
-/// more bytes: `reply` receives those too. In RTU frames silence ends such a reply. The
-/// client does not wait for silence if the byte count is right.
-///
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_reportServerId(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-) -> u8 {
-    code_only(client, request, FunctionSpec::REPORT_SERVER_ID)
-}
+    /// Function 0C: reads status, event count and message count, and then up to 64 events, into
+    /// the bytes of `reply`. The first three have two bytes each, the high byte first. An event
+    /// is one byte; the latest event is first (V1.1b3, 6.10).
+    ///
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_getCommEventLog() = code_only(FunctionSpec::GET_COMM_EVENT_LOG);
 
-/// Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
-/// 6.14).
-///
-/// @param file      the file number, 1 to 65535
-/// @param record    the first record, 0 to 9999
-/// @param quantity  the number of records, 1 to 121
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readFileRecord(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    file: u16,
-    record: u16,
-    quantity: u16,
-) -> u8 {
-    with_more(
-        client,
-        request,
-        FunctionSpec::READ_FILE_RECORD,
-        [GROUP, file.into(), record.into(), quantity.into()],
-        Some(add_group),
-    )
-}
+    /// Function 11: reads the server id, whose format is specific to the device (V1.1b3, 6.13).
+    /// `reply` receives all bytes after the byte count. Some devices count only the id and send
+    /// more bytes: `reply` receives those too. In RTU frames silence ends such a reply. The
+    /// client does not wait for silence if the byte count is right.
+    ///
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_reportServerId() = code_only(FunctionSpec::REPORT_SERVER_ID);
 
-/// Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
-/// 6.15).
-///
-/// @param file      the file number, 1 to 65535
-/// @param record    the first record, 0 to 9999
-/// @param quantity  the number of records, 1 to 122
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_writeFileRecord(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    file: u16,
-    record: u16,
-    quantity: u16,
-) -> u8 {
-    with_more(
-        client,
-        request,
-        FunctionSpec::WRITE_FILE_RECORD,
-        [GROUP, file.into(), record.into(), quantity.into()],
-        Some(add_group),
-    )
-}
+    /// Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
+    /// 6.14).
+    ///
+    /// @param file      the file number, 1 to 65535
+    /// @param record    the first record, 0 to 9999
+    /// @param quantity  the number of records, 1 to 121
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_readFileRecord(file: u16, record: u16, quantity: u16)
+        = with_more(
+            FunctionSpec::READ_FILE_RECORD, [GROUP, file.into(), record.into(), quantity.into()],
+            Some(add_group));
 
-/// Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
-/// 6.18).
-///
-/// @param address  the FIFO pointer address of the queue, 0 to 65535
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readFifoQueue(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    address: u16,
-) -> u8 {
-    two_words(client, request, address, 0, FunctionSpec::READ_FIFO_QUEUE)
-}
+    /// Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
+    /// 6.15).
+    ///
+    /// @param file      the file number, 1 to 65535
+    /// @param record    the first record, 0 to 9999
+    /// @param quantity  the number of records, 1 to 122
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_writeFileRecord(file: u16, record: u16, quantity: u16)
+        = with_more(
+            FunctionSpec::WRITE_FILE_RECORD, [GROUP, file.into(), record.into(), quantity.into()],
+            Some(add_group));
 
-/// Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` receives,
-/// as on the wire: the conformity level, more follows (0 or FF), the next object id, the
-/// number of objects, and of each object its id, length and value.
-///
-/// @param code    the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
-/// @param object  the id of the first object to read
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    code: u8,
-    object: u8,
-) -> u8 {
-    let [first, second] = RequestHeader::identification(code, object);
-    with_more(
-        client,
-        request,
-        FunctionSpec::READ_DEVICE_IDENTIFICATION,
-        [first.into(), second.into(), code.into(), 0],
-        Some(|_, words, _| RequestHeader::check_code(words[2] as u8)),
-    )
+    /// Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
+    /// 6.18).
+    ///
+    /// @param address  the FIFO pointer address of the queue, 0 to 65535
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_readFifoQueue(address: u16)
+        = two_words(address, 0, FunctionSpec::READ_FIFO_QUEUE);
+
+    /// Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` receives,
+    /// as on the wire: the conformity level, more follows (0 or FF), the next object id, the
+    /// number of objects, and of each object its id, length and value.
+    ///
+    /// @param code    the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
+    /// @param object  the id of the first object to read
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_readDeviceIdentification(code: u8, object: u8)
+        = with_more(
+            FunctionSpec::READ_DEVICE_IDENTIFICATION, identification(code, object),
+            Some(|_, words, _| RequestHeader::check_code(words[2] as u8)));
 }
 
 /// Any function code: sends the bytes of `data` after the function code, and reads the bytes
@@ -308,6 +231,21 @@ pub unsafe fn forward<const MAY_LACK_COUNT: bool>(
         }
         status
     }
+}
+
+/// The words of a request for a device identification, and its code.
+fn identification(code: u8, object: u8) -> [usize; 4] {
+    let [first, second] = RequestHeader::identification(code, object);
+    [first.into(), second.into(), code.into(), 0]
+}
+
+/// Adds the words that the request sends.
+///
+/// # Safety
+/// As for [`add_group`].
+unsafe fn add_words(fields: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
+    let header = &mut fields.state.header;
+    header.add_words(words[0] as u16, words[1] as u16)
 }
 
 /// Adds the group of file records that the request reads or writes.
