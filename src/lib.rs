@@ -194,7 +194,16 @@
 #[cfg(test)]
 extern crate std;
 
-mod atomic;
+/// The atomic types of the ring. `tests/ring_orders.rs` compiles `ring.rs` with loom's types of
+/// the same names, to try every order in which writer and reader may run.
+mod atomic {
+    #[cfg(not(target_pointer_width = "16"))]
+    pub use core::sync::atomic::AtomicU16 as AtomicPlace;
+    #[cfg(target_pointer_width = "16")]
+    pub use core::sync::atomic::AtomicU8 as AtomicPlace;
+    pub use core::sync::atomic::{AtomicU8, Ordering};
+}
+
 mod bytes;
 #[doc(hidden)]
 pub mod error;
@@ -213,8 +222,6 @@ pub mod trace;
 // The crate mbm-c uses these too. They may change in any version.
 #[doc(hidden)]
 pub mod engine;
-#[doc(hidden)]
-pub mod node;
 
 // The examples of the guide are tests.
 #[cfg(all(doctest, feature = "embedded-io", feature = "embedded-io-async"))]

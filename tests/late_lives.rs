@@ -12,7 +12,7 @@ use mbm::engine::{Buffers, Frame, Setting};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::master::Master;
-use mbm::node::{Line, Node};
+use mbm::master::{node::Node, request::Line};
 use mbm::pdu::functions::FunctionSpec;
 use mbm::port::Port;
 use mbm::Error;

@@ -5,7 +5,7 @@ mod common;
 use common::device::{ask, sealed, Device};
 use mbm::frame::Framing;
 use mbm::server::custom::Outcome;
-use mbm::server::respond::respond;
+use mbm::server::respond;
 use mbm::server::storage::{HoldingRegisters, RegisterArray};
 use mbm::server::Unit;
 

@@ -4,7 +4,7 @@ mod common;
 
 use common::device::{ask, Device};
 use mbm::frame::Framing;
-use mbm::server::respond::respond;
+use mbm::server::respond;
 use mbm::server::Service;
 
 /// The response of a new device, which has ten registers and 20 bits of each kind from address

@@ -1,6 +1,7 @@
 //! The work, done by mbm.
 
-use mbm::data::{bits, registers};
+use mbm::data::bits;
+use mbm::data::view::{send_words, take_words};
 use mbm::error::{Error, Status};
 use mbm::frame::{ascii, rtu, tcp, Adu, Framing};
 use mbm::pdu::header::RequestHeader;
@@ -83,7 +84,7 @@ pub fn answer(
             let from = usize::from(address);
             let words = model.words.get(from..from + usize::from(quantity));
             let data = &mut model.place[..2 * usize::from(quantity)];
-            registers::send(data, words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?);
+            send_words(data, words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?);
             Response::ReadRegisters { function, data }
         }
         Request::WriteSingleCoil { address, on } => {
@@ -125,7 +126,7 @@ pub fn answer(
         } => {
             let from = usize::from(address);
             let words = model.words.get_mut(from..from + usize::from(quantity));
-            registers::take(words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?, data);
+            take_words(words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?, data);
             Response::WriteMultiple {
                 function: 16,
                 address,
@@ -157,11 +158,11 @@ pub fn answer(
             let words = model
                 .words
                 .get_mut(from..from + usize::from(write_quantity));
-            registers::take(words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?, data);
+            take_words(words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?, data);
             let from = usize::from(read_address);
             let words = model.words.get(from..from + usize::from(read_quantity));
             let data = &mut model.place[..2 * usize::from(read_quantity)];
-            registers::send(data, words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?);
+            send_words(data, words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?);
             Response::ReadRegisters {
                 function: 0x17,
                 data,
@@ -188,7 +189,7 @@ pub fn receive(framing: Framing, frame: &[u8], words: &mut [u16]) {
     let response = Response::parse(adu.pdu);
     assert!(response.is_ok());
     if let Ok(Response::ReadRegisters { data, .. }) = response {
-        registers::take(words, data);
+        take_words(words, data);
     }
     black_box(&response);
 }

@@ -12,7 +12,7 @@ use mbm::packet::refusal::{Exception, Head};
 use mbm::packet::{length, PduKind};
 use mbm::pdu::custom::Function;
 use mbm::pdu::length::Length;
-use mbm::pdu::limits::MAX_PDU;
+use mbm::pdu::MAX_PDU;
 
 /// The content of an `mbm_framing`, in the core's types.
 struct FrameFormat {

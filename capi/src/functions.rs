@@ -3,7 +3,7 @@
 
 use mbm::error::Error;
 use mbm::pdu::custom::{Function, Rule};
-use mbm::pdu::limits::MAX_PDU;
+use mbm::pdu::MAX_PDU;
 use mbm::pdu::{diagnostics, identification};
 
 /// Sub-function of 08: the device returns the data, of any number of words (V1.1b3, 6.8.1).

@@ -1,7 +1,7 @@
 //! The limits of the standard, as C constants.
 
 use mbm::frame::rtu;
-use mbm::pdu::limits;
+use mbm::pdu as limits;
 
 /// The maximum number of registers that one request reads (V1.1b3, 6.3 and 6.4).
 pub const MBM_MAX_READ_REGISTERS: u16 = 125;

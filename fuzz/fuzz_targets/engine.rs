@@ -8,7 +8,7 @@ use mbm::engine::{
     Buffers, Counter, Engine, Setting, Settings, Storage as _, Words as _, BROADCAST,
 };
 use mbm::error::Status;
-use mbm::pdu::master_request::MasterRequest;
+use mbm::master::request::MasterRequest;
 use mbm::port::Port;
 use mbm_fuzz::asked::{words, Asked};
 use mbm_fuzz::search::Search;

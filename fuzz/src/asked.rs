@@ -1,8 +1,8 @@
 //! A request of the master: as mbm builds it, as the standard describes it, and its responses.
 
 use crate::{be, naive, Input};
+use mbm::master::request::MasterRequest;
 use mbm::pdu::functions::FunctionSpec;
-use mbm::pdu::master_request::MasterRequest;
 
 /// A request and its PDU.
 pub struct Asked {

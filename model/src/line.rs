@@ -4,8 +4,8 @@ use crate::wire::{self, Lent, Wire};
 use mbm::engine::Setting;
 use mbm::error::Status;
 use mbm::frame::rtu;
+use mbm::master::request::Line;
 use mbm::master::Master;
-use mbm::node::Line;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// The units of the devices. They are equal modulo 32.

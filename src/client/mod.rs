@@ -9,25 +9,20 @@ mod link;
 mod policy;
 mod queue;
 mod ready;
-mod refused;
 mod request;
-mod retry;
 mod serial;
 mod storage;
 mod tcp;
 mod transaction;
-mod transport;
 mod units;
 
 pub use link::{Link, LinkEvent, LinkHooks, LinkState, MOST_REPLACE_AFTER};
-pub use policy::{Backoff, Policy};
+#[doc(hidden)]
+pub use policy::{again, again_when_busy};
+pub use policy::{Backoff, Policy, NO_RETRIES};
 pub use queue::RequestQueue;
 pub use ready::Request;
-pub use refused::Refused;
-pub use request::{ClientRequest, RequestState};
-pub use retry::NO_RETRIES;
-#[doc(hidden)]
-pub use retry::{again, again_when_busy};
+pub use request::{ClientRequest, Refused, RequestState};
 #[doc(hidden)]
 pub use serial::late_rest;
 pub use serial::Serial;
@@ -35,7 +30,6 @@ pub use storage::{ClientStorage, TcpBuffers};
 pub use tcp::Tcp;
 #[doc(hidden)]
 pub use transaction::{ClientEngine, ClientTransaction};
-pub use transport::Transport;
 pub use units::UnitRecord;
 #[doc(hidden)]
 pub use units::{find, note, rest};
@@ -186,5 +180,78 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     #[must_use = "the line may be in use"]
     pub fn suspend(&mut self) -> bool {
         self.line.suspend(&mut self.queue)
+    }
+}
+
+/// A serial line, or a TCP stream.
+pub trait Transport<J> {
+    /// True if unit 0 addresses all units (broadcast).
+    const HAS_BROADCAST: bool;
+
+    /// True if the transaction numbers of pending requests must differ.
+    const HAS_TRANSACTION_IDS: bool;
+
+    /// The type of the port.
+    type Port;
+
+    /// The type of the buffers.
+    type Storage;
+
+    /// See [`Client::settings`](Client::settings).
+    fn settings(&mut self) -> &mut Settings;
+
+    /// See [`Client::port`](Client::port).
+    fn port(&mut self) -> &mut Self::Port;
+
+    /// See [`Client::storage`](Client::storage).
+    fn storage(&mut self) -> &mut Self::Storage;
+
+    /// Advances the requests to the time `now`, and returns one that has ended. `fresh` is
+    /// true in the first call of each poll, when new bytes may have arrived.
+    fn advance<const N: usize>(
+        &mut self,
+        queue: &mut RequestQueue<J, N>,
+        now: u32,
+        fresh: bool,
+    ) -> Option<J>;
+
+    /// Discards the state of one request in flight; with `None`, of all requests and of
+    /// all partly received or partly sent frames.
+    fn release(&mut self, request: Option<&J>);
+
+    /// Forgets which units may still answer earlier requests: the link is a new one, on which they
+    /// cannot come.
+    fn forget_late_replies(&mut self) {}
+
+    /// True if no bytes of cancelled requests wait to be sent.
+    fn is_idle(&self) -> bool {
+        true
+    }
+
+    /// Microseconds until the line has something to do; `None` if the queue decides.
+    fn delay(&mut self, now: u32) -> Option<u32>;
+
+    /// See [`Client::suspend`](Client::suspend).
+    fn suspend<const N: usize>(&self, queue: &mut RequestQueue<J, N>) -> bool
+    where
+        J: ClientRequest,
+    {
+        let free = !queue.suspended && queue.is_idle() && self.is_idle();
+        queue.suspended |= free;
+        free
+    }
+
+    /// See [`Client::poll_delay`](Client::poll_delay).
+    fn poll_delay<const N: usize>(&mut self, queue: &RequestQueue<J, N>, now: u32) -> u32
+    where
+        J: ClientRequest,
+    {
+        if queue.suspended {
+            return u32::MAX;
+        }
+        match self.delay(now) {
+            Some(delay) => delay,
+            None => queue.delay(now),
+        }
     }
 }

@@ -1,9 +1,8 @@
 //! The queue of a client, and what follows when a request ends. Serial lines and TCP
 //! streams use the same queue, so a program contains its code once.
 
-use super::policy::Policy;
+use super::policy::{Policy, NO_RETRIES};
 use super::request::{ClientRequest, RequestState, Stage};
-use super::retry::NO_RETRIES;
 use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
 use crate::error::Status;

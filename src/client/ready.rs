@@ -1,7 +1,7 @@
 //! Ready-made requests, whose data are slices of the program.
 
 use super::request::{ClientRequest, RequestState};
-use crate::data::registers;
+use crate::data::view::take_words;
 use crate::error::{Error, Status};
 use crate::pdu::functions::{coil_value, FunctionSpec};
 use crate::pdu::header::RequestHeader;
@@ -52,7 +52,7 @@ impl Slice<'_> {
     fn store(&mut self, data: &[u8], mask: u8) {
         match self {
             Slice::None => {}
-            Slice::Registers(words) => registers::take(words, data),
+            Slice::Registers(words) => take_words(words, data),
             Slice::Coils(coils) => {
                 for (coils, byte) in coils.chunks_mut(8).zip(data) {
                     for (bit, coil) in coils.iter_mut().enumerate() {

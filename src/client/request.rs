@@ -2,9 +2,11 @@
 //! response.
 
 use crate::engine::BROADCAST;
+use crate::error::Error;
 use crate::error::Status;
 use crate::pdu::header::RequestHeader;
 use crate::time::LONGEST_TIMEOUT_MS;
+use core::fmt;
 
 /// The stage of a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -184,3 +186,41 @@ pub(super) fn store_response<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> S
 pub(super) fn data_of<J: ClientRequest>(request: &J) -> impl Fn(usize) -> u8 + '_ {
     |index| request.byte(index)
 }
+
+/// A request that [`Client::queue`](super::Client::queue) has refused, and hands back. In a
+/// function that returns [`Error`], `?` passes the reason on and drops the request.
+pub struct Refused<J>(pub J);
+
+impl<J: ClientRequest> Refused<J> {
+    /// Why it was refused.
+    pub fn error(&self) -> Error {
+        match self.0.state().status.result() {
+            Err(error) => error,
+            // The program has changed the state since.
+            Ok(()) => Error::INVALID_ARGUMENT,
+        }
+    }
+}
+
+impl<J: ClientRequest> From<Refused<J>> for Error {
+    fn from(refused: Refused<J>) -> Error {
+        refused.error()
+    }
+}
+
+impl<J: ClientRequest> fmt::Debug for Refused<J> {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter
+            .debug_tuple("Refused")
+            .field(&self.error())
+            .finish()
+    }
+}
+
+impl<J: ClientRequest> fmt::Display for Refused<J> {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        fmt::Display::fmt(&self.error(), formatter)
+    }
+}
+
+impl<J: ClientRequest> core::error::Error for Refused<J> {}

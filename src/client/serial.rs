@@ -5,7 +5,7 @@ use super::queue::RequestQueue;
 use super::request::{is_answer, store_response, ClientRequest, RequestState, Stage};
 use super::storage::ClientStorage;
 use super::transaction::ClientEngine;
-use super::transport::Transport;
+use super::Transport;
 use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
 use crate::engine::{Engine, LateUnits, Setting, Settings};
 use crate::error::Status;

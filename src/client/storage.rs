@@ -1,8 +1,7 @@
 //! The buffers, records and random numbers that a caller supplies to a client.
 
-use super::policy::Policy;
+use super::policy::{again, again_when_busy, Policy};
 use super::request::{RequestState, Stage};
-use super::retry::{again, again_when_busy};
 use super::units::{find, note, rest, UnitRecord};
 use crate::engine::{Frame, Storage};
 use crate::error::Status;

@@ -6,7 +6,7 @@ use crate::engine::{ascii, Engine, Transaction};
 use crate::error::Status;
 use crate::frame::{ascii as characters, rtu};
 use crate::pdu::header::RequestHeader;
-use crate::pdu::limits::MAX_PDU;
+use crate::pdu::MAX_PDU;
 use crate::port::Port;
 use core::num::NonZeroU8;
 

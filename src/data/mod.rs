@@ -2,7 +2,6 @@
 
 pub mod bits;
 pub mod order;
-pub mod registers;
 pub mod value;
 pub mod view;
 

@@ -61,7 +61,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// True if the next reply may be a late one.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn may_be_late(&self) -> bool {
+    pub(crate) fn may_be_late(&self) -> bool {
         self.owes() && self.settings.quiet_time.get() > 0 && !self.request.has_unique_reply()
     }
 
@@ -178,7 +178,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// How long the line must be silent before a held reply is accepted.
-    pub(super) fn hold(&mut self) -> u32 {
+    pub(crate) fn hold(&mut self) -> u32 {
         if self.owed & SLOW != 0 {
             Q::response_timeout(self)
         } else {

@@ -7,10 +7,8 @@
 //! - `send` writes the request and waits until the port has sent it.
 //! - `search` finds the reply in RTU frames: for each byte it asks whether the reply ends there.
 //! - `late` keeps a late reply from being delivered as the answer to a later request.
-//! - `extras` has retries, echo discarding and the post-flush hold.
-//! - `tally` counts the attempts that end, if the program has counters.
-//! - `ascii` finds the reply in ASCII frames; `lenient` accepts replies that deviate from the
-//!   standard.
+//! - `extras` has retries, echo discarding, the post-flush hold, and counters.
+//! - `ascii` finds the reply in ASCII frames.
 //!
 //! `inline(never)` keeps the steps apart in firmware. Each step then needs few values at a
 //! time, which fit into the registers, and the code is small.
@@ -19,18 +17,14 @@ pub mod ascii;
 mod extras;
 mod late;
 mod late_units;
-mod lenient;
-mod outcome;
 mod poll;
 mod search;
 mod send;
 mod settings;
 mod storage;
-mod tally;
 mod transaction;
 
 pub use late_units::LateUnits;
-pub use outcome::Outcome;
 pub use settings::{Setting, Settings};
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 pub use transaction::Transaction;
@@ -77,37 +71,37 @@ pub struct Engine<P, S: Storage, Q> {
     /// The unit that the request is sent to.
     pub(crate) unit: u8,
     /// The function code of the request.
-    function: u8,
+    pub(crate) function: u8,
     /// How often the request was repeated.
     retries: u8,
     /// The exception code of the last reply; 0 if the reply was no exception.
     pub(crate) exception: u8,
     /// What the request ends with if no more bytes arrive.
-    seen: Outcome,
+    pub(crate) seen: Outcome,
     /// The response or damaged reply in `seen` may lie within another frame, so a silence must
     /// follow it.
-    is_early: bool,
+    pub(crate) is_early: bool,
     /// How many replies the unit owed when the request was begun, less the replies that have
     /// come since: see `late`.
-    owed: u8,
+    pub(crate) owed: u8,
     /// A reply is or was held, because it may be a late one.
-    is_held: bool,
+    pub(crate) is_held: bool,
     /// A reply may have arrived that counts only once the bytes end: one of unknown length, or a
     /// deviating one.
-    awaits_end: bool,
+    pub(crate) awaits_end: bool,
     /// The last poll may have left bytes unread.
     has_more: bool,
     /// The kind of the frame that is being received, if it ends with a right CRC. It is known
     /// from its second byte on: see `kind_of_frame`.
     run_kind: Outcome,
     /// How many bytes have arrived since the last frame ended.
-    run_length: S::Count,
+    pub(crate) run_length: S::Count,
     /// Length of the reply's frame that is no exception; 0 if the request does not determine it.
-    length: S::Count,
+    pub(crate) length: S::Count,
     /// How many bytes the frame buffer holds.
-    end: S::Count,
+    pub(crate) end: S::Count,
     /// How many bytes at the end of the frame buffer the observer has filled.
-    kept: S::Count,
+    pub(crate) kept: S::Count,
     /// Length of the right reply, unit and PDU, at the front of the frame buffer; 0 if there is
     /// none.
     pub(crate) content: S::Count,
@@ -119,7 +113,7 @@ pub struct Engine<P, S: Storage, Q> {
     /// How many of them were counted, and the request with the first of them.
     counted: S::Count,
     /// How many frames with a right CRC were skipped that were not counted yet.
-    foreign_frames: i8,
+    pub(crate) foreign_frames: i8,
     /// CRC of the bytes that have arrived since the last frame ended.
     run: Crc16,
     /// How many bytes have arrived that were not counted yet.
@@ -132,11 +126,11 @@ pub struct Engine<P, S: Storage, Q> {
     /// The byte stream.
     pub port: P,
     /// When the wait began. Before and between requests: when the line was last in use.
-    since: u32,
+    pub(crate) since: u32,
     /// How long the wait lasts.
-    wait: u32,
+    pub(crate) wait: u32,
     /// The time of the current poll.
-    now: u32,
+    pub(crate) now: u32,
     /// When the phase began.
     begun: u32,
     /// Counts attempts and bytes. (A pointer, so that a program without counters does not
@@ -147,9 +141,9 @@ pub struct Engine<P, S: Storage, Q> {
     pub settings: Settings,
     /// The function that the engine calls at the moments of a request: `extras`, or `lenient`,
     /// which calls `extras` in turn.
-    extension: Option<Extension<P, S, Q>>,
+    pub(crate) extension: Option<Extension<P, S, Q>>,
     /// Retries, echo discarding and the post-flush hold (see `extras`).
-    extras: Option<Extension<P, S, Q>>,
+    pub(crate) extras: Option<Extension<P, S, Q>>,
 }
 
 /// A function that does something at a moment of a request. `true` if that replaces what follows.
@@ -167,4 +161,68 @@ pub enum Moment {
     Missed,
     /// The request ends with the outcome in `seen`. `true` if it is repeated.
     End,
+}
+
+/// The result of a request so far: the status of a response (0, or an exception code below 0x80),
+/// or the most severe fault in the received bytes. The more severe fault is the greater one. The
+/// low hexadecimal digit of a fault is the low digit of its status.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
+pub struct Outcome(u8);
+
+impl Outcome {
+    /// A right reply, or a broadcast that was sent.
+    pub const OK: Outcome = Outcome(0x00);
+    /// No frame arrived.
+    pub const NOTHING: Outcome = Outcome(0x82);
+    /// A frame of another unit.
+    pub const OTHER_UNIT: Outcome = Outcome(0x90);
+    /// A frame of our unit with another function.
+    pub const OTHER_FUNCTION: Outcome = Outcome(0xA1);
+    /// A frame of our unit and function that is not the reply.
+    pub const MALFORMED: Outcome = Outcome(0xB5);
+    /// A complete frame of our unit and function with a wrong CRC.
+    pub const BAD_CRC: Outcome = Outcome(0xC3);
+    /// No response, and the frame buffer cannot hold the reply.
+    pub const TOO_LONG: Outcome = Outcome(0xD9);
+
+    /// True for a response of the device: the right reply or an exception.
+    pub const fn is_response(self) -> bool {
+        self.0 < 0x80
+    }
+
+    /// The status of a request that ends with this outcome.
+    pub const fn status(self) -> Status {
+        if self.is_response() {
+            Status::from_code(self.0)
+        } else {
+            Status::from_code(0xE0 | (self.0 & 0x0F))
+        }
+    }
+}
+
+const _: () = {
+    assert!(Outcome::NOTHING.status().code() == Status::RESPONSE_TIMED_OUT.code());
+    assert!(Outcome::OTHER_UNIT.status().code() == Status::INVALID_SLAVE_ID.code());
+    assert!(Outcome::OTHER_FUNCTION.status().code() == Status::INVALID_FUNCTION.code());
+    assert!(Outcome::MALFORMED.status().code() == Status::MALFORMED_REPLY.code());
+    assert!(Outcome::BAD_CRC.status().code() == Status::INVALID_CRC.code());
+    assert!(Outcome::TOO_LONG.status().code() == Status::BUFFER_TOO_SMALL.code());
+};
+
+impl<P, S: Storage, Q> Engine<P, S, Q> {
+    /// True if deviating replies are accepted.
+    pub fn is_lenient(&self) -> bool {
+        let address = |extension: Option<Extension<P, S, Q>>| extension.map_or(0, |f| f as usize);
+        address(self.extension) != address(self.extras)
+    }
+
+    /// Sets what [`Engine::lenient`] returns, for later requests. Call it only while no request
+    /// is pending.
+    pub fn set_lenient(&mut self, lenient: Option<Extension<P, S, Q>>) {
+        self.extension = if lenient.is_some() {
+            lenient
+        } else {
+            self.extras
+        };
+    }
 }

@@ -193,7 +193,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Drops the bytes before `front`.
     #[inline(always)]
-    pub(super) fn drop_to(&mut self, front: S::Count) {
+    pub(crate) fn drop_to(&mut self, front: S::Count) {
         self.content = S::Count::ZERO;
         self.end -= front;
         self.storage.move_down(front, self.end);
@@ -228,7 +228,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// True if all bytes since the last frame form a frame.
-    pub(super) fn is_whole_frame(&self) -> bool {
+    pub(crate) fn is_whole_frame(&self) -> bool {
         self.run.is_residue() && self.run_length >= MIN_FRAME.into()
     }
 
@@ -287,7 +287,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Sets the outcome of a request for which no bytes arrive.
-    pub(super) fn see_nothing(&mut self) {
+    pub(crate) fn see_nothing(&mut self) {
         self.is_early = false;
         self.exception = 0;
         self.seen = if Q::HAS_FIXED_REPLY && self.length > self.storage.capacity() {
@@ -298,7 +298,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Notes a frame with a right CRC that does not answer the request.
-    pub(super) fn note_foreign_frame(&mut self) {
+    pub(crate) fn note_foreign_frame(&mut self) {
         self.foreign_frames = self.foreign_frames.wrapping_add(1);
     }
 
@@ -311,7 +311,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// How many bytes of the frame buffer the search uses.
-    pub(super) fn space(&self) -> S::Count {
+    pub(crate) fn space(&self) -> S::Count {
         self.storage.capacity() - self.kept
     }
 

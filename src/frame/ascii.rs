@@ -2,7 +2,7 @@
 //! carriage return, and an end character (serial line guide V1.02, 2.5.2).
 
 use super::checksum::lrc;
-use super::Adu;
+use super::rtu::Adu;
 use crate::error::Error;
 
 /// The colon at the start of a frame.

@@ -1,12 +1,11 @@
 //! Frames (application data units): how each framing carries a unit id and a PDU.
 
-mod adu;
 pub mod ascii;
 pub mod checksum;
 pub mod rtu;
 pub mod tcp;
 
-pub use adu::Adu;
+pub use rtu::Adu;
 
 use crate::error::Error;
 

@@ -2,8 +2,18 @@
 //! 2.5.1).
 
 use super::checksum::{crc16, Crc16};
-use super::Adu;
 use crate::error::Error;
+
+/// The content of a frame, in every framing: unit and PDU.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Adu<'a> {
+    /// The transaction identifier of a TCP frame; 0 in other framings.
+    pub transaction: u16,
+    /// The unit id: of the unit that receives a request, or that sent a response.
+    pub unit: u8,
+    /// The PDU: function code and data.
+    pub pdu: &'a [u8],
+}
 
 /// Bytes of the longest frame: unit, PDU of 253 bytes, CRC.
 pub const MAX_FRAME: usize = 256;

@@ -1,6 +1,6 @@
 //! TCP frames: an MBAP header and a PDU (messaging on TCP/IP guide V1.0b, 3.1.3).
 
-use super::Adu;
+use super::rtu::Adu;
 use crate::error::Error;
 use core::ops::RangeInclusive;
 

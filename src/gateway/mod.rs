@@ -10,11 +10,10 @@
 //! The gateway knows neither sockets nor clients of serial lines: [`GatewayStorage`] has
 //! them. It never waits.
 
+mod connections;
 mod lines;
 mod object;
 mod poll;
-mod receive;
-mod reply;
 mod route;
 mod state;
 mod storage;

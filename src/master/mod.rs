@@ -3,16 +3,22 @@
 
 #[cfg(feature = "embedded-io-async")]
 mod asynchronous;
+mod lenient;
+#[doc(hidden)]
+pub mod node;
+#[doc(hidden)]
+pub mod request;
 
 #[cfg(feature = "embedded-io-async")]
 pub use self::asynchronous::AsyncMaster;
 
 pub use crate::engine::{Buffers, Count, Counter, Setting, Settings, Storage, Words, COUNTERS};
 use crate::error::{Error, Status};
-use crate::node::{Line, Node};
 use crate::pdu::functions::FunctionSpec;
 use crate::port::Port;
 use core::task::Poll;
+use node::Node;
+use request::Line;
 
 /// A serial line with one node, its port and its buffers.
 #[derive(Clone, Hash, Debug)]

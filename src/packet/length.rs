@@ -7,9 +7,9 @@ use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::{is_user_defined, Function};
 use crate::pdu::functions::REPORT_SERVER_ID;
 use crate::pdu::length::{response as response_length, Length};
-use crate::pdu::limits::MAX_PDU;
 use crate::pdu::request::Request;
 use crate::pdu::EXCEPTION;
+use crate::pdu::MAX_PDU;
 
 /// The length of a frame whose PDU has `pdu` bytes.
 const fn frame_bytes(framing: Framing, pdu: usize) -> usize {

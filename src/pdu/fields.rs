@@ -3,7 +3,7 @@
 //! of a response.
 
 use super::functions::COIL_ON;
-use super::limits::MORE;
+use super::MORE;
 use crate::bytes::{Reader, Writer};
 use crate::error::{Error, Status};
 
@@ -254,7 +254,7 @@ pub(super) fn counted<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Error> {
 
 /// Checks a range of addresses as every device would (application protocol,
 /// figures 11 and following: quantity first, then addresses).
-pub(super) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
+pub(crate) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
     if quantity == 0 || quantity > most {
         Status::ILLEGAL_DATA_VALUE
     } else if address.checked_add(quantity - 1).is_none() {

@@ -1,7 +1,7 @@
 //! File records in the PDUs of functions 14 and 15.
 
 use super::fields::{byte, check_within, counted, word};
-use super::limits::{FILE_DATA_BYTES, MAX_RECORD, READ_FILE_BYTES, WRITE_FILE_BYTES};
+use super::{FILE_DATA_BYTES, MAX_RECORD, READ_FILE_BYTES, WRITE_FILE_BYTES};
 use crate::bytes::Reader;
 use crate::error::Error;
 

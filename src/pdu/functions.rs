@@ -233,14 +233,14 @@ pub(super) const GROUPS: u32 = 1 << 13;
 /// Units do not respond.
 pub(super) const UNANSWERED: u32 = 1 << 14;
 /// The second word is a quantity.
-pub(super) const RANGE: u32 = 1 << 15;
+pub(crate) const RANGE: u32 = 1 << 15;
 /// The quantity counts bits, not registers.
-pub(super) const BITS: u32 = 1 << 16;
+pub(crate) const BITS: u32 = 1 << 16;
 
 /// Two bits say how the length of the response is known. `FIXED`: the request determines it.
 pub const FIXED: u32 = 0;
 /// The request determines it, and the second byte of the response counts the data.
-pub(super) const READ: u32 = 1 << 17;
+pub(crate) const READ: u32 = 1 << 17;
 /// The byte at an index counts the bytes after it.
 pub const COUNTS: u32 = 2 << 17;
 /// The function has a rule of its own, or only the end of the frame ends the response.
@@ -334,12 +334,12 @@ impl FunctionSpec {
         FunctionSpec::new(function, flags | kind, 1, length as u32, 0, data)
     }
 
-    pub(super) const fn has(self, flag: u32) -> bool {
+    pub(crate) const fn has(self, flag: u32) -> bool {
         self.0 & flag != 0
     }
 
     /// The function code.
-    pub(super) const fn function(self) -> u8 {
+    pub(crate) const fn function(self) -> u8 {
         self.0 as u8
     }
 

@@ -2,7 +2,7 @@
 //! 2B.
 
 use super::fields::{byte, counted, expect};
-use super::limits::MORE;
+use super::MORE;
 use crate::bytes::Reader;
 use crate::error::Error;
 

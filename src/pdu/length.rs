@@ -9,7 +9,7 @@ use crate::error::Error;
 /// The length of a PDU or frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Length {
-    /// This number of bytes. It may be greater than [`MAX_PDU`](super::limits::MAX_PDU) if the
+    /// This number of bytes. It may be greater than [`MAX_PDU`](super::MAX_PDU) if the
     /// first bytes are wrong; there is no such PDU.
     Exactly(usize),
     /// At least this number of bytes. When that many have arrived, more may be known.

@@ -10,7 +10,7 @@ use super::files::{Reads, Writes};
 use super::functions;
 use super::identification::{BASIC, INDIVIDUAL, MEI_READ_DEVICE_IDENTIFICATION};
 use super::length::{self, Length};
-use super::limits::{
+use super::{
     MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,
 };

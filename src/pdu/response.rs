@@ -7,11 +7,10 @@ use super::fields::{
 };
 use super::files::{Records, Writes};
 use super::identification::{check_head, ObjectList, MEI_READ_DEVICE_IDENTIFICATION};
-use super::limits::{
-    MAX_EVENTS, MAX_FIFO, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_WRITE_BITS,
-    MAX_WRITE_REGISTERS,
+use super::{
+    custom, functions, length, EXCEPTION, MAX_EVENTS, MAX_FIFO, MAX_PDU, MAX_READ_BITS,
+    MAX_READ_REGISTERS, MAX_WRITE_BITS, MAX_WRITE_REGISTERS,
 };
-use super::{custom, functions, length, EXCEPTION};
 use crate::bytes::{Reader, Writer};
 use crate::error::{Error, Status};
 use core::mem::discriminant;

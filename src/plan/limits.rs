@@ -2,7 +2,7 @@
 
 use super::field::{place, Field};
 use crate::error::Status;
-use crate::pdu::limits::{MAX_READ_BITS, MAX_READ_REGISTERS};
+use crate::pdu::{MAX_READ_BITS, MAX_READ_REGISTERS};
 
 /// How much one read of a unit may request. 0 means as [`Limits`] says.
 #[repr(C)]

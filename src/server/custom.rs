@@ -2,7 +2,7 @@
 
 use super::{Reply, Service};
 use crate::bytes::move_items;
-use crate::pdu::limits::MAX_PDU;
+use crate::pdu::MAX_PDU;
 use core::cell::Cell;
 
 /// Serves a request of a user-defined function. The request PDU is the first `length` bytes of

@@ -4,7 +4,7 @@ use super::{Addressing, Indication, Reply};
 use crate::pdu::diagnostics::sub_function as sub;
 use crate::pdu::diagnostics::CLEAR_LOG;
 use crate::pdu::functions::{DIAGNOSTICS, GET_COMM_EVENT_COUNTER, GET_COMM_EVENT_LOG};
-use crate::pdu::limits::MAX_EVENTS;
+use crate::pdu::MAX_EVENTS;
 
 /// The diagnostics of a unit's line. All fields are zero at first. Counters wrap at 65536.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -4,7 +4,7 @@ use super::Reply;
 use crate::error::Status;
 use crate::pdu::files::{Reads, Record, Writes, REFERENCE_TYPE};
 use crate::pdu::functions::{READ_FIFO_QUEUE, READ_FILE_RECORD, WRITE_FILE_RECORD};
-use crate::pdu::limits::{MAX_FIFO, READ_FILE_BYTES};
+use crate::pdu::{MAX_FIFO, READ_FILE_BYTES};
 
 /// The records of files. Each record is one register.
 pub trait Files {

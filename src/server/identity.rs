@@ -7,7 +7,7 @@ use crate::pdu::functions::{
 use crate::pdu::identification::{
     BASIC, EXTENDED, INDIVIDUAL, MEI_READ_DEVICE_IDENTIFICATION, REGULAR,
 };
-use crate::pdu::limits::MAX_PDU;
+use crate::pdu::MAX_PDU;
 
 /// Serves function 07 with eight outputs. The request PDU is the first `length` bytes of
 /// `pdu`; the response overwrites it.

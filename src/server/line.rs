@@ -11,7 +11,7 @@ use crate::error::{Error, Status};
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::Rule;
-use crate::pdu::limits::MAX_PDU;
+use crate::pdu::MAX_PDU;
 use crate::port::Port;
 use crate::time::{self, elapsed, sure_to_be_sending};
 

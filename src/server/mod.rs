@@ -18,11 +18,11 @@ pub mod identity;
 mod indication;
 mod line;
 mod reply;
-pub mod respond;
 pub mod storage;
 pub mod table;
 mod units;
 
+pub use framing::{respond, DELIMITER};
 pub use indication::{only_writes, Addressing, Indication, ANY};
 pub use line::{Server, ServerStorage};
 pub use reply::Reply;

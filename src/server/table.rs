@@ -8,7 +8,7 @@ use super::Reply;
 use crate::pdu::functions::{
     MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS, WRITE_MULTIPLE_COILS, WRITE_SINGLE_COIL,
 };
-use crate::pdu::limits::{
+use crate::pdu::{
     MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,
 };

@@ -1,6 +1,5 @@
 //! Describes requests and responses in words, one line each.
 
-pub mod names;
 mod writer;
 
 pub use writer::TextWriter;
@@ -13,7 +12,9 @@ use crate::pdu::diagnostics::CLEAR_LOG;
 use crate::pdu::fields::{Byte, Data, Fields, Flag, Word};
 use crate::pdu::files::{Reads, Record, Writes};
 use crate::pdu::functions::{self, READ_FILE_RECORD};
-use crate::pdu::identification::MEI_READ_DEVICE_IDENTIFICATION;
+use crate::pdu::identification::{
+    BASIC, EXTENDED, INDIVIDUAL, MEI_READ_DEVICE_IDENTIFICATION, REGULAR,
+};
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 use crate::pdu::EXCEPTION;
@@ -138,7 +139,7 @@ fn writes(line: &mut TextWriter, writes: &Writes) {
 
 fn diagnostics(line: &mut TextWriter, code: u16, data: &[u8], is_response: bool) {
     line.put(", ");
-    line.put(names::sub_function(code));
+    line.put(sub_function_name(code));
     match (code, data) {
         (sub::RETURN_QUERY_DATA, data) => {
             line.byte(b':');
@@ -292,7 +293,7 @@ impl<'a> Fields<'a> for Words<'_, '_> {
                 line.put(": exception ");
                 line.hex(code);
                 line.byte(b' ');
-                line.put(names::exception(code));
+                line.put(exception_name(code));
             }
             // The read device id code follows.
             (Byte::MeiType, MEI_READ_DEVICE_IDENTIFICATION) => (),
@@ -302,7 +303,7 @@ impl<'a> Fields<'a> for Words<'_, '_> {
             }
             (Byte::ReadDeviceIdCode, code) => {
                 line.put(", device identification, ");
-                line.put(names::device_id(code));
+                line.put(device_id_name(code));
             }
             (Byte::ObjectId, object) => self.number(", object ", object.into()),
             _ => (),
@@ -412,7 +413,7 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
             ..
         } => {
             line.put(", device identification, ");
-            line.put(names::device_id(code));
+            line.put(device_id_name(code));
             line.byte(b':');
             for (id, value) in objects.iter() {
                 line.byte(b' ');
@@ -426,5 +427,54 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
             }
         }
         response => response.give(&mut Words::new(line, head)),
+    }
+}
+
+/// The name of a sub-function of function 08, diagnostics.
+const fn sub_function_name(code: u16) -> &'static str {
+    match code {
+        sub::RETURN_QUERY_DATA => "return query data",
+        sub::RESTART_COMMUNICATIONS => "restart communications option",
+        sub::RETURN_DIAGNOSTIC_REGISTER => "return diagnostic register",
+        sub::CHANGE_ASCII_INPUT_DELIMITER => "change ASCII input delimiter",
+        sub::FORCE_LISTEN_ONLY => "force listen only mode",
+        sub::CLEAR_COUNTERS => "clear counters and diagnostic register",
+        sub::BUS_MESSAGE_COUNT => "return bus message count",
+        sub::BUS_COMMUNICATION_ERROR_COUNT => "return bus communication error count",
+        sub::BUS_EXCEPTION_ERROR_COUNT => "return bus exception error count",
+        sub::SERVER_MESSAGE_COUNT => "return server message count",
+        sub::SERVER_NO_RESPONSE_COUNT => "return server no response count",
+        sub::SERVER_NAK_COUNT => "return server NAK count",
+        sub::SERVER_BUSY_COUNT => "return server busy count",
+        sub::BUS_CHARACTER_OVERRUN_COUNT => "return bus character overrun count",
+        sub::CLEAR_OVERRUN_COUNTER => "clear overrun counter and flag",
+        _ => "unknown sub-function",
+    }
+}
+
+/// The name of an exception code (V1.1b3, 7).
+const fn exception_name(code: u8) -> &'static str {
+    match code {
+        0x01 => "illegal function",
+        0x02 => "illegal data address",
+        0x03 => "illegal data value",
+        0x04 => "server device failure",
+        0x05 => "acknowledge",
+        0x06 => "server device busy",
+        0x08 => "memory parity error",
+        0x0A => "gateway path unavailable",
+        0x0B => "gateway target device failed to respond",
+        _ => "unknown code",
+    }
+}
+
+/// The name of a read device id code (V1.1b3, 6.21).
+const fn device_id_name(code: u8) -> &'static str {
+    match code {
+        BASIC => "basic",
+        REGULAR => "regular",
+        EXTENDED => "extended",
+        INDIVIDUAL => "individual",
+        _ => "unknown",
     }
 }

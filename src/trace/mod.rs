@@ -7,9 +7,8 @@
 //! frame is sent, the link is lost, or the buffer is full.
 
 mod cutter;
-mod record;
 
-pub use record::{Direction, Observer, Record};
+pub use cutter::{Direction, Observer, Record};
 
 use crate::error::Error;
 use crate::frame::Framing;

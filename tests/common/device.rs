@@ -7,7 +7,7 @@ use mbm::server::custom::{Custom, DisabledFunctions, Outcome};
 use mbm::server::diagnostics::Diagnostics;
 use mbm::server::files::{self, Fifos, Files};
 use mbm::server::identity::{self, Objects};
-use mbm::server::respond::respond;
+use mbm::server::respond;
 use mbm::server::storage::{
     BitArray, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, RegisterArray,
 };

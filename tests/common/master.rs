@@ -3,10 +3,10 @@
 use mbm::engine::{Buffers, Words};
 use mbm::error::{Error, Status};
 use mbm::frame::checksum::crc16;
+use mbm::master::request::MasterRequest;
 use mbm::master::Master;
 use mbm::pdu::functions;
 use mbm::pdu::functions::FunctionSpec;
-use mbm::pdu::master_request::MasterRequest;
 use mbm::port::Port;
 use std::collections::VecDeque;
 

@@ -11,7 +11,7 @@ use crate::port::{mbm_port, PortRef};
 use crate::storage::LineStorage;
 use core::ptr::null_mut;
 use mbm::error::Status;
-use mbm::node::Line;
+use mbm::master::request::Line;
 
 /// The fields in the storage of an `mbm_line`.
 #[repr(C)]

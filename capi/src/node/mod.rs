@@ -16,8 +16,8 @@ use super::port::PortRef;
 use super::storage::{LineStorage, NodeWords};
 use mbm::engine::Extension;
 use mbm::error::Status;
-use mbm::node::Node;
-use mbm::pdu::master_request::MasterRequest;
+use mbm::master::node::Node;
+use mbm::master::request::MasterRequest;
 use mbm::port::Port;
 
 /// The fields in the storage of an `mbm_node`.

@@ -3,7 +3,7 @@
 use super::mbm_node;
 use crate::pointers::{read, with};
 use mbm::error::Status;
-use mbm::node::NO_WORD;
+use mbm::master::node::NO_WORD;
 
 /// Sets the write address and empties the queue of mbm_node_send. The transmit words do not
 /// change.

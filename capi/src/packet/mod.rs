@@ -12,9 +12,9 @@ use mbm::error::{Error, Status};
 use mbm::packet::{self, PduKind};
 use mbm::pdu::custom::Function;
 use mbm::pdu::length::Length;
-use mbm::pdu::limits::MAX_PDU;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
+use mbm::pdu::MAX_PDU;
 
 /// A request: a client sends it.
 pub const MBM_PACKET_REQUEST: u8 = 0;

@@ -9,7 +9,7 @@ use core::ffi::c_void;
 use core::mem::MaybeUninit;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
-use mbm::server::respond::respond;
+use mbm::server::respond;
 use mbm::server::{Indication, Reply, Units};
 
 /// The units that C passed, how many, and the connection that the request came from.

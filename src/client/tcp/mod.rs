@@ -6,7 +6,7 @@ mod find;
 use super::queue::RequestQueue;
 use super::request::{data_of, ClientRequest, RequestState, Stage};
 use super::storage::ClientStorage;
-use super::transport::Transport;
+use super::Transport;
 use crate::bytes::move_to_front;
 use crate::engine::{Counter, Settings};
 use crate::error::Status;

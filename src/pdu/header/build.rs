@@ -8,13 +8,13 @@ use super::super::functions::{
     REPEATS_DATA, UNANSWERED,
 };
 use super::super::identification::MEI_READ_DEVICE_IDENTIFICATION;
-use super::super::limits::{
-    FILE_DATA_BYTES, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS,
-    MAX_RECORD, MAX_WRITE_BITS, MAX_WRITE_REGISTERS, READ_FILE_BYTES, WRITE_FILE_BYTES,
-};
 use super::super::{files, EXCEPTION};
 use super::RequestHeader;
 use crate::error::Status;
+use crate::pdu::{
+    FILE_DATA_BYTES, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS,
+    MAX_RECORD, MAX_WRITE_BITS, MAX_WRITE_REGISTERS, READ_FILE_BYTES, WRITE_FILE_BYTES,
+};
 
 /// The first word of a group of records: the byte count, which is set later, and the
 /// reference type.

@@ -17,8 +17,7 @@ use super::functions::{
 };
 use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use super::length::Length;
-use super::limits::{MAX_FIFO, MAX_PDU};
-use super::{files, length, EXCEPTION};
+use super::{files, length, EXCEPTION, MAX_FIFO, MAX_PDU};
 use crate::error::Status;
 use core::num::NonZeroU8;
 

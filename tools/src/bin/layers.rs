@@ -18,7 +18,7 @@ const LAYERS: [&[&str]; 10] = [
     &["packet"],
     &["text"],
     &["sniffer", "trace", "engine"],
-    &["node", "client", "plan", "server", "gateway"],
+    &["client", "plan", "server", "gateway"],
     &["master"],
 ];
 

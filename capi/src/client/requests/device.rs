@@ -8,7 +8,7 @@ use crate::pointers::array_or_empty;
 use mbm::error::Status;
 use mbm::pdu::functions::{FunctionSpec, COUNTS, FIXED, OWN};
 use mbm::pdu::header::{RequestHeader, GROUP};
-use mbm::pdu::limits::MAX_PDU;
+use mbm::pdu::MAX_PDU;
 
 functions! {
     (client: *mut mbm_client, request: *mut mbm_clientRequest)

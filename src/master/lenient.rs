@@ -11,9 +11,9 @@
 //! Only [`Engine::lenient`] names this module. A program that does not call that function
 //! contains none of this code.
 
-use super::{Engine, Extension, Moment, Outcome, Storage, Words};
+use super::request::MasterRequest;
+use crate::engine::{Engine, Extension, Moment, Outcome, Words};
 use crate::frame::rtu;
-use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
 
 /// Bytes before the data in the response to a read: unit, function code and byte count.
@@ -22,24 +22,6 @@ const BEFORE_DATA: u8 = 3;
 /// Bytes of the frame buffer that must stay free beside the kept bytes. An exception fits into
 /// them.
 const LEFT_FREE: u8 = 8;
-
-impl<P, S: Storage, Q> Engine<P, S, Q> {
-    /// True if deviating replies are accepted.
-    pub fn is_lenient(&self) -> bool {
-        let address = |extension: Option<Extension<P, S, Q>>| extension.map_or(0, |f| f as usize);
-        address(self.extension) != address(self.extras)
-    }
-
-    /// Sets what [`Engine::lenient`] returns, for later requests. Call it only while no request
-    /// is pending.
-    pub fn set_lenient(&mut self, lenient: Option<Extension<P, S, Q>>) {
-        self.extension = if lenient.is_some() {
-            lenient
-        } else {
-            self.extras
-        };
-    }
-}
 
 impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     /// The argument for [`Engine::set_lenient`]: deviating replies are accepted if `on`. A read

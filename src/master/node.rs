@@ -2,20 +2,14 @@
 //! library ModbusMaster. It has the device's unit, the result of its last request, and the
 //! positions in the words to send and in the received words. The line sends its requests.
 
-mod transaction;
-
-use crate::engine::{Engine, Words, BROADCAST};
+use super::request::Line;
+use crate::engine::{Words, BROADCAST};
 use crate::error::Status;
 use crate::pdu::functions::{coil_value, FunctionSpec};
-use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
 
 /// The value returned for a word that does not exist.
 pub const NO_WORD: u16 = 0xFFFF;
-
-/// A serial line: its port, its buffers and its settings, and the pending request. Any number
-/// of nodes use it, one request after the other.
-pub type Line<P, S> = Engine<P, S, MasterRequest>;
 
 /// A device on a line. Zeroed memory is a node of unit 0.
 #[derive(Clone, Hash, Debug)]
