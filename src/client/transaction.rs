@@ -151,7 +151,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         let mut length = (engine.end() - engine.content).min(rtu::MAX_FRAME as u16);
         while length >= rtu::MIN_FRAME.into() {
             if engine.would_end(length, is_silent)
-                && engine.ends_with(length, engine.request.function)
+                && engine.check_end(length, engine.request.function)
             {
                 return length;
             }

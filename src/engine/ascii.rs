@@ -38,7 +38,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 break;
             };
             let after = self.content + S::Count::of(after);
-            if front < after && self.is_ascii_reply(front, after - front, delimiter) {
+            if front < after && self.take_ascii_frame(front, after - front, delimiter) {
                 self.is_early = self.run_length > S::Count::ZERO;
                 let end = self.end;
                 if self.take_response() {
@@ -86,8 +86,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Decodes the frame of `length` characters at `front`. If it is the reply, moves it to the
-    /// front of the buffer. While no request is pending, only notes which unit has sent it.
-    fn is_ascii_reply(&mut self, front: S::Count, length: S::Count, delimiter: u8) -> bool {
+    /// front of the buffer and returns true. While no request is pending, only notes which unit has
+    /// sent it.
+    fn take_ascii_frame(&mut self, front: S::Count, length: S::Count, delimiter: u8) -> bool {
         let frame = self.storage.bytes(front, length);
         let content = match ascii::decode(frame, delimiter, true) {
             Decoded::Valid(length) => S::Count::from(length),

@@ -19,18 +19,18 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// See [`super::Extension`].
     pub(super) fn extras(&mut self, moment: Moment) -> bool {
         match moment {
-            Moment::Byte => self.ends_echo(),
-            Moment::Sent => self.holds_driver(),
-            Moment::End => self.is_repeated(),
+            Moment::Byte => self.take_echo(),
+            Moment::Sent => self.hold_driver(),
+            Moment::End => self.repeat_if_allowed(),
             Moment::Missed => false,
         }
     }
 
-    /// True if the last byte ends the echo of the request.
-    fn ends_echo(&mut self) -> bool {
+    /// Drops the echo of the request if it ends with the last byte, and returns true then.
+    fn take_echo(&mut self) -> bool {
         let length = self.outgoing;
         if length == S::Count::ZERO
-            || !self.ends_with(length, self.function)
+            || !self.check_end(length, self.function)
             || !Q::is_echo(self, self.end - length)
         {
             return false;
@@ -44,8 +44,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         true
     }
 
-    /// True while the driver must stay on after the port has sent the last bit.
-    fn holds_driver(&mut self) -> bool {
+    /// Keeps the driver on after the port has sent the last bit, for the post-flush hold. Returns
+    /// false when it is over.
+    fn hold_driver(&mut self) -> bool {
         let hold = self.settings.post_flush_hold;
         if self.phase == Phase::PostFlush {
             return !self.has_expired();
@@ -58,8 +59,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         hold > 0
     }
 
-    /// True if the request has failed and is begun again.
-    fn is_repeated(&mut self) -> bool {
+    /// Begins the request again if it has failed and has retries left, and returns true then.
+    fn repeat_if_allowed(&mut self) -> bool {
         let retries = self.settings.retries;
         let is_final = self.seen.is_response() || self.seen == Outcome::TOO_LONG;
         if !Q::HAS_FIXED_REPLY || self.retries >= retries || is_final {

@@ -70,21 +70,32 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn expect_late_reply(&mut self, is_cancelled: bool) {
         self.is_late = true;
-        // An earlier request may have failed as well, by a timeout or by being cancelled.
+        self.add_owed_reply(is_cancelled);
+        let has_heard_unit = self.is_held || self.seen > Outcome::OTHER_UNIT;
+        if has_heard_unit {
+            self.begun = self.now;
+        }
+        self.write_record();
+    }
+
+    /// Counts the pending request among those whose reply the unit owes.
+    #[inline(always)]
+    fn add_owed_reply(&mut self, is_cancelled: bool) {
         if self.owed & REPLIES != REPLIES {
             self.owed += 1;
         }
-        // Without a damaged reply, the right one may be late.
-        if self.phase != Phase::Reply || self.seen != Outcome::BAD_CRC {
+        let has_damaged_reply = self.phase == Phase::Reply && self.seen == Outcome::BAD_CRC;
+        if !has_damaged_reply {
             self.owed |= SLOW;
         }
         if is_cancelled {
             self.owed |= CANCELLED;
         }
-        if self.is_held || self.seen > Outcome::OTHER_UNIT {
-            // The unit was heard.
-            self.begun = self.now;
-        }
+    }
+
+    /// Writes into the record of the unit what it owes, and when it is clean at the latest.
+    #[inline(always)]
+    fn write_record(&mut self) {
         let place = self.place_of_record();
         let timeout = Q::response_timeout(self);
         let silence = timeout

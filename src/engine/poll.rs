@@ -260,7 +260,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         let mut is_old = false;
         if budget < MOST.into() {
             let is_before = self.phase <= Phase::Gap;
-            if is_before || self.waits_for_silence() {
+            if is_before || self.wait_for_silence() {
                 // The search may have taken long. The silence begins after it.
                 self.note_use();
             }
@@ -305,9 +305,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         has_elapsed(limit, self.now, since)
     }
 
-    /// True if silence ends the wait for the reply, because it is known what the request ends with
-    /// then. Sets how long the silence must last.
-    fn waits_for_silence(&mut self) -> bool {
+    /// Lets silence end the wait for the reply if the outcome of the request is known, and sets how
+    /// long the silence must last. Returns false if it is not known.
+    fn wait_for_silence(&mut self) -> bool {
         if self.is_held {
             self.wait = self.hold();
         } else if self.is_early || self.may_end_in_silence() {
@@ -342,7 +342,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Ends the request with the outcome in `seen`.
     fn settle(&mut self) -> Status {
-        if self.has_extra(Moment::End) {
+        if self.run_extension(Moment::End) {
             return Status::PENDING;
         }
         if self.seen.is_response() {
@@ -351,9 +351,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.seen.status()
     }
 
-    /// True if the engine has an extension, and it replaces what follows at this moment.
+    /// Runs the extension, if there is one. Returns true if it replaces the code that follows at this
+    /// moment.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub(super) fn has_extra(&mut self, moment: Moment) -> bool {
+    pub(super) fn run_extension(&mut self, moment: Moment) -> bool {
         self.extension
             .is_some_and(|extension| extension(self, moment))
     }

@@ -31,7 +31,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             // One byte, at the end.
             return self.take_in();
         }
-        if first == S::Count::ZERO && received == self.length && self.is_reply_alone(received) {
+        if first == S::Count::ZERO && received == self.length && self.accept_reply_alone(received) {
             return true;
         }
         let mut index = first;
@@ -48,9 +48,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         false
     }
 
-    /// True if the received bytes are exactly the reply, and end the request. Hosts receive most
-    /// replies in this way, and save 2000 instructions for ten registers.
-    fn is_reply_alone(&mut self, received: S::Count) -> bool {
+    /// Accepts the received bytes if they are exactly the reply. Returns true if they end the
+    /// request. Hosts receive most replies in this way, and save 2000 instructions for ten registers.
+    fn accept_reply_alone(&mut self, received: S::Count) -> bool {
         let frame = self.storage.slice(S::Count::ZERO, received);
         let start = [self.unit, self.function];
         if self.may_be_late()
@@ -76,10 +76,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.end += 1u8.into();
         let is_whole = self.continue_frame();
         let function = self.function;
-        if self.has_extra(Moment::Byte) {
+        if self.run_extension(Moment::Byte) {
             return false;
         }
-        let is_response = if self.ends_with(EXCEPTION_FRAME.into(), function | EXCEPTION) {
+        let is_response = if self.check_end(EXCEPTION_FRAME.into(), function | EXCEPTION) {
             self.accept_exception()
         } else {
             let length = self.ending_reply();
@@ -93,7 +93,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 return true;
             }
         }
-        let goes_on = self.has_extra(Moment::Missed);
+        let goes_on = self.run_extension(Moment::Missed);
         is_whole && !goes_on && self.skip_frame()
     }
 
@@ -121,7 +121,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
             return Q::ending_reply(self, false);
         }
-        match self.ends_with(self.length, self.function) {
+        match self.check_end(self.length, self.function) {
             true => self.length,
             false => S::Count::ZERO,
         }
@@ -166,9 +166,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         true
     }
 
-    /// True if the last `length` bytes are a frame of our unit with that function code and a
-    /// right CRC. Notes a wrong CRC.
-    pub(crate) fn ends_with(&mut self, length: S::Count, function: u8) -> bool {
+    /// Checks whether the last `length` bytes are a frame of our unit with that function code and a
+    /// right CRC, and notes a wrong CRC.
+    pub(crate) fn check_end(&mut self, length: S::Count, function: u8) -> bool {
         let have = self.end - self.content;
         if length > have {
             return false;

@@ -115,7 +115,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if self.phase == Phase::Flush && !self.port.flush() {
             return self.stalled();
         }
-        if self.has_extra(Moment::Sent) {
+        if self.run_extension(Moment::Sent) {
             return Status::PENDING;
         }
         // The request has been sent: the driver goes off, and the wait for the reply begins.

@@ -46,7 +46,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
         }
         if !self.request.is_read() {
             // The search has found that it is not the reply.
-            if self.ends_with(self.length, function) {
+            if self.check_end(self.length, function) {
                 self.note_deviating(is_whole);
             }
             return false;

@@ -122,13 +122,13 @@ pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), 
     if !is_free(function) {
         return Err(Error::ILLEGAL_FUNCTION);
     }
-    let matches_echo = match rule.map(|rule| by_rule(pdu, rule)) {
+    let has_right_length = match rule.map(|rule| by_rule(pdu, rule)) {
         None if !is_user_defined(function) => return Err(Error::ILLEGAL_FUNCTION),
         None | Some(Length::Silence) => true,
         Some(Length::Exactly(length)) => length == pdu.len(),
         Some(_) => false,
     };
-    if matches_echo {
+    if has_right_length {
         Ok(())
     } else {
         Err(Error::ILLEGAL_DATA_VALUE)

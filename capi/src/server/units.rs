@@ -189,7 +189,7 @@ pub(super) unsafe fn call_services(
         let end = (&raw mut (*unit).monitor).cast();
         while place != end && !(*place).is_null() {
             let reply = call_service(*place, info, pdu);
-            if is_answer(reply, info) {
+            if take_reply(reply, info) {
                 return reply;
             }
             place = place.add(1);
@@ -216,11 +216,12 @@ unsafe fn begin_refusal(info: *const c_void) {
     unsafe { refusal_field(info).write(Reply::ILLEGAL_FUNCTION.exception_code()) }
 }
 
-/// False if the services after the one that returned `reply` are called too.
+/// Takes the reply of a service. Returns false if the next service is called too, and notes it if
+/// this one lacks cells of the request.
 ///
 /// # Safety
 /// As for [`Serve`].
-unsafe fn is_answer(reply: usize, info: *const c_void) -> bool {
+unsafe fn take_reply(reply: usize, info: *const c_void) -> bool {
     if reply == Reply::NOT_HANDLED.code() {
         return false;
     }
