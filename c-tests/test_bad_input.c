@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 /* Calls the functions that make a request. */
 static void all_requests_answer(mbm_node *m, uint8_t status)
 {
@@ -58,7 +60,7 @@ static void all_others_answer(mbm_line *l, mbm_node *m, uint8_t status)
     assert_int_equal(mbm_node_receive(m), 0xFFFF);
 }
 
-static void null_is_an_invalid_argument_everywhere(void **state)
+TEST(null_is_an_invalid_argument_everywhere)
 {
     mbm_line l = MBM_INIT;
     mbm_node m = MBM_INIT;
@@ -83,25 +85,23 @@ static void null_is_an_invalid_argument_everywhere(void **state)
     all_others_answer(&l, &m, MBM_NOT_INITIALISED);
 }
 
-static void a_zeroed_object_is_not_initialised_and_stays_zero(void **state)
+TEST(a_zeroed_object_is_not_initialised_and_stays_zero)
 {
     static mbm_line l;
     static const mbm_line zero_line;
     static mbm_node m;
     static const mbm_node zero;
 
-    (void)state;
     all_requests_answer(&m, MBM_NOT_INITIALISED);
     all_others_answer(&l, &m, MBM_NOT_INITIALISED);
     assert_memory_equal(&l, &zero_line, sizeof l);
     assert_memory_equal(&m, &zero, sizeof m);
 }
 
-static void every_status_has_a_text(void **state)
+TEST(every_status_has_a_text)
 {
     unsigned status;
 
-    (void)state;
     for (status = 0; status < 256; status++) {
         assert_non_null(mbm_status_text((uint8_t)status));
         assert_true(strlen(mbm_status_text((uint8_t)status)) > 0);
@@ -109,7 +109,7 @@ static void every_status_has_a_text(void **state)
     assert_string_not_equal(mbm_status_text(MBM_OK), mbm_status_text(MBM_INVALID_CRC));
 }
 
-static void a_line_without_a_frame_buffer_sends_no_request(void **state)
+TEST(a_line_without_a_frame_buffer_sends_no_request)
 {
     mbm_line l = MBM_INIT;
     mbm_node m = MBM_INIT;
@@ -124,14 +124,13 @@ static void a_line_without_a_frame_buffer_sends_no_request(void **state)
     IS(MBM_NOT_INITIALISED, mbm_node_poll(&m));
 }
 
-static void a_line_without_a_port_sends_no_request(void **state)
+TEST(a_line_without_a_port_sends_no_request)
 {
     mbm_line l = MBM_INIT;
     mbm_node m = MBM_INIT;
     uint16_t words[2] = {0, 0};
     uint8_t frame[32];
 
-    (void)state;
     OK(mbm_node_begin(&m, &l, 17, words, 1, words + 1, 1));
     OK(mbm_line_setFrame(&l, frame, sizeof frame));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
@@ -142,7 +141,7 @@ static void a_line_without_a_port_sends_no_request(void **state)
     OK(mbm_node_cancel(&m));
 }
 
-static void a_port_without_its_three_hooks_is_refused(void **state)
+TEST(a_port_without_its_three_hooks_is_refused)
 {
     mbm_port read_less, write_less, clock_less, empty;
     mbm_line l = MBM_INIT;
@@ -167,7 +166,7 @@ static void a_port_without_its_three_hooks_is_refused(void **state)
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
-static void forbidden_quantities_return_3_and_nothing_is_sent(void **state)
+TEST(forbidden_quantities_return_3_and_nothing_is_sent)
 {
     static const uint16_t beyond[] = {0, 2001, 2048, 4096, 32768, 65535};
     static const uint16_t registers[] = {0, 126, 128, 256, 257, 512, 32769, 65535};
@@ -194,7 +193,7 @@ static void forbidden_quantities_return_3_and_nothing_is_sent(void **state)
     sim_assert_order(s, "PWO", "");
 }
 
-static void ranges_beyond_65535_return_2_and_nothing_is_sent(void **state)
+TEST(ranges_beyond_65535_return_2_and_nothing_is_sent)
 {
     NODE;
 
@@ -211,7 +210,7 @@ static void ranges_beyond_65535_return_2_and_nothing_is_sent(void **state)
     assert_int_equal(s->sent, 0);
 }
 
-static void the_last_address_can_be_read_and_written(void **state)
+TEST(the_last_address_can_be_read_and_written)
 {
     NODE;
 
@@ -254,7 +253,7 @@ static void free_buffers(sim *s, buffers b)
     free(b.frame);
 }
 
-static void a_frame_buffer_below_8_bytes_is_refused(void **state)
+TEST(a_frame_buffer_below_8_bytes_is_refused)
 {
     uint16_t bytes;
     SIM;
@@ -267,7 +266,7 @@ static void a_frame_buffer_below_8_bytes_is_refused(void **state)
     OK(mbm_line_beginRtu(&s->line, &s->port, s->buffer, 8));
 }
 
-static void a_request_is_sent_whole_or_not_at_all(void **state)
+TEST(a_request_is_sent_whole_or_not_at_all)
 {
     uint16_t bytes;
     NODE;
@@ -297,7 +296,7 @@ static void a_request_is_sent_whole_or_not_at_all(void **state)
     }
 }
 
-static void a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing(void **state)
+TEST(a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing)
 {
     uint16_t bytes;
     NODE;
@@ -328,7 +327,7 @@ static void ends_in_12_bytes(sim *s, mbm_node *n, uint8_t status, const char *re
     free_buffers(s, b);
 }
 
-static void a_read_that_the_frame_buffer_is_too_small_for_ends_so_or_with_an_exception(void **state)
+TEST(a_read_that_the_frame_buffer_is_too_small_for_ends_so_or_with_an_exception)
 {
     NODE;
 
@@ -340,7 +339,7 @@ static void a_read_that_the_frame_buffer_is_too_small_for_ends_so_or_with_an_exc
     ends_in_12_bytes(s, n, MBM_ILLEGAL_DATA_ADDRESS, "12 03 04 11 03 08 00 + / 11 83 02 +");
 }
 
-static void a_whole_reply_longer_than_the_frame_buffer_ends_the_request_at_once(void **state)
+TEST(a_whole_reply_longer_than_the_frame_buffer_ends_the_request_at_once)
 {
     NODE;
 
@@ -348,7 +347,7 @@ static void a_whole_reply_longer_than_the_frame_buffer_ends_the_request_at_once(
     assert_true(s->now < 100000);
 }
 
-static void a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception(void **state)
+TEST(a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception)
 {
     char reply[600] = "11 03 84";
     unsigned i;
@@ -370,7 +369,7 @@ static void a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception
     free_buffers(s, b);
 }
 
-static void a_reply_longer_than_the_response_words_changes_none(void **state)
+TEST(a_reply_longer_than_the_response_words_changes_none)
 {
     buffers b;
     NODE;
@@ -392,7 +391,7 @@ static void a_reply_longer_than_the_response_words_changes_none(void **state)
     free_buffers(s, b);
 }
 
-static void writes_beyond_the_transmit_words_return_3_and_nothing_is_sent(void **state)
+TEST(writes_beyond_the_transmit_words_return_3_and_nothing_is_sent)
 {
     buffers b;
     NODE;
@@ -409,7 +408,7 @@ static void writes_beyond_the_transmit_words_return_3_and_nothing_is_sent(void *
     free_buffers(s, b);
 }
 
-static void single_writes_need_no_transmit_words(void **state)
+TEST(single_writes_need_no_transmit_words)
 {
     buffers b;
     NODE;
@@ -424,7 +423,7 @@ static void single_writes_need_no_transmit_words(void **state)
     free_buffers(s, b);
 }
 
-static void a_frame_buffer_of_64_kilobytes_works(void **state)
+TEST(a_frame_buffer_of_64_kilobytes_works)
 {
     buffers b;
     NODE;
@@ -433,31 +432,4 @@ static void a_frame_buffer_of_64_kilobytes_works(void **state)
     sim_answer(s, 1, 500, "00 00 / 11 03 02 12 34 +");
     OK(mbm_node_readHoldingRegisters(n, 1, 1));
     free_buffers(s, b);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(null_is_an_invalid_argument_everywhere),
-        SIM_TEST(a_zeroed_object_is_not_initialised_and_stays_zero),
-        SIM_TEST(every_status_has_a_text),
-        SIM_TEST(a_line_without_a_frame_buffer_sends_no_request),
-        SIM_TEST(a_line_without_a_port_sends_no_request),
-        SIM_TEST(a_port_without_its_three_hooks_is_refused),
-        SIM_TEST(forbidden_quantities_return_3_and_nothing_is_sent),
-        SIM_TEST(ranges_beyond_65535_return_2_and_nothing_is_sent),
-        SIM_TEST(the_last_address_can_be_read_and_written),
-        SIM_TEST(a_frame_buffer_below_8_bytes_is_refused),
-        SIM_TEST(a_request_is_sent_whole_or_not_at_all),
-        SIM_TEST(a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing),
-        SIM_TEST(a_read_that_the_frame_buffer_is_too_small_for_ends_so_or_with_an_exception),
-        SIM_TEST(a_whole_reply_longer_than_the_frame_buffer_ends_the_request_at_once),
-        SIM_TEST(a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception),
-        SIM_TEST(a_reply_longer_than_the_response_words_changes_none),
-        SIM_TEST(writes_beyond_the_transmit_words_return_3_and_nothing_is_sent),
-        SIM_TEST(single_writes_need_no_transmit_words),
-        SIM_TEST(a_frame_buffer_of_64_kilobytes_works),
-    };
-
-    return cmocka_run_group_tests_name("bad input", tests, NULL, NULL);
 }

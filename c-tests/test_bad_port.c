@@ -3,7 +3,9 @@
 #include "sim.h"
 #include "test.h"
 
-static void write_may_accept_a_byte_at_a_time(void **state)
+fixture each_test = {sim_setup, sim_teardown};
+
+TEST(write_may_accept_a_byte_at_a_time)
 {
     unsigned i;
     NODE;
@@ -17,7 +19,7 @@ static void write_may_accept_a_byte_at_a_time(void **state)
     assert_int_equal(s->frames[0].bytes[7 + 2 * 99], 99);
 }
 
-static void read_may_return_a_byte_at_a_time(void **state)
+TEST(read_may_return_a_byte_at_a_time)
 {
     SIM;
 
@@ -26,7 +28,7 @@ static void read_may_return_a_byte_at_a_time(void **state)
     sim_reads(s, 500);
 }
 
-static void a_write_that_never_accepts_a_byte_is_a_busy_line(void **state)
+TEST(a_write_that_never_accepts_a_byte_is_a_busy_line)
 {
     SIM;
 
@@ -39,7 +41,7 @@ static void a_write_that_never_accepts_a_byte_is_a_busy_line(void **state)
     sim_reads(s, 500);
 }
 
-static void a_flush_that_never_drains_is_a_busy_line(void **state)
+TEST(a_flush_that_never_drains_is_a_busy_line)
 {
     SIM;
 
@@ -51,7 +53,7 @@ static void a_flush_that_never_drains_is_a_busy_line(void **state)
     sim_reads(s, 500);
 }
 
-static void a_link_lost_in_the_gap_sends_nothing(void **state)
+TEST(a_link_lost_in_the_gap_sends_nothing)
 {
     NODE;
 
@@ -70,7 +72,7 @@ static void die_mid_reply(sim *s)
         s->read_dead = 1;
 }
 
-static void a_link_lost_mid_reply_ends_the_request_at_once(void **state)
+TEST(a_link_lost_mid_reply_ends_the_request_at_once)
 {
     SIM;
 
@@ -85,7 +87,7 @@ static void a_link_lost_mid_reply_ends_the_request_at_once(void **state)
     sim_reads(s, 500);
 }
 
-static void a_link_lost_mid_write_switches_the_driver_off(void **state)
+TEST(a_link_lost_mid_write_switches_the_driver_off)
 {
     uint16_t at;
     SIM;
@@ -103,7 +105,7 @@ static void a_link_lost_mid_write_switches_the_driver_off(void **state)
 
 /* Without the gap, a device would take the sent half of the request and the next request
  * for one frame. */
-static void the_gap_is_kept_after_a_link_lost_mid_write(void **state)
+TEST(the_gap_is_kept_after_a_link_lost_mid_write)
 {
     SIM;
 
@@ -116,7 +118,7 @@ static void the_gap_is_kept_after_a_link_lost_mid_write(void **state)
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
-static void hooks_that_claim_too_many_bytes_do_no_harm(void **state)
+TEST(hooks_that_claim_too_many_bytes_do_no_harm)
 {
     SIM;
 
@@ -131,17 +133,13 @@ static void hooks_that_claim_too_many_bytes_do_no_harm(void **state)
 
 /* One read with its gap, hold and reply takes 12 ms. The clock wraps at each quarter of a
  * character in this time. */
-static void the_clock_may_wrap_at_any_time_of_a_transaction(void **state)
+TEST(the_clock_may_wrap_at_any_time_of_a_transaction)
 {
     uint32_t ahead;
 
-    (void)state;
     for (ahead = 0; ahead < 12000; ahead += 25) {
-        void *inner;
-        sim *s;
+        SIM;
 
-        assert_int_equal(sim_setup(&inner), 0);
-        s = (sim *)inner;
         s->clock_start = (uint32_t)(0u - ahead - s->now);
         mbm_line_setPostFlushHold(&s->line, 1);
         mbm_node_setResponseTimeout(&s->node, 5);
@@ -152,22 +150,19 @@ static void the_clock_may_wrap_at_any_time_of_a_transaction(void **state)
         assert_in_range(s->frames[0].silence, 4000, 4100);
         IS(MBM_RESPONSE_TIMED_OUT, sim_read_one(s));
         assert_in_range(s->now - s->frames[1].end, 5000 + 1146, 5000 + 1146 + 100);
-        sim_teardown(&inner);
+        sim_teardown();
+        sim_setup();
     }
 }
 
-static void the_clock_may_wrap_in_a_long_wait(void **state)
+TEST(the_clock_may_wrap_in_a_long_wait)
 {
     static const uint32_t ahead[] = {100, 5000, 50000, 500000, 1999000, 2050000, 2100000};
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(ahead); i++) {
-        void *inner;
-        sim *s;
+        SIM;
 
-        assert_int_equal(sim_setup(&inner), 0);
-        s = (sim *)inner;
         s->clock_start = (uint32_t)(0u - ahead[i] - s->now);
         sim_begin(s, 17);
         IS(MBM_RESPONSE_TIMED_OUT, sim_read_one(s));
@@ -177,25 +172,7 @@ static void the_clock_may_wrap_in_a_long_wait(void **state)
         mbm_node_setSlaveID(&s->node, 0);
         OK(mbm_node_writeSingleCoil(&s->node, 0, 0));
         assert_in_range(s->now - s->frames[2].end, 100000, 100100);
-        sim_teardown(&inner);
+        sim_teardown();
+        sim_setup();
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(write_may_accept_a_byte_at_a_time),
-        SIM_TEST(read_may_return_a_byte_at_a_time),
-        SIM_TEST(a_write_that_never_accepts_a_byte_is_a_busy_line),
-        SIM_TEST(a_flush_that_never_drains_is_a_busy_line),
-        SIM_TEST(a_link_lost_in_the_gap_sends_nothing),
-        SIM_TEST(a_link_lost_mid_reply_ends_the_request_at_once),
-        SIM_TEST(a_link_lost_mid_write_switches_the_driver_off),
-        SIM_TEST(the_gap_is_kept_after_a_link_lost_mid_write),
-        SIM_TEST(hooks_that_claim_too_many_bytes_do_no_harm),
-        SIM_TEST(the_clock_may_wrap_at_any_time_of_a_transaction),
-        SIM_TEST(the_clock_may_wrap_in_a_long_wait),
-    };
-
-    return cmocka_run_group_tests_name("bad port", tests, NULL, NULL);
 }

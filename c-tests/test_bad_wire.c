@@ -54,7 +54,7 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     return first;
 }
 
-static void no_row_of_the_fault_table_gets_worse(void **state)
+TEST(no_row_of_the_fault_table_gets_worse)
 {
     const char *path = getenv("MBM_FAULT_TABLE");
     FILE *table = path ? fopen(path, "w") : NULL;
@@ -62,7 +62,6 @@ static void no_row_of_the_fault_table_gets_worse(void **state)
     int worse = 0;
     unsigned i;
 
-    (void)state;
     if (table)
         fprintf(
             table,
@@ -80,13 +79,4 @@ static void no_row_of_the_fault_table_gets_worse(void **state)
     if (table)
         (void)fclose(table);
     assert_int_equal(worse, 0);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_row_of_the_fault_table_gets_worse),
-    };
-
-    return cmocka_run_group_tests_name("bad wire", tests, NULL, NULL);
 }

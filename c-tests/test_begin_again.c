@@ -25,11 +25,10 @@ static void count_done(void *context, mbm_clientRequest *request)
     ended++;
 }
 
-static int reset(void **state)
+static void reset(void)
 {
     size_t i;
 
-    (void)state;
     memset(&client, 0, sizeof client);
     memset(&line, 0, sizeof line);
     memset(&master, 0, sizeof master);
@@ -47,8 +46,9 @@ static int reset(void **state)
         requests[i].done = count_done;
     }
     ended = hooks_called = 0;
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 /* Begins the client with the framing of a number, on either port. */
 static uint8_t begin(unsigned framing, const mbm_port *on)
@@ -93,14 +93,14 @@ static void ask_over_the_other_port(unsigned framing)
     assert_int_equal(words[0], 0x1234);
 }
 
-static void a_client_gives_up_its_requests_whatever_its_framing_was_and_becomes(void **state)
+TEST(a_client_gives_up_its_requests_whatever_its_framing_was_and_becomes)
 {
     unsigned from, to;
     size_t i;
 
     for (from = 0; from < 4; from++) {
         for (to = 0; to < 4; to++) {
-            reset(state);
+            reset();
             OK(begin(from, &port));
             ask_three_times();
             assert_int_equal(mbm_client_pending(&client), 3);
@@ -118,11 +118,10 @@ static void a_client_gives_up_its_requests_whatever_its_framing_was_and_becomes(
     }
 }
 
-static void a_client_that_begins_again_has_the_settings_of_the_first_time(void **state)
+TEST(a_client_that_begins_again_has_the_settings_of_the_first_time)
 {
     mbm_counters counters = {0};
 
-    (void)state;
     OK(begin(MBM_FRAMING_RTU, &port));
     OK(mbm_client_setCounters(&client, &counters));
     OK(mbm_client_setResponseTimeout(&client, 1));
@@ -150,9 +149,8 @@ static uint8_t never_drained(void *context)
     return 0;
 }
 
-static void a_client_that_begins_again_switches_the_driver_of_the_old_port_off(void **state)
+TEST(a_client_that_begins_again_switches_the_driver_of_the_old_port_off)
 {
-    (void)state;
     port.flush = never_drained;
     OK(begin(MBM_FRAMING_RTU, &port));
     ask_three_times();
@@ -165,11 +163,10 @@ static void a_client_that_begins_again_switches_the_driver_of_the_old_port_off(v
     ask_over_the_other_port(MBM_FRAMING_RTU);
 }
 
-static void a_client_that_is_suspended_is_not_begun_again(void **state)
+TEST(a_client_that_is_suspended_is_not_begun_again)
 {
     unsigned framing;
 
-    (void)state;
     OK(begin(MBM_FRAMING_RTU, &port));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &requests[0], 0, 1));
     OK(mbm_client_suspend(&client, &line));
@@ -189,11 +186,10 @@ static void begin_another(void *context, mbm_clientRequest *request)
     OK(begin(MBM_FRAMING_TCP, &other_port));
 }
 
-static void a_client_may_begin_again_when_a_request_is_done(void **state)
+TEST(a_client_may_begin_again_when_a_request_is_done)
 {
     unsigned i;
 
-    (void)state;
     requests[0].done = begin_another;
     OK(begin(MBM_FRAMING_RTU, &port));
     ask_three_times();
@@ -209,12 +205,11 @@ static void a_client_may_begin_again_when_a_request_is_done(void **state)
     ask_over_the_other_port(MBM_FRAMING_TCP);
 }
 
-static void a_line_and_a_node_keep_their_settings(void **state)
+TEST(a_line_and_a_node_keep_their_settings)
 {
     mbm_counters counters = {0};
     unsigned i;
 
-    (void)state;
     OK(mbm_line_beginRtu(&line, &port, other_frame, 256));
     OK(mbm_node_begin(&master, &line, 17, words, 4, NULL, 0));
     OK(mbm_node_setBlocking(&master, 0));
@@ -240,14 +235,13 @@ static void a_line_and_a_node_keep_their_settings(void **state)
     assert_int_equal(counters.requests, 2);
 }
 
-static void a_server_drops_what_it_received_and_serves_the_new_port(void **state)
+TEST(a_server_drops_what_it_received_and_serves_the_new_port)
 {
     static mbm_server server;
     static mbm_unit unit;
     static mbm_registerTable table;
     unsigned i;
 
-    (void)state;
     unit.id = 17;
     table.words = words;
     table.size = 4;
@@ -272,12 +266,11 @@ static void a_server_drops_what_it_received_and_serves_the_new_port(void **state
     assert_int_equal(other_wire.length, 7);
 }
 
-static void a_sniffer_forgets_bytes_and_requests(void **state)
+TEST(a_sniffer_forgets_bytes_and_requests)
 {
     static mbm_sniffer sniffer;
     mbm_event event;
 
-    (void)state;
     hooked_port_arrive_rtu(&wire, 17, "\x03\x00\x00\x00\x01", 5);
     OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, frame, sizeof frame));
     OK(mbm_sniffer_setResponseTimeout(&sniffer, 1));
@@ -289,12 +282,11 @@ static void a_sniffer_forgets_bytes_and_requests(void **state)
     assert_int_equal(mbm_sniffer_next(&sniffer, 60000000, &event), 0);
 }
 
-static void a_ring_is_empty_and_has_lost_nothing(void **state)
+TEST(a_ring_is_empty_and_has_lost_nothing)
 {
     static mbm_ring ring;
     uint8_t bytes[4], others[8], taken[8];
 
-    (void)state;
     OK(mbm_ring_begin(&ring, bytes, sizeof bytes));
     assert_int_equal(mbm_ring_write(&ring, (const uint8_t *)"12345", 5), 3);
     assert_int_equal(mbm_ring_lost(&ring), 2);
@@ -303,24 +295,4 @@ static void a_ring_is_empty_and_has_lost_nothing(void **state)
     assert_int_equal(mbm_ring_lost(&ring), 0);
     assert_int_equal(mbm_ring_write(&ring, (const uint8_t *)"1234567", 7), 7);
     assert_int_equal(mbm_ring_read(&ring, taken, sizeof taken), 7);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(a_client_gives_up_its_requests_whatever_its_framing_was_and_becomes,
-                               reset),
-        cmocka_unit_test_setup(a_client_that_begins_again_has_the_settings_of_the_first_time,
-                               reset),
-        cmocka_unit_test_setup(a_client_that_begins_again_switches_the_driver_of_the_old_port_off,
-                               reset),
-        cmocka_unit_test_setup(a_client_that_is_suspended_is_not_begun_again, reset),
-        cmocka_unit_test_setup(a_client_may_begin_again_when_a_request_is_done, reset),
-        cmocka_unit_test_setup(a_line_and_a_node_keep_their_settings, reset),
-        cmocka_unit_test_setup(a_server_drops_what_it_received_and_serves_the_new_port, reset),
-        cmocka_unit_test_setup(a_sniffer_forgets_bytes_and_requests, reset),
-        cmocka_unit_test_setup(a_ring_is_empty_and_has_lost_nothing, reset),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

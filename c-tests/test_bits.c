@@ -7,12 +7,11 @@ static const uint8_t coils_19[] = {0xCD, 0x6B, 0x05};
 static const uint16_t words_19[] = {0x6BCD, 0x0005};
 static const uint8_t on_19[19] = {1, 0, 1, 1, 0, 0, 1, 1, 1, 1, 0, 1, 0, 1, 1, 0, 1, 0, 1};
 
-static void a_coil_is_found_by_its_address(void **state)
+TEST(a_coil_is_found_by_its_address)
 {
     unsigned i;
     uint8_t on;
 
-    (void)state;
     for (i = 0; i < 19; i++) {
         OK(mbm_bits_isSet(coils_19, 19, 19, (uint16_t)(19 + i), &on));
         assert_int_equal(on, on_19[i]);
@@ -21,7 +20,7 @@ static void a_coil_is_found_by_its_address(void **state)
     }
 }
 
-static void a_coil_outside_of_the_words_has_no_state(void **state)
+TEST(a_coil_outside_of_the_words_has_no_state)
 {
     static const uint16_t outside[] = {0, 18, 38, 39, 65535};
     uint8_t bytes[3] = {0};
@@ -29,7 +28,6 @@ static void a_coil_outside_of_the_words_has_no_state(void **state)
     unsigned i;
     uint8_t on = 7;
 
-    (void)state;
     for (i = 0; i < COUNT(outside); i++) {
         IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_isSet(coils_19, 19, 19, outside[i], &on));
         IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_isSetInWords(words_19, 19, 19, outside[i], &on));
@@ -44,12 +42,11 @@ static void a_coil_outside_of_the_words_has_no_state(void **state)
     assert_int_equal(on, 1);
 }
 
-static void setting_a_coil_leaves_the_others(void **state)
+TEST(setting_a_coil_leaves_the_others)
 {
     uint8_t bytes[] = {0xCD, 0x6B, 0x05};
     uint16_t words[] = {0x6BCD, 0x0005};
 
-    (void)state;
     OK(mbm_bits_set(bytes, 19, 19, 20, 0xFF));
     OK(mbm_bits_set(bytes, 19, 19, 37, 0));
     assert_int_equal(bytes[0], 0xCF);
@@ -61,7 +58,7 @@ static void setting_a_coil_leaves_the_others(void **state)
     assert_int_equal(words[1], 0x0001);
 }
 
-static void coils_are_packed_lowest_bit_first(void **state)
+TEST(coils_are_packed_lowest_bit_first)
 {
     /* The request of 6.11. */
     static const uint8_t coils[] = {1, 0, 0xFF, 1, 0, 0, 2, 1, 1, 0};
@@ -69,7 +66,6 @@ static void coils_are_packed_lowest_bit_first(void **state)
     uint16_t words[] = {0, 0xFFFF};
     unsigned i;
 
-    (void)state;
     OK(mbm_bits_pack(coils, 10, bytes, 3));
     assert_int_equal(bytes[0], 0xCD);
     assert_int_equal(bytes[1], 0x01);
@@ -83,11 +79,10 @@ static void coils_are_packed_lowest_bit_first(void **state)
     assert_int_equal(bytes[2], 0xFF);
 }
 
-static void coils_are_unpacked_to_one_byte_each(void **state)
+TEST(coils_are_unpacked_to_one_byte_each)
 {
     uint8_t coils[25] = {0};
 
-    (void)state;
     OK(mbm_bits_unpack(coils_19, 3, coils, 19));
     assert_memory_equal(coils, on_19, 19);
     coils[24] = 7;
@@ -96,12 +91,11 @@ static void coils_are_unpacked_to_one_byte_each(void **state)
     assert_int_equal(coils[24], 7);
 }
 
-static void null_is_an_invalid_argument(void **state)
+TEST(null_is_an_invalid_argument)
 {
     uint8_t byte = 0;
     uint16_t word = 0;
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_bits_pack(NULL, 1, &byte, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_pack(&byte, 1, NULL, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_unpack(NULL, 1, &byte, 1));
@@ -111,18 +105,4 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_bits_isSetInWords(&word, 0, 1, 0, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_set(NULL, 0, 1, 0, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_setInWords(NULL, 0, 1, 0, 1));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_coil_is_found_by_its_address),
-        cmocka_unit_test(a_coil_outside_of_the_words_has_no_state),
-        cmocka_unit_test(setting_a_coil_leaves_the_others),
-        cmocka_unit_test(coils_are_packed_lowest_bit_first),
-        cmocka_unit_test(coils_are_unpacked_to_one_byte_each),
-        cmocka_unit_test(null_is_an_invalid_argument),
-    };
-
-    return cmocka_run_group_tests_name("bits", tests, NULL, NULL);
 }

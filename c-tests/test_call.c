@@ -114,9 +114,8 @@ static void asks_everything(mbm_caller *with)
        mbm_call(with, mbm_client_readHoldingRegisters(&client, &request, 0, 126)));
 }
 
-static void calls_over_a_serial_line_are_answered_by_libmodbus(void **state)
+TEST(calls_over_a_serial_line_are_answered_by_libmodbus)
 {
-    (void)state;
     server_start(&rtu_server, UNIT);
     begin_on_tty(rtu_server.line.ours);
     asks_everything(&caller);
@@ -124,11 +123,10 @@ static void calls_over_a_serial_line_are_answered_by_libmodbus(void **state)
     server_stop(&rtu_server);
 }
 
-static void calls_over_tcp_are_answered_by_libmodbus(void **state)
+TEST(calls_over_tcp_are_answered_by_libmodbus)
 {
     char service[8];
 
-    (void)state;
     tcp_server_start(&server_of_tcp);
     snprintf(service, sizeof service, "%u", server_of_tcp.port);
     memset(&tcp, 0, sizeof tcp);
@@ -139,9 +137,8 @@ static void calls_over_tcp_are_answered_by_libmodbus(void **state)
     tcp_server_stop(&server_of_tcp);
 }
 
-static void a_device_that_does_not_answer_is_a_timeout(void **state)
+TEST(a_device_that_does_not_answer_is_a_timeout)
 {
-    (void)state;
     begin_on_pair();
     OK(mbm_client_setResponseTimeout(&client, 30));
     OK(mbm_client_setRetries(&client, 1));
@@ -161,12 +158,11 @@ static void *hang_up(void *unused)
     return NULL;
 }
 
-static void a_link_that_is_lost_ends_the_call(void **state)
+TEST(a_link_that_is_lost_ends_the_call)
 {
     pthread_t thread;
     pty line;
 
-    (void)state;
     begin_on_pair();
     pthread_create(&thread, NULL, hang_up, NULL);
     IS(MBM_LINK_LOST, mbm_call(&caller, read_words(1)));
@@ -224,11 +220,10 @@ static void handle(void (*handler)(int))
     sigaction(SIGUSR1, &action, NULL);
 }
 
-static void signals_do_not_end_the_call(void **state)
+TEST(signals_do_not_end_the_call)
 {
     pthread_t thread;
 
-    (void)state;
     handle(count_signal);
     begin_on_pair();
     pthread_create(&thread, NULL, interrupt_and_answer, NULL);
@@ -249,11 +244,10 @@ static void *signal_when_asked(void *unused)
     return NULL;
 }
 
-static void a_signal_that_sets_stop_cancels_the_request(void **state)
+TEST(a_signal_that_sets_stop_cancels_the_request)
 {
     pthread_t thread;
 
-    (void)state;
     handle(stop_it);
     begin_on_pair();
     caller.stop = &stop;
@@ -285,11 +279,10 @@ static void note_end(void *context, mbm_clientRequest *ended)
     others_ended++;
 }
 
-static void requests_of_others_go_on(void **state)
+TEST(requests_of_others_go_on)
 {
     uint16_t word;
 
-    (void)state;
     server_start(&rtu_server, UNIT);
     begin_on_tty(rtu_server.line.ours);
     others_ended = 0;
@@ -313,11 +306,10 @@ static void requests_of_others_go_on(void **state)
     server_stop(&rtu_server);
 }
 
-static void a_call_from_within_done_is_busy_and_leaves_nothing_pending(void **state)
+TEST(a_call_from_within_done_is_busy_and_leaves_nothing_pending)
 {
     uint16_t word;
 
-    (void)state;
     server_start(&rtu_server, UNIT);
     begin_on_tty(rtu_server.line.ours);
     others_ended = 0;
@@ -346,9 +338,8 @@ static void once_more(void *context, mbm_clientRequest *ended)
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, ended, FIRST, 1));
 }
 
-static void a_request_that_done_queues_again_is_waited_for(void **state)
+TEST(a_request_that_done_queues_again_is_waited_for)
 {
-    (void)state;
     server_start(&rtu_server, UNIT);
     begin_on_tty(rtu_server.line.ours);
     rounds = 0;
@@ -359,12 +350,11 @@ static void a_request_that_done_queues_again_is_waited_for(void **state)
     server_stop(&rtu_server);
 }
 
-static void a_call_that_cannot_go_on_is_refused(void **state)
+TEST(a_call_that_cannot_go_on_is_refused)
 {
     static mbm_client idle;
     mbm_caller wrong;
 
-    (void)state;
     begin_on_pair();
     IS(MBM_INVALID_ARGUMENT, mbm_call(NULL, MBM_PENDING));
     wrong = caller;
@@ -403,9 +393,8 @@ static int cannot_wait(void *port, uint32_t timeoutUs)
     return -1;
 }
 
-static void a_link_that_cannot_be_waited_for_ends_by_the_timeout(void **state)
+TEST(a_link_that_cannot_be_waited_for_ends_by_the_timeout)
 {
-    (void)state;
     begin_on_pair();
     OK(mbm_client_setResponseTimeout(&client, 30));
     caller.wait = cannot_wait;
@@ -431,9 +420,8 @@ static int wait_for_long(void *port, uint32_t timeoutUs)
     return 1;
 }
 
-static void the_longest_response_timeout_is_passed_on_whole(void **state)
+TEST(the_longest_response_timeout_is_passed_on_whole)
 {
-    (void)state;
     begin_on_pair();
     OK(mbm_client_setResponseTimeout(&client, 65535));
     caller.timeoutMs = MBM_CALL_FOREVER;
@@ -450,33 +438,11 @@ static void the_longest_response_timeout_is_passed_on_whole(void **state)
     end_pair();
 }
 
-static void a_call_ends_at_its_own_limit_before_the_device_answers(void **state)
+TEST(a_call_ends_at_its_own_limit_before_the_device_answers)
 {
-    (void)state;
     begin_on_pair();
     caller.timeoutMs = 30;
     IS(MBM_RESPONSE_TIMED_OUT, mbm_call(&caller, read_words(1)));
     IS(MBM_RESPONSE_TIMED_OUT, request.status);
     end_pair();
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(calls_over_a_serial_line_are_answered_by_libmodbus),
-        cmocka_unit_test(calls_over_tcp_are_answered_by_libmodbus),
-        cmocka_unit_test(a_device_that_does_not_answer_is_a_timeout),
-        cmocka_unit_test(a_link_that_is_lost_ends_the_call),
-        cmocka_unit_test(signals_do_not_end_the_call),
-        cmocka_unit_test(a_signal_that_sets_stop_cancels_the_request),
-        cmocka_unit_test(requests_of_others_go_on),
-        cmocka_unit_test(a_call_from_within_done_is_busy_and_leaves_nothing_pending),
-        cmocka_unit_test(a_request_that_done_queues_again_is_waited_for),
-        cmocka_unit_test(a_call_that_cannot_go_on_is_refused),
-        cmocka_unit_test(a_link_that_cannot_be_waited_for_ends_by_the_timeout),
-        cmocka_unit_test(the_longest_response_timeout_is_passed_on_whole),
-        cmocka_unit_test(a_call_ends_at_its_own_limit_before_the_device_answers),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -148,12 +148,11 @@ static int64_t time_to_hear_it_again(void)
     return began;
 }
 
-static void after_one_lost_reply_a_device_is_heard_again_within_five_limits(void **state)
+TEST(after_one_lost_reply_a_device_is_heard_again_within_five_limits)
 {
     static const uint32_t limits[] = {50, 200, 500, 1000};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(limits); i++) {
         begin();
         caller.timeoutMs = limits[i];
@@ -164,12 +163,11 @@ static void after_one_lost_reply_a_device_is_heard_again_within_five_limits(void
     }
 }
 
-static void the_timeout_of_a_request_is_as_before_after_the_call(void **state)
+TEST(the_timeout_of_a_request_is_as_before_after_the_call)
 {
     static const uint32_t own[] = {0, 150, 5000};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(own); i++) {
         begin();
         caller.timeoutMs = 200;
@@ -184,13 +182,12 @@ static void the_timeout_of_a_request_is_as_before_after_the_call(void **state)
 }
 
 /* The request then ends by the response timeout, so its next reply is held for that. */
-static void a_limit_longer_than_the_response_timeout_changes_nothing(void **state)
+TEST(a_limit_longer_than_the_response_timeout_changes_nothing)
 {
     static const uint32_t limits[] = {0, 5000, MBM_CALL_FOREVER};
     int64_t times[COUNT(limits)];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(limits); i++) {
         begin();
         caller.timeoutMs = limits[i];
@@ -200,15 +197,4 @@ static void a_limit_longer_than_the_response_timeout_changes_nothing(void **stat
                         (2 * RESPONSE_TIMEOUT_MS + 150) * MS);
         assert_in_range(times[i], times[0] - MS, times[0] + MS);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(after_one_lost_reply_a_device_is_heard_again_within_five_limits),
-        cmocka_unit_test(the_timeout_of_a_request_is_as_before_after_the_call),
-        cmocka_unit_test(a_limit_longer_than_the_response_timeout_changes_nothing),
-    };
-
-    return cmocka_run_group_tests_name("mbm_call after a lost reply", tests, NULL, NULL);
 }

@@ -72,13 +72,12 @@ static void find_silent_host(int *listener, int *filler, char *service)
     sprintf(service, "%u", port);
 }
 
-static void a_call_ends_at_its_own_limit_while_requests_wait_for_a_link(void **state)
+TEST(a_call_ends_at_its_own_limit_while_requests_wait_for_a_link)
 {
     uint16_t port;
     const int nobody = tcp_reserve(&port);
     char service[8];
 
-    (void)state;
     sprintf(service, "%u", port);
     memset(&tcp, 0, sizeof tcp);
     assert_int_equal(mbm_tcp_openLater(&tcp, &addresses, "127.0.0.1", service), 0);
@@ -100,12 +99,11 @@ static void a_call_ends_at_its_own_limit_while_requests_wait_for_a_link(void **s
 }
 
 /* Each limit alone: that of the call, the link's, and without a link the response timeout. */
-static void a_host_that_never_answers_is_a_timeout_of_the_connection(void **state)
+TEST(a_host_that_never_answers_is_a_timeout_of_the_connection)
 {
     int listener, filler;
     char service[8];
 
-    (void)state;
     find_silent_host(&listener, &filler, service);
     memset(&tcp, 0, sizeof tcp);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
@@ -144,14 +142,4 @@ static void a_host_that_never_answers_is_a_timeout_of_the_connection(void **stat
     mbm_tcp_close(&tcp);
     close(filler);
     close(listener);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_call_ends_at_its_own_limit_while_requests_wait_for_a_link),
-        cmocka_unit_test(a_host_that_never_answers_is_a_timeout_of_the_connection),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

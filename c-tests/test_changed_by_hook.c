@@ -58,7 +58,7 @@ static void serve(const mbm_accessHooks *hooks)
     OK(mbm_registerTable_serveMaskAndReadWrite(table));
 }
 
-static void a_write_goes_on_with_the_old_table_if_its_hook_changes_it(void **state)
+TEST(a_write_goes_on_with_the_old_table_if_its_hook_changes_it)
 {
     static const mbm_accessHooks hooks[] = {
         {.beforeWrite = zero_before},
@@ -67,7 +67,6 @@ static void a_write_goes_on_with_the_old_table_if_its_hook_changes_it(void **sta
     };
     int i;
 
-    (void)state;
     for (i = 0; i < 3; i++) {
         serve(&hooks[i]);
         assert_int_equal(answer(&unit, 17, "\x10\0\0\0\4\x08\0\1\0\2\0\3\0\4", 14), 0x10);
@@ -76,18 +75,16 @@ static void a_write_goes_on_with_the_old_table_if_its_hook_changes_it(void **sta
     }
 }
 
-static void
-function_17_reads_from_the_old_table_if_the_hook_after_its_write_changes_it(void **state)
+TEST(function_17_reads_from_the_old_table_if_the_hook_after_its_write_changes_it)
 {
     static const mbm_accessHooks hooks = {.afterWrite = shrink_after};
 
-    (void)state;
     serve(&hooks);
     assert_int_equal(answer(&unit, 17, "\x17\0\0\0\4\0\0\0\1\2\0\1", 12), 0x17);
 }
 
 /* Each function that reads, with a hook before the read. */
-static void a_read_goes_on_with_the_old_table_if_its_hook_changes_it(void **state)
+TEST(a_read_goes_on_with_the_old_table_if_its_hook_changes_it)
 {
     static const mbm_accessHooks hooks[] = {
         {.beforeRead = zero_before},
@@ -105,7 +102,6 @@ static void a_read_goes_on_with_the_old_table_if_its_hook_changes_it(void **stat
     };
     int i, j;
 
-    (void)state;
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++) {
             serve(&hooks[j]);
@@ -116,28 +112,15 @@ static void a_read_goes_on_with_the_old_table_if_its_hook_changes_it(void **stat
         }
 }
 
-static int make_table(void **state)
+static void make_table(void)
 {
-    (void)state;
     table = (mbm_registerTable *)malloc(sizeof *table);
-    return table ? 0 : -1;
+    assert_non_null(table);
 }
 
-static int free_table(void **state)
+static void free_table(void)
 {
-    (void)state;
     free(table);
-    return 0;
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_write_goes_on_with_the_old_table_if_its_hook_changes_it),
-        cmocka_unit_test(
-            function_17_reads_from_the_old_table_if_the_hook_after_its_write_changes_it),
-        cmocka_unit_test(a_read_goes_on_with_the_old_table_if_its_hook_changes_it),
-    };
-
-    return cmocka_run_group_tests(tests, make_table, free_table);
-}
+fixture all_tests = {make_table, free_table};

@@ -1,7 +1,9 @@
 /* ModbusSerialClient on a simulated board: what its documentation promises. */
 #include "client_checks.h"
 
-static void a_reply_ends_in_the_words_of_its_request(void **)
+fixture each_test = {reset_board, nullptr};
+
+TEST(a_reply_ends_in_the_words_of_its_request)
 {
     ModbusSerialClient client;
     ModbusRequestOf<3> request(17);
@@ -21,7 +23,7 @@ static void a_reply_ends_in_the_words_of_its_request(void **)
     assert_int_equal(request.wireTransaction(), 0);
 }
 
-static void an_exception_leaves_the_words(void **)
+TEST(an_exception_leaves_the_words)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -42,7 +44,7 @@ static void count_call(ModbusRequest &request)
     assert_int_equal(request.status(), MBM_OK);
 }
 
-static void a_function_or_a_lambda_is_called_when_a_request_has_ended(void **)
+TEST(a_function_or_a_lambda_is_called_when_a_request_has_ended)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -70,7 +72,7 @@ static void a_function_or_a_lambda_is_called_when_a_request_has_ended(void **)
     assert_int_equal(request[0], 11);
 }
 
-static void a_callback_may_replace_itself_and_send_a_request(void **)
+TEST(a_callback_may_replace_itself_and_send_a_request)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -95,7 +97,7 @@ static void a_callback_may_replace_itself_and_send_a_request(void **)
     assert_int_equal(Serial.sent.size(), 2);
 }
 
-static void requests_are_sent_in_their_order(void **)
+TEST(requests_are_sent_in_their_order)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> first(1), second(2), third(3);
@@ -113,7 +115,7 @@ static void requests_are_sent_in_their_order(void **)
     assert_int_equal(Serial.sent.size(), 3);
 }
 
-static void a_pending_request_is_refused_and_unchanged(void **)
+TEST(a_pending_request_is_refused_and_unchanged)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -133,7 +135,7 @@ static void a_pending_request_is_refused_and_unchanged(void **)
                     {4, 3, 2, 0, 2});
 }
 
-static void a_request_refuses_a_unit_and_a_timeout_that_are_too_large(void **)
+TEST(a_request_refuses_a_unit_and_a_timeout_that_are_too_large)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17), beyond(300);
@@ -155,7 +157,7 @@ static void a_request_refuses_a_unit_and_a_timeout_that_are_too_large(void **)
     assert_int_equal(client.pending(), 0);
 }
 
-static void a_request_that_needs_more_words_than_it_has_is_refused(void **)
+TEST(a_request_that_needs_more_words_than_it_has_is_refused)
 {
     ModbusSerialClient client;
     ModbusRequestOf<2> request(17);
@@ -183,7 +185,7 @@ static void a_request_that_needs_more_words_than_it_has_is_refused(void **)
                     {17, 6, 0, 3, 0x12, 0x34});
 }
 
-static void a_request_has_its_own_timeout_and_retries(void **)
+TEST(a_request_has_its_own_timeout_and_retries)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17), other(17);
@@ -220,7 +222,7 @@ static void a_request_has_its_own_timeout_and_retries(void **)
     Serial.sent.clear();
 }
 
-static void a_request_is_repeated_as_often_as_set(void **)
+TEST(a_request_is_repeated_as_often_as_set)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -240,7 +242,7 @@ static void a_request_is_repeated_as_often_as_set(void **)
     assert_int_equal(request[0], 5);
 }
 
-static void poll_returns_before_the_reply_comes(void **)
+TEST(poll_returns_before_the_reply_comes)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -258,7 +260,7 @@ static void poll_returns_before_the_reply_comes(void **)
     assert_true(polls > 1000);
 }
 
-static void wait_returns_how_a_request_ended(void **)
+TEST(wait_returns_how_a_request_ended)
 {
     ModbusSerialClient client, other;
     ModbusRequestOf<1> request(17), foreign(17);
@@ -279,7 +281,7 @@ static void wait_returns_how_a_request_ended(void **)
     assert_int_equal(other.cancel(foreign), MBM_NOT_PENDING);
 }
 
-static void the_driver_is_on_while_a_request_leaves(void **)
+TEST(the_driver_is_on_while_a_request_leaves)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -297,7 +299,7 @@ static void the_driver_is_on_while_a_request_leaves(void **)
 static ModbusSerialClient *called_client;
 static ModbusRequest *other_request;
 
-static void a_driver_callback_can_call_nothing(void **)
+TEST(a_driver_callback_can_call_nothing)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17), another(18);
@@ -314,7 +316,7 @@ static void a_driver_callback_can_call_nothing(void **)
     assert_int_equal(another.status(), MBM_OK);
 }
 
-static void the_settings_of_the_line_reach_the_client(void **)
+TEST(the_settings_of_the_line_reach_the_client)
 {
     static uint32_t released;
     ModbusSerialClient client;
@@ -346,7 +348,7 @@ static void the_settings_of_the_line_reach_the_client(void **)
     assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT); // that was the echo
 }
 
-static void begin_resets_the_settings_of_a_client(void **)
+TEST(begin_resets_the_settings_of_a_client)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -361,7 +363,7 @@ static void begin_resets_the_settings_of_a_client(void **)
     assert_int_equal(Serial1.sent.size(), 1); // no retry
 }
 
-static void ascii_frames_go_both_ways(void **)
+TEST(ascii_frames_go_both_ways)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -377,7 +379,7 @@ static void ascii_frames_go_both_ways(void **)
     assert_int_equal(client.setDelimiter('!'), MBM_OK);
 }
 
-static void a_broadcast_ends_without_a_response(void **)
+TEST(a_broadcast_ends_without_a_response)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> all(0);
@@ -391,7 +393,7 @@ static void a_broadcast_ends_without_a_response(void **)
     assert_int_equal(all.status(), MBM_OK);
 }
 
-static void a_seventeenth_request_finds_the_queue_full(void **)
+TEST(a_seventeenth_request_finds_the_queue_full)
 {
     ModbusSerialClient client;
     uint16_t words[17] = {};
@@ -409,7 +411,7 @@ static void a_seventeenth_request_finds_the_queue_full(void **)
     assert_int_equal(client.pending(), 0);
 }
 
-static void a_units_record_counts_its_requests_and_delays_the_next(void **)
+TEST(a_units_record_counts_its_requests_and_delays_the_next)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> first(1), second(1);
@@ -435,7 +437,7 @@ static void a_units_record_counts_its_requests_and_delays_the_next(void **)
     assert_int_equal(counters.exceptions, 1);
 }
 
-static void a_stream_that_returns_0_for_what_it_sends_works(void **)
+TEST(a_stream_that_returns_0_for_what_it_sends_works)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -448,7 +450,7 @@ static void a_stream_that_returns_0_for_what_it_sends_works(void **)
     assert_int_equal(request.status(), MBM_OK);
 }
 
-static void a_sketch_may_sleep_until_the_next_poll_is_due(void **)
+TEST(a_sketch_may_sleep_until_the_next_poll_is_due)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -460,33 +462,4 @@ static void a_sketch_may_sleep_until_the_next_poll_is_due(void **)
         client.poll();
     client.poll();
     assert_in_range(client.pollDelay(), 490000, 500000);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_reply_ends_in_the_words_of_its_request),
-        TEST(an_exception_leaves_the_words),
-        TEST(a_function_or_a_lambda_is_called_when_a_request_has_ended),
-        TEST(a_callback_may_replace_itself_and_send_a_request),
-        TEST(requests_are_sent_in_their_order),
-        TEST(a_pending_request_is_refused_and_unchanged),
-        TEST(a_request_refuses_a_unit_and_a_timeout_that_are_too_large),
-        TEST(a_request_that_needs_more_words_than_it_has_is_refused),
-        TEST(a_request_has_its_own_timeout_and_retries),
-        TEST(a_request_is_repeated_as_often_as_set),
-        TEST(poll_returns_before_the_reply_comes),
-        TEST(wait_returns_how_a_request_ended),
-        TEST(the_driver_is_on_while_a_request_leaves),
-        TEST(a_driver_callback_can_call_nothing),
-        TEST(the_settings_of_the_line_reach_the_client),
-        TEST(begin_resets_the_settings_of_a_client),
-        TEST(ascii_frames_go_both_ways),
-        TEST(a_broadcast_ends_without_a_response),
-        TEST(a_seventeenth_request_finds_the_queue_full),
-        TEST(a_units_record_counts_its_requests_and_delays_the_next),
-        TEST(a_stream_that_returns_0_for_what_it_sends_works),
-        TEST(a_sketch_may_sleep_until_the_next_poll_is_due),
-    };
-    return cmocka_run_group_tests_name("ModbusSerialClient", tests, nullptr, nullptr);
 }

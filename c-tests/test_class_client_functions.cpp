@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+fixture each_test = {reset_board, nullptr};
+
 static void words_of(ModbusRequest &request, std::initializer_list<uint16_t> values)
 {
     uint16_t index = 0;
@@ -12,7 +14,7 @@ static void words_of(ModbusRequest &request, std::initializer_list<uint16_t> val
         request[index++] = value;
 }
 
-static void bits_are_read_and_written(void **)
+TEST(bits_are_read_and_written)
 {
     ModbusSerialClient client;
     ModbusRequestOf<4> request(17);
@@ -39,7 +41,7 @@ static void bits_are_read_and_written(void **)
     assert_int_equal(request.status(), MBM_OK);
 }
 
-static void registers_are_read_and_written(void **)
+TEST(registers_are_read_and_written)
 {
     ModbusSerialClient client;
     ModbusRequestOf<6> request(17);
@@ -67,7 +69,7 @@ static void registers_are_read_and_written(void **)
     assert_int_equal(request[1], 0x1284);
 }
 
-static void the_functions_of_a_serial_line_are_sent(void **)
+TEST(the_functions_of_a_serial_line_are_sent)
 {
     ModbusSerialClient client;
     ModbusRequestOf<8> request(17);
@@ -95,7 +97,7 @@ static void the_functions_of_a_serial_line_are_sent(void **)
     assert_int_equal(request.getByte(1), 'b');
 }
 
-static void files_are_read_and_written(void **)
+TEST(files_are_read_and_written)
 {
     ModbusSerialClient client;
     ModbusRequestOf<8> request(17);
@@ -122,7 +124,7 @@ static void files_are_read_and_written(void **)
     assert_int_equal(request.status(), MBM_OK);
 }
 
-static void a_device_identifies_itself(void **)
+TEST(a_device_identifies_itself)
 {
     ModbusSerialClient client;
     ModbusRequestOf<16> request(17);
@@ -140,7 +142,7 @@ static void a_device_identifies_itself(void **)
     assert_int_equal(request.length(), 4);
 }
 
-static void user_defined_and_forwarded_functions_are_sent(void **)
+TEST(user_defined_and_forwarded_functions_are_sent)
 {
     static const uint8_t body[] = {0, 107, 0, 1};
     const mbm_rule two = {MBM_RULE_FIXED, 3, 0};
@@ -162,7 +164,7 @@ static void user_defined_and_forwarded_functions_are_sent(void **)
                     {17, 16, 0, 1, 0, 1, 2, 0x12, 0x34}, {17, 16, 0, 1, 0, 1});
 }
 
-static void values_of_each_type_and_order_are_in_the_words(void **)
+TEST(values_of_each_type_and_order_are_in_the_words)
 {
     uint16_t words[4] = {0x4365, 0x1234, 0, 0};
     ModbusRequest request(1, words);
@@ -200,7 +202,7 @@ static void values_of_each_type_and_order_are_in_the_words(void **)
     assert_int_equal(request.setUInt32(2, 7), MBM_OK);
 }
 
-static void values_past_the_end_are_refused(void **)
+TEST(values_past_the_end_are_refused)
 {
     ModbusRequestOf<2> request(1);
     ModbusRequest bare(1);
@@ -224,20 +226,4 @@ static void values_past_the_end_are_refused(void **)
     assert_int_equal(bare.getByte(0), 0);
     assert_int_equal(bare.getUInt16(0), 0);
     assert_int_not_equal(bare.setUInt16(0, 1), MBM_OK);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(bits_are_read_and_written),
-        TEST(registers_are_read_and_written),
-        TEST(the_functions_of_a_serial_line_are_sent),
-        TEST(files_are_read_and_written),
-        TEST(a_device_identifies_itself),
-        TEST(user_defined_and_forwarded_functions_are_sent),
-        TEST(values_of_each_type_and_order_are_in_the_words),
-        TEST(values_past_the_end_are_refused),
-    };
-
-    return cmocka_run_group_tests_name("ModbusSerialClient: functions", tests, nullptr, nullptr);
 }

@@ -16,9 +16,9 @@ static EthernetClient *ethernet;
 static ModbusTcpClient *client;
 static const IPAddress device(192, 168, 1, 20);
 
-static int fresh(void **state)
+static void fresh()
 {
-    reset_board(state);
+    reset_board();
     board().realTime = true;
     tcp_server_start(&peer);
     networkPort(502) = peer.port;
@@ -26,17 +26,17 @@ static int fresh(void **state)
     client = new ModbusTcpClient;
     client->begin(*ethernet);
     client->setResponseTimeout(PATIENCE_MS);
-    return 0;
 }
 
-static int gone(void **)
+static void gone()
 {
     ethernet->stop();
     delete client;
     delete ethernet;
     tcp_server_stop(&peer);
-    return 0;
 }
+
+fixture each_test = {fresh, gone};
 
 /* Calls poll, as a sketch's loop does, until no request is pending. */
 static void run_until_idle()
@@ -44,7 +44,7 @@ static void run_until_idle()
     AWAIT(client->poll() != MBM_PENDING);
 }
 
-static void reads_what_libmodbus_holds(void **)
+TEST(reads_what_libmodbus_holds)
 {
     ModbusRequestOf<125> request(255);
     assert_int_equal(client->connect(device), MBM_OK);
@@ -68,7 +68,7 @@ static void reads_what_libmodbus_holds(void **)
     assert_int_equal(request[0], static_cast<uint16_t>(~server_pattern(9)));
 }
 
-static void writes_reach_libmodbus(void **)
+TEST(writes_reach_libmodbus)
 {
     ModbusRequestOf<4> request(255);
     client->connect("device");
@@ -98,7 +98,7 @@ static void writes_reach_libmodbus(void **)
                      MBM_ILLEGAL_DATA_ADDRESS);
 }
 
-static void many_requests_are_under_way_at_once(void **)
+TEST(many_requests_are_under_way_at_once)
 {
     ModbusRequestOf<1> a(255), b(255), c(255);
     unsigned sum = 0;
@@ -118,7 +118,7 @@ static void many_requests_are_under_way_at_once(void **)
     assert_int_equal(sum, server_pattern(1) + server_pattern(2) + server_pattern(3));
 }
 
-static void a_client_that_takes_few_bytes_gets_all_of_them(void **)
+TEST(a_client_that_takes_few_bytes_gets_all_of_them)
 {
     ModbusRequestOf<123> request(255);
     client->connect(device);
@@ -131,7 +131,7 @@ static void a_client_that_takes_few_bytes_gets_all_of_them(void **)
     assert_int_equal(peer.mapping->tab_registers[132], 1122);
 }
 
-static void without_a_connection_requests_end_at_once(void **)
+TEST(without_a_connection_requests_end_at_once)
 {
     ModbusTcpClient other;
     ModbusRequestOf<1> request(255);
@@ -148,7 +148,7 @@ static void without_a_connection_requests_end_at_once(void **)
     close(reserved);
 }
 
-static void a_lost_connection_can_be_made_again(void **)
+TEST(a_lost_connection_can_be_made_again)
 {
     ModbusRequestOf<1> request(255);
     client->connect(device);
@@ -169,7 +169,7 @@ static void a_lost_connection_can_be_made_again(void **)
     assert_int_equal(request[0], server_pattern(8));
 }
 
-static void replies_in_any_order_find_their_requests(void **)
+TEST(replies_in_any_order_find_their_requests)
 {
     tcp_peer *faulty = tcp_peer_new();
     ModbusRequestOf<1> late(7), early(7);
@@ -190,7 +190,7 @@ static void replies_in_any_order_find_their_requests(void **)
     tcp_peer_stop(faulty);
 }
 
-static void poll_never_waits_for_a_device(void **)
+TEST(poll_never_waits_for_a_device)
 {
     tcp_peer *faulty = tcp_peer_new();
     ModbusRequestOf<1> request(7);
@@ -207,7 +207,7 @@ static void poll_never_waits_for_a_device(void **)
     tcp_peer_stop(faulty);
 }
 
-static void rtu_frames_are_sent_over_a_tcp_connection(void **)
+TEST(rtu_frames_are_sent_over_a_tcp_connection)
 {
     uint16_t port;
     int listener = tcp_listen(&port);
@@ -230,7 +230,7 @@ static void rtu_frames_are_sent_over_a_tcp_connection(void **)
     close(listener);
 }
 
-static void begin_is_refused_while_a_request_is_pending(void **)
+TEST(begin_is_refused_while_a_request_is_pending)
 {
     EthernetClient another;
     ModbusRequestOf<1> request(255);
@@ -241,24 +241,4 @@ static void begin_is_refused_while_a_request_is_pending(void **)
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(client->begin(another), MBM_OK);
     assert_false(client->isConnected());
-}
-
-#define SERVED(test) cmocka_unit_test_setup_teardown(test, fresh, gone)
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        SERVED(reads_what_libmodbus_holds),
-        SERVED(writes_reach_libmodbus),
-        SERVED(many_requests_are_under_way_at_once),
-        SERVED(a_client_that_takes_few_bytes_gets_all_of_them),
-        SERVED(without_a_connection_requests_end_at_once),
-        SERVED(a_lost_connection_can_be_made_again),
-        SERVED(replies_in_any_order_find_their_requests),
-        SERVED(poll_never_waits_for_a_device),
-        SERVED(rtu_frames_are_sent_over_a_tcp_connection),
-        SERVED(begin_is_refused_while_a_request_is_pending),
-    };
-
-    return cmocka_run_group_tests_name("ModbusTcpClient", tests, nullptr, nullptr);
 }

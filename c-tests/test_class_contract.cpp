@@ -6,6 +6,8 @@
 
 #include "wire.h"
 
+fixture each_test = {reset_board, nullptr};
+
 static void logs_callbacks(ModbusMaster &node)
 {
     node.preTransmission([] { board().logEvent("pre"); });
@@ -13,7 +15,7 @@ static void logs_callbacks(ModbusMaster &node)
     node.idle([] { board().logEvent("idle"); });
 }
 
-static void a_transaction_discards_old_bytes_then_sends_then_waits(void **)
+TEST(a_transaction_discards_old_bytes_then_sends_then_waits)
 {
     ModbusMaster node;
     Serial.character = 0;
@@ -29,7 +31,7 @@ static void a_transaction_discards_old_bytes_then_sends_then_waits(void **)
     }
 }
 
-static void a_write_taken_in_pieces_stays_between_the_callbacks(void **)
+TEST(a_write_taken_in_pieces_stays_between_the_callbacks)
 {
     ModbusMaster node;
     Serial.character = 0;
@@ -45,7 +47,7 @@ static void a_write_taken_in_pieces_stays_between_the_callbacks(void **)
     }
 }
 
-static void idle_is_called_only_while_the_master_waits_for_a_reply(void **)
+TEST(idle_is_called_only_while_the_master_waits_for_a_reply)
 {
     static unsigned yields_before_sending;
     ModbusMaster node;
@@ -59,7 +61,7 @@ static void idle_is_called_only_while_the_master_waits_for_a_reply(void **)
     assert_true(yields_before_sending > 100); // the wait for the silence yields too
 }
 
-static void the_driver_is_off_again_after_a_failure(void **)
+TEST(the_driver_is_off_again_after_a_failure)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -70,7 +72,7 @@ static void the_driver_is_off_again_after_a_failure(void **)
     assert_string_equal(board().log.c_str(), "pre write flush post ");
 }
 
-static void the_response_timeout_is_two_seconds(void **)
+TEST(the_response_timeout_is_two_seconds)
 {
     ModbusMaster with_stream, of_version_0_9;
     with_stream.begin(1, Serial);
@@ -81,7 +83,7 @@ static void the_response_timeout_is_two_seconds(void **)
     }
 }
 
-static void exception_codes_are_returned_unchanged(void **)
+TEST(exception_codes_are_returned_unchanged)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -92,7 +94,7 @@ static void exception_codes_are_returned_unchanged(void **)
     }
 }
 
-static void each_failure_has_its_status(void **)
+TEST(each_failure_has_its_status)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -105,7 +107,7 @@ static void each_failure_has_its_status(void **)
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
 }
 
-static void a_failure_keeps_the_response_words_and_a_transaction_the_transmit_words(void **)
+TEST(a_failure_keeps_the_response_words_and_a_transaction_the_transmit_words)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -122,7 +124,7 @@ static void a_failure_keeps_the_response_words_and_a_transaction_the_transmit_wo
     assert_sent(Serial, {1, 16, 0, 0, 0, 1, 2, 0x0A, 0x0B});
 }
 
-static void any_transaction_empties_the_queue(void **)
+TEST(any_transaction_empties_the_queue)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -143,7 +145,7 @@ static void any_transaction_empties_the_queue(void **)
     assert_sent(Serial, {1, 16, 0, 0, 0, 1, 2, 0x56, 0x78});
 }
 
-static void any_transaction_takes_receive_back_to_the_first_word(void **)
+TEST(any_transaction_takes_receive_back_to_the_first_word)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -155,7 +157,7 @@ static void any_transaction_takes_receive_back_to_the_first_word(void **)
     assert_int_equal(node.receive(), 7);
 }
 
-static void the_write_address_is_shared(void **)
+TEST(the_write_address_is_shared)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -169,7 +171,7 @@ static void the_write_address_is_shared(void **)
     assert_sent(Serial, {1, 16, 0, 0x55, 0, 1, 2, 0, 9});
 }
 
-static void reads_of_65_to_125_registers_are_sent(void **)
+TEST(reads_of_65_to_125_registers_are_sent)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -180,7 +182,7 @@ static void reads_of_65_to_125_registers_are_sent(void **)
     }
 }
 
-static void units_above_247_are_accepted(void **)
+TEST(units_above_247_are_accepted)
 {
     ModbusMaster node;
     for (int unit : {247, 248, 255}) {
@@ -192,7 +194,7 @@ static void units_above_247_are_accepted(void **)
     }
 }
 
-static void callbacks_survive_begin(void **)
+TEST(callbacks_survive_begin)
 {
     ModbusMaster node;
     logs_callbacks(node);
@@ -204,7 +206,7 @@ static void callbacks_survive_begin(void **)
     assert_string_equal(board().log.c_str(), "pre write flush post idle read ");
 }
 
-static void zero_and_nullptr_remove_callbacks(void **)
+TEST(zero_and_nullptr_remove_callbacks)
 {
     ModbusMaster node;
     logs_callbacks(node);
@@ -218,7 +220,7 @@ static void zero_and_nullptr_remove_callbacks(void **)
     assert_string_equal(board().log.c_str(), "write flush read ");
 }
 
-static void a_long_idle_does_not_lose_the_reply(void **)
+TEST(a_long_idle_does_not_lose_the_reply)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -228,7 +230,7 @@ static void a_long_idle_does_not_lose_the_reply(void **)
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
 }
 
-static void an_idle_callback_may_use_another_object(void **)
+TEST(an_idle_callback_may_use_another_object)
 {
     static ModbusMaster other;
     ModbusMaster node;
@@ -246,7 +248,7 @@ static void an_idle_callback_may_use_another_object(void **)
     assert_int_equal(other.getResponseBuffer(0), 22);
 }
 
-static void requests_of_an_idle_callback_on_its_own_object_are_refused(void **)
+TEST(requests_of_an_idle_callback_on_its_own_object_are_refused)
 {
     static ModbusMaster *self;
     static unsigned calls;
@@ -264,7 +266,7 @@ static void requests_of_an_idle_callback_on_its_own_object_are_refused(void **)
     assert_true(calls > 10);
 }
 
-static void copies_have_buffers_and_callbacks_of_their_own(void **)
+TEST(copies_have_buffers_and_callbacks_of_their_own)
 {
     static int called;
     called = 0;
@@ -294,7 +296,7 @@ static void copies_have_buffers_and_callbacks_of_their_own(void **)
     assert_in_range(board().now - Serial.sentAt, 40000, 40200);
 }
 
-static void a_copy_leaves_a_request_under_way_to_the_original(void **)
+TEST(a_copy_leaves_a_request_under_way_to_the_original)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -312,7 +314,7 @@ static void a_copy_leaves_a_request_under_way_to_the_original(void **)
     assert_int_equal(copy.getResponseBuffer(0), 0);
 }
 
-static void an_assignment_cancels_the_request_under_way(void **)
+TEST(an_assignment_cancels_the_request_under_way)
 {
     ModbusMaster node, other;
     node.begin(1, Serial);
@@ -327,7 +329,7 @@ static void an_assignment_cancels_the_request_under_way(void **)
     assert_string_equal(board().log.c_str(), "pre write flush post ");
 }
 
-static void an_assignment_to_itself_changes_nothing(void **)
+TEST(an_assignment_to_itself_changes_nothing)
 {
     ModbusMaster node, &alias = node;
     node.begin(1, Serial);
@@ -339,7 +341,7 @@ static void an_assignment_to_itself_changes_nothing(void **)
     assert_sent(Serial, {1, 16, 0, 2, 0, 1, 2, 0, 3});
 }
 
-static void objects_live_in_containers_that_move_them(void **)
+TEST(objects_live_in_containers_that_move_them)
 {
     std::vector<ModbusMaster> nodes;
     for (uint8_t slave = 1; slave < 6; slave++) {
@@ -352,36 +354,4 @@ static void objects_live_in_containers_that_move_them(void **)
         assert_int_equal(node.readInputRegisters(0, 1), 0);
         assert_int_equal(node.getResponseBuffer(0), slave * 3);
     }
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_transaction_discards_old_bytes_then_sends_then_waits),
-        TEST(a_write_taken_in_pieces_stays_between_the_callbacks),
-        TEST(idle_is_called_only_while_the_master_waits_for_a_reply),
-        TEST(the_driver_is_off_again_after_a_failure),
-        TEST(the_response_timeout_is_two_seconds),
-        TEST(exception_codes_are_returned_unchanged),
-        TEST(each_failure_has_its_status),
-        TEST(a_failure_keeps_the_response_words_and_a_transaction_the_transmit_words),
-        TEST(any_transaction_empties_the_queue),
-        TEST(any_transaction_takes_receive_back_to_the_first_word),
-        TEST(the_write_address_is_shared),
-        TEST(reads_of_65_to_125_registers_are_sent),
-        TEST(units_above_247_are_accepted),
-        TEST(callbacks_survive_begin),
-        TEST(zero_and_nullptr_remove_callbacks),
-        TEST(a_long_idle_does_not_lose_the_reply),
-        TEST(an_idle_callback_may_use_another_object),
-        TEST(requests_of_an_idle_callback_on_its_own_object_are_refused),
-        TEST(copies_have_buffers_and_callbacks_of_their_own),
-        TEST(a_copy_leaves_a_request_under_way_to_the_original),
-        TEST(an_assignment_cancels_the_request_under_way),
-        TEST(an_assignment_to_itself_changes_nothing),
-        TEST(objects_live_in_containers_that_move_them),
-    };
-
-    return cmocka_run_group_tests_name("ModbusMaster: the contract with sketches", tests, nullptr,
-                                       nullptr);
 }

@@ -36,15 +36,16 @@ static int gets(void (*loop)(), int (*call)(modbus_t *))
     return result;
 }
 
-static int real_time(void **state)
+static void real_time()
 {
-    reset_board(state);
+    reset_board();
     pins() = Pins();
     board().realTime = true;
-    return 0;
 }
 
-static void the_tcp_client_reads_writes_and_connects_again(void **)
+fixture each_test = {real_time, nullptr};
+
+TEST(the_tcp_client_reads_writes_and_connects_again)
 {
     tcp_server device;
     tcp_server_start(&device);
@@ -64,7 +65,7 @@ static void the_tcp_client_reads_writes_and_connects_again(void **)
     tcp_server_stop(&device);
 }
 
-static void the_tcp_server_serves_a_sensor_and_a_relay(void **)
+TEST(the_tcp_server_serves_a_sensor_and_a_relay)
 {
     static uint16_t word;
     pins().voltage[A0] = 513;
@@ -85,7 +86,7 @@ static void the_tcp_server_serves_a_sensor_and_a_relay(void **)
     assert_int_equal(pins().level[4], LOW);
 }
 
-static void the_gateway_passes_a_request_to_its_line(void **)
+TEST(the_gateway_passes_a_request_to_its_line)
 {
     static uint16_t word;
     board().realTime = false; // the simulated UART has a clock of its own
@@ -107,17 +108,4 @@ static void the_gateway_passes_a_request_to_its_line(void **)
                           }),
                      EMBXGPATH);
     assert_int_equal(Serial.sent.size(), 0);
-}
-
-#define REAL(test) cmocka_unit_test_setup(test, real_time)
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        REAL(the_tcp_client_reads_writes_and_connects_again),
-        REAL(the_tcp_server_serves_a_sensor_and_a_relay),
-        REAL(the_gateway_passes_a_request_to_its_line),
-    };
-
-    return cmocka_run_group_tests_name("examples with a network", tests, nullptr, nullptr);
 }

@@ -17,9 +17,9 @@ static WiFiServer *wifi;
 static ModbusSerialClient *line;
 static ModbusTcpGateway<WiFiServer> *gateway;
 
-static int start(void **state)
+static void start()
 {
-    reset_board(state);
+    reset_board();
     board().realTime = true;
     server_start(&device, 17);
     tty.fd = device.line.ours;
@@ -33,17 +33,17 @@ static int start(void **state)
     assert_int_equal(gateway->begin(*wifi, *line, 0), MBM_INVALID_ARGUMENT);
     assert_int_equal(gateway->begin(*wifi, *line, 273, 274), MBM_INVALID_ARGUMENT);
     assert_int_equal(gateway->begin(*wifi, *line, 17, 18), MBM_OK);
-    return 0;
 }
 
-static int stop(void **)
+static void stop()
 {
     delete gateway;
     delete line;
     delete wifi;
     server_stop(&device);
-    return 0;
 }
+
+fixture each_test = {start, stop};
 
 /* Returns the result of a client's call, while the sketch's loop polls the gateway. */
 static int passes(modbus_t *peer, int (*call)(modbus_t *))
@@ -75,7 +75,7 @@ static int error_of_a_read(modbus_t *peer)
     return modbus_read_registers(peer, 3, 1, words) == 1 ? 0 : errno;
 }
 
-static void requests_and_replies_of_any_length_are_forwarded(void **)
+TEST(requests_and_replies_of_any_length_are_forwarded)
 {
     modbus_t *peer = client_of(17);
     assert_int_equal(passes(peer, read_registers), 125);
@@ -100,7 +100,7 @@ static void requests_and_replies_of_any_length_are_forwarded(void **)
     hang_up(peer);
 }
 
-static void the_exception_of_a_device_is_forwarded(void **)
+TEST(the_exception_of_a_device_is_forwarded)
 {
     modbus_t *peer = client_of(17);
     assert_int_equal(passes(peer,
@@ -112,7 +112,7 @@ static void the_exception_of_a_device_is_forwarded(void **)
     hang_up(peer);
 }
 
-static void a_unit_without_a_line_gets_0a_and_a_silent_unit_0b(void **)
+TEST(a_unit_without_a_line_gets_0a_and_a_silent_unit_0b)
 {
     modbus_t *peer = client_of(19);
     assert_int_equal(passes(peer, error_of_a_read), EMBXGPATH);
@@ -127,7 +127,7 @@ static void a_unit_without_a_line_gets_0a_and_a_silent_unit_0b(void **)
     hang_up(peer);
 }
 
-static void clients_and_the_sketch_share_the_line(void **)
+TEST(clients_and_the_sketch_share_the_line)
 {
     modbus_t *peers[] = {client_of(17), client_of(17), client_of(17), client_of(17)};
     ModbusRequestOf<1> own(17);
@@ -144,7 +144,7 @@ static void clients_and_the_sketch_share_the_line(void **)
     AWAIT((gateway->poll(), gateway->connections() == 0));
 }
 
-static void closing_a_connection_cancels_its_request(void **)
+TEST(closing_a_connection_cancels_its_request)
 {
     const uint8_t request[] = {0, 1, 0, 0, 0, 6, 18, 3, 0, 3, 0, 1};
     WiFiClient hasty;
@@ -158,19 +158,4 @@ static void closing_a_connection_cancels_its_request(void **)
     modbus_t *peer = client_of(17);
     assert_int_equal(passes(peer, error_of_a_read), 0);
     hang_up(peer);
-}
-
-#define SERVED(test) cmocka_unit_test_setup_teardown(test, start, stop)
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        SERVED(requests_and_replies_of_any_length_are_forwarded),
-        SERVED(the_exception_of_a_device_is_forwarded),
-        SERVED(a_unit_without_a_line_gets_0a_and_a_silent_unit_0b),
-        SERVED(clients_and_the_sketch_share_the_line),
-        SERVED(closing_a_connection_cancels_its_request),
-    };
-
-    return cmocka_run_group_tests_name("ModbusTcpGateway", tests, nullptr, nullptr);
 }

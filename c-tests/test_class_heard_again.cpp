@@ -4,6 +4,8 @@
 #define RAMEND 0x08FF
 #include "wire.h"
 
+fixture each_test = {reset_board, nullptr};
+
 enum : uint32_t { MS = 1000 };
 
 static ModbusMaster node;
@@ -36,7 +38,7 @@ static uint8_t reads(uint32_t limit)
 
 /* The next reply holds the value until no other one can follow it: that takes the response timeout.
  */
-static void with_the_defaults_one_lost_reply_costs_one_more_response_timeout(void **)
+TEST(with_the_defaults_one_lost_reply_costs_one_more_response_timeout)
 {
     begin();
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
@@ -52,10 +54,10 @@ static void with_the_defaults_one_lost_reply_costs_one_more_response_timeout(voi
     assert_in_range(board().now - later, 0, 20 * MS);
 }
 
-static void a_sketch_that_cancels_its_requests_hears_the_device_again(void **)
+TEST(a_sketch_that_cancels_its_requests_hears_the_device_again)
 {
     for (uint32_t limit : {30 * MS, 60 * MS, 120 * MS, 400 * MS}) {
-        reset_board(nullptr);
+        reset_board();
         begin();
         node.setResponseTimeout(200);
         node.setBlocking(false);
@@ -82,7 +84,7 @@ static void a_sketch_that_cancels_its_requests_hears_the_device_again(void **)
 }
 
 /* A second node on the line is read at once, though the first one waits for its unit. */
-static void a_node_that_waits_for_its_unit_does_not_keep_another_one_from_the_line(void **)
+TEST(a_node_that_waits_for_its_unit_does_not_keep_another_one_from_the_line)
 {
     ModbusMaster other;
 
@@ -103,7 +105,7 @@ static void a_node_that_waits_for_its_unit_does_not_keep_another_one_from_the_li
 }
 
 /* It is refused, and the one under way still reads from its own Stream. */
-static void a_request_that_is_refused_leaves_the_one_under_way_to_its_node(void **)
+TEST(a_request_that_is_refused_leaves_the_one_under_way_to_its_node)
 {
     ModbusMaster other;
     HardwareSerial another_line;
@@ -124,15 +126,4 @@ static void a_request_that_is_refused_leaves_the_one_under_way_to_its_node(void 
     assert_int_equal(node.status(), 0);
     assert_int_equal(node.getResponseBuffer(0), 7);
     assert_true(another_line.sent.empty());
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(with_the_defaults_one_lost_reply_costs_one_more_response_timeout),
-        TEST(a_sketch_that_cancels_its_requests_hears_the_device_again),
-        TEST(a_node_that_waits_for_its_unit_does_not_keep_another_one_from_the_line),
-        TEST(a_request_that_is_refused_leaves_the_one_under_way_to_its_node),
-    };
-    return cmocka_run_group_tests_name("ModbusMaster after a lost reply", tests, nullptr, nullptr);
 }

@@ -1,13 +1,15 @@
 /* The faults of ModbusMaster 2.0.1 that this class does not have. */
 #include "wire.h"
 
+fixture each_test = {reset_board, nullptr};
+
 #if defined(_UTIL_CRC16_H_)
 #error "the guard of avr-libc's <util/crc16.h> is taken"
 #endif
 
 static const uint32_t gap_without_baud_rate = 4000;
 
-static void available_counts_every_word(void **)
+TEST(available_counts_every_word)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -18,7 +20,7 @@ static void available_counts_every_word(void **)
     assert_int_equal(node.available(), 0);
 }
 
-static void the_largest_reads_are_complete(void **)
+TEST(the_largest_reads_are_complete)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -40,7 +42,7 @@ static void the_largest_reads_are_complete(void **)
                          (254 - 2 * i) << 8 | (255 - 2 * i));
 }
 
-static void writes_of_more_than_the_buffer_send_nothing(void **)
+TEST(writes_of_more_than_the_buffer_send_nothing)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -54,7 +56,7 @@ static void writes_of_more_than_the_buffer_send_nothing(void **)
     assert_int_equal(Serial.sent.size(), 0);
 }
 
-static void a_byte_count_of_251_to_255_is_malformed(void **)
+TEST(a_byte_count_of_251_to_255_is_malformed)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -66,7 +68,7 @@ static void a_byte_count_of_251_to_255_is_malformed(void **)
     }
 }
 
-static void a_reply_with_fewer_words_than_requested_is_malformed(void **)
+TEST(a_reply_with_fewer_words_than_requested_is_malformed)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -77,7 +79,7 @@ static void a_reply_with_fewer_words_than_requested_is_malformed(void **)
     assert_int_equal(node.available(), 0);
 }
 
-static void an_echo_with_other_values_is_malformed(void **)
+TEST(an_echo_with_other_values_is_malformed)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -96,7 +98,7 @@ static void an_echo_with_other_values_is_malformed(void **)
     assert_int_equal(node.maskWriteRegister(1, 2, 3), ModbusMaster::ku8MBMalformedReply);
 }
 
-static void exceptions_are_checked(void **)
+TEST(exceptions_are_checked)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -110,7 +112,7 @@ static void exceptions_are_checked(void **)
     }
 }
 
-static void noise_and_frames_of_other_units_before_the_reply_are_skipped(void **)
+TEST(noise_and_frames_of_other_units_before_the_reply_are_skipped)
 {
     const Bytes strays[] = {raw({0}),
                             raw({0xFF}),
@@ -133,7 +135,7 @@ static void noise_and_frames_of_other_units_before_the_reply_are_skipped(void **
     }
 }
 
-static void a_lenient_object_accepts_replies_that_deviate(void **)
+TEST(a_lenient_object_accepts_replies_that_deviate)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -161,7 +163,7 @@ public:
     size_t write(uint8_t) override { return 1; }
 };
 
-static void a_request_on_a_line_that_is_never_silent_times_out(void **)
+TEST(a_request_on_a_line_that_is_never_silent_times_out)
 {
     Babbler babbler;
     ModbusMaster node;
@@ -172,7 +174,7 @@ static void a_request_on_a_line_that_is_never_silent_times_out(void **)
     assert_in_range(board().now, 100000, 105000); /* the timeout and the gap */
 }
 
-static void a_request_on_a_port_that_accepts_no_bytes_times_out(void **)
+TEST(a_request_on_a_port_that_accepts_no_bytes_times_out)
 {
     ModbusMaster node;
     Serial.writeSpace = 0;
@@ -196,7 +198,7 @@ static uint32_t silence_before(ModbusMaster &first, ModbusMaster &second,
     return port.startedAt - end;
 }
 
-static void a_silence_is_kept_before_each_request(void **)
+TEST(a_silence_is_kept_before_each_request)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -217,7 +219,7 @@ public:
     int baudRate() { return static_cast<int>(baud); }
 };
 
-static void the_silence_follows_the_rate_that_the_port_tells(void **)
+TEST(the_silence_follows_the_rate_that_the_port_tells)
 {
     RatedSerial port;
     ModbusMaster node;
@@ -238,7 +240,7 @@ static void the_silence_follows_the_rate_that_the_port_tells(void **)
                     gap_without_baud_rate + 100);
 }
 
-static void a_rate_or_gap_that_the_sketch_sets_stays_whatever_the_port_tells(void **)
+TEST(a_rate_or_gap_that_the_sketch_sets_stays_whatever_the_port_tells)
 {
     RatedSerial port;
     ModbusMaster paced, slow;
@@ -254,7 +256,7 @@ static void a_rate_or_gap_that_the_sketch_sets_stays_whatever_the_port_tells(voi
     assert_in_range(silence_before(slow, slow), 15900, 16200);
 }
 
-static void a_hook_cannot_change_the_rate_by_begin(void **)
+TEST(a_hook_cannot_change_the_rate_by_begin)
 {
     static RatedSerial port;
     static ModbusMaster node;
@@ -266,7 +268,7 @@ static void a_hook_cannot_change_the_rate_by_begin(void **)
 }
 #endif
 
-static void the_silence_counts_from_another_objects_last_use(void **)
+TEST(the_silence_counts_from_another_objects_last_use)
 {
     ModbusMaster first, second;
     first.begin(1, Serial);
@@ -280,7 +282,7 @@ static void the_silence_counts_from_another_objects_last_use(void **)
     }
 }
 
-static void a_line_that_was_silent_for_long_enough_needs_no_wait(void **)
+TEST(a_line_that_was_silent_for_long_enough_needs_no_wait)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -293,7 +295,7 @@ static void a_line_that_was_silent_for_long_enough_needs_no_wait(void **)
     assert_in_range(Serial.startedAt - other_request, 0, 200);
 }
 
-static void a_pause_between_two_objects_counts_as_silence(void **)
+TEST(a_pause_between_two_objects_counts_as_silence)
 {
     ModbusMaster first, second;
     first.begin(1, Serial);
@@ -311,7 +313,7 @@ static void a_pause_between_two_objects_counts_as_silence(void **)
 }
 
 /* A device whose first reply is later than the timeout. It replies to all requests in order. */
-static void a_late_reply_is_not_taken_for_that_of_a_later_request(void **)
+TEST(a_late_reply_is_not_taken_for_that_of_a_later_request)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -326,7 +328,7 @@ static void a_late_reply_is_not_taken_for_that_of_a_later_request(void **)
     }
 }
 
-static void the_response_timeout_can_be_set(void **)
+TEST(the_response_timeout_can_be_set)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -347,7 +349,7 @@ static uint32_t failing_call(ModbusMaster &node)
     return board().now - began;
 }
 
-static void the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_work(void **)
+TEST(the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_work)
 {
     const uint32_t request = 8 * 573, call = request + 200000, slack = 500;
     ModbusMaster node, other;
@@ -369,7 +371,7 @@ static void the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_w
     assert_in_range(failing_call(node), call, call + slack);
 }
 
-static void the_slave_can_be_changed(void **)
+TEST(the_slave_can_be_changed)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -380,7 +382,7 @@ static void the_slave_can_be_changed(void **)
     assert_sent(Serial, {9, 6, 0, 1, 0, 2});
 }
 
-static void a_broadcast_succeeds_after_the_turnaround_delay(void **)
+TEST(a_broadcast_succeeds_after_the_turnaround_delay)
 {
     ModbusMaster node;
     node.begin(0, Serial);
@@ -392,7 +394,7 @@ static void a_broadcast_succeeds_after_the_turnaround_delay(void **)
     assert_int_equal(Serial.sent.size(), 0);
 }
 
-static void a_reply_complete_as_the_deadline_passes_succeeds(void **)
+TEST(a_reply_complete_as_the_deadline_passes_succeeds)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -402,7 +404,7 @@ static void a_reply_complete_as_the_deadline_passes_succeeds(void **)
     assert_int_equal(node.getResponseBuffer(0), 7);
 }
 
-static void coils_are_padded_with_zeros(void **)
+TEST(coils_are_padded_with_zeros)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -416,7 +418,7 @@ static void coils_are_padded_with_zeros(void **)
     assert_sent(Serial, {1, 15, 0, 0, 0, 3, 1, 0x07});
 }
 
-static void a_word_after_bits_starts_a_new_word(void **)
+TEST(a_word_after_bits_starts_a_new_word)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -428,7 +430,7 @@ static void a_word_after_bits_starts_a_new_word(void **)
     assert_sent(Serial, {1, 16, 0, 0, 0, 2, 4, 0, 1, 2, 3});
 }
 
-static void callbacks_may_have_a_context(void **)
+TEST(callbacks_may_have_a_context)
 {
     char log[] = "...";
     ModbusMaster node;
@@ -441,7 +443,7 @@ static void callbacks_may_have_a_context(void **)
     assert_string_equal(log, "pqi");
 }
 
-static void the_driver_can_be_held_on_after_the_flush(void **)
+TEST(the_driver_can_be_held_on_after_the_flush)
 {
     static uint32_t released;
     ModbusMaster node;
@@ -454,7 +456,7 @@ static void the_driver_can_be_held_on_after_the_flush(void **)
     assert_in_range(released - Serial.sentAt, 2 * 1146, 2 * 1146 + 100);
 }
 
-static void an_echo_is_dropped_with_setEcho(void **)
+TEST(an_echo_is_dropped_with_setEcho)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -468,7 +470,7 @@ static void an_echo_is_dropped_with_setEcho(void **)
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
 }
 
-static void the_wait_yields(void **)
+TEST(the_wait_yields)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -478,7 +480,7 @@ static void the_wait_yields(void **)
     assert_true(board().yields - before > 4000);
 }
 
-static void a_request_without_a_reply_is_repeated_with_setRetries(void **)
+TEST(a_request_without_a_reply_is_repeated_with_setRetries)
 {
     mbm_counters counters = {};
     ModbusMaster node;
@@ -496,7 +498,7 @@ static void a_request_without_a_reply_is_repeated_with_setRetries(void **)
     assert_int_equal(counters.badCrc, 1);
 }
 
-static void a_request_may_be_polled_or_cancelled(void **)
+TEST(a_request_may_be_polled_or_cancelled)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -511,47 +513,4 @@ static void a_request_may_be_polled_or_cancelled(void **)
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
     node.cancel();
     assert_int_equal(node.poll(), ModbusMaster::ku8MBCancelled);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(available_counts_every_word),
-        TEST(the_largest_reads_are_complete),
-        TEST(writes_of_more_than_the_buffer_send_nothing),
-        TEST(a_byte_count_of_251_to_255_is_malformed),
-        TEST(a_reply_with_fewer_words_than_requested_is_malformed),
-        TEST(an_echo_with_other_values_is_malformed),
-        TEST(exceptions_are_checked),
-        TEST(noise_and_frames_of_other_units_before_the_reply_are_skipped),
-        TEST(a_lenient_object_accepts_replies_that_deviate),
-        TEST(a_request_on_a_line_that_is_never_silent_times_out),
-        TEST(a_request_on_a_port_that_accepts_no_bytes_times_out),
-        TEST(a_silence_is_kept_before_each_request),
-#if !defined(MODBUSMASTER_SHARE_LINE)
-        TEST(the_silence_follows_the_rate_that_the_port_tells),
-        TEST(a_rate_or_gap_that_the_sketch_sets_stays_whatever_the_port_tells),
-        TEST(a_hook_cannot_change_the_rate_by_begin),
-#endif
-        TEST(the_silence_counts_from_another_objects_last_use),
-        TEST(a_line_that_was_silent_for_long_enough_needs_no_wait),
-        TEST(a_pause_between_two_objects_counts_as_silence),
-        TEST(a_late_reply_is_not_taken_for_that_of_a_later_request),
-        TEST(the_response_timeout_can_be_set),
-        TEST(the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_work),
-        TEST(the_slave_can_be_changed),
-        TEST(a_broadcast_succeeds_after_the_turnaround_delay),
-        TEST(a_reply_complete_as_the_deadline_passes_succeeds),
-        TEST(coils_are_padded_with_zeros),
-        TEST(a_word_after_bits_starts_a_new_word),
-        TEST(callbacks_may_have_a_context),
-        TEST(the_driver_can_be_held_on_after_the_flush),
-        TEST(an_echo_is_dropped_with_setEcho),
-        TEST(the_wait_yields),
-        TEST(a_request_without_a_reply_is_repeated_with_setRetries),
-        TEST(a_request_may_be_polled_or_cancelled),
-    };
-
-    return cmocka_run_group_tests_name("ModbusMaster: faults of the original", tests, nullptr,
-                                       nullptr);
 }

@@ -13,7 +13,7 @@ static server peer;
 static PtyStream line;
 static ModbusMaster node;
 
-static int start(void **)
+static void start()
 {
     board().realTime = true;
     server_start(&peer, 17);
@@ -26,16 +26,16 @@ static int start(void **)
         struct pollfd ready = {line.fd, POLLIN, 0};
         ::poll(&ready, 1, 1);
     });
-    return 0;
 }
 
-static int stop(void **)
+static void stop()
 {
     server_stop(&peer);
-    return 0;
 }
 
-static void reads_what_the_server_holds(void **)
+fixture each_test = {start, stop};
+
+TEST(reads_what_the_server_holds)
 {
     assert_int_equal(node.readHoldingRegisters(3, 125), 0);
     for (unsigned i = 0; i < 125; i++)
@@ -50,7 +50,7 @@ static void reads_what_the_server_holds(void **)
     assert_int_equal(node.getResponseBuffer(0) & 1, !server_bit_pattern(7));
 }
 
-static void writes_reach_the_servers_memory(void **)
+TEST(writes_reach_the_servers_memory)
 {
     assert_int_equal(node.writeSingleRegister(40, 0xBEEF), 0);
     assert_int_equal(peer.mapping->tab_registers[40], 0xBEEF);
@@ -78,32 +78,18 @@ static void writes_reach_the_servers_memory(void **)
     assert_int_equal(node.getResponseBuffer(0), 0x7777);
 }
 
-static void an_exception_of_the_server_is_returned(void **)
+TEST(an_exception_of_the_server_is_returned)
 {
     assert_int_equal(node.readHoldingRegisters(SERVER_REGISTERS, 1),
                      ModbusMaster::ku8MBIllegalDataAddress);
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
 }
 
-static void copies_take_turns_on_one_line(void **)
+TEST(copies_take_turns_on_one_line)
 {
     ModbusMaster nodes[] = {node, node, node};
     for (unsigned i = 0; i < 9; i++) {
         assert_int_equal(nodes[i % 3].readHoldingRegisters(static_cast<uint16_t>(i), 1), 0);
         assert_int_equal(nodes[i % 3].getResponseBuffer(0), server_pattern(i));
     }
-}
-
-#define SERVED(test) cmocka_unit_test_setup_teardown(test, start, stop)
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        SERVED(reads_what_the_server_holds),
-        SERVED(writes_reach_the_servers_memory),
-        SERVED(an_exception_of_the_server_is_returned),
-        SERVED(copies_take_turns_on_one_line),
-    };
-
-    return cmocka_run_group_tests_name("ModbusMaster with libmodbus", tests, nullptr, nullptr);
 }

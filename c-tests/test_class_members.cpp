@@ -1,11 +1,13 @@
 /* Each member of ModbusMaster: the bytes that it sends and the values that it returns. */
 #include "wire.h"
 
+fixture each_test = {reset_board, nullptr};
+
 static ModbusMaster global_node;
 static ModbusMaster global_array[2] = {4, 5};
 static const unsigned clock_reads_before_main = board().clockReads;
 
-static void constructors_touch_neither_clock_nor_port(void **)
+TEST(constructors_touch_neither_clock_nor_port)
 {
     assert_int_equal(clock_reads_before_main, 0);
     ModbusMaster one, two(2), three(1, 3);
@@ -14,7 +16,7 @@ static void constructors_touch_neither_clock_nor_port(void **)
         assert_int_equal(shimSerial(i).baud, 0);
 }
 
-static void the_default_is_slave_1_on_the_first_port_at_19200(void **)
+TEST(the_default_is_slave_1_on_the_first_port_at_19200)
 {
     ModbusMaster node;
     node.begin();
@@ -25,7 +27,7 @@ static void the_default_is_slave_1_on_the_first_port_at_19200(void **)
     assert_int_equal(node.getResponseBuffer(0), 0x1234);
 }
 
-static void the_constructor_chooses_the_slave(void **)
+TEST(the_constructor_chooses_the_slave)
 {
     ModbusMaster node(17);
     node.begin(9600);
@@ -35,10 +37,10 @@ static void the_constructor_chooses_the_slave(void **)
     assert_sent(Serial, {17, 6, 0, 1, 0, 2});
 }
 
-static void the_constructor_chooses_the_port_and_past_3_means_0(void **)
+TEST(the_constructor_chooses_the_port_and_past_3_means_0)
 {
     for (uint8_t port = 0; port < 6; port++) {
-        reset_board(nullptr);
+        reset_board();
         unsigned expected = port > 3 ? 0 : port;
         ModbusMaster node(port, 9);
         node.begin(38400);
@@ -50,13 +52,13 @@ static void the_constructor_chooses_the_port_and_past_3_means_0(void **)
     }
 }
 
-static void begin_takes_a_rate_beyond_16_bits(void **)
+TEST(begin_takes_a_rate_beyond_16_bits)
 {
     global_node.begin(115200);
     assert_int_equal(Serial.baud, 115200);
 }
 
-static void begin_with_a_stream_opens_nothing_and_may_be_repeated(void **)
+TEST(begin_with_a_stream_opens_nothing_and_may_be_repeated)
 {
     ModbusMaster node;
     node.setTransmitBuffer(0, 0xABCD);
@@ -73,7 +75,7 @@ static void begin_with_a_stream_opens_nothing_and_may_be_repeated(void **)
     assert_int_equal(Serial.baud, 0);
 }
 
-static void words_may_be_queued_before_begin(void **)
+TEST(words_may_be_queued_before_begin)
 {
     ModbusMaster node;
     assert_int_equal(node.setTransmitBuffer(1, 0x0304), 0);
@@ -83,7 +85,7 @@ static void words_may_be_queued_before_begin(void **)
     assert_sent(Serial, {1, 16, 0, 0, 0, 2, 4, 0, 0, 3, 4});
 }
 
-static void settings_may_be_made_before_begin(void **)
+TEST(settings_may_be_made_before_begin)
 {
     ModbusMaster node(3);
     node.setResponseTimeout(30);
@@ -92,13 +94,13 @@ static void settings_may_be_made_before_begin(void **)
     assert_in_range(board().now - Serial.sentAt, 30000, 30500);
 }
 
-static void a_request_before_begin_returns_a_status(void **)
+TEST(a_request_before_begin_returns_a_status)
 {
     ModbusMaster node;
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBNotInitialised);
 }
 
-static void response_words_past_the_end_are_ffff(void **)
+TEST(response_words_past_the_end_are_ffff)
 {
     ModbusMaster node;
     assert_int_equal(node.getResponseBuffer(124), 0);
@@ -106,7 +108,7 @@ static void response_words_past_the_end_are_ffff(void **)
     assert_int_equal(node.getResponseBuffer(255), 0xFFFF);
 }
 
-static void transmit_words_past_the_end_are_refused_with_02(void **)
+TEST(transmit_words_past_the_end_are_refused_with_02)
 {
     ModbusMaster node;
     assert_int_equal(node.setTransmitBuffer(122, 1), 0);
@@ -114,7 +116,7 @@ static void transmit_words_past_the_end_are_refused_with_02(void **)
     assert_int_equal(node.setTransmitBuffer(255, 1), 2);
 }
 
-static void set_transmit_buffer_does_not_move_the_queue(void **)
+TEST(set_transmit_buffer_does_not_move_the_queue)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -126,7 +128,7 @@ static void set_transmit_buffer_does_not_move_the_queue(void **)
     assert_sent(Serial, {1, 16, 0, 0, 0, 1, 2, 7, 8});
 }
 
-static void clearing_the_words_keeps_the_indices(void **)
+TEST(clearing_the_words_keeps_the_indices)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -147,7 +149,7 @@ static void clearing_the_words_keeps_the_indices(void **)
     assert_sent(Serial, {1, 16, 0, 0, 0, 2, 4, 0, 0, 0x22, 0x22});
 }
 
-static void begin_transmission_sets_the_address_and_keeps_the_words(void **)
+TEST(begin_transmission_sets_the_address_and_keeps_the_words)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -180,7 +182,7 @@ template <typename Value> static void assert_queues(Value value, std::initialize
 
 enum Colour { red = 0x0605 };
 
-static void send_takes_every_integer_type(void **)
+TEST(send_takes_every_integer_type)
 {
     assert_queues(uint8_t(0xFE), {0, 0xFE});
     assert_queues(uint16_t(0xFEDC), {0xFE, 0xDC});
@@ -197,7 +199,7 @@ static void send_takes_every_integer_type(void **)
     assert_queues(-1L, {0xFF, 0xFF, 0xFF, 0xFF});
 }
 
-static void words_past_the_end_are_dropped(void **)
+TEST(words_past_the_end_are_dropped)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -212,7 +214,7 @@ static void words_past_the_end_are_dropped(void **)
     assert_int_equal(Serial.sent.at(0).at(252), 122);
 }
 
-static void bits_are_queued_lowest_first_and_count_complete_words(void **)
+TEST(bits_are_queued_lowest_first_and_count_complete_words)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -231,7 +233,7 @@ static void bits_are_queued_lowest_first_and_count_complete_words(void **)
     assert_sent(Serial, {1, 16, 0, 4, 0, 1, 2, 0xFF, 0xFF});
 }
 
-static void request_from_reads_words_for_receive(void **)
+TEST(request_from_reads_words_for_receive)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -248,7 +250,7 @@ static void request_from_reads_words_for_receive(void **)
     assert_int_equal(node.status(), 2);
 }
 
-static void each_read_has_its_function_code(void **)
+TEST(each_read_has_its_function_code)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -267,7 +269,7 @@ static void each_read_has_its_function_code(void **)
     assert_int_equal(node.getResponseBuffer(0), 10);
 }
 
-static void each_write_has_its_function_code(void **)
+TEST(each_write_has_its_function_code)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -289,7 +291,7 @@ static void each_write_has_its_function_code(void **)
     assert_sent(Serial, {1, 16, 0, 1, 0, 2, 4, 0, 0xF2, 0, 0x25});
 }
 
-static void reading_and_writing_at_once_has_two_forms(void **)
+TEST(reading_and_writing_at_once_has_two_forms)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -306,7 +308,7 @@ static void reading_and_writing_at_once_has_two_forms(void **)
     assert_int_equal(node.getResponseBuffer(0), 0xFE);
 }
 
-static void write_single_register_overwrites_word_0(void **)
+TEST(write_single_register_overwrites_word_0)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -323,7 +325,7 @@ static uint8_t by_reference(const uint8_t &constant)
     return constant;
 }
 
-static void constants_serve_as_values_labels_and_references(void **)
+TEST(constants_serve_as_values_labels_and_references)
 {
     ModbusMaster node;
     assert_int_equal(node.ku8MBSuccess, 0);
@@ -345,7 +347,7 @@ static void constants_serve_as_values_labels_and_references(void **)
 
 typedef long LONG; // FatFs defines such a name
 
-static void every_status_has_the_same_text_as_in_c(void **)
+TEST(every_status_has_the_same_text_as_in_c)
 {
     for (unsigned status = 0; status < 256; status++) {
         const uint8_t number = static_cast<uint8_t>(status);
@@ -360,7 +362,7 @@ static void every_status_has_the_same_text_as_in_c(void **)
     }
 }
 
-static void helpers_split_and_join_words(void **)
+TEST(helpers_split_and_join_words)
 {
     LONG untouched = 1;
     assert_int_equal(untouched, 1);
@@ -370,7 +372,7 @@ static void helpers_split_and_join_words(void **)
     assert_int_equal(LONG(0xFEDC, 0xBA98), 0xFEDCBA98);
 }
 
-static void arrays_hold_independent_objects(void **)
+TEST(arrays_hold_independent_objects)
 {
     for (ModbusMaster &node : global_array)
         node.begin();
@@ -380,38 +382,4 @@ static void arrays_hold_independent_objects(void **)
     assert_int_equal(global_array[1].readHoldingRegisters(0, 1), 0);
     assert_int_equal(global_array[0].getResponseBuffer(0), 44);
     assert_int_equal(global_array[1].getResponseBuffer(0), 55);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(constructors_touch_neither_clock_nor_port),
-        TEST(the_default_is_slave_1_on_the_first_port_at_19200),
-        TEST(the_constructor_chooses_the_slave),
-        TEST(the_constructor_chooses_the_port_and_past_3_means_0),
-        TEST(begin_takes_a_rate_beyond_16_bits),
-        TEST(begin_with_a_stream_opens_nothing_and_may_be_repeated),
-        TEST(words_may_be_queued_before_begin),
-        TEST(settings_may_be_made_before_begin),
-        TEST(a_request_before_begin_returns_a_status),
-        TEST(response_words_past_the_end_are_ffff),
-        TEST(transmit_words_past_the_end_are_refused_with_02),
-        TEST(set_transmit_buffer_does_not_move_the_queue),
-        TEST(clearing_the_words_keeps_the_indices),
-        TEST(begin_transmission_sets_the_address_and_keeps_the_words),
-        TEST(send_takes_every_integer_type),
-        TEST(words_past_the_end_are_dropped),
-        TEST(bits_are_queued_lowest_first_and_count_complete_words),
-        TEST(request_from_reads_words_for_receive),
-        TEST(each_read_has_its_function_code),
-        TEST(each_write_has_its_function_code),
-        TEST(reading_and_writing_at_once_has_two_forms),
-        TEST(write_single_register_overwrites_word_0),
-        TEST(constants_serve_as_values_labels_and_references),
-        TEST(every_status_has_the_same_text_as_in_c),
-        TEST(helpers_split_and_join_words),
-        TEST(arrays_hold_independent_objects),
-    };
-
-    return cmocka_run_group_tests_name("ModbusMaster: members", tests, nullptr, nullptr);
 }

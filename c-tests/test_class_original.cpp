@@ -5,6 +5,8 @@
 #include "util/word.h"
 #include "wire.h"
 
+fixture each_test = {reset_board, nullptr};
+
 #if !defined(ModbusMaster_h)
 #error "the original's guard is not defined"
 #endif
@@ -12,7 +14,7 @@
 #error "the guard of avr-libc's <util/crc16.h> is taken"
 #endif
 
-static void crc16_update_computes_the_crc_of_a_frame(void **)
+TEST(crc16_update_computes_the_crc_of_a_frame)
 {
     const Bytes frame = adu({0x01, 0x42, 0x80, 0x11, 0xFF});
     uint16_t crc = 0xFFFF;
@@ -27,14 +29,14 @@ static void crc16_update_computes_the_crc_of_a_frame(void **)
     assert_int_equal(crc, 0x4B37);
 }
 
-static void the_helpers_split_and_join_words(void **)
+TEST(the_helpers_split_and_join_words)
 {
     assert_int_equal(lowWord(0x12345678), 0x5678);
     assert_int_equal(highWord(0x12345678), 0x1234);
     assert_int_equal(LONG(0x1234, 0x5678), 0x12345678);
 }
 
-static void members_have_the_originals_types(void **)
+TEST(members_have_the_originals_types)
 {
     typedef uint8_t (ModbusMaster::*Read)(uint16_t, uint16_t);
     uint8_t (ModbusMaster::*original)(uint16_t, uint8_t) = &ModbusMaster::readInputRegisters;
@@ -83,7 +85,7 @@ static const char *said(ModbusMaster node, uint8_t result)
     }
 }
 
-static void a_class_of_a_sketch_derives_from_the_class(void **)
+TEST(a_class_of_a_sketch_derives_from_the_class)
 {
     Meter meters[2];
     meters[0].begin(4, Serial);
@@ -97,7 +99,7 @@ static void a_class_of_a_sketch_derives_from_the_class(void **)
     assert_int_equal(meters[1].getResponseBuffer(0), 7);
 }
 
-static void the_debug_pins_show_reads_and_idle_calls(void **)
+TEST(the_debug_pins_show_reads_and_idle_calls)
 {
     static unsigned idles;
     ModbusMaster node;
@@ -127,7 +129,7 @@ public:
     void flush() override { Serial.flush(); }
 };
 
-static void a_stream_that_returns_no_count_sends_each_request_once(void **)
+TEST(a_stream_that_returns_no_count_sends_each_request_once)
 {
     Uncounted stream;
     ModbusMaster node;
@@ -142,7 +144,7 @@ static void a_stream_that_returns_no_count_sends_each_request_once(void **)
     }
 }
 
-static void a_stream_that_returns_no_count_sends_the_longest_request(void **)
+TEST(a_stream_that_returns_no_count_sends_the_longest_request)
 {
     const uint16_t words = 121; /* the longest request of function 17: 255 bytes */
     Bytes request = raw({1, 0x17, 0, 0, 0, 1, 0, 0, 0, words, 2 * words});
@@ -175,7 +177,7 @@ public:
     }
 };
 
-static void a_full_buffer_is_distinguished_from_a_stream_that_returns_no_count(void **)
+TEST(a_full_buffer_is_distinguished_from_a_stream_that_returns_no_count)
 {
     Full stream;
     Uncounted other;
@@ -205,29 +207,11 @@ public:
     }
 };
 
-static void a_write_error_means_that_no_byte_was_accepted(void **)
+TEST(a_write_error_means_that_no_byte_was_accepted)
 {
     Refusing stream;
     ModbusMaster node;
     node.begin(1, stream);
     node.setResponseTimeout(100);
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBLineBusy);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(crc16_update_computes_the_crc_of_a_frame),
-        TEST(the_helpers_split_and_join_words),
-        TEST(members_have_the_originals_types),
-        TEST(a_class_of_a_sketch_derives_from_the_class),
-        TEST(the_debug_pins_show_reads_and_idle_calls),
-        TEST(a_stream_that_returns_no_count_sends_each_request_once),
-        TEST(a_stream_that_returns_no_count_sends_the_longest_request),
-        TEST(a_full_buffer_is_distinguished_from_a_stream_that_returns_no_count),
-        TEST(a_write_error_means_that_no_byte_was_accepted),
-    };
-
-    return cmocka_run_group_tests_name("ModbusMaster: other parts of the original", tests, nullptr,
-                                       nullptr);
 }

@@ -4,15 +4,17 @@
 #define MODBUSMASTER_OWN_LINES
 #include "wire.h"
 
+fixture each_test = {reset_board, nullptr};
+
 static HardwareSerial other_line;
 
-static void objects_have_a_line_each(void **)
+TEST(objects_have_a_line_each)
 {
     assert_in_range(sizeof(ModbusMaster),
                     2 * (125 + 123) + sizeof(mbm_line) + sizeof(mbm_node) + 255, 1300);
 }
 
-static void two_objects_have_a_request_under_way_at_the_same_time(void **)
+TEST(two_objects_have_a_request_under_way_at_the_same_time)
 {
     ModbusMaster first, second;
     first.begin(1, Serial);
@@ -32,14 +34,4 @@ static void two_objects_have_a_request_under_way_at_the_same_time(void **)
     assert_int_equal(first.getResponseBuffer(0), 7);
     assert_int_equal(second.status(), 0);
     assert_int_equal(second.getResponseBuffer(0), 8);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(objects_have_a_line_each),
-        TEST(two_objects_have_a_request_under_way_at_the_same_time),
-    };
-    return cmocka_run_group_tests_name("ModbusMaster with lines on a small board", tests, nullptr,
-                                       nullptr);
 }

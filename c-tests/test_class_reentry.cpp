@@ -3,6 +3,8 @@
 
 #include "ModbusMaster.h"
 
+fixture each_test = {reset_board, nullptr};
+
 static ModbusMaster *calling;
 static ModbusServer *polled;
 static unsigned entered;
@@ -19,7 +21,7 @@ static void begin_elsewhere()
     assert_int_equal(calling->status(), ModbusMaster::ku8MBBusy);
 }
 
-static void callbacks_around_a_request_cannot_begin_or_assign_their_master(void **)
+TEST(callbacks_around_a_request_cannot_begin_or_assign_their_master)
 {
     ModbusMaster node;
     calling = &node;
@@ -43,7 +45,7 @@ static void use_words()
     calling->clearResponseBuffer();
 }
 
-static void callbacks_around_a_request_may_use_the_words(void **)
+TEST(callbacks_around_a_request_may_use_the_words)
 {
     ModbusMaster node;
     calling = &node;
@@ -75,7 +77,7 @@ static uint8_t begin_other(const mbm_access &)
     return 0;
 }
 
-static void hooks_cannot_begin_their_server(void **)
+TEST(hooks_cannot_begin_their_server)
 {
     ModbusRegisterArray<2> registers;
     ModbusServer server;
@@ -92,7 +94,7 @@ static void hooks_cannot_begin_their_server(void **)
     assert_int_equal(registers[1], 6);
 }
 
-static void several_units_may_serve_one_array(void **)
+TEST(several_units_may_serve_one_array)
 {
     ModbusRegisterArray<2> registers;
     ModbusUnit units[] = {{17}, {18}};
@@ -103,16 +105,4 @@ static void several_units_may_serve_one_array(void **)
     assert_int_equal(server.begin(units, Serial, 19200), MBM_OK);
     expect_response(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});
     expect_response(server, {18, 3, 0, 1, 0, 1}, {18, 3, 2, 0, 5});
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(callbacks_around_a_request_cannot_begin_or_assign_their_master),
-        TEST(callbacks_around_a_request_may_use_the_words),
-        TEST(hooks_cannot_begin_their_server),
-        TEST(several_units_may_serve_one_array),
-    };
-
-    return cmocka_run_group_tests_name("classes: calls within callbacks", tests, nullptr, nullptr);
 }

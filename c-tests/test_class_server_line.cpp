@@ -1,7 +1,9 @@
 /* ModbusServer: silences, the driver, echoes and damaged frames. */
 #include "server_checks.h"
 
-static void a_response_begins_after_the_silence(void **)
+fixture each_test = {reset_board, nullptr};
+
+TEST(a_response_begins_after_the_silence)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
@@ -24,7 +26,7 @@ static void a_response_begins_after_the_silence(void **)
     assert_in_range(Serial.startedAt - last, 4000, 4000 + 6 * board().tick);
 }
 
-static void a_request_may_pause_for_t15(void **)
+TEST(a_request_may_pause_for_t15)
 {
     const uint32_t t15 = t35 * 3 / 7;
     ModbusRegisterArray<1> registers;
@@ -39,7 +41,7 @@ static void a_request_may_pause_for_t15(void **)
     assert_sent(Serial, {17, 6, 0, 0, 0, 1});
 }
 
-static void a_request_that_the_serial_driver_hands_over_in_blocks_is_answered(void **)
+TEST(a_request_that_the_serial_driver_hands_over_in_blocks_is_answered)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
@@ -81,7 +83,7 @@ struct FifoSerial : HardwareSerial {
     void setRxFIFOFull(uint8_t bytes) { threshold = bytes; }
 };
 
-static void a_serial_port_with_a_fifo_hands_over_each_byte(void **)
+TEST(a_serial_port_with_a_fifo_hands_over_each_byte)
 {
     ModbusServer server;
     ModbusUnit units[1] = {{17}};
@@ -97,7 +99,7 @@ static void a_serial_port_with_a_fifo_hands_over_each_byte(void **)
     assert_int_equal(refused.threshold, 120);
 }
 
-static void the_time_that_an_adapter_takes_can_be_set(void **)
+TEST(the_time_that_an_adapter_takes_can_be_set)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
@@ -117,7 +119,7 @@ static void the_time_that_an_adapter_takes_can_be_set(void **)
     }
 }
 
-static void a_sketch_whose_receiver_gets_what_it_sends_answers_once(void **)
+TEST(a_sketch_whose_receiver_gets_what_it_sends_answers_once)
 {
     ModbusRegisterArray<2> registers;
     ModbusServer server;
@@ -132,7 +134,7 @@ static void a_sketch_whose_receiver_gets_what_it_sends_answers_once(void **)
     assert_int_equal(Serial.sent.size(), 0);
 }
 
-static void a_stream_that_returns_0_for_what_it_sends_works(void **)
+TEST(a_stream_that_returns_0_for_what_it_sends_works)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
@@ -144,7 +146,7 @@ static void a_stream_that_returns_0_for_what_it_sends_works(void **)
     assert_sent(port, {17, 3, 2, 0, 0});
 }
 
-static void the_driver_is_off_until_the_silence_has_passed(void **)
+TEST(the_driver_is_off_until_the_silence_has_passed)
 {
     static uint32_t on;
     ModbusRegisterArray<1> registers;
@@ -157,7 +159,7 @@ static void the_driver_is_off_until_the_silence_has_passed(void **)
     assert_in_range(on - requested_at, t35, t35 + 6 * board().tick);
 }
 
-static void a_sketch_may_sleep_for_the_time_of_pollDelay(void **)
+TEST(a_sketch_may_sleep_for_the_time_of_pollDelay)
 {
     ModbusServer server;
     server.begin(17, Serial, 19200);
@@ -169,7 +171,7 @@ static void a_sketch_may_sleep_for_the_time_of_pollDelay(void **)
     assert_in_range(server.pollDelay(), t35 / 2 - 6 * board().tick, t35 / 2);
 }
 
-static void the_driver_is_on_while_a_response_leaves(void **)
+TEST(the_driver_is_on_while_a_response_leaves)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
@@ -195,7 +197,7 @@ static void counts(void *context)
     ++*static_cast<int *>(context);
 }
 
-static void callbacks_get_their_context(void **)
+TEST(callbacks_get_their_context)
 {
     int on = 0, off = 0;
     ModbusRegisterArray<1> registers;
@@ -210,7 +212,7 @@ static void callbacks_get_their_context(void **)
     assert_int_equal(off, 2);
 }
 
-static void an_echo_of_the_response_is_dropped_if_set_so(void **)
+TEST(an_echo_of_the_response_is_dropped_if_set_so)
 {
     ModbusRegisterArray<2> registers;
     ModbusServer server;
@@ -224,7 +226,7 @@ static void an_echo_of_the_response_is_dropped_if_set_so(void **)
     expect_response(server, {17, 3, 0, 1, 0, 1}, {17, 3, 2, 0, 7});
 }
 
-static void a_response_written_in_pieces_is_one_frame(void **)
+TEST(a_response_written_in_pieces_is_one_frame)
 {
     ModbusRegisterArray<2> registers;
     ModbusServer server;
@@ -237,7 +239,7 @@ static void a_response_written_in_pieces_is_one_frame(void **)
     assert_string_equal(board().log.c_str(), "read pre write flush post ");
 }
 
-static void damaged_frames_and_those_of_other_units_get_no_response(void **)
+TEST(damaged_frames_and_those_of_other_units_get_no_response)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
@@ -253,7 +255,7 @@ static void damaged_frames_and_those_of_other_units_get_no_response(void **)
     expect_response(server, {17, 6, 0, 0, 0, 9}, {17, 6, 0, 0, 0, 9});
 }
 
-static void ascii_is_served(void **)
+TEST(ascii_is_served)
 {
     ModbusRegisterArray<1> registers;
     ModbusUnit units[1] = {{17}};
@@ -274,7 +276,7 @@ static void ascii_is_served(void **)
     assert_bytes(Serial.sent[0], answer);
 }
 
-static void a_baud_rate_does_not_change_the_timeout_of_ascii(void **)
+TEST(a_baud_rate_does_not_change_the_timeout_of_ascii)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
@@ -297,7 +299,7 @@ static void a_baud_rate_does_not_change_the_timeout_of_ascii(void **)
     assert_int_equal(Serial.sent.size(), 1);
 }
 
-static void begin_may_be_called_again(void **)
+TEST(begin_may_be_called_again)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
@@ -311,29 +313,4 @@ static void begin_may_be_called_again(void **)
     expect_response(server, {18, 3, 0, 0, 0, 1}, {18, 3, 2, 0, 0});
     expect_no_response(server, adu({17, 3, 0, 0, 0, 1}));
     assert_int_equal(Serial1.sent.size(), 0);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_response_begins_after_the_silence),
-        TEST(a_request_may_pause_for_t15),
-        TEST(a_request_that_the_serial_driver_hands_over_in_blocks_is_answered),
-        TEST(a_serial_port_with_a_fifo_hands_over_each_byte),
-        TEST(the_time_that_an_adapter_takes_can_be_set),
-        TEST(a_sketch_whose_receiver_gets_what_it_sends_answers_once),
-        TEST(a_stream_that_returns_0_for_what_it_sends_works),
-        TEST(the_driver_is_off_until_the_silence_has_passed),
-        TEST(a_sketch_may_sleep_for_the_time_of_pollDelay),
-        TEST(the_driver_is_on_while_a_response_leaves),
-        TEST(callbacks_get_their_context),
-        TEST(an_echo_of_the_response_is_dropped_if_set_so),
-        TEST(a_response_written_in_pieces_is_one_frame),
-        TEST(damaged_frames_and_those_of_other_units_get_no_response),
-        TEST(ascii_is_served),
-        TEST(a_baud_rate_does_not_change_the_timeout_of_ascii),
-        TEST(begin_may_be_called_again),
-    };
-
-    return cmocka_run_group_tests_name("ModbusServer: the line", tests, nullptr, nullptr);
 }

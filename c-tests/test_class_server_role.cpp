@@ -1,7 +1,9 @@
 /* ModbusServer on a simulated board: what its documentation promises. */
 #include "server_checks.h"
 
-static void registers_and_bits_of_arrays_are_served(void **)
+fixture each_test = {reset_board, nullptr};
+
+TEST(registers_and_bits_of_arrays_are_served)
 {
     uint16_t words[] = {0x1111, 0x2222, 0x3333};
     uint8_t bytes[] = {0x05, 0x80};
@@ -27,7 +29,7 @@ static void registers_and_bits_of_arrays_are_served(void **)
     assert_int_equal(inputs.size(), 3);
 }
 
-static void writes_reach_the_arrays(void **)
+TEST(writes_reach_the_arrays)
 {
     ModbusRegisterArray<4> registers(10);
     ModbusBitArray<9> coils;
@@ -50,7 +52,7 @@ static void writes_reach_the_arrays(void **)
     expect_response(server, {17, 5, 0, 9, 0, 0}, {17, 0x85, 2});
 }
 
-static void a_sketch_sets_what_a_client_reads(void **)
+TEST(a_sketch_sets_what_a_client_reads)
 {
     ModbusRegisterArray<2> readings;
     ModbusBitArray<10> inputs;
@@ -72,7 +74,7 @@ static void a_sketch_sets_what_a_client_reads(void **)
 
 static uint16_t written_address, written_quantity, written_count;
 
-static void one_hook_refuses_a_write_and_another_is_called_after_it(void **)
+TEST(one_hook_refuses_a_write_and_another_is_called_after_it)
 {
     ModbusRegisterArray<4> registers(10);
     ModbusServer server;
@@ -116,7 +118,7 @@ static void one_hook_refuses_a_write_and_another_is_called_after_it(void **)
     expect_response(server, {17, 3, 0, 12, 0, 2}, {17, 3, 4, 0, 0, 0, 0});
 }
 
-static void absent_registers_and_bits_are_refused(void **)
+TEST(absent_registers_and_bits_are_refused)
 {
     static const uint8_t valid[] = {0x05};
     ModbusRegisterArray<3> registers;
@@ -128,7 +130,7 @@ static void absent_registers_and_bits_are_refused(void **)
     expect_response(server, {17, 3, 0, 0, 0, 3}, {17, 0x83, 2});
 }
 
-static void mask_write_and_read_write_are_served_after_maskAndReadWrite(void **)
+TEST(mask_write_and_read_write_are_served_after_maskAndReadWrite)
 {
     ModbusRegisterArray<4> registers;
     ModbusServer server;
@@ -142,14 +144,14 @@ static void mask_write_and_read_write_are_served_after_maskAndReadWrite(void **)
     expect_response(server, {17, 23, 0, 0, 0, 2, 0, 1, 0, 1, 2, 7, 8}, {17, 23, 4, 0, 0x17, 7, 8});
 }
 
-static void a_unit_without_tables_sends_no_response(void **)
+TEST(a_unit_without_tables_sends_no_response)
 {
     ModbusServer server;
     server.begin(17, Serial, 19200);
     expect_no_response(server, adu({17, 3, 0, 0, 0, 1}));
 }
 
-static void each_of_several_units_serves_its_own_tables(void **)
+TEST(each_of_several_units_serves_its_own_tables)
 {
     ModbusUnit units[2] = {{5}, {6}};
     ModbusRegisterArray<1> left, right;
@@ -171,7 +173,7 @@ static void each_of_several_units_serves_its_own_tables(void **)
     expect_no_response(server, adu({6, 3, 0, 0, 0, 1}));
 }
 
-static void a_unit_id_above_255_is_refused(void **)
+TEST(a_unit_id_above_255_is_refused)
 {
     ModbusServer server;
     ModbusRegisterArray<2> holding;
@@ -196,7 +198,7 @@ static uint16_t adds(const mbm_request &request, uint8_t *response, uint16_t cap
     return 1;
 }
 
-static void a_function_of_the_sketch_is_served(void **)
+TEST(a_function_of_the_sketch_is_served)
 {
     ModbusFunction sum(65, adds), none(66, nullptr);
     ModbusServer server;
@@ -209,7 +211,7 @@ static void a_function_of_the_sketch_is_served(void **)
     expect_response(server, {17, 66, 3, 4}, {17, 66 | 0x80, 1});
 }
 
-static void a_function_can_be_switched_off_and_on(void **)
+TEST(a_function_can_be_switched_off_and_on)
 {
     mbm_functionMask switches = {};
     ModbusRegisterArray<1> registers;
@@ -228,7 +230,7 @@ static uint16_t address_itself(void *, uint16_t address)
     return address;
 }
 
-static void the_other_functions_are_served_from_their_records(void **)
+TEST(the_other_functions_are_served_from_their_records)
 {
     static const uint8_t name[] = {'m', 'b', 'm'};
     static uint16_t records[] = {1, 2};
@@ -298,7 +300,7 @@ public:
     }
 };
 
-static void master_and_server_understand_each_other(void **)
+TEST(master_and_server_understand_each_other)
 {
     static ModbusServer server;
     ModbusRegisterArray<125> registers, inputs;
@@ -335,25 +337,4 @@ static void master_and_server_understand_each_other(void **)
     assert_int_equal(node.getResponseBuffer(0), (0xA5C3 & 0x3FF) << 6 & 0xFFFF);
     assert_int_equal(node.writeSingleCoil(2000, 1), ModbusMaster::ku8MBIllegalDataAddress);
     assert_int_equal(node.readDiscreteInputs(0, 1), ModbusMaster::ku8MBIllegalFunction);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(registers_and_bits_of_arrays_are_served),
-        TEST(writes_reach_the_arrays),
-        TEST(a_sketch_sets_what_a_client_reads),
-        TEST(one_hook_refuses_a_write_and_another_is_called_after_it),
-        TEST(absent_registers_and_bits_are_refused),
-        TEST(mask_write_and_read_write_are_served_after_maskAndReadWrite),
-        TEST(a_unit_without_tables_sends_no_response),
-        TEST(each_of_several_units_serves_its_own_tables),
-        TEST(a_unit_id_above_255_is_refused),
-        TEST(a_function_of_the_sketch_is_served),
-        TEST(a_function_can_be_switched_off_and_on),
-        TEST(the_other_functions_are_served_from_their_records),
-        TEST(master_and_server_understand_each_other),
-    };
-
-    return cmocka_run_group_tests_name("ModbusServer", tests, nullptr, nullptr);
 }

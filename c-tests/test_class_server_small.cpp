@@ -14,15 +14,16 @@ static void receive(const Bytes &bytes)
         assert_int_equal(server.poll(), MBM_OK);
 }
 
-static int start(void **state)
+static void start()
 {
-    reset_board(state);
+    reset_board();
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
-    return 0;
 }
 
-static void an_object_is_little_more_than_its_frame(void **)
+fixture each_test = {start, nullptr};
+
+TEST(an_object_is_little_more_than_its_frame)
 {
     assert_true(sizeof server <=
                 MBM_FRAME_BYTES(64) + sizeof(mbm_server) + sizeof(mbm_unit) + 9 * sizeof(void *));
@@ -30,7 +31,7 @@ static void an_object_is_little_more_than_its_frame(void **)
     assert_true(sizeof(ModbusBits) == sizeof(mbm_bitTable));
 }
 
-static void transfers_of_64_registers_fit(void **)
+TEST(transfers_of_64_registers_fit)
 {
     Bytes write = raw({17, 16, 0, 0, 0, 64, 128});
     Bytes response = raw({17, 3, 128});
@@ -45,13 +46,13 @@ static void transfers_of_64_registers_fit(void **)
     assert_bytes(Serial.sent[0], sealed(response));
 }
 
-static void a_longer_response_becomes_an_exception(void **)
+TEST(a_longer_response_becomes_an_exception)
 {
     receive(adu({17, 3, 0, 0, 0, 125}));
     assert_sent(Serial, {17, 0x83, 4});
 }
 
-static void a_request_longer_than_the_buffer_is_ignored(void **)
+TEST(a_request_longer_than_the_buffer_is_ignored)
 {
     Bytes write = raw({17, 16, 0, 0, 0, 123, 246});
     write.resize(7 + 246, 0xEE);
@@ -61,18 +62,4 @@ static void a_request_longer_than_the_buffer_is_ignored(void **)
     assert_int_equal(registers[0], 1);
     receive(adu({17, 3, 0, 0, 0, 1}));
     assert_sent(Serial, {17, 3, 2, 0, 1});
-}
-
-#define SERVED(test) cmocka_unit_test_setup(test, start)
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        SERVED(an_object_is_little_more_than_its_frame),
-        SERVED(transfers_of_64_registers_fit),
-        SERVED(a_longer_response_becomes_an_exception),
-        SERVED(a_request_longer_than_the_buffer_is_ignored),
-    };
-
-    return cmocka_run_group_tests_name("ModbusServer: small buffer", tests, nullptr, nullptr);
 }

@@ -24,12 +24,13 @@ static int serves(Server &server, modbus_t *peer, int (*call)(modbus_t *))
     return result_of(peer, call, [&server] { assert_int_equal(server.poll(), MBM_OK); });
 }
 
-static int real_time(void **state)
+static void real_time()
 {
-    reset_board(state);
+    reset_board();
     board().realTime = true;
-    return 0;
 }
+
+fixture each_test = {real_time, nullptr};
 
 static uint16_t words[8];
 
@@ -81,17 +82,17 @@ template <typename Listener> static void each_function_is_served()
     AWAIT((server.poll(), server.connections() == 0));
 }
 
-static void libmodbus_reads_and_writes_over_ethernet(void **)
+TEST(libmodbus_reads_and_writes_over_ethernet)
 {
     each_function_is_served<EthernetServer>();
 }
 
-static void libmodbus_reads_and_writes_over_wifi(void **)
+TEST(libmodbus_reads_and_writes_over_wifi)
 {
     each_function_is_served<WiFiServer>();
 }
 
-static void a_library_without_accept_serves_too(void **)
+TEST(a_library_without_accept_serves_too)
 {
     each_function_is_served<OlderServer>();
 }
@@ -123,14 +124,14 @@ template <typename Listener> static void four_at_once()
     AWAIT((server.poll(), server.connections() == 0));
 }
 
-static void four_clients_are_served_at_once(void **)
+TEST(four_clients_are_served_at_once)
 {
     four_at_once<EthernetServer>();
     four_at_once<WiFiServer>();
     four_at_once<OlderServer>();
 }
 
-static void a_connection_without_a_free_place_is_closed(void **)
+TEST(a_connection_without_a_free_place_is_closed)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer, 1> server;
@@ -153,7 +154,7 @@ static void a_connection_without_a_free_place_is_closed(void **)
     close_client(third);
 }
 
-static void the_connection_that_was_idle_for_longest_is_closed_for_a_new_one(void **)
+TEST(the_connection_that_was_idle_for_longest_is_closed_for_a_new_one)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer, 2> server;
@@ -179,7 +180,7 @@ static void the_connection_that_was_idle_for_longest_is_closed_for_a_new_one(voi
     close_client(newcomer);
 }
 
-static void a_connection_with_bytes_that_are_no_modbus_is_closed(void **)
+TEST(a_connection_with_bytes_that_are_no_modbus_is_closed)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer> server;
@@ -195,7 +196,7 @@ static void a_connection_with_bytes_that_are_no_modbus_is_closed(void **)
     assert_int_equal(server.connections(), 0);
 }
 
-static void requests_reach_the_unit_they_address(void **)
+TEST(requests_reach_the_unit_they_address)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer> server;
@@ -217,7 +218,7 @@ static void requests_reach_the_unit_they_address(void **)
 static ModbusTcpServer<EthernetServer> *polled;
 static EthernetServer *again;
 
-static void a_hook_cannot_poll_or_begin_its_server(void **)
+TEST(a_hook_cannot_poll_or_begin_its_server)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer> server;
@@ -245,7 +246,7 @@ static void a_hook_cannot_poll_or_begin_its_server(void **)
     close_client(peer);
 }
 
-static void a_connection_that_takes_few_bytes_gets_the_whole_response(void **)
+TEST(a_connection_that_takes_few_bytes_gets_the_whole_response)
 {
     static const size_t few = 7;
     class NarrowServer : public SocketServer {
@@ -273,24 +274,4 @@ static void a_connection_that_takes_few_bytes_gets_the_whole_response(void **)
         100);
     assert_int_equal(all[99], 0x1234);
     close_client(peer);
-}
-
-#define REAL(test) cmocka_unit_test_setup(test, real_time)
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        REAL(libmodbus_reads_and_writes_over_ethernet),
-        REAL(libmodbus_reads_and_writes_over_wifi),
-        REAL(a_library_without_accept_serves_too),
-        REAL(four_clients_are_served_at_once),
-        REAL(a_connection_without_a_free_place_is_closed),
-        REAL(the_connection_that_was_idle_for_longest_is_closed_for_a_new_one),
-        REAL(a_connection_with_bytes_that_are_no_modbus_is_closed),
-        REAL(requests_reach_the_unit_they_address),
-        REAL(a_hook_cannot_poll_or_begin_its_server),
-        REAL(a_connection_that_takes_few_bytes_gets_the_whole_response),
-    };
-
-    return cmocka_run_group_tests_name("ModbusTcpServer", tests, nullptr, nullptr);
 }

@@ -6,10 +6,12 @@
 #define RAMEND 0x08FF /* as on an Uno */
 #include "wire.h"
 
-static void a_uart_that_the_board_lacks_falls_back_to_the_first(void **)
+fixture each_test = {reset_board, nullptr};
+
+TEST(a_uart_that_the_board_lacks_falls_back_to_the_first)
 {
     for (uint8_t port = 0; port < 5; port++) {
-        reset_board(nullptr);
+        reset_board();
         ModbusMaster node(port, 3);
         node.begin(57600);
         assert_int_equal(Serial.baud, 57600);
@@ -19,12 +21,12 @@ static void a_uart_that_the_board_lacks_falls_back_to_the_first(void **)
     }
 }
 
-static void objects_are_small(void **)
+TEST(objects_are_small)
 {
     assert_in_range(sizeof(ModbusMaster), 2 * 128, 2 * 128 + sizeof(mbm_node) + 80);
 }
 
-static void objects_may_share_the_frame_buffer(void **)
+TEST(objects_may_share_the_frame_buffer)
 {
     ModbusMaster first, second;
     first.begin(1, Serial);
@@ -51,95 +53,7 @@ static Bytes registers_of_unit_1(int count)
     return sealed(reply);
 }
 
-static void a_lenient_read_of_65_to_125_registers_delivers_64(void **)
-{
-    ModbusMaster node;
-    node.begin(1, Serial);
-    for (int quantity : {64, 65, 66, 100, 125}) {
-        node.clearResponseBuffer();
-        node.setLenient(true);
-        Serial.reply(registers_of_unit_1(quantity));
-        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)), 0);
-        assert_int_equal(node.available(), 64);
-        for (int i = 0; i < 64; i++)
-            assert_int_equal(node.getResponseBuffer(static_cast<uint8_t>(i)), i + 1);
-    }
-    node.setLenient(false);
-    Serial.reply(registers_of_unit_1(65));
-    assert_int_equal(node.readHoldingRegisters(0, 65), ModbusMaster::ku8MBBufferTooSmall);
-}
-
-static void a_lenient_object_leaves_others_that_share_its_frame_unchanged(void **)
-{
-    ModbusMaster lenient, strict;
-    lenient.begin(1, Serial);
-    strict.begin(2, Serial);
-    lenient.setLenient(true);
-    lenient.setResponseTimeout(50);
-    for (int i = 0; i < 3; i++) {
-        Serial.reply(adu({1, 3, 4, 0, 7, 0, i}));
-        assert_int_equal(lenient.readHoldingRegisters(0, 1), 0);
-        assert_int_equal(lenient.getResponseBuffer(1), i);
-        Serial.reply(adu({2, 3, 2, 0x55, 0x55}));
-        assert_int_equal(strict.readHoldingRegisters(0, 1), 0);
-        assert_int_equal(strict.getResponseBuffer(0), 0x5555);
-    }
-}
-
-static void a_request_is_refused_while_another_object_uses_the_frame(void **)
-{
-    ModbusMaster first, second;
-    first.begin(1, Serial);
-    second.begin(2, Serial);
-    first.setBlocking(false);
-    Serial.reply(adu({1, 3, 2, 0, 7}));
-    assert_int_equal(first.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
-    assert_int_equal(second.readHoldingRegisters(0, 1), ModbusMaster::ku8MBBusy);
-    assert_int_equal(second.requestFrom(0, 1), 0);
-    assert_int_equal(second.status(), 0);
-    while (first.poll() == ModbusMaster::ku8MBPending)
-        board().now += 100;
-    assert_int_equal(first.status(), 0);
-    assert_int_equal(first.getResponseBuffer(0), 7);
-    Serial.reply(adu({2, 3, 2, 0, 8}));
-    assert_int_equal(second.readHoldingRegisters(0, 1), 0);
-    assert_int_equal(second.getResponseBuffer(0), 8);
-}
-
-static ModbusMaster *other;
-static uint8_t answers[3];
-
-static void a_request_from_a_callback_of_another_object_is_refused(void **)
-{
-    ModbusMaster first, second;
-    first.begin(1, Serial);
-    second.begin(2, Serial);
-    other = &second;
-    first.preTransmission([] { answers[0] = other->readHoldingRegisters(0, 1); });
-    first.postTransmission([] { answers[1] = other->readHoldingRegisters(0, 1); });
-    first.idle([] { answers[2] = other->readHoldingRegisters(0, 1); });
-    Serial.reply(adu({1, 3, 2, 0, 7}));
-    assert_int_equal(first.readHoldingRegisters(0, 1), 0);
-    assert_int_equal(first.getResponseBuffer(0), 7);
-    for (uint8_t answer : answers)
-        assert_int_equal(answer, ModbusMaster::ku8MBBusy);
-}
-
-static void a_destroyed_object_frees_the_shared_frame(void **)
-{
-    ModbusMaster second;
-    second.begin(2, Serial);
-    {
-        ModbusMaster first;
-        first.begin(1, Serial);
-        first.setBlocking(false);
-        assert_int_equal(first.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
-    }
-    Serial.reply(adu({2, 3, 2, 0, 8}));
-    assert_int_equal(second.readHoldingRegisters(0, 1), 0);
-}
-
-static void the_buffer_ends_after_64_words(void **)
+TEST(the_buffer_ends_after_64_words)
 {
     ModbusMaster node;
     assert_int_equal(node.getResponseBuffer(63), 0);
@@ -148,7 +62,7 @@ static void the_buffer_ends_after_64_words(void **)
     assert_int_equal(node.setTransmitBuffer(64, 0), 2);
 }
 
-static void transfers_of_64_registers_fit(void **)
+TEST(transfers_of_64_registers_fit)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -166,7 +80,7 @@ static void transfers_of_64_registers_fit(void **)
 }
 
 /* With the least frame that each function has. */
-static void a_late_reply_fits_beside_the_right_one(void **)
+TEST(a_late_reply_fits_beside_the_right_one)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -188,7 +102,7 @@ static void a_late_reply_fits_beside_the_right_one(void **)
 
 /* The first reply after a timeout is held. A frame of another unit follows it, which is as long as
  * a reply, or short if two replies do not fit into the longest frame. */
-static void a_held_reply_stays_beside_a_frame_of_another_unit(void **)
+TEST(a_held_reply_stays_beside_a_frame_of_another_unit)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -213,7 +127,7 @@ static void a_held_reply_stays_beside_a_frame_of_another_unit(void **)
     }
 }
 
-static void noise_longer_than_the_frame_is_skipped(void **)
+TEST(noise_longer_than_the_frame_is_skipped)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -227,7 +141,7 @@ static void noise_longer_than_the_frame_is_skipped(void **)
     }
 }
 
-static void every_function_has_a_frame_that_suffices(void **)
+TEST(every_function_has_a_frame_that_suffices)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -267,6 +181,126 @@ static void every_function_has_a_frame_that_suffices(void **)
     assert_int_equal(node.receive(), 9);
 }
 
+TEST(reads_of_65_registers_are_sent)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(300);
+    for (int quantity : {65, 66, 125}) {
+        Serial.reply(adu({1, 0x83, 2}));
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)), 2);
+        assert_sent(Serial, {1, 3, 0, 0, 0, quantity});
+
+        Bytes reply = raw({1, 3, quantity * 2});
+        reply.resize(3 + static_cast<size_t>(quantity) * 2, 0xEE);
+        Serial.reply(sealed(reply));
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)),
+                         ModbusMaster::ku8MBBufferTooSmall);
+        assert_int_equal(node.getResponseBuffer(0), 0);
+        Serial.sent.clear();
+    }
+}
+
+TEST(writes_of_more_than_the_buffer_send_nothing)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    assert_int_equal(node.writeMultipleRegisters(0, 65), 3);
+    assert_int_equal(node.writeMultipleCoils(0, 64 * 16 + 1), 3);
+    assert_int_equal(node.readWriteMultipleRegisters(0, 1, 0, 65), 3);
+    assert_int_equal(Serial.sent.size(), 0);
+}
+
+/* Until here the frame lies on the stack. The next test keeps it for all later ones. */
+
+TEST(a_lenient_read_of_65_to_125_registers_delivers_64)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    for (int quantity : {64, 65, 66, 100, 125}) {
+        node.clearResponseBuffer();
+        node.setLenient(true);
+        Serial.reply(registers_of_unit_1(quantity));
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)), 0);
+        assert_int_equal(node.available(), 64);
+        for (int i = 0; i < 64; i++)
+            assert_int_equal(node.getResponseBuffer(static_cast<uint8_t>(i)), i + 1);
+    }
+    node.setLenient(false);
+    Serial.reply(registers_of_unit_1(65));
+    assert_int_equal(node.readHoldingRegisters(0, 65), ModbusMaster::ku8MBBufferTooSmall);
+}
+
+TEST(a_lenient_object_leaves_others_that_share_its_frame_unchanged)
+{
+    ModbusMaster lenient, strict;
+    lenient.begin(1, Serial);
+    strict.begin(2, Serial);
+    lenient.setLenient(true);
+    lenient.setResponseTimeout(50);
+    for (int i = 0; i < 3; i++) {
+        Serial.reply(adu({1, 3, 4, 0, 7, 0, i}));
+        assert_int_equal(lenient.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(lenient.getResponseBuffer(1), i);
+        Serial.reply(adu({2, 3, 2, 0x55, 0x55}));
+        assert_int_equal(strict.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(strict.getResponseBuffer(0), 0x5555);
+    }
+}
+
+TEST(a_request_is_refused_while_another_object_uses_the_frame)
+{
+    ModbusMaster first, second;
+    first.begin(1, Serial);
+    second.begin(2, Serial);
+    first.setBlocking(false);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(first.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    assert_int_equal(second.readHoldingRegisters(0, 1), ModbusMaster::ku8MBBusy);
+    assert_int_equal(second.requestFrom(0, 1), 0);
+    assert_int_equal(second.status(), 0);
+    while (first.poll() == ModbusMaster::ku8MBPending)
+        board().now += 100;
+    assert_int_equal(first.status(), 0);
+    assert_int_equal(first.getResponseBuffer(0), 7);
+    Serial.reply(adu({2, 3, 2, 0, 8}));
+    assert_int_equal(second.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(second.getResponseBuffer(0), 8);
+}
+
+static ModbusMaster *other;
+static uint8_t answers[3];
+
+TEST(a_request_from_a_callback_of_another_object_is_refused)
+{
+    ModbusMaster first, second;
+    first.begin(1, Serial);
+    second.begin(2, Serial);
+    other = &second;
+    first.preTransmission([] { answers[0] = other->readHoldingRegisters(0, 1); });
+    first.postTransmission([] { answers[1] = other->readHoldingRegisters(0, 1); });
+    first.idle([] { answers[2] = other->readHoldingRegisters(0, 1); });
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(first.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(first.getResponseBuffer(0), 7);
+    for (uint8_t answer : answers)
+        assert_int_equal(answer, ModbusMaster::ku8MBBusy);
+}
+
+TEST(a_destroyed_object_frees_the_shared_frame)
+{
+    ModbusMaster second;
+    second.begin(2, Serial);
+    {
+        ModbusMaster first;
+        first.begin(1, Serial);
+        first.setBlocking(false);
+        assert_int_equal(first.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    }
+    Serial.reply(adu({2, 3, 2, 0, 8}));
+    assert_int_equal(second.readHoldingRegisters(0, 1), 0);
+}
+
 /* Overwrites the stack that other functions have used. */
 static void use_the_stack()
 {
@@ -275,7 +309,7 @@ static void use_the_stack()
         byte = 0x5A;
 }
 
-static void a_request_that_outlives_its_function_keeps_its_frame(void **)
+TEST(a_request_that_outlives_its_function_keeps_its_frame)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -301,7 +335,7 @@ static void a_request_that_outlives_its_function_keeps_its_frame(void **)
 
 static ModbusMaster *own;
 
-static void an_idle_callback_may_cancel_and_make_another_request(void **)
+TEST(an_idle_callback_may_cancel_and_make_another_request)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -317,62 +351,4 @@ static void an_idle_callback_may_cancel_and_make_another_request(void **)
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
     assert_int_equal(answers[0], 0);
     assert_int_equal(node.getResponseBuffer(1), 8);
-}
-
-static void reads_of_65_registers_are_sent(void **)
-{
-    ModbusMaster node;
-    node.begin(1, Serial);
-    node.setResponseTimeout(300);
-    for (int quantity : {65, 66, 125}) {
-        Serial.reply(adu({1, 0x83, 2}));
-        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)), 2);
-        assert_sent(Serial, {1, 3, 0, 0, 0, quantity});
-
-        Bytes reply = raw({1, 3, quantity * 2});
-        reply.resize(3 + static_cast<size_t>(quantity) * 2, 0xEE);
-        Serial.reply(sealed(reply));
-        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)),
-                         ModbusMaster::ku8MBBufferTooSmall);
-        assert_int_equal(node.getResponseBuffer(0), 0);
-        Serial.sent.clear();
-    }
-}
-
-static void writes_of_more_than_the_buffer_send_nothing(void **)
-{
-    ModbusMaster node;
-    node.begin(1, Serial);
-    assert_int_equal(node.writeMultipleRegisters(0, 65), 3);
-    assert_int_equal(node.writeMultipleCoils(0, 64 * 16 + 1), 3);
-    assert_int_equal(node.readWriteMultipleRegisters(0, 1, 0, 65), 3);
-    assert_int_equal(Serial.sent.size(), 0);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        /* The frame lies on the stack, until a test keeps it for all later ones. */
-        TEST(a_uart_that_the_board_lacks_falls_back_to_the_first),
-        TEST(objects_are_small),
-        TEST(objects_may_share_the_frame_buffer),
-        TEST(the_buffer_ends_after_64_words),
-        TEST(transfers_of_64_registers_fit),
-        TEST(a_late_reply_fits_beside_the_right_one),
-        TEST(a_held_reply_stays_beside_a_frame_of_another_unit),
-        TEST(noise_longer_than_the_frame_is_skipped),
-        TEST(every_function_has_a_frame_that_suffices),
-        TEST(reads_of_65_registers_are_sent),
-        TEST(writes_of_more_than_the_buffer_send_nothing),
-        /* From here on it is kept. */
-        TEST(a_lenient_read_of_65_to_125_registers_delivers_64),
-        TEST(a_lenient_object_leaves_others_that_share_its_frame_unchanged),
-        TEST(a_request_is_refused_while_another_object_uses_the_frame),
-        TEST(a_request_from_a_callback_of_another_object_is_refused),
-        TEST(a_destroyed_object_frees_the_shared_frame),
-        TEST(a_request_that_outlives_its_function_keeps_its_frame),
-        TEST(an_idle_callback_may_cancel_and_make_another_request),
-    };
-
-    return cmocka_run_group_tests_name("ModbusMaster on a small board", tests, nullptr, nullptr);
 }

@@ -5,6 +5,8 @@
 
 #include <string.h>
 
+fixture each_test = {reset_board, nullptr};
+
 /* Collects the printed text. */
 class Paper : public Print {
 public:
@@ -53,7 +55,7 @@ struct Listening {
     }
 };
 
-static void requests_and_replies_are_printed(void **)
+TEST(requests_and_replies_are_printed)
 {
     Listening l;
     ModbusSniffer &sniffer = l.sniffer;
@@ -72,7 +74,7 @@ static void requests_and_replies_are_printed(void **)
     assert_int_equal(reply.find("unit 17 reply 01 read coils 19..22: 1 0 1 1 ("), 0);
 }
 
-static void writes_are_printed_with_their_values(void **)
+TEST(writes_are_printed_with_their_values)
 {
     Listening l;
     ModbusSniffer &sniffer = l.sniffer;
@@ -89,7 +91,7 @@ static void writes_are_printed_with_their_values(void **)
     PRINTS("unit 2 request 08 diagnostics: A5 37", adu({2, 8, 0, 0, 0xA5, 0x37}));
 }
 
-static void exceptions_and_silent_units_are_printed(void **)
+TEST(exceptions_and_silent_units_are_printed)
 {
     Listening l;
     ModbusSniffer &sniffer = l.sniffer;
@@ -108,7 +110,7 @@ static void exceptions_and_silent_units_are_printed(void **)
         strstr(paper.text.c_str(), " ms unit 17 no reply 06 write single register 1 (200 ms)\r\n"));
 }
 
-static void damaged_frames_and_noise_are_printed_as_bytes(void **)
+TEST(damaged_frames_and_noise_are_printed_as_bytes)
 {
     Listening l;
     ModbusSniffer &sniffer = l.sniffer;
@@ -130,7 +132,7 @@ static void count_replies(const mbm_event &event)
     replies += event.kind == MBM_EVENT_REPLY;
 }
 
-static void a_callback_gets_each_event(void **)
+TEST(a_callback_gets_each_event)
 {
     ModbusSniffer sniffer;
     Paper paper;
@@ -158,7 +160,7 @@ static void a_callback_gets_each_event(void **)
     assert_int_equal(events, 2);
 }
 
-static void ascii_frames_are_printed_too(void **)
+TEST(ascii_frames_are_printed_too)
 {
     ModbusSniffer sniffer;
     Paper paper;
@@ -169,26 +171,11 @@ static void ascii_frames_are_printed_too(void **)
            Bytes(request, request + sizeof request - 1));
 }
 
-static void nothing_is_ever_sent(void **)
+TEST(nothing_is_ever_sent)
 {
     Listening l;
     prints(l.sniffer, l.paper, adu({17, 3, 0, 107, 0, 1}));
     Serial.flush();
     assert_int_equal(Serial.sent.size(), 1);
     assert_int_equal(Serial.sent[0].size(), 0);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(requests_and_replies_are_printed),
-        TEST(writes_are_printed_with_their_values),
-        TEST(exceptions_and_silent_units_are_printed),
-        TEST(damaged_frames_and_noise_are_printed_as_bytes),
-        TEST(a_callback_gets_each_event),
-        TEST(ascii_frames_are_printed_too),
-        TEST(nothing_is_ever_sent),
-    };
-
-    return cmocka_run_group_tests_name("ModbusSniffer", tests, nullptr, nullptr);
 }

@@ -50,7 +50,7 @@ static unsigned set_rate(Registers &r, unsigned long rate, bool doubles)
     return divider * cycles;
 }
 
-static void the_silence_is_at_least_t3_5_and_at_most_4_percent_more(void **)
+TEST(the_silence_is_at_least_t3_5_and_at_most_4_percent_more)
 {
     Registers r = {0, 0, 0};
     const Uart uart(r);
@@ -67,7 +67,7 @@ static void the_silence_is_at_least_t3_5_and_at_most_4_percent_more(void **)
     assert_in_range(ModbusMasterUart<Uart>::silenceOf(uart) * 4u, 128333, 133500);
 }
 
-static void above_19200_baud_the_silence_is_1750_us(void **)
+TEST(above_19200_baud_the_silence_is_1750_us)
 {
     Registers r = {0, 0, 0};
     const Uart uart(r);
@@ -80,7 +80,7 @@ static void above_19200_baud_the_silence_is_1750_us(void **)
     }
 }
 
-static void the_silence_of_the_slowest_divider_does_not_overflow(void **)
+TEST(the_silence_of_the_slowest_divider_does_not_overflow)
 {
     Registers r = {0x0F, 0xFF, 0};
     const Uart uart(r);
@@ -88,23 +88,11 @@ static void the_silence_of_the_slowest_divider_does_not_overflow(void **)
     assert_in_range(ModbusMasterUart<Uart>::silenceOf(uart) * 4u, 157000, 164000);
 }
 
-static void a_core_that_hides_its_registers_gets_the_default_silence(void **)
+TEST(a_core_that_hides_its_registers_gets_the_default_silence)
 {
     Registers r = {0, 16, DOUBLES};
     const OtherUart uart(r);
 
     assert_false(uart.isSlow());
     assert_int_equal(ModbusMasterUart<OtherUart>::silenceOf(uart) * 4u, 4000);
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_silence_is_at_least_t3_5_and_at_most_4_percent_more),
-        cmocka_unit_test(above_19200_baud_the_silence_is_1750_us),
-        cmocka_unit_test(the_silence_of_the_slowest_divider_does_not_overflow),
-        cmocka_unit_test(a_core_that_hides_its_registers_gets_the_default_silence),
-    };
-
-    return cmocka_run_group_tests_name("ModbusMaster on a UART of an AVR", tests, nullptr, nullptr);
 }

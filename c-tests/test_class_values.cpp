@@ -5,6 +5,8 @@
 #include <string.h>
 #include <type_traits>
 
+fixture each_test = {reset_board, nullptr};
+
 static_assert(std::is_empty<ModbusMasterValues<ModbusMaster>>::value, "no byte more an object");
 
 /* Lets the node read words with these bytes. */
@@ -34,7 +36,7 @@ static void assert_writes(ModbusMaster &node, std::initializer_list<int> bytes)
 static const ModbusMaster::WordOrder orders[] = {ModbusMaster::orderABCD, ModbusMaster::orderCDAB,
                                                  ModbusMaster::orderBADC, ModbusMaster::orderDCBA};
 
-static void a_float_is_read_high_word_first(void **)
+TEST(a_float_is_read_high_word_first)
 {
     ModbusMaster node;
     read(node, {0, 7, 0x43, 0x66, 0x80, 0x00});
@@ -44,7 +46,7 @@ static void a_float_is_read_high_word_first(void **)
     assert_true(value == 230.5f);
 }
 
-static void the_order_is_set_for_all_calls_or_named_by_one(void **)
+TEST(the_order_is_set_for_all_calls_or_named_by_one)
 {
     ModbusMaster node;
     read(node, {0xAE, 0x41, 0x56, 0x52, 0x56, 0x52, 0xAE, 0x41, 0x41, 0xAE, 0x52, 0x56, 0x52, 0x56,
@@ -63,7 +65,7 @@ static void the_order_is_set_for_all_calls_or_named_by_one(void **)
     assert_int_equal(copy.getResponseUInt32(6), 2923517522u);
 }
 
-static void each_type_is_read(void **)
+TEST(each_type_is_read)
 {
     ModbusMaster node;
     read(node, {0x40, 0x09, 0x21, 0xFB, 0x54, 0x44, 0x2D, 0x18, 0xFF, 0xFE});
@@ -87,7 +89,7 @@ static void each_type_is_read(void **)
     assert_true(node.getResponseInt32(3, two) && two == 0x2D18FFFE);
 }
 
-static void a_value_past_the_end_is_an_error_and_not_invented(void **)
+TEST(a_value_past_the_end_is_an_error_and_not_invented)
 {
     ModbusMaster node; // its response buffer has 125 words
     float value = 7;
@@ -111,7 +113,7 @@ static void a_value_past_the_end_is_an_error_and_not_invented(void **)
     assert_false(node.getResponseBit(65535));
 }
 
-static void each_type_is_written(void **)
+TEST(each_type_is_written)
 {
     ModbusMaster node;
     assert_int_equal(node.setTransmitFloat(0, 230.5f), 0);
@@ -130,7 +132,7 @@ static void each_type_is_written(void **)
                          3, 4, 1, 2, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFE});
 }
 
-static void values_past_the_transmit_words_are_refused_with_02(void **)
+TEST(values_past_the_transmit_words_are_refused_with_02)
 {
     ModbusMaster node; // its transmit buffer has 123 words
     assert_int_equal(node.setTransmitFloat(121, 1), 0);
@@ -142,7 +144,7 @@ static void values_past_the_transmit_words_are_refused_with_02(void **)
     assert_int_equal(node.setTransmitString(0, 3, "ABCD"), ModbusMaster::ku8MBBufferTooSmall);
 }
 
-static void texts_are_read_and_written(void **)
+TEST(texts_are_read_and_written)
 {
     ModbusMaster node;
     char text[9] = "old";
@@ -158,7 +160,7 @@ static void texts_are_read_and_written(void **)
     assert_writes(node, {'A', 'B', '3', 0, 0, 0});
 }
 
-static void coils_are_read_and_written_one_by_one(void **)
+TEST(coils_are_read_and_written_one_by_one)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -175,20 +177,4 @@ static void coils_are_read_and_written_one_by_one(void **)
     Serial.reply(adu({1, 15, 0, 19, 0, 19}));
     assert_int_equal(node.writeMultipleCoils(19, 19), 0);
     assert_sent(Serial, {1, 15, 0, 19, 0, 19, 3, 0xCD, 0x6B, 0x05});
-}
-
-int main()
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_float_is_read_high_word_first),
-        TEST(the_order_is_set_for_all_calls_or_named_by_one),
-        TEST(each_type_is_read),
-        TEST(a_value_past_the_end_is_an_error_and_not_invented),
-        TEST(each_type_is_written),
-        TEST(values_past_the_transmit_words_are_refused_with_02),
-        TEST(texts_are_read_and_written),
-        TEST(coils_are_read_and_written_one_by_one),
-    };
-
-    return cmocka_run_group_tests_name("ModbusMaster: values", tests, nullptr, nullptr);
 }

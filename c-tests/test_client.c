@@ -87,11 +87,10 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     assert_int_equal(r.length, 0);
 }
 
-static void every_function_over_a_pty(void **state)
+TEST(every_function_over_a_pty)
 {
     server s;
 
-    (void)state;
     server_start(&s, UNIT);
     asker_begin_rtu(&a, s.line.ours);
     every_function_of_libmodbus(s.mapping);
@@ -99,11 +98,10 @@ static void every_function_over_a_pty(void **state)
     server_stop(&s);
 }
 
-static void every_function_over_tcp(void **state)
+TEST(every_function_over_tcp)
 {
     tcp_server s;
 
-    (void)state;
     tcp_server_start(&s);
     asker_begin_tcp(&a, s.port);
     every_function_of_libmodbus(s.mapping);
@@ -111,14 +109,13 @@ static void every_function_over_tcp(void **state)
     tcp_server_stop(&s);
 }
 
-static void sixteen_requests_are_pipelined(void **state)
+TEST(sixteen_requests_are_pipelined)
 {
     mbm_clientRequest requests[MBM_CLIENT_DEPTH + 1];
     uint16_t words[MBM_CLIENT_DEPTH][10];
     tcp_server s;
     unsigned i, round;
 
-    (void)state;
     tcp_server_start(&s);
     asker_begin_tcp(&a, s.port);
     OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
@@ -142,13 +139,12 @@ static void sixteen_requests_are_pipelined(void **state)
     tcp_server_stop(&s);
 }
 
-static void a_lost_connection_is_reported_and_made_anew(void **state)
+TEST(a_lost_connection_is_reported_and_made_anew)
 {
     mbm_clientRequest r = asker_request(UNIT, NULL, 0, NULL);
     mbm_clientRequest waiting = asker_request(UNIT, NULL, 0, NULL);
     tcp_server s;
 
-    (void)state;
     tcp_server_start(&s);
     asker_begin_tcp(&a, s.port);
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
@@ -181,12 +177,11 @@ static void queue_again(void *context, mbm_clientRequest *request)
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, request, 0, 1));
 }
 
-static void a_callback_may_queue_and_may_not_poll(void **state)
+TEST(a_callback_may_queue_and_may_not_poll)
 {
     mbm_clientRequest r = asker_request(UNIT, NULL, 0, NULL);
     tcp_server s;
 
-    (void)state;
     tcp_server_start(&s);
     asker_begin_tcp(&a, s.port);
     called = 0;
@@ -201,7 +196,7 @@ static void a_callback_may_queue_and_may_not_poll(void **state)
     tcp_server_stop(&s);
 }
 
-static void the_master_uses_the_line_between_the_clients_requests(void **state)
+TEST(the_master_uses_the_line_between_the_clients_requests)
 {
     uint16_t words[4], more[4], none[1];
     uint8_t frame[64];
@@ -210,7 +205,6 @@ static void the_master_uses_the_line_between_the_clients_requests(void **state)
     mbm_clientRequest r = asker_request(UNIT, words, sizeof words, NULL);
     server s;
 
-    (void)state;
     server_start(&s, UNIT);
     asker_begin_rtu(&a, s.line.ours);
     OK(mbm_line_setFrame(&line, frame, sizeof frame));
@@ -240,13 +234,12 @@ static void the_master_uses_the_line_between_the_clients_requests(void **state)
     server_stop(&s);
 }
 
-static void a_master_gets_no_line_that_carries_other_frames(void **state)
+TEST(a_master_gets_no_line_that_carries_other_frames)
 {
     static mbm_client tcp, ascii;
     static mbm_line line;
     pty wire;
 
-    (void)state;
     pty_open(&wire);
     memset(&a, 0, sizeof a);
     assert_int_equal(mbm_tty_attach(&a.tty, wire.ours), 0);
@@ -262,7 +255,7 @@ static void a_master_gets_no_line_that_carries_other_frames(void **state)
     pty_close(&wire);
 }
 
-static void bad_calls_are_refused_with_a_status(void **state)
+TEST(bad_calls_are_refused_with_a_status)
 {
     static mbm_client fresh;
     uint16_t words[2];
@@ -271,7 +264,6 @@ static void bad_calls_are_refused_with_a_status(void **state)
     mbm_client *c = &a.client;
     server s;
 
-    (void)state;
     server_start(&s, UNIT);
     asker_begin_rtu(&a, s.line.ours);
     IS(MBM_INVALID_ARGUMENT, mbm_client_poll(NULL));
@@ -316,14 +308,13 @@ static void bad_calls_are_refused_with_a_status(void **state)
     server_stop(&s);
 }
 
-static void a_broadcast_arrives_and_the_delay_after_it_is_kept(void **state)
+TEST(a_broadcast_arrives_and_the_delay_after_it_is_kept)
 {
     mbm_clientUnit units[1] = {{0}};
     mbm_clientRequest r = asker_request(0, NULL, 0, NULL);
     uint32_t begun;
     server s;
 
-    (void)state;
     server_start(&s, UNIT);
     asker_begin_rtu(&a, s.line.ours);
     ends(MBM_OK, &r, mbm_client_writeSingleRegister(&a.client, &r, 5, 0x5A5A));
@@ -339,21 +330,4 @@ static void a_broadcast_arrives_and_the_delay_after_it_is_kept(void **state)
     assert_int_equal(units[0].requests, 2);
     assert_int_equal(units[0].replies, 2);
     server_stop(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_function_over_a_pty),
-        cmocka_unit_test(every_function_over_tcp),
-        cmocka_unit_test(sixteen_requests_are_pipelined),
-        cmocka_unit_test(a_lost_connection_is_reported_and_made_anew),
-        cmocka_unit_test(a_callback_may_queue_and_may_not_poll),
-        cmocka_unit_test(the_master_uses_the_line_between_the_clients_requests),
-        cmocka_unit_test(a_master_gets_no_line_that_carries_other_frames),
-        cmocka_unit_test(bad_calls_are_refused_with_a_status),
-        cmocka_unit_test(a_broadcast_arrives_and_the_delay_after_it_is_kept),
-    };
-
-    return cmocka_run_group_tests_name("client", tests, NULL, NULL);
 }

@@ -325,12 +325,11 @@ static void all_end(void)
     }
 }
 
-static void every_request_ends_once_whatever_is_called(void **state)
+TEST(every_request_ends_once_whatever_is_called)
 {
     const char *fewer = getenv("MBM_TRANSACTIONS");
     unsigned seeds = fewer ? 40 : SEEDS, seed, i, pending;
 
-    (void)state;
     for (seed = 0; seed < seeds; seed++) {
         random_state = seed * 0x9E3779B97F4A7C15u + 1;
         begin(seed);
@@ -345,13 +344,4 @@ static void every_request_ends_once_whatever_is_called(void **state)
     }
     printf("%u clients, %lu requests ended\n", seeds, ended);
     assert_true(ended > seeds);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_request_ends_once_whatever_is_called),
-    };
-
-    return cmocka_run_group_tests_name("client under any calls", tests, NULL, NULL);
 }

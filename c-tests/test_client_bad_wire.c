@@ -60,13 +60,12 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     return first;
 }
 
-static void no_row_of_the_fault_table_is_worse_for_the_client(void **state)
+TEST(no_row_of_the_fault_table_is_worse_for_the_client)
 {
     char plain[FAULT_TRANSACTIONS + 1], retried[FAULT_TRANSACTIONS + 1];
     int worse = 0;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < fault_count; i++) {
         const fault *f = &faults[i];
         uint8_t status = outcome(f, 0, plain);
@@ -75,13 +74,4 @@ static void no_row_of_the_fault_table_is_worse_for_the_client(void **state)
         worse += fault_report(f, plain, retried, status);
     }
     assert_int_equal(worse, 0);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_row_of_the_fault_table_is_worse_for_the_client),
-    };
-
-    return cmocka_run_group_tests_name("client on a bad wire", tests, NULL, NULL);
 }

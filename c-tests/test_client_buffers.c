@@ -128,12 +128,11 @@ static void queue_request(line *l, mbm_clientRequest *request)
     }
 }
 
-static void no_byte_outside_of_the_buffers_is_touched(void **state)
+TEST(no_byte_outside_of_the_buffers_is_touched)
 {
     static line l;
     unsigned round, step, i;
 
-    (void)state;
     random_state = 7;
     for (round = 0; round < ROUNDS; round++) {
         begin(&l, round % 4);
@@ -217,35 +216,23 @@ static void zero_while_sent(line *l)
     memset(&l->requests[0], 0, sizeof l->requests[0]);
 }
 
-static void a_request_zeroed_while_it_is_sent_is_cancelled_with_the_driver_off(void **state)
+TEST(a_request_zeroed_while_it_is_sent_is_cancelled_with_the_driver_off)
 {
     static line l;
 
-    (void)state;
     zero_while_sent(&l);
     OK(mbm_client_cancel(&l.client, &l.requests[0]));
     assert_int_equal(driver, 0);
     assert_int_equal(mbm_client_pending(&l.client), 0);
 }
 
-static void a_request_zeroed_while_it_is_sent_is_lost_with_its_link(void **state)
+TEST(a_request_zeroed_while_it_is_sent_is_lost_with_its_link)
 {
     static line l;
 
-    (void)state;
     zero_while_sent(&l);
     OK(mbm_client_reconnect(&l.client, NULL));
     assert_int_equal(driver, 0);
     OK(mbm_client_poll(&l.client));
     assert_int_equal(l.requests[0].status, MBM_LINK_LOST);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_byte_outside_of_the_buffers_is_touched),
-        cmocka_unit_test(a_request_zeroed_while_it_is_sent_is_cancelled_with_the_driver_off),
-        cmocka_unit_test(a_request_zeroed_while_it_is_sent_is_lost_with_its_link),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -40,11 +40,10 @@ static uint32_t any(void *context)
     return random_state >> 8;
 }
 
-static int begin(void **state)
+static void begin(void)
 {
     unsigned i, word;
 
-    (void)state;
     bus_start(&line);
     memset(servers, 0, sizeof servers);
     memset(units, 0, sizeof units);
@@ -74,8 +73,9 @@ static int begin(void **state)
         OK(mbm_client_setQuietTime(&a->client, 20));
         OK(mbm_client_setCounters(&a->client, &a->counters));
     }
-    return 0;
 }
+
+fixture each_test = {begin, NULL};
 
 static void pass(void)
 {
@@ -124,11 +124,10 @@ static void queue_reads(asker *a, unsigned first, unsigned count, unsigned reque
     }
 }
 
-static void clients_that_take_turns_are_answered_by_every_server(void **state)
+TEST(clients_that_take_turns_are_answered_by_every_server)
 {
     unsigned round, i;
 
-    (void)state;
     for (round = 0; round < ROUNDS; round++) {
         asker *a = &askers[round % CLIENTS];
 
@@ -145,13 +144,12 @@ static void clients_that_take_turns_are_answered_by_every_server(void **state)
     }
 }
 
-static void a_broadcast_reaches_every_server_at_once(void **state)
+TEST(a_broadcast_reaches_every_server_at_once)
 {
     static const uint16_t words[] = {0xBEEF, 0xCAFE};
     mbm_clientRequest r = {.unit = 0, .data = words};
     unsigned i;
 
-    (void)state;
     IS(MBM_PENDING, mbm_client_writeMultipleRegisters(&askers[0].client, &r, 97, 2));
     while (mbm_client_poll(&askers[0].client) == MBM_PENDING)
         pass();
@@ -161,12 +159,11 @@ static void a_broadcast_reaches_every_server_at_once(void **state)
     assert_int_equal(line.collisions, 0);
 }
 
-static void clients_that_collide_get_no_wrong_data(void **state)
+TEST(clients_that_collide_get_no_wrong_data)
 {
     unsigned asked[CLIENTS] = {0}, i;
     uint64_t due[CLIENTS] = {0};
 
-    (void)state;
     for (i = 0; i < CLIENTS; i++) {
         OK(mbm_client_setRetries(&askers[i].client, 10));
         OK(mbm_client_setBackoff(&askers[i].client, MBM_BACKOFF_EXPONENTIAL, 40, 1000));
@@ -194,15 +191,4 @@ static void clients_that_collide_get_no_wrong_data(void **state)
     assert_int_equal(wrong + doubled, 0);
     assert_int_equal(asked[0] + asked[1], right + failed);
     assert_true(right > failed * 20);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(clients_that_take_turns_are_answered_by_every_server, begin),
-        cmocka_unit_test_setup(a_broadcast_reaches_every_server_at_once, begin),
-        cmocka_unit_test_setup(clients_that_collide_get_no_wrong_data, begin),
-    };
-
-    return cmocka_run_group_tests_name("clients and servers on one bus", tests, NULL, NULL);
 }

@@ -256,7 +256,7 @@ static void queue_job(job *j)
        mbm_client_readHoldingRegisters(&a.client, &j->request, j->request.transaction, QUANTITY));
 }
 
-static void every_request_ends_once_and_with_its_own_data(void **state)
+TEST(every_request_ends_once_and_with_its_own_data)
 {
     const char *fewer = getenv("MBM_TRANSACTIONS");
     static device d;
@@ -264,7 +264,6 @@ static void every_request_ends_once_and_with_its_own_data(void **state)
     uint16_t port;
     unsigned i;
 
-    (void)state;
     total = fewer ? strtoul(fewer, NULL, 10) : 200000;
     d.listener = tcp_listen(&port);
     d.peer = -1;
@@ -302,13 +301,4 @@ static void every_request_ends_once_and_with_its_own_data(void **state)
     pthread_join(d.thread, NULL);
     mbm_tcp_close(&a.tcp);
     close(d.listener);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_request_ends_once_and_with_its_own_data),
-    };
-
-    return cmocka_run_group_tests_name("client over a bad TCP stream", tests, NULL, NULL);
 }

@@ -106,11 +106,10 @@ static uint8_t exchange_once(int framing, const exchange *e, const uint8_t *resp
     return memory_port_run(&m, &client, &request, 1000);
 }
 
-static void every_function_and_its_response_are_forwarded_unchanged(void **state)
+TEST(every_function_and_its_response_are_forwarded_unchanged)
 {
     unsigned i, k;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (k = 0; k < COUNT(exchanges); k++) {
             const exchange *e = &exchanges[k];
@@ -127,7 +126,7 @@ static void every_function_and_its_response_are_forwarded_unchanged(void **state
 }
 
 /* The bytes of these responses are fixed by the request: each changed byte must be noticed. */
-static void a_response_whose_repeated_bytes_differ_is_not_accepted(void **state)
+TEST(a_response_whose_repeated_bytes_differ_is_not_accepted)
 {
     static const struct {
         uint8_t function, first, last;
@@ -136,7 +135,6 @@ static void a_response_whose_repeated_bytes_differ_is_not_accepted(void **state)
                     {0x16, 1, 6}, {0x17, 1, 1}, {0x2B, 1, 2}};
     unsigned i, k, r, at;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (k = 0; k < COUNT(exchanges) - 2; k++)
             for (r = 0; r < COUNT(repeated); r++) {
@@ -155,11 +153,10 @@ static void a_response_whose_repeated_bytes_differ_is_not_accepted(void **state)
             }
 }
 
-static void force_listen_only_mode_ends_without_a_response(void **state)
+TEST(force_listen_only_mode_ends_without_a_response)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         IS(MBM_PENDING, forward("\x08\x00\x04\x00\x00", 5));
@@ -168,12 +165,11 @@ static void force_listen_only_mode_ends_without_a_response(void **state)
     }
 }
 
-static void a_request_that_is_not_forwarded_is_not_queued(void **state)
+TEST(a_request_that_is_not_forwarded_is_not_queued)
 {
     static const uint8_t body[253] = {0};
     const void *before = &body[9];
 
-    (void)state;
     begin(MBM_FRAMING_RTU);
     request.data = before;
     IS(MBM_ILLEGAL_DATA_VALUE, forward("\x03\x00\x00\x00\x00", 5));
@@ -226,12 +222,11 @@ static void is_sent_as_built(int framing, const mbm_packet *packet, const uint8_
     }
 }
 
-static void every_request_that_is_built_is_forwarded(void **state)
+TEST(every_request_that_is_built_is_forwarded)
 {
     unsigned i, forwarded = 0;
     size_t k;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (k = 0; k < example_count; k++) {
             uint8_t pdu[MBM_MAX_PDU];
@@ -263,12 +258,11 @@ static void records_are_forwarded(int framing, uint8_t function, uint16_t length
     assert_true(record.record > 0);
 }
 
-static void records_are_forwarded_as_they_were_added(void **state)
+TEST(records_are_forwarded_as_they_were_added)
 {
     static const uint16_t lengths[] = {1, 2, 3, 7, 60, 122};
     unsigned i, k;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (k = 0; k < COUNT(lengths); k++) {
             if (lengths[k] <= 121)
@@ -277,7 +271,7 @@ static void records_are_forwarded_as_they_were_added(void **state)
         }
 }
 
-static void the_reply_to_records_that_were_added_is_accepted(void **state)
+TEST(the_reply_to_records_that_were_added_is_accepted)
 {
     static const uint8_t registers[] = {0xBE, 0xEF}, reading[] = {6, 0, 4, 0, 7, 0, 2};
     static const uint8_t data[] = {UNIT, 0x14, 6, 5, 6, 0x12, 0x34, 0x56, 0x78},
@@ -286,7 +280,6 @@ static void the_reply_to_records_that_were_added_is_accepted(void **state)
     mbm_packet packet = {.kind = MBM_PACKET_REQUEST, .function = MBM_FC_READ_FILE_RECORD};
     mbm_record record = {registers, 4, 7, 2};
 
-    (void)state;
     begin(MBM_FRAMING_RTU);
     OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &record));
     assert_memory_equal(storage, reading, sizeof reading);
@@ -313,19 +306,4 @@ static void the_reply_to_records_that_were_added_is_accepted(void **state)
     memory_port_rtu(&m, written, sizeof written);
     IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
     assert_memory_equal(reply, written + 2, sizeof written - 2);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_function_and_its_response_are_forwarded_unchanged),
-        cmocka_unit_test(a_response_whose_repeated_bytes_differ_is_not_accepted),
-        cmocka_unit_test(force_listen_only_mode_ends_without_a_response),
-        cmocka_unit_test(a_request_that_is_not_forwarded_is_not_queued),
-        cmocka_unit_test(every_request_that_is_built_is_forwarded),
-        cmocka_unit_test(records_are_forwarded_as_they_were_added),
-        cmocka_unit_test(the_reply_to_records_that_were_added_is_accepted),
-    };
-
-    return cmocka_run_group_tests_name("client forward", tests, NULL, NULL);
 }

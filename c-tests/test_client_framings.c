@@ -165,35 +165,30 @@ static void every_function(int framing)
     end();
 }
 
-static void every_function_in_rtu(void **state)
+TEST(every_function_in_rtu)
 {
-    (void)state;
     every_function(MBM_FRAMING_RTU);
 }
 
-static void every_function_in_ascii(void **state)
+TEST(every_function_in_ascii)
 {
-    (void)state;
     every_function(MBM_FRAMING_ASCII);
 }
 
-static void every_function_in_tcp(void **state)
+TEST(every_function_in_tcp)
 {
-    (void)state;
     every_function(MBM_FRAMING_TCP);
 }
 
-static void every_function_in_rtu_over_tcp(void **state)
+TEST(every_function_in_rtu_over_tcp)
 {
-    (void)state;
     every_function(MBM_FRAMING_RTU_OVER_TCP);
 }
 
-static void a_broadcast_reaches_every_unit_in_ascii_and_is_refused_in_rtu_over_tcp(void **state)
+TEST(a_broadcast_reaches_every_unit_in_ascii_and_is_refused_in_rtu_over_tcp)
 {
     mbm_clientRequest r = asker_request(0, NULL, 0, NULL);
 
-    (void)state;
     begin(MBM_FRAMING_ASCII);
     ends(MBM_OK, &r, mbm_client_writeSingleRegister(&a.client, &r, SERVED_BASE, 0x5A5A));
     AWAIT(s.words[0] == 0x5A5A);
@@ -211,13 +206,12 @@ static void change(void *context, mbm_clientRequest *request)
         set_in_done = mbm_client_setDelimiter((mbm_client *)context, '!');
 }
 
-static void the_ascii_delimiter_follows_the_devices(void **state)
+TEST(the_ascii_delimiter_follows_the_devices)
 {
     static const uint16_t wanted[] = {'!' << 8};
     uint16_t words[2];
     mbm_clientRequest r = asker_request(SERVED_UNIT, words, sizeof words, wanted);
 
-    (void)state;
     begin(MBM_FRAMING_ASCII);
     r.done = change;
     r.context = &a.client;
@@ -237,7 +231,7 @@ static void the_ascii_delimiter_follows_the_devices(void **state)
     end();
 }
 
-static void an_impossible_delimiter_is_refused(void **state)
+TEST(an_impossible_delimiter_is_refused)
 {
     static const uint8_t wrong[] = {0, ':', '\r', '0', '9', 'A', 'F', 'a', 'f', 128, 255};
     static mbm_client fresh;
@@ -245,7 +239,6 @@ static void an_impossible_delimiter_is_refused(void **state)
     mbm_clientRequest r = asker_request(SERVED_UNIT, words, sizeof words, NULL);
     unsigned i;
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_client_setDelimiter(NULL, '!'));
     IS(MBM_NOT_INITIALISED, mbm_client_setDelimiter(&fresh, '!'));
     begin(MBM_FRAMING_RTU);
@@ -290,9 +283,8 @@ static uint32_t most_under_way(void)
 }
 
 /* Devices that take one request at a time lose the others. */
-static void one_request_is_under_way_over_tcp_unless_the_program_allows_more(void **state)
+TEST(one_request_is_under_way_over_tcp_unless_the_program_allows_more)
 {
-    (void)state;
     begin(MBM_FRAMING_TCP);
     assert_int_equal(most_under_way(), 1);
     OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
@@ -302,11 +294,10 @@ static void one_request_is_under_way_over_tcp_unless_the_program_allows_more(voi
     end();
 }
 
-static void requests_under_way_over_tcp_are_1_to_16(void **state)
+TEST(requests_under_way_over_tcp_are_1_to_16)
 {
     static mbm_client fresh;
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(NULL, 1));
     IS(MBM_NOT_INITIALISED, mbm_client_setInFlight(&fresh, 1));
     begin(MBM_FRAMING_RTU);
@@ -318,21 +309,4 @@ static void requests_under_way_over_tcp_are_1_to_16(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH + 1));
     OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
     end();
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_function_in_rtu),
-        cmocka_unit_test(every_function_in_ascii),
-        cmocka_unit_test(every_function_in_tcp),
-        cmocka_unit_test(every_function_in_rtu_over_tcp),
-        cmocka_unit_test(a_broadcast_reaches_every_unit_in_ascii_and_is_refused_in_rtu_over_tcp),
-        cmocka_unit_test(the_ascii_delimiter_follows_the_devices),
-        cmocka_unit_test(one_request_is_under_way_over_tcp_unless_the_program_allows_more),
-        cmocka_unit_test(requests_under_way_over_tcp_are_1_to_16),
-        cmocka_unit_test(an_impossible_delimiter_is_refused),
-    };
-
-    return cmocka_run_group_tests_name("client in each framing", tests, NULL, NULL);
 }

@@ -74,11 +74,10 @@ static uint32_t time_of_read(void)
     return (m.now - sent) / MS;
 }
 
-static void the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_client(void **state)
+TEST(the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_client)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         assert_int_equal(time_of_read(), CLIENTS);
@@ -110,11 +109,10 @@ static void the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_clien
     }
 }
 
-static void a_unit_and_a_timeout_that_are_too_large_are_refused(void **state)
+TEST(a_unit_and_a_timeout_that_are_too_large_are_refused)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         request.unit = 300; /* not 44 */
@@ -143,11 +141,10 @@ static void a_unit_and_a_timeout_that_are_too_large_are_refused(void **state)
     }
 }
 
-static void a_record_with_a_unit_or_a_timeout_that_is_too_large_is_refused(void **state)
+TEST(a_record_with_a_unit_or_a_timeout_that_is_too_large_is_refused)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         units[1].timeoutMs = UNITS;
@@ -186,11 +183,10 @@ static unsigned sendings(void)
     return (unsigned)(m.sent_count / one);
 }
 
-static void the_retries_of_a_request_override_those_of_the_unit_and_of_the_client(void **state)
+TEST(the_retries_of_a_request_override_those_of_the_unit_and_of_the_client)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         assert_int_equal(sendings(), 1);
@@ -227,11 +223,10 @@ static void the_retries_of_a_request_override_those_of_the_unit_and_of_the_clien
     }
 }
 
-static void a_client_that_repeats_nothing_refuses_a_request_with_retries(void **state)
+TEST(a_client_that_repeats_nothing_refuses_a_request_with_retries)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         request.retryLimit = 1;
@@ -294,12 +289,11 @@ static unsigned refusals(int framing, uint8_t function, uint8_t code, uint32_t w
     return count;
 }
 
-static void a_busy_device_gets_its_request_again_after_the_wait(void **state)
+TEST(a_busy_device_gets_its_request_again_after_the_wait)
 {
     enum { WAIT = 250 };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         assert_int_equal(refusals(framings[i], 3, SERVER_DEVICE_BUSY, 0), 1);
@@ -320,11 +314,10 @@ static void a_busy_device_gets_its_request_again_after_the_wait(void **state)
     }
 }
 
-static void refusals_and_lost_replies_are_counted_apart(void **state)
+TEST(refusals_and_lost_replies_are_counted_apart)
 {
     unsigned i, k;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         OK(mbm_client_setUnits(&client, units, 2));
@@ -347,33 +340,28 @@ static asker a;
 static held_clock by_clock;
 static tcp_peer *peer;
 
-static int begin_peer(void **state)
+static void begin_peer(void)
 {
-    (void)state;
     peer = tcp_peer_new();
     held_clock_start(&by_clock);
     tcp_peer_clock(peer, &by_clock);
     asker_begin_tcp_by(&a, tcp_peer_start(peer, 0), &by_clock);
     OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
     OK(mbm_client_setResponseTimeout(&a.client, 150));
-    return 0;
 }
 
-static int end_peer(void **state)
+static void end_peer(void)
 {
-    (void)state;
     mbm_tcp_close(&a.tcp);
     tcp_peer_stop(peer);
-    return 0;
 }
 
-static void requests_under_way_at_once_have_their_own_timeouts_and_retries(void **state)
+TEST_WITH(requests_under_way_at_once_have_their_own_timeouts_and_retries, begin_peer, end_peer)
 {
     static mbm_clientRequest requests[8];
     static uint16_t replies[8][2];
     unsigned i;
 
-    (void)state;
     OK(mbm_client_setRetries(&a.client, 0));
     OK(mbm_client_setBusyRetries(&a.client, 1, 5));
     for (i = 0; i < 8; i++) {
@@ -396,21 +384,4 @@ static void requests_under_way_at_once_have_their_own_timeouts_and_retries(void 
     for (i = 3; i < 7; i++)
         assert_int_equal(replies[i][1], tcp_peer_word(10 * i + 1));
     assert_int_equal(tcp_peer_count(peer).requests, 8 + 3);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_client),
-        cmocka_unit_test(a_unit_and_a_timeout_that_are_too_large_are_refused),
-        cmocka_unit_test(a_record_with_a_unit_or_a_timeout_that_is_too_large_is_refused),
-        cmocka_unit_test(the_retries_of_a_request_override_those_of_the_unit_and_of_the_client),
-        cmocka_unit_test(a_client_that_repeats_nothing_refuses_a_request_with_retries),
-        cmocka_unit_test(a_busy_device_gets_its_request_again_after_the_wait),
-        cmocka_unit_test(refusals_and_lost_replies_are_counted_apart),
-        cmocka_unit_test_setup_teardown(
-            requests_under_way_at_once_have_their_own_timeouts_and_retries, begin_peer, end_peer),
-    };
-
-    return cmocka_run_group_tests_name("client limits", tests, NULL, NULL);
 }

@@ -72,13 +72,12 @@ static uint8_t reconnected(void *context)
 static const int framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
                                MBM_FRAMING_RTU_OVER_TCP};
 
-static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **state)
+TEST(a_link_is_connected_once_connect_succeeds_or_a_reply_arrives)
 {
     static const uint8_t statuses[] = {MBM_OK, MBM_PENDING, MBM_LINK_LOST, MBM_INVALID_ARGUMENT};
     const mbm_linkHooks link = {.connect = reconnected};
     unsigned i, k;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (k = 0; k < COUNT(statuses); k++) {
             begin(framings[i]);
@@ -104,12 +103,11 @@ static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **
         }
 }
 
-static void a_link_that_the_program_connected_is_connected(void **state)
+TEST(a_link_that_the_program_connected_is_connected)
 {
     const mbm_linkHooks none = {.connect = NULL};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         m.is_lost = 1;
@@ -145,12 +143,11 @@ static uint32_t of_upper_bits(void *context)
     return of_32_bits(context) & 0xFFFF0000u;
 }
 
-static void any_random_function_gives_the_whole_range_of_jitter(void **state)
+TEST(any_random_function_gives_the_whole_range_of_jitter)
 {
     uint32_t (*const generators[])(void *) = {of_32_bits, of_15_bits, of_16_bits, of_upper_bits};
     unsigned i, k;
 
-    (void)state;
     for (i = 0; i < COUNT(generators); i++) {
         uint32_t least = UINT32_MAX, most = 0, sum = 0;
 
@@ -178,12 +175,11 @@ static void any_random_function_gives_the_whole_range_of_jitter(void **state)
     }
 }
 
-static void the_transaction_identifier_on_the_wire_can_be_read(void **state)
+TEST(the_transaction_identifier_on_the_wire_can_be_read)
 {
     mbm_clientRequest other = {0};
     uint16_t first;
 
-    (void)state;
     begin(MBM_FRAMING_TCP);
     assert_int_equal(mbm_client_wireTransaction(&request), 0);
     assert_int_equal(mbm_client_wireTransaction(NULL), 0);
@@ -211,12 +207,11 @@ static void the_transaction_identifier_on_the_wire_can_be_read(void **state)
     assert_int_equal(mbm_client_wireTransaction(&request), first);
 }
 
-static void reserved_units_and_sub_functions_are_sent_as_they_are(void **state)
+TEST(reserved_units_and_sub_functions_are_sent_as_they_are)
 {
     static const uint8_t sent[] = {255, 8, 0, 0x15, 0xAB, 0xCD}, reply[] = {255, 8, 0, 0x15, 1, 2};
     const uint16_t data = 0xABCD;
 
-    (void)state;
     begin(MBM_FRAMING_RTU);
     request.unit = 255;
     request.data = &data;
@@ -229,27 +224,12 @@ static void reserved_units_and_sub_functions_are_sent_as_they_are(void **state)
     assert_int_equal(words[0], 0x0102);
 }
 
-static void an_ascii_frame_buffer_below_17_bytes_is_refused(void **state)
+TEST(an_ascii_frame_buffer_below_17_bytes_is_refused)
 {
     const mbm_port port = memory_port_of(&m);
 
-    (void)state;
     memset(&client, 0, sizeof client);
     IS(MBM_INVALID_ARGUMENT, mbm_client_beginAscii(&client, &port, frame, 16));
     IS(MBM_NOT_INITIALISED, mbm_client_poll(&client));
     OK(mbm_client_beginAscii(&client, &port, frame, 17));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_link_is_connected_once_connect_succeeds_or_a_reply_arrives),
-        cmocka_unit_test(a_link_that_the_program_connected_is_connected),
-        cmocka_unit_test(any_random_function_gives_the_whole_range_of_jitter),
-        cmocka_unit_test(the_transaction_identifier_on_the_wire_can_be_read),
-        cmocka_unit_test(reserved_units_and_sub_functions_are_sent_as_they_are),
-        cmocka_unit_test(an_ascii_frame_buffer_below_17_bytes_is_refused),
-    };
-
-    return cmocka_run_group_tests_name("client link", tests, NULL, NULL);
 }

@@ -87,43 +87,38 @@ static void assert_report(const char *answer, const char *data)
     }
 }
 
-static void a_server_id_whose_byte_count_covers_all_data_is_read(void **state)
+TEST(a_server_id_whose_byte_count_covers_all_data_is_read)
 {
-    (void)state;
     assert_report("11 11 03 01 02 FF +", "01 02 FF");
     assert_report("11 11 00 +", "");
     assert_report("11 11 0A 01 02 03 04 05 06 07 08 09 FF +", "01 02 03 04 05 06 07 08 09 FF");
 }
 
-static void a_server_id_whose_byte_count_covers_less_is_read_whole(void **state)
+TEST(a_server_id_whose_byte_count_covers_less_is_read_whole)
 {
-    (void)state;
     assert_report("11 11 02 01 02 FF 07 08 +", "01 02 FF 07 08");
     assert_report("11 11 01 2A FF +", "2A FF");
     assert_report("11 11 00 2A FF +", "2A FF");
 }
 
-static void a_server_id_is_found_in_noise(void **state)
+TEST(a_server_id_is_found_in_noise)
 {
-    (void)state;
     assert_report("FF 00 55 / 11 11 02 01 02 FF 07 08 +", "01 02 FF 07 08");
     assert_report("12 11 02 01 02 + / 11 11 02 01 FF +", "01 FF");
     /* Noise after a response with a right byte count does not hide it. */
     assert_report("11 11 02 01 FF + / 00 00 00", "01 FF");
 }
 
-static void a_server_id_with_a_right_byte_count_ends_without_a_wait(void **state)
+TEST(a_server_id_with_a_right_byte_count_ends_without_a_wait)
 {
-    (void)state;
     OK(report(mbm_client_beginRtuOverTcp, sizeof reply, "11 11 02 01 FF +"));
     assert_in_range(d.now, d.end, d.end + 1000);
 }
 
-static void a_wrong_server_id_is_refused(void **state)
+TEST(a_wrong_server_id_is_refused)
 {
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_function begin = framings[i];
 
@@ -137,17 +132,4 @@ static void a_wrong_server_id_is_refused(void **state)
         IS(MBM_BUFFER_TOO_SMALL, report(begin, 4, "11 11 02 01 02 FF 07 08 +"));
         assert_int_equal(reply[0], 0xEE);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_server_id_whose_byte_count_covers_all_data_is_read),
-        cmocka_unit_test(a_server_id_whose_byte_count_covers_less_is_read_whole),
-        cmocka_unit_test(a_server_id_is_found_in_noise),
-        cmocka_unit_test(a_server_id_with_a_right_byte_count_ends_without_a_wait),
-        cmocka_unit_test(a_wrong_server_id_is_refused),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -98,9 +98,8 @@ static void resume_in_turn(void)
     OK(mbm_client_resume(client, &other_line));
 }
 
-static void a_client_resumes_only_from_the_one_who_has_its_line(void **state)
+TEST(a_client_resumes_only_from_the_one_who_has_its_line)
 {
-    (void)state;
     each_variant(resume_in_turn);
 }
 
@@ -118,9 +117,8 @@ static void lend_and_end(void)
     OK(mbm_node_cancel(&node));
 }
 
-static void a_master_uses_nothing_of_a_client_that_has_resumed(void **state)
+TEST(a_master_uses_nothing_of_a_client_that_has_resumed)
 {
-    (void)state;
     each_variant(lend_and_end);
 }
 
@@ -146,9 +144,8 @@ static void begin_the_master(void)
     the_master_keeps_the_other_port();
 }
 
-static void a_master_that_began_on_a_port_of_its_own_keeps_that_port(void **state)
+TEST(a_master_that_began_on_a_port_of_its_own_keeps_that_port)
 {
-    (void)state;
     each_variant(begin_the_master);
 }
 
@@ -169,9 +166,8 @@ static void lend_to_the_master_of_another(void)
     IS(MBM_NOT_INITIALISED, mbm_node_readCoils(&node, 0, 1));
 }
 
-static void a_master_with_the_lines_of_two_clients_keeps_the_second(void **state)
+TEST(a_master_with_the_lines_of_two_clients_keeps_the_second)
 {
-    (void)state;
     each_variant(lend_to_the_master_of_another);
 }
 
@@ -185,9 +181,8 @@ static void forget_the_master(void)
     IS(MBM_NOT_INITIALISED, mbm_line_cancel(&line));
 }
 
-static void a_client_resumes_from_a_master_that_was_zeroed(void **state)
+TEST(a_client_resumes_from_a_master_that_was_zeroed)
 {
-    (void)state;
     each_variant(forget_the_master);
 }
 
@@ -233,22 +228,7 @@ static void suspend_when_done(void)
     assert_int_equal(m.sent_count, 16);
 }
 
-static void a_client_that_is_suspended_when_a_request_is_done_sends_nothing(void **state)
+TEST(a_client_that_is_suspended_when_a_request_is_done_sends_nothing)
 {
-    (void)state;
     each_variant(suspend_when_done);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_client_resumes_only_from_the_one_who_has_its_line),
-        cmocka_unit_test(a_master_uses_nothing_of_a_client_that_has_resumed),
-        cmocka_unit_test(a_master_that_began_on_a_port_of_its_own_keeps_that_port),
-        cmocka_unit_test(a_master_with_the_lines_of_two_clients_keeps_the_second),
-        cmocka_unit_test(a_client_resumes_from_a_master_that_was_zeroed),
-        cmocka_unit_test(a_client_that_is_suspended_when_a_request_is_done_sends_nothing),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,25 +16,23 @@ static tcp_peer *peer;
 static mbm_clientRequest requests[ASKED];
 static uint16_t words[ASKED][WORDS];
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     peer = tcp_peer_new();
     held_clock_start(&by_clock);
     tcp_peer_clock(peer, &by_clock);
     asker_begin_tcp_by(&a, tcp_peer_start(peer, 0), &by_clock);
     OK(mbm_client_setInFlight(&a.client, ASKED));
     OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     mbm_tcp_close(&a.tcp);
     tcp_peer_stop(peer);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 static void queue_read(unsigned i)
 {
@@ -100,17 +98,15 @@ static void meets_and_retries(tcp_fault fault, unsigned argument)
 }
 
 #define MEETS(name, fault, argument, status)                                                       \
-    static void name(void **state)                                                                 \
+    TEST(name)                                                                                     \
     {                                                                                              \
-        (void)state;                                                                               \
         assert_ends_with(fault, argument, status);                                                 \
     }
 
 #define MEETS_AND_RETRIES(name, fault, argument, status)                                           \
     MEETS(name, fault, argument, status)                                                           \
-    static void name##_and_a_retry_helps(void **state)                                             \
+    TEST(name##_and_a_retry_helps)                                                                 \
     {                                                                                              \
-        (void)state;                                                                               \
         meets_and_retries(fault, argument);                                                        \
     }
 
@@ -136,11 +132,10 @@ MEETS_AND_RETRIES(a_response_of_another_function_is_reported, FAULT_WRONG_FUNCTI
 MEETS_AND_RETRIES(a_length_that_is_too_small_is_malformed, FAULT_SHORT_LENGTH, 2,
                   MBM_MALFORMED_REPLY)
 
-static void responses_in_another_order_are_matched(void **state)
+TEST(responses_in_another_order_are_matched)
 {
     unsigned i;
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_HOLD, 5);
     tcp_peer_fault(peer, 2, FAULT_HOLD, 2);
     tcp_peer_fault(peer, 5, FAULT_DELAY, 20);
@@ -152,11 +147,10 @@ static void responses_in_another_order_are_matched(void **state)
     assert_int_equal(a.counters.foreignFrames, 0);
 }
 
-static void responses_in_one_segment_are_separated(void **state)
+TEST(responses_in_one_segment_are_separated)
 {
     unsigned i;
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_JOIN, ASKED - 1);
     for (i = 0; i < ASKED; i++)
         queue_read(i);
@@ -165,11 +159,10 @@ static void responses_in_one_segment_are_separated(void **state)
         is_right(i);
 }
 
-static void a_reset_ends_all_requests_under_way(void **state)
+TEST(a_reset_ends_all_requests_under_way)
 {
     unsigned i, lost = 0;
 
-    (void)state;
     tcp_peer_fault(peer, MET, FAULT_RESET, 0);
     for (i = 0; i < ASKED; i++)
         queue_read(i);
@@ -184,34 +177,4 @@ static void a_reset_ends_all_requests_under_way(void **state)
     finish();
     for (i = 0; i < ASKED; i++)
         is_right(i);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-#define BOTH(name) TEST(name), TEST(name##_and_a_retry_helps)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_response_in_time_is_waited_for),
-        TEST(a_response_in_single_bytes_is_put_together),
-        TEST(the_second_of_two_responses_is_dropped),
-        TEST(a_response_of_another_id_before_the_right_one_is_dropped),
-        TEST(garbage_before_the_response_is_skipped),
-        TEST(an_exception_is_reported),
-        TEST(half_a_response_and_the_end_is_a_lost_link),
-        TEST(the_end_of_the_stream_is_a_lost_link),
-        TEST(a_reset_is_a_lost_link),
-        BOTH(a_response_that_never_comes_times_out),
-        BOTH(a_late_response_answers_nothing_else),
-        BOTH(a_response_of_another_id_only_times_out),
-        BOTH(a_response_of_another_protocol_times_out),
-        BOTH(a_response_of_another_unit_is_reported),
-        BOTH(a_response_of_another_function_is_reported),
-        BOTH(a_length_that_is_too_small_is_malformed),
-        TEST(responses_in_another_order_are_matched),
-        TEST(responses_in_one_segment_are_separated),
-        TEST(a_reset_ends_all_requests_under_way),
-    };
-
-    return cmocka_run_group_tests_name("client over TCP, each fault", tests, NULL, NULL);
 }

@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 #define WORD(index) s->response[index]
 
 static uint8_t read_words(sim *s, uint16_t quantity, const char *reply)
@@ -32,7 +34,7 @@ static void found_after(sim *s, const char *noise)
     recovers_at_once(s);
 }
 
-static void exception_codes_of_the_device_are_returned_unchanged(void **state)
+TEST(exception_codes_of_the_device_are_returned_unchanged)
 {
     unsigned code;
     NODE;
@@ -53,7 +55,7 @@ static void exception_codes_of_the_device_are_returned_unchanged(void **state)
     assert_int_equal(mbm_node_getExceptionCode(n), 0);
 }
 
-static void an_exception_code_of_0_or_from_80_on_is_malformed_and_kept(void **state)
+TEST(an_exception_code_of_0_or_from_80_on_is_malformed_and_kept)
 {
     NODE;
 
@@ -66,7 +68,7 @@ static void an_exception_code_of_0_or_from_80_on_is_malformed_and_kept(void **st
     recovers_at_once(s);
 }
 
-static void an_exception_with_a_bad_crc_is_no_exception(void **state)
+TEST(an_exception_with_a_bad_crc_is_no_exception)
 {
     NODE;
 
@@ -76,7 +78,7 @@ static void an_exception_with_a_bad_crc_is_no_exception(void **state)
     recovers_at_once(s);
 }
 
-static void response_words_survive_a_failure(void **state)
+TEST(response_words_survive_a_failure)
 {
     static const char *const replies[] = {
         "11 83 02 +",
@@ -99,7 +101,7 @@ static void response_words_survive_a_failure(void **state)
     }
 }
 
-static void each_failure_has_its_status(void **state)
+TEST(each_failure_has_its_status)
 {
     SIM;
 
@@ -113,7 +115,7 @@ static void each_failure_has_its_status(void **state)
     recovers_at_once(s);
 }
 
-static void the_most_specific_failure_is_reported(void **state)
+TEST(the_most_specific_failure_is_reported)
 {
     SIM;
 
@@ -124,7 +126,7 @@ static void the_most_specific_failure_is_reported(void **state)
     recovers_at_once(s);
 }
 
-static void a_bad_crc_fails_after_t35_and_not_after_the_timeout(void **state)
+TEST(a_bad_crc_fails_after_t35_and_not_after_the_timeout)
 {
     uint64_t over;
     SIM;
@@ -134,7 +136,7 @@ static void a_bad_crc_fails_after_t35_and_not_after_the_timeout(void **state)
     assert_in_range(s->now, over + 4000, over + 4100);
 }
 
-static void all_125_registers_and_2000_bits_are_readable(void **state)
+TEST(all_125_registers_and_2000_bits_are_readable)
 {
     uint8_t reply[256];
     char text[1024];
@@ -157,7 +159,7 @@ static void all_125_registers_and_2000_bits_are_readable(void **state)
         assert_int_equal(WORD((uint8_t)i), (2 * i + 1) << 8 | (2 * i));
 }
 
-static void reads_of_65_registers_and_more_are_sent(void **state)
+TEST(reads_of_65_registers_and_more_are_sent)
 {
     SIM;
 
@@ -165,7 +167,7 @@ static void reads_of_65_registers_and_more_are_sent(void **state)
     sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
 }
 
-static void a_byte_count_of_251_to_255_is_malformed(void **state)
+TEST(a_byte_count_of_251_to_255_is_malformed)
 {
     unsigned count;
     NODE;
@@ -183,7 +185,7 @@ static void a_byte_count_of_251_to_255_is_malformed(void **state)
     recovers_at_once(s);
 }
 
-static void a_byte_count_that_does_not_suit_the_request_is_malformed(void **state)
+TEST(a_byte_count_that_does_not_suit_the_request_is_malformed)
 {
     NODE;
 
@@ -203,7 +205,7 @@ static void malformed(sim *s, uint8_t status)
     recovers_at_once(s);
 }
 
-static void an_echo_with_another_address_or_value_is_malformed(void **state)
+TEST(an_echo_with_another_address_or_value_is_malformed)
 {
     NODE;
 
@@ -230,7 +232,7 @@ static void an_echo_with_another_address_or_value_is_malformed(void **state)
     malformed(s, mbm_node_maskWriteRegister(n, 1, 2, 3));
 }
 
-static void the_reply_is_found_after_stray_bytes(void **state)
+TEST(the_reply_is_found_after_stray_bytes)
 {
     SIM;
 
@@ -241,7 +243,7 @@ static void the_reply_is_found_after_stray_bytes(void **state)
     assert_int_equal(s->counters.resynchronisations, 4);
 }
 
-static void the_reply_is_found_after_noise_that_looks_like_its_header(void **state)
+TEST(the_reply_is_found_after_noise_that_looks_like_its_header)
 {
     SIM;
 
@@ -257,7 +259,7 @@ static void the_reply_is_found_after_noise_that_looks_like_its_header(void **sta
 
 /* Four bytes that look like the start of a longer reply. An exception after them is found,
  * also if the line was silent between. */
-static void an_exception_after_noise_that_looks_like_a_longer_reply_is_found(void **state)
+TEST(an_exception_after_noise_that_looks_like_a_longer_reply_is_found)
 {
     NODE;
 
@@ -269,7 +271,7 @@ static void an_exception_after_noise_that_looks_like_a_longer_reply_is_found(voi
     assert_true(s->now - s->frames[1].end < 30000);
 }
 
-static void the_reply_is_found_after_a_frame_of_another_unit(void **state)
+TEST(the_reply_is_found_after_a_frame_of_another_unit)
 {
     SIM;
 
@@ -279,7 +281,7 @@ static void the_reply_is_found_after_a_frame_of_another_unit(void **state)
     assert_int_equal(s->counters.foreignFrames, 4);
 }
 
-static void the_reply_is_found_after_a_late_reply_of_another_function_or_length(void **state)
+TEST(the_reply_is_found_after_a_late_reply_of_another_function_or_length)
 {
     SIM;
 
@@ -289,7 +291,7 @@ static void the_reply_is_found_after_a_late_reply_of_another_function_or_length(
     found_after(s, "11 84 02 +");
 }
 
-static void a_reply_in_two_pieces_is_found_at_the_end_of_the_second(void **state)
+TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second)
 {
     NODE;
 
@@ -302,7 +304,7 @@ static void a_reply_in_two_pieces_is_found_at_the_end_of_the_second(void **state
 
 /* Noise that looks like the start of our reply, then a pause, then the reply. However the
  * first call ends, its reply must not become the second call's data. */
-static void a_reply_after_noise_and_a_pause_is_not_taken_for_the_next(void **state)
+TEST(a_reply_after_noise_and_a_pause_is_not_taken_for_the_next)
 {
     uint8_t status;
     NODE;
@@ -317,7 +319,7 @@ static void a_reply_after_noise_and_a_pause_is_not_taken_for_the_next(void **sta
 }
 
 /* Data may have any value, so a pause within the data must not end the request. */
-static void a_pause_after_data_like_a_damaged_exception_does_not_end_the_request(void **state)
+TEST(a_pause_after_data_like_a_damaged_exception_does_not_end_the_request)
 {
     NODE;
 
@@ -327,7 +329,7 @@ static void a_pause_after_data_like_a_damaged_exception_does_not_end_the_request
     assert_int_equal(WORD(3), 0x0506);
 }
 
-static void foreign_data_like_our_damaged_reply_do_not_end_the_request(void **state)
+TEST(foreign_data_like_our_damaged_reply_do_not_end_the_request)
 {
     NODE;
 
@@ -336,7 +338,7 @@ static void foreign_data_like_our_damaged_reply_do_not_end_the_request(void **st
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
-static void an_echo_is_dropped_with_echo_discard_on(void **state)
+TEST(an_echo_is_dropped_with_echo_discard_on)
 {
     NODE;
 
@@ -357,7 +359,7 @@ static void an_echo_is_dropped_with_echo_discard_on(void **state)
     OK(mbm_node_writeSingleCoil(n, 1, 1));
 }
 
-static void a_damaged_echo_does_not_hide_the_reply(void **state)
+TEST(a_damaged_echo_does_not_hide_the_reply)
 {
     NODE;
 
@@ -372,7 +374,7 @@ static void a_damaged_echo_does_not_hide_the_reply(void **state)
     OK(mbm_node_writeMultipleRegisters(n, 1, 2));
 }
 
-static void noise_before_the_echo_does_not_hide_a_foreign_frame_after_it(void **state)
+TEST(noise_before_the_echo_does_not_hide_a_foreign_frame_after_it)
 {
     SIM;
 
@@ -382,7 +384,7 @@ static void noise_before_the_echo_does_not_hide_a_foreign_frame_after_it(void **
     assert_int_equal(s->counters.foreignFrames, 1);
 }
 
-static void an_echo_alone_is_no_success(void **state)
+TEST(an_echo_alone_is_no_success)
 {
     NODE;
 
@@ -395,7 +397,7 @@ static void an_echo_alone_is_no_success(void **state)
     assert_int_equal(mbm_node_maskWriteRegister(n, 1, 2, 3), MBM_RESPONSE_TIMED_OUT);
 }
 
-static void with_discard_off_an_echo_that_is_no_reply_is_skipped(void **state)
+TEST(with_discard_off_an_echo_that_is_no_reply_is_skipped)
 {
     NODE;
 
@@ -405,7 +407,7 @@ static void with_discard_off_an_echo_that_is_no_reply_is_skipped(void **state)
     OK(mbm_node_writeMultipleRegisters(n, 1, 2));
 }
 
-static void a_device_that_does_not_echo_still_answers_reads_with_discard_on(void **state)
+TEST(a_device_that_does_not_echo_still_answers_reads_with_discard_on)
 {
     SIM;
 
@@ -413,7 +415,7 @@ static void a_device_that_does_not_echo_still_answers_reads_with_discard_on(void
     OK(read_words(s, 1, "11 03 02 00 2A +"));
 }
 
-static void counters_count_what_happened(void **state)
+TEST(counters_count_what_happened)
 {
     NODE;
 
@@ -434,7 +436,7 @@ static void counters_count_what_happened(void **state)
     assert_int_equal(s->counters.requests, 4);
 }
 
-static void counters_miss_no_frame_of_a_crowded_line(void **state)
+TEST(counters_miss_no_frame_of_a_crowded_line)
 {
     int i;
     NODE;
@@ -449,7 +451,7 @@ static void counters_miss_no_frame_of_a_crowded_line(void **state)
 }
 
 /* So the exception begins as a reply of one register does. */
-static void an_exception_whose_code_is_the_byte_count_is_a_whole_frame(void **state)
+TEST(an_exception_whose_code_is_the_byte_count_is_a_whole_frame)
 {
     SIM;
 
@@ -460,7 +462,7 @@ static void an_exception_whose_code_is_the_byte_count_is_a_whole_frame(void **st
     assert_int_equal(s->counters.foreignFrames, 0);
 }
 
-static void a_right_crc_within_the_reply_is_no_frame(void **state)
+TEST(a_right_crc_within_the_reply_is_no_frame)
 {
     SIM;
 
@@ -471,43 +473,4 @@ static void a_right_crc_within_the_reply_is_no_frame(void **state)
     assert_int_equal(s->counters.replies, 1);
     assert_int_equal(s->counters.resynchronisations, 0);
     assert_int_equal(s->counters.foreignFrames, 0);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(a_right_crc_within_the_reply_is_no_frame),
-        SIM_TEST(an_exception_whose_code_is_the_byte_count_is_a_whole_frame),
-        SIM_TEST(exception_codes_of_the_device_are_returned_unchanged),
-        SIM_TEST(an_exception_code_of_0_or_from_80_on_is_malformed_and_kept),
-        SIM_TEST(an_exception_with_a_bad_crc_is_no_exception),
-        SIM_TEST(response_words_survive_a_failure),
-        SIM_TEST(each_failure_has_its_status),
-        SIM_TEST(the_most_specific_failure_is_reported),
-        SIM_TEST(a_bad_crc_fails_after_t35_and_not_after_the_timeout),
-        SIM_TEST(all_125_registers_and_2000_bits_are_readable),
-        SIM_TEST(reads_of_65_registers_and_more_are_sent),
-        SIM_TEST(a_byte_count_of_251_to_255_is_malformed),
-        SIM_TEST(a_byte_count_that_does_not_suit_the_request_is_malformed),
-        SIM_TEST(an_echo_with_another_address_or_value_is_malformed),
-        SIM_TEST(the_reply_is_found_after_stray_bytes),
-        SIM_TEST(the_reply_is_found_after_noise_that_looks_like_its_header),
-        SIM_TEST(an_exception_after_noise_that_looks_like_a_longer_reply_is_found),
-        SIM_TEST(the_reply_is_found_after_a_frame_of_another_unit),
-        SIM_TEST(the_reply_is_found_after_a_late_reply_of_another_function_or_length),
-        SIM_TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second),
-        SIM_TEST(a_reply_after_noise_and_a_pause_is_not_taken_for_the_next),
-        SIM_TEST(a_pause_after_data_like_a_damaged_exception_does_not_end_the_request),
-        SIM_TEST(foreign_data_like_our_damaged_reply_do_not_end_the_request),
-        SIM_TEST(an_echo_is_dropped_with_echo_discard_on),
-        SIM_TEST(a_damaged_echo_does_not_hide_the_reply),
-        SIM_TEST(noise_before_the_echo_does_not_hide_a_foreign_frame_after_it),
-        SIM_TEST(an_echo_alone_is_no_success),
-        SIM_TEST(with_discard_off_an_echo_that_is_no_reply_is_skipped),
-        SIM_TEST(a_device_that_does_not_echo_still_answers_reads_with_discard_on),
-        SIM_TEST(counters_count_what_happened),
-        SIM_TEST(counters_miss_no_frame_of_a_crowded_line),
-    };
-
-    return cmocka_run_group_tests_name("contract: replies", tests, NULL, NULL);
 }

@@ -6,10 +6,12 @@
 
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 #define WORD(index) s->response[index]
 #define LAST(text) sim_assert_sent(s, s->sent - 1, text)
 
-static void reads_coils_and_inputs_as_the_specification_shows(void **state)
+TEST(reads_coils_and_inputs_as_the_specification_shows)
 {
     NODE;
 
@@ -25,7 +27,7 @@ static void reads_coils_and_inputs_as_the_specification_shows(void **state)
     assert_int_equal(WORD(1), 0x0035);
 }
 
-static void reads_registers_as_the_specification_shows(void **state)
+TEST(reads_registers_as_the_specification_shows)
 {
     NODE;
 
@@ -41,7 +43,7 @@ static void reads_registers_as_the_specification_shows(void **state)
     assert_int_equal(WORD(0), 10);
 }
 
-static void writes_single_cells_as_the_specification_shows(void **state)
+TEST(writes_single_cells_as_the_specification_shows)
 {
     NODE;
 
@@ -56,7 +58,7 @@ static void writes_single_cells_as_the_specification_shows(void **state)
     LAST("11 06 00 01 00 03 +");
 }
 
-static void any_state_except_zero_is_on(void **state)
+TEST(any_state_except_zero_is_on)
 {
     static const uint8_t states[] = {1, 2, 0x80, 0xFF};
     size_t i;
@@ -69,7 +71,7 @@ static void any_state_except_zero_is_on(void **state)
     }
 }
 
-static void writes_many_cells_as_the_specification_shows(void **state)
+TEST(writes_many_cells_as_the_specification_shows)
 {
     NODE;
 
@@ -84,7 +86,7 @@ static void writes_many_cells_as_the_specification_shows(void **state)
     LAST("11 10 00 01 00 02 04 00 0A 01 02 +");
 }
 
-static void mask_writes_as_the_specification_shows(void **state)
+TEST(mask_writes_as_the_specification_shows)
 {
     NODE;
 
@@ -93,7 +95,7 @@ static void mask_writes_as_the_specification_shows(void **state)
     LAST("11 16 00 04 00 F2 00 25 66 E2");
 }
 
-static void reads_and_writes_at_once_as_the_specification_shows(void **state)
+TEST(reads_and_writes_at_once_as_the_specification_shows)
 {
     uint8_t i;
     NODE;
@@ -109,7 +111,7 @@ static void reads_and_writes_at_once_as_the_specification_shows(void **state)
 }
 
 /* Complete frames with their CRC, as the documentation of another library shows them. */
-static void frames_are_the_same_as_in_the_documentation_of_another_library(void **state)
+TEST(frames_are_the_same_as_in_the_documentation_of_another_library)
 {
     NODE;
 
@@ -152,7 +154,7 @@ static void frames_are_the_same_as_in_the_documentation_of_another_library(void 
     LAST("11 17 04 10 00 01 01 12 00 02 04 00 C8 00 82 64 E2");
 }
 
-static void units_248_to_255_are_accepted(void **state)
+TEST(units_248_to_255_are_accepted)
 {
     NODE;
 
@@ -166,7 +168,7 @@ static void units_248_to_255_are_accepted(void **state)
     LAST("FF 03 00 00 00 01 +");
 }
 
-static void the_last_odd_byte_of_coils_is_padded_with_zero(void **state)
+TEST(the_last_odd_byte_of_coils_is_padded_with_zero)
 {
     NODE;
 
@@ -181,7 +183,7 @@ static void the_last_odd_byte_of_coils_is_padded_with_zero(void **state)
     assert_int_equal(WORD(0), 0x0007);
 }
 
-static void coil_pad_bits_are_sent_as_zero(void **state)
+TEST(coil_pad_bits_are_sent_as_zero)
 {
     NODE;
 
@@ -194,7 +196,7 @@ static void coil_pad_bits_are_sent_as_zero(void **state)
     LAST("11 0F 00 00 00 09 02 FF 01 +");
 }
 
-static void a_transmit_word_that_the_program_sets_leaves_the_queue(void **state)
+TEST(a_transmit_word_that_the_program_sets_leaves_the_queue)
 {
     NODE;
 
@@ -207,7 +209,7 @@ static void a_transmit_word_that_the_program_sets_leaves_the_queue(void **state)
     LAST("11 10 00 07 00 01 02 BB BB +");
 }
 
-static void words_that_the_program_changes_leave_the_indices_alone(void **state)
+TEST(words_that_the_program_changes_leave_the_indices_alone)
 {
     NODE;
 
@@ -226,7 +228,7 @@ static void words_that_the_program_changes_leave_the_indices_alone(void **state)
     LAST("11 10 00 03 00 02 04 00 00 22 22 +");
 }
 
-static void begin_transmission_empties_the_queue_and_keeps_the_words(void **state)
+TEST(begin_transmission_empties_the_queue_and_keeps_the_words)
 {
     NODE;
 
@@ -243,7 +245,7 @@ static void begin_transmission_empties_the_queue_and_keeps_the_words(void **stat
     LAST("11 10 00 09 00 02 04 33 33 22 22 +");
 }
 
-static void send_queues_words(void **state)
+TEST(send_queues_words)
 {
     NODE;
 
@@ -255,7 +257,7 @@ static void send_queues_words(void **state)
     LAST("11 10 01 00 00 02 04 12 34 00 AB +");
 }
 
-static void send_bit_queues_bits_lowest_first(void **state)
+TEST(send_bit_queues_bits_lowest_first)
 {
     static const uint8_t bits[] = {1, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 1, 9};
     size_t i;
@@ -270,7 +272,7 @@ static void send_bit_queues_bits_lowest_first(void **state)
     LAST("11 0F 00 05 00 12 03 8D 80 03 +");
 }
 
-static void a_word_after_bits_starts_a_new_word(void **state)
+TEST(a_word_after_bits_starts_a_new_word)
 {
     NODE;
 
@@ -283,7 +285,7 @@ static void a_word_after_bits_starts_a_new_word(void **state)
     LAST("11 10 00 05 00 02 04 00 03 12 34 +");
 }
 
-static void queued_registers_are_complete_words_only(void **state)
+TEST(queued_registers_are_complete_words_only)
 {
     unsigned i;
     NODE;
@@ -296,7 +298,7 @@ static void queued_registers_are_complete_words_only(void **state)
     LAST("11 10 00 05 00 01 02 FF FF +");
 }
 
-static void words_beyond_the_transmit_buffer_are_not_queued(void **state)
+TEST(words_beyond_the_transmit_buffer_are_not_queued)
 {
     unsigned i;
     NODE;
@@ -312,7 +314,7 @@ static void words_beyond_the_transmit_buffer_are_not_queued(void **state)
     assert_int_equal(s->frames[0].length, 9 + 2 * 123);
 }
 
-static void any_transaction_empties_the_queue_but_keeps_the_words(void **state)
+TEST(any_transaction_empties_the_queue_but_keeps_the_words)
 {
     NODE;
 
@@ -328,7 +330,7 @@ static void any_transaction_empties_the_queue_but_keeps_the_words(void **state)
     assert_int_equal(s->transmit[0], 0x1234);
 }
 
-static void a_failed_transaction_empties_the_queue_and_rewinds_receive(void **state)
+TEST(a_failed_transaction_empties_the_queue_and_rewinds_receive)
 {
     NODE;
 
@@ -343,7 +345,7 @@ static void a_failed_transaction_empties_the_queue_and_rewinds_receive(void **st
     assert_int_equal(mbm_node_writeQueuedRegisters(n), MBM_ILLEGAL_DATA_VALUE);
 }
 
-static void the_write_address_is_shared_by_all_writing_functions(void **state)
+TEST(the_write_address_is_shared_by_all_writing_functions)
 {
     NODE;
 
@@ -367,7 +369,7 @@ static void the_write_address_is_shared_by_all_writing_functions(void **state)
     LAST("11 17 00 03 00 01 00 77 00 01 02 AA AA +");
 }
 
-static void single_writes_overwrite_the_first_transmit_words(void **state)
+TEST(single_writes_overwrite_the_first_transmit_words)
 {
     NODE;
 
@@ -383,7 +385,7 @@ static void single_writes_overwrite_the_first_transmit_words(void **state)
     assert_int_equal(s->transmit[2], 0xEEEE);
 }
 
-static void a_read_makes_exactly_its_words_available_to_receive(void **state)
+TEST(a_read_makes_exactly_its_words_available_to_receive)
 {
     NODE;
 
@@ -399,7 +401,7 @@ static void a_read_makes_exactly_its_words_available_to_receive(void **state)
     assert_int_equal(mbm_node_available(n), 0);
 }
 
-static void begin_is_cheap_and_switches_slaves(void **state)
+TEST(begin_is_cheap_and_switches_slaves)
 {
     NODE;
 
@@ -420,7 +422,7 @@ static void begin_is_cheap_and_switches_slaves(void **state)
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
 }
 
-static void set_slave_id_counts_from_the_next_request_on(void **state)
+TEST(set_slave_id_counts_from_the_next_request_on)
 {
     NODE;
 
@@ -428,38 +430,4 @@ static void set_slave_id_counts_from_the_next_request_on(void **state)
     OK(mbm_node_setSlaveID(n, 247));
     assert_int_equal(mbm_node_getSlaveID(n), 247);
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(reads_coils_and_inputs_as_the_specification_shows),
-        SIM_TEST(reads_registers_as_the_specification_shows),
-        SIM_TEST(writes_single_cells_as_the_specification_shows),
-        SIM_TEST(any_state_except_zero_is_on),
-        SIM_TEST(writes_many_cells_as_the_specification_shows),
-        SIM_TEST(mask_writes_as_the_specification_shows),
-        SIM_TEST(reads_and_writes_at_once_as_the_specification_shows),
-        SIM_TEST(frames_are_the_same_as_in_the_documentation_of_another_library),
-        SIM_TEST(units_248_to_255_are_accepted),
-        SIM_TEST(the_last_odd_byte_of_coils_is_padded_with_zero),
-        SIM_TEST(coil_pad_bits_are_sent_as_zero),
-        SIM_TEST(a_transmit_word_that_the_program_sets_leaves_the_queue),
-        SIM_TEST(words_that_the_program_changes_leave_the_indices_alone),
-        SIM_TEST(begin_transmission_empties_the_queue_and_keeps_the_words),
-        SIM_TEST(send_queues_words),
-        SIM_TEST(send_bit_queues_bits_lowest_first),
-        SIM_TEST(a_word_after_bits_starts_a_new_word),
-        SIM_TEST(queued_registers_are_complete_words_only),
-        SIM_TEST(words_beyond_the_transmit_buffer_are_not_queued),
-        SIM_TEST(any_transaction_empties_the_queue_but_keeps_the_words),
-        SIM_TEST(a_failed_transaction_empties_the_queue_and_rewinds_receive),
-        SIM_TEST(the_write_address_is_shared_by_all_writing_functions),
-        SIM_TEST(single_writes_overwrite_the_first_transmit_words),
-        SIM_TEST(a_read_makes_exactly_its_words_available_to_receive),
-        SIM_TEST(begin_is_cheap_and_switches_slaves),
-        SIM_TEST(set_slave_id_counts_from_the_next_request_on),
-    };
-
-    return cmocka_run_group_tests_name("contract: requests and words", tests, NULL, NULL);
 }

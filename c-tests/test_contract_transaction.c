@@ -5,7 +5,9 @@
 
 #include <string.h>
 
-static void steps_come_in_order(void **state)
+fixture each_test = {sim_setup, sim_teardown};
+
+TEST(steps_come_in_order)
 {
     SIM;
 
@@ -18,7 +20,7 @@ static void steps_come_in_order(void **state)
     sim_assert_sent(s, 0, "11 03 00 00 00 01 +");
 }
 
-static void steps_come_in_order_when_the_port_takes_bytes_one_by_one(void **state)
+TEST(steps_come_in_order_when_the_port_takes_bytes_one_by_one)
 {
     SIM;
 
@@ -30,7 +32,7 @@ static void steps_come_in_order_when_the_port_takes_bytes_one_by_one(void **stat
 }
 
 /* A port that takes a byte at every other call. */
-static void bytes_are_counted_as_they_are_sent(void **state)
+TEST(bytes_are_counted_as_they_are_sent)
 {
     unsigned again;
     NODE;
@@ -63,7 +65,7 @@ static void bytes_are_counted_as_they_are_sent(void **state)
     }
 }
 
-static void a_request_of_which_the_port_takes_no_byte_is_counted(void **state)
+TEST(a_request_of_which_the_port_takes_no_byte_is_counted)
 {
     NODE;
 
@@ -74,7 +76,7 @@ static void a_request_of_which_the_port_takes_no_byte_is_counted(void **state)
     assert_int_equal(s->counters.bytesSent, 0);
 }
 
-static void a_client_counts_bytes_as_they_are_sent(void **state)
+TEST(a_client_counts_bytes_as_they_are_sent)
 {
     static mbm_client client;
     static uint8_t frame[MBM_MAX_ASCII_FRAME];
@@ -110,7 +112,7 @@ static void a_client_counts_bytes_as_they_are_sent(void **state)
     }
 }
 
-static void bytes_that_wait_in_the_receiver_are_no_part_of_the_reply(void **state)
+TEST(bytes_that_wait_in_the_receiver_are_no_part_of_the_reply)
 {
     SIM;
 
@@ -118,7 +120,7 @@ static void bytes_that_wait_in_the_receiver_are_no_part_of_the_reply(void **stat
     sim_reads(s, 500);
 }
 
-static void the_driver_is_switched_off_only_after_the_last_bit(void **state)
+TEST(the_driver_is_switched_off_only_after_the_last_bit)
 {
     SIM;
 
@@ -127,7 +129,7 @@ static void the_driver_is_switched_off_only_after_the_last_bit(void **state)
     sim_assert_time(sim_time_of(s, 'O'), s->frames[0].end);
 }
 
-static void the_driver_is_held_on_after_an_early_flush(void **state)
+TEST(the_driver_is_held_on_after_an_early_flush)
 {
     SIM;
 
@@ -141,7 +143,7 @@ static void the_driver_is_held_on_after_an_early_flush(void **state)
     assert_int_equal(s->idle_while_driving, 0);
 }
 
-static void without_a_baud_rate_the_hold_is_that_of_9600_baud(void **state)
+TEST(without_a_baud_rate_the_hold_is_that_of_9600_baud)
 {
     SIM;
 
@@ -151,7 +153,7 @@ static void without_a_baud_rate_the_hold_is_that_of_9600_baud(void **state)
     sim_assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 2 * 1146);
 }
 
-static void all_hooks_except_three_may_be_missing(void **state)
+TEST(all_hooks_except_three_may_be_missing)
 {
     SIM;
 
@@ -164,7 +166,7 @@ static void all_hooks_except_three_may_be_missing(void **state)
     sim_assert_order(s, "PFOI", "");
 }
 
-static void the_first_request_waits_for_the_gap_after_begin(void **state)
+TEST(the_first_request_waits_for_the_gap_after_begin)
 {
     SIM;
 
@@ -179,7 +181,7 @@ static void gap_after_reply(sim *s, uint32_t wanted)
     sim_assert_time(s->frames[s->sent - 1].silence, wanted);
 }
 
-static void the_gap_is_4_ms_while_no_baud_rate_is_set(void **state)
+TEST(the_gap_is_4_ms_while_no_baud_rate_is_set)
 {
     SIM;
 
@@ -189,7 +191,7 @@ static void the_gap_is_4_ms_while_no_baud_rate_is_set(void **state)
     gap_after_reply(s, 4000);
 }
 
-static void the_gap_is_three_and_a_half_characters_up_to_19200_baud(void **state)
+TEST(the_gap_is_three_and_a_half_characters_up_to_19200_baud)
 {
     SIM;
 
@@ -201,7 +203,7 @@ static void the_gap_is_three_and_a_half_characters_up_to_19200_baud(void **state
     gap_after_reply(s, 2006);
 }
 
-static void the_gap_is_1750_us_above_19200_baud(void **state)
+TEST(the_gap_is_1750_us_above_19200_baud)
 {
     SIM;
 
@@ -211,7 +213,7 @@ static void the_gap_is_1750_us_above_19200_baud(void **state)
     gap_after_reply(s, 1750);
 }
 
-static void a_set_gap_holds_until_a_baud_rate_is_set(void **state)
+TEST(a_set_gap_holds_until_a_baud_rate_is_set)
 {
     SIM;
 
@@ -223,7 +225,7 @@ static void a_set_gap_holds_until_a_baud_rate_is_set(void **state)
     gap_after_reply(s, 1750);
 }
 
-static void the_gap_counts_from_the_last_foreign_byte(void **state)
+TEST(the_gap_counts_from_the_last_foreign_byte)
 {
     SIM;
 
@@ -235,7 +237,7 @@ static void the_gap_counts_from_the_last_foreign_byte(void **state)
     sim_assert_order(s, "PR", "PRPR");
 }
 
-static void the_gap_counts_from_the_last_byte_sent(void **state)
+TEST(the_gap_counts_from_the_last_byte_sent)
 {
     NODE;
 
@@ -246,7 +248,7 @@ static void the_gap_counts_from_the_last_byte_sent(void **state)
     sim_assert_time(s->frames[1].begin - s->frames[0].end, 4000);
 }
 
-static void a_gap_that_has_passed_already_is_not_waited_for(void **state)
+TEST(a_gap_that_has_passed_already_is_not_waited_for)
 {
     uint64_t asked;
     SIM;
@@ -258,7 +260,7 @@ static void a_gap_that_has_passed_already_is_not_waited_for(void **state)
     sim_assert_time(s->frames[1].begin - asked, 0);
 }
 
-static void line_used_makes_the_gap_count_from_now(void **state)
+TEST(line_used_makes_the_gap_count_from_now)
 {
     uint64_t asked;
     SIM;
@@ -271,7 +273,7 @@ static void line_used_makes_the_gap_count_from_now(void **state)
     sim_assert_time(s->frames[1].begin - asked, 4000);
 }
 
-static void idle_is_not_called_while_bytes_wait(void **state)
+TEST(idle_is_not_called_while_bytes_wait)
 {
     SIM;
 
@@ -281,7 +283,7 @@ static void idle_is_not_called_while_bytes_wait(void **state)
     sim_assert_order(s, "IRO", "IOIR");
 }
 
-static void no_gap_is_waited_for_after_begin_on_a_silent_line(void **state)
+TEST(no_gap_is_waited_for_after_begin_on_a_silent_line)
 {
     uint64_t asked;
     SIM;
@@ -297,7 +299,7 @@ static void no_gap_is_waited_for_after_begin_on_a_silent_line(void **state)
     sim_assert_time(s->frames[1].silence, 4000);
 }
 
-static void bytes_that_arrive_after_begin_start_the_gap(void **state)
+TEST(bytes_that_arrive_after_begin_start_the_gap)
 {
     SIM;
 
@@ -308,7 +310,7 @@ static void bytes_that_arrive_after_begin_start_the_gap(void **state)
     sim_assert_time(s->frames[0].silence, 4000);
 }
 
-static void the_gap_counts_from_the_reported_use_of_the_line(void **state)
+TEST(the_gap_counts_from_the_reported_use_of_the_line)
 {
     uint64_t asked;
     SIM;
@@ -325,7 +327,7 @@ static void the_gap_counts_from_the_reported_use_of_the_line(void **state)
     sim_assert_time(s->frames[2].silence, 4000);
 }
 
-static void a_reported_use_counts_also_after_40_minutes_without_one(void **state)
+TEST(a_reported_use_counts_also_after_40_minutes_without_one)
 {
     uint64_t asked;
     SIM;
@@ -340,7 +342,7 @@ static void a_reported_use_counts_also_after_40_minutes_without_one(void **state
 }
 
 /* Two objects that know nothing of each other, each with a line. */
-static void several_lines_share_a_stream(void **state)
+TEST(several_lines_share_a_stream)
 {
     mbm_line line = MBM_INIT;
     mbm_node other = MBM_INIT;
@@ -359,37 +361,4 @@ static void several_lines_share_a_stream(void **state)
     assert_int_equal(s->response[0], 42);
     mbm_line_used(&s->line);
     sim_reads(s, 500);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(steps_come_in_order),
-        SIM_TEST(steps_come_in_order_when_the_port_takes_bytes_one_by_one),
-        SIM_TEST(bytes_are_counted_as_they_are_sent),
-        SIM_TEST(a_request_of_which_the_port_takes_no_byte_is_counted),
-        SIM_TEST(a_client_counts_bytes_as_they_are_sent),
-        SIM_TEST(bytes_that_wait_in_the_receiver_are_no_part_of_the_reply),
-        SIM_TEST(the_driver_is_switched_off_only_after_the_last_bit),
-        SIM_TEST(the_driver_is_held_on_after_an_early_flush),
-        SIM_TEST(without_a_baud_rate_the_hold_is_that_of_9600_baud),
-        SIM_TEST(all_hooks_except_three_may_be_missing),
-        SIM_TEST(the_first_request_waits_for_the_gap_after_begin),
-        SIM_TEST(the_gap_is_4_ms_while_no_baud_rate_is_set),
-        SIM_TEST(the_gap_is_three_and_a_half_characters_up_to_19200_baud),
-        SIM_TEST(the_gap_is_1750_us_above_19200_baud),
-        SIM_TEST(a_set_gap_holds_until_a_baud_rate_is_set),
-        SIM_TEST(the_gap_counts_from_the_last_foreign_byte),
-        SIM_TEST(the_gap_counts_from_the_last_byte_sent),
-        SIM_TEST(a_gap_that_has_passed_already_is_not_waited_for),
-        SIM_TEST(line_used_makes_the_gap_count_from_now),
-        SIM_TEST(idle_is_not_called_while_bytes_wait),
-        SIM_TEST(no_gap_is_waited_for_after_begin_on_a_silent_line),
-        SIM_TEST(bytes_that_arrive_after_begin_start_the_gap),
-        SIM_TEST(the_gap_counts_from_the_reported_use_of_the_line),
-        SIM_TEST(a_reported_use_counts_also_after_40_minutes_without_one),
-        SIM_TEST(several_lines_share_a_stream),
-    };
-
-    return cmocka_run_group_tests_name("contract: one transaction", tests, NULL, NULL);
 }

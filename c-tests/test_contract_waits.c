@@ -6,6 +6,8 @@
 
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 static void gap_after_reply(sim *s, uint32_t wanted)
 {
     sim_reads(s, 500);
@@ -13,7 +15,7 @@ static void gap_after_reply(sim *s, uint32_t wanted)
     sim_assert_time(s->frames[s->sent - 1].silence, wanted);
 }
 
-static void a_reply_may_take_2000_ms(void **state)
+TEST(a_reply_may_take_2000_ms)
 {
     NODE;
 
@@ -24,7 +26,7 @@ static void a_reply_may_take_2000_ms(void **state)
     sim_reads(s, 1990000);
 }
 
-static void the_response_timeout_can_be_set(void **state)
+TEST(the_response_timeout_can_be_set)
 {
     NODE;
 
@@ -42,7 +44,7 @@ static void pass_3_seconds(sim *s)
         s->now += 3000000;
 }
 
-static void a_reply_that_is_complete_as_the_deadline_passes_is_a_success(void **state)
+TEST(a_reply_that_is_complete_as_the_deadline_passes_is_a_success)
 {
     SIM;
 
@@ -51,7 +53,7 @@ static void a_reply_that_is_complete_as_the_deadline_passes_is_a_success(void **
 }
 
 /* Ports such as Arduino's return one byte for each read. The result must be the same. */
-static void a_reply_read_byte_by_byte_after_the_deadline_is_a_success(void **state)
+TEST(a_reply_read_byte_by_byte_after_the_deadline_is_a_success)
 {
     SIM;
 
@@ -61,7 +63,7 @@ static void a_reply_read_byte_by_byte_after_the_deadline_is_a_success(void **sta
 }
 
 /* The request must end, however many bytes arrive after the deadline. */
-static void endless_bytes_do_not_keep_a_request_from_ending(void **state)
+TEST(endless_bytes_do_not_keep_a_request_from_ending)
 {
     static const uint8_t noise[8000] = {0};
     NODE;
@@ -76,7 +78,7 @@ static void endless_bytes_do_not_keep_a_request_from_ending(void **state)
     assert_in_range(s->now - s->frames[0].end, 50000, 300000);
 }
 
-static void a_long_idle_while_a_reply_arrives_is_tolerated(void **state)
+TEST(a_long_idle_while_a_reply_arrives_is_tolerated)
 {
     NODE;
 
@@ -86,7 +88,7 @@ static void a_long_idle_while_a_reply_arrives_is_tolerated(void **state)
     assert_true(s->idles < 1000);
 }
 
-static void the_quiet_time_is_kept_after_a_timeout(void **state)
+TEST(the_quiet_time_is_kept_after_a_timeout)
 {
     uint64_t failed;
     SIM;
@@ -108,7 +110,7 @@ static void the_quiet_time_is_kept_after_a_timeout(void **state)
 }
 
 /* It is the reply that the quiet time waits for. */
-static void a_reply_in_the_quiet_time_is_dropped_and_ends_it(void **state)
+TEST(a_reply_in_the_quiet_time_is_dropped_and_ends_it)
 {
     uint64_t failed;
     SIM;
@@ -122,7 +124,7 @@ static void a_reply_in_the_quiet_time_is_dropped_and_ends_it(void **state)
 }
 
 /* One frame followed by silence does not mean that the line never falls silent. */
-static void a_reply_late_in_the_quiet_time_does_not_make_the_line_busy(void **state)
+TEST(a_reply_late_in_the_quiet_time_does_not_make_the_line_busy)
 {
     NODE;
 
@@ -132,7 +134,7 @@ static void a_reply_late_in_the_quiet_time_does_not_make_the_line_busy(void **st
     sim_reads(s, 500);
 }
 
-static void a_foreign_frame_in_the_quiet_time_does_not_lengthen_it(void **state)
+TEST(a_foreign_frame_in_the_quiet_time_does_not_lengthen_it)
 {
     NODE;
 
@@ -144,7 +146,7 @@ static void a_foreign_frame_in_the_quiet_time_does_not_lengthen_it(void **state)
     sim_assert_time(s->frames[1].silence, 100000);
 }
 
-static void a_request_without_a_reply_is_repeated_as_often_as_set(void **state)
+TEST(a_request_without_a_reply_is_repeated_as_often_as_set)
 {
     SIM;
 
@@ -160,7 +162,7 @@ static void a_request_without_a_reply_is_repeated_as_often_as_set(void **state)
     assert_int_equal(s->sent, 6);
 }
 
-static void damaged_and_malformed_replies_are_retried_exceptions_are_not(void **state)
+TEST(damaged_and_malformed_replies_are_retried_exceptions_are_not)
 {
     SIM;
 
@@ -177,7 +179,7 @@ static void damaged_and_malformed_replies_are_retried_exceptions_are_not(void **
     assert_int_equal(s->sent, 5);
 }
 
-static void a_broadcast_succeeds_after_the_turnaround_delay(void **state)
+TEST(a_broadcast_succeeds_after_the_turnaround_delay)
 {
     NODE;
 
@@ -195,7 +197,7 @@ static void a_broadcast_succeeds_after_the_turnaround_delay(void **state)
     assert_int_equal(s->idle_while_driving, 0);
 }
 
-static void a_read_is_not_broadcast(void **state)
+TEST(a_read_is_not_broadcast)
 {
     NODE;
 
@@ -208,7 +210,7 @@ static void a_read_is_not_broadcast(void **state)
     assert_int_equal(s->sent, 0);
 }
 
-static void a_line_that_never_falls_silent_is_busy(void **state)
+TEST(a_line_that_never_falls_silent_is_busy)
 {
     static const uint8_t noise[300] = {0};
     unsigned i;
@@ -223,7 +225,7 @@ static void a_line_that_never_falls_silent_is_busy(void **state)
     assert_in_range(s->now, 100000, 110000);
 }
 
-static void a_flood_is_bounded_even_if_every_read_returns_bytes(void **state)
+TEST(a_flood_is_bounded_even_if_every_read_returns_bytes)
 {
     static const uint8_t noise[8000] = {0};
     NODE;
@@ -238,7 +240,7 @@ static void a_flood_is_bounded_even_if_every_read_returns_bytes(void **state)
 }
 
 /* On a slow line the port still accepts bytes, so it is not stuck. */
-static void a_request_that_takes_longer_than_the_response_timeout_is_sent(void **state)
+TEST(a_request_that_takes_longer_than_the_response_timeout_is_sent)
 {
     NODE;
 
@@ -249,7 +251,7 @@ static void a_request_that_takes_longer_than_the_response_timeout_is_sent(void *
     OK(mbm_node_writeMultipleRegisters(n, 0, 100));
 }
 
-static void a_port_that_accepts_a_byte_now_and_then_is_not_busy(void **state)
+TEST(a_port_that_accepts_a_byte_now_and_then_is_not_busy)
 {
     NODE;
 
@@ -261,7 +263,7 @@ static void a_port_that_accepts_a_byte_now_and_then_is_not_busy(void **state)
     OK(mbm_node_writeMultipleRegisters(n, 0, 100));
 }
 
-static void a_gap_longer_than_the_timeout_is_waited_for(void **state)
+TEST(a_gap_longer_than_the_timeout_is_waited_for)
 {
     NODE;
 
@@ -285,7 +287,7 @@ static uint8_t poll_as_rarely_as_allowed(sim *s)
 
 /* A poll does not take all of 407 bytes. Those that are left need no wait, also if the deadline
  * has passed. */
-static void a_reply_behind_400_bytes_is_found_by_polls_without_a_wait(void **state)
+TEST(a_reply_behind_400_bytes_is_found_by_polls_without_a_wait)
 {
     static const uint32_t pauses[] = {1000000, 3000000};
     unsigned i;
@@ -313,7 +315,7 @@ static void a_reply_behind_400_bytes_is_found_by_polls_without_a_wait(void **sta
     }
 }
 
-static void sleeping_for_poll_delay_does_not_lengthen_a_timeout(void **state)
+TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout)
 {
     uint64_t begin;
     NODE;
@@ -333,7 +335,7 @@ static void sleeping_for_poll_delay_does_not_lengthen_a_timeout(void **state)
     assert_in_range(s->now - begin, 1800000, 1800000 + 40 * s->character);
 }
 
-static void sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay(void **state)
+TEST(sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay)
 {
     NODE;
 
@@ -345,7 +347,7 @@ static void sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay(void **
     sim_assert_time(s->now - s->frames[0].end, 200000);
 }
 
-static void sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply(void **state)
+TEST(sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply)
 {
     NODE;
 
@@ -406,7 +408,7 @@ static const struct leaving {
     {9600, 1042, 200}, {9600, 1042, 128}, /* a port that takes the frame in two parts */
 };
 
-static void a_program_sleeps_while_a_frame_leaves(void **state)
+TEST(a_program_sleeps_while_a_frame_leaves)
 {
     static const uint16_t quantities[] = {1, 2, 10, 60, LONGEST_WRITE};
     unsigned i, k;
@@ -440,7 +442,7 @@ static void a_program_sleeps_while_a_frame_leaves(void **state)
 }
 
 /* Without a baud rate, the frame may leave at any time. */
-static void a_program_polls_while_a_frame_leaves_at_an_unknown_rate(void **state)
+TEST(a_program_polls_while_a_frame_leaves_at_an_unknown_rate)
 {
     NODE;
 
@@ -451,7 +453,7 @@ static void a_program_polls_while_a_frame_leaves_at_an_unknown_rate(void **state
     OK(mbm_node_cancel(n));
 }
 
-static void a_program_sleeps_while_the_driver_stays_on(void **state)
+TEST(a_program_sleeps_while_the_driver_stays_on)
 {
     unsigned polls;
     NODE;
@@ -483,7 +485,7 @@ static uint32_t client_delay(sim *s)
     return mbm_client_pollDelay(&a_client);
 }
 
-static void a_program_with_a_client_sleeps_while_a_frame_leaves(void **state)
+TEST(a_program_with_a_client_sleeps_while_a_frame_leaves)
 {
     static const uint16_t words[LONGEST_WRITE] = {0};
     static uint8_t frame[MBM_MAX_ASCII_FRAME];
@@ -521,7 +523,7 @@ static void a_program_with_a_client_sleeps_while_a_frame_leaves(void **state)
 }
 
 /* A longer gap could not be measured with the clock, so it would not be kept at all. */
-static void the_longest_gap_is_2_to_the_31_microseconds(void **state)
+TEST(the_longest_gap_is_2_to_the_31_microseconds)
 {
     static const uint32_t gaps[] = {0x80000000, 0x80000001, 0xFFFF0000, 0xFFFFFFFE, 0xFFFFFFFF};
     unsigned i;
@@ -549,7 +551,7 @@ static void the_longest_gap_is_2_to_the_31_microseconds(void **state)
     }
 }
 
-static void the_longest_gap_of_a_client_is_2_to_the_31_microseconds(void **state)
+TEST(the_longest_gap_of_a_client_is_2_to_the_31_microseconds)
 {
     static mbm_client client;
     mbm_clientRequest request = {0};
@@ -572,41 +574,4 @@ static void the_longest_gap_of_a_client_is_2_to_the_31_microseconds(void **state
         assert_true(s->now < 0x80100000);
     }
     OK(mbm_client_cancel(&client, &request));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(a_reply_may_take_2000_ms),
-        SIM_TEST(the_response_timeout_can_be_set),
-        SIM_TEST(a_reply_that_is_complete_as_the_deadline_passes_is_a_success),
-        SIM_TEST(a_reply_read_byte_by_byte_after_the_deadline_is_a_success),
-        SIM_TEST(endless_bytes_do_not_keep_a_request_from_ending),
-        SIM_TEST(a_long_idle_while_a_reply_arrives_is_tolerated),
-        SIM_TEST(the_quiet_time_is_kept_after_a_timeout),
-        SIM_TEST(a_reply_in_the_quiet_time_is_dropped_and_ends_it),
-        SIM_TEST(a_reply_late_in_the_quiet_time_does_not_make_the_line_busy),
-        SIM_TEST(a_foreign_frame_in_the_quiet_time_does_not_lengthen_it),
-        SIM_TEST(a_request_without_a_reply_is_repeated_as_often_as_set),
-        SIM_TEST(damaged_and_malformed_replies_are_retried_exceptions_are_not),
-        SIM_TEST(a_broadcast_succeeds_after_the_turnaround_delay),
-        SIM_TEST(a_read_is_not_broadcast),
-        SIM_TEST(a_line_that_never_falls_silent_is_busy),
-        SIM_TEST(a_flood_is_bounded_even_if_every_read_returns_bytes),
-        SIM_TEST(a_request_that_takes_longer_than_the_response_timeout_is_sent),
-        SIM_TEST(a_port_that_accepts_a_byte_now_and_then_is_not_busy),
-        SIM_TEST(a_gap_longer_than_the_timeout_is_waited_for),
-        SIM_TEST(a_reply_behind_400_bytes_is_found_by_polls_without_a_wait),
-        SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout),
-        SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay),
-        SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply),
-        SIM_TEST(a_program_sleeps_while_a_frame_leaves),
-        SIM_TEST(a_program_polls_while_a_frame_leaves_at_an_unknown_rate),
-        SIM_TEST(a_program_sleeps_while_the_driver_stays_on),
-        SIM_TEST(a_program_with_a_client_sleeps_while_a_frame_leaves),
-        SIM_TEST(the_longest_gap_is_2_to_the_31_microseconds),
-        SIM_TEST(the_longest_gap_of_a_client_is_2_to_the_31_microseconds),
-    };
-
-    return cmocka_run_group_tests_name("contract: waits", tests, NULL, NULL);
 }

@@ -14,23 +14,22 @@
 static program server;
 static char service[16], output[4096];
 
-static int start_server(void **state)
+static void start_server(void)
 {
     const char *const any[] = {"0", NULL};
 
-    (void)state;
     program_start(&server, "linux/custom_server", any);
     program_line(&server, output, sizeof output);
-    return sscanf(output, "ready %15s", service) != 1;
+    assert_int_equal(sscanf(output, "ready %15s", service), 1);
 }
 
-static int stop_server(void **state)
+static void stop_server(void)
 {
-    (void)state;
     kill(server.pid, SIGTERM);
     (void)program_end(&server);
-    return 0;
 }
+
+fixture each_test = {start_server, stop_server};
 
 /* Runs the client. Keeps what it prints, and returns its exit code. */
 static int run(const char *address, const char *second, const char *third)
@@ -69,18 +68,16 @@ static const char *exchange(const char *request)
     return response;
 }
 
-static void a_written_register_is_read_back(void **state)
+TEST(a_written_register_is_read_back)
 {
-    (void)state;
     assert_int_equal(run("2", "=", "4660"), 0);
     assert_string_equal(output, "written\n");
     assert_int_equal(run("1", "3", NULL), 0);
     assert_string_equal(output, "0\n4660\n0\n");
 }
 
-static void the_tenth_register_is_the_last(void **state)
+TEST(the_tenth_register_is_the_last)
 {
-    (void)state;
     assert_int_equal(run("9", "1", NULL), 0);
     assert_int_equal(run("9", "2", NULL), 1);
     assert_int_equal(run("65535", "2", NULL), 1);
@@ -89,13 +86,12 @@ static void the_tenth_register_is_the_last(void **state)
     assert_string_equal(exchange("42 00 09 00 02 04 00 01 00 02"), "C2 02");
 }
 
-static void wrong_lengths_return_03_and_change_nothing(void **state)
+TEST(wrong_lengths_return_03_and_change_nothing)
 {
     static const char *const wrong[] = {"42 00 00 00 01 03 00 01 02", "42 00 00 00 02 02 00 01",
                                         "42 00 00 00 01 02 00", "42 00 00 00 00 00"};
     size_t i;
 
-    (void)state;
     for (i = 0; i < sizeof wrong / sizeof *wrong; i++)
         assert_string_equal(exchange(wrong[i]), "C2 03");
     assert_string_equal(exchange("41 00 00 00"), "C1 03");
@@ -104,35 +100,17 @@ static void wrong_lengths_return_03_and_change_nothing(void **state)
     assert_string_equal(exchange("41 00 00 00 02"), "41 00 00 04 00 00 00 00");
 }
 
-static void the_frames_are_those_of_the_two_functions(void **state)
+TEST(the_frames_are_those_of_the_two_functions)
 {
-    (void)state;
     assert_string_equal(exchange("42 00 03 00 02 04 12 34 AB CD"), "42 00 03 00 02");
     assert_string_equal(exchange("41 00 03 00 02"), "41 00 03 04 12 34 AB CD");
     assert_string_equal(exchange("43 01"), "C3 01");
     assert_string_equal(exchange("03 00 00 00 01"), "83 01");
 }
 
-static void arguments_that_are_missing_print_the_usage(void **state)
+TEST(arguments_that_are_missing_print_the_usage)
 {
-    (void)state;
     assert_int_equal(run(NULL, NULL, NULL), 2);
     assert_int_equal(run("1", NULL, NULL), 2);
     assert_int_equal(run("1", "2", "3"), 2);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(a_written_register_is_read_back, start_server, stop_server),
-        cmocka_unit_test_setup_teardown(the_tenth_register_is_the_last, start_server, stop_server),
-        cmocka_unit_test_setup_teardown(wrong_lengths_return_03_and_change_nothing, start_server,
-                                        stop_server),
-        cmocka_unit_test_setup_teardown(the_frames_are_those_of_the_two_functions, start_server,
-                                        stop_server),
-        cmocka_unit_test_setup_teardown(arguments_that_are_missing_print_the_usage, start_server,
-                                        stop_server),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

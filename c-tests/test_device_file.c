@@ -13,19 +13,20 @@ static char path[] = "/tmp/mbm-device-XXXXXX";
 static device meter;
 static char wrong[YAML_FILE_WRONG_BYTES];
 
-static int make_file(void **state)
+static void make_file(void)
 {
     const int fd = mkstemp(path);
 
-    (void)state;
-    return fd < 0 ? -1 : close(fd);
+    assert_true(fd >= 0);
+    close(fd);
 }
 
-static int remove_file(void **state)
+static void remove_file(void)
 {
-    (void)state;
-    return remove(path);
+    remove(path);
 }
+
+fixture all_tests = {make_file, remove_file};
 
 static int read_bytes(const char *text, size_t length)
 {
@@ -66,12 +67,11 @@ static void expect_refused(const char *text, const char *reason)
 
 /* --- what is read --- */
 
-static void a_field_has_what_its_file_says(void **state)
+TEST(a_field_has_what_its_file_says)
 {
     const mbm_planField *planned;
     const device_field *field;
 
-    (void)state;
     read_text("device: SDM120\nunit: 3\ninterval: 2s\norder: CDAB\n"
               "fields:\n"
               "  - name: voltage\n"
@@ -122,9 +122,8 @@ static void a_field_has_what_its_file_says(void **state)
     device_free(&meter);
 }
 
-static void what_a_file_leaves_out_has_the_documented_value(void **state)
+TEST(what_a_file_leaves_out_has_the_documented_value)
 {
-    (void)state;
     read_text(UINT16(""));
     assert_null(meter.name);
     assert_int_equal(meter.planned->unit, 1);
@@ -139,12 +138,11 @@ static void what_a_file_leaves_out_has_the_documented_value(void **state)
     device_free(&meter);
 }
 
-static void fields_that_can_only_be_written_come_last(void **state)
+TEST(fields_that_can_only_be_written_come_last)
 {
     static const char *const names[] = {"b", "d", "a", "c"};
     unsigned i;
 
-    (void)state;
     read_text("fields:\n"
               "- {name: a, table: holding, address: 0, type: uint16, access: write}\n"
               "- {name: b, table: holding, address: 1, type: uint16}\n"
@@ -174,9 +172,8 @@ static void expect_words(const char *text, unsigned count, const uint16_t *words
 #define WORDS(text, ...)                                                                           \
     expect_words(text, sizeof((const uint16_t[]){__VA_ARGS__}) / 2, (const uint16_t[]){__VA_ARGS__})
 
-static void bits_of_a_register_are_written_if_the_device_writes_masks(void **state)
+TEST(bits_of_a_register_are_written_if_the_device_writes_masks)
 {
-    (void)state;
     read_text("mask_write: yes\nfields:\n"
               "  - {name: pump, table: holding, address: 7, type: bit, bit: 3, access: write}\n"
               "  - {name: mode, table: holding, address: 7, type: bit, bit: 4, count: 3,\n"
@@ -193,9 +190,8 @@ static void bits_of_a_register_are_written_if_the_device_writes_masks(void **sta
     device_free(&meter);
 }
 
-static void a_value_becomes_registers_exactly(void **state)
+TEST(a_value_becomes_registers_exactly)
 {
-    (void)state;
     WORDS(UINT16("    value: 65535\n"), 65535);
     WORDS(UINT16("    scale: 0.1\n    value: 230.1\n"), 2301);
     WORDS(UINT16("    scale: 0.1\n    order: BADC\n    value: 230.1\n"), 0xFD08);
@@ -220,7 +216,7 @@ static void a_value_becomes_registers_exactly(void **state)
 
 /* --- what is refused --- */
 
-static void a_wrong_word_is_refused_with_its_line(void **state)
+TEST(a_wrong_word_is_refused_with_its_line)
 {
     static const struct {
         const char *text, *reason;
@@ -258,12 +254,11 @@ static void a_wrong_word_is_refused_with_its_line(void **state)
     };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
 }
 
-static void a_wrong_key_is_refused_with_its_line(void **state)
+TEST(a_wrong_key_is_refused_with_its_line)
 {
     static const struct {
         const char *text, *reason;
@@ -305,12 +300,11 @@ static void a_wrong_key_is_refused_with_its_line(void **state)
     };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
 }
 
-static void keys_that_do_not_go_together_are_refused(void **state)
+TEST(keys_that_do_not_go_together_are_refused)
 {
     static const struct {
         const char *text, *reason;
@@ -360,7 +354,6 @@ static void keys_that_do_not_go_together_are_refused(void **state)
     };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
     read_text(UINT16(
@@ -371,7 +364,7 @@ static void keys_that_do_not_go_together_are_refused(void **state)
     device_free(&meter);
 }
 
-static void a_value_that_the_registers_cannot_hold_is_refused(void **state)
+TEST(a_value_that_the_registers_cannot_hold_is_refused)
 {
     static const struct {
         const char *text, *reason;
@@ -406,17 +399,15 @@ static void a_value_that_the_registers_cannot_hold_is_refused(void **state)
     };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
 }
 
-static void an_enumeration_names_the_numbers_of_its_field(void **state)
+TEST(an_enumeration_names_the_numbers_of_its_field)
 {
     static const uint16_t off[] = {0, 1}, on[] = {0xFFFF, 0xFFFF}, other[] = {1, 0};
     static const uint16_t swapped[] = {0x0400}, bits[] = {5}, none[] = {4};
 
-    (void)state;
     read_text(FIELD("    type: int32\n    enumeration:\n      1: off\n      -1: \"on\"\n"));
     assert_int_equal(meter.fields->label_count, 2);
     assert_string_equal(meter.fields->labels[1].number, "-1");
@@ -438,7 +429,7 @@ static void an_enumeration_names_the_numbers_of_its_field(void **state)
     device_free(&meter);
 }
 
-static void a_wrong_enumeration_is_refused_with_its_line(void **state)
+TEST(a_wrong_enumeration_is_refused_with_its_line)
 {
     static const struct {
         const char *text, *reason;
@@ -483,14 +474,12 @@ static void a_wrong_enumeration_is_refused_with_its_line(void **state)
     };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
 }
 
-static void what_is_not_yaml_is_refused(void **state)
+TEST(what_is_not_yaml_is_refused)
 {
-    (void)state;
     expect_refused("fields:\n  - name: a\n table: b\n",
                    "3: this is not YAML: while parsing a block mapping, did not find expected "
                    "key");
@@ -505,31 +494,28 @@ static void what_is_not_yaml_is_refused(void **state)
                   "byte 8");
 }
 
-static void an_anchor_that_holds_itself_is_refused(void **state)
+TEST(an_anchor_that_holds_itself_is_refused)
 {
-    (void)state;
     expect_refused("fields: &a [*a]\n",
                    "1: the field must be a mapping of keys, such as \"name:\"");
     expect_refused("&a {fields: *a}\n", "1: fields must be a list: each item begins with \"-\"");
 }
 
-static void a_file_that_cannot_be_read_is_a_failure_of_the_system(void **state)
+TEST(a_file_that_cannot_be_read_is_a_failure_of_the_system)
 {
-    (void)state;
     assert_int_equal(device_file_read(&meter, "/nowhere/meter.yaml", wrong), CODE_SYSTEM);
     assert_string_equal(wrong, "/nowhere/meter.yaml: No such file or directory");
     assert_int_equal(device_file_read(&meter, "/tmp", wrong), CODE_SYSTEM);
     assert_string_equal(wrong, "/tmp: Is a directory");
 }
 
-static void a_file_has_at_most_as_many_fields_as_a_plan(void **state)
+TEST(a_file_has_at_most_as_many_fields_as_a_plan)
 {
     const size_t size = 80 * ((size_t)MBM_PLAN_MAX_FIELDS + 1);
     char *text = malloc(size), reason[100];
     size_t length;
     int i;
 
-    (void)state;
     assert_non_null(text);
     length = (size_t)snprintf(text, size, "fields:\n");
     for (i = 0; i <= MBM_PLAN_MAX_FIELDS; i++)
@@ -552,7 +538,7 @@ static uint32_t next_random(uint32_t *state)
 }
 
 /* The sanitizers find what reads or frees too much, and what is not freed. */
-static void any_damaged_file_is_read_or_refused(void **state)
+TEST(any_damaged_file_is_read_or_refused)
 {
     static const char whole[] =
         "device: SDM120\nunit: 3\ninterval: 2s\norder: CDAB\nfields:\n"
@@ -568,7 +554,6 @@ static void any_damaged_file_is_read_or_refused(void **state)
     unsigned round, right = 0;
     uint32_t random = 1;
 
-    (void)state;
     for (round = 0; round < 20000; round++) {
         size_t length = sizeof whole - 1;
         unsigned change;
@@ -603,28 +588,4 @@ static void any_damaged_file_is_read_or_refused(void **state)
         }
     }
     assert_in_range(right, 100, 19900);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_field_has_what_its_file_says),
-        cmocka_unit_test(what_a_file_leaves_out_has_the_documented_value),
-        cmocka_unit_test(fields_that_can_only_be_written_come_last),
-        cmocka_unit_test(bits_of_a_register_are_written_if_the_device_writes_masks),
-        cmocka_unit_test(a_value_becomes_registers_exactly),
-        cmocka_unit_test(a_wrong_word_is_refused_with_its_line),
-        cmocka_unit_test(a_wrong_key_is_refused_with_its_line),
-        cmocka_unit_test(keys_that_do_not_go_together_are_refused),
-        cmocka_unit_test(a_value_that_the_registers_cannot_hold_is_refused),
-        cmocka_unit_test(an_enumeration_names_the_numbers_of_its_field),
-        cmocka_unit_test(a_wrong_enumeration_is_refused_with_its_line),
-        cmocka_unit_test(what_is_not_yaml_is_refused),
-        cmocka_unit_test(an_anchor_that_holds_itself_is_refused),
-        cmocka_unit_test(a_file_that_cannot_be_read_is_a_failure_of_the_system),
-        cmocka_unit_test(a_file_has_at_most_as_many_fields_as_a_plan),
-        cmocka_unit_test(any_damaged_file_is_read_or_refused),
-    };
-
-    return cmocka_run_group_tests_name("the device file", tests, make_file, remove_file);
 }

@@ -44,11 +44,10 @@ static found_port found;
 static mbm_port line;
 static uint8_t got[600];
 
-static int begin(void **state)
+static void begin(void)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < sizeof bytes; i++)
         bytes[i] = (uint8_t)i;
     at = end = 0;
@@ -56,8 +55,9 @@ static int begin(void **state)
     reads = writes = 0;
     found_port_end_round();
     line = found_port_begin(&found, &below);
-    return 0;
 }
+
+fixture each_test = {begin, NULL};
 
 static int16_t take(const mbm_port *from, uint16_t capacity)
 {
@@ -69,9 +69,8 @@ static uint32_t time_of(const mbm_port *from)
     return from->micros(from->context);
 }
 
-static void without_a_round_every_call_passes(void **state)
+TEST(without_a_round_every_call_passes)
 {
-    (void)state;
     found_port_note(&found, &NOTHING);
     assert_int_equal(take(&line, 8), 0);
     assert_int_equal(take(&line, 8), 0);
@@ -81,11 +80,10 @@ static void without_a_round_every_call_passes(void **state)
     assert_int_equal(time_of(&line), 1001);
 }
 
-static void a_line_without_bytes_is_not_read_and_its_time_stands_still(void **state)
+TEST(a_line_without_bytes_is_not_read_and_its_time_stands_still)
 {
     uint32_t waited;
 
-    (void)state;
     found_port_begin_round();
     found_port_note(&found, &NOTHING);
     waited = time_of(&line);
@@ -103,9 +101,8 @@ static void a_line_without_bytes_is_not_read_and_its_time_stands_still(void **st
     assert_memory_equal(got, bytes, 5);
 }
 
-static void a_write_lets_the_time_go_on_and_the_line_be_read(void **state)
+TEST(a_write_lets_the_time_go_on_and_the_line_be_read)
 {
-    (void)state;
     found_port_begin_round();
     found_port_note(&found, &NOTHING);
     now = 2000;
@@ -116,9 +113,8 @@ static void a_write_lets_the_time_go_on_and_the_line_be_read(void **state)
     assert_int_equal(take(&line, 8), 2);
 }
 
-static void a_read_that_takes_all_bytes_is_the_last_one(void **state)
+TEST(a_read_that_takes_all_bytes_is_the_last_one)
 {
-    (void)state;
     found_port_begin_round();
     found_port_note(&found, &FOUND);
     end = 12;
@@ -137,21 +133,19 @@ static void a_read_that_takes_all_bytes_is_the_last_one(void **state)
     assert_int_equal(reads, 3);
 }
 
-static void a_line_that_the_wait_was_not_for_is_read(void **state)
+TEST(a_line_that_the_wait_was_not_for_is_read)
 {
-    (void)state;
     found_port_begin_round();
     found_port_note(&found, &NOT_ASKED);
     end = 3;
     assert_int_equal(take(&line, 8), 3);
 }
 
-static void a_clients_bytes_are_read_at_once_and_given_in_parts(void **state)
+TEST(a_clients_bytes_are_read_at_once_and_given_in_parts)
 {
     static ahead_port ahead;
     const mbm_port client = ahead_port_begin(&ahead, &below);
 
-    (void)state;
     end = sizeof ahead.bytes + 40;
     assert_int_equal(take(&client, 8), 0);
     assert_int_equal(reads, 0);
@@ -167,20 +161,4 @@ static void a_clients_bytes_are_read_at_once_and_given_in_parts(void **state)
     assert_int_equal(ahead_port_has_bytes(&ahead), 0);
     assert_int_equal(take(&client, sizeof got), 0);
     assert_int_equal(reads, 2);
-}
-
-#define TEST(name) cmocka_unit_test_setup(name, begin)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(without_a_round_every_call_passes),
-        TEST(a_line_without_bytes_is_not_read_and_its_time_stands_still),
-        TEST(a_write_lets_the_time_go_on_and_the_line_be_read),
-        TEST(a_read_that_takes_all_bytes_is_the_last_one),
-        TEST(a_line_that_the_wait_was_not_for_is_read),
-        TEST(a_clients_bytes_are_read_at_once_and_given_in_parts),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -66,14 +66,13 @@ static uint16_t framed(size_t i, const mbm_framing *f, uint8_t *pdu, mbm_packet 
     return wrap(f, packet, pdu, length, frame);
 }
 
-static void every_function_is_built_and_parsed_in_every_framing(void **state)
+TEST(every_function_is_built_and_parsed_in_every_framing)
 {
     uint8_t pdu[MBM_MAX_PDU], wanted[MBM_MAX_ASCII_FRAME], built[MBM_MAX_ASCII_FRAME];
     mbm_packet packet, found;
     uint16_t length, size;
     size_t i, f;
 
-    (void)state;
     for (f = 0; f < COUNT(framings); f++) {
         for (i = 0; i < example_count; i++) {
             length = framed(i, &framings[f], pdu, &packet, wanted);
@@ -90,7 +89,7 @@ static void every_function_is_built_and_parsed_in_every_framing(void **state)
     }
 }
 
-static void frames_of_other_implementations_are_parsed_and_built(void **state)
+TEST(frames_of_other_implementations_are_parsed_and_built)
 {
     static const struct {
         uint8_t framing, kind;
@@ -129,7 +128,6 @@ static void frames_of_other_implementations_are_parsed_and_built(void **state)
     uint16_t length, size;
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(frames); i++) {
         const mbm_framing *f = &framings[frames[i].framing];
 
@@ -141,7 +139,7 @@ static void frames_of_other_implementations_are_parsed_and_built(void **state)
     }
 }
 
-static void the_first_bytes_of_a_frame_determine_its_length(void **state)
+TEST(the_first_bytes_of_a_frame_determine_its_length)
 {
     uint8_t pdu[MBM_MAX_PDU], frame[MBM_MAX_ASCII_FRAME];
     mbm_packet packet;
@@ -149,7 +147,6 @@ static void the_first_bytes_of_a_frame_determine_its_length(void **state)
     uint16_t length, have;
     size_t i, f;
 
-    (void)state;
     for (f = 0; f < COUNT(framings); f++) {
         for (i = 0; i < example_count; i++) {
             uint8_t side = example_side(&examples[i]), last = MBM_LENGTH_UNKNOWN;
@@ -172,14 +169,13 @@ static void the_first_bytes_of_a_frame_determine_its_length(void **state)
     }
 }
 
-static void a_request_determines_the_length_of_its_reply_frame(void **state)
+TEST(a_request_determines_the_length_of_its_reply_frame)
 {
     static const uint16_t lengths[] = {11, 23, 15, 11};
     mbm_packet packet = {.unit = 1, .function = 0x03, .quantity = 3};
     mbm_length expected;
     size_t f;
 
-    (void)state;
     for (f = 0; f < COUNT(framings); f++) {
         OK(mbm_frame_replyLength(&framings[f], &packet, &expected));
         assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
@@ -204,13 +200,12 @@ static int has_example(uint8_t function)
     return (function >= 65 && function <= 72) || (function >= 100 && function <= 110);
 }
 
-static void bytes_look_like_tcp_with_or_without_unknown_functions(void **state)
+TEST(bytes_look_like_tcp_with_or_without_unknown_functions)
 {
     uint8_t frame[] = {0x81, 0x80, 0, 0, 0, 6, 0x10, 1, 0, 0x6B, 0, 3};
     uint16_t length = 0, have;
     unsigned function;
 
-    (void)state;
     for (have = 0; have < 8; have++)
         IS(MBM_INCOMPLETE_FRAME, mbm_frame_looksLikeTcp(frame, have, 0, &length));
     for (have = 8; have <= sizeof frame; have++) {
@@ -253,11 +248,10 @@ static int looks_like_tcp(uint8_t length, const char *pdu)
     return status == MBM_OK;
 }
 
-static void a_header_with_a_length_that_the_function_never_has_does_not_look_like_tcp(void **state)
+TEST(a_header_with_a_length_that_the_function_never_has_does_not_look_like_tcp)
 {
     unsigned length;
 
-    (void)state;
     /* A request has 5 bytes. A response has as many as its byte count says, at least 2. */
     assert_false(looks_like_tcp(2, "01"));
     assert_true(looks_like_tcp(3, "01"));
@@ -287,7 +281,7 @@ static void a_header_with_a_length_that_the_function_never_has_does_not_look_lik
     }
 }
 
-static void the_length_of_a_server_id_is_found_by_its_crc(void **state)
+TEST(the_length_of_a_server_id_is_found_by_its_crc)
 {
     static const char whole[] = "10 11 02 01FF 00EF", more[] = "10 11 02 0102 00 0102 0000";
     uint8_t bytes[16];
@@ -295,7 +289,6 @@ static void the_length_of_a_server_id_is_found_by_its_crc(void **state)
     uint16_t have, length = hex_bytes(bytes, whole);
     mbm_packet packet;
 
-    (void)state;
     OK(mbm_frame_parse(rtu, MBM_PACKET_RESPONSE, bytes, length, &packet));
     for (have = 3; have <= length; have++) {
         OK(mbm_frame_expectedLength(rtu, MBM_PACKET_RESPONSE, bytes, have, &expected));
@@ -310,7 +303,7 @@ static void the_length_of_a_server_id_is_found_by_its_crc(void **state)
     assert_int_equal(expected.kind, MBM_LENGTH_UNKNOWN);
 }
 
-static void a_refused_request_is_answered_with_its_exception(void **state)
+TEST(a_refused_request_is_answered_with_its_exception)
 {
     static const struct {
         const char *pdu;
@@ -328,7 +321,6 @@ static void a_refused_request_is_answered_with_its_exception(void **state)
     uint16_t length, size;
     size_t i, f;
 
-    (void)state;
     for (f = 0; f < COUNT(framings); f++) {
         for (i = 0; i < COUNT(refused); i++) {
             uint8_t exception[2];
@@ -356,14 +348,13 @@ static void a_refused_request_is_answered_with_its_exception(void **state)
     }
 }
 
-static void a_serial_broadcast_and_a_bad_frame_get_no_exception(void **state)
+TEST(a_serial_broadcast_and_a_bad_frame_get_no_exception)
 {
     mbm_packet head = {.unit = 0}, packet;
     uint8_t frame[32], reply[32];
     uint16_t length, size;
     const uint8_t pdu[] = {9}, exception[] = {0x83};
 
-    (void)state;
     length = wrap(ascii, &head, pdu, 1, frame);
     IS(MBM_ILLEGAL_FUNCTION, mbm_frame_parse(ascii, MBM_PACKET_REQUEST, frame, length, &packet));
     IS(MBM_BROADCAST_NOT_ALLOWED,
@@ -382,11 +373,10 @@ static void a_serial_broadcast_and_a_bad_frame_get_no_exception(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(rtu, &packet, 1, reply, 32, &size));
 }
 
-static void checksums_are_those_of_the_guide(void **state)
+TEST(checksums_are_those_of_the_guide)
 {
     const uint8_t bytes[] = {0x02, 0x07};
 
-    (void)state;
     assert_int_equal(mbm_frame_crc16(bytes, 2), 0x1241);
     assert_int_equal(mbm_frame_crc16((const uint8_t *)"123456789", 9), 0x4B37);
     assert_int_equal(mbm_frame_lrc(bytes, 2), 0xF7);
@@ -395,7 +385,7 @@ static void checksums_are_those_of_the_guide(void **state)
     assert_int_equal(mbm_frame_lrc(NULL, 2), 0);
 }
 
-static void a_declared_function_is_built_and_parsed_in_every_framing(void **state)
+TEST(a_declared_function_is_built_and_parsed_in_every_framing)
 {
     const mbm_function own = {0x55, {MBM_RULE_COUNTED, 1, 0}, {MBM_RULE_FIXED, 2, 0}};
     const uint8_t pdu[] = {0x55, 2, 8, 9};
@@ -405,7 +395,6 @@ static void a_declared_function_is_built_and_parsed_in_every_framing(void **stat
     uint16_t length, size;
     size_t f;
 
-    (void)state;
     for (f = 0; f < COUNT(framings); f++) {
         mbm_framing with = framings[f];
 
@@ -422,23 +411,4 @@ static void a_declared_function_is_built_and_parsed_in_every_framing(void **stat
         IS(MBM_ILLEGAL_FUNCTION,
            mbm_frame_build(&framings[f], &packet, built, sizeof built, &size));
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_function_is_built_and_parsed_in_every_framing),
-        cmocka_unit_test(frames_of_other_implementations_are_parsed_and_built),
-        cmocka_unit_test(the_first_bytes_of_a_frame_determine_its_length),
-        cmocka_unit_test(a_request_determines_the_length_of_its_reply_frame),
-        cmocka_unit_test(bytes_look_like_tcp_with_or_without_unknown_functions),
-        cmocka_unit_test(a_header_with_a_length_that_the_function_never_has_does_not_look_like_tcp),
-        cmocka_unit_test(the_length_of_a_server_id_is_found_by_its_crc),
-        cmocka_unit_test(a_refused_request_is_answered_with_its_exception),
-        cmocka_unit_test(a_serial_broadcast_and_a_bad_frame_get_no_exception),
-        cmocka_unit_test(checksums_are_those_of_the_guide),
-        cmocka_unit_test(a_declared_function_is_built_and_parsed_in_every_framing),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

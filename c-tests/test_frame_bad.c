@@ -52,14 +52,13 @@ static uint8_t parsed(const mbm_framing *f, uint8_t side, const uint8_t *frame, 
     return status;
 }
 
-static void an_rtu_frame_that_is_cut_or_changed_is_refused(void **state)
+TEST(an_rtu_frame_that_is_cut_or_changed_is_refused)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     uint16_t length, at;
     unsigned flip;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         uint8_t side = example_side(&examples[i]);
 
@@ -78,14 +77,13 @@ static void an_rtu_frame_that_is_cut_or_changed_is_refused(void **state)
     IS(MBM_MALFORMED_FRAME, parsed(&rtu, MBM_PACKET_REQUEST, frame, 257));
 }
 
-static void a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused(void **state)
+TEST(a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     uint16_t length, at;
     unsigned flip;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         uint8_t side = example_side(&examples[i]);
 
@@ -108,14 +106,13 @@ static void a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused(void *
     }
 }
 
-static void an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused(void **state)
+TEST(an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     uint16_t length, at;
     unsigned value, right;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         uint8_t side = example_side(&examples[i]);
 
@@ -136,7 +133,7 @@ static void an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused(voi
     }
 }
 
-static void a_packet_with_a_unit_above_255_is_refused(void **state)
+TEST(a_packet_with_a_unit_above_255_is_refused)
 {
     const mbm_framing *const kinds[] = {&rtu, &ascii, &tcp};
     uint8_t frame[MBM_MAX_ASCII_FRAME], was[MBM_MAX_ASCII_FRAME] = {0};
@@ -145,7 +142,6 @@ static void a_packet_with_a_unit_above_255_is_refused(void **state)
     uint16_t length;
     size_t i;
 
-    (void)state;
     memset(frame, 0, sizeof frame);
     for (i = 0; i < COUNT(kinds); i++) {
         packet.unit = 300; /* not 44 */
@@ -163,7 +159,7 @@ static void a_packet_with_a_unit_above_255_is_refused(void **state)
     assert_int_equal(frame[6], 255);
 }
 
-static void impossible_mbap_lengths_are_malformed(void **state)
+TEST(impossible_mbap_lengths_are_malformed)
 {
     static const uint16_t lengths[] = {0, 1, 255, 256, 65535};
     uint8_t frame[600] = {0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 1};
@@ -171,7 +167,6 @@ static void impossible_mbap_lengths_are_malformed(void **state)
     uint16_t total;
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(lengths); i++) {
         frame[4] = (uint8_t)(lengths[i] >> 8);
         frame[5] = (uint8_t)lengths[i];
@@ -190,7 +185,7 @@ static void impossible_mbap_lengths_are_malformed(void **state)
     IS(MBM_MALFORMED_FRAME, parsed(&tcp, MBM_PACKET_REQUEST, frame, 12));
 }
 
-static void ascii_digits_may_be_lower_case_and_must_come_in_pairs(void **state)
+TEST(ascii_digits_may_be_lower_case_and_must_come_in_pairs)
 {
     static const struct {
         uint8_t status;
@@ -218,7 +213,6 @@ static void ascii_digits_may_be_lower_case_and_must_come_in_pairs(void **state)
     uint16_t length;
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(frames); i++) {
         length = (uint16_t)strlen(frames[i].text);
         memcpy(text, frames[i].text, length);
@@ -238,11 +232,10 @@ static void ascii_digits_may_be_lower_case_and_must_come_in_pairs(void **state)
     IS(MBM_MALFORMED_FRAME, parsed(&ascii, MBM_PACKET_REQUEST, text, 514));
 }
 
-static void first_bytes_that_begin_no_frame_are_malformed(void **state)
+TEST(first_bytes_that_begin_no_frame_are_malformed)
 {
     mbm_length expected;
 
-    (void)state;
 #define FIRST(framing, text)                                                                       \
     mbm_frame_expectedLength(&framing, MBM_PACKET_RESPONSE, (const uint8_t *)(text),               \
                              sizeof(text) - 1, &expected)
@@ -257,7 +250,7 @@ static void first_bytes_that_begin_no_frame_are_malformed(void **state)
     assert_int_equal(expected.kind, MBM_LENGTH_SILENCE);
 }
 
-static void null_is_an_invalid_argument(void **state)
+TEST(null_is_an_invalid_argument)
 {
     const mbm_framing unknown = {.kind = 5}, no_list = {.functionCount = 1};
     mbm_packet packet = {.unit = 1, .function = 0x03, .quantity = 1};
@@ -265,7 +258,6 @@ static void null_is_an_invalid_argument(void **state)
     uint8_t frame[16];
     uint16_t length;
 
-    (void)state;
     OK(mbm_frame_build(&rtu, &packet, frame, 16, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(NULL, &packet, frame, 16, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&unknown, &packet, frame, 16, &length));
@@ -289,20 +281,4 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(NULL, &packet, &expected));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, NULL, &expected));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, &packet, NULL));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_rtu_frame_that_is_cut_or_changed_is_refused),
-        cmocka_unit_test(a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused),
-        cmocka_unit_test(an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused),
-        cmocka_unit_test(a_packet_with_a_unit_above_255_is_refused),
-        cmocka_unit_test(impossible_mbap_lengths_are_malformed),
-        cmocka_unit_test(ascii_digits_may_be_lower_case_and_must_come_in_pairs),
-        cmocka_unit_test(first_bytes_that_begin_no_frame_are_malformed),
-        cmocka_unit_test(null_is_an_invalid_argument),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

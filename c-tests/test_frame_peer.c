@@ -111,12 +111,11 @@ static void sends_what_we_build(modbus_t *client, int fd, const mbm_framing *f)
     }
 }
 
-static void mbm_builds_the_requests_that_libmodbus_sends_over_rtu(void **state)
+TEST(mbm_builds_the_requests_that_libmodbus_sends_over_rtu)
 {
     pty line;
     modbus_t *client;
 
-    (void)state;
     pty_open(&line);
     client = modbus_new_rtu(line.path, 115200, 'N', 8, 1);
     assert_non_null(client);
@@ -127,13 +126,12 @@ static void mbm_builds_the_requests_that_libmodbus_sends_over_rtu(void **state)
     pty_close(&line);
 }
 
-static void mbm_builds_the_requests_that_libmodbus_sends_over_tcp(void **state)
+TEST(mbm_builds_the_requests_that_libmodbus_sends_over_tcp)
 {
     modbus_t *client;
     uint16_t port;
     int listener = tcp_listen(&port), peer;
 
-    (void)state;
     client = modbus_new_tcp("127.0.0.1", port);
     assert_non_null(client);
     assert_int_equal(modbus_connect(client), 0);
@@ -212,37 +210,23 @@ static void answers_what_we_parse(int fd, const mbm_framing *f, const modbus_map
     assert_int_equal(reply.exceptionCode, MBM_ILLEGAL_DATA_ADDRESS);
 }
 
-static void mbm_parses_the_responses_of_libmodbus_over_rtu(void **state)
+TEST(mbm_parses_the_responses_of_libmodbus_over_rtu)
 {
     static server peer;
 
-    (void)state;
     server_start(&peer, 17);
     answers_what_we_parse(peer.line.ours, &rtu, peer.mapping);
     server_stop(&peer);
 }
 
-static void mbm_parses_the_responses_of_libmodbus_over_tcp(void **state)
+TEST(mbm_parses_the_responses_of_libmodbus_over_tcp)
 {
     tcp_server peer;
     int fd;
 
-    (void)state;
     tcp_server_start(&peer);
     fd = tcp_connect(peer.port);
     answers_what_we_parse(fd, &tcp, peer.mapping);
     close(fd);
     tcp_server_stop(&peer);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mbm_builds_the_requests_that_libmodbus_sends_over_rtu),
-        cmocka_unit_test(mbm_builds_the_requests_that_libmodbus_sends_over_tcp),
-        cmocka_unit_test(mbm_parses_the_responses_of_libmodbus_over_rtu),
-        cmocka_unit_test(mbm_parses_the_responses_of_libmodbus_over_tcp),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

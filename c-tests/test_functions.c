@@ -10,28 +10,25 @@
 static server peer;
 static node n;
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     server_start(&peer, 17);
     node_begin(&n, peer.line.ours, 17);
-    return 0;
 }
 
-static int stop(void **state)
+static void stop(void)
 {
-    (void)state;
     server_stop(&peer);
-    return 0;
 }
 
-static void reads_holding_registers(void **state)
+fixture each_test = {start, stop};
+
+TEST(reads_holding_registers)
 {
     static const uint16_t quantities[] = {1, 2, 64, 65, 125};
     size_t q;
     unsigned i;
 
-    (void)state;
     for (q = 0; q < COUNT(quantities); q++) {
         assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 3, quantities[q]), MBM_OK);
         assert_int_equal(mbm_node_available(&n.node), quantities[q]);
@@ -40,13 +37,12 @@ static void reads_holding_registers(void **state)
     }
 }
 
-static void reads_input_registers(void **state)
+TEST(reads_input_registers)
 {
     static const uint16_t quantities[] = {1, 2, 64, 65, 125};
     size_t q;
     unsigned i;
 
-    (void)state;
     for (q = 0; q < COUNT(quantities); q++) {
         assert_int_equal(mbm_node_readInputRegisters(&n.node, 9, quantities[q]), MBM_OK);
         for (i = 0; i < quantities[q]; i++)
@@ -56,12 +52,11 @@ static void reads_input_registers(void **state)
 
 static const uint16_t bit_quantities[] = {1, 8, 16, 17, 1968, 2000};
 
-static void reads_coils(void **state)
+TEST(reads_coils)
 {
     size_t q;
     unsigned i;
 
-    (void)state;
     for (q = 0; q < COUNT(bit_quantities); q++) {
         assert_int_equal(mbm_node_readCoils(&n.node, 5, bit_quantities[q]), MBM_OK);
         for (i = 0; i < bit_quantities[q]; i++)
@@ -71,12 +66,11 @@ static void reads_coils(void **state)
     }
 }
 
-static void reads_discrete_inputs(void **state)
+TEST(reads_discrete_inputs)
 {
     size_t q;
     unsigned i;
 
-    (void)state;
     for (q = 0; q < COUNT(bit_quantities); q++) {
         assert_int_equal(mbm_node_readDiscreteInputs(&n.node, 7, bit_quantities[q]), MBM_OK);
         for (i = 0; i < bit_quantities[q]; i++)
@@ -86,9 +80,8 @@ static void reads_discrete_inputs(void **state)
     }
 }
 
-static void writes_a_single_coil(void **state)
+TEST(writes_a_single_coil)
 {
-    (void)state;
     assert_int_equal(mbm_node_writeSingleCoil(&n.node, 30, 0), MBM_OK);
     assert_int_equal(peer.mapping->tab_bits[30], 0);
     assert_int_equal(mbm_node_writeSingleCoil(&n.node, 30, 1), MBM_OK);
@@ -98,22 +91,20 @@ static void writes_a_single_coil(void **state)
     assert_int_equal(peer.mapping->tab_bits[30], 1);
 }
 
-static void writes_a_single_register(void **state)
+TEST(writes_a_single_register)
 {
-    (void)state;
     assert_int_equal(mbm_node_writeSingleRegister(&n.node, 499, 0xBEEF), MBM_OK);
     assert_int_equal(peer.mapping->tab_registers[499], 0xBEEF);
     assert_int_equal(mbm_node_writeSingleRegister(&n.node, 0, 0), MBM_OK);
     assert_int_equal(peer.mapping->tab_registers[0], 0);
 }
 
-static void writes_multiple_coils(void **state)
+TEST(writes_multiple_coils)
 {
     static const uint16_t quantities[] = {1, 8, 16, 17, 1968};
     size_t q;
     unsigned i;
 
-    (void)state;
     for (q = 0; q < COUNT(quantities); q++) {
         uint16_t quantity = quantities[q];
 
@@ -129,13 +120,12 @@ static void writes_multiple_coils(void **state)
     }
 }
 
-static void writes_multiple_registers(void **state)
+TEST(writes_multiple_registers)
 {
     static const uint16_t quantities[] = {1, 2, 64, 65, 123};
     size_t q;
     unsigned i;
 
-    (void)state;
     for (q = 0; q < COUNT(quantities); q++) {
         uint16_t quantity = quantities[q];
 
@@ -149,16 +139,15 @@ static void writes_multiple_registers(void **state)
     }
 }
 
-static void mask_writes_a_register(void **state)
+TEST(mask_writes_a_register)
 {
-    (void)state;
     peer.mapping->tab_registers[4] = 0x0012;
     assert_int_equal(mbm_node_maskWriteRegister(&n.node, 4, 0x00F2, 0x0025), MBM_OK);
     /* The standard's example, 6.16. */
     assert_int_equal(peer.mapping->tab_registers[4], 0x0017);
 }
 
-static void reads_and_writes_multiple_registers(void **state)
+TEST(reads_and_writes_multiple_registers)
 {
     static const struct {
         uint16_t read, write;
@@ -166,7 +155,6 @@ static void reads_and_writes_multiple_registers(void **state)
     size_t q;
     unsigned i;
 
-    (void)state;
     for (q = 0; q < COUNT(quantities); q++) {
         for (i = 0; i < quantities[q].write; i++)
             n.transmit[i] = (uint16_t)(0x4000 + i * 3);
@@ -186,9 +174,8 @@ static void reads_and_writes_multiple_registers(void **state)
     }
 }
 
-static void writes_queued_words_and_bits(void **state)
+TEST(writes_queued_words_and_bits)
 {
-    (void)state;
     mbm_node_beginTransmission(&n.node, 40);
     mbm_node_send(&n.node, 0x1122);
     mbm_node_send(&n.node, 0x33);
@@ -215,9 +202,8 @@ static void writes_queued_words_and_bits(void **state)
     assert_int_equal(n.response[1], 0xABCD);
 }
 
-static void requests_words_to_receive(void **state)
+TEST(requests_words_to_receive)
 {
-    (void)state;
     OK(mbm_node_readHoldingRegisters(&n.node, 10, 3));
     assert_int_equal(mbm_node_available(&n.node), 3);
     assert_int_equal(mbm_node_receive(&n.node), server_pattern(10));
@@ -228,9 +214,8 @@ static void requests_words_to_receive(void **state)
     assert_int_equal(mbm_node_receive(&n.node), 0xFFFF);
 }
 
-static void returns_exceptions_of_the_server(void **state)
+TEST(returns_exceptions_of_the_server)
 {
-    (void)state;
     assert_int_equal(mbm_node_readHoldingRegisters(&n.node, SERVER_REGISTERS, 1),
                      MBM_ILLEGAL_DATA_ADDRESS);
     assert_int_equal(mbm_node_getExceptionCode(&n.node), 2);
@@ -252,25 +237,22 @@ static void reaches_unit(uint8_t unit)
     node_begin(&n, peer.line.ours, 17);
 }
 
-static void reaches_units_1_and_247(void **state)
+TEST(reaches_units_1_and_247)
 {
-    (void)state;
     reaches_unit(1);
     reaches_unit(247);
 }
 
-static void an_absent_unit_times_out(void **state)
+TEST(an_absent_unit_times_out)
 {
-    (void)state;
     mbm_node_setSlaveID(&n.node, 18);
     mbm_node_setResponseTimeout(&n.node, 50);
     assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 0, 1), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(n.counters.timeouts, 1);
 }
 
-static void a_broadcast_reaches_the_server_and_succeeds(void **state)
+TEST(a_broadcast_reaches_the_server_and_succeeds)
 {
-    (void)state;
     mbm_node_setSlaveID(&n.node, 0);
     mbm_line_setTurnaroundDelay(&n.line, 60);
     assert_int_equal(mbm_node_writeSingleRegister(&n.node, 70, 0x5A5A), MBM_OK);
@@ -281,12 +263,11 @@ static void a_broadcast_reaches_the_server_and_succeeds(void **state)
     assert_int_equal(n.response[0], 0x5A5A);
 }
 
-static void a_non_blocking_request_is_pending_until_polled_to_its_end(void **state)
+TEST(a_non_blocking_request_is_pending_until_polled_to_its_end)
 {
     uint8_t status;
     unsigned polls = 0;
 
-    (void)state;
     mbm_node_setBlocking(&n.node, 0);
     assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 3, 2), MBM_PENDING);
     assert_int_equal(mbm_node_writeSingleRegister(&n.node, 3, 1), MBM_BUSY);
@@ -299,31 +280,4 @@ static void a_non_blocking_request_is_pending_until_polled_to_its_end(void **sta
     assert_int_equal(n.counters.requests, 1);
     assert_int_equal(n.response[1], server_pattern(4));
     assert_int_equal(mbm_node_poll(&n.node), MBM_OK);
-}
-
-#define TEST(test) cmocka_unit_test_setup_teardown(test, start, stop)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(reads_holding_registers),
-        TEST(reads_input_registers),
-        TEST(reads_coils),
-        TEST(reads_discrete_inputs),
-        TEST(writes_a_single_coil),
-        TEST(writes_a_single_register),
-        TEST(writes_multiple_coils),
-        TEST(writes_multiple_registers),
-        TEST(mask_writes_a_register),
-        TEST(reads_and_writes_multiple_registers),
-        TEST(writes_queued_words_and_bits),
-        TEST(requests_words_to_receive),
-        TEST(returns_exceptions_of_the_server),
-        TEST(reaches_units_1_and_247),
-        TEST(an_absent_unit_times_out),
-        TEST(a_broadcast_reaches_the_server_and_succeeds),
-        TEST(a_non_blocking_request_is_pending_until_polled_to_its_end),
-    };
-
-    return cmocka_run_group_tests_name("functions", tests, NULL, NULL);
 }

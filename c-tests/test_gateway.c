@@ -77,20 +77,19 @@ static void halt_peer(void)
     peer_runs = 0;
 }
 
-static int start(void **state)
+static void start(void)
 {
     char paths[3][128], text[64];
     const char *arguments[] = {"gateway", "--timeout", "3s",     "tcp://:0", paths[0], "1-10",
                                paths[1],  "11-30",     paths[2], "40-41",    NULL};
     unsigned i;
 
-    (void)state;
     pty_open(&line);
     peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
     mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
-    if (!peer || !mapping || modbus_set_slave(peer, PEER_UNIT) ||
-        modbus_set_socket(peer, line.ours) || modbus_set_response_timeout(peer, 0, 20000))
-        return -1;
+    assert_true(peer && mapping && !modbus_set_slave(peer, PEER_UNIT) &&
+                !modbus_set_socket(peer, line.ours) &&
+                !modbus_set_response_timeout(peer, 0, 20000));
     run_peer();
     for (i = 0; i < SERVER_REGISTERS; i++)
         mapping->tab_registers[i] = server_pattern(i);
@@ -100,25 +99,20 @@ static int start(void **state)
     served_on_line(&ours, MBM_FRAMING_RTU);
 
     snprintf(name, sizeof name, "/tmp/mbm-gateway-%d", (int)getpid());
-    if (symlink(line.path, name) != 0)
-        return -1;
+    assert_int_equal(symlink(line.path, name), 0);
     snprintf(paths[0], sizeof paths[0], "rtu:%s?baud=115200&parity=none", name);
     snprintf(paths[1], sizeof paths[1], "rtu:%s?baud=115200&parity=none", ours.line.path);
     snprintf(paths[2], sizeof paths[2], "rtu:/dev/no-such-line?baud=9600");
     program_start(&gateway, "mbm", arguments);
     program_line(&gateway, text, sizeof text);
-    if (sscanf(text, "ready %d", &port) != 1)
-        return -1;
+    assert_int_equal(sscanf(text, "ready %d", &port), 1);
     client = modbus_new_tcp("127.0.0.1", port);
-    if (!client || modbus_connect(client))
-        return -1;
+    assert_true(client && !modbus_connect(client));
     modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
-    return 0;
 }
 
-static int stop(void **state)
+static void stop(void)
 {
-    (void)state;
     modbus_close(client);
     modbus_free(client);
     kill(gateway.pid, SIGTERM);
@@ -129,8 +123,9 @@ static int stop(void **state)
     pty_close(&line);
     unlink(name);
     served_stop(&ours);
-    return 0;
 }
+
+fixture each_test = {start, stop};
 
 static void expect_exception(int code, uint8_t unit)
 {
@@ -142,13 +137,12 @@ static void expect_exception(int code, uint8_t unit)
     assert_int_equal(errno, MODBUS_ENOBASE + code);
 }
 
-static void libmodbus_reads_and_writes_through_the_gateway(void **state)
+TEST(libmodbus_reads_and_writes_through_the_gateway)
 {
     uint16_t words[125], values[] = {1, 0xFFFE, 0x1234};
     uint8_t cells[2000];
     int i;
 
-    (void)state;
     modbus_set_slave(client, PEER_UNIT);
     assert_int_equal(modbus_read_registers(client, 3, 125, words), 125);
     assert_memory_equal(words, mapping->tab_registers + 3, sizeof words);
@@ -167,11 +161,10 @@ static void libmodbus_reads_and_writes_through_the_gateway(void **state)
     assert_memory_equal(words + 1, values, sizeof values);
 }
 
-static void exceptions_of_a_device_pass_through(void **state)
+TEST(exceptions_of_a_device_pass_through)
 {
     uint16_t word;
 
-    (void)state;
     modbus_set_slave(client, PEER_UNIT);
     assert_int_equal(modbus_read_registers(client, SERVER_REGISTERS, 1, &word), -1);
     assert_int_equal(errno, EMBXILADD);
@@ -180,11 +173,10 @@ static void exceptions_of_a_device_pass_through(void **state)
     assert_int_equal(errno, EMBXILVAL);
 }
 
-static void every_function_passes_through(void **state)
+TEST(every_function_passes_through)
 {
     int fd = tcp_connect((uint16_t)port);
 
-    (void)state;
     asked_functions(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
     fd = tcp_connect((uint16_t)port);
@@ -195,12 +187,11 @@ static void every_function_passes_through(void **state)
 /* A busy machine can only make the times longer, so the shortest of some attempts counts. */
 enum { ATTEMPTS = 5 };
 
-static void a_request_to_an_absent_device_gets_0b_after_the_timeout(void **state)
+TEST(a_request_to_an_absent_device_gets_0b_after_the_timeout)
 {
     double took = TIMEOUT_MS;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < ATTEMPTS && took > TIMEOUT_MS * 2e-3; i++) {
         double before = seconds();
 
@@ -209,15 +200,14 @@ static void a_request_to_an_absent_device_gets_0b_after_the_timeout(void **state
     }
     assert_true(took > TIMEOUT_MS * 0.9e-3 && took < TIMEOUT_MS * 2e-3);
     modbus_set_slave(client, PEER_UNIT);
-    libmodbus_reads_and_writes_through_the_gateway(state);
+    libmodbus_reads_and_writes_through_the_gateway();
 }
 
-static void a_request_to_a_unit_without_a_line_gets_0a(void **state)
+TEST(a_request_to_a_unit_without_a_line_gets_0a)
 {
     double took = TIMEOUT_MS;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < ATTEMPTS && took > TIMEOUT_MS * 0.9e-3; i++) {
         double before = seconds();
 
@@ -230,13 +220,12 @@ static void a_request_to_a_unit_without_a_line_gets_0a(void **state)
     assert_true(took < TIMEOUT_MS * 0.9e-3);
 }
 
-static void requests_of_many_connections_wait_for_their_turn(void **state)
+TEST(requests_of_many_connections_wait_for_their_turn)
 {
     enum { MANY = 12 };
     int fds[MANY];
     unsigned i, round;
 
-    (void)state;
     for (i = 0; i < MANY; i++)
         fds[i] = tcp_connect((uint16_t)port);
     for (round = 0; round < 5; round++) {
@@ -271,7 +260,7 @@ static void requests_of_many_connections_wait_for_their_turn(void **state)
         close(fds[i]);
 }
 
-static void a_line_that_waits_does_not_delay_another(void **state)
+TEST(a_line_that_waits_does_not_delay_another)
 {
     static const uint8_t absent[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
     uint8_t answer[600];
@@ -279,7 +268,6 @@ static void a_line_that_waits_does_not_delay_another(void **state)
     int fd = tcp_connect((uint16_t)port);
     unsigned i, attempts;
 
-    (void)state;
     modbus_set_slave(client, SERVED_UNIT);
     for (i = attempts = 0; i < 5 && attempts < ATTEMPTS; attempts++) {
         struct pollfd pending = {fd, POLLIN, 0};
@@ -296,12 +284,11 @@ static void a_line_that_waits_does_not_delay_another(void **state)
     close(fd);
 }
 
-static void a_connection_that_breaks_gives_up_its_request(void **state)
+TEST(a_connection_that_breaks_gives_up_its_request)
 {
     const struct linger hard = {1, 0};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 40; i++) {
         static const uint8_t request[] = {0, 1, 0, 0, 0, 6, PEER_UNIT, 3, 0, 0, 0, 1};
         int fd = tcp_connect((uint16_t)port);
@@ -313,21 +300,20 @@ static void a_connection_that_breaks_gives_up_its_request(void **state)
             usleep(1000);
         close(fd);
     }
-    libmodbus_reads_and_writes_through_the_gateway(state);
+    libmodbus_reads_and_writes_through_the_gateway();
 }
 
-static void connections_beyond_the_places_are_closed(void **state)
+TEST(connections_beyond_the_places_are_closed)
 {
     int fds[40];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(fds); i++)
         fds[i] = tcp_connect((uint16_t)port);
     /* One of the places is the client's. */
     for (i = 0; i < COUNT(fds); i++)
         assert_int_equal(asked_is_served(fds[i], NO_LINE, 0x0A), i < PLACES - 1);
-    libmodbus_reads_and_writes_through_the_gateway(state);
+    libmodbus_reads_and_writes_through_the_gateway();
     for (i = 0; i < COUNT(fds); i++)
         close(fds[i]);
 }
@@ -348,12 +334,11 @@ static void have_line(void)
     run_peer();
 }
 
-static void a_request_to_a_lost_line_gets_0a_until_the_line_is_back(void **state)
+TEST(a_request_to_a_lost_line_gets_0a_until_the_line_is_back)
 {
     double start;
     uint16_t word;
 
-    (void)state;
     lose_line();
     expect_exception(0x0A, PEER_UNIT);
     expect_exception(0x0A, PEER_UNIT);
@@ -366,11 +351,10 @@ static void a_request_to_a_lost_line_gets_0a_until_the_line_is_back(void **state
         assert_true(seconds() - start < PATIENCE_MS * 1e-3);
 }
 
-static void a_line_that_was_lost_between_requests_fails_no_request(void **state)
+TEST(a_line_that_was_lost_between_requests_fails_no_request)
 {
     uint16_t word;
 
-    (void)state;
     /* The gateway has opened the line when it answers. */
     modbus_set_slave(client, PEER_UNIT);
     assert_int_equal(modbus_read_registers(client, 0, 1, &word), 1);
@@ -381,7 +365,7 @@ static void a_line_that_was_lost_between_requests_fails_no_request(void **state)
 
 /* After a request to another unit, libmodbus's server takes the next frame for the response of that
  * unit. docs/gateway.md says so. */
-static void a_libmodbus_server_ignores_the_request_after_one_to_an_absent_unit(void **state)
+TEST(a_libmodbus_server_ignores_the_request_after_one_to_an_absent_unit)
 {
     uint16_t word;
 
@@ -400,11 +384,11 @@ static void a_libmodbus_server_ignores_the_request_after_one_to_an_absent_unit(v
     modbus_set_response_timeout(peer, 0, 20000);
     run_peer();
     expect_exception(0x0B, ABSENT);
-    libmodbus_reads_and_writes_through_the_gateway(state);
+    libmodbus_reads_and_writes_through_the_gateway();
 }
 
 /* A gateway with bad arguments prints no `ready` line and ends with exit code 2. */
-static void bad_arguments_end_the_program(void **state)
+TEST(bad_arguments_end_the_program)
 {
     static const char *const bad[][8] = {
         {"gateway"},
@@ -450,7 +434,6 @@ static void bad_arguments_end_the_program(void **state)
     char text[64];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(bad); i++) {
         program one;
 
@@ -458,28 +441,4 @@ static void bad_arguments_end_the_program(void **state)
         assert_int_equal(program_rest(&one, text, sizeof text), 0);
         assert_int_equal(program_end(&one), 2);
     }
-}
-
-/* Each test starts a gateway of its own, so that no test finds the state of another. */
-#define TEST(test) cmocka_unit_test_setup_teardown(test, start, stop)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(libmodbus_reads_and_writes_through_the_gateway),
-        TEST(exceptions_of_a_device_pass_through),
-        TEST(every_function_passes_through),
-        TEST(a_request_to_an_absent_device_gets_0b_after_the_timeout),
-        TEST(a_request_to_a_unit_without_a_line_gets_0a),
-        TEST(requests_of_many_connections_wait_for_their_turn),
-        TEST(a_line_that_waits_does_not_delay_another),
-        TEST(a_connection_that_breaks_gives_up_its_request),
-        TEST(connections_beyond_the_places_are_closed),
-        TEST(a_request_to_a_lost_line_gets_0a_until_the_line_is_back),
-        TEST(a_line_that_was_lost_between_requests_fails_no_request),
-        TEST(a_libmodbus_server_ignores_the_request_after_one_to_an_absent_unit),
-        TEST(bad_arguments_end_the_program),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

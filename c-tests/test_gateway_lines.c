@@ -16,12 +16,12 @@ static const mbm_gatewayRoute routes[] = {{1, 31, 0, 0}, {101, 131, 1, 1}};
 #define NO_PATH "\x83\x0A"
 #define NO_RESPONSE "\x83\x0B"
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     gateway_bench_start(&b, routes, COUNT(routes));
-    return 0;
 }
+
+fixture each_test = {start, NULL};
 
 static uint8_t ready;
 
@@ -31,9 +31,8 @@ static uint8_t is_ready(void *context)
     return ready;
 }
 
-static void a_line_that_is_not_ready_gets_0a(void **state)
+TEST(a_line_that_is_not_ready_gets_0a)
 {
-    (void)state;
     b.lines[0].isReady = is_ready;
     b.lines[0].context = &b;
     ready = 0;
@@ -45,11 +44,10 @@ static void a_line_that_is_not_ready_gets_0a(void **state)
     ON_LINE(0, 2, READ);
 }
 
-static void a_changed_route_holds_for_later_requests(void **state)
+TEST(a_changed_route_holds_for_later_requests)
 {
     static mbm_gatewayRoute map[2];
 
-    (void)state;
     map[0] = (mbm_gatewayRoute){1, 9, 0, 0};
     map[1] = (mbm_gatewayRoute){10, 19, 1, 0};
     gateway_bench_start(&b, map, COUNT(map));
@@ -67,9 +65,8 @@ static void a_changed_route_holds_for_later_requests(void **state)
     EXPECT(0, 3, 12, NO_PATH);
 }
 
-static void a_line_that_is_lost_gets_0a(void **state)
+TEST(a_line_that_is_lost_gets_0a)
 {
-    (void)state;
     ASK(0, 1, 2, READ);
     ASK(0, 2, 2, READ);
     ON_LINE(0, 2, READ);
@@ -96,17 +93,15 @@ static void fill_the_queue(void)
     }
 }
 
-static void a_client_whose_queue_is_full_gets_0a(void **state)
+TEST(a_client_whose_queue_is_full_gets_0a)
 {
-    (void)state;
     fill_the_queue();
     ASK(0, 1, 2, READ);
     EXPECT(0, 1, 2, NO_PATH);
 }
 
-static void the_program_shares_the_line(void **state)
+TEST(the_program_shares_the_line)
 {
-    (void)state;
     memset(own, 0, sizeof own);
     own[0].unit = 9;
     ASK(0, 1, 2, READ);
@@ -123,11 +118,10 @@ static void the_program_shares_the_line(void **state)
     EXPECT(0, 2, 2, OTHER_VALUE);
 }
 
-static void a_line_that_is_begun_anew_gets_0a(void **state)
+TEST(a_line_that_is_begun_anew_gets_0a)
 {
     const mbm_port port = memory_port_of(&b.wires[0]);
 
-    (void)state;
     ASK(0, 1, 2, READ);
     ON_LINE(0, 2, READ);
     OK(mbm_client_beginRtu(&b.clients[0], &port, b.frames[0], MBM_MAX_FRAME));
@@ -141,9 +135,8 @@ static void a_line_that_is_begun_anew_gets_0a(void **state)
     EXPECT(0, 3, 2, NO_PATH);
 }
 
-static void a_suspended_line_goes_on_when_it_is_resumed(void **state)
+TEST(a_suspended_line_goes_on_when_it_is_resumed)
 {
-    (void)state;
     OK(mbm_client_suspend(&b.clients[0], NULL));
     ASK(0, 1, 2, READ);
     SILENT(b.wires[0]);
@@ -154,12 +147,11 @@ static void a_suspended_line_goes_on_when_it_is_resumed(void **state)
     EXPECT(0, 1, 2, VALUE);
 }
 
-static void an_ascii_line_works(void **state)
+TEST(an_ascii_line_works)
 {
     const mbm_port port = memory_port_of(&b.wires[1]);
     static const char sent[] = ":020300100001EA\r\n", reply[] = ":0203021234B3\r\n";
 
-    (void)state;
     OK(mbm_client_beginAscii(&b.clients[1], &port, b.frames[1], MBM_MAX_ASCII_FRAME));
     ASK(0, 1, 102, READ);
     gateway_bench_settle(&b);
@@ -175,14 +167,13 @@ static void an_ascii_line_works(void **state)
 }
 
 /* A line that is a TCP connection has as many requests under way as `inFlight` says. */
-static void a_line_may_be_a_tcp_connection(void **state)
+TEST(a_line_may_be_a_tcp_connection)
 {
     static uint8_t outgoing[MBM_MAX_TCP_FRAME];
     const mbm_port port = memory_port_of(&b.wires[0]);
     uint8_t reply[] = {0, 0, 0, 0, 0, 5, 2, 3, 2, 0x12, 0x34};
     unsigned i;
 
-    (void)state;
     OK(mbm_client_beginTcp(&b.clients[0], &port, b.frames[0], MBM_MAX_TCP_FRAME, outgoing,
                            sizeof outgoing));
     OK(mbm_client_setInFlight(&b.clients[0], 3));
@@ -226,11 +217,10 @@ static uint16_t serve(void *context, const mbm_request *request, uint8_t *respon
     return 1;
 }
 
-static void own_units_are_served_beside_the_lines(void **state)
+TEST(own_units_are_served_beside_the_lines)
 {
     static const mbm_gatewayRoute local[] = {{1, 31, 0, 0}, {200, 201, MBM_GATEWAY_LOCAL, 7}};
 
-    (void)state;
     gateway_bench_start(&b, local, COUNT(local));
     memset(&unit, 0, sizeof unit);
     memset(&table, 0, sizeof table);
@@ -264,24 +254,4 @@ static void own_units_are_served_beside_the_lines(void **state)
     assert_int_equal(units_seen[3], 7);
     ON_LINE(0, 3, READ);
     SILENT(b.wires[1]);
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, start)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_line_that_is_not_ready_gets_0a),
-        TEST(a_changed_route_holds_for_later_requests),
-        TEST(a_line_that_is_lost_gets_0a),
-        TEST(a_client_whose_queue_is_full_gets_0a),
-        TEST(the_program_shares_the_line),
-        TEST(a_line_that_is_begun_anew_gets_0a),
-        TEST(a_suspended_line_goes_on_when_it_is_resumed),
-        TEST(an_ascii_line_works),
-        TEST(a_line_may_be_a_tcp_connection),
-        TEST(own_units_are_served_beside_the_lines),
-    };
-
-    return cmocka_run_group_tests_name("gateway lines", tests, NULL, NULL);
 }

@@ -15,12 +15,12 @@ static const mbm_gatewayRoute routes[] = {
 #define VALUE "\x03\x02\x12\x34"
 #define OTHER_VALUE "\x03\x02\xAB\xCD"
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     gateway_bench_start(&b, routes, COUNT(routes));
-    return 0;
 }
+
+fixture each_test = {start, NULL};
 
 /* --- refused --- */
 
@@ -33,7 +33,7 @@ static void refuses_config(uint8_t status, mbm_gatewayConfig config)
     IS(MBM_NOT_INITIALISED, mbm_gateway_poll(&other));
 }
 
-static void a_gateway_goes_on_after_a_refused_begin(void **state)
+TEST(a_gateway_goes_on_after_a_refused_begin)
 {
     static const mbm_gatewayRoute bad[] = {{2, 1, 0, 0},
                                            {1, 1, 2, 0},
@@ -52,7 +52,6 @@ static void a_gateway_goes_on_after_a_refused_begin(void **state)
     mbm_gatewayConfig config;
     unsigned i;
 
-    (void)state;
     ASK(0, 1, 2, READ);
     ON_LINE(0, 2, READ);
     REFUSED(MBM_INVALID_ARGUMENT, b.gateway, mbm_gateway_begin(&b.gateway, NULL));
@@ -87,13 +86,12 @@ static void a_gateway_goes_on_after_a_refused_begin(void **state)
     EXPECT(0, 1, 2, VALUE);
 }
 
-static void a_refused_call_changes_nothing(void **state)
+TEST(a_refused_call_changes_nothing)
 {
     static const mbm_function bad[] = {{0x41, {0}, {0}}, {128, {0}, {0}}};
     mbm_port port = memory_port_of(&b.sockets[0]), deaf = port;
     mbm_unit beyond = {.id = 300};
 
-    (void)state;
     deaf.read = NULL;
     OK(mbm_gateway_close(&b.gateway, 1));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_open(&b.gateway, 1, NULL));
@@ -110,12 +108,11 @@ static void a_refused_call_changes_nothing(void **state)
     assert_int_equal(mbm_gateway_isReading(&b.gateway, 250), 0);
 }
 
-static void an_object_that_was_never_begun_does_nothing(void **state)
+TEST(an_object_that_was_never_begun_does_nothing)
 {
     static mbm_gateway none;
     const mbm_port port = memory_port_of(&b.sockets[0]);
 
-    (void)state;
     IS(MBM_NOT_INITIALISED, mbm_gateway_poll(&none));
     IS(MBM_INVALID_ARGUMENT, mbm_gateway_poll(NULL));
     IS(MBM_NOT_INITIALISED, mbm_gateway_open(&none, 0, &port));
@@ -134,9 +131,8 @@ static void an_object_that_was_never_begun_does_nothing(void **state)
 
 /* --- begin again --- */
 
-static void begin_again_gives_up_all_connections_and_requests(void **state)
+TEST(begin_again_gives_up_all_connections_and_requests)
 {
-    (void)state;
     OK(mbm_gateway_setMaxPending(&b.gateway, 2));
     OK(mbm_gateway_setQueueTime(&b.gateway, 20));
     ASK(0, 1, 2, READ);
@@ -166,7 +162,7 @@ static void begin_again_gives_up_all_connections_and_requests(void **state)
     ON_LINE(0, 3, READ);
 }
 
-static void begin_again_with_other_parts_works(void **state)
+TEST(begin_again_with_other_parts_works)
 {
     static mbm_gatewayConnection connections[2];
     static mbm_gatewayRequest requests[2];
@@ -181,7 +177,6 @@ static void begin_again_with_other_parts_works(void **state)
                                       .requests = requests,
                                       .requestCount = 2};
 
-    (void)state;
     ASK(0, 1, 2, READ);
     ON_LINE(0, 2, READ);
     line.client = &b.clients[1];
@@ -283,11 +278,10 @@ static void exchange(void)
     EXPECT(0, 1, 2, VALUE);
 }
 
-static void hooks_of_a_connection_cannot_use_the_gateway(void **state)
+TEST(hooks_of_a_connection_cannot_use_the_gateway)
 {
     const mbm_port port = hooked(&b.sockets[0]);
 
-    (void)state;
     OK(mbm_gateway_close(&b.gateway, 0));
     OK(mbm_gateway_open(&b.gateway, 0, &port));
     OK(mbm_gateway_setQueueTime(&b.gateway, 1000));
@@ -296,11 +290,10 @@ static void hooks_of_a_connection_cannot_use_the_gateway(void **state)
     assert_true(entered > 3);
 }
 
-static void hooks_of_a_line_cannot_use_the_gateway(void **state)
+TEST(hooks_of_a_line_cannot_use_the_gateway)
 {
     const mbm_port port = hooked(&b.wires[0]);
 
-    (void)state;
     /* The clock of the new port is read at once, in begin, when nothing may be refused. */
     memset(&b.clients[0], 0, sizeof b.clients[0]);
     {
@@ -315,13 +308,12 @@ static void hooks_of_a_line_cannot_use_the_gateway(void **state)
     assert_true(entered > 3);
 }
 
-static void functions_of_own_units_and_of_own_requests_cannot_use_the_gateway(void **state)
+TEST(functions_of_own_units_and_of_own_requests_cannot_use_the_gateway)
 {
     static mbm_unit unit;
     static mbm_custom custom = {.serve = serve, .code = 0x41};
     static mbm_clientRequest own = {.unit = 9, .done = done};
 
-    (void)state;
     OK(mbm_unit_serveCustom(&unit, &custom));
     OK(mbm_gateway_serveUnits(&b.gateway, &unit, 1));
     entered = 0;
@@ -354,11 +346,10 @@ static int16_t read_and_close(void *context, uint8_t *bytes, uint16_t capacity)
     return inner.read(context, bytes, capacity);
 }
 
-static void a_hook_of_a_line_that_the_program_polls_cannot_use_the_gateway(void **state)
+TEST(a_hook_of_a_line_that_the_program_polls_cannot_use_the_gateway)
 {
     mbm_port port = inner = memory_port_of(&b.wires[0]);
 
-    (void)state;
     port.read = read_and_close;
     OK(mbm_client_beginRtu(&b.clients[0], &port, b.frames[0], MBM_MAX_FRAME));
     ASK(0, 1, 2, READ);
@@ -383,11 +374,10 @@ static void done_and_close(void *context, mbm_clientRequest *request)
     close_and_poll(0);
 }
 
-static void done_may_use_the_gateway_if_the_program_polls_the_line(void **state)
+TEST(done_may_use_the_gateway_if_the_program_polls_the_line)
 {
     static mbm_clientRequest own;
 
-    (void)state;
     memset(&own, 0, sizeof own);
     own.unit = 9;
     own.done = done_and_close;
@@ -404,24 +394,4 @@ static void done_may_use_the_gateway_if_the_program_polls_the_line(void **state)
     assert_int_equal(mbm_client_pending(&b.clients[0]), 0);
     ASK(1, 1, 2, READ);
     ON_LINE(0, 2, READ);
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, start)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_gateway_goes_on_after_a_refused_begin),
-        TEST(a_refused_call_changes_nothing),
-        TEST(an_object_that_was_never_begun_does_nothing),
-        TEST(begin_again_gives_up_all_connections_and_requests),
-        TEST(begin_again_with_other_parts_works),
-        TEST(hooks_of_a_connection_cannot_use_the_gateway),
-        TEST(hooks_of_a_line_cannot_use_the_gateway),
-        TEST(functions_of_own_units_and_of_own_requests_cannot_use_the_gateway),
-        TEST(a_hook_of_a_line_that_the_program_polls_cannot_use_the_gateway),
-        TEST(done_may_use_the_gateway_if_the_program_polls_the_line),
-    };
-
-    return cmocka_run_group_tests_name("gateway misuse", tests, NULL, NULL);
 }

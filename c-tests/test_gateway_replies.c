@@ -140,7 +140,7 @@ typedef struct late {
         }                                                                                          \
     }
 
-static void a_late_reply_to_one_client_does_not_reach_another(void **state)
+TEST(a_late_reply_to_one_client_does_not_reach_another)
 {
     static const late cases[] = {
         LATE("\x03\x00\x00\x00\x03",
@@ -165,7 +165,6 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
     int first[COUNT(cases)], second;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(cases); i++) {
         const late *c = &cases[i];
 
@@ -191,7 +190,7 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
     }
 }
 
-static void a_reply_that_does_not_answer_the_request_becomes_0b(void **state)
+TEST(a_reply_that_does_not_answer_the_request_becomes_0b)
 {
     static const char *const no_answers[][2] = {
         {"\x03\x00\x64\x00\x03", "\x03\x02\x12\x34"}, /* one register instead of three */
@@ -206,7 +205,6 @@ static void a_reply_that_does_not_answer_the_request_becomes_0b(void **state)
     unsigned i;
     int fd;
 
-    (void)state;
     start(&g, "500ms", NULL);
     fd = tcp_connect(g.port);
     for (i = 0; i < COUNT(no_answers); i++) {
@@ -222,13 +220,12 @@ static void a_reply_that_does_not_answer_the_request_becomes_0b(void **state)
     stop(&g);
 }
 
-static void a_request_that_the_standard_forbids_does_not_reach_the_line(void **state)
+TEST(a_request_that_the_standard_forbids_does_not_reach_the_line)
 {
     gateway g;
     struct pollfd asked = {0, POLLIN, 0};
     int fd;
 
-    (void)state;
     start(&g, TIMEOUT, NULL);
     fd = tcp_connect(g.port);
     ASK(fd, "\x03\x00\x64\x00\x00");
@@ -243,12 +240,11 @@ static void a_request_that_the_standard_forbids_does_not_reach_the_line(void **s
     stop(&g);
 }
 
-static void force_listen_only_mode_is_passed_on_and_gets_no_response(void **state)
+TEST(force_listen_only_mode_is_passed_on_and_gets_no_response)
 {
     gateway g;
     int fd;
 
-    (void)state;
     start(&g, TIMEOUT, NULL);
     fd = tcp_connect(g.port);
     ASK(fd, "\x08\x00\x04\x00\x00");
@@ -261,12 +257,11 @@ static void force_listen_only_mode_is_passed_on_and_gets_no_response(void **stat
     stop(&g);
 }
 
-static void unknown_functions_pass_through(void **state)
+TEST(unknown_functions_pass_through)
 {
     gateway g;
     int fd;
 
-    (void)state;
     start(&g, TIMEOUT, NULL);
     fd = tcp_connect(g.port);
     ASK(fd, "\x64 any data");
@@ -287,14 +282,13 @@ static void unknown_functions_pass_through(void **state)
     stop(&g);
 }
 
-static void every_function_of_our_server_passes_through(void **state)
+TEST(every_function_of_our_server_passes_through)
 {
     gateway g;
     static served ours;
     modbus_t *client;
     int fd;
 
-    (void)state;
     served_prepare(&ours);
     served_on_line(&ours, MBM_FRAMING_RTU);
     start_at(&g, ours.line.path, TIMEOUT, NULL);
@@ -320,7 +314,7 @@ static void every_function_of_our_server_passes_through(void **state)
 }
 
 /* The test checks only the shortest time, since a busy machine makes times longer. */
-static void the_quiet_time_is_an_option(void **state)
+TEST(the_quiet_time_is_an_option)
 {
     static const char *const options[] = {"--quiet-time", "1s", NULL};
     static const char *const bad[][7] = {
@@ -335,7 +329,6 @@ static void the_quiet_time_is_an_option(void **state)
     unsigned i;
     int fd;
 
-    (void)state;
     start(&g, "200ms", options);
     fd = tcp_connect(g.port);
     before = seconds();
@@ -354,19 +347,4 @@ static void the_quiet_time_is_an_option(void **state)
         assert_int_equal(program_rest(&g.program, text, sizeof text), 0);
         assert_int_equal(program_end(&g.program), 2);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_late_reply_to_one_client_does_not_reach_another),
-        cmocka_unit_test(a_reply_that_does_not_answer_the_request_becomes_0b),
-        cmocka_unit_test(a_request_that_the_standard_forbids_does_not_reach_the_line),
-        cmocka_unit_test(force_listen_only_mode_is_passed_on_and_gets_no_response),
-        cmocka_unit_test(unknown_functions_pass_through),
-        cmocka_unit_test(every_function_of_our_server_passes_through),
-        cmocka_unit_test(the_quiet_time_is_an_option),
-    };
-
-    return cmocka_run_group_tests_name("gateway replies", tests, NULL, NULL);
 }

@@ -21,21 +21,20 @@ static const mbm_gatewayRoute routes[] = {
 #define NO_PATH "\x83\x0A"
 #define NO_RESPONSE "\x83\x0B"
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     gateway_bench_start(&b, routes, COUNT(routes));
-    return 0;
 }
 
-static void a_request_goes_to_the_line_and_unit_of_its_route(void **state)
+fixture each_test = {start, NULL};
+
+TEST(a_request_goes_to_the_line_and_unit_of_its_route)
 {
     static const struct {
         uint8_t unit, line, there;
     } cases[] = {{1, 0, 1}, {31, 0, 31}, {101, 1, 1}, {131, 1, 31}, {255, 0, 5}, {0, 1, 6}};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(cases); i++) {
         ASK(0, 0x1200 + i, cases[i].unit, READ);
         ON_LINE(cases[i].line, cases[i].there, READ);
@@ -45,9 +44,8 @@ static void a_request_goes_to_the_line_and_unit_of_its_route(void **state)
     SILENT(b.wires[0]);
 }
 
-static void a_unit_without_a_route_gets_0a(void **state)
+TEST(a_unit_without_a_route_gets_0a)
 {
-    (void)state;
     ASK(1, 7, 32, READ);
     EXPECT(1, 7, 32, NO_PATH);
     ASK(1, 8, 254, READ);
@@ -56,26 +54,23 @@ static void a_unit_without_a_route_gets_0a(void **state)
     SILENT(b.wires[1]);
 }
 
-static void an_exception_of_a_device_passes(void **state)
+TEST(an_exception_of_a_device_passes)
 {
-    (void)state;
     ASK(0, 1, 2, READ);
     ON_LINE(0, 2, READ);
     REPLY(0, 2, "\x83\x02");
     EXPECT(0, 1, 2, "\x83\x02");
 }
 
-static void a_silent_device_gets_0b(void **state)
+TEST(a_silent_device_gets_0b)
 {
-    (void)state;
     ASK(0, 1, 2, READ);
     ON_LINE(0, 2, READ);
     EXPECT(0, 1, 2, NO_RESPONSE);
 }
 
-static void half_a_reply_and_a_damaged_one_get_0b(void **state)
+TEST(half_a_reply_and_a_damaged_one_get_0b)
 {
-    (void)state;
     ASK(0, 1, 2, READ);
     ON_LINE(0, 2, READ);
     memory_port_bytes(&b.wires[0], (const uint8_t *)"\x02\x03\x02\x12", 4);
@@ -86,9 +81,8 @@ static void half_a_reply_and_a_damaged_one_get_0b(void **state)
     EXPECT(0, 2, 2, NO_RESPONSE);
 }
 
-static void a_reply_that_does_not_answer_the_request_gets_0b(void **state)
+TEST(a_reply_that_does_not_answer_the_request_gets_0b)
 {
-    (void)state;
     ASK(0, 1, 2, "\x03\x00\x10\x00\x03");
     ON_LINE(0, 2, "\x03\x00\x10\x00\x03");
     REPLY(0, 2, VALUE);
@@ -99,9 +93,8 @@ static void a_reply_that_does_not_answer_the_request_gets_0b(void **state)
     EXPECT(0, 2, 2, "\x86\x0B");
 }
 
-static void a_late_reply_to_a_closed_connection_is_discarded(void **state)
+TEST(a_late_reply_to_a_closed_connection_is_discarded)
 {
-    (void)state;
     ASK(0, 1, 2, READ);
     ON_LINE(0, 2, READ);
     EXPECT(0, 1, 2, NO_RESPONSE);
@@ -113,9 +106,8 @@ static void a_late_reply_to_a_closed_connection_is_discarded(void **state)
     SILENT(b.sockets[0]);
 }
 
-static void a_request_that_the_standard_forbids_is_refused(void **state)
+TEST(a_request_that_the_standard_forbids_is_refused)
 {
-    (void)state;
     ASK(0, 1, 2, "\x03\x00\x10\x00\x00");
     EXPECT(0, 1, 2, "\x83\x03");
     ASK(0, 2, 2, "\x03\xFF\xFF\x00\x02");
@@ -130,18 +122,16 @@ static void a_request_that_the_standard_forbids_is_refused(void **state)
     SILENT(b.wires[0]);
 }
 
-static void force_listen_only_mode_gets_no_response(void **state)
+TEST(force_listen_only_mode_gets_no_response)
 {
-    (void)state;
     ASK(0, 1, 2, "\x08\x00\x04\x00\x00");
     ON_LINE(0, 2, "\x08\x00\x04\x00\x00");
     SILENT(b.sockets[0]);
     assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
 }
 
-static void unknown_functions_pass(void **state)
+TEST(unknown_functions_pass)
 {
-    (void)state;
     ASK(0, 1, 2, "\x64 any data");
     ON_LINE(0, 2, "\x64 any data");
     REPLY(0, 2, "\x64 of any length");
@@ -152,11 +142,10 @@ static void unknown_functions_pass(void **state)
     EXPECT(0, 2, 2, "\x41\x00");
 }
 
-static void a_reply_without_data_passes(void **state)
+TEST(a_reply_without_data_passes)
 {
     unsigned function;
 
-    (void)state;
     for (function = 0x41; function <= 0x48; function++) {
         const char pdu[] = {(char)function};
 
@@ -167,7 +156,7 @@ static void a_reply_without_data_passes(void **state)
     }
 }
 
-static void a_declared_function_has_its_lengths(void **state)
+TEST(a_declared_function_has_its_lengths)
 {
     static const mbm_function functions[] = {
         {0x41, {MBM_RULE_FIXED, 3, 0}, {MBM_RULE_COUNTED, 1, 1}},
@@ -175,7 +164,6 @@ static void a_declared_function_has_its_lengths(void **state)
     };
     uint32_t before;
 
-    (void)state;
     OK(mbm_gateway_setFunctions(&b.gateway, functions, COUNT(functions)));
     ASK(0, 1, 2, "\x41\x01");
     EXPECT(0, 1, 2, "\xC1\x03");
@@ -199,9 +187,8 @@ static void a_declared_function_has_its_lengths(void **state)
     ON_LINE(0, 2, "\x41\x01");
 }
 
-static void a_retry_sends_the_same_request(void **state)
+TEST(a_retry_sends_the_same_request)
 {
-    (void)state;
     OK(mbm_client_setRetries(&b.clients[0], 2));
     ASK(0, 1, 2, "\x10\x00\x01\x00\x02\x04\x11\x22\x33\x44");
     ON_LINE(0, 2, "\x10\x00\x01\x00\x02\x04\x11\x22\x33\x44");
@@ -216,12 +203,11 @@ static void a_retry_sends_the_same_request(void **state)
     EXPECT(0, 2, 2, "\x10\x00\x01\x00\x02");
 }
 
-static void the_longest_request_and_reply_pass(void **state)
+TEST(the_longest_request_and_reply_pass)
 {
     char request[253] = {0x10, 0, 1, 0, 123, (char)246}, reply[252] = {0x03, (char)250};
     unsigned i;
 
-    (void)state;
     for (i = 6; i < 252; i++)
         request[i] = (char)i;
     for (i = 2; i < 252; i++)
@@ -240,11 +226,10 @@ static void the_longest_request_and_reply_pass(void **state)
 
 #define WRITE "\x06\x00\x10\x12\x34"
 
-static void a_broadcast_goes_to_its_line_and_gets_no_response(void **state)
+TEST(a_broadcast_goes_to_its_line_and_gets_no_response)
 {
     static const mbm_gatewayRoute one[] = {{0, 31, 0, 0}, {101, 131, 1, 1}};
 
-    (void)state;
     gateway_bench_start(&b, one, COUNT(one));
     ASK(0, 1, 0, WRITE);
     ASK(0, 2, 1, READ);
@@ -257,11 +242,10 @@ static void a_broadcast_goes_to_its_line_and_gets_no_response(void **state)
     assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
 }
 
-static void a_broadcast_to_all_lines_reaches_each(void **state)
+TEST(a_broadcast_to_all_lines_reaches_each)
 {
     static const mbm_gatewayRoute all[] = {{0, 0, MBM_GATEWAY_ALL_LINES, 0}, {1, 31, 1, 0}};
 
-    (void)state;
     gateway_bench_start(&b, all, COUNT(all));
     ASK(0, 1, 0, WRITE);
     ON_LINE(0, 0, WRITE);
@@ -276,11 +260,10 @@ static void a_broadcast_to_all_lines_reaches_each(void **state)
     assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
 }
 
-static void a_broadcast_to_all_lines_of_a_gateway_without_lines_ends(void **state)
+TEST(a_broadcast_to_all_lines_of_a_gateway_without_lines_ends)
 {
     static const mbm_gatewayRoute all[] = {{0, 0, MBM_GATEWAY_ALL_LINES, 0}};
 
-    (void)state;
     gateway_bench_start(&b, all, COUNT(all));
     b.config.lineCount = 0;
     OK(mbm_gateway_begin(&b.gateway, &b.config));
@@ -292,42 +275,13 @@ static void a_broadcast_to_all_lines_of_a_gateway_without_lines_ends(void **stat
     SILENT(b.sockets[0]);
 }
 
-static void a_function_that_cannot_be_broadcast_gets_01(void **state)
+TEST(a_function_that_cannot_be_broadcast_gets_01)
 {
     static const mbm_gatewayRoute all[] = {{0, 0, MBM_GATEWAY_ALL_LINES, 0}};
 
-    (void)state;
     gateway_bench_start(&b, all, COUNT(all));
     ASK(0, 1, 0, READ);
     EXPECT(0, 1, 0, "\x83\x01");
     SILENT(b.wires[0]);
     SILENT(b.wires[1]);
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, start)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_request_goes_to_the_line_and_unit_of_its_route),
-        TEST(a_unit_without_a_route_gets_0a),
-        TEST(an_exception_of_a_device_passes),
-        TEST(a_silent_device_gets_0b),
-        TEST(half_a_reply_and_a_damaged_one_get_0b),
-        TEST(a_reply_that_does_not_answer_the_request_gets_0b),
-        TEST(a_late_reply_to_a_closed_connection_is_discarded),
-        TEST(a_request_that_the_standard_forbids_is_refused),
-        TEST(force_listen_only_mode_gets_no_response),
-        TEST(unknown_functions_pass),
-        TEST(a_reply_without_data_passes),
-        TEST(a_declared_function_has_its_lengths),
-        TEST(a_retry_sends_the_same_request),
-        TEST(the_longest_request_and_reply_pass),
-        TEST(a_broadcast_goes_to_its_line_and_gets_no_response),
-        TEST(a_broadcast_to_all_lines_reaches_each),
-        TEST(a_broadcast_to_all_lines_of_a_gateway_without_lines_ends),
-        TEST(a_function_that_cannot_be_broadcast_gets_01),
-    };
-
-    return cmocka_run_group_tests_name("gateway requests", tests, NULL, NULL);
 }

@@ -26,33 +26,32 @@ static pty line;
 static char name[64];
 static int fds[MANY];
 
-static int begin(void **state)
+static void begin(void)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < MANY; i++)
         fds[i] = -1;
     alarm(6 * PATIENCE_MS / 1000);
     pty_open(&line);
     snprintf(name, sizeof name, "/tmp/mbm-shortage-%d", (int)getpid());
     unlink(name);
-    return symlink(line.path, name);
+    assert_int_equal(symlink(line.path, name), 0);
 }
 
-static int end(void **state)
+static void end(void)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < MANY; i++)
         if (fds[i] >= 0)
             close(fds[i]);
     unlink(name);
     pty_close(&line);
     alarm(0);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 static void start(unsigned descriptors, const char *idle)
 {
@@ -93,12 +92,11 @@ static void close_from_to(unsigned first, unsigned last)
     }
 }
 
-static void with_few_descriptors_the_gateway_serves_sleeps_and_ends(void **state)
+TEST(with_few_descriptors_the_gateway_serves_sleeps_and_ends)
 {
     static const unsigned limits[] = {OWN + 1, OWN + 3, OWN + 15, OWN + 16, OWN + 17};
     unsigned i, k;
 
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     for (i = 0; i < COUNT(limits); i++) {
         const unsigned most = limits[i] - OWN < PLACES ? limits[i] - OWN : PLACES;
@@ -113,12 +111,11 @@ static void with_few_descriptors_the_gateway_serves_sleeps_and_ends(void **state
     }
 }
 
-static void connections_beyond_the_descriptors_are_closed_at_once(void **state)
+TEST(connections_beyond_the_descriptors_are_closed_at_once)
 {
     enum { SERVED = 4, ALL = MANY };
     unsigned i;
 
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     start(OWN + SERVED, "60s");
     connect_to(0, ALL);
@@ -134,11 +131,10 @@ static void connections_beyond_the_descriptors_are_closed_at_once(void **state)
     stop();
 }
 
-static void a_new_client_gets_the_place_of_an_idle_one(void **state)
+TEST(a_new_client_gets_the_place_of_an_idle_one)
 {
     char byte;
 
-    (void)state;
     start(0, "1s");
     connect_to(0, PLACES);
     /* The connections are silent for at least a second. */
@@ -149,12 +145,11 @@ static void a_new_client_gets_the_place_of_an_idle_one(void **state)
     stop();
 }
 
-static void a_new_client_gets_the_descriptor_of_an_idle_one(void **state)
+TEST(a_new_client_gets_the_descriptor_of_an_idle_one)
 {
     enum { SERVED = 4 };
     unsigned i;
 
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     start(OWN + SERVED, "1s");
     connect_to(0, SERVED);
@@ -163,11 +158,10 @@ static void a_new_client_gets_the_descriptor_of_an_idle_one(void **state)
     stop();
 }
 
-static void an_idle_time_of_0_closes_none(void **state)
+TEST(an_idle_time_of_0_closes_none)
 {
     unsigned i;
 
-    (void)state;
     start(0, "0s");
     connect_to(0, PLACES + 1);
     assert_int_equal(is_served(fds[PLACES]), 0);
@@ -176,12 +170,11 @@ static void an_idle_time_of_0_closes_none(void **state)
     stop();
 }
 
-static void a_connection_that_waits_for_its_device_is_not_idle(void **state)
+TEST(a_connection_that_waits_for_its_device_is_not_idle)
 {
     static const uint8_t request[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
     uint8_t answer[9];
 
-    (void)state;
     start(0, "1s");
     connect_to(0, 1);
     assert_int_equal(write(fds[0], request, sizeof request), sizeof request);
@@ -194,14 +187,13 @@ static void a_connection_that_waits_for_its_device_is_not_idle(void **state)
     stop();
 }
 
-static void a_lost_line_keeps_its_descriptor(void **state)
+TEST(a_lost_line_keeps_its_descriptor)
 {
     enum { SERVED = 4 };
     static const uint8_t request[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
     struct pollfd input;
     unsigned i;
 
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     start(OWN + SERVED, "60s");
     connect_to(0, SERVED + 2);
@@ -218,21 +210,4 @@ static void a_lost_line_keeps_its_descriptor(void **state)
     input = (struct pollfd){line.ours, POLLIN, 0};
     AWAIT((send(fds[0], request, sizeof request, MSG_NOSIGNAL), poll(&input, 1, 100) == 1));
     stop();
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(with_few_descriptors_the_gateway_serves_sleeps_and_ends),
-        TEST(connections_beyond_the_descriptors_are_closed_at_once),
-        TEST(a_new_client_gets_the_place_of_an_idle_one),
-        TEST(a_new_client_gets_the_descriptor_of_an_idle_one),
-        TEST(an_idle_time_of_0_closes_none),
-        TEST(a_connection_that_waits_for_its_device_is_not_idle),
-        TEST(a_lost_line_keeps_its_descriptor),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

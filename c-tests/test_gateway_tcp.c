@@ -60,19 +60,17 @@ static void stop(void)
     assert_int_equal(program_end(&gateway), 0);
 }
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     alarm(6 * PATIENCE_MS / 1000);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     alarm(0);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 /* The next connection of the gateway to the device. */
 static int accept_gateway(void)
@@ -148,14 +146,13 @@ static void expect_exception(uint8_t address, uint8_t exception)
     assert_memory_equal(response, wanted, sizeof wanted);
 }
 
-static void libmodbus_reaches_a_libmodbus_server_over_tcp(void **state)
+TEST(libmodbus_reaches_a_libmodbus_server_over_tcp)
 {
     uint16_t words[125], values[] = {1, 0xFFFE, 0x1234};
     tcp_server far;
     modbus_t *peer;
     int i;
 
-    (void)state;
     memset(&far, 0, sizeof far);
     tcp_server_start(&far);
     start("tcp://127.0.0.1", far.port, NULL);
@@ -178,13 +175,12 @@ static void libmodbus_reaches_a_libmodbus_server_over_tcp(void **state)
     tcp_server_stop(&far);
 }
 
-static void a_line_of_rtu_over_tcp_has_frames_of_rtu(void **state)
+TEST(a_line_of_rtu_over_tcp_has_frames_of_rtu)
 {
     uint8_t request[] = {UNIT, 3, 0, 7, 0, 1, 0, 0}, response[] = {UNIT, 3, 2, 0, 9, 0, 0};
     uint8_t found[sizeof request];
     int device;
 
-    (void)state;
     listener = tcp_listen(&device_port);
     start("rtu+tcp://127.0.0.1", device_port, NULL);
     device = accept_gateway();
@@ -200,12 +196,11 @@ static void a_line_of_rtu_over_tcp_has_frames_of_rtu(void **state)
     close(listener);
 }
 
-static void a_device_that_closes_an_idle_connection_costs_no_request(void **state)
+TEST(a_device_that_closes_an_idle_connection_costs_no_request)
 {
     uint8_t round;
     int device;
 
-    (void)state;
     listener = tcp_listen(&device_port);
     start("tcp://127.0.0.1", device_port, NULL);
     for (round = 1; round < 6; round++) {
@@ -227,11 +222,10 @@ static void a_device_that_closes_an_idle_connection_costs_no_request(void **stat
     close(listener);
 }
 
-static void a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again(void **state)
+TEST(a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again)
 {
     int device;
 
-    (void)state;
     listener = tcp_listen(&device_port);
     start("tcp://127.0.0.1", device_port, NULL);
     device = accept_gateway();
@@ -249,11 +243,10 @@ static void a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again(voi
     close(listener);
 }
 
-static void requests_to_a_device_that_does_not_listen_get_0a_until_it_does(void **state)
+TEST(requests_to_a_device_that_does_not_listen_get_0a_until_it_does)
 {
     int device, reserved = tcp_reserve(&device_port);
 
-    (void)state;
     start("tcp://127.0.0.1", device_port, NULL);
     ask(1);
     expect_exception(1, 0x0A);
@@ -271,11 +264,10 @@ static void requests_to_a_device_that_does_not_listen_get_0a_until_it_does(void 
     close(listener);
 }
 
-static void requests_to_a_host_that_is_not_found_get_0a(void **state)
+TEST(requests_to_a_host_that_is_not_found_get_0a)
 {
     uint8_t i;
 
-    (void)state;
     start("tcp://no-such-host.invalid", 502, NULL);
     for (i = 0; i < 3; i++) {
         ask(i);
@@ -285,14 +277,13 @@ static void requests_to_a_host_that_is_not_found_get_0a(void **state)
     stop();
 }
 
-static void a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says(void **state)
+TEST(a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says)
 {
     static const char *const options[] = {"--in-flight", "4", NULL};
     uint16_t transactions[4];
     uint8_t byte;
     int device, i;
 
-    (void)state;
     listener = tcp_listen(&device_port);
     start("tcp://127.0.0.1", device_port, options);
     device = accept_gateway();
@@ -333,39 +324,18 @@ static void expect_places(const char *const *options, unsigned places)
     close(listener);
 }
 
-static void forty_clients_are_served_if_there_are_places_for_them(void **state)
+TEST(forty_clients_are_served_if_there_are_places_for_them)
 {
     static const char *const options[] = {"-c", "40", NULL};
 
-    (void)state;
     expect_places(options, MANY);
 }
 
-static void of_forty_clients_those_without_a_place_are_closed_at_once(void **state)
+TEST(of_forty_clients_those_without_a_place_are_closed_at_once)
 {
     static const char *const one[] = {"-c", "1", NULL}, *const three[] = {"-c", "3", NULL};
 
-    (void)state;
     expect_places(NULL, 16);
     expect_places(three, 3);
     expect_places(one, 1);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(libmodbus_reaches_a_libmodbus_server_over_tcp),
-        TEST(a_line_of_rtu_over_tcp_has_frames_of_rtu),
-        TEST(a_device_that_closes_an_idle_connection_costs_no_request),
-        TEST(a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again),
-        TEST(requests_to_a_device_that_does_not_listen_get_0a_until_it_does),
-        TEST(requests_to_a_host_that_is_not_found_get_0a),
-        TEST(a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says),
-        TEST(forty_clients_are_served_if_there_are_places_for_them),
-        TEST(of_forty_clients_those_without_a_place_are_closed_at_once),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

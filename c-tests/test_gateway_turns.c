@@ -15,12 +15,12 @@ static const mbm_gatewayRoute routes[] = {{1, 31, 0, 0}, {101, 131, 1, 1}};
 #define NO_PATH "\x83\x0A"
 #define NO_RESPONSE "\x83\x0B"
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     gateway_bench_start(&b, routes, COUNT(routes));
-    return 0;
 }
+
+fixture each_test = {start, NULL};
 
 static uint16_t pending(unsigned connection)
 {
@@ -29,9 +29,8 @@ static uint16_t pending(unsigned connection)
 
 /* --- several requests of one connection --- */
 
-static void replies_go_back_as_they_arrive_with_their_transaction_id(void **state)
+TEST(replies_go_back_as_they_arrive_with_their_transaction_id)
 {
-    (void)state;
     ASK(0, 0x0001, 2, READ);
     ASK(0, 0xFFFF, 102, READ);
     ON_LINE(0, 2, READ);
@@ -44,11 +43,10 @@ static void replies_go_back_as_they_arrive_with_their_transaction_id(void **stat
     assert_int_equal(pending(0), 0);
 }
 
-static void requests_of_one_connection_reach_their_line_in_order(void **state)
+TEST(requests_of_one_connection_reach_their_line_in_order)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 5; i++)
         ASK(0, i, (uint8_t)(2 + i), READ);
     for (i = 0; i < 5; i++) {
@@ -58,9 +56,8 @@ static void requests_of_one_connection_reach_their_line_in_order(void **state)
     }
 }
 
-static void requests_with_the_same_transaction_id_are_all_answered(void **state)
+TEST(requests_with_the_same_transaction_id_are_all_answered)
 {
-    (void)state;
     ASK(0, 7, 2, READ);
     ASK(0, 7, 3, READ);
     ASK(1, 7, 4, READ);
@@ -75,9 +72,8 @@ static void requests_with_the_same_transaction_id_are_all_answered(void **state)
     EXPECT(0, 7, 3, OTHER_VALUE);
 }
 
-static void a_connection_has_as_many_requests_as_the_setting_allows(void **state)
+TEST(a_connection_has_as_many_requests_as_the_setting_allows)
 {
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_gateway_setMaxPending(&b.gateway, 0));
     OK(mbm_gateway_setMaxPending(&b.gateway, 2));
     ASK(0, 1, 2, READ);
@@ -106,11 +102,10 @@ static void next_is(uint8_t unit)
     REPLY(0, unit, VALUE);
 }
 
-static void the_connections_take_turns_on_a_line(void **state)
+TEST(the_connections_take_turns_on_a_line)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 5; i++)
         ASK(0, i, 2, READ);
     ON_LINE(0, 2, READ); /* the flood has begun before the others come */
@@ -130,11 +125,10 @@ static void the_connections_take_turns_on_a_line(void **state)
 
 /* However much one client sends: between two requests of another client at most two requests
  * of others reach the line. Counted in requests, so it does not depend on time. */
-static void a_flood_of_one_client_does_not_starve_another(void **state)
+TEST(a_flood_of_one_client_does_not_starve_another)
 {
     unsigned round, i, served = 0, others = 0;
 
-    (void)state;
     ASK(1, 0, 3, READ);
     for (round = 0; round < 300; round++) {
         for (i = 0; b.sockets[0].arriving_count < 200; i++)
@@ -159,11 +153,10 @@ static void a_flood_of_one_client_does_not_starve_another(void **state)
     assert_true(served >= 100);
 }
 
-static void a_client_that_floods_leaves_a_place_for_each_other(void **state)
+TEST(a_client_that_floods_leaves_a_place_for_each_other)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 20; i++)
         ASK(0, i, 2, READ);
     ON_LINE(0, 2, READ);
@@ -186,9 +179,8 @@ static void a_client_that_floods_leaves_a_place_for_each_other(void **state)
 
 /* --- time --- */
 
-static void a_request_that_waits_too_long_for_its_line_gets_0a(void **state)
+TEST(a_request_that_waits_too_long_for_its_line_gets_0a)
 {
-    (void)state;
     OK(mbm_gateway_setQueueTime(&b.gateway, 150));
     ASK(0, 1, 2, READ);
     ASK(0, 2, 3, READ);
@@ -206,9 +198,8 @@ static void a_request_that_waits_too_long_for_its_line_gets_0a(void **state)
     EXPECT(1, 1, 5, NO_RESPONSE);
 }
 
-static void a_request_that_waits_is_answered_in_time_though_nothing_else_happens(void **state)
+TEST(a_request_that_waits_is_answered_in_time_though_nothing_else_happens)
 {
-    (void)state;
     OK(mbm_gateway_setQueueTime(&b.gateway, 30));
     ASK(0, 1, 2, READ);
     ASK(0, 2, 3, READ);
@@ -217,9 +208,8 @@ static void a_request_that_waits_is_answered_in_time_though_nothing_else_happens
     EXPECT(0, 1, 2, NO_RESPONSE); /* after 100 ms */
 }
 
-static void an_idle_gateway_has_nothing_to_do(void **state)
+TEST(an_idle_gateway_has_nothing_to_do)
 {
-    (void)state;
     OK(mbm_gateway_poll(&b.gateway));
     assert_int_equal(mbm_gateway_pollDelay(&b.gateway), UINT32_MAX);
     ASK(0, 1, 2, READ);
@@ -229,9 +219,8 @@ static void an_idle_gateway_has_nothing_to_do(void **state)
 
 /* --- connections --- */
 
-static void a_connection_that_closes_gives_up_its_requests(void **state)
+TEST(a_connection_that_closes_gives_up_its_requests)
 {
-    (void)state;
     ASK(0, 1, 2, READ);
     ASK(0, 2, 3, READ);
     ON_LINE(0, 2, READ);
@@ -249,9 +238,8 @@ static void a_connection_that_closes_gives_up_its_requests(void **state)
 }
 
 /* The same unit, function and length: only the order of the replies tells them apart. */
-static void a_new_client_in_the_place_gets_only_its_own_reply(void **state)
+TEST(a_new_client_in_the_place_gets_only_its_own_reply)
 {
-    (void)state;
     ASK(0, 5, 2, READ);
     ON_LINE(0, 2, READ);
     OK(mbm_gateway_close(&b.gateway, 0));
@@ -266,9 +254,8 @@ static void a_new_client_in_the_place_gets_only_its_own_reply(void **state)
     SILENT(b.sockets[0]);
 }
 
-static void half_a_request_dies_with_its_connection(void **state)
+TEST(half_a_request_dies_with_its_connection)
 {
-    (void)state;
     memory_port_bytes(&b.sockets[0], (const uint8_t *)"\0\1\0\0\0\6\2\3\0", 9);
     OK(mbm_gateway_poll(&b.gateway));
     assert_int_equal(pending(0), 0);
@@ -278,12 +265,11 @@ static void half_a_request_dies_with_its_connection(void **state)
     ON_LINE(0, 3, READ);
 }
 
-static void bytes_that_are_not_modbus_end_their_connection_only(void **state)
+TEST(bytes_that_are_not_modbus_end_their_connection_only)
 {
     static const char *const bad[] = {"\0\1\0\1\0\6\2\3", "\0\1\0\0\0\0\2\3", "\0\1\0\0\1\0\2\3"};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(bad); i++) {
         ASK(0, 1, 2, READ);
         ON_LINE(0, 2, READ);
@@ -300,11 +286,10 @@ static void bytes_that_are_not_modbus_end_their_connection_only(void **state)
     }
 }
 
-static void a_place_is_free_in_use_or_lost(void **state)
+TEST(a_place_is_free_in_use_or_lost)
 {
     const mbm_port port = memory_port_of(&b.sockets[0]);
 
-    (void)state;
     IS(MBM_BUSY, mbm_gateway_open(&b.gateway, 0, &port));
     OK(mbm_gateway_close(&b.gateway, 0));
     IS(MBM_NOT_INITIALISED, mbm_gateway_status(&b.gateway, 0));
@@ -340,9 +325,8 @@ static void open_narrow(void)
     OK(mbm_gateway_open(&b.gateway, 0, &port));
 }
 
-static void requests_arrive_and_responses_leave_byte_by_byte(void **state)
+TEST(requests_arrive_and_responses_leave_byte_by_byte)
 {
-    (void)state;
     open_narrow();
     most = 1;
     ASK(0, 1, 2, READ);
@@ -356,9 +340,8 @@ static void requests_arrive_and_responses_leave_byte_by_byte(void **state)
     EXPECT(0, 2, 102, OTHER_VALUE);
 }
 
-static void a_client_that_takes_no_responses_delays_no_other(void **state)
+TEST(a_client_that_takes_no_responses_delays_no_other)
 {
-    (void)state;
     open_narrow();
     most = 20;
     ASK(0, 1, 2, READ);
@@ -375,31 +358,4 @@ static void a_client_that_takes_no_responses_delays_no_other(void **state)
     assert_true(mbm_gateway_pollDelay(&b.gateway) > 0);
     most = 20;
     EXPECT(0, 1, 2, VALUE);
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, start)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(replies_go_back_as_they_arrive_with_their_transaction_id),
-        TEST(requests_of_one_connection_reach_their_line_in_order),
-        TEST(requests_with_the_same_transaction_id_are_all_answered),
-        TEST(a_connection_has_as_many_requests_as_the_setting_allows),
-        TEST(the_connections_take_turns_on_a_line),
-        TEST(a_flood_of_one_client_does_not_starve_another),
-        TEST(a_client_that_floods_leaves_a_place_for_each_other),
-        TEST(a_request_that_waits_too_long_for_its_line_gets_0a),
-        TEST(a_request_that_waits_is_answered_in_time_though_nothing_else_happens),
-        TEST(an_idle_gateway_has_nothing_to_do),
-        TEST(a_connection_that_closes_gives_up_its_requests),
-        TEST(a_new_client_in_the_place_gets_only_its_own_reply),
-        TEST(half_a_request_dies_with_its_connection),
-        TEST(bytes_that_are_not_modbus_end_their_connection_only),
-        TEST(a_place_is_free_in_use_or_lost),
-        TEST(requests_arrive_and_responses_leave_byte_by_byte),
-        TEST(a_client_that_takes_no_responses_delays_no_other),
-    };
-
-    return cmocka_run_group_tests_name("gateway turns", tests, NULL, NULL);
 }

@@ -5,6 +5,8 @@
 
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 static void call_back(sim *s)
 {
     mbm_node *n = &s->node;
@@ -34,7 +36,7 @@ static void call_back(sim *s)
     assert_int_equal(s->sent, sent);
 }
 
-static void requests_in_an_idle_hook_return_busy_and_change_nothing(void **state)
+TEST(requests_in_an_idle_hook_return_busy_and_change_nothing)
 {
     NODE;
 
@@ -55,7 +57,7 @@ static void poll_from_idle(sim *s)
     mbm_node_poll(&s->node);
 }
 
-static void an_idle_hook_that_polls_does_no_harm(void **state)
+TEST(an_idle_hook_that_polls_does_no_harm)
 {
     SIM;
 
@@ -69,7 +71,7 @@ static void cancel_after_20_idles(sim *s)
         OK(mbm_node_cancel(&s->node));
 }
 
-static void an_idle_hook_may_cancel_before_a_byte_is_sent(void **state)
+TEST(an_idle_hook_may_cancel_before_a_byte_is_sent)
 {
     NODE;
 
@@ -87,7 +89,7 @@ static void cancel_in_the_reply(sim *s)
         OK(mbm_node_cancel(&s->node));
 }
 
-static void an_idle_hook_may_cancel_while_the_reply_is_waited_for(void **state)
+TEST(an_idle_hook_may_cancel_while_the_reply_is_waited_for)
 {
     SIM;
 
@@ -99,7 +101,7 @@ static void an_idle_hook_may_cancel_while_the_reply_is_waited_for(void **state)
     sim_reads(s, 500);
 }
 
-static void idle_is_not_called_again_once_it_has_cancelled(void **state)
+TEST(idle_is_not_called_again_once_it_has_cancelled)
 {
     SIM;
 
@@ -114,7 +116,7 @@ static void poll_until(sim *s, unsigned bytes)
         IS(MBM_PENDING, mbm_node_poll(&s->node));
 }
 
-static void a_non_blocking_request_is_ended_by_poll(void **state)
+TEST(a_non_blocking_request_is_ended_by_poll)
 {
     NODE;
 
@@ -137,7 +139,7 @@ static void a_non_blocking_request_is_ended_by_poll(void **state)
     sim_reads(s, 500);
 }
 
-static void buffers_of_a_pending_request_do_not_change(void **state)
+TEST(buffers_of_a_pending_request_do_not_change)
 {
     uint16_t words[1];
     uint8_t frame[8];
@@ -160,7 +162,7 @@ static void buffers_of_a_pending_request_do_not_change(void **state)
     assert_int_equal(words[0], 42);
 }
 
-static void a_cancel_mid_send_switches_the_driver_off(void **state)
+TEST(a_cancel_mid_send_switches_the_driver_off)
 {
     NODE;
 
@@ -179,7 +181,7 @@ static void a_cancel_mid_send_switches_the_driver_off(void **state)
     sim_reads(s, 500);
 }
 
-static void the_gap_is_kept_after_a_cancel_mid_send(void **state)
+TEST(the_gap_is_kept_after_a_cancel_mid_send)
 {
     NODE;
 
@@ -195,7 +197,7 @@ static void the_gap_is_kept_after_a_cancel_mid_send(void **state)
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
-static void a_cancel_while_the_port_drains_switches_the_driver_off(void **state)
+TEST(a_cancel_while_the_port_drains_switches_the_driver_off)
 {
     NODE;
 
@@ -209,7 +211,7 @@ static void a_cancel_while_the_port_drains_switches_the_driver_off(void **state)
     sim_reads(s, 500);
 }
 
-static void a_cancel_in_the_hold_switches_the_driver_off(void **state)
+TEST(a_cancel_in_the_hold_switches_the_driver_off)
 {
     NODE;
 
@@ -224,7 +226,7 @@ static void a_cancel_in_the_hold_switches_the_driver_off(void **state)
     sim_assert_order(s, "PO", "PO");
 }
 
-static void begin_mid_send_is_refused_until_the_request_is_given_up(void **state)
+TEST(begin_mid_send_is_refused_until_the_request_is_given_up)
 {
     mbm_port other;
     NODE;
@@ -251,7 +253,7 @@ static void begin_mid_send_is_refused_until_the_request_is_given_up(void **state
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
-static void a_refused_begin_leaves_the_request_under_way(void **state)
+TEST(a_refused_begin_leaves_the_request_under_way)
 {
     mbm_port empty;
     NODE;
@@ -265,25 +267,4 @@ static void a_refused_begin_leaves_the_request_under_way(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_node_begin(n, NULL, 17, s->response, 1, NULL, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_node_begin(n, &s->line, 17, NULL, 1, NULL, 0));
     OK(sim_poll(s));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(requests_in_an_idle_hook_return_busy_and_change_nothing),
-        SIM_TEST(an_idle_hook_that_polls_does_no_harm),
-        SIM_TEST(an_idle_hook_may_cancel_before_a_byte_is_sent),
-        SIM_TEST(an_idle_hook_may_cancel_while_the_reply_is_waited_for),
-        SIM_TEST(idle_is_not_called_again_once_it_has_cancelled),
-        SIM_TEST(a_non_blocking_request_is_ended_by_poll),
-        SIM_TEST(buffers_of_a_pending_request_do_not_change),
-        SIM_TEST(a_cancel_mid_send_switches_the_driver_off),
-        SIM_TEST(the_gap_is_kept_after_a_cancel_mid_send),
-        SIM_TEST(a_cancel_while_the_port_drains_switches_the_driver_off),
-        SIM_TEST(a_cancel_in_the_hold_switches_the_driver_off),
-        SIM_TEST(begin_mid_send_is_refused_until_the_request_is_given_up),
-        SIM_TEST(a_refused_begin_leaves_the_request_under_way),
-    };
-
-    return cmocka_run_group_tests_name("requests that end early", tests, NULL, NULL);
 }

@@ -23,14 +23,13 @@ static modbus_t *client_of(int port)
     return client;
 }
 
-static void libmodbus_clients_are_told_apart(void **state)
+TEST(libmodbus_clients_are_told_apart)
 {
     const char *const any[] = {"0", NULL};
     modbus_t *operator_of, *guest;
     uint16_t words[2];
     program p;
 
-    (void)state;
     program_start(&p, "linux/guarded_server", any);
     program_line(&p, output, sizeof output);
     assert_int_equal(strncmp(output, "ready ", 6), 0);
@@ -62,22 +61,11 @@ static void libmodbus_clients_are_told_apart(void **state)
                                 "client 2 reads 1 from 9 on\n");
 }
 
-static void a_missing_port_prints_the_usage(void **state)
+TEST(a_missing_port_prints_the_usage)
 {
     const char *const none[] = {NULL};
     program p;
 
-    (void)state;
     program_start(&p, "linux/guarded_server", none);
     assert_int_equal(program_end(&p), 2);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(libmodbus_clients_are_told_apart),
-        cmocka_unit_test(a_missing_port_prints_the_usage),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 enum {
     MS = 1000,
     TIMEOUT = 500 * MS,
@@ -296,7 +298,7 @@ static void one_row(sim *s, FILE *table, uint32_t timeout, uint32_t limit, unsig
         fprintf(table, "\n");
 }
 
-static void a_device_is_heard_again_whatever_limit_and_pause_a_program_has(void **state)
+TEST(a_device_is_heard_again_whatever_limit_and_pause_a_program_has)
 {
     const char *path = getenv("MBM_FAULT_TABLE");
     FILE *table = path ? fopen(path, "w") : NULL;
@@ -323,7 +325,7 @@ static void a_device_is_heard_again_whatever_limit_and_pause_a_program_has(void 
 #define BEGIN begin(&b, s, (reader_kind)kind)
 
 /* Cancelled while it waits for the gap. */
-static void a_request_that_is_cancelled_before_its_frame_left_changes_nothing(void **state)
+TEST(a_request_that_is_cancelled_before_its_frame_left_changes_nothing)
 {
     unsigned sent;
     BENCH;
@@ -344,7 +346,7 @@ static void a_request_that_is_cancelled_before_its_frame_left_changes_nothing(vo
     }
 }
 
-static void a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_nothing(void **state)
+TEST(a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_nothing)
 {
     BENCH;
 
@@ -370,7 +372,7 @@ static void a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_nothi
 }
 
 /* As a program does that looks in each round whether the unit is there again. */
-static void requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer(void **state)
+TEST(requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer)
 {
     uint64_t sent;
     unsigned count;
@@ -389,7 +391,7 @@ static void requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer(
     }
 }
 
-static void a_request_that_waits_does_not_stop_the_clients_queue(void **state)
+TEST(a_request_that_waits_does_not_stop_the_clients_queue)
 {
     mbm_clientRequest other = {0};
     uint16_t word = 0;
@@ -434,7 +436,7 @@ static void begin_second(sim *s, uint8_t unit)
     OK(mbm_node_setResponseTimeout(&second, TIMEOUT / MS));
 }
 
-static void a_request_of_a_node_that_waits_gives_way_to_that_of_another_node(void **state)
+TEST(a_request_of_a_node_that_waits_gives_way_to_that_of_another_node)
 {
     uint64_t sent, began;
     int blocks;
@@ -475,7 +477,7 @@ static void try_the_second_node(sim *s)
     refused++;
 }
 
-static void a_request_of_a_blocking_node_that_waits_does_not_give_way(void **state)
+TEST(a_request_of_a_blocking_node_that_waits_does_not_give_way)
 {
     uint64_t sent;
     BENCH;
@@ -498,7 +500,7 @@ static void a_request_of_a_blocking_node_that_waits_does_not_give_way(void **sta
 }
 
 /* The late reply shows that the unit owes nothing any more. */
-static void a_late_reply_lets_the_request_that_waits_be_sent_at_once(void **state)
+TEST(a_late_reply_lets_the_request_that_waits_be_sent_at_once)
 {
     uint64_t sent;
     BENCH;
@@ -520,7 +522,7 @@ static void a_late_reply_lets_the_request_that_waits_be_sent_at_once(void **stat
 }
 
 /* It comes within the quiet time. */
-static void a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait(void **state)
+TEST(a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait)
 {
     BENCH;
 
@@ -536,7 +538,7 @@ static void a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait
     }
 }
 
-static void a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well(void **state)
+TEST(a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well)
 {
     BENCH;
 
@@ -558,7 +560,7 @@ static void a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well(v
 static const uint8_t alike[] = {33, 65, 97, 129, 225, 255};
 
 /* The reply of unit 1 comes 700 ms after its timeout, and the other unit is read in between. */
-static void units_with_the_same_last_five_bits_share_no_memory(void **state)
+TEST(units_with_the_same_last_five_bits_share_no_memory)
 {
     unsigned i;
     uint16_t n;
@@ -585,7 +587,7 @@ static void units_with_the_same_last_five_bits_share_no_memory(void **state)
         }
 }
 
-static void a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits(void **state)
+TEST(a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits)
 {
     unsigned i, n;
     int is_cancelled;
@@ -608,7 +610,7 @@ static void a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits(void
 }
 
 /* What one of them has cancelled, or waited for in vain, the other one must know. */
-static void two_nodes_of_one_unit_know_of_each_others_late_replies(void **state)
+TEST(two_nodes_of_one_unit_know_of_each_others_late_replies)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
     unsigned i, n;
@@ -631,7 +633,7 @@ static void two_nodes_of_one_unit_know_of_each_others_late_replies(void **state)
     }
 }
 
-static void a_node_that_has_changed_its_unit_does_not_forget_the_late_reply(void **state)
+TEST(a_node_that_has_changed_its_unit_does_not_forget_the_late_reply)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
     unsigned i, begins;
@@ -687,7 +689,7 @@ static void broadcast(bench *b)
 }
 
 /* Even if more units owe replies than are remembered one by one. */
-static void a_broadcast_does_not_wait_after_a_cancelled_request(void **state)
+TEST(a_broadcast_does_not_wait_after_a_cancelled_request)
 {
     uint8_t unit;
     BENCH;
@@ -708,7 +710,7 @@ static void a_broadcast_does_not_wait_after_a_cancelled_request(void **state)
 }
 
 /* More units than are remembered one by one. */
-static void a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones(void **state)
+TEST(a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones)
 {
     uint64_t last;
     uint8_t unit;
@@ -727,7 +729,7 @@ static void a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones(voi
     }
 }
 
-static void a_quiet_time_of_0_gives_it_all_up(void **state)
+TEST(a_quiet_time_of_0_gives_it_all_up)
 {
     device *d;
     BENCH;
@@ -744,7 +746,7 @@ static void a_quiet_time_of_0_gives_it_all_up(void **state)
     }
 }
 
-static void a_device_whose_replies_always_deviate_is_heard_again(void **state)
+TEST(a_device_whose_replies_always_deviate_is_heard_again)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
     static const int8_t by[] = {1, -1, 20};
@@ -780,7 +782,7 @@ static void a_device_whose_replies_always_deviate_is_heard_again(void **state)
         }
 }
 
-static void a_device_that_always_repeats_another_value_is_heard_again(void **state)
+TEST(a_device_that_always_repeats_another_value_is_heard_again)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
     unsigned i, n;
@@ -811,7 +813,7 @@ static void a_device_that_always_repeats_another_value_is_heard_again(void **sta
 
 /* A late reply to a read of more registers, to a lenient node that reads fewer, and the reverse.
  * All replies deviate. */
-static void no_late_reply_that_deviates_is_taken_for_the_next_one(void **state)
+TEST(no_late_reply_that_deviates_is_taken_for_the_next_one)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
     unsigned i, n, first;
@@ -852,7 +854,7 @@ static void disconnect(void *context)
 }
 
 /* A new connection has no replies of the old one. A serial line that was opened again may. */
-static void a_new_connection_of_rtu_over_tcp_owes_nothing(void **state)
+TEST(a_new_connection_of_rtu_over_tcp_owes_nothing)
 {
     mbm_link link = MBM_INIT;
     mbm_linkHooks hooks = {0};
@@ -886,33 +888,4 @@ static void a_new_connection_of_rtu_over_tcp_owes_nothing(void **state)
             assert_in_range(s->frames[s->sent - 1].begin - sent, CLEAN, CLEAN + EXCHANGE);
         OK(mbm_link_end(&link));
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(a_device_is_heard_again_whatever_limit_and_pause_a_program_has),
-        SIM_TEST(a_request_that_is_cancelled_before_its_frame_left_changes_nothing),
-        SIM_TEST(a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_nothing),
-        SIM_TEST(requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer),
-        SIM_TEST(a_request_that_waits_does_not_stop_the_clients_queue),
-        SIM_TEST(a_request_of_a_node_that_waits_gives_way_to_that_of_another_node),
-        SIM_TEST(a_request_of_a_blocking_node_that_waits_does_not_give_way),
-        SIM_TEST(a_late_reply_lets_the_request_that_waits_be_sent_at_once),
-        SIM_TEST(a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait),
-        SIM_TEST(a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well),
-        SIM_TEST(units_with_the_same_last_five_bits_share_no_memory),
-        SIM_TEST(a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits),
-        SIM_TEST(two_nodes_of_one_unit_know_of_each_others_late_replies),
-        SIM_TEST(a_node_that_has_changed_its_unit_does_not_forget_the_late_reply),
-        SIM_TEST(a_broadcast_does_not_wait_after_a_cancelled_request),
-        SIM_TEST(a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones),
-        SIM_TEST(a_quiet_time_of_0_gives_it_all_up),
-        SIM_TEST(a_device_whose_replies_always_deviate_is_heard_again),
-        SIM_TEST(a_device_that_always_repeats_another_value_is_heard_again),
-        SIM_TEST(no_late_reply_that_deviates_is_taken_for_the_next_one),
-        SIM_TEST(a_new_connection_of_rtu_over_tcp_owes_nothing),
-    };
-
-    return cmocka_run_group_tests_name("heard again", tests, NULL, NULL);
 }

@@ -107,9 +107,8 @@ static void assert_ended(uint8_t status, unsigned objects)
     assert_int_equal(mbm_client_pending(&client), 0);
 }
 
-static void all_objects_are_read_with_as_many_requests_as_it_takes(void **state)
+TEST(all_objects_are_read_with_as_many_requests_as_it_takes)
 {
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_EXTENDED);
     ANSWER(0xFF, 2, 2, "\x00\x03mbm\x01\x00");
@@ -134,9 +133,8 @@ static void all_objects_are_read_with_as_many_requests_as_it_takes(void **state)
     assert_int_equal(id.count, 1);
 }
 
-static void one_object_is_read_alone(void **state)
+TEST(one_object_is_read_alone)
 {
-    (void)state;
     begin();
     IS(MBM_PENDING, mbm_identification_read(&id, &client, MBM_DEVICE_ID_INDIVIDUAL, 4));
     ANSWER(0, 0, 1, "\x04\x01n");
@@ -144,27 +142,24 @@ static void one_object_is_read_alone(void **state)
     assert_int_equal(requested[0], 4);
 }
 
-static void another_object_than_the_one_requested_alone_is_malformed(void **state)
+TEST(another_object_than_the_one_requested_alone_is_malformed)
 {
-    (void)state;
     begin();
     IS(MBM_PENDING, mbm_identification_read(&id, &client, MBM_DEVICE_ID_INDIVIDUAL, 4));
     ANSWER(0, 0, 1, "\x03\x01n");
     assert_ended(MBM_MALFORMED_REPLY, 0);
 }
 
-static void a_device_that_lacks_the_first_object_may_begin_with_its_first(void **state)
+TEST(a_device_that_lacks_the_first_object_may_begin_with_its_first)
 {
-    (void)state;
     begin();
     IS(MBM_PENDING, mbm_identification_read(&id, &client, MBM_DEVICE_ID_REGULAR, 5));
     ANSWER(0, 0, 2, "\x01\x01n\x00\x01m");
     assert_ended(MBM_OK, 2);
 }
 
-static void the_same_next_object_forever_is_no_progress(void **state)
+TEST(the_same_next_object_forever_is_no_progress)
 {
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 1, 1, "\x00\x01m");
@@ -178,9 +173,8 @@ static void the_same_next_object_forever_is_no_progress(void **state)
     assert_ended(MBM_NO_PROGRESS, 1);
 }
 
-static void a_next_object_before_those_received_is_no_progress(void **state)
+TEST(a_next_object_before_those_received_is_no_progress)
 {
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_EXTENDED);
     ANSWER(0xFF, 0x80, 1, "\x00\x01m");
@@ -188,9 +182,8 @@ static void a_next_object_before_those_received_is_no_progress(void **state)
     assert_ended(MBM_NO_PROGRESS, 2);
 }
 
-static void objects_that_were_sent_before_are_not_handed_out_again(void **state)
+TEST(objects_that_were_sent_before_are_not_handed_out_again)
 {
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_EXTENDED);
     ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
@@ -213,9 +206,8 @@ static void objects_that_were_sent_before_are_not_handed_out_again(void **state)
     assert_ended(MBM_NO_PROGRESS, 1);
 }
 
-static void no_object_although_more_follow_is_no_progress(void **state)
+TEST(no_object_although_more_follow_is_no_progress)
 {
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 1, 0, "");
@@ -228,12 +220,11 @@ static void no_object_although_more_follow_is_no_progress(void **state)
 }
 
 /* However a device lies, it is asked at most once for each of the 256 objects. */
-static void a_device_that_names_every_object_is_asked_256_times(void **state)
+TEST(a_device_that_names_every_object_is_asked_256_times)
 {
     char object[] = "?\x01x";
     unsigned next;
 
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_EXTENDED);
     for (next = 0; next < 256; next++) {
@@ -244,9 +235,8 @@ static void a_device_that_names_every_object_is_asked_256_times(void **state)
     assert_ended(MBM_NO_PROGRESS, 256);
 }
 
-static void an_object_that_is_cut_off_is_malformed(void **state)
+TEST(an_object_that_is_cut_off_is_malformed)
 {
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 1, 1, "\x00\x01m");
@@ -264,11 +254,10 @@ static void an_object_that_is_cut_off_is_malformed(void **state)
     assert_ended(MBM_MALFORMED_REPLY, 0);
 }
 
-static void an_exception_ends_it_with_that_status(void **state)
+TEST(an_exception_ends_it_with_that_status)
 {
     uint8_t frame[] = {0, 0, 0, 0, 0, 3, UNIT, 0xAB, MBM_ILLEGAL_DATA_ADDRESS};
 
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_REGULAR);
     ANSWER(0xFF, 3, 1, "\x02\x01v");
@@ -280,9 +269,8 @@ static void an_exception_ends_it_with_that_status(void **state)
     assert_int_equal(id.request.exception, MBM_ILLEGAL_DATA_ADDRESS);
 }
 
-static void a_device_that_falls_silent_ends_it_with_a_timeout(void **state)
+TEST(a_device_that_falls_silent_ends_it_with_a_timeout)
 {
-    (void)state;
     begin();
     OK(mbm_client_setRetries(&client, 1));
     read_all(MBM_DEVICE_ID_REGULAR);
@@ -291,9 +279,8 @@ static void a_device_that_falls_silent_ends_it_with_a_timeout(void **state)
     assert_ended(MBM_RESPONSE_TIMED_OUT, 1);
 }
 
-static void a_reply_that_does_not_fit_ends_it(void **state)
+TEST(a_reply_that_does_not_fit_ends_it)
 {
-    (void)state;
     begin();
     id.request.replyBytes = 9;
     read_all(MBM_DEVICE_ID_REGULAR);
@@ -315,9 +302,8 @@ static void fill_the_queue(void)
     assert_int_equal(mbm_client_pending(&client), MBM_CLIENT_DEPTH);
 }
 
-static void others_may_fill_the_queue_meanwhile(void **state)
+TEST(others_may_fill_the_queue_meanwhile)
 {
-    (void)state;
     begin();
     OK(mbm_client_setInFlight(&client, 1));
     in_object = fill_the_queue;
@@ -337,9 +323,8 @@ static void cancel(void)
     (void)mbm_client_cancel(&client, &id.request);
 }
 
-static void cancelling_in_object_ends_the_calls(void **state)
+TEST(cancelling_in_object_ends_the_calls)
 {
-    (void)state;
     begin();
     in_object = cancel;
     read_all(MBM_DEVICE_ID_BASIC);
@@ -356,9 +341,8 @@ static void cancelling_in_object_ends_the_calls(void **state)
     assert_ended(MBM_OK, 2);
 }
 
-static void it_may_be_cancelled_between_two_replies(void **state)
+TEST(it_may_be_cancelled_between_two_replies)
 {
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 2, 1, "\x00\x01m");
@@ -369,9 +353,8 @@ static void it_may_be_cancelled_between_two_replies(void **state)
     read_all(MBM_DEVICE_ID_BASIC);
 }
 
-static void beginning_the_client_again_gives_it_up(void **state)
+TEST(beginning_the_client_again_gives_it_up)
 {
-    (void)state;
     begin();
     in_object = begin_port;
     read_all(MBM_DEVICE_ID_BASIC);
@@ -389,9 +372,8 @@ static void spoil_the_reply(void)
     memset(reply, 0xFF, sizeof reply);
 }
 
-static void overwriting_the_reply_in_object_harms_nothing(void **state)
+TEST(overwriting_the_reply_in_object_harms_nothing)
 {
-    (void)state;
     begin();
     in_object = spoil_the_reply;
     read_all(MBM_DEVICE_ID_BASIC);
@@ -412,9 +394,8 @@ static void read_again(void)
     refuses(MBM_BUSY, &client, MBM_DEVICE_ID_BASIC);
 }
 
-static void it_is_busy_while_it_is_pending_and_in_its_object(void **state)
+TEST(it_is_busy_while_it_is_pending_and_in_its_object)
 {
-    (void)state;
     begin();
     read_all(MBM_DEVICE_ID_BASIC);
     refuses(MBM_BUSY, &client, MBM_DEVICE_ID_BASIC);
@@ -424,11 +405,10 @@ static void it_is_busy_while_it_is_pending_and_in_its_object(void **state)
     assert_ended(MBM_OK, 2);
 }
 
-static void wrong_arguments_change_nothing(void **state)
+TEST(wrong_arguments_change_nothing)
 {
     static mbm_client never_begun;
 
-    (void)state;
     begin();
     IS(MBM_INVALID_ARGUMENT, mbm_identification_read(NULL, &client, MBM_DEVICE_ID_BASIC, 0));
     refuses(MBM_INVALID_ARGUMENT, NULL, MBM_DEVICE_ID_BASIC);
@@ -454,9 +434,8 @@ static void read_the_next(void *context, mbm_identification *identification)
         IS(MBM_PENDING, mbm_identification_read(identification, &client, MBM_DEVICE_ID_REGULAR, 3));
 }
 
-static void done_may_read_the_next(void **state)
+TEST(done_may_read_the_next)
 {
-    (void)state;
     begin();
     id.done = read_the_next;
     read_all(MBM_DEVICE_ID_BASIC);
@@ -467,33 +446,4 @@ static void done_may_read_the_next(void **state)
     assert_int_equal(ended, 2);
     assert_int_equal(id.request.status, MBM_OK);
     assert_memory_equal(requested, "\x00\x03", 2);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_objects_are_read_with_as_many_requests_as_it_takes),
-        cmocka_unit_test(one_object_is_read_alone),
-        cmocka_unit_test(another_object_than_the_one_requested_alone_is_malformed),
-        cmocka_unit_test(a_device_that_lacks_the_first_object_may_begin_with_its_first),
-        cmocka_unit_test(the_same_next_object_forever_is_no_progress),
-        cmocka_unit_test(a_next_object_before_those_received_is_no_progress),
-        cmocka_unit_test(objects_that_were_sent_before_are_not_handed_out_again),
-        cmocka_unit_test(no_object_although_more_follow_is_no_progress),
-        cmocka_unit_test(a_device_that_names_every_object_is_asked_256_times),
-        cmocka_unit_test(an_object_that_is_cut_off_is_malformed),
-        cmocka_unit_test(an_exception_ends_it_with_that_status),
-        cmocka_unit_test(a_device_that_falls_silent_ends_it_with_a_timeout),
-        cmocka_unit_test(a_reply_that_does_not_fit_ends_it),
-        cmocka_unit_test(others_may_fill_the_queue_meanwhile),
-        cmocka_unit_test(cancelling_in_object_ends_the_calls),
-        cmocka_unit_test(it_may_be_cancelled_between_two_replies),
-        cmocka_unit_test(beginning_the_client_again_gives_it_up),
-        cmocka_unit_test(overwriting_the_reply_in_object_harms_nothing),
-        cmocka_unit_test(it_is_busy_while_it_is_pending_and_in_its_object),
-        cmocka_unit_test(wrong_arguments_change_nothing),
-        cmocka_unit_test(done_may_read_the_next),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -49,14 +49,13 @@ static void put_arriving(const uint8_t *bytes, size_t length)
     wire.last = length;
 }
 
-static void a_client_over_tcp_works_with_large_buffers(void **state)
+TEST(a_client_over_tcp_works_with_large_buffers)
 {
     static const uint8_t response[] = {0, 0, 0, 0, 0, 7, 1, 3, 4, 0, 1, 0, 2};
     static mbm_client client;
     mbm_clientRequest request = {0};
     uint16_t words[2] = {0};
 
-    (void)state;
     memset(&wire, 0, sizeof wire);
     OK(mbm_client_beginTcp(&client, &port, incoming, LARGE, outgoing, LARGE));
     request.unit = 1;
@@ -70,7 +69,7 @@ static void a_client_over_tcp_works_with_large_buffers(void **state)
     assert_int_equal(words[1], 2);
 }
 
-static void a_client_on_a_serial_line_works_with_large_buffers(void **state)
+TEST(a_client_on_a_serial_line_works_with_large_buffers)
 {
     uint8_t response[] = {1, 3, 4, 0, 1, 0, 2, 0, 0};
     static mbm_client client;
@@ -78,7 +77,6 @@ static void a_client_on_a_serial_line_works_with_large_buffers(void **state)
     uint16_t words[2] = {0};
     unsigned i;
 
-    (void)state;
     memset(&wire, 0, sizeof wire);
     OK(mbm_client_beginRtu(&client, &port, incoming, LARGE));
     request.unit = 1;
@@ -118,25 +116,13 @@ static void assert_served(uint8_t (*begin)(mbm_server *, const mbm_port *, mbm_u
     assert_int_equal(wire.length, answered);
 }
 
-static void a_server_works_with_large_buffers(void **state)
+TEST(a_server_works_with_large_buffers)
 {
     static const uint8_t over_tcp[] = {0, 0, 0, 0, 0, 6, 1, 3, 0, 0, 0, 2};
     uint8_t over_rtu[] = {1, 3, 0, 0, 0, 2, 0, 0};
 
-    (void)state;
     (void)seal(over_rtu, 6);
     assert_served(mbm_server_beginTcp, over_tcp, sizeof over_tcp, 13);
     assert_served(mbm_server_beginRtu, over_rtu, sizeof over_rtu, 9);
     assert_served(mbm_server_beginRtuOverTcp, over_rtu, sizeof over_rtu, 9);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_client_over_tcp_works_with_large_buffers),
-        cmocka_unit_test(a_client_on_a_serial_line_works_with_large_buffers),
-        cmocka_unit_test(a_server_works_with_large_buffers),
-    };
-
-    return cmocka_run_group_tests_name("large buffers", tests, NULL, NULL);
 }

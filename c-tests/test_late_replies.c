@@ -9,6 +9,8 @@
 
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 enum {
     TIMEOUT_MS = 500,
     LATE = 750000,  /* microseconds that the device takes for a late reply */
@@ -82,7 +84,7 @@ static uint8_t read_at(sim *s, uint16_t address)
     return mbm_node_readHoldingRegisters(&s->node, address, 1);
 }
 
-static void one_late_reply_does_not_shift_the_answers_of_later_requests(void **state)
+TEST(one_late_reply_does_not_shift_the_answers_of_later_requests)
 {
     uint16_t i;
     DEVICE;
@@ -93,7 +95,7 @@ static void one_late_reply_does_not_shift_the_answers_of_later_requests(void **s
     assert_int_equal(s->counters.foreignFrames, 1);
 }
 
-static void a_late_reply_does_not_shift_the_answers_after_a_retry(void **state)
+TEST(a_late_reply_does_not_shift_the_answers_after_a_retry)
 {
     uint16_t i;
     DEVICE;
@@ -105,7 +107,7 @@ static void a_late_reply_does_not_shift_the_answers_after_a_retry(void **state)
 }
 
 /* The frame buffer has space for one reply of this length, not for two. */
-static void a_late_reply_of_the_longest_length_does_not_shift_later_answers(void **state)
+TEST(a_late_reply_of_the_longest_length_does_not_shift_later_answers)
 {
     uint16_t i;
     DEVICE;
@@ -115,7 +117,7 @@ static void a_late_reply_of_the_longest_length_does_not_shift_later_answers(void
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
 
-static void a_late_reply_to_a_write_of_the_same_value_costs_one_request(void **state)
+TEST(a_late_reply_to_a_write_of_the_same_value_costs_one_request)
 {
     unsigned i;
     DEVICE;
@@ -126,7 +128,7 @@ static void a_late_reply_to_a_write_of_the_same_value_costs_one_request(void **s
     assert_reads(s, 9, 1);
 }
 
-static void several_late_replies_in_a_row_are_all_skipped(void **state)
+TEST(several_late_replies_in_a_row_are_all_skipped)
 {
     uint16_t i;
     DEVICE;
@@ -140,7 +142,7 @@ static void several_late_replies_in_a_row_are_all_skipped(void **state)
 }
 
 /* The reply is held beyond the response timeout. */
-static void a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer(void **state)
+TEST(a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer)
 {
     uint16_t i;
     DEVICE;
@@ -151,7 +153,7 @@ static void a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answ
         assert_reads(s, i, 1);
 }
 
-static void a_late_exception_is_not_the_answer_to_a_later_request(void **state)
+TEST(a_late_exception_is_not_the_answer_to_a_later_request)
 {
     static const uint8_t codes[] = {2, 5, 6, 0x0B};
     unsigned i;
@@ -168,7 +170,7 @@ static void a_late_exception_is_not_the_answer_to_a_later_request(void **state)
     }
 }
 
-static void after_an_exception_in_time_no_reply_is_held(void **state)
+TEST(after_an_exception_in_time_no_reply_is_held)
 {
     DEVICE;
 
@@ -181,7 +183,7 @@ static void after_an_exception_in_time_no_reply_is_held(void **state)
 }
 
 /* The reply that was held first is most likely the late one. */
-static void a_held_reply_is_no_answer_if_the_next_one_is_damaged(void **state)
+TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged)
 {
     DEVICE;
 
@@ -193,7 +195,7 @@ static void a_held_reply_is_no_answer_if_the_next_one_is_damaged(void **state)
     assert_reads(s, 3, 1);
 }
 
-static void a_held_reply_is_no_answer_if_the_next_one_is_cut_off(void **state)
+TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
 {
     DEVICE;
 
@@ -206,7 +208,7 @@ static void a_held_reply_is_no_answer_if_the_next_one_is_cut_off(void **state)
 }
 
 /* As when an RS-485 driver releases the line. */
-static void a_byte_of_noise_after_a_held_reply_does_not_spoil_it(void **state)
+TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
 {
     uint16_t i;
     DEVICE;
@@ -221,8 +223,7 @@ static void a_byte_of_noise_after_a_held_reply_does_not_spoil_it(void **state)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
 
-static void
-after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else(void **state)
+TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else)
 {
     uint64_t begin;
     DEVICE;
@@ -239,7 +240,7 @@ after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else(
 }
 
 /* The damaged reply has come, so none is late. */
-static void after_a_damaged_reply_the_next_reply_costs_one_quiet_time(void **state)
+TEST(after_a_damaged_reply_the_next_reply_costs_one_quiet_time)
 {
     DEVICE;
 
@@ -250,7 +251,7 @@ static void after_a_damaged_reply_the_next_reply_costs_one_quiet_time(void **sta
     assert_in_range(s->now - s->last_byte, QUIET, QUIET + SIM_SLACK);
 }
 
-static void a_program_that_polls_late_does_not_lengthen_the_hold(void **state)
+TEST(a_program_that_polls_late_does_not_lengthen_the_hold)
 {
     DEVICE;
 
@@ -272,7 +273,7 @@ static void a_program_that_polls_late_does_not_lengthen_the_hold(void **state)
 }
 
 /* The line is free, so the reply belongs to an earlier request, and another may follow. */
-static void a_right_reply_before_a_request_lets_the_next_one_be_held(void **state)
+TEST(a_right_reply_before_a_request_lets_the_next_one_be_held)
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
@@ -290,7 +291,7 @@ static void a_right_reply_before_a_request_lets_the_next_one_be_held(void **stat
     assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
 }
 
-static void noise_and_other_replies_before_a_request_let_no_reply_be_held(void **state)
+TEST(noise_and_other_replies_before_a_request_let_no_reply_be_held)
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 2};
@@ -307,7 +308,7 @@ static void noise_and_other_replies_before_a_request_let_no_reply_be_held(void *
     sim_assert_sent(s, 1, "11 03 00 01 00 01 +");
 }
 
-static void without_a_quiet_time_no_reply_is_held(void **state)
+TEST(without_a_quiet_time_no_reply_is_held)
 {
     DEVICE;
 
@@ -320,7 +321,7 @@ static void without_a_quiet_time_no_reply_is_held(void **state)
 }
 
 /* Unit 18 answers between the failed request to unit 17 and the late reply. */
-static void the_reply_of_another_unit_does_not_end_the_holding(void **state)
+TEST(the_reply_of_another_unit_does_not_end_the_holding)
 {
     DEVICE;
 
@@ -361,7 +362,7 @@ static void begin_client(sim *s, mbm_client *client)
     OK(mbm_client_setResponseTimeout(client, TIMEOUT_MS));
 }
 
-static void one_late_reply_does_not_shift_the_clients_answers(void **state)
+TEST(one_late_reply_does_not_shift_the_clients_answers)
 {
     mbm_client client;
     uint16_t i;
@@ -373,7 +374,7 @@ static void one_late_reply_does_not_shift_the_clients_answers(void **state)
         client_reads(s, &client, i, MBM_OK);
 }
 
-static void a_late_reply_does_not_shift_the_clients_answers_after_a_retry(void **state)
+TEST(a_late_reply_does_not_shift_the_clients_answers_after_a_retry)
 {
     mbm_client client;
     uint16_t i;
@@ -401,7 +402,7 @@ static uint8_t echoes(sim *s, mbm_client *client, uint16_t data)
 }
 
 /* So this request finds out at once whether the answers are in step. */
-static void a_reply_that_repeats_data_of_its_own_is_not_held(void **state)
+TEST(a_reply_that_repeats_data_of_its_own_is_not_held)
 {
     mbm_client client;
     DEVICE;
@@ -416,7 +417,7 @@ static void a_reply_that_repeats_data_of_its_own_is_not_held(void **state)
 }
 
 /* A request must end, however many right replies arrive. */
-static void a_device_that_never_stops_answering_does_not_keep_a_request_from_ending(void **state)
+TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_ending)
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
@@ -439,7 +440,7 @@ static void a_device_that_never_stops_answering_does_not_keep_a_request_from_end
 }
 
 /* The late reply, then the one to the request. The unit owes no other, so it is not held. */
-static void the_last_reply_that_the_unit_owes_is_delivered_at_once(void **state)
+TEST(the_last_reply_that_the_unit_owes_is_delivered_at_once)
 {
     uint16_t i;
     DEVICE;
@@ -454,7 +455,7 @@ static void the_last_reply_that_the_unit_owes_is_delivered_at_once(void **state)
 }
 
 /* The program polls when a byte has arrived, and else when mbm_node_pollDelay says. */
-static void a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_most(void **state)
+TEST(a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_most)
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
@@ -480,36 +481,4 @@ static void a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_
     }
     sent = s->frames[s->sent - 1].end;
     assert_in_range(s->now - sent, 0, 1000 * 3 * TIMEOUT_MS + 1000);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(one_late_reply_does_not_shift_the_answers_of_later_requests),
-        SIM_TEST(a_late_reply_does_not_shift_the_answers_after_a_retry),
-        SIM_TEST(a_late_reply_of_the_longest_length_does_not_shift_later_answers),
-        SIM_TEST(a_late_reply_to_a_write_of_the_same_value_costs_one_request),
-        SIM_TEST(several_late_replies_in_a_row_are_all_skipped),
-        SIM_TEST(a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer),
-        SIM_TEST(a_late_exception_is_not_the_answer_to_a_later_request),
-        SIM_TEST(after_an_exception_in_time_no_reply_is_held),
-        SIM_TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged),
-        SIM_TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off),
-        SIM_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it),
-        SIM_TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else),
-        SIM_TEST(after_a_damaged_reply_the_next_reply_costs_one_quiet_time),
-        SIM_TEST(a_program_that_polls_late_does_not_lengthen_the_hold),
-        SIM_TEST(a_right_reply_before_a_request_lets_the_next_one_be_held),
-        SIM_TEST(noise_and_other_replies_before_a_request_let_no_reply_be_held),
-        SIM_TEST(without_a_quiet_time_no_reply_is_held),
-        SIM_TEST(a_reply_that_repeats_data_of_its_own_is_not_held),
-        SIM_TEST(the_reply_of_another_unit_does_not_end_the_holding),
-        SIM_TEST(one_late_reply_does_not_shift_the_clients_answers),
-        SIM_TEST(a_late_reply_does_not_shift_the_clients_answers_after_a_retry),
-        SIM_TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_ending),
-        SIM_TEST(the_last_reply_that_the_unit_owes_is_delivered_at_once),
-        SIM_TEST(a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_most),
-    };
-
-    return cmocka_run_group_tests_name("late replies", tests, NULL, NULL);
 }

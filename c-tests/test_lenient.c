@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 enum { TIMEOUT_MS = 200, TIMEOUT = 200000 };
 
 /* The simulation with a lenient master. */
@@ -18,7 +20,7 @@ enum { TIMEOUT_MS = 200, TIMEOUT = 200000 };
     OK(mbm_node_setResponseTimeout(n, TIMEOUT_MS));                                                \
     OK(mbm_node_setLenient(n, 1))
 
-static void a_write_whose_reply_repeats_other_content_is_accepted(void **state)
+TEST(a_write_whose_reply_repeats_other_content_is_accepted)
 {
     static const char *const values[] = {"11 06 00 01 00 08 +", "11 06 00 02 00 07 +"};
     unsigned i;
@@ -41,7 +43,7 @@ static void a_write_whose_reply_repeats_other_content_is_accepted(void **state)
     assert_int_equal(s->counters.timeouts, 0);
 }
 
-static void without_it_the_same_replies_are_malformed(void **state)
+TEST(without_it_the_same_replies_are_malformed)
 {
     LENIENT;
 
@@ -52,7 +54,7 @@ static void without_it_the_same_replies_are_malformed(void **state)
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_MALFORMED_REPLY);
 }
 
-static void a_read_takes_the_registers_that_come(void **state)
+TEST(a_read_takes_the_registers_that_come)
 {
     LENIENT;
 
@@ -78,7 +80,7 @@ static void a_read_takes_the_registers_that_come(void **state)
     assert_int_equal(s->counters.foreignFrames, 0);
 }
 
-static void the_bytes_may_come_one_at_a_time_or_all_at_once(void **state)
+TEST(the_bytes_may_come_one_at_a_time_or_all_at_once)
 {
     uint16_t piece;
     LENIENT;
@@ -99,7 +101,7 @@ static void the_bytes_may_come_one_at_a_time_or_all_at_once(void **state)
 }
 
 /* Such a reply has a right CRC one byte before its end. */
-static void a_reply_that_ends_with_the_byte_0_is_accepted(void **state)
+TEST(a_reply_that_ends_with_the_byte_0_is_accepted)
 {
     uint8_t read[9] = {17, 3, 4}, write[8] = {17, 6, 0, 1};
     unsigned value, reads = 0, writes = 0;
@@ -126,7 +128,7 @@ static void a_reply_that_ends_with_the_byte_0_is_accepted(void **state)
     assert_true(reads > 5 && writes > 5);
 }
 
-static void a_right_reply_is_better_before_and_after_it(void **state)
+TEST(a_right_reply_is_better_before_and_after_it)
 {
     LENIENT;
 
@@ -145,7 +147,7 @@ static void a_right_reply_is_better_before_and_after_it(void **state)
     assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_ILLEGAL_DATA_ADDRESS);
 }
 
-static void half_a_reply_in_front_hides_no_right_one(void **state)
+TEST(half_a_reply_in_front_hides_no_right_one)
 {
     LENIENT;
 
@@ -156,7 +158,7 @@ static void half_a_reply_in_front_hides_no_right_one(void **state)
 }
 
 /* Unit, function and CRC must be right, and the byte count must be that of the frame. */
-static void what_is_no_reply_to_the_request_is_not_accepted(void **state)
+TEST(what_is_no_reply_to_the_request_is_not_accepted)
 {
     static const struct {
         const char *bytes;
@@ -214,7 +216,7 @@ static void answer_largest(sim *s, const sim_frame *frame)
     sim_deliver(s, frame->end + 500, bytes, length);
 }
 
-static void a_read_of_more_words_than_the_buffer_fills_it(void **state)
+TEST(a_read_of_more_words_than_the_buffer_fills_it)
 {
     static const uint16_t frames[] = {MBM_FRAME_BYTES(64), 255};
     unsigned i, word;
@@ -238,7 +240,7 @@ static void a_read_of_more_words_than_the_buffer_fills_it(void **state)
     }
 }
 
-static void what_the_buffer_does_not_hold_is_checked_too(void **state)
+TEST(what_the_buffer_does_not_hold_is_checked_too)
 {
     LENIENT;
 
@@ -250,7 +252,7 @@ static void what_the_buffer_does_not_hold_is_checked_too(void **state)
     assert_int_equal(s->response[0], 0);
 }
 
-static void a_small_frame_buffer_is_not_left(void **state)
+TEST(a_small_frame_buffer_is_not_left)
 {
     uint16_t size;
     LENIENT;
@@ -275,7 +277,7 @@ static void a_small_frame_buffer_is_not_left(void **state)
     }
 }
 
-static void a_read_from_unit_0_is_sent_and_its_reply_accepted(void **state)
+TEST(a_read_from_unit_0_is_sent_and_its_reply_accepted)
 {
     LENIENT;
 
@@ -294,7 +296,7 @@ static void a_read_from_unit_0_is_sent_and_its_reply_accepted(void **state)
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
 }
 
-static void it_cannot_be_set_while_a_request_is_under_way(void **state)
+TEST(it_cannot_be_set_while_a_request_is_under_way)
 {
     LENIENT;
 
@@ -309,7 +311,7 @@ static void it_cannot_be_set_while_a_request_is_under_way(void **state)
 }
 
 /* After a failure a reply is held, for it may be the late one. */
-static void a_late_reply_that_deviates_is_not_better_than_the_next(void **state)
+TEST(a_late_reply_that_deviates_is_not_better_than_the_next)
 {
     LENIENT;
 
@@ -321,26 +323,4 @@ static void a_late_reply_that_deviates_is_not_better_than_the_next(void **state)
     OK(mbm_node_readHoldingRegisters(n, 2, 2));
     assert_int_equal(mbm_node_available(n), 2);
     assert_int_equal(s->response[0], 2);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(a_write_whose_reply_repeats_other_content_is_accepted),
-        SIM_TEST(without_it_the_same_replies_are_malformed),
-        SIM_TEST(a_read_takes_the_registers_that_come),
-        SIM_TEST(the_bytes_may_come_one_at_a_time_or_all_at_once),
-        SIM_TEST(a_reply_that_ends_with_the_byte_0_is_accepted),
-        SIM_TEST(a_right_reply_is_better_before_and_after_it),
-        SIM_TEST(half_a_reply_in_front_hides_no_right_one),
-        SIM_TEST(what_is_no_reply_to_the_request_is_not_accepted),
-        SIM_TEST(a_read_of_more_words_than_the_buffer_fills_it),
-        SIM_TEST(what_the_buffer_does_not_hold_is_checked_too),
-        SIM_TEST(a_small_frame_buffer_is_not_left),
-        SIM_TEST(a_read_from_unit_0_is_sent_and_its_reply_accepted),
-        SIM_TEST(it_cannot_be_set_while_a_request_is_under_way),
-        SIM_TEST(a_late_reply_that_deviates_is_not_better_than_the_next),
-    };
-
-    return cmocka_run_group_tests_name("lenient", tests, NULL, NULL);
 }

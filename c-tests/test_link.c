@@ -1,11 +1,10 @@
 /* A client's link: when it is opened again, and what becomes of requests meanwhile. */
 #include "linked.h"
 
-static void a_link_is_opened_in_the_first_poll(void **state)
+TEST(a_link_is_opened_in_the_first_poll)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         assert_int_equal(mbm_link_state(&kept), 0);
@@ -25,9 +24,8 @@ static void a_link_is_opened_in_the_first_poll(void **state)
     }
 }
 
-static void a_link_that_is_open_already_is_used_as_it_is(void **state)
+TEST(a_link_that_is_open_already_is_used_as_it_is)
 {
-    (void)state;
     begin(MBM_FRAMING_TCP);
     status_is = MBM_OK;
     OK(mbm_client_poll(&client));
@@ -45,11 +43,10 @@ static void a_link_that_is_open_already_is_used_as_it_is(void **state)
     assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
 }
 
-static void the_loss_of_the_link_is_noticed_while_the_client_is_idle(void **state)
+TEST(the_loss_of_the_link_is_noticed_while_the_client_is_idle)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         assert_int_equal(mbm_client_pollDelay(&client), 1000 * MS);
@@ -73,12 +70,11 @@ static void the_loss_of_the_link_is_noticed_while_the_client_is_idle(void **stat
     }
 }
 
-static void bytes_that_arrive_while_the_client_is_idle_are_dropped(void **state)
+TEST(bytes_that_arrive_while_the_client_is_idle_are_dropped)
 {
     static const uint8_t late[] = {0, 9, 0, 0, 0, 5, UNIT, 3, 2, 0xAA, 0xAA, 0, 9, 0, 0};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         mbm_counters counted = {0};
 
@@ -103,9 +99,8 @@ static void bytes_that_arrive_while_the_client_is_idle_are_dropped(void **state)
     }
 }
 
-static void the_gap_is_kept_after_bytes_that_arrived_while_idle(void **state)
+TEST(the_gap_is_kept_after_bytes_that_arrived_while_idle)
 {
-    (void)state;
     begin_up(MBM_FRAMING_RTU);
     OK(mbm_client_setBaudRate(&client, 9600));
     run(1000);
@@ -117,9 +112,8 @@ static void the_gap_is_kept_after_bytes_that_arrived_while_idle(void **state)
     assert_in_range(mbm_client_pollDelay(&client), 4000, 4020);
 }
 
-static void the_wait_grows_from_attempt_to_attempt(void **state)
+TEST(the_wait_grows_from_attempt_to_attempt)
 {
-    (void)state;
     begin_up(MBM_FRAMING_TCP);
     OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_EXPONENTIAL, 100, 1000));
     run(5000);
@@ -147,11 +141,10 @@ static void the_wait_grows_from_attempt_to_attempt(void **state)
     assert_int_equal(next_attempt(), 100);
 }
 
-static void a_peer_that_closes_each_connection_at_once_is_asked_less_and_less(void **state)
+TEST(a_peer_that_closes_each_connection_at_once_is_asked_less_and_less)
 {
     unsigned i;
 
-    (void)state;
     begin_up(MBM_FRAMING_TCP);
     OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_EXPONENTIAL, 100, 30000));
     run(2000);
@@ -168,9 +161,8 @@ static void a_peer_that_closes_each_connection_at_once_is_asked_less_and_less(vo
     assert_int_equal(next_attempt(), 100);
 }
 
-static void jitter_shortens_the_wait(void **state)
+TEST(jitter_shortens_the_wait)
 {
-    (void)state;
     begin_up(MBM_FRAMING_TCP);
     OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 1000, 1000));
     OK(mbm_link_setJitter(&kept, 50, half, &m));
@@ -179,11 +171,10 @@ static void jitter_shortens_the_wait(void **state)
     assert_in_range(next_attempt(), 740, 760);
 }
 
-static void requests_fail_while_the_link_is_down(void **state)
+TEST(requests_fail_while_the_link_is_down)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         connects_with = MBM_LINK_LOST;
@@ -203,11 +194,10 @@ static void requests_fail_while_the_link_is_down(void **state)
     }
 }
 
-static void requests_that_were_not_sent_wait_for_the_link(void **state)
+TEST(requests_that_were_not_sent_wait_for_the_link)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         OK(mbm_link_setRequestsWait(&kept, 1));
@@ -239,11 +229,10 @@ static void requests_that_were_not_sent_wait_for_the_link(void **state)
     }
 }
 
-static void requests_wait_while_the_first_connection_is_being_made(void **state)
+TEST(requests_wait_while_the_first_connection_is_being_made)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         connects_with = MBM_PENDING;
@@ -262,9 +251,8 @@ static void requests_wait_while_the_first_connection_is_being_made(void **state)
     }
 }
 
-static void a_connection_that_takes_too_long_has_failed(void **state)
+TEST(a_connection_that_takes_too_long_has_failed)
 {
-    (void)state;
     begin(MBM_FRAMING_TCP);
     connects_with = MBM_PENDING;
     OK(mbm_client_poll(&client));
@@ -298,11 +286,10 @@ static void a_connection_that_takes_too_long_has_failed(void **state)
     IS(MBM_LINK_LOST, request.status);
 }
 
-static void a_link_without_a_status_hook_waits_for_the_connect_timeout(void **state)
+TEST(a_link_without_a_status_hook_waits_for_the_connect_timeout)
 {
     const mbm_linkHooks one = {.context = &m, .connect = connect_hook};
 
-    (void)state;
     begin(MBM_FRAMING_TCP);
     OK(mbm_link_begin(&kept, &client, &one));
     OK(mbm_client_poll(&client));
@@ -311,25 +298,4 @@ static void a_link_without_a_status_hook_waits_for_the_connect_timeout(void **st
     OK(mbm_client_poll(&client));
     assert_int_equal(next_attempt(), 500);
     assert_int_equal(disconnects, 0);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_link_is_opened_in_the_first_poll),
-        cmocka_unit_test(a_link_that_is_open_already_is_used_as_it_is),
-        cmocka_unit_test(the_loss_of_the_link_is_noticed_while_the_client_is_idle),
-        cmocka_unit_test(bytes_that_arrive_while_the_client_is_idle_are_dropped),
-        cmocka_unit_test(the_gap_is_kept_after_bytes_that_arrived_while_idle),
-        cmocka_unit_test(the_wait_grows_from_attempt_to_attempt),
-        cmocka_unit_test(a_peer_that_closes_each_connection_at_once_is_asked_less_and_less),
-        cmocka_unit_test(jitter_shortens_the_wait),
-        cmocka_unit_test(requests_fail_while_the_link_is_down),
-        cmocka_unit_test(requests_that_were_not_sent_wait_for_the_link),
-        cmocka_unit_test(requests_wait_while_the_first_connection_is_being_made),
-        cmocka_unit_test(a_connection_that_takes_too_long_has_failed),
-        cmocka_unit_test(a_link_without_a_status_hook_waits_for_the_connect_timeout),
-    };
-
-    return cmocka_run_group_tests_name("link", tests, NULL, NULL);
 }

@@ -27,11 +27,10 @@ static void is_answered(int framing, mbm_clientRequest *which)
     assert_int_equal(words[0], 0x1234);
 }
 
-static void a_request_that_finds_the_link_closed_opens_it_at_once(void **state)
+TEST(a_request_that_finds_the_link_closed_opens_it_at_once)
 {
     unsigned i, noticed;
 
-    (void)state;
     for (i = 0; i < 2 * COUNT(framings); i++) {
         const int framing = framings[i / 2];
         uint32_t before;
@@ -63,11 +62,10 @@ static void a_request_that_finds_the_link_closed_opens_it_at_once(void **state)
 }
 
 /* A device that serves one request with each connection. */
-static void a_peer_that_closes_the_link_after_each_reply_answers_each_request(void **state)
+TEST(a_peer_that_closes_the_link_after_each_reply_answers_each_request)
 {
     unsigned i, round;
 
-    (void)state;
     for (i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
         for (round = 0; round < 20; round++) {
@@ -82,11 +80,10 @@ static void a_peer_that_closes_the_link_after_each_reply_answers_each_request(vo
     }
 }
 
-static void a_request_waits_for_the_opening_as_long_as_its_response_timeout(void **state)
+TEST(a_request_waits_for_the_opening_as_long_as_its_response_timeout)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_good(framings[i]);
         m.is_lost = 1;
@@ -114,9 +111,8 @@ static void a_request_waits_for_the_opening_as_long_as_its_response_timeout(void
     }
 }
 
-static void requests_that_wait_for_the_link_wait_longer(void **state)
+TEST(requests_that_wait_for_the_link_wait_longer)
 {
-    (void)state;
     begin_good(MBM_FRAMING_TCP);
     OK(mbm_link_setRequestsWait(&kept, 1));
     m.is_lost = 1;
@@ -129,11 +125,10 @@ static void requests_that_wait_for_the_link_wait_longer(void **state)
     is_answered(MBM_FRAMING_TCP, &request);
 }
 
-static void only_a_failed_opening_backs_off(void **state)
+TEST(only_a_failed_opening_backs_off)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_good(framings[i]);
         m.is_lost = 1;
@@ -152,11 +147,10 @@ static void only_a_failed_opening_backs_off(void **state)
     }
 }
 
-static void a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_request(void **state)
+TEST(a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_request)
 {
     unsigned i;
 
-    (void)state;
     begin_good(MBM_FRAMING_TCP);
     m.is_lost = 1;
     for (i = 0; i < 1000; i++) {
@@ -170,11 +164,10 @@ static void a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_req
     assert_in_range(connects, 4, 6);
 }
 
-static void a_request_that_was_sent_is_not_sent_again_over_the_new_link(void **state)
+TEST(a_request_that_was_sent_is_not_sent_again_over_the_new_link)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_good(framings[i]);
         OK(mbm_client_setRetries(&client, 3));
@@ -194,11 +187,10 @@ static void a_request_that_was_sent_is_not_sent_again_over_the_new_link(void **s
     }
 }
 
-static void a_link_that_its_peer_closes_twice_while_idle_waits_for_a_request(void **state)
+TEST(a_link_that_its_peer_closes_twice_while_idle_waits_for_a_request)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_good(framings[i]);
         OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 1000, 1000));
@@ -236,11 +228,10 @@ static void is_unanswered(mbm_clientRequest *which)
     IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, which, 1000));
 }
 
-static void a_silent_connection_is_replaced_after_two_requests(void **state)
+TEST(a_silent_connection_is_replaced_after_two_requests)
 {
     unsigned i, round;
 
-    (void)state;
     for (i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
         for (round = 1; round < 5; round++) {
@@ -260,11 +251,10 @@ static void a_silent_connection_is_replaced_after_two_requests(void **state)
 }
 
 /* A unit behind a gateway is absent, and the gateway says nothing. Another one is there. */
-static void a_silent_unit_costs_the_others_no_request(void **state)
+TEST(a_silent_unit_costs_the_others_no_request)
 {
     unsigned i, round;
 
-    (void)state;
     for (i = 0; i < COUNT(streams); i++) {
         begin_up(streams[i]);
         connects = 0;
@@ -281,11 +271,10 @@ static void a_silent_unit_costs_the_others_no_request(void **state)
     }
 }
 
-static void a_repetition_goes_over_the_new_connection(void **state)
+TEST(a_repetition_goes_over_the_new_connection)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
         OK(mbm_client_setRetries(&client, 2));
@@ -299,12 +288,11 @@ static void a_repetition_goes_over_the_new_connection(void **state)
     }
 }
 
-static void any_byte_begins_the_count_anew(void **state)
+TEST(any_byte_begins_the_count_anew)
 {
     static const uint8_t noise = 0xA5;
     unsigned i, round;
 
-    (void)state;
     for (i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
         for (round = 0; round < 20; round++) {
@@ -319,11 +307,10 @@ static void any_byte_begins_the_count_anew(void **state)
     }
 }
 
-static void requests_of_a_program_with_limits_of_its_own_count_too(void **state)
+TEST(requests_of_a_program_with_limits_of_its_own_count_too)
 {
     unsigned i, round;
 
-    (void)state;
     for (i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
         /* Each is cancelled after 20 ms. The response timeout is 300 ms. */
@@ -340,11 +327,10 @@ static void requests_of_a_program_with_limits_of_its_own_count_too(void **state)
     }
 }
 
-static void cancelled_requests_alone_do_not_close_a_connection(void **state)
+TEST(cancelled_requests_alone_do_not_close_a_connection)
 {
     unsigned round;
 
-    (void)state;
     begin_good(MBM_FRAMING_TCP);
     for (round = 0; round < 100; round++) {
         unsigned cancelled;
@@ -361,11 +347,10 @@ static void cancelled_requests_alone_do_not_close_a_connection(void **state)
     assert_int_equal(connects, 0);
 }
 
-static void the_limit_is_a_setting(void **state)
+TEST(the_limit_is_a_setting)
 {
     unsigned i, round;
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_link_setReplaceAfter(NULL, 1));
     begin(MBM_FRAMING_TCP);
     IS(MBM_INVALID_ARGUMENT, mbm_link_setReplaceAfter(&kept, 101));
@@ -390,11 +375,10 @@ static void the_limit_is_a_setting(void **state)
     }
 }
 
-static void a_response_of_the_old_connection_is_not_taken_for_one_of_the_new(void **state)
+TEST(a_response_of_the_old_connection_is_not_taken_for_one_of_the_new)
 {
     uint8_t late[11] = {0, 0, 0, 0, 0, 5, UNIT, 3, 2, 0x66, 0x66};
 
-    (void)state;
     begin_good(MBM_FRAMING_TCP);
     is_unanswered(&request);
     m.sent_count = 0;
@@ -409,13 +393,12 @@ static void a_response_of_the_old_connection_is_not_taken_for_one_of_the_new(voi
 }
 
 /* Two requests time out while three that were sent later may still be answered. */
-static void requests_under_way_have_their_time_before_a_connection_is_replaced(void **state)
+TEST(requests_under_way_have_their_time_before_a_connection_is_replaced)
 {
     static mbm_clientRequest late[3];
     uint8_t reply[11] = {0, 0, 0, 0, 0, 5, UNIT, 3, 2, 0x12, 0x34};
     unsigned i, answered;
 
-    (void)state;
     for (answered = 0; answered < 2; answered++) {
         begin_good(MBM_FRAMING_TCP);
         queue_read(&request);
@@ -439,29 +422,4 @@ static void requests_under_way_have_their_time_before_a_connection_is_replaced(v
         IS(MBM_RESPONSE_TIMED_OUT, late[2].status);
         assert_int_equal(counters.lost, answered ? 0 : 1);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_request_that_finds_the_link_closed_opens_it_at_once),
-        cmocka_unit_test(a_peer_that_closes_the_link_after_each_reply_answers_each_request),
-        cmocka_unit_test(a_request_waits_for_the_opening_as_long_as_its_response_timeout),
-        cmocka_unit_test(requests_that_wait_for_the_link_wait_longer),
-        cmocka_unit_test(only_a_failed_opening_backs_off),
-        cmocka_unit_test(a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_request),
-        cmocka_unit_test(a_request_that_was_sent_is_not_sent_again_over_the_new_link),
-        cmocka_unit_test(a_link_that_its_peer_closes_twice_while_idle_waits_for_a_request),
-        cmocka_unit_test(a_silent_connection_is_replaced_after_two_requests),
-        cmocka_unit_test(a_silent_unit_costs_the_others_no_request),
-        cmocka_unit_test(a_repetition_goes_over_the_new_connection),
-        cmocka_unit_test(any_byte_begins_the_count_anew),
-        cmocka_unit_test(requests_of_a_program_with_limits_of_its_own_count_too),
-        cmocka_unit_test(cancelled_requests_alone_do_not_close_a_connection),
-        cmocka_unit_test(the_limit_is_a_setting),
-        cmocka_unit_test(a_response_of_the_old_connection_is_not_taken_for_one_of_the_new),
-        cmocka_unit_test(requests_under_way_have_their_time_before_a_connection_is_replaced),
-    };
-
-    return cmocka_run_group_tests_name("links again", tests, NULL, NULL);
 }

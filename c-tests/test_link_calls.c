@@ -25,9 +25,8 @@ static void use_everything(void)
     assert_int_equal(mbm_client_pollDelay(&client), 0);
 }
 
-static void the_hooks_of_a_link_may_use_neither_link_nor_client(void **state)
+TEST(the_hooks_of_a_link_may_use_neither_link_nor_client)
 {
-    (void)state;
     begin(MBM_FRAMING_TCP);
     called = 0;
     within = use_everything;
@@ -69,13 +68,12 @@ static void act(void *context, uint8_t event, uint8_t status)
     }
 }
 
-static void the_callback_may_use_link_and_client(void **state)
+TEST(the_callback_may_use_link_and_client)
 {
     static const uint8_t after[] = {MBM_OK, MBM_OK, MBM_OK, MBM_NOT_INITIALISED,
                                     MBM_OK, MBM_OK, MBM_OK, MBM_OK};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (what = 0; what < 8; what++) {
             begin_up(framings[i]);
@@ -96,11 +94,10 @@ static void the_callback_may_use_link_and_client(void **state)
         }
 }
 
-static void a_client_without_its_link_works_as_before(void **state)
+TEST(a_client_without_its_link_works_as_before)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         OK(mbm_link_end(&kept));
@@ -124,9 +121,8 @@ static void a_client_without_its_link_works_as_before(void **state)
     }
 }
 
-static void a_client_that_is_begun_again_has_no_link(void **state)
+TEST(a_client_that_is_begun_again_has_no_link)
 {
-    (void)state;
     begin_up(MBM_FRAMING_TCP);
     begin_client(MBM_FRAMING_RTU);
     assert_int_equal(mbm_client_pollDelay(&client), UINT32_MAX);
@@ -138,12 +134,11 @@ static void a_client_that_is_begun_again_has_no_link(void **state)
     assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
 }
 
-static void a_link_uses_nothing_of_a_client_that_was_begun_again(void **state)
+TEST(a_link_uses_nothing_of_a_client_that_was_begun_again)
 {
     static mbm_client linked, next;
     const mbm_port port = memory_port_of(&m);
 
-    (void)state;
     begin_up(MBM_FRAMING_TCP);
     memcpy(&linked, &client, sizeof client);
     begin_client(MBM_FRAMING_RTU);
@@ -157,9 +152,8 @@ static void a_link_uses_nothing_of_a_client_that_was_begun_again(void **state)
     assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
 }
 
-static void a_link_begun_again_has_its_default_settings(void **state)
+TEST(a_link_begun_again_has_its_default_settings)
 {
-    (void)state;
     begin_up(MBM_FRAMING_TCP);
     OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 7, 7));
     OK(mbm_link_setRequestsWait(&kept, 1));
@@ -174,7 +168,7 @@ static void a_link_begun_again_has_its_default_settings(void **state)
     assert_int_equal(mbm_client_pollDelay(&client), 500 * MS);
 }
 
-static void a_suspended_client_leaves_its_link_alone(void **state)
+TEST(a_suspended_client_leaves_its_link_alone)
 {
     static mbm_line line;
     static mbm_node node;
@@ -182,7 +176,6 @@ static void a_suspended_client_leaves_its_link_alone(void **state)
     static uint8_t buffer[16];
     mbm_link second = {0};
 
-    (void)state;
     memset(&line, 0, sizeof line);
     memset(&node, 0, sizeof node);
     begin_up(MBM_FRAMING_RTU);
@@ -212,11 +205,10 @@ static void a_suspended_client_leaves_its_link_alone(void **state)
     OK(mbm_client_resume(&client, &line));
 }
 
-static void a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link(void **state)
+TEST(a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         queue_read(&request);
@@ -229,9 +221,8 @@ static void a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link(void **state)
     }
 }
 
-static void a_reconnection_on_demand_closes_the_link_and_opens_it_at_once(void **state)
+TEST(a_reconnection_on_demand_closes_the_link_and_opens_it_at_once)
 {
-    (void)state;
     begin_up(MBM_FRAMING_TCP);
     OK(mbm_link_setRequestsWait(&kept, 1));
     queue_read(&request);
@@ -265,11 +256,10 @@ static void a_reconnection_on_demand_closes_the_link_and_opens_it_at_once(void *
     assert_int_equal(next_attempt(), 0);
 }
 
-static void queued_requests_wait_for_a_reconnection_on_demand(void **state)
+TEST(queued_requests_wait_for_a_reconnection_on_demand)
 {
     unsigned is_down;
 
-    (void)state;
     for (is_down = 0; is_down < 2; is_down++) {
         mbm_clientRequest queued = {.unit = 17};
 
@@ -304,11 +294,10 @@ static void queue_again(void *context, mbm_clientRequest *ended)
     queue_read(ended);
 }
 
-static void a_request_of_done_fails_or_waits_as_all_do(void **state)
+TEST(a_request_of_done_fails_or_waits_as_all_do)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 2; i++) {
         begin_up(MBM_FRAMING_TCP);
         OK(mbm_link_setRequestsWait(&kept, (uint8_t)i));
@@ -324,14 +313,13 @@ static void a_request_of_done_fails_or_waits_as_all_do(void **state)
     }
 }
 
-static void a_call_that_is_refused_changes_nothing(void **state)
+TEST(a_call_that_is_refused_changes_nothing)
 {
     const mbm_linkHooks none = {.disconnect = disconnect};
     static mbm_link zero, second;
     static mbm_client unused;
     mbm_link before;
 
-    (void)state;
     memset(&second, 0, sizeof second);
     begin_up(MBM_FRAMING_TCP);
     IS(MBM_INVALID_ARGUMENT, mbm_link_begin(NULL, &client, &hooks));
@@ -356,24 +344,4 @@ static void a_call_that_is_refused_changes_nothing(void **state)
     assert_memory_equal(&before, &kept, sizeof kept);
     run(3000);
     assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_hooks_of_a_link_may_use_neither_link_nor_client),
-        cmocka_unit_test(the_callback_may_use_link_and_client),
-        cmocka_unit_test(a_client_without_its_link_works_as_before),
-        cmocka_unit_test(a_client_that_is_begun_again_has_no_link),
-        cmocka_unit_test(a_link_uses_nothing_of_a_client_that_was_begun_again),
-        cmocka_unit_test(a_link_begun_again_has_its_default_settings),
-        cmocka_unit_test(a_suspended_client_leaves_its_link_alone),
-        cmocka_unit_test(a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link),
-        cmocka_unit_test(a_reconnection_on_demand_closes_the_link_and_opens_it_at_once),
-        cmocka_unit_test(queued_requests_wait_for_a_reconnection_on_demand),
-        cmocka_unit_test(a_request_of_done_fails_or_waits_as_all_do),
-        cmocka_unit_test(a_call_that_is_refused_changes_nothing),
-    };
-
-    return cmocka_run_group_tests_name("link calls", tests, NULL, NULL);
 }

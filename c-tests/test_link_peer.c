@@ -56,27 +56,25 @@ static void poll_once(void)
         }                                                                                          \
     } while (0)
 
-static int begin_tcp(void **state)
+static void begin_tcp(void)
 {
     mbm_linkHooks hooks;
 
-    (void)state;
     peer = tcp_peer_new();
     port = tcp_peer_start(peer, 0);
     asker_begin_tcp(&a, port);
     hooks = mbm_tcp_link(&a.tcp);
     keep(&hooks);
     UNTIL(mbm_link_state(&kept) == MBM_LINK_IS_UP);
-    return 0;
 }
 
-static int end_tcp(void **state)
+static void end_tcp(void)
 {
-    (void)state;
     mbm_tcp_close(&a.tcp);
     tcp_peer_stop(peer);
-    return 0;
 }
+
+fixture each_test = {begin_tcp, end_tcp};
 
 static void queue_read(unsigned i)
 {
@@ -94,11 +92,10 @@ static void read_over_tcp(unsigned i)
     assert_int_equal(words[i][1], tcp_peer_word(10 * i + 1));
 }
 
-static void a_connection_that_the_server_closes_is_opened_again_while_idle(void **state)
+TEST(a_connection_that_the_server_closes_is_opened_again_while_idle)
 {
     unsigned i;
 
-    (void)state;
     read_over_tcp(0);
     for (i = 1; i < 4; i++) {
         tcp_peer_hang_up(peer);
@@ -111,11 +108,10 @@ static void a_connection_that_the_server_closes_is_opened_again_while_idle(void 
     assert_int_equal(counters.failed, 0);
 }
 
-static void a_request_after_the_server_has_hung_up_is_sent_once_over_a_new_connection(void **state)
+TEST(a_request_after_the_server_has_hung_up_is_sent_once_over_a_new_connection)
 {
     unsigned i;
 
-    (void)state;
     OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 1000000, 1000000));
     read_over_tcp(0);
     for (i = 1; i < MANY; i++) {
@@ -132,11 +128,10 @@ static void a_request_after_the_server_has_hung_up_is_sent_once_over_a_new_conne
     assert_int_equal(counters.failed, 0);
 }
 
-static void a_server_that_answers_no_more_is_connected_to_anew(void **state)
+TEST(a_server_that_answers_no_more_is_connected_to_anew)
 {
     unsigned n;
 
-    (void)state;
     OK(mbm_client_setResponseTimeout(&a.client, 100));
     read_over_tcp(0);
     tcp_peer_fault(peer, 2, FAULT_DROP, 0);
@@ -152,9 +147,8 @@ static void a_server_that_answers_no_more_is_connected_to_anew(void **state)
     assert_int_equal(tcp_peer_count(peer).requests, 4);
 }
 
-static void the_loss_wakes_a_program_that_waits_for_an_hour(void **state)
+TEST(the_loss_wakes_a_program_that_waits_for_an_hour)
 {
-    (void)state;
     read_over_tcp(0);
     tcp_peer_hang_up(peer);
     assert_int_equal(mbm_tcp_wait(&a.tcp, 1, NULL, -1, 3600000000u), 1);
@@ -163,11 +157,10 @@ static void the_loss_wakes_a_program_that_waits_for_an_hour(void **state)
     assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
 }
 
-static void a_server_that_was_away_is_found_again(void **state)
+TEST(a_server_that_was_away_is_found_again)
 {
     unsigned i;
 
-    (void)state;
     read_over_tcp(0);
     tcp_peer_halt(peer);
     UNTIL(counters.failed >= 3);
@@ -193,11 +186,10 @@ static void a_server_that_was_away_is_found_again(void **state)
     assert_int_equal(counters.connected, 2);
 }
 
-static void requests_under_way_when_the_server_dies_end_and_the_others_wait(void **state)
+TEST(requests_under_way_when_the_server_dies_end_and_the_others_wait)
 {
     unsigned i, lost = 0;
 
-    (void)state;
     OK(mbm_link_setRequestsWait(&kept, 1));
     OK(mbm_client_setInFlight(&a.client, 4));
     /* The first two are answered, then the server resets the connection. */
@@ -215,9 +207,8 @@ static void requests_under_way_when_the_server_dies_end_and_the_others_wait(void
     assert_int_equal(counters.connected, 2);
 }
 
-static void half_a_reply_before_the_loss_does_not_disturb_the_next_connection(void **state)
+TEST(half_a_reply_before_the_loss_does_not_disturb_the_next_connection)
 {
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_HALF, 7);
     queue_read(0);
     UNTIL(requests[0].status != MBM_PENDING);
@@ -270,12 +261,11 @@ static void read_over_tty(void)
     assert_int_equal(words[3][1], server_pattern(31));
 }
 
-static void a_terminal_that_is_unplugged_is_opened_again(void **state)
+TEST_WITH(a_terminal_that_is_unplugged_is_opened_again, NULL, NULL)
 {
     const mbm_linkHooks hooks = {NULL, close_tty, open_tty, status_of_tty};
     unsigned i;
 
-    (void)state;
     come();
     asker_begin_rtu(&a, dup(far_end.line.ours));
     keep(&hooks);
@@ -293,11 +283,10 @@ static void a_terminal_that_is_unplugged_is_opened_again(void **state)
     UNTIL(counters.lost == 3);
 }
 
-static void a_terminal_that_is_unplugged_during_a_request_ends_it(void **state)
+TEST_WITH(a_terminal_that_is_unplugged_during_a_request_ends_it, NULL, NULL)
 {
     const mbm_linkHooks hooks = {NULL, close_tty, open_tty, status_of_tty};
 
-    (void)state;
     come();
     asker_begin_rtu(&a, dup(far_end.line.ours));
     keep(&hooks);
@@ -321,28 +310,4 @@ static void a_terminal_that_is_unplugged_during_a_request_ends_it(void **state)
     OK(mbm_link_end(&kept));
     mbm_tty_close(&a.tty);
     go();
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(
-            a_connection_that_the_server_closes_is_opened_again_while_idle, begin_tcp, end_tcp),
-        cmocka_unit_test_setup_teardown(
-            a_request_after_the_server_has_hung_up_is_sent_once_over_a_new_connection, begin_tcp,
-            end_tcp),
-        cmocka_unit_test_setup_teardown(a_server_that_answers_no_more_is_connected_to_anew,
-                                        begin_tcp, end_tcp),
-        cmocka_unit_test_setup_teardown(the_loss_wakes_a_program_that_waits_for_an_hour, begin_tcp,
-                                        end_tcp),
-        cmocka_unit_test_setup_teardown(a_server_that_was_away_is_found_again, begin_tcp, end_tcp),
-        cmocka_unit_test_setup_teardown(
-            requests_under_way_when_the_server_dies_end_and_the_others_wait, begin_tcp, end_tcp),
-        cmocka_unit_test_setup_teardown(
-            half_a_reply_before_the_loss_does_not_disturb_the_next_connection, begin_tcp, end_tcp),
-        cmocka_unit_test(a_terminal_that_is_unplugged_is_opened_again),
-        cmocka_unit_test(a_terminal_that_is_unplugged_during_a_request_ends_it),
-    };
-
-    return cmocka_run_group_tests_name("link peers", tests, NULL, NULL);
 }

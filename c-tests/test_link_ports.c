@@ -152,11 +152,10 @@ static void begin_tcp(void)
     keep(&hooks);
 }
 
-static void a_program_begins_before_the_network_and_the_name_are_there(void **state)
+TEST(a_program_begins_before_the_network_and_the_name_are_there)
 {
     tcp_peer *peer = tcp_peer_new();
 
-    (void)state;
     begin_tcp();
     lookup_fails_with = EAI_AGAIN;
     UNTIL(counters.failed == 2);
@@ -175,11 +174,10 @@ static void a_program_begins_before_the_network_and_the_name_are_there(void **st
     tcp_peer_stop(peer);
 }
 
-static void a_server_that_moves_to_another_address_is_found_again(void **state)
+TEST(a_server_that_moves_to_another_address_is_found_again)
 {
     tcp_peer *first = tcp_peer_new(), *second = tcp_peer_new();
 
-    (void)state;
     begin_tcp();
     ports[0] = tcp_peer_start(first, 0);
     read_word(5, tcp_peer_word(5));
@@ -197,12 +195,11 @@ static void a_server_that_moves_to_another_address_is_found_again(void **state)
 }
 
 /* The first address is a listener whose queue is full. */
-static void an_address_that_never_answers_does_not_keep_the_link_from_the_next(void **state)
+TEST(an_address_that_never_answers_does_not_keep_the_link_from_the_next)
 {
     tcp_peer *peer = tcp_peer_new();
     int listener, filler;
 
-    (void)state;
     begin_tcp();
     listener = tcp_listen(&ports[0]);
     assert_int_equal(listen(listener, 0), 0);
@@ -219,13 +216,12 @@ static void an_address_that_never_answers_does_not_keep_the_link_from_the_next(v
     close(listener);
 }
 
-static void a_server_that_cannot_be_noted_is_refused(void **state)
+TEST(a_server_that_cannot_be_noted_is_refused)
 {
     static mbm_tcp tcp;
     static mbm_tcp_addresses addresses;
     char name[MBM_TCP_HOST_BYTES + 1];
 
-    (void)state;
     memset(name, 'a', sizeof name);
     name[MBM_TCP_HOST_BYTES] = '\0';
     FAILS(ENAMETOOLONG, mbm_tcp_openLater(&tcp, &addresses, name, "502"));
@@ -275,13 +271,12 @@ static void unplug(void)
     pty_close(&line);
 }
 
-static void a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_comes(void **state)
+TEST(a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_comes)
 {
     const mbm_tty_options options = {.baud = 115200, .parity = 'N', .stop = 1};
     mbm_linkHooks hooks;
     unsigned i;
 
-    (void)state;
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/tty", folder);
     memset(&unit, 0, sizeof unit);
@@ -313,14 +308,13 @@ static void a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_
     rmdir(folder);
 }
 
-static void a_terminal_that_cannot_be_noted_is_refused(void **state)
+TEST(a_terminal_that_cannot_be_noted_is_refused)
 {
     const mbm_tty_options right = {.baud = 9600, .parity = 'E', .stop = 1},
                           wrong = {.baud = 9600, .parity = 'X', .stop = 1};
     char name[MBM_TTY_PATH_BYTES + 1];
     mbm_tty tty = {0};
 
-    (void)state;
     memset(name, 'a', sizeof name);
     name[MBM_TTY_PATH_BYTES] = '\0';
     FAILS(ENAMETOOLONG, mbm_tty_openLater(&tty, name, &right));
@@ -330,18 +324,4 @@ static void a_terminal_that_cannot_be_noted_is_refused(void **state)
     FAILS(ENOENT, mbm_tty_openWith(&tty, "/dev/there-is-none", &right));
     assert_int_equal(mbm_tty_connect(&tty), MBM_LINK_LOST);
     assert_int_equal(tty.error, EBADF);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_program_begins_before_the_network_and_the_name_are_there),
-        cmocka_unit_test(a_server_that_moves_to_another_address_is_found_again),
-        cmocka_unit_test(an_address_that_never_answers_does_not_keep_the_link_from_the_next),
-        cmocka_unit_test(a_server_that_cannot_be_noted_is_refused),
-        cmocka_unit_test(a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_comes),
-        cmocka_unit_test(a_terminal_that_cannot_be_noted_is_refused),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

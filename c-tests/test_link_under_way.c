@@ -128,23 +128,20 @@ static void requests_under_way_end_when_the_link_was_closed(uint16_t accepted)
             }
 }
 
-static void requests_that_were_sent_end_when_a_link_begins_that_is_closed(void **state)
+TEST(requests_that_were_sent_end_when_a_link_begins_that_is_closed)
 {
-    (void)state;
     requests_under_way_end_when_the_link_was_closed(ALL);
 }
 
-static void a_request_that_the_port_took_in_part_is_not_sent_on_over_the_new_link(void **state)
+TEST(a_request_that_the_port_took_in_part_is_not_sent_on_over_the_new_link)
 {
-    (void)state;
     requests_under_way_end_when_the_link_was_closed(5);
 }
 
-static void a_request_that_ended_with_the_old_link_is_never_sent(void **state)
+TEST(a_request_that_ended_with_the_old_link_is_never_sent)
 {
     unsigned i, j;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (j = 0; j < COUNT(courses); j++) {
             begin_under_way(framings[i], NOTHING);
@@ -162,12 +159,11 @@ static void a_request_that_ended_with_the_old_link_is_never_sent(void **state)
         }
 }
 
-static void half_a_reply_of_the_old_peer_is_dropped(void **state)
+TEST(half_a_reply_of_the_old_peer_is_dropped)
 {
     static const uint8_t half_rtu[] = {UNIT, 3, 2}, half_tcp[] = {0, 0, 0, 0, 0, 5, UNIT, 6};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin_under_way(framings[i], ALL);
         if (framings[i] == MBM_FRAMING_TCP)
@@ -186,13 +182,12 @@ static void half_a_reply_of_the_old_peer_is_dropped(void **state)
     }
 }
 
-static void a_request_under_way_goes_on_if_the_link_is_found_open(void **state)
+TEST(a_request_under_way_goes_on_if_the_link_is_found_open)
 {
     static const uint8_t reply[] = {UNIT, 6, 0, 7, 0xBE, 0xEF};
     uint8_t tcp[] = {0, 0, 0, 0, 0, 6, UNIT, 6, 0, 7, 0xBE, 0xEF};
     unsigned i, waits;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (waits = 0; waits < 2; waits++) {
             begin_under_way(framings[i], ALL);
@@ -215,11 +210,10 @@ static void a_request_under_way_goes_on_if_the_link_is_found_open(void **state)
         }
 }
 
-static void a_link_that_the_program_closes_while_it_is_being_made_sends_nothing_old(void **state)
+TEST(a_link_that_the_program_closes_while_it_is_being_made_sends_nothing_old)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         mbm_clientRequest second = {.unit = UNIT};
 
@@ -252,11 +246,10 @@ static void end_it(void *context, uint8_t event, uint8_t status)
         OK(mbm_link_end(&kept));
 }
 
-static void a_client_whose_link_ends_in_its_callback_sends_nothing_old(void **state)
+TEST(a_client_whose_link_ends_in_its_callback_sends_nothing_old)
 {
     unsigned i, j;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (j = 1; j < COUNT(courses); j++) {
             begin_under_way(framings[i], NOTHING);
@@ -281,11 +274,10 @@ static void a_client_whose_link_ends_in_its_callback_sends_nothing_old(void **st
 }
 
 /* A reply that guesses the transaction identifier ends a request before it was sent. */
-static void a_request_that_was_answered_before_it_was_sent_is_not_sent(void **state)
+TEST(a_request_that_was_answered_before_it_was_sent_is_not_sent)
 {
     static const uint8_t reply[] = {0, 0, 0, 0, 0, 6, UNIT, 6, 0, 7, 0xBE, 0xEF};
 
-    (void)state;
     begin_under_way(MBM_FRAMING_TCP, NOTHING);
     memory_port_bytes(&m, reply, sizeof reply);
     IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
@@ -293,20 +285,4 @@ static void a_request_that_was_answered_before_it_was_sent_is_not_sent(void **st
     begin_link();
     run(10);
     works_over_the_new_link(MBM_FRAMING_TCP);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(requests_that_were_sent_end_when_a_link_begins_that_is_closed),
-        cmocka_unit_test(a_request_that_the_port_took_in_part_is_not_sent_on_over_the_new_link),
-        cmocka_unit_test(a_request_that_ended_with_the_old_link_is_never_sent),
-        cmocka_unit_test(half_a_reply_of_the_old_peer_is_dropped),
-        cmocka_unit_test(a_request_under_way_goes_on_if_the_link_is_found_open),
-        cmocka_unit_test(a_link_that_the_program_closes_while_it_is_being_made_sends_nothing_old),
-        cmocka_unit_test(a_client_whose_link_ends_in_its_callback_sends_nothing_old),
-        cmocka_unit_test(a_request_that_was_answered_before_it_was_sent_is_not_sent),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -654,24 +654,12 @@ static void lives(int with_jumps)
     assert_true(count < 50 || (sent > count && completed > count / 4 && lost > count));
 }
 
-static void each_request_of_a_life_ends_once_and_is_not_sent_afterwards(void **state)
+TEST(each_request_of_a_life_ends_once_and_is_not_sent_afterwards)
 {
-    (void)state;
     lives(0);
 }
 
-static void so_it_is_with_a_clock_that_jumps(void **state)
+TEST(so_it_is_with_a_clock_that_jumps)
 {
-    (void)state;
     lives(1);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_request_of_a_life_ends_once_and_is_not_sent_afterwards),
-        cmocka_unit_test(so_it_is_with_a_clock_that_jumps),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -44,23 +44,20 @@ static tcp_peer *peers[PEERS];
 static uint16_t ports[PEERS];
 static struct rlimit found;
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     alarm(3 * PATIENCE_MS / 1000);
     memset(&loop, 0, sizeof loop);
     memset(devices, 0, sizeof devices);
     memset(peers, 0, sizeof peers);
     assert_int_equal(getrlimit(RLIMIT_NOFILE, &found), 0);
     assert_int_equal(mbm_loop_open(&loop, places, PLACES), 0);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
     unsigned i;
 
-    (void)state;
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
     for (i = 0; i < CLIENTS; i++) {
         mbm_loop_remove(&devices[i].entry);
@@ -74,7 +71,6 @@ static int end(void **state)
     mbm_loop_close(&loop);
     mbm_loop_close(&loop);
     alarm(0);
-    return 0;
 }
 
 static void start_peers(unsigned count)
@@ -155,12 +151,11 @@ static int all_are_right(unsigned count, unsigned requests)
 
 /* --- over TCP --- */
 
-static void many_clients_are_served_by_one_wait(void **state)
+TEST_WITH(many_clients_are_served_by_one_wait, begin, end)
 {
     enum { REQUESTS = 50 };
     unsigned i;
 
-    (void)state;
     start_peers(PEERS);
     begin_devices(CLIENTS, REQUESTS);
     UNTIL(&loop, all_are_right(CLIENTS, REQUESTS));
@@ -171,14 +166,13 @@ static void many_clients_are_served_by_one_wait(void **state)
     }
 }
 
-static void a_client_that_gets_no_answer_ends_while_others_are_busy(void **state)
+TEST_WITH(a_client_that_gets_no_answer_ends_while_others_are_busy, begin, end)
 {
     device *silent = &devices[TCP_PEER_CONNECTIONS];
     uint32_t from;
     uint16_t port;
     int listener = tcp_listen(&port);
 
-    (void)state;
     start_peers(1);
     begin_devices(TCP_PEER_CONNECTIONS, 1000000);
     begin_device(silent, port, 1);
@@ -192,11 +186,10 @@ static void a_client_that_gets_no_answer_ends_while_others_are_busy(void **state
     close(listener);
 }
 
-static void a_link_that_is_lost_is_opened_and_waited_for_again(void **state)
+TEST_WITH(a_link_that_is_lost_is_opened_and_waited_for_again, begin, end)
 {
     unsigned i, round;
 
-    (void)state;
     start_peers(1);
     begin_devices(4, 5);
     UNTIL(&loop, all_are_right(4, 5));
@@ -222,9 +215,8 @@ static void a_link_that_is_lost_is_opened_and_waited_for_again(void **state)
         assert_true(devices[i].counters.lost >= 3);
 }
 
-static void a_request_that_is_queued_outside_needs_a_wake(void **state)
+TEST_WITH(a_request_that_is_queued_outside_needs_a_wake, begin, end)
 {
-    (void)state;
     start_peers(1);
     begin_devices(1, 0);
     UNTIL(&loop, devices[0].counters.connected == 1);
@@ -236,12 +228,11 @@ static void a_request_that_is_queued_outside_needs_a_wake(void **state)
     UNTIL(&loop, devices[0].right == 2);
 }
 
-static void without_a_descriptor_links_wait_and_connect_later(void **state)
+TEST_WITH(without_a_descriptor_links_wait_and_connect_later, begin, end)
 {
     struct rlimit limit;
     int next, i;
 
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     start_peers(1);
     next = dup(0);
@@ -287,18 +278,17 @@ static void add_inlet(inlet *one)
     assert_int_equal(mbm_loop_addFd(&loop, &one->entry, one->ends[0]), 0);
 }
 
-static int begin_inlets(void **state)
+static void begin_inlets(void)
 {
     unsigned i;
 
-    begin(state);
+    begin();
     memset(inlets, 0, sizeof inlets);
     for (i = 0; i < PIPES; i++)
         assert_int_equal(pipe2(inlets[i].ends, O_CLOEXEC | O_NONBLOCK), 0);
-    return 0;
 }
 
-static int end_inlets(void **state)
+static void end_inlets(void)
 {
     unsigned i;
 
@@ -307,8 +297,10 @@ static int end_inlets(void **state)
         close(inlets[i].ends[0]);
         close(inlets[i].ends[1]);
     }
-    return end(state);
+    end();
 }
+
+fixture each_test = {begin_inlets, end_inlets};
 
 static void make_ready(unsigned i)
 {
@@ -322,11 +314,10 @@ static void read_one(inlet *own)
     assert_int_equal(read(own->ends[0], &byte, 1), 1);
 }
 
-static void descriptors_that_are_always_ready_keep_no_other_waiting(void **state)
+TEST(descriptors_that_are_always_ready_keep_no_other_waiting)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < PIPES; i++)
         add_inlet(&inlets[i]);
     assert_int_equal(mbm_loop_wait(&loop, 0), PIPES);
@@ -365,11 +356,10 @@ static void add_inlets_but(const inlet *that)
         }
 }
 
-static void an_entry_that_was_removed_in_the_poll_of_another_is_not_polled(void **state)
+TEST(an_entry_that_was_removed_in_the_poll_of_another_is_not_polled)
 {
     unsigned i;
 
-    (void)state;
     add_inlets_but(NULL);
     for (i = 0; i < 10; i++) {
         make_ready(i);
@@ -403,9 +393,8 @@ static void remove_self(inlet *own)
     mbm_loop_wake(&own->entry);
 }
 
-static void an_entry_removes_itself_and_adds_another_in_its_poll(void **state)
+TEST(an_entry_removes_itself_and_adds_another_in_its_poll)
 {
-    (void)state;
     inlets[0].within = inlets[1].within = remove_self;
     add_inlet(&inlets[0]);
     assert_int_equal(mbm_loop_wait(&loop, MBM_LOOP_FOREVER), 1);
@@ -429,9 +418,8 @@ static void wait_within(inlet *own)
     read_one(own);
 }
 
-static void the_loop_cannot_wait_or_end_within_a_poll(void **state)
+TEST(the_loop_cannot_wait_or_end_within_a_poll)
 {
-    (void)state;
     make_ready(0);
     inlets[0].within = wait_within;
     add_inlet(&inlets[0]);
@@ -440,11 +428,10 @@ static void the_loop_cannot_wait_or_end_within_a_poll(void **state)
     assert_int_equal(mbm_loop_wait(&loop, 0), 0);
 }
 
-static void the_wait_ends_when_its_time_is_over(void **state)
+TEST(the_wait_ends_when_its_time_is_over)
 {
     struct timespec from, to;
 
-    (void)state;
     add_inlet(&inlets[0]);
     assert_int_equal(mbm_loop_wait(&loop, 0), 1);
     clock_gettime(CLOCK_MONOTONIC, &from);
@@ -455,11 +442,10 @@ static void the_wait_ends_when_its_time_is_over(void **state)
                 123 * 1000000LL);
 }
 
-static void another_loop_can_wait_for_this_one(void **state)
+TEST(another_loop_can_wait_for_this_one)
 {
     struct pollfd wait;
 
-    (void)state;
     inlets[0].within = NULL;
     add_inlet(&inlets[0]);
     assert_int_equal(mbm_loop_pollDelay(&loop), 0);
@@ -471,7 +457,7 @@ static void another_loop_can_wait_for_this_one(void **state)
     assert_int_equal(mbm_loop_wait(&loop, 0), 1);
 }
 
-static void a_call_that_is_refused_changes_nothing(void **state)
+TEST(a_call_that_is_refused_changes_nothing)
 {
     static mbm_loop closed, other;
     static mbm_loop_place one_place[1];
@@ -482,7 +468,6 @@ static void a_call_that_is_refused_changes_nothing(void **state)
     mbm_loop_entry entry = {0}, another = {0};
     int file;
 
-    (void)state;
     FAILS(EBUSY, mbm_loop_open(&loop, places, PLACES));
     FAILS(EINVAL, mbm_loop_open(&closed, NULL, 1));
     FAILS(EINVAL, mbm_loop_open(&closed, one_place, 0));
@@ -532,27 +517,4 @@ static void a_call_that_is_refused_changes_nothing(void **state)
     mbm_tcp_closeListener(&listener);
     mbm_tcp_closeListener(&second);
     mbm_loop_close(&other);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-#define WITH_INLETS(name) cmocka_unit_test_setup_teardown(name, begin_inlets, end_inlets)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(many_clients_are_served_by_one_wait),
-        TEST(a_client_that_gets_no_answer_ends_while_others_are_busy),
-        TEST(a_link_that_is_lost_is_opened_and_waited_for_again),
-        TEST(a_request_that_is_queued_outside_needs_a_wake),
-        TEST(without_a_descriptor_links_wait_and_connect_later),
-        WITH_INLETS(descriptors_that_are_always_ready_keep_no_other_waiting),
-        WITH_INLETS(an_entry_that_was_removed_in_the_poll_of_another_is_not_polled),
-        WITH_INLETS(an_entry_removes_itself_and_adds_another_in_its_poll),
-        WITH_INLETS(the_loop_cannot_wait_or_end_within_a_poll),
-        WITH_INLETS(the_wait_ends_when_its_time_is_over),
-        WITH_INLETS(another_loop_can_wait_for_this_one),
-        WITH_INLETS(a_call_that_is_refused_changes_nothing),
-    };
-
-    return cmocka_run_group_tests_name("a loop", tests, NULL, NULL);
 }

@@ -43,9 +43,8 @@ static mbm_tcp_addresses addresses;
 static mbm_udp udp_client, udp_server;
 static struct rlimit found;
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     alarm(3 * PATIENCE_MS / 1000);
     memset(&loop, 0, sizeof loop);
     memset(&by_line, 0, sizeof by_line);
@@ -57,12 +56,10 @@ static int begin(void **state)
     memset(&udp_server, 0, sizeof udp_server);
     assert_int_equal(getrlimit(RLIMIT_NOFILE, &found), 0);
     assert_int_equal(mbm_loop_open(&loop, storage, COUNT(storage)), 0);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
     mbm_loop_remove(&by_line.entry);
     mbm_loop_remove(&by_tcp.entry);
@@ -74,8 +71,9 @@ static int end(void **state)
     mbm_udp_close(&udp_server);
     mbm_loop_close(&loop);
     alarm(0);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 static uint32_t poll_client(mbm_loop_entry *entry)
 {
@@ -152,14 +150,13 @@ static void begin_tcp(uint16_t at, unsigned requests)
 
 /* --- serial lines --- */
 
-static void a_serial_line_takes_part_beside_tcp(void **state)
+TEST(a_serial_line_takes_part_beside_tcp)
 {
     tcp_peer *peer = tcp_peer_new();
     const mbm_port port = mbm_tty_port(&tty);
     server s;
     unsigned i;
 
-    (void)state;
     server_start(&s, UNIT);
     assert_int_equal(mbm_tty_attach(&tty, s.line.ours), 0);
     OK(mbm_client_beginRtu(&by_line.client, &port, by_line.incoming, sizeof by_line.incoming));
@@ -186,7 +183,7 @@ static uint32_t poll_nothing(mbm_loop_entry *entry)
 }
 
 /* The port is one that a program uses only now and then. */
-static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
+TEST(bytes_that_are_not_read_do_not_end_the_wait_again)
 {
     const struct sockaddr_in none = {.sin_family = AF_INET};
     const mbm_port serial = mbm_tty_port(&tty), datagrams = mbm_udp_port(&udp_server);
@@ -200,7 +197,6 @@ static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
     int sender;
     pty ends;
 
-    (void)state;
     pty_open(&ends);
     assert_int_equal(mbm_tty_attach(&tty, dup(ends.ours)), 0);
     assert_int_equal(mbm_udp_listen(&udp_server, "127.0.0.1", "0"), 0);
@@ -245,14 +241,13 @@ static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
 }
 
 /* A child process has the descriptor too, so the system would go on reporting it. */
-static void a_terminal_that_is_closed_is_not_reported(void **state)
+TEST(a_terminal_that_is_closed_is_not_reported)
 {
     mbm_loop_entry line = {.poll = poll_nothing};
     unsigned polls = 0;
     int other;
     pty ends;
 
-    (void)state;
     pty_open(&ends);
     assert_int_equal(mbm_tty_attach(&tty, dup(ends.ours)), 0);
     line.context = &polls;
@@ -339,9 +334,8 @@ static unsigned places_in_use(void)
     return count;
 }
 
-static void servers_and_clients_share_a_loop(void **state)
+TEST(servers_and_clients_share_a_loop)
 {
-    (void)state;
     begin_to_listen();
     begin_tcp(listener.port, 50);
     UNTIL(&loop, by_tcp.right == 50);
@@ -357,11 +351,10 @@ static void servers_and_clients_share_a_loop(void **state)
     end_listening();
 }
 
-static void bytes_that_are_no_modbus_end_the_connection_of_a_server(void **state)
+TEST(bytes_that_are_no_modbus_end_the_connection_of_a_server)
 {
     int peer;
 
-    (void)state;
     begin_to_listen();
     peer = tcp_connect(listener.port);
     UNTIL(&loop, places_in_use() == 1);
@@ -371,12 +364,11 @@ static void bytes_that_are_no_modbus_end_the_connection_of_a_server(void **state
     end_listening();
 }
 
-static void without_a_descriptor_connections_wait_and_are_accepted_later(void **state)
+TEST(without_a_descriptor_connections_wait_and_are_accepted_later)
 {
     struct rlimit limit;
     int peers[3], next, i;
 
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     begin_to_listen();
     peers[0] = tcp_connect(listener.port);
@@ -427,9 +419,8 @@ static void end_far_end(void)
     pty_close(&line);
 }
 
-static void a_server_on_a_serial_line_takes_part(void **state)
+TEST(a_server_on_a_serial_line_takes_part)
 {
-    (void)state;
     begin_unit();
     begin_far_end();
     begin_line(line.path, 20);
@@ -439,13 +430,12 @@ static void a_server_on_a_serial_line_takes_part(void **state)
 }
 
 /* The adapter is unplugged and plugged in again, and gets another descriptor. */
-static void a_terminal_that_comes_back_is_waited_for_again(void **state)
+TEST(a_terminal_that_comes_back_is_waited_for_again)
 {
     char folder[] = "/tmp/mbm-loop-XXXXXX", path[64];
     unsigned round;
     int taken[3];
 
-    (void)state;
     begin_unit();
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/tty", folder);
@@ -473,12 +463,11 @@ static void a_terminal_that_comes_back_is_waited_for_again(void **state)
 
 /* --- UDP --- */
 
-static void a_client_and_a_server_over_udp_take_part(void **state)
+TEST(a_client_and_a_server_over_udp_take_part)
 {
     const mbm_port at = mbm_udp_port(&udp_server), from = mbm_udp_port(&udp_client);
     char service[8];
 
-    (void)state;
     begin_unit();
     assert_int_equal(mbm_udp_listen(&udp_server, "127.0.0.1", "0"), 0);
     snprintf(service, sizeof service, "%u", udp_server.port);
@@ -500,23 +489,4 @@ static void a_client_and_a_server_over_udp_take_part(void **state)
     mbm_loop_remove(&lone_entry);
     assert_true(mbm_loop_wait(&loop, 1000) >= 0);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_serial_line_takes_part_beside_tcp),
-        TEST(bytes_that_are_not_read_do_not_end_the_wait_again),
-        TEST(a_terminal_that_is_closed_is_not_reported),
-        TEST(servers_and_clients_share_a_loop),
-        TEST(bytes_that_are_no_modbus_end_the_connection_of_a_server),
-        TEST(without_a_descriptor_connections_wait_and_are_accepted_later),
-        TEST(a_server_on_a_serial_line_takes_part),
-        TEST(a_terminal_that_comes_back_is_waited_for_again),
-        TEST(a_client_and_a_server_over_udp_take_part),
-    };
-
-    return cmocka_run_group_tests_name("the ports of a loop", tests, NULL, NULL);
 }

@@ -47,26 +47,24 @@ static uint32_t chance(uint32_t below)
     return (seed >> 8) % below;
 }
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     now = 5000000;
     seed = 1;
     devices = (device *)test_calloc(MANY, sizeof *devices);
     places = (mbm_loop_place *)test_calloc(MANY, sizeof *places);
     memset(&loop, 0, sizeof loop);
     assert_int_equal(mbm_loop_open(&loop, places, MANY), 0);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     mbm_loop_close(&loop);
     test_free(devices);
     test_free(places);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 /* Lets the time pass until the next entry is due, and waits. Returns 0 if none ever is. */
 static int step(void)
@@ -168,11 +166,10 @@ static void answer(device *d)
     d->replyLength = 2 + sizeof rest;
 }
 
-static void each_of_ten_thousand_timeouts_ends_at_its_time(void **state)
+TEST(each_of_ten_thousand_timeouts_ends_at_its_time)
 {
     unsigned i;
 
-    (void)state;
     begin_clients(MANY);
     for (i = 0; i < MANY; i++) {
         ask(&devices[i], 1 + chance(3000));
@@ -188,12 +185,11 @@ static void each_of_ten_thousand_timeouts_ends_at_its_time(void **state)
     }
 }
 
-static void a_timeout_ends_at_its_time_though_others_are_busy(void **state)
+TEST(a_timeout_ends_at_its_time_though_others_are_busy)
 {
     device *silent = &devices[SOME];
     unsigned i, rounds = 0;
 
-    (void)state;
     begin_clients(SOME + 1);
     ask(silent, 250);
     silent->polls = 0;
@@ -223,11 +219,10 @@ static void a_timeout_ends_at_its_time_though_others_are_busy(void **state)
         assert_true(devices[i].polls <= 2 * rounds + 4);
 }
 
-static void a_client_without_requests_is_not_polled(void **state)
+TEST(a_client_without_requests_is_not_polled)
 {
     unsigned i;
 
-    (void)state;
     begin_clients(SOME);
     ask(&devices[5], 100);
     while (step())
@@ -236,11 +231,10 @@ static void a_client_without_requests_is_not_polled(void **state)
         assert_int_equal(devices[i].polls, i == 5 ? 3 : 1);
 }
 
-static void after_a_jump_of_the_clock_no_timeout_is_missing(void **state)
+TEST(after_a_jump_of_the_clock_no_timeout_is_missing)
 {
     unsigned i;
 
-    (void)state;
     begin_clients(SOME);
     for (i = 0; i < SOME; i++)
         ask(&devices[i], 1000 + i);
@@ -252,9 +246,8 @@ static void after_a_jump_of_the_clock_no_timeout_is_missing(void **state)
     assert_int_equal(mbm_loop_pollDelay(&loop), MBM_LOOP_FOREVER);
 }
 
-static void a_clock_that_steps_back_only_delays(void **state)
+TEST(a_clock_that_steps_back_only_delays)
 {
-    (void)state;
     begin_clients(1);
     ask(&devices[0], 100);
     assert_int_equal(mbm_loop_wait(&loop, 0), 1);
@@ -336,12 +329,11 @@ static uint32_t poll_chore(mbm_loop_entry *entry)
     return delay;
 }
 
-static void entries_are_polled_when_they_are_due_and_never_else(void **state)
+TEST(entries_are_polled_when_they_are_due_and_never_else)
 {
     const unsigned rounds = RUNNING_ON_VALGRIND ? 3000 : 30000;
     unsigned i;
 
-    (void)state;
     memset(chores, 0, sizeof chores);
     polls = changes = round_now = 0;
     for (i = 0; i < SOME; i++) {
@@ -387,12 +379,11 @@ static uint32_t poll_calm(mbm_loop_entry *entry)
     return 10 * MS;
 }
 
-static void an_entry_that_always_has_something_to_do_is_polled_once_in_a_wait(void **state)
+TEST(an_entry_that_always_has_something_to_do_is_polled_once_in_a_wait)
 {
     static mbm_loop_entry eager, calm;
     unsigned i;
 
-    (void)state;
     eager.poll = poll_eager;
     calm.poll = poll_calm;
     assert_int_equal(mbm_loop_addFd(&loop, &eager, -1), 0);
@@ -417,14 +408,13 @@ static uint32_t poll_in_20_ms(mbm_loop_entry *entry)
 }
 
 /* Its `poll` does not look at the clock of the port, which others did long ago. */
-static void a_delay_counts_from_its_poll(void **state)
+TEST(a_delay_counts_from_its_poll)
 {
     mbm_loop_entry entry = {.poll = poll_in_20_ms};
     unsigned count = 0, i;
     mbm_tcp tcp = {0};
     int pair[2];
 
-    (void)state;
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
     assert_int_equal(mbm_tcp_attach(&tcp, pair[0]), 0);
     (void)mbm_tcp_port(&tcp).micros(&tcp);
@@ -445,7 +435,7 @@ static void a_delay_counts_from_its_poll(void **state)
 
 /* --- plans --- */
 
-static void a_plan_reads_at_its_intervals(void **state)
+TEST(a_plan_reads_at_its_intervals)
 {
     static const mbm_planField fields[] = {{.unit = UNIT,
                                             .table = MBM_TABLE_HOLDING_REGISTERS,
@@ -470,7 +460,6 @@ static void a_plan_reads_at_its_intervals(void **state)
     unsigned i;
     double value;
 
-    (void)state;
     begin_client(&devices[0]);
     OK(mbm_plan_begin(&plan, &devices[0].client, &setup, NULL));
     devices[0].entry.poll = mbm_loop_pollPlan;
@@ -487,23 +476,4 @@ static void a_plan_reads_at_its_intervals(void **state)
         OK(mbm_plan_getNumber(&plan, 0, 0, &value));
         assert_int_equal((int)value, 0x1234);
     }
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(each_of_ten_thousand_timeouts_ends_at_its_time),
-        TEST(a_timeout_ends_at_its_time_though_others_are_busy),
-        TEST(a_client_without_requests_is_not_polled),
-        TEST(after_a_jump_of_the_clock_no_timeout_is_missing),
-        TEST(a_clock_that_steps_back_only_delays),
-        TEST(entries_are_polled_when_they_are_due_and_never_else),
-        TEST(an_entry_that_always_has_something_to_do_is_polled_once_in_a_wait),
-        TEST(a_delay_counts_from_its_poll),
-        TEST(a_plan_reads_at_its_intervals),
-    };
-
-    return cmocka_run_group_tests_name("the times of a loop", tests, NULL, NULL);
 }

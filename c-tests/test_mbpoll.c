@@ -12,25 +12,23 @@ static served tcp, rtu;
 static char place[2][128];
 static char output[8192];
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     served_prepare(&tcp);
     served_on_tcp(&tcp, MBM_FRAMING_TCP);
     served_prepare(&rtu);
     served_on_line(&rtu, MBM_FRAMING_RTU);
     snprintf(place[0], sizeof place[0], "-m tcp -p %d 127.0.0.1", tcp.port);
     snprintf(place[1], sizeof place[1], "-m rtu -b 115200 -P none %s", rtu.line.path);
-    return 0;
 }
 
-static int stop(void **state)
+static void stop(void)
 {
-    (void)state;
     served_stop(&tcp);
     served_stop(&rtu);
-    return 0;
 }
+
+fixture all_tests = {start, stop};
 
 /* Runs mbpoll and keeps its output. Returns its exit code. The values to write come last on
  * the command line. */
@@ -72,11 +70,10 @@ static void assert_printed(const char *text)
     assert_non_null(strstr(output, text));
 }
 
-static void mbpoll_reads_every_table(void **state)
+TEST(mbpoll_reads_every_table)
 {
     unsigned where, i;
 
-    (void)state;
     for (where = 0; where < 2; where++) {
         assert_int_equal(mbpoll(place[where], "-a 17 -r 103 -c 125", ""), 0);
         for (i = 103; i < 103 + 125; i++)
@@ -92,12 +89,11 @@ static void mbpoll_reads_every_table(void **state)
     }
 }
 
-static void mbpoll_writes_one_and_several_values(void **state)
+TEST(mbpoll_writes_one_and_several_values)
 {
     served *servers[] = {&tcp, &rtu};
     unsigned where;
 
-    (void)state;
     for (where = 0; where < 2; where++) {
         const uint16_t words[] = {7, 65535, 4711};
         uint8_t before = servers[where]->bits[2];
@@ -113,11 +109,10 @@ static void mbpoll_writes_one_and_several_values(void **state)
     }
 }
 
-static void mbpoll_receives_exceptions(void **state)
+TEST(mbpoll_receives_exceptions)
 {
     unsigned where;
 
-    (void)state;
     for (where = 0; where < 2; where++) {
         assert_int_equal(mbpoll(place[where], "-a 17 -r 99", ""), 1);
         assert_printed("Illegal data address");
@@ -128,9 +123,8 @@ static void mbpoll_receives_exceptions(void **state)
     }
 }
 
-static void mbpoll_reads_two_units_of_one_line(void **state)
+TEST(mbpoll_reads_two_units_of_one_line)
 {
-    (void)state;
     rtu.other_words[3] = 1234;
     tcp.other_words[3] = 4321;
     assert_int_equal(mbpoll(place[1], "-a 18 -r 3", ""), 0);
@@ -141,23 +135,9 @@ static void mbpoll_reads_two_units_of_one_line(void **state)
     assert_int_equal(value(399, 10), served_pattern(399));
 }
 
-static void mbpoll_reads_the_server_id(void **state)
+TEST(mbpoll_reads_the_server_id)
 {
-    (void)state;
     assert_int_equal(mbpoll(place[1], "-a 17 -u", ""), 0);
     assert_printed("Length: 8");
     assert_printed("Data  : m\\FFtest");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mbpoll_reads_every_table),
-        cmocka_unit_test(mbpoll_writes_one_and_several_values),
-        cmocka_unit_test(mbpoll_receives_exceptions),
-        cmocka_unit_test(mbpoll_reads_two_units_of_one_line),
-        cmocka_unit_test(mbpoll_reads_the_server_id),
-    };
-
-    return cmocka_run_group_tests(tests, start, stop);
 }

@@ -34,7 +34,7 @@ static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
 static const mbm_port flooded = {NULL, flooded_read, port_write, port_micros,
                                  NULL, NULL,         NULL,       NULL};
 
-static void a_poll_of_an_ascii_server_ends_while_a_peer_floods(void **state)
+TEST(a_poll_of_an_ascii_server_ends_while_a_peer_floods)
 {
     static mbm_server server;
     static mbm_unit unit;
@@ -42,7 +42,6 @@ static void a_poll_of_an_ascii_server_ends_while_a_peer_floods(void **state)
     static const uint8_t floods[] = {'x', ':', '0', '\r', '\n'};
     size_t i;
 
-    (void)state;
     OK(mbm_server_beginAscii(&server, &flooded, &unit, 1, frame, sizeof frame));
     for (i = 0; i < sizeof floods; i++) {
         flood = floods[i];
@@ -70,26 +69,15 @@ static void answers_with_exception_04(uint8_t framing, mbm_unit *unit, const cha
     free(frame);
 }
 
-static void a_response_longer_than_its_buffer_is_exception_04(void **state)
+TEST(a_response_longer_than_its_buffer_is_exception_04)
 {
     static mbm_unit unit;
     static mbm_serverIdentification identification;
     static mbm_diagnostics diagnostics;
 
-    (void)state;
     OK(mbm_unit_serveIdentification(&unit, &identification));
     OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
     answers_with_exception_04(MBM_FRAMING_TCP, &unit, "\0\1\0\0\0\5\x11\x2B\x0E\1\0", 11, 12);
     answers_with_exception_04(MBM_FRAMING_TCP, &unit, "\0\1\0\0\0\2\x11\x0B", 8, 11);
     answers_with_exception_04(MBM_FRAMING_RTU, &unit, "\x11\x0B\x4C\x27", 4, 6);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_poll_of_an_ascii_server_ends_while_a_peer_floods),
-        cmocka_unit_test(a_response_longer_than_its_buffer_is_exception_04),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

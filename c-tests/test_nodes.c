@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 typedef struct other {
     mbm_node node;
     uint16_t words[4];
@@ -23,7 +25,7 @@ static void other_reads(sim *s, other *o)
     assert_int_equal(o->words[0], 7);
 }
 
-static void the_gap_counts_from_the_last_use_by_any_node(void **state)
+TEST(the_gap_counts_from_the_last_use_by_any_node)
 {
     uint64_t asked;
     other o;
@@ -41,7 +43,7 @@ static void the_gap_counts_from_the_last_use_by_any_node(void **state)
     sim_assert_time(s->frames[3].begin - asked, 0);
 }
 
-static void each_node_keeps_its_result(void **state)
+TEST(each_node_keeps_its_result)
 {
     other o;
     NODE;
@@ -59,7 +61,7 @@ static void each_node_keeps_its_result(void **state)
     assert_int_equal(mbm_node_available(&o.node), 0);
 }
 
-static void a_request_is_refused_while_another_node_has_one_under_way(void **state)
+TEST(a_request_is_refused_while_another_node_has_one_under_way)
 {
     other o;
     NODE;
@@ -96,7 +98,7 @@ static void try_the_other_node(void *context)
     tried++;
 }
 
-static void a_hook_may_use_another_node_but_not_for_a_request(void **state)
+TEST(a_hook_may_use_another_node_but_not_for_a_request)
 {
     NODE;
 
@@ -111,7 +113,7 @@ static void a_hook_may_use_another_node_but_not_for_a_request(void **state)
     assert_int_equal(mbm_node_getSlaveID(&within.node), 4);
 }
 
-static void the_idle_hook_is_given_the_node_that_waits(void **state)
+TEST(the_idle_hook_is_given_the_node_that_waits)
 {
     other o;
     NODE;
@@ -123,7 +125,7 @@ static void the_idle_hook_is_given_the_node_that_waits(void **state)
     assert_ptr_equal(s->waits, &o.node);
 }
 
-static void a_request_that_the_line_has_given_up_is_cancelled(void **state)
+TEST(a_request_that_the_line_has_given_up_is_cancelled)
 {
     other o;
     NODE;
@@ -139,7 +141,7 @@ static void a_request_that_the_line_has_given_up_is_cancelled(void **state)
     OK(mbm_line_cancel(&s->line));
 }
 
-static void a_lost_node_blocks_its_line_until_that_is_cancelled(void **state)
+TEST(a_lost_node_blocks_its_line_until_that_is_cancelled)
 {
     other o;
     SIM;
@@ -154,7 +156,7 @@ static void a_lost_node_blocks_its_line_until_that_is_cancelled(void **state)
     sim_reads(s, 500);
 }
 
-static void the_request_of_a_node_is_not_that_of_its_copy(void **state)
+TEST(the_request_of_a_node_is_not_that_of_its_copy)
 {
     mbm_node copy;
     NODE;
@@ -172,7 +174,7 @@ static void the_request_of_a_node_is_not_that_of_its_copy(void **state)
     assert_int_equal(s->response[0], 42);
 }
 
-static void a_node_may_move_to_another_line(void **state)
+TEST(a_node_may_move_to_another_line)
 {
     mbm_line line = MBM_INIT;
     uint8_t frame[MBM_FRAME_BYTES(4)];
@@ -194,7 +196,7 @@ static void a_node_may_move_to_another_line(void **state)
     sim_assert_sent(&second, 0, "03 04 00 00 00 01 +");
 }
 
-static void a_failure_of_one_node_delays_the_next_request_of_another(void **state)
+TEST(a_failure_of_one_node_delays_the_next_request_of_another)
 {
     other o;
     NODE;
@@ -207,7 +209,7 @@ static void a_failure_of_one_node_delays_the_next_request_of_another(void **stat
     assert_in_range(s->frames[1].begin - s->frames[0].end, 150000, 151000);
 }
 
-static void one_node_may_be_lenient_beside_a_strict_one(void **state)
+TEST(one_node_may_be_lenient_beside_a_strict_one)
 {
     other o;
     NODE;
@@ -222,23 +224,4 @@ static void one_node_may_be_lenient_beside_a_strict_one(void **state)
     assert_int_equal(mbm_node_available(&o.node), 2);
     sim_answer(s, 1, 500, "11 03 04 00 07 00 08 +");
     IS(MBM_MALFORMED_REPLY, sim_read_one(s));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(the_gap_counts_from_the_last_use_by_any_node),
-        SIM_TEST(each_node_keeps_its_result),
-        SIM_TEST(a_request_is_refused_while_another_node_has_one_under_way),
-        SIM_TEST(a_hook_may_use_another_node_but_not_for_a_request),
-        SIM_TEST(the_idle_hook_is_given_the_node_that_waits),
-        SIM_TEST(a_request_that_the_line_has_given_up_is_cancelled),
-        SIM_TEST(a_lost_node_blocks_its_line_until_that_is_cancelled),
-        SIM_TEST(the_request_of_a_node_is_not_that_of_its_copy),
-        SIM_TEST(a_node_may_move_to_another_line),
-        SIM_TEST(a_failure_of_one_node_delays_the_next_request_of_another),
-        SIM_TEST(one_node_may_be_lenient_beside_a_strict_one),
-    };
-
-    return cmocka_run_group_tests_name("nodes", tests, NULL, NULL);
 }

@@ -319,11 +319,10 @@ static void use_all(void)
     }
 }
 
-static void a_begin_function_works_in_memory_filled_with_any_byte(void **state)
+TEST(a_begin_function_works_in_memory_filled_with_any_byte)
 {
     int byte;
 
-    (void)state;
     for (byte = 0; byte < 256; byte++) {
         memset(&memory, byte, sizeof memory);
         if (byte != MARK)
@@ -331,13 +330,12 @@ static void a_begin_function_works_in_memory_filled_with_any_byte(void **state)
     }
 }
 
-static void a_begin_function_works_in_memory_with_random_bytes(void **state)
+TEST(a_begin_function_works_in_memory_with_random_bytes)
 {
     unsigned char bytes[sizeof memory];
     uint32_t random = 1;
     size_t fill, i;
 
-    (void)state;
     for (fill = 0; fill < RANDOM_FILLS; fill++) {
         for (i = 0; i < sizeof bytes; i++) {
             random = random * 1664525 + 1013904223;
@@ -358,9 +356,8 @@ static void a_begin_function_works_in_memory_with_random_bytes(void **state)
         OK(use(&object));                                                                          \
     } while (0)
 
-static void every_object_works_with_the_initialiser(void **state)
+TEST(every_object_works_with_the_initialiser)
 {
-    (void)state;
     WORKS(mbm_line, use_line);
     WORKS(mbm_node, use_node);
     WORKS(mbm_client, use_rtu_client);
@@ -377,15 +374,4 @@ static void every_object_works_with_the_initialiser(void **state)
     WORKS(mbm_sniffer, use_sniffer);
     WORKS(mbm_trace, use_trace);
     WORKS(mbm_ring, use_ring);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_object_works_with_the_initialiser),
-        cmocka_unit_test(a_begin_function_works_in_memory_filled_with_any_byte),
-        cmocka_unit_test(a_begin_function_works_in_memory_with_random_bytes),
-    };
-
-    return cmocka_run_group_tests_name("not zeroed", tests, NULL, NULL);
 }

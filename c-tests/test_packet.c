@@ -7,14 +7,13 @@
 
 static const mbm_rule three_bytes = {MBM_RULE_FIXED, 3, 0};
 
-static void every_example_is_parsed_to_its_fields(void **state)
+TEST(every_example_is_parsed_to_its_fields)
 {
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet wanted, found;
     uint16_t length;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &wanted);
         OK(mbm_frame_parse(PDU(NULL, 0), example_side(&examples[i]), pdu, length, &found));
@@ -24,14 +23,13 @@ static void every_example_is_parsed_to_its_fields(void **state)
     }
 }
 
-static void every_example_is_built_byte_for_byte(void **state)
+TEST(every_example_is_built_byte_for_byte)
 {
     uint8_t pdu[MBM_MAX_PDU], built[MBM_MAX_PDU];
     mbm_packet packet;
     uint16_t length, found;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &packet);
         memset(built, 0xEE, sizeof built);
@@ -44,13 +42,12 @@ static void every_example_is_built_byte_for_byte(void **state)
     }
 }
 
-static void every_sub_function_of_08_is_built_and_parsed(void **state)
+TEST(every_sub_function_of_08_is_built_and_parsed)
 {
     static const uint8_t zero[2];
     uint8_t pdu[5];
     unsigned sub_function, known = 0;
 
-    (void)state;
     for (sub_function = 0; sub_function < 0x200; sub_function++) {
         mbm_packet packet = {.function = MBM_FC_DIAGNOSTICS, .data = zero, .dataLength = 2}, found;
         uint16_t length;
@@ -100,7 +97,7 @@ static unsigned parsed_right(uint8_t side, const uint8_t *pdu, uint16_t length)
     return 0;
 }
 
-static void a_pdu_cut_short_is_parsed_right_or_refused(void **state)
+TEST(a_pdu_cut_short_is_parsed_right_or_refused)
 {
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
@@ -108,7 +105,6 @@ static void a_pdu_cut_short_is_parsed_right_or_refused(void **state)
     unsigned right = 0;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &packet);
         for (cut = 0; cut < length; cut++)
@@ -119,7 +115,7 @@ static void a_pdu_cut_short_is_parsed_right_or_refused(void **state)
     assert_in_range(right, 1, 16);
 }
 
-static void a_pdu_with_one_byte_changed_is_parsed_right_or_refused(void **state)
+TEST(a_pdu_with_one_byte_changed_is_parsed_right_or_refused)
 {
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
@@ -127,7 +123,6 @@ static void a_pdu_with_one_byte_changed_is_parsed_right_or_refused(void **state)
     unsigned value, right = 0, all = 0;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &packet);
         for (at = 0; at < length; at++) {
@@ -144,14 +139,13 @@ static void a_pdu_with_one_byte_changed_is_parsed_right_or_refused(void **state)
     assert_in_range(right, 1, all - 1);
 }
 
-static void an_extra_byte_is_refused_unless_the_data_may_have_any_length(void **state)
+TEST(an_extra_byte_is_refused_unless_the_data_may_have_any_length)
 {
     uint8_t pdu[MBM_MAX_PDU + 1];
     mbm_packet packet;
     unsigned right = 0;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         uint16_t length = example_load(&examples[i], pdu, &packet);
 
@@ -162,7 +156,7 @@ static void an_extra_byte_is_refused_unless_the_data_may_have_any_length(void **
     assert_int_equal(right, 5);
 }
 
-static void an_impossible_packet_is_not_built(void **state)
+TEST(an_impossible_packet_is_not_built)
 {
     static const uint8_t data[600];
     static const struct {
@@ -214,7 +208,6 @@ static void an_impossible_packet_is_not_built(void **state)
     uint16_t length = 0x5555;
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(refused); i++) {
         mbm_packet packet = refused[i].packet;
 
@@ -225,7 +218,7 @@ static void an_impossible_packet_is_not_built(void **state)
     }
 }
 
-static void the_first_bytes_of_a_pdu_determine_its_length(void **state)
+TEST(the_first_bytes_of_a_pdu_determine_its_length)
 {
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
@@ -233,7 +226,6 @@ static void the_first_bytes_of_a_pdu_determine_its_length(void **state)
     uint16_t length, have;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         uint8_t side = example_side(&examples[i]), kind = MBM_LENGTH_UNKNOWN;
         uint8_t id_goes_on = examples[i].packet.byteCount;
@@ -262,14 +254,13 @@ static void the_first_bytes_of_a_pdu_determine_its_length(void **state)
                                                      (const uint8_t *)"\x03\xFC", 2, &expected));
 }
 
-static void a_request_determines_the_length_of_its_response(void **state)
+TEST(a_request_determines_the_length_of_its_response)
 {
     uint8_t pdu[MBM_MAX_PDU], reply[MBM_MAX_PDU];
     mbm_packet request, response;
     mbm_length expected;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         uint16_t length;
 
@@ -300,7 +291,7 @@ static void a_request_determines_the_length_of_its_response(void **state)
     assert_int_equal(expected.bytes, 0);
 }
 
-static void a_declared_function_keeps_its_length(void **state)
+TEST(a_declared_function_keeps_its_length)
 {
     const mbm_function own[] = {
         {0x41, three_bytes, {MBM_RULE_COUNTED, 1, 2}},
@@ -313,7 +304,6 @@ static void a_declared_function_keeps_its_length(void **state)
     uint8_t built[8];
     uint16_t length;
 
-    (void)state;
     OK(mbm_frame_parse(PDU(own, 2), MBM_PACKET_REQUEST, (uint8_t *)request, 3, &packet));
     OK(mbm_frame_build(PDU(own, 2), &packet, built, sizeof built, &length));
     assert_int_equal(length, 3);
@@ -336,7 +326,7 @@ static void a_declared_function_keeps_its_length(void **state)
     IS(MBM_ILLEGAL_FUNCTION, mbm_frame_build(PDU(own, 1), &packet, built, sizeof built, &length));
 }
 
-static void an_impossible_declaration_is_an_invalid_argument(void **state)
+TEST(an_impossible_declaration_is_an_invalid_argument)
 {
     static const mbm_function wrong[] = {
         {0, {0, 0, 0}, {0, 0, 0}},
@@ -352,7 +342,6 @@ static void an_impossible_declaration_is_an_invalid_argument(void **state)
     mbm_length expected;
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(wrong); i++) {
         IS(MBM_INVALID_ARGUMENT,
            mbm_frame_parse(PDU(&wrong[i], 1), MBM_PACKET_REQUEST, (uint8_t *)pdu, 3, &packet));
@@ -361,14 +350,13 @@ static void an_impossible_declaration_is_an_invalid_argument(void **state)
     }
 }
 
-static void null_is_an_invalid_argument(void **state)
+TEST(null_is_an_invalid_argument)
 {
     uint8_t pdu[8] = {0x03, 0, 0, 0, 1};
     mbm_packet packet;
     mbm_length expected;
     uint16_t length;
 
-    (void)state;
     OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, 5, &packet));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, NULL, 5, &packet));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(PDU(NULL, 1), MBM_PACKET_REQUEST, pdu, 5, &packet));
@@ -389,36 +377,14 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), &packet, pdu, 8, &length));
 }
 
-static void data_inside_the_buffer_to_write_are_an_invalid_argument(void **state)
+TEST(data_inside_the_buffer_to_write_are_an_invalid_argument)
 {
     uint8_t pdu[8] = {0x41, 1, 2};
     mbm_packet packet;
     uint16_t length;
 
-    (void)state;
     OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, 3, &packet));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), &packet, pdu, 8, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), &packet, pdu + 2, 6, &length));
     OK(mbm_frame_build(PDU(NULL, 0), &packet, pdu + 3, 5, &length));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_example_is_parsed_to_its_fields),
-        cmocka_unit_test(every_example_is_built_byte_for_byte),
-        cmocka_unit_test(every_sub_function_of_08_is_built_and_parsed),
-        cmocka_unit_test(a_pdu_cut_short_is_parsed_right_or_refused),
-        cmocka_unit_test(a_pdu_with_one_byte_changed_is_parsed_right_or_refused),
-        cmocka_unit_test(an_extra_byte_is_refused_unless_the_data_may_have_any_length),
-        cmocka_unit_test(an_impossible_packet_is_not_built),
-        cmocka_unit_test(the_first_bytes_of_a_pdu_determine_its_length),
-        cmocka_unit_test(a_request_determines_the_length_of_its_response),
-        cmocka_unit_test(a_declared_function_keeps_its_length),
-        cmocka_unit_test(an_impossible_declaration_is_an_invalid_argument),
-        cmocka_unit_test(null_is_an_invalid_argument),
-        cmocka_unit_test(data_inside_the_buffer_to_write_are_an_invalid_argument),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-static void a_request_of_14_is_made_of_records(void **state)
+TEST(a_request_of_14_is_made_of_records)
 {
     const mbm_record records[] = {{NULL, 4, 1, 2}, {NULL, 3, 9, 2}};
     uint8_t storage[14], pdu[16], wanted[16];
@@ -13,7 +13,6 @@ static void a_request_of_14_is_made_of_records(void **state)
     mbm_record record;
     uint16_t length, cursor = 0, i = 0;
 
-    (void)state;
     OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &records[0]));
     OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &records[1]));
     OK(mbm_frame_build(PDU(NULL, 0), &packet, pdu, sizeof pdu, &length));
@@ -58,17 +57,16 @@ static void carries_data(uint8_t kind, uint8_t function, const char *hex, int is
     assert_int_equal(cursor, packet.dataLength);
 }
 
-static void responses_of_14_and_both_packets_of_15_have_records_with_data(void **state)
+TEST(responses_of_14_and_both_packets_of_15_have_records_with_data)
 {
     const char *written = "15 16 06 0004 0001 0002 0DFE0020 06 0003 0009 0002 33CD0040";
 
-    (void)state;
     carries_data(MBM_PACKET_RESPONSE, 0x14, "14 0C 05 06 0DFE 0020 05 06 33CD 0040", 0);
     carries_data(MBM_PACKET_REQUEST, 0x15, written, 1);
     carries_data(MBM_PACKET_RESPONSE, 0x15, written, 1);
 }
 
-static void an_impossible_record_is_not_added(void **state)
+TEST(an_impossible_record_is_not_added)
 {
     static uint8_t data[500];
     static const struct {
@@ -91,7 +89,6 @@ static void an_impossible_record_is_not_added(void **state)
     uint8_t storage[600];
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(refused); i++) {
         mbm_packet packet = {0};
 
@@ -104,13 +101,12 @@ static void an_impossible_record_is_not_added(void **state)
     }
 }
 
-static void groups_that_fill_the_storage_leave_the_packet_as_it_was(void **state)
+TEST(groups_that_fill_the_storage_leave_the_packet_as_it_was)
 {
     uint8_t storage[9], elsewhere[9];
     mbm_packet packet = {.kind = MBM_PACKET_REQUEST, .function = MBM_FC_READ_FILE_RECORD};
     mbm_record record = {NULL, 4, 1, 2};
 
-    (void)state;
     IS(MBM_BUFFER_TOO_SMALL, mbm_packet_addRecord(&packet, storage, 6, &record));
     OK(mbm_packet_addRecord(&packet, storage, 7, &record));
     IS(MBM_BUFFER_TOO_SMALL, mbm_packet_addRecord(&packet, storage, 9, &record));
@@ -123,7 +119,7 @@ static void groups_that_fill_the_storage_leave_the_packet_as_it_was(void **state
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addRecord(&packet, storage, 9, &record));
 }
 
-static void a_device_identification_is_made_of_objects(void **state)
+TEST(a_device_identification_is_made_of_objects)
 {
     const mbm_object objects[] = {
         {(const uint8_t *)"mbm", 3, 0}, {NULL, 0, 1}, {(const uint8_t *)"V2.11", 5, 2}};
@@ -136,7 +132,6 @@ static void a_device_identification_is_made_of_objects(void **state)
     mbm_object object;
     uint16_t length, cursor = 0, i;
 
-    (void)state;
     for (i = 0; i < 3; i++)
         OK(mbm_packet_addObject(&packet, storage, sizeof storage, &objects[i]));
     IS(MBM_BUFFER_TOO_SMALL, mbm_packet_addObject(&packet, storage, sizeof storage, &objects[1]));
@@ -160,7 +155,7 @@ static void a_device_identification_is_made_of_objects(void **state)
     IS(MBM_ILLEGAL_FUNCTION, mbm_packet_addObject(&packet, pdu + 7, 14, &objects[0]));
 }
 
-static void other_packets_have_neither_records_nor_objects(void **state)
+TEST(other_packets_have_neither_records_nor_objects)
 {
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
@@ -168,7 +163,6 @@ static void other_packets_have_neither_records_nor_objects(void **state)
     mbm_object object;
     size_t i;
 
-    (void)state;
     for (i = 0; i < example_count; i++) {
         uint16_t cursor = 0, other = 0;
 
@@ -180,7 +174,7 @@ static void other_packets_have_neither_records_nor_objects(void **state)
     }
 }
 
-static void null_returns_nothing_and_adds_nothing(void **state)
+TEST(null_returns_nothing_and_adds_nothing)
 {
     uint8_t pdu[MBM_MAX_PDU], storage[16];
     mbm_packet packet;
@@ -188,7 +182,6 @@ static void null_returns_nothing_and_adds_nothing(void **state)
     mbm_object object = {NULL, 0, 0};
     uint16_t cursor = 0, length;
 
-    (void)state;
     length = hex_bytes(pdu, "14 07 06 0004 0001 0002");
     OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, length, &packet));
     assert_false(mbm_packet_nextRecord(NULL, &cursor, &record));
@@ -205,19 +198,4 @@ static void null_returns_nothing_and_adds_nothing(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addObject(&packet, storage, 16, NULL));
     object.length = 1;
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addObject(&packet, storage, 16, &object));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_request_of_14_is_made_of_records),
-        cmocka_unit_test(responses_of_14_and_both_packets_of_15_have_records_with_data),
-        cmocka_unit_test(an_impossible_record_is_not_added),
-        cmocka_unit_test(groups_that_fill_the_storage_leave_the_packet_as_it_was),
-        cmocka_unit_test(a_device_identification_is_made_of_objects),
-        cmocka_unit_test(other_packets_have_neither_records_nor_objects),
-        cmocka_unit_test(null_returns_nothing_and_adds_nothing),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -168,18 +168,17 @@ static const char *const NO_NUMBERS[] = {
     "5 /* 5 */",
 };
 
-static void a_payload_that_is_no_number_as_a_whole_is_refused(void **state)
+TEST(a_payload_that_is_no_number_as_a_whole_is_refused)
 {
     unsigned i;
     uint8_t type;
 
-    (void)state;
     for (i = 0; i < COUNT(NO_NUMBERS); i++)
         for (type = MBM_TYPE_BIT; type <= MBM_TYPE_DOUBLE; type++)
             expect_refused(type, NULL, NO_NUMBERS[i], "no number");
 }
 
-static void bytes_after_a_zero_byte_are_not_overlooked(void **state)
+TEST(bytes_after_a_zero_byte_are_not_overlooked)
 {
     static const struct {
         const char *payload;
@@ -198,7 +197,6 @@ static void bytes_after_a_zero_byte_are_not_overlooked(void **state)
     };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++) {
         assert_int_equal(parse_bytes(MBM_TYPE_UINT16, NULL, rows[i].payload, rows[i].length), 0);
         assert_int_equal(parse_bytes(MBM_TYPE_BIT, NULL, rows[i].payload, rows[i].length), 0);
@@ -206,15 +204,14 @@ static void bytes_after_a_zero_byte_are_not_overlooked(void **state)
     assert_int_equal(parse_bytes(MBM_TYPE_UINT16, NULL, "", 0), 0);
 }
 
-static void a_payload_ends_where_its_length_says(void **state)
+TEST(a_payload_ends_where_its_length_says)
 {
-    (void)state;
     assert_int_equal(parse_bytes(MBM_TYPE_UINT16, NULL, "1234", 2), 1);
     assert_int_equal(words[0], 12);
     assert_int_equal(parse_bytes(MBM_TYPE_UINT16, NULL, "{\"value\":12}", 11), 0);
 }
 
-static void json_may_have_space_and_other_members(void **state)
+TEST(json_may_have_space_and_other_members)
 {
     static const char *const rows[] = {
         "9",
@@ -236,12 +233,11 @@ static void json_may_have_space_and_other_members(void **state)
     };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++)
         expect(MBM_TYPE_UINT16, NULL, rows[i], 9);
 }
 
-static void integers_of_64_bits_are_exact(void **state)
+TEST(integers_of_64_bits_are_exact)
 {
     static const char *const forms[] = {"%s", "{\"value\":%s}", "%s.0", "%se0", "%s0e-1"};
     static const struct {
@@ -259,7 +255,6 @@ static void integers_of_64_bits_are_exact(void **state)
     char payload[64];
     unsigned i, form;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++)
         for (form = 0; form < COUNT(forms); form++) {
             snprintf(payload, sizeof payload, forms[form], rows[i].text);
@@ -267,7 +262,7 @@ static void integers_of_64_bits_are_exact(void **state)
         }
 }
 
-static void every_integer_of_a_type_is_taken_and_none_beyond(void **state)
+TEST(every_integer_of_a_type_is_taken_and_none_beyond)
 {
     static const struct {
         uint8_t type;
@@ -302,7 +297,6 @@ static void every_integer_of_a_type_is_taken_and_none_beyond(void **state)
     };
     unsigned i, k;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++) {
         const uint16_t count = parse(rows[i].type, NULL, rows[i].least);
 
@@ -320,7 +314,7 @@ static void every_integer_of_a_type_is_taken_and_none_beyond(void **state)
     expect(MBM_TYPE_UINT16, NULL, "-0.0", 0);
 }
 
-static void a_fraction_for_an_integer_is_refused_and_not_rounded(void **state)
+TEST(a_fraction_for_an_integer_is_refused_and_not_rounded)
 {
     static const char *const rows[] = {
         "0.5",
@@ -339,15 +333,13 @@ static void a_fraction_for_an_integer_is_refused_and_not_rounded(void **state)
     unsigned i;
     uint8_t type;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++)
         for (type = MBM_TYPE_BIT; type <= MBM_TYPE_INT64; type++)
             expect_refused(type, NULL, rows[i], "not a whole number");
 }
 
-static void a_scaled_number_is_a_multiple_of_the_scale_in_decimal(void **state)
+TEST(a_scaled_number_is_a_multiple_of_the_scale_in_decimal)
 {
-    (void)state;
     expect(MBM_TYPE_UINT16, "0.1", "12.3", 123);
     expect(MBM_TYPE_UINT16, "0.1", "{\"value\":6553.5}", 65535);
     expect(MBM_TYPE_UINT16, "0.1", "0.30", 3);
@@ -376,14 +368,13 @@ static void a_scaled_number_is_a_multiple_of_the_scale_in_decimal(void **state)
     expect_refused(MBM_TYPE_UINT16, "1e300", "1e-300", "multiple of the scale");
 }
 
-static void what_a_scaled_integer_is_published_as_can_be_written_back(void **state)
+TEST(what_a_scaled_integer_is_published_as_can_be_written_back)
 {
     static const char *const scales[] = {"0.1",  "0.01", "0.001", "1e-4", "0.5",     "0.25",
                                          "-0.1", "7",    "10",    "1000", "0.333333"};
     char payload[64];
     unsigned i, raw;
 
-    (void)state;
     for (i = 0; i < COUNT(scales); i++)
         for (raw = 0; raw <= UINT16_MAX; raw += 1 + raw % 7) {
             /* As a scaled value is published. */
@@ -392,7 +383,7 @@ static void what_a_scaled_integer_is_published_as_can_be_written_back(void **sta
         }
 }
 
-static void a_scale_is_a_decimal_number(void **state)
+TEST(a_scale_is_a_decimal_number)
 {
     static const char *const bad[] = {
         "",
@@ -417,7 +408,6 @@ static void a_scale_is_a_decimal_number(void **state)
     value_scale scale;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(bad); i++)
         if (value_scale_read(bad[i], &scale))
             fail_msg("%s is taken", bad[i]);
@@ -446,9 +436,8 @@ static double double_of_words(void)
     return value;
 }
 
-static void a_float_gets_the_nearest_number_or_none(void **state)
+TEST(a_float_gets_the_nearest_number_or_none)
 {
-    (void)state;
     assert_int_equal(parse(MBM_TYPE_FLOAT, NULL, "21.5"), 2);
     assert_true(float_of_words() == 21.5f);
     assert_int_equal(parse(MBM_TYPE_FLOAT, NULL, "0.1"), 2);
@@ -477,7 +466,7 @@ static void a_float_gets_the_nearest_number_or_none(void **state)
     expect_refused(MBM_TYPE_DOUBLE, "1e-300", "1e300", "out of range");
 }
 
-static void only_a_bit_takes_a_truth_value(void **state)
+TEST(only_a_bit_takes_a_truth_value)
 {
     static const char *const on[] = {"true",  "on",           "ON", "1", "1.0", "{\"value\":true}",
                                      " ON\n", "{\"value\":1}"};
@@ -486,7 +475,6 @@ static void only_a_bit_takes_a_truth_value(void **state)
     unsigned i;
     uint8_t type;
 
-    (void)state;
     for (i = 0; i < COUNT(on); i++)
         expect(MBM_TYPE_BIT, NULL, on[i], 1);
     for (i = 0; i < COUNT(off); i++)
@@ -498,11 +486,10 @@ static void only_a_bit_takes_a_truth_value(void **state)
     }
 }
 
-static void the_longest_payload_is_read_and_a_longer_one_is_refused(void **state)
+TEST(the_longest_payload_is_read_and_a_longer_one_is_refused)
 {
     char payload[PAYLOAD_BYTES + 2];
 
-    (void)state;
     memset(payload, '0', sizeof payload);
     payload[1] = '.';
     payload[sizeof payload - 1] = '\0';
@@ -548,9 +535,8 @@ static void expect_text(const char *payload, const char *latin)
     assert_int_equal(all[4], 0xEEEE);
 }
 
-static void a_text_is_the_payload_or_a_json_string(void **state)
+TEST(a_text_is_the_payload_or_a_json_string)
 {
-    (void)state;
     expect_text("pump", "pump");
     expect_text("pump no1", "pump no1");
     expect_text(" a b ", " a b ");
@@ -572,11 +558,10 @@ static void expect_wrong(uint8_t type, uint16_t count, const char *payload, cons
         fail_msg("%s: %s, and not: %s", payload, wrong, reason);
 }
 
-static void a_text_that_does_not_fit_is_refused(void **state)
+TEST(a_text_that_does_not_fit_is_refused)
 {
     static char longest[PAYLOAD_LONGEST + 2];
 
-    (void)state;
     expect_wrong(MBM_TYPE_TEXT, 8, "123456789", "longer than the field");
     expect_wrong(MBM_TYPE_TEXT, 8, "\342\202\254", "not in Latin-1");
     expect_wrong(MBM_TYPE_TEXT, 8, "\"\\u20ac\"", "not in Latin-1");
@@ -592,7 +577,7 @@ static void a_text_that_does_not_fit_is_refused(void **state)
     expect_wrong(MBM_TYPE_TEXT, 8, longest, "too long");
 }
 
-static void several_values_are_all_written(void **state)
+TEST(several_values_are_all_written)
 {
     static const char *const right[] = {"1,2,3", "[1,2,3]", " [ 1 , 2 ,3 ] ", "1, 2, 3\n",
                                         "{\"value\":[1,2,3]}"};
@@ -600,7 +585,6 @@ static void several_values_are_all_written(void **state)
                                        "{\"value\":[1,false,1]}"};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(right); i++) {
         if (parse_all(MBM_TYPE_UINT16, 3, right[i], strlen(right[i])) != 3)
             fail_msg("%s: %s", right[i], wrong);
@@ -615,7 +599,7 @@ static void several_values_are_all_written(void **state)
     }
 }
 
-static void a_list_with_one_wrong_value_is_refused(void **state)
+TEST(a_list_with_one_wrong_value_is_refused)
 {
     static const char *const wrongs[] = {"",
                                          "1",
@@ -637,7 +621,6 @@ static void a_list_with_one_wrong_value_is_refused(void **state)
                                          "[{\"value\":1},2,3]"};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(wrongs); i++)
         if (parse_all(MBM_TYPE_UINT16, 3, wrongs[i], strlen(wrongs[i])) != 0)
             fail_msg("%s is taken", wrongs[i]);
@@ -656,12 +639,11 @@ static uint64_t next_random(void)
     return random_state;
 }
 
-static void random_integers_are_written_exactly(void **state)
+TEST(random_integers_are_written_exactly)
 {
     char payload[80];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 20000; i++) {
         const uint64_t value = next_random() >> next_random() % 64;
         const unsigned decimals = (unsigned)(next_random() % 6);
@@ -684,13 +666,12 @@ static void random_integers_are_written_exactly(void **state)
 
 /* Any bytes: what is taken as a number is one for strtod too, up to its end, and is the number that
  * is written. */
-static void random_bytes_are_numbers_or_refused(void **state)
+TEST(random_bytes_are_numbers_or_refused)
 {
     static const char BYTES[] = "0123456789.-+eE {}[]\":,valuex\\\n\0truefsON";
     char payload[24];
     unsigned i, taken = 0;
 
-    (void)state;
     for (i = 0; i < 400000; i++) {
         const size_t length = next_random() % 7;
         char *end;
@@ -709,31 +690,4 @@ static void random_bytes_are_numbers_or_refused(void **state)
         assert_null(strpbrk(payload, "xX,"));
     }
     assert_true(taken > 1000);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_payload_that_is_no_number_as_a_whole_is_refused),
-        cmocka_unit_test(bytes_after_a_zero_byte_are_not_overlooked),
-        cmocka_unit_test(a_payload_ends_where_its_length_says),
-        cmocka_unit_test(json_may_have_space_and_other_members),
-        cmocka_unit_test(integers_of_64_bits_are_exact),
-        cmocka_unit_test(every_integer_of_a_type_is_taken_and_none_beyond),
-        cmocka_unit_test(a_fraction_for_an_integer_is_refused_and_not_rounded),
-        cmocka_unit_test(a_scaled_number_is_a_multiple_of_the_scale_in_decimal),
-        cmocka_unit_test(what_a_scaled_integer_is_published_as_can_be_written_back),
-        cmocka_unit_test(a_scale_is_a_decimal_number),
-        cmocka_unit_test(a_float_gets_the_nearest_number_or_none),
-        cmocka_unit_test(only_a_bit_takes_a_truth_value),
-        cmocka_unit_test(the_longest_payload_is_read_and_a_longer_one_is_refused),
-        cmocka_unit_test(a_text_is_the_payload_or_a_json_string),
-        cmocka_unit_test(a_text_that_does_not_fit_is_refused),
-        cmocka_unit_test(several_values_are_all_written),
-        cmocka_unit_test(a_list_with_one_wrong_value_is_refused),
-        cmocka_unit_test(random_integers_are_written_exactly),
-        cmocka_unit_test(random_bytes_are_numbers_or_refused),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,12 +11,11 @@ static place read_place(const char *text, int is_server)
 }
 
 /* Serial line guide V1.02, 2.5.1, 2.5.2 and 3.2. */
-static void a_serial_line_has_the_settings_of_the_standard(void **state)
+TEST(a_serial_line_has_the_settings_of_the_standard)
 {
     const place rtu = read_place("rtu:/dev/ttyUSB0", 0),
                 ascii = read_place("ascii:/dev/ttyUSB0", 0);
 
-    (void)state;
     assert_int_equal(rtu.tty.baud, 19200);
     assert_int_equal(rtu.tty.parity, 'E');
     assert_int_equal(rtu.tty.stop, 1);
@@ -28,22 +27,11 @@ static void a_serial_line_has_the_settings_of_the_standard(void **state)
 }
 
 /* TCP guide V1.0b, 4.1 and 4.2.1.2. */
-static void a_host_has_port_502_unless_another_is_named(void **state)
+TEST(a_host_has_port_502_unless_another_is_named)
 {
-    (void)state;
     assert_string_equal(read_place("tcp://192.168.0.7", 0).service, "502");
     assert_string_equal(read_place("tcp://192.168.0.7:1502", 0).service, "1502");
     assert_string_equal(read_place("tcp://192.168.0.7", 1).service, "502");
     assert_string_equal(read_place("tcp://:1502", 1).service, "1502");
     assert_string_equal(MBM_TCP_SERVICE, "502");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_serial_line_has_the_settings_of_the_standard),
-        cmocka_unit_test(a_host_has_port_502_unless_another_is_named),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

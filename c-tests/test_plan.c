@@ -4,11 +4,12 @@
 
 #include <string.h>
 
-static void every_table_is_read_with_its_function(void **state)
+fixture each_test = {rtu, NULL};
+
+TEST(every_table_is_read_with_its_function)
 {
     unsigned i;
 
-    (void)state;
     for (i = 1; i <= 4; i++)
         (void)plan_device_add(&d, 1, (uint8_t)i, i <= 2 ? MBM_TYPE_BIT : MBM_TYPE_UINT16,
                               (uint16_t)(10 * i), SECOND);
@@ -25,9 +26,8 @@ static void every_table_is_read_with_its_function(void **state)
     }
 }
 
-static void fields_that_fit_together_are_one_request(void **state)
+TEST(fields_that_fit_together_are_one_request)
 {
-    (void)state;
     add(1, 12, SECOND);
     add(1, 10, SECOND);
     add(1, 15, SECOND);
@@ -42,11 +42,10 @@ static void fields_that_fit_together_are_one_request(void **state)
     assert_int_equal(plan_device_integer(&d, 2, 0), d.registers[15]);
 }
 
-static void fields_that_were_grouped_before_are_read_as_they_were_grouped(void **state)
+TEST(fields_that_were_grouped_before_are_read_as_they_were_grouped)
 {
     static const uint16_t counts[] = {3, 1};
 
-    (void)state;
     add(1, 10, SECOND);
     add(1, 15, SECOND);
     add(1, 12, SECOND);
@@ -66,11 +65,10 @@ static void fields_that_were_grouped_before_are_read_as_they_were_grouped(void *
     assert_int_equal(plan_device_updates(&d, 3), 3);
 }
 
-static void limits_above_255_are_not_reduced(void **state)
+TEST(limits_above_255_are_not_reduced)
 {
     mbm_planUnitLimits own = {.registersPerRead = 260, .unit = 2};
 
-    (void)state;
     d.setup.registersPerRead = 300;
     d.setup.registerGap = 300;
     d.setup.units = &own;
@@ -86,11 +84,10 @@ static void limits_above_255_are_not_reduced(void **state)
     assert_int_equal(d.log[1].quantity, 125);
 }
 
-static void each_read_keeps_its_interval(void **state)
+TEST(each_read_keeps_its_interval)
 {
     unsigned fast, slow;
 
-    (void)state;
     add(1, 10, 100);
     add(1, 50, SECOND);
     plan_device_start(&d);
@@ -101,11 +98,10 @@ static void each_read_keeps_its_interval(void **state)
     assert_in_range(slow, 10, 11);
 }
 
-static void reads_of_one_interval_are_spread_over_it(void **state)
+TEST(reads_of_one_interval_are_spread_over_it)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 5; i++)
         add(1, (uint16_t)(10 * i), SECOND);
     plan_device_start(&d);
@@ -117,11 +113,10 @@ static void reads_of_one_interval_are_spread_over_it(void **state)
     assert_in_range(d.requested, 25, 30);
 }
 
-static void a_value_is_never_older_than_its_interval_while_its_unit_answers(void **state)
+TEST(a_value_is_never_older_than_its_interval_while_its_unit_answers)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 8; i++)
         add(1, (uint16_t)(10 * i), i % 2 ? SECOND : 700);
     plan_device_start(&d);
@@ -132,11 +127,10 @@ static void a_value_is_never_older_than_its_interval_while_its_unit_answers(void
     }
 }
 
-static void a_value_has_no_age_before_it_was_read(void **state)
+TEST(a_value_has_no_age_before_it_was_read)
 {
     int64_t value = 77;
 
-    (void)state;
     add(1, 10, SECOND);
     plan_device_start(&d);
     IS(MBM_PENDING, status(0));
@@ -150,12 +144,11 @@ static void a_value_has_no_age_before_it_was_read(void **state)
     assert_in_range(age(0), 500, 551);
 }
 
-static void a_full_queue_delays_the_plan_and_no_more(void **state)
+TEST(a_full_queue_delays_the_plan_and_no_more)
 {
     static mbm_clientRequest own[16];
     unsigned i;
 
-    (void)state;
     add(2, 10, 500);
     d.answers[1] = SILENT;
     for (i = 0; i < COUNT(own); i++) {
@@ -172,12 +165,11 @@ static void a_full_queue_delays_the_plan_and_no_more(void **state)
         IS(MBM_RESPONSE_TIMED_OUT, own[i].status);
 }
 
-static void the_programs_own_requests_go_beside_the_plan(void **state)
+TEST(the_programs_own_requests_go_beside_the_plan)
 {
     mbm_clientRequest own = {0};
     uint16_t word = 0;
 
-    (void)state;
     add(1, 10, 100);
     plan_device_start(&d);
     plan_device_run(&d, 250);
@@ -191,11 +183,10 @@ static void the_programs_own_requests_go_beside_the_plan(void **state)
     assert_int_equal(plan_device_updates(&d, 0), 5);
 }
 
-static void many_requests_are_under_way_on_tcp(void **state)
+TEST_WITH(many_requests_are_under_way_on_tcp, NULL, NULL)
 {
     unsigned i;
 
-    (void)state;
     plan_device_begin(&d, 1);
     for (i = 0; i < 6; i++)
         add(1, (uint16_t)(10 * i), SECOND);
@@ -210,9 +201,8 @@ static void many_requests_are_under_way_on_tcp(void **state)
     }
 }
 
-static void a_refresh_reads_at_once(void **state)
+TEST(a_refresh_reads_at_once)
 {
-    (void)state;
     add(1, 10, 3600 * SECOND);
     add(1, 50, 3600 * SECOND);
     plan_device_start(&d);
@@ -225,9 +215,8 @@ static void a_refresh_reads_at_once(void **state)
     assert_int_equal(d.log[2].address, 50);
 }
 
-static void an_ended_plan_gives_its_requests_up(void **state)
+TEST(an_ended_plan_gives_its_requests_up)
 {
-    (void)state;
     add(1, 10, SECOND);
     plan_device_start(&d);
     OK(mbm_plan_poll(&d.plan));
@@ -240,9 +229,8 @@ static void an_ended_plan_gives_its_requests_up(void **state)
     OK(status(0));
 }
 
-static void a_plan_that_was_zeroed_ignores_the_reply(void **state)
+TEST(a_plan_that_was_zeroed_ignores_the_reply)
 {
-    (void)state;
     add(1, 10, SECOND);
     plan_device_start(&d);
     OK(mbm_plan_poll(&d.plan));
@@ -265,11 +253,10 @@ static void ending(void *context, mbm_plan *plan, uint16_t field)
     IS(MBM_NOT_INITIALISED, mbm_plan_refresh(plan, 0));
 }
 
-static void update_may_end_the_plan(void **state)
+TEST(update_may_end_the_plan)
 {
     unsigned calls = 0;
 
-    (void)state;
     add(1, 10, SECOND);
     add(1, 11, SECOND);
     d.setup.update = ending;
@@ -296,11 +283,10 @@ static void beginning_again(void *context, mbm_plan *plan, uint16_t field)
     OK(mbm_plan_poll(plan));
 }
 
-static void update_may_begin_the_plan_anew(void **state)
+TEST(update_may_begin_the_plan_anew)
 {
     unsigned calls = 0;
 
-    (void)state;
     add(1, 10, SECOND);
     add(1, 11, SECOND);
     d.setup.update = beginning_again;
@@ -310,29 +296,4 @@ static void update_may_begin_the_plan_anew(void **state)
     assert_int_equal(calls, 1);
     OK(status(0));
     IS(MBM_INVALID_ARGUMENT, status(1));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(every_table_is_read_with_its_function, rtu),
-        cmocka_unit_test_setup(fields_that_fit_together_are_one_request, rtu),
-        cmocka_unit_test_setup(fields_that_were_grouped_before_are_read_as_they_were_grouped, rtu),
-        cmocka_unit_test_setup(limits_above_255_are_not_reduced, rtu),
-        cmocka_unit_test_setup(each_read_keeps_its_interval, rtu),
-        cmocka_unit_test_setup(reads_of_one_interval_are_spread_over_it, rtu),
-        cmocka_unit_test_setup(a_value_is_never_older_than_its_interval_while_its_unit_answers,
-                               rtu),
-        cmocka_unit_test_setup(a_value_has_no_age_before_it_was_read, rtu),
-        cmocka_unit_test_setup(a_full_queue_delays_the_plan_and_no_more, rtu),
-        cmocka_unit_test_setup(the_programs_own_requests_go_beside_the_plan, rtu),
-        cmocka_unit_test(many_requests_are_under_way_on_tcp),
-        cmocka_unit_test_setup(a_refresh_reads_at_once, rtu),
-        cmocka_unit_test_setup(an_ended_plan_gives_its_requests_up, rtu),
-        cmocka_unit_test_setup(a_plan_that_was_zeroed_ignores_the_reply, rtu),
-        cmocka_unit_test_setup(update_may_end_the_plan, rtu),
-        cmocka_unit_test_setup(update_may_begin_the_plan_anew, rtu),
-    };
-
-    return cmocka_run_group_tests_name("plan", tests, NULL, NULL);
 }

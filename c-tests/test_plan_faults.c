@@ -5,9 +5,10 @@
 
 #include <string.h>
 
-static void a_unit_that_is_gone_keeps_its_last_value_with_status_and_age(void **state)
+fixture each_test = {rtu, NULL};
+
+TEST(a_unit_that_is_gone_keeps_its_last_value_with_status_and_age)
 {
-    (void)state;
     add(1, 10, SECOND);
     plan_device_start(&d);
     plan_device_run(&d, 100);
@@ -23,9 +24,8 @@ static void a_unit_that_is_gone_keeps_its_last_value_with_status_and_age(void **
     assert_int_equal(plan_device_integer(&d, 0, 0), 1234);
 }
 
-static void the_plan_backs_off_from_a_silent_unit_and_goes_on_with_the_rest(void **state)
+TEST(the_plan_backs_off_from_a_silent_unit_and_goes_on_with_the_rest)
 {
-    (void)state;
     add(1, 10, 200);
     add(2, 10, 200);
     d.answers[1] = SILENT;
@@ -40,11 +40,10 @@ static void the_plan_backs_off_from_a_silent_unit_and_goes_on_with_the_rest(void
     IS(MBM_RESPONSE_TIMED_OUT, status(0));
 }
 
-static void a_silent_unit_with_many_reads_is_tried_with_one_at_a_time(void **state)
+TEST(a_silent_unit_with_many_reads_is_tried_with_one_at_a_time)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 6; i++)
         add(1, (uint16_t)(10 * i), 500);
     d.answers[1] = SILENT;
@@ -64,9 +63,8 @@ static void a_silent_unit_with_many_reads_is_tried_with_one_at_a_time(void **sta
         OK(status((uint16_t)i));
 }
 
-static void one_read_without_an_answer_does_not_stop_the_others_of_its_unit(void **state)
+TEST(one_read_without_an_answer_does_not_stop_the_others_of_its_unit)
 {
-    (void)state;
     add(1, 10, 500);
     (void)plan_device_add(&d, 1, MBM_TABLE_INPUT_REGISTERS, MBM_TYPE_UINT16, 10, 500);
     d.silent_function = 4;
@@ -78,9 +76,8 @@ static void one_read_without_an_answer_does_not_stop_the_others_of_its_unit(void
     assert_true(plan_device_updates(&d, 1) < 10);
 }
 
-static void an_exception_is_an_answer(void **state)
+TEST(an_exception_is_an_answer)
 {
-    (void)state;
     add(1, 10, 200);
     d.answers[1] = EXCEPTION;
     plan_device_start(&d);
@@ -89,11 +86,10 @@ static void an_exception_is_an_answer(void **state)
     assert_in_range(d.requested, 49, 51);
 }
 
-static void half_a_reply_is_no_value(void **state)
+TEST(half_a_reply_is_no_value)
 {
     int64_t value = 77;
 
-    (void)state;
     add(1, 10, 500);
     d.answers[1] = HALF_A_REPLY;
     plan_device_start(&d);
@@ -107,9 +103,8 @@ static void half_a_reply_is_no_value(void **state)
     assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[10]);
 }
 
-static void a_damaged_reply_is_read_again_at_the_interval(void **state)
+TEST(a_damaged_reply_is_read_again_at_the_interval)
 {
-    (void)state;
     add(1, 10, 500);
     d.answers[1] = WRONG_CRC;
     plan_device_start(&d);
@@ -118,9 +113,8 @@ static void a_damaged_reply_is_read_again_at_the_interval(void **state)
     assert_in_range(d.requested, 19, 21);
 }
 
-static void a_lost_link_is_the_status_and_the_plan_goes_on_once_it_is_back(void **state)
+TEST(a_lost_link_is_the_status_and_the_plan_goes_on_once_it_is_back)
 {
-    (void)state;
     add(1, 10, 500);
     plan_device_start(&d);
     plan_device_run(&d, 100);
@@ -133,11 +127,10 @@ static void a_lost_link_is_the_status_and_the_plan_goes_on_once_it_is_back(void 
     assert_true(age(0) <= 600);
 }
 
-static void many_timeouts_at_once_count_as_one(void **state)
+TEST_WITH(many_timeouts_at_once_count_as_one, NULL, NULL)
 {
     unsigned i;
 
-    (void)state;
     plan_device_begin(&d, 1);
     for (i = 0; i < 6; i++)
         add(1, (uint16_t)(10 * i), 100);
@@ -153,11 +146,10 @@ static void many_timeouts_at_once_count_as_one(void **state)
         OK(status((uint16_t)i));
 }
 
-static void a_client_that_is_begun_again_loses_the_reads_under_way_only(void **state)
+TEST(a_client_that_is_begun_again_loses_the_reads_under_way_only)
 {
     mbm_port port = memory_port_of(&d.memory);
 
-    (void)state;
     add(1, 10, 500);
     plan_device_start(&d);
     OK(mbm_plan_poll(&d.plan));
@@ -170,9 +162,8 @@ static void a_client_that_is_begun_again_loses_the_reads_under_way_only(void **s
     OK(status(0));
 }
 
-static void a_request_that_cannot_be_sent_is_a_status(void **state)
+TEST(a_request_that_cannot_be_sent_is_a_status)
 {
-    (void)state;
     add(1, 10, SECOND);
     plan_device_start(&d);
     memset(&d.client, 0, sizeof d.client);
@@ -181,11 +172,10 @@ static void a_request_that_cannot_be_sent_is_a_status(void **state)
     OK(mbm_plan_end(&d.plan));
 }
 
-static void the_clock_may_wrap(void **state)
+TEST(the_clock_may_wrap)
 {
     unsigned i;
 
-    (void)state;
     d.memory.now = UINT32_MAX - 2500000;
     add(1, 10, 500);
     plan_device_start(&d);
@@ -196,9 +186,8 @@ static void the_clock_may_wrap(void **state)
     assert_in_range(d.requested, 19, 21);
 }
 
-static void a_plan_that_was_not_polled_for_long_reads_once(void **state)
+TEST(a_plan_that_was_not_polled_for_long_reads_once)
 {
-    (void)state;
     add(1, 10, 10);
     plan_device_start(&d);
     plan_device_run(&d, 100);
@@ -207,27 +196,4 @@ static void a_plan_that_was_not_polled_for_long_reads_once(void **state)
     plan_device_run(&d, 9);
     assert_in_range(d.requested, 1, 2);
     assert_true(age(0) < 10);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(a_unit_that_is_gone_keeps_its_last_value_with_status_and_age, rtu),
-        cmocka_unit_test_setup(the_plan_backs_off_from_a_silent_unit_and_goes_on_with_the_rest,
-                               rtu),
-        cmocka_unit_test_setup(a_silent_unit_with_many_reads_is_tried_with_one_at_a_time, rtu),
-        cmocka_unit_test_setup(one_read_without_an_answer_does_not_stop_the_others_of_its_unit,
-                               rtu),
-        cmocka_unit_test_setup(an_exception_is_an_answer, rtu),
-        cmocka_unit_test_setup(half_a_reply_is_no_value, rtu),
-        cmocka_unit_test_setup(a_damaged_reply_is_read_again_at_the_interval, rtu),
-        cmocka_unit_test_setup(a_lost_link_is_the_status_and_the_plan_goes_on_once_it_is_back, rtu),
-        cmocka_unit_test(many_timeouts_at_once_count_as_one),
-        cmocka_unit_test_setup(a_client_that_is_begun_again_loses_the_reads_under_way_only, rtu),
-        cmocka_unit_test_setup(a_request_that_cannot_be_sent_is_a_status, rtu),
-        cmocka_unit_test_setup(the_clock_may_wrap, rtu),
-        cmocka_unit_test_setup(a_plan_that_was_not_polled_for_long_reads_once, rtu),
-    };
-
-    return cmocka_run_group_tests_name("plan_faults", tests, NULL, NULL);
 }

@@ -70,7 +70,7 @@ static uint16_t make_table(uint32_t number, mbm_planField *fields, mbm_planSetup
     return made;
 }
 
-static void a_plan_needs_no_request_more_than_go_modbus_client(void **unused)
+TEST(a_plan_needs_no_request_more_than_go_modbus_client)
 {
     static mbm_planField fields[MOST];
     static mbm_planPosition positions[MOST];
@@ -82,7 +82,6 @@ static void a_plan_needs_no_request_more_than_go_modbus_client(void **unused)
     unsigned theirs = 0, ours = 0;
     uint32_t number;
 
-    (void)unused;
     for (number = 0; number < COUNT(expected); number++) {
         mbm_planSetup setup = {.fields = fields,
                                .positions = positions,
@@ -120,13 +119,4 @@ static void a_plan_needs_no_request_more_than_go_modbus_client(void **unused)
     /* docs/plan.md has these figures. */
     assert_int_equal(theirs, 259257);
     assert_int_equal(ours, 236068);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_plan_needs_no_request_more_than_go_modbus_client),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

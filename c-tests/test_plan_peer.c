@@ -120,12 +120,11 @@ static void check_values(const modbus_mapping_t *memory)
     }
 }
 
-static void every_value_is_that_of_the_server_on_a_line(void **state)
+TEST(every_value_is_that_of_the_server_on_a_line)
 {
     server s;
     mbm_planReadInfo read;
 
-    (void)state;
     server_start(&s, UNIT);
     asker_begin_rtu(&a, s.line.ours);
     begin(1);
@@ -152,11 +151,10 @@ static void every_value_is_that_of_the_server_on_a_line(void **state)
     server_stop(&s);
 }
 
-static void every_value_is_that_of_the_server_over_tcp(void **state)
+TEST(every_value_is_that_of_the_server_over_tcp)
 {
     tcp_server s;
 
-    (void)state;
     tcp_server_start(&s);
     asker_begin_tcp(&a, s.port);
     begin(4);
@@ -167,11 +165,10 @@ static void every_value_is_that_of_the_server_over_tcp(void **state)
     tcp_server_stop(&s);
 }
 
-static void a_server_that_hangs_up_is_a_lost_link_until_it_is_connected_again(void **state)
+TEST(a_server_that_hangs_up_is_a_lost_link_until_it_is_connected_again)
 {
     tcp_server s;
 
-    (void)state;
     tcp_server_start(&s);
     asker_begin_tcp(&a, s.port);
     begin(4);
@@ -180,15 +177,4 @@ static void a_server_that_hangs_up_is_a_lost_link_until_it_is_connected_again(vo
     poll_until(MBM_LINK_LOST);
     OK(mbm_plan_end(&plan));
     mbm_tcp_close(&a.tcp);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_value_is_that_of_the_server_on_a_line),
-        cmocka_unit_test(every_value_is_that_of_the_server_over_tcp),
-        cmocka_unit_test(a_server_that_hangs_up_is_a_lost_link_until_it_is_connected_again),
-    };
-
-    return cmocka_run_group_tests_name("plan and libmodbus", tests, NULL, NULL);
 }

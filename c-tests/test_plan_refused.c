@@ -11,12 +11,12 @@ enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS };
 
 static plan_device d;
 
-static int rtu(void **state)
+static void rtu(void)
 {
-    (void)state;
     plan_device_begin(&d, 0);
-    return 0;
 }
+
+fixture each_test = {rtu, NULL};
 
 static mbm_planField *add(uint8_t type, uint16_t address)
 {
@@ -33,11 +33,10 @@ static void refuses(uint8_t status, uint16_t wrong)
     IS(MBM_NOT_INITIALISED, mbm_plan_poll(&d.plan));
 }
 
-static void a_wrong_field_is_named(void **state)
+TEST(a_wrong_field_is_named)
 {
     mbm_planField *field;
 
-    (void)state;
     add(MBM_TYPE_UINT16, 0);
     field = add(MBM_TYPE_UINT32, 20);
     field->type = 99;
@@ -81,12 +80,11 @@ static void a_wrong_field_is_named(void **state)
     plan_device_start(&d);
 }
 
-static void a_setup_that_is_not_complete_is_refused(void **state)
+TEST(a_setup_that_is_not_complete_is_refused)
 {
     const mbm_planSetup whole = d.setup;
     unsigned i;
 
-    (void)state;
     add(MBM_TYPE_UINT16, 0);
     for (i = 0; i < 12; i++) {
         uint16_t count = d.setup.fieldCount;
@@ -118,13 +116,12 @@ static void a_setup_that_is_not_complete_is_refused(void **state)
     refuses(MBM_NOT_INITIALISED, 0xFFFF);
 }
 
-static void limits_and_ranges_of_a_unit_above_255_are_refused(void **state)
+TEST(limits_and_ranges_of_a_unit_above_255_are_refused)
 {
     mbm_planUnitLimits limits[2] = {{.unit = 255}, {.unit = 256}};
     mbm_planExcludedRange ranges[2] = {{.unit = 255, .table = HOLDING},
                                        {.unit = 301, .table = HOLDING}};
 
-    (void)state;
     add(MBM_TYPE_UINT16, 0);
     plan_device_start(&d);
     d.setup.units = limits;
@@ -138,7 +135,7 @@ static void limits_and_ranges_of_a_unit_above_255_are_refused(void **state)
     plan_device_start(&d);
 }
 
-static void what_was_never_begun_is_refused(void **state)
+TEST(what_was_never_begun_is_refused)
 {
     static mbm_plan plan;
     mbm_registers view = {0};
@@ -150,7 +147,6 @@ static void what_was_never_begun_is_refused(void **state)
     char text[4] = "abc";
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 2; i++) {
         mbm_plan *object = i ? &plan : NULL;
         uint8_t status = i ? MBM_NOT_INITIALISED : MBM_INVALID_ARGUMENT;
@@ -170,11 +166,10 @@ static void what_was_never_begun_is_refused(void **state)
     assert_string_equal(text, "abc");
 }
 
-static void a_plan_that_begins_again_gives_its_requests_up(void **state)
+TEST(a_plan_that_begins_again_gives_its_requests_up)
 {
     mbm_clientRequest more[2];
 
-    (void)state;
     memset(more, 0, sizeof more);
     add(MBM_TYPE_UINT16, 0);
     plan_device_start(&d);
@@ -198,11 +193,10 @@ static void a_plan_that_begins_again_gives_its_requests_up(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_plan_getStatus(&d.plan, 1, NULL));
 }
 
-static void a_plan_whose_new_table_is_wrong_has_ended(void **state)
+TEST(a_plan_whose_new_table_is_wrong_has_ended)
 {
     uint16_t field = 0;
 
-    (void)state;
     add(MBM_TYPE_UINT16, 0);
     plan_device_start(&d);
     OK(mbm_plan_poll(&d.plan));
@@ -230,9 +224,8 @@ static void begin_again(void *context, mbm_plan *plan, uint16_t field)
     }
 }
 
-static void a_plan_may_begin_again_in_its_update(void **state)
+TEST(a_plan_may_begin_again_in_its_update)
 {
-    (void)state;
     updates = 0;
     add(MBM_TYPE_UINT16, 0);
     add(MBM_TYPE_UINT16, 1);
@@ -244,12 +237,11 @@ static void a_plan_may_begin_again_in_its_update(void **state)
     assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[0]);
 }
 
-static void a_table_that_is_not_grouped_as_the_counts_say_is_refused(void **state)
+TEST(a_table_that_is_not_grouped_as_the_counts_say_is_refused)
 {
     static const uint16_t counts[] = {1, 2};
     uint16_t field = 77;
 
-    (void)state;
     add(MBM_TYPE_UINT16, 0);
     add(MBM_TYPE_UINT16, 20);
     add(MBM_TYPE_UINT16, 145);
@@ -274,13 +266,12 @@ static void a_table_that_is_not_grouped_as_the_counts_say_is_refused(void **stat
 #undef TRY
 }
 
-static void a_wrong_field_of_a_grouped_table_is_named(void **state)
+TEST(a_wrong_field_of_a_grouped_table_is_named)
 {
     static const uint16_t counts[] = {1, 2};
     uint16_t field = 77;
     mbm_planField *last;
 
-    (void)state;
     add(MBM_TYPE_UINT16, 0);
     add(MBM_TYPE_UINT16, 20);
     last = add(MBM_TYPE_UINT16, 21);
@@ -307,21 +298,4 @@ static void a_wrong_field_of_a_grouped_table_is_named(void **state)
     last->address = 0xFFFF;
     NAMES(MBM_ILLEGAL_DATA_ADDRESS);
 #undef NAMES
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(a_wrong_field_is_named, rtu),
-        cmocka_unit_test_setup(a_table_that_is_not_grouped_as_the_counts_say_is_refused, rtu),
-        cmocka_unit_test_setup(a_wrong_field_of_a_grouped_table_is_named, rtu),
-        cmocka_unit_test_setup(a_setup_that_is_not_complete_is_refused, rtu),
-        cmocka_unit_test_setup(limits_and_ranges_of_a_unit_above_255_are_refused, rtu),
-        cmocka_unit_test_setup(what_was_never_begun_is_refused, rtu),
-        cmocka_unit_test_setup(a_plan_that_begins_again_gives_its_requests_up, rtu),
-        cmocka_unit_test_setup(a_plan_whose_new_table_is_wrong_has_ended, rtu),
-        cmocka_unit_test_setup(a_plan_may_begin_again_in_its_update, rtu),
-    };
-
-    return cmocka_run_group_tests_name("plan_refused", tests, NULL, NULL);
 }

@@ -10,12 +10,12 @@ enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS, COILS = MBM_TABLE_COILS };
 
 static plan_device d;
 
-static int rtu(void **state)
+static void rtu(void)
 {
-    (void)state;
     plan_device_begin(&d, 0);
-    return 0;
 }
+
+fixture each_test = {rtu, NULL};
 
 static mbm_planField *add(uint8_t type, uint16_t address)
 {
@@ -43,7 +43,7 @@ static void put(uint16_t address, uint64_t number, unsigned registers, uint8_t o
     }
 }
 
-static void integers_have_their_sign_in_every_order(void **state)
+TEST_WITH(integers_have_their_sign_in_every_order, NULL, NULL)
 {
     static const struct {
         uint8_t type;
@@ -62,7 +62,6 @@ static void integers_have_their_sign_in_every_order(void **state)
     uint8_t order;
     unsigned i;
 
-    (void)state;
     for (order = MBM_ORDER_DEFAULT; order <= MBM_ORDER_DCBA; order++) {
         plan_device_begin(&d, 0);
         for (i = 0; i < COUNT(numbers); i++) {
@@ -85,7 +84,7 @@ static void integers_have_their_sign_in_every_order(void **state)
     }
 }
 
-static void floats_and_doubles_are_numbers_too(void **state)
+TEST_WITH(floats_and_doubles_are_numbers_too, NULL, NULL)
 {
     const float pi = 3.14159274f;
     const double e = 2.718281828459045;
@@ -93,7 +92,6 @@ static void floats_and_doubles_are_numbers_too(void **state)
     uint64_t e_bits;
     uint8_t order;
 
-    (void)state;
     memcpy(&pi_bits, &pi, sizeof pi);
     memcpy(&e_bits, &e, sizeof e);
     for (order = MBM_ORDER_ABCD; order <= MBM_ORDER_DCBA; order++) {
@@ -125,7 +123,7 @@ static void floats_and_doubles_are_numbers_too(void **state)
     }
 }
 
-static void a_number_is_scaled_and_rounded_to_the_nearest(void **state)
+TEST(a_number_is_scaled_and_rounded_to_the_nearest)
 {
     static const struct {
         uint16_t bits;
@@ -141,7 +139,6 @@ static void a_number_is_scaled_and_rounded_to_the_nearest(void **state)
     };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(scales); i++) {
         mbm_planField *field = add(MBM_TYPE_INT16, (uint16_t)i);
 
@@ -163,7 +160,7 @@ static void a_number_is_scaled_and_rounded_to_the_nearest(void **state)
     }
 }
 
-static void bits_of_a_register_are_one_number_in_every_order(void **state)
+TEST(bits_of_a_register_are_one_number_in_every_order)
 {
     static const struct {
         uint8_t bit;
@@ -173,7 +170,6 @@ static void bits_of_a_register_are_one_number_in_every_order(void **state)
     uint8_t order;
     unsigned i;
 
-    (void)state;
     for (order = MBM_ORDER_ABCD; order <= MBM_ORDER_DCBA; order++) {
         plan_device_begin(&d, 0);
         put(7, 0xA3C5, 1, order);
@@ -204,11 +200,10 @@ static void bits_of_a_register_are_one_number_in_every_order(void **state)
     }
 }
 
-static void fields_that_overlap_have_their_own_values_from_one_read(void **state)
+TEST(fields_that_overlap_have_their_own_values_from_one_read)
 {
     mbm_planField *half;
 
-    (void)state;
     put(10, 0x12345678, 2, MBM_ORDER_ABCD);
     add(MBM_TYPE_UINT32, 10);
     add(MBM_TYPE_UINT16, 10);
@@ -226,7 +221,7 @@ static void fields_that_overlap_have_their_own_values_from_one_read(void **state
     assert_int_equal(plan_device_updates(&d, 3), 1);
 }
 
-static void a_number_beyond_32_bits_is_too_large_for_int32(void **state)
+TEST(a_number_beyond_32_bits_is_too_large_for_int32)
 {
     static const struct {
         uint8_t type;
@@ -251,7 +246,6 @@ static void a_number_beyond_32_bits_is_too_large_for_int32(void **state)
     };
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(numbers); i++) {
         mbm_planField *field = add(numbers[i].type, (uint16_t)(4 * i));
         uint8_t type = numbers[i].type;
@@ -273,7 +267,7 @@ static void a_number_beyond_32_bits_is_too_large_for_int32(void **state)
     }
 }
 
-static void a_scaled_number_is_the_nearest_double(void **state)
+TEST(a_scaled_number_is_the_nearest_double)
 {
     static const struct {
         uint8_t type;
@@ -293,7 +287,6 @@ static void a_scaled_number_is_the_nearest_double(void **state)
     unsigned i;
     double value = 77;
 
-    (void)state;
     for (i = 0; i < COUNT(numbers); i++) {
         mbm_planField *field = add(numbers[i].type, (uint16_t)(4 * i));
         unsigned registers =
@@ -321,11 +314,10 @@ static void a_scaled_number_is_the_nearest_double(void **state)
     assert_true(value == 1);
 }
 
-static void a_number_beyond_64_bits_is_too_large(void **state)
+TEST(a_number_beyond_64_bits_is_too_large)
 {
     int64_t value = 77;
 
-    (void)state;
     add(MBM_TYPE_UINT64, 0);
     add(MBM_TYPE_INT64, 4)->multiplier = 3;
     add(MBM_TYPE_UINT64, 8)->divisor = 2;
@@ -346,12 +338,11 @@ static void a_number_beyond_64_bits_is_too_large(void **state)
     assert_true(value == INT64_MAX);
 }
 
-static void the_least_integer_is_an_integer(void **state)
+TEST(the_least_integer_is_an_integer)
 {
     int64_t value = 77;
     int32_t short_value = 77;
 
-    (void)state;
     add(MBM_TYPE_INT64, 0);
     add(MBM_TYPE_UINT64, 4)->multiplier = -1;
     add(MBM_TYPE_INT32, 8);
@@ -374,12 +365,11 @@ static void the_least_integer_is_an_integer(void **state)
     assert_true(value == -3074457345618258603);
 }
 
-static void a_field_may_have_many_values(void **state)
+TEST(a_field_may_have_many_values)
 {
     unsigned i;
     int64_t value = 77;
 
-    (void)state;
     add(MBM_TYPE_UINT32, 0)->count = 5;
     add(MBM_TYPE_BIT, 3)->count = 30;
     for (i = 0; i < 5; i++)
@@ -395,11 +385,10 @@ static void a_field_may_have_many_values(void **state)
     assert_int_equal(value, 77);
 }
 
-static void a_text_ends_at_its_nul_or_with_its_field(void **state)
+TEST(a_text_ends_at_its_nul_or_with_its_field)
 {
     char text[8] = "unset";
 
-    (void)state;
     add(MBM_TYPE_TEXT, 0)->count = 5;
     add(MBM_TYPE_TEXT, 3)->count = 6;
     d.fields[1].order = MBM_ORDER_BADC;
@@ -421,12 +410,11 @@ static void a_text_ends_at_its_nul_or_with_its_field(void **state)
     }
 }
 
-static void the_registers_of_a_field_are_a_view(void **state)
+TEST(the_registers_of_a_field_are_a_view)
 {
     mbm_registers view;
     uint32_t value = 0;
 
-    (void)state;
     add(MBM_TYPE_UINT16, 10);
     add(MBM_TYPE_UINT32, 12)->order = MBM_ORDER_CDAB;
     add(MBM_TYPE_BIT, 3);
@@ -441,11 +429,10 @@ static void the_registers_of_a_field_are_a_view(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_plan_getRegisters(&d.plan, 2, &view));
 }
 
-static void the_reads_can_be_looked_at(void **state)
+TEST(the_reads_can_be_looked_at)
 {
     mbm_planReadInfo read;
 
-    (void)state;
     add(MBM_TYPE_UINT16, 50);
     add(MBM_TYPE_UINT16, 10);
     add(MBM_TYPE_UINT16, 11);
@@ -464,26 +451,4 @@ static void the_reads_can_be_looked_at(void **state)
     IS(MBM_OK, read.status);
     IS(MBM_INVALID_ARGUMENT, mbm_plan_getRead(&d.plan, 2, &read));
     assert_int_equal(read.address, 50);
-}
-
-/* A begin that is refused with a status because of a field. */
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(integers_have_their_sign_in_every_order),
-        cmocka_unit_test(floats_and_doubles_are_numbers_too),
-        cmocka_unit_test_setup(a_number_is_scaled_and_rounded_to_the_nearest, rtu),
-        cmocka_unit_test_setup(bits_of_a_register_are_one_number_in_every_order, rtu),
-        cmocka_unit_test_setup(fields_that_overlap_have_their_own_values_from_one_read, rtu),
-        cmocka_unit_test_setup(a_number_beyond_32_bits_is_too_large_for_int32, rtu),
-        cmocka_unit_test_setup(a_scaled_number_is_the_nearest_double, rtu),
-        cmocka_unit_test_setup(a_number_beyond_64_bits_is_too_large, rtu),
-        cmocka_unit_test_setup(the_least_integer_is_an_integer, rtu),
-        cmocka_unit_test_setup(a_field_may_have_many_values, rtu),
-        cmocka_unit_test_setup(a_text_ends_at_its_nul_or_with_its_field, rtu),
-        cmocka_unit_test_setup(the_registers_of_a_field_are_a_view, rtu),
-        cmocka_unit_test_setup(the_reads_can_be_looked_at, rtu),
-    };
-
-    return cmocka_run_group_tests_name("plan values", tests, NULL, NULL);
 }

@@ -18,9 +18,8 @@ static uint8_t frame[MBM_MAX_ASCII_FRAME], outgoing[MBM_MAX_TCP_FRAME];
 static uint8_t reply[256];
 static const uint16_t data[128];
 
-static int setup(void **state)
+static void setup(void)
 {
-    (void)state;
     memset(&wire, 0, sizeof wire);
     memset(&c, 0, sizeof c);
     memset(&never, 0, sizeof never);
@@ -32,8 +31,10 @@ static int setup(void **state)
     r.data = data;
     r.reply = reply;
     r.replyBytes = sizeof reply;
-    return mbm_client_beginRtu(&c, &port, frame, sizeof frame);
+    OK(mbm_client_beginRtu(&c, &port, frame, sizeof frame));
 }
+
+fixture each_test = {setup, NULL};
 
 /* --- requests --- */
 
@@ -109,7 +110,7 @@ static const struct {
     {write_of_both, 121, 0},
 };
 
-static void a_quantity_and_an_address_have_the_limits_of_the_header(void **state)
+TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
 {
     unsigned i, nth;
 
@@ -129,7 +130,7 @@ static void a_quantity_and_an_address_have_the_limits_of_the_header(void **state
                     {(uint16_t)(65537 - most), most, MBM_ILLEGAL_DATA_ADDRESS}};
 
         for (nth = 0; nth < (most != 0 ? COUNT(rows) : 2u); nth++) {
-            setup(state);
+            setup();
             r.exception = 7;
             IS(rows[nth].status, calls[i].call(&c, &r, rows[nth].address, rows[nth].quantity));
             IS(rows[nth].status, r.status);
@@ -139,12 +140,12 @@ static void a_quantity_and_an_address_have_the_limits_of_the_header(void **state
     }
 }
 
-static void a_request_is_refused_before_it_is_queued(void **state)
+TEST(a_request_is_refused_before_it_is_queued)
 {
     unsigned i;
 
     for (i = 0; i < COUNT(calls); i++) {
-        setup(state);
+        setup();
         IS(MBM_INVALID_ARGUMENT, calls[i].call(NULL, &r, 0, 1));
         IS(MBM_INVALID_ARGUMENT, calls[i].call(&c, NULL, 0, 1));
         REFUSED(MBM_NOT_INITIALISED, never, calls[i].call(&never, &r, 0, 1));
@@ -166,12 +167,11 @@ static void a_request_is_refused_before_it_is_queued(void **state)
     }
 }
 
-static void a_queue_holds_sixteen_requests(void **state)
+TEST(a_queue_holds_sixteen_requests)
 {
     static mbm_clientRequest many[MBM_CLIENT_DEPTH + 1];
     unsigned i;
 
-    (void)state;
     memset(many, 0, sizeof many);
     OK(mbm_client_beginTcp(&c, &port, frame, 260, outgoing, sizeof outgoing));
     for (i = 0; i <= MBM_CLIENT_DEPTH; i++) {
@@ -199,7 +199,7 @@ static void a_queue_holds_sixteen_requests(void **state)
         (void)mbm_client_cancel(&c, &r);                                                           \
     } while (0)
 
-static void functions_with_bodies_check_them(void **state)
+TEST(functions_with_bodies_check_them)
 {
     static const uint8_t bytes[256];
     static const mbm_rule silence = {.kind = MBM_RULE_SILENCE};
@@ -207,7 +207,6 @@ static void functions_with_bodies_check_them(void **state)
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
 
-    (void)state;
 #define ANSWERS(status, what)                                                                      \
     do {                                                                                           \
         IS(status, what);                                                                          \
@@ -280,14 +279,14 @@ static uint8_t begin(unsigned framing, mbm_client *client, const mbm_port *on, u
     }
 }
 
-static void a_begin_is_refused_without_a_change(void **state)
+TEST(a_begin_is_refused_without_a_change)
 {
     static const uint16_t least[] = {8, 17, 8, 9};
     mbm_port lacking;
     unsigned i;
 
     for (i = 0; i < COUNT(least); i++) {
-        setup(state);
+        setup();
         OK(begin(i, &c, &port, frame, least[i]));
         IS(MBM_INVALID_ARGUMENT, begin(i, NULL, &port, frame, 300));
         REFUSED(MBM_INVALID_ARGUMENT, c, begin(i, &c, NULL, frame, 300));
@@ -337,9 +336,8 @@ static uint32_t gap(void)
     return delay;
 }
 
-static void the_gap_is_that_of_the_header(void **state)
+TEST(the_gap_is_that_of_the_header)
 {
-    (void)state;
     assert_int_equal(gap(), 4000);
     OK(mbm_client_setBaudRate(&c, 19200));
     assert_int_equal(gap(), 2006);
@@ -370,12 +368,11 @@ static unsigned frames(uint32_t *us)
     return wire.called[HOOK_WRITE];
 }
 
-static void a_begin_restores_the_defaults_of_the_header(void **state)
+TEST(a_begin_restores_the_defaults_of_the_header)
 {
     unsigned again;
     uint32_t us;
 
-    (void)state;
     for (again = 0; again < 2; again++) {
         assert_int_equal(frames(&us), 1); /* no retries */
         assert_in_range(us, 2000000, 2004100);
@@ -397,12 +394,11 @@ static void a_begin_restores_the_defaults_of_the_header(void **state)
     }
 }
 
-static void settings_have_the_ranges_of_the_header(void **state)
+TEST(settings_have_the_ranges_of_the_header)
 {
     static mbm_clientUnit units[2];
     unsigned i;
 
-    (void)state;
     OK(mbm_client_setResponseTimeout(&c, 1000000));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setResponseTimeout(&c, 1000001));
     OK(mbm_client_setTurnaroundDelay(&c, 65535));
@@ -448,11 +444,10 @@ static void settings_have_the_ranges_of_the_header(void **state)
     }
 }
 
-static void the_response_timeout_of_a_unit_can_be_read(void **state)
+TEST(the_response_timeout_of_a_unit_can_be_read)
 {
     static mbm_clientUnit units[2];
 
-    (void)state;
     memset(units, 0, sizeof units);
     units[0].unit = 5;
     units[0].timeoutMs = 70;
@@ -471,13 +466,12 @@ static void the_response_timeout_of_a_unit_can_be_read(void **state)
     assert_int_equal(mbm_client_getResponseTimeout(NULL, 5), 0);
 }
 
-static void a_client_that_was_never_begun_has_no_settings(void **state)
+TEST(a_client_that_was_never_begun_has_no_settings)
 {
     static const mbm_rule silence = {.kind = MBM_RULE_SILENCE};
     mbm_client *const clients[] = {NULL, &never};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(clients); i++) {
         mbm_client *n = clients[i];
         uint8_t status = n == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
@@ -524,14 +518,13 @@ static uint8_t connect_at_once(void *context)
     return MBM_OK;
 }
 
-static void a_link_has_the_limits_of_the_header(void **state)
+TEST(a_link_has_the_limits_of_the_header)
 {
     static mbm_link link, other, none;
     mbm_linkHooks hooks = {.connect = connect_at_once};
     mbm_link *const links[] = {NULL, &none};
     unsigned i;
 
-    (void)state;
     memset(&link, 0, sizeof link);
     memset(&other, 0, sizeof other);
     IS(MBM_INVALID_ARGUMENT, mbm_link_begin(NULL, &c, &hooks));
@@ -578,25 +571,4 @@ static void a_link_has_the_limits_of_the_header(void **state)
         IS(status, mbm_link_end(n));
         assert_int_equal(mbm_link_state(n), 0);
     }
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, setup)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_quantity_and_an_address_have_the_limits_of_the_header),
-        TEST(a_request_is_refused_before_it_is_queued),
-        TEST(a_queue_holds_sixteen_requests),
-        TEST(functions_with_bodies_check_them),
-        TEST(a_begin_is_refused_without_a_change),
-        TEST(the_gap_is_that_of_the_header),
-        TEST(a_begin_restores_the_defaults_of_the_header),
-        TEST(settings_have_the_ranges_of_the_header),
-        TEST(the_response_timeout_of_a_unit_can_be_read),
-        TEST(a_client_that_was_never_begun_has_no_settings),
-        TEST(a_link_has_the_limits_of_the_header),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

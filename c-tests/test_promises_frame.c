@@ -30,17 +30,15 @@ static mbm_packet read_of(uint16_t quantity)
 
 /* --- mbm_version, mbm_status_text, mbm_status_textOf --- */
 
-static void the_archive_is_that_of_the_header(void **state)
+TEST(the_archive_is_that_of_the_header)
 {
-    (void)state;
     assert_string_equal(mbm_version(), MBM_VERSION);
 }
 
-static void every_number_has_a_text(void **state)
+TEST(every_number_has_a_text)
 {
     unsigned status;
 
-    (void)state;
     for (status = 0; status < 256; status++) {
         const char *text = mbm_status_text((uint8_t)status);
 
@@ -51,7 +49,7 @@ static void every_number_has_a_text(void **state)
     assert_string_equal(mbm_status_text(200), "not a status");
 }
 
-static void a_request_that_was_refused_here_is_no_exception_of_the_device(void **state)
+TEST(a_request_that_was_refused_here_is_no_exception_of_the_device)
 {
     static mbm_client client;
     static mbm_clientRequest request;
@@ -64,7 +62,6 @@ static void a_request_that_was_refused_here_is_no_exception_of_the_device(void *
     unsigned status, code;
     uint8_t refused;
 
-    (void)state;
     for (status = 0; status < 256; status++) {
         for (code = 0; code < 256; code++) {
             const char *text = mbm_status_textOf((uint8_t)status, (uint8_t)code);
@@ -103,13 +100,12 @@ static void a_request_that_was_refused_here_is_no_exception_of_the_device(void *
 
 /* --- mbm_frame_build, parse, exception, expectedLength, replyLength --- */
 
-static void the_longest_frames_fit_into_the_buffers_that_are_named(void **state)
+TEST(the_longest_frames_fit_into_the_buffers_that_are_named)
 {
     uint8_t data[MBM_MAX_PDU] = {0}, frame[MBM_MAX_ASCII_FRAME];
     uint16_t length;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         /* 08, return query data, may have any number of data bytes. */
         mbm_packet packet = {
@@ -127,7 +123,7 @@ static void the_longest_frames_fit_into_the_buffers_that_are_named(void **state)
     }
 }
 
-static void a_frame_is_never_built_malformed(void **state)
+TEST(a_frame_is_never_built_malformed)
 {
     static const struct {
         uint16_t address, quantity;
@@ -146,7 +142,6 @@ static void a_frame_is_never_built_malformed(void **state)
     uint16_t length;
     unsigned i, f;
 
-    (void)state;
     for (f = 0; f < COUNT(framings); f++) {
         for (i = 0; i < COUNT(rows); i++) {
             packet.address = rows[i].address;
@@ -167,7 +162,7 @@ static void a_frame_is_never_built_malformed(void **state)
     }
 }
 
-static void every_null_is_refused(void **state)
+TEST(every_null_is_refused)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME] = {17, 3, 0, 107, 0, 3, 0x76, 0x87};
     mbm_packet packet = read_of(3), kept;
@@ -175,7 +170,6 @@ static void every_null_is_refused(void **state)
     uint16_t length = 9, end;
     char text[80];
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(NULL, &packet, frame, 99, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, NULL, frame, 99, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, NULL, 99, &length));
@@ -211,7 +205,7 @@ static void every_null_is_refused(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_event_text(NULL, text, sizeof text));
 }
 
-static void an_exception_has_the_length_and_the_codes_that_are_named(void **state)
+TEST(an_exception_has_the_length_and_the_codes_that_are_named)
 {
     static const uint16_t lengths[] = {5, 11, 9};
     mbm_packet request = read_of(3), parsed;
@@ -220,7 +214,6 @@ static void an_exception_has_the_length_and_the_codes_that_are_named(void **stat
     uint16_t length;
     unsigned code, f;
 
-    (void)state;
     for (f = 0; f < COUNT(framings); f++) {
         for (code = 0; code < 256; code++) {
             uint8_t status =
@@ -254,7 +247,7 @@ static void an_exception_has_the_length_and_the_codes_that_are_named(void **stat
     }
 }
 
-static void a_listen_only_request_has_no_reply(void **state)
+TEST(a_listen_only_request_has_no_reply)
 {
     static const uint8_t zero[2];
     mbm_packet request = {.function = MBM_FC_DIAGNOSTICS,
@@ -265,7 +258,6 @@ static void a_listen_only_request_has_no_reply(void **state)
     mbm_length expected;
     unsigned f;
 
-    (void)state;
     for (f = 0; f < COUNT(framings); f++) {
         OK(mbm_frame_replyLength(framings[f], &request, &expected));
         assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
@@ -273,13 +265,12 @@ static void a_listen_only_request_has_no_reply(void **state)
     }
 }
 
-static void a_frame_that_does_not_hold_fills_in_what_is_known(void **state)
+TEST(a_frame_that_does_not_hold_fills_in_what_is_known)
 {
     /* Quantity 0 in a right frame, then a wrong CRC. */
     uint8_t frame[8] = {17, 3, 0, 107, 0, 0};
     mbm_packet packet;
 
-    (void)state;
     seal(frame, 6);
     memset(&packet, 0x77, sizeof packet);
     IS(MBM_ILLEGAL_DATA_VALUE, mbm_frame_parse(&rtu, MBM_PACKET_REQUEST, frame, 8, &packet));
@@ -299,12 +290,11 @@ static void a_frame_that_does_not_hold_fills_in_what_is_known(void **state)
     IS(MBM_ILLEGAL_FUNCTION, mbm_frame_parse(&rtu, MBM_PACKET_REQUEST, frame, 8, &packet));
 }
 
-static void bytes_look_like_tcp_from_the_eighth_on(void **state)
+TEST(bytes_look_like_tcp_from_the_eighth_on)
 {
     uint8_t bytes[12] = {0x12, 0x34, 0, 0, 0, 6, 17, 3, 0, 107, 0, 3};
     uint16_t length, have;
 
-    (void)state;
     for (have = 0; have < 8; have++) {
         IS(MBM_INCOMPLETE_FRAME, mbm_frame_looksLikeTcp(bytes, have, 0, &length));
         assert_int_equal(length, 0);
@@ -322,13 +312,12 @@ static void bytes_look_like_tcp_from_the_eighth_on(void **state)
     IS(MBM_MALFORMED_FRAME, mbm_frame_looksLikeTcp(bytes, 12, 0, &length));
 }
 
-static void the_first_bytes_may_be_none(void **state)
+TEST(the_first_bytes_may_be_none)
 {
     mbm_length expected;
     uint16_t length = 9;
     unsigned f;
 
-    (void)state;
     for (f = 0; f < COUNT(framings); f++) {
         OK(mbm_frame_expectedLength(framings[f], MBM_PACKET_REQUEST, NULL, 0, &expected));
         assert_int_equal(expected.kind, MBM_LENGTH_AT_LEAST);
@@ -337,11 +326,10 @@ static void the_first_bytes_may_be_none(void **state)
     assert_int_equal(length, 0);
 }
 
-static void the_checksums_of_nothing_are_their_start(void **state)
+TEST(the_checksums_of_nothing_are_their_start)
 {
     const uint8_t bytes[] = {2, 7};
 
-    (void)state;
     assert_int_equal(mbm_frame_crc16(NULL, 9), 0xFFFF);
     assert_int_equal(mbm_frame_crc16(bytes, 0), 0xFFFF);
     /* Serial line guide V1.02, 6.2.2: the frame ends with 41 12. */
@@ -413,7 +401,7 @@ static void shape_pdu(uint8_t *pdu, uint16_t length, unsigned shape)
     }
 }
 
-static void no_text_of_a_frame_is_longer_than_its_comment_says(void **state)
+TEST(no_text_of_a_frame_is_longer_than_its_comment_says)
 {
     static char text[8192];
     uint8_t frame[MBM_MAX_FRAME];
@@ -422,7 +410,6 @@ static void no_text_of_a_frame_is_longer_than_its_comment_says(void **state)
     uint16_t length;
     uint8_t side;
 
-    (void)state;
     for (function = 0; function < 129; function++) {
         for (shape = 0; shape < SHAPES; shape++) {
             for (length = MBM_MAX_PDU - 16; length <= MBM_MAX_PDU; length++) {
@@ -452,7 +439,7 @@ static void no_text_of_a_frame_is_longer_than_its_comment_says(void **state)
     assert_int_equal(strlen(text), TEXT_SUFFICES - 2);
 }
 
-static void the_longest_text_of_an_event_fits_too(void **state)
+TEST(the_longest_text_of_an_event_fits_too)
 {
     static char text[2400];
     static mbm_sniffer sniffer;
@@ -460,7 +447,6 @@ static void the_longest_text_of_an_event_fits_too(void **state)
     uint8_t frame[MBM_MAX_FRAME] = {255, 2, 0xF8, 0x30, 0x07, 0xD0};
     mbm_event event;
 
-    (void)state;
     OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, buffer, sizeof buffer));
     mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, frame, (uint16_t)seal(frame, 6), 0);
     assert_int_equal(mbm_sniffer_next(&sniffer, 10000, &event), 1);
@@ -477,14 +463,13 @@ static void the_longest_text_of_an_event_fits_too(void **state)
 
 /* --- mbm_packet_* --- */
 
-static void packets_without_records_or_objects_have_none(void **state)
+TEST(packets_without_records_or_objects_have_none)
 {
     mbm_packet packet = read_of(3);
     uint16_t cursor = 5;
     mbm_record record;
     mbm_object object;
 
-    (void)state;
     memset(&record, 0x77, sizeof record);
     memset(&object, 0x77, sizeof object);
     REFUSED(0, record, mbm_packet_nextRecord(&packet, &cursor, &record));
@@ -498,14 +483,13 @@ static void packets_without_records_or_objects_have_none(void **state)
     assert_int_equal(cursor, 5);
 }
 
-static void records_are_added_within_their_limits(void **state)
+TEST(records_are_added_within_their_limits)
 {
     static const uint8_t words[300];
     uint8_t storage[251];
     mbm_packet packet = {.kind = MBM_PACKET_REQUEST, .function = MBM_FC_WRITE_FILE_RECORD};
     mbm_record record = {.data = words, .file = 1, .record = 9999, .length = 1};
 
-    (void)state;
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, NULL, 251, &record));
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, storage, 251, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addRecord(NULL, storage, 251, &record));
@@ -537,7 +521,7 @@ static void records_are_added_within_their_limits(void **state)
     assert_int_equal(packet.dataLength, 27 * 9);
 }
 
-static void objects_are_added_within_their_limits(void **state)
+TEST(objects_are_added_within_their_limits)
 {
     static const uint8_t value[] = "value";
     uint8_t storage[246];
@@ -546,7 +530,6 @@ static void objects_are_added_within_their_limits(void **state)
                          .meiType = MBM_MEI_READ_DEVICE_IDENTIFICATION};
     mbm_object object = {.data = value, .length = 5, .id = 0x80};
 
-    (void)state;
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, NULL, 246, &object));
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, storage, 246, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addObject(NULL, storage, 246, &object));
@@ -571,29 +554,4 @@ static void objects_are_added_within_their_limits(void **state)
     assert_int_equal(packet.objectCount, 35);
     REFUSED(MBM_BUFFER_TOO_SMALL, packet,
             mbm_packet_addObject(&packet, storage, sizeof storage, &object));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_archive_is_that_of_the_header),
-        cmocka_unit_test(every_number_has_a_text),
-        cmocka_unit_test(a_request_that_was_refused_here_is_no_exception_of_the_device),
-        cmocka_unit_test(the_longest_frames_fit_into_the_buffers_that_are_named),
-        cmocka_unit_test(a_frame_is_never_built_malformed),
-        cmocka_unit_test(every_null_is_refused),
-        cmocka_unit_test(an_exception_has_the_length_and_the_codes_that_are_named),
-        cmocka_unit_test(a_listen_only_request_has_no_reply),
-        cmocka_unit_test(a_frame_that_does_not_hold_fills_in_what_is_known),
-        cmocka_unit_test(bytes_look_like_tcp_from_the_eighth_on),
-        cmocka_unit_test(the_first_bytes_may_be_none),
-        cmocka_unit_test(the_checksums_of_nothing_are_their_start),
-        cmocka_unit_test(no_text_of_a_frame_is_longer_than_its_comment_says),
-        cmocka_unit_test(the_longest_text_of_an_event_fits_too),
-        cmocka_unit_test(packets_without_records_or_objects_have_none),
-        cmocka_unit_test(records_are_added_within_their_limits),
-        cmocka_unit_test(objects_are_added_within_their_limits),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

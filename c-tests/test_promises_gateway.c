@@ -16,19 +16,18 @@ static const mbm_gatewayRoute routes[] = {{1, 31, 0, 0}, {101, 131, 1, 1}};
 #define READ "\x03\x00\x10\x00\x01"
 #define VALUE "\x03\x02\x12\x34"
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     gateway_bench_start(&b, routes, COUNT(routes));
     OK(mbm_gateway_close(&b.gateway, FREE));
-    return 0;
 }
 
-static void a_place_is_opened_and_closed(void **state)
+fixture each_test = {start, NULL};
+
+TEST(a_place_is_opened_and_closed)
 {
     const mbm_port port = memory_port_of(&b.sockets[FREE]);
 
-    (void)state;
     REFUSED(MBM_NOT_INITIALISED, b, mbm_gateway_status(&b.gateway, FREE));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_status(&b.gateway, BENCH_CONNECTIONS));
     REFUSED(MBM_OK, b, mbm_gateway_close(&b.gateway, FREE)); /* it is free already */
@@ -49,9 +48,8 @@ static void a_place_is_opened_and_closed(void **state)
     IS(MBM_MALFORMED_FRAME, mbm_gateway_status(&b.gateway, FREE));
 }
 
-static void requests_are_counted_until_they_are_answered(void **state)
+TEST(requests_are_counted_until_they_are_answered)
 {
-    (void)state;
     assert_int_equal(mbm_gateway_pollDelay(&b.gateway), UINT32_MAX);
     assert_int_equal(mbm_gateway_isReading(&b.gateway, 0), 1);
     assert_int_equal(mbm_gateway_isReading(&b.gateway, FREE), 0);
@@ -69,12 +67,11 @@ static void requests_are_counted_until_they_are_answered(void **state)
     assert_int_equal(mbm_gateway_isReading(&b.gateway, 0), 1);
 }
 
-static void settings_have_the_defaults_and_ranges_of_the_header(void **state)
+TEST(settings_have_the_defaults_and_ranges_of_the_header)
 {
     static const mbm_function right = {.code = 65}, wrong = {.code = 128};
     static mbm_unit unit;
 
-    (void)state;
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setMaxPending(&b.gateway, 0));
     OK(mbm_gateway_setMaxPending(&b.gateway, 1));
     OK(mbm_gateway_setQueueTime(&b.gateway, 1000000));
@@ -90,14 +87,13 @@ static void settings_have_the_defaults_and_ranges_of_the_header(void **state)
     IS(MBM_NOT_INITIALISED, mbm_gateway_status(&b.gateway, 0));
 }
 
-static void what_was_never_begun_is_refused(void **state)
+TEST(what_was_never_begun_is_refused)
 {
     static mbm_gateway none;
     mbm_gateway *const both[] = {NULL, &none};
     const mbm_port port = memory_port_of(&b.sockets[0]);
     unsigned i;
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_gateway_begin(NULL, &b.config));
     for (i = 0; i < COUNT(both); i++) {
         uint8_t status = both[i] == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
@@ -114,16 +110,4 @@ static void what_was_never_begun_is_refused(void **state)
         assert_int_equal(mbm_gateway_pending(both[i], 0), 0);
         assert_int_equal(mbm_gateway_isReading(both[i], 0), 0);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(a_place_is_opened_and_closed, start),
-        cmocka_unit_test_setup(requests_are_counted_until_they_are_answered, start),
-        cmocka_unit_test_setup(settings_have_the_defaults_and_ranges_of_the_header, start),
-        cmocka_unit_test_setup(what_was_never_begun_is_refused, start),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,9 +18,8 @@ static mbm_node m;
 static uint16_t response[RESPONSE], transmit[TRANSMIT];
 static uint8_t frame[MBM_MAX_FRAME];
 
-static int setup(void **state)
+static void setup(void)
 {
-    (void)state;
     memset(&wire, 0, sizeof wire);
     memset(&line, 0, sizeof line);
     memset(&m, 0, sizeof m);
@@ -30,8 +29,9 @@ static int setup(void **state)
     OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
     OK(mbm_node_begin(&m, &line, 17, response, RESPONSE, transmit, TRANSMIT));
     OK(mbm_node_setBlocking(&m, 0));
-    return 0;
 }
+
+fixture each_test = {setup, NULL};
 
 /* Polls until the request has ended, and lets the time of pollDelay pass. */
 static uint8_t run(void)
@@ -120,7 +120,7 @@ static const struct {
                 {read_of_both, 125},      {write_of_both, 121},      {read_queued, 125},
                 {write_queued, TRANSMIT}, {write_queued_coils, 1968}};
 
-static void a_quantity_and_an_address_have_the_limits_of_the_header(void **state)
+TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
 {
     unsigned i, nth;
 
@@ -140,7 +140,7 @@ static void a_quantity_and_an_address_have_the_limits_of_the_header(void **state
                     {(uint16_t)(65537 - most), most, MBM_ILLEGAL_DATA_ADDRESS}};
 
         for (nth = 0; nth < COUNT(rows); nth++) {
-            setup(state);
+            setup();
             IS(rows[nth].status, requests[i].call(rows[nth].address, rows[nth].quantity));
             if (rows[nth].status == MBM_PENDING) {
                 IS(MBM_RESPONSE_TIMED_OUT, run());
@@ -155,9 +155,8 @@ static void a_quantity_and_an_address_have_the_limits_of_the_header(void **state
     }
 }
 
-static void single_writes_store_their_arguments(void **state)
+TEST(single_writes_store_their_arguments)
 {
-    (void)state;
     IS(MBM_PENDING, mbm_node_writeSingleRegister(&m, 65535, 0x1234));
     assert_int_equal(transmit[0], 0x1234);
     OK(mbm_node_cancel(&m));
@@ -169,9 +168,8 @@ static void single_writes_store_their_arguments(void **state)
     assert_int_equal(wire.sent[4], 0xFF);
 }
 
-static void requests_that_read_are_not_broadcast(void **state)
+TEST(requests_that_read_are_not_broadcast)
 {
-    (void)state;
     OK(mbm_node_setSlaveID(&m, 0));
     IS(MBM_BROADCAST_NOT_ALLOWED, read_coils(0, 1));
     IS(MBM_BROADCAST_NOT_ALLOWED, read_inputs(0, 1));
@@ -188,11 +186,10 @@ static void requests_that_read_are_not_broadcast(void **state)
 
 /* --- words --- */
 
-static void words_end_where_their_buffers_end(void **state)
+TEST(words_end_where_their_buffers_end)
 {
     unsigned i;
 
-    (void)state;
     assert_int_equal(mbm_node_available(&m), 0);
     assert_int_equal(mbm_node_receive(&m), 0xFFFF);
     for (i = 0; i < TRANSMIT; i++)
@@ -206,9 +203,8 @@ static void words_end_where_their_buffers_end(void **state)
     assert_true((transmit[0] & 1) == 1 && transmit[1] == 5);
 }
 
-static void the_words_of_a_read_are_received_once(void **state)
+TEST(the_words_of_a_read_are_received_once)
 {
-    (void)state;
     IS(MBM_PENDING, read_holding(0, 2));
     while (wire.length == 0) {
         IS(MBM_PENDING, mbm_node_poll(&m));
@@ -226,11 +222,10 @@ static void the_words_of_a_read_are_received_once(void **state)
 
 /* --- begin, buffers, views --- */
 
-static void a_begin_is_refused_without_a_change(void **state)
+TEST(a_begin_is_refused_without_a_change)
 {
     mbm_port lacking = port;
 
-    (void)state;
 #define LINE(status, p, f, fs) REFUSED(status, line, mbm_line_beginRtu(&line, p, f, fs))
     LINE(MBM_INVALID_ARGUMENT, NULL, frame, 8);
     LINE(MBM_INVALID_ARGUMENT, &port, NULL, 8);
@@ -260,11 +255,10 @@ static void a_begin_is_refused_without_a_change(void **state)
     IS(MBM_ILLEGAL_DATA_VALUE, write_registers(0, 1));
 }
 
-static void a_line_without_a_frame_makes_no_request(void **state)
+TEST(a_line_without_a_frame_makes_no_request)
 {
     mbm_line other = MBM_INIT;
 
-    (void)state;
     OK(mbm_line_beginRtu(&other, &port, NULL, 0));
     OK(mbm_node_begin(&m, &other, 17, response, RESPONSE, transmit, TRANSMIT));
     IS(MBM_NOT_INITIALISED, mbm_node_readHoldingRegisters(&m, 0, 1));
@@ -283,9 +277,8 @@ static uint8_t read_by_the_stack(uint8_t quantity)
     return run();
 }
 
-static void a_frame_is_used_only_while_a_request_is_under_way(void **state)
+TEST(a_frame_is_used_only_while_a_request_is_under_way)
 {
-    (void)state;
     REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_setFrame(&line, NULL, 8));
     REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_setFrame(&line, NULL, 0));
     REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_setFrame(&line, frame, 7));
@@ -302,13 +295,12 @@ static void a_frame_is_used_only_while_a_request_is_under_way(void **state)
 }
 
 /* A right reply, a wrong one, none, and a request that was cancelled. */
-static void an_ended_request_leaves_its_frame_alone(void **state)
+TEST(an_ended_request_leaves_its_frame_alone)
 {
     static const uint8_t right[] = {3, 2, 0, 7}, wrong[] = {4, 2, 0, 7}, late[] = {3, 2, 0, 8};
     static uint8_t one_frame[MBM_FRAME_BYTES(2)], untouched[sizeof one_frame];
     unsigned nth;
 
-    (void)state;
     for (nth = 0; nth < 4; nth++) {
         OK(mbm_line_setFrame(&line, one_frame, sizeof one_frame));
         IS(MBM_PENDING, read_holding(0, 1));
@@ -337,9 +329,8 @@ static void an_ended_request_leaves_its_frame_alone(void **state)
     }
 }
 
-static void what_begin_keeps_and_drops(void **state)
+TEST(what_begin_keeps_and_drops)
 {
-    (void)state;
     OK(mbm_line_setRetries(&line, 3));
     OK(mbm_node_send(&m, 0x77));
     OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
@@ -355,9 +346,8 @@ static void what_begin_keeps_and_drops(void **state)
     assert_int_equal(wire.length, 4 * 8);
 }
 
-static void a_line_gives_up_the_request_of_any_node(void **state)
+TEST(a_line_gives_up_the_request_of_any_node)
 {
-    (void)state;
     REFUSED(MBM_OK, line, mbm_line_cancel(&line)); /* there is none */
     IS(MBM_PENDING, read_holding(0, 1));
     OK(mbm_line_cancel(&line));
@@ -382,9 +372,8 @@ static uint32_t gap(void)
     return delay;
 }
 
-static void the_gap_is_that_of_the_header(void **state)
+TEST(the_gap_is_that_of_the_header)
 {
-    (void)state;
     assert_int_equal(gap(), 4000);
     OK(mbm_line_setGap(&line, 0xFFFFFFFF));
     assert_int_equal(gap(), 0x80000000);
@@ -414,11 +403,10 @@ static unsigned frames(uint32_t *us)
     return sent;
 }
 
-static void a_master_without_settings_has_the_defaults_of_the_header(void **state)
+TEST(a_master_without_settings_has_the_defaults_of_the_header)
 {
     uint32_t us;
 
-    (void)state;
     assert_int_equal(frames(&us), 1); /* no retries */
     assert_in_range(us, 2000000, 2004100);
     assert_int_equal(frames(&us), 1);
@@ -431,12 +419,11 @@ static void a_master_without_settings_has_the_defaults_of_the_header(void **stat
     assert_in_range(wire.now - us, 100000, 104100); /* gap and turnaround delay */
 }
 
-static void settings_have_the_ranges_of_the_header(void **state)
+TEST(settings_have_the_ranges_of_the_header)
 {
     static mbm_counters counters;
     uint32_t us;
 
-    (void)state;
     OK(mbm_node_setResponseTimeout(&m, 1));
     OK(mbm_line_setRetries(&line, 255));
     assert_int_equal(frames(&us), 256);
@@ -452,9 +439,8 @@ static void settings_have_the_ranges_of_the_header(void **state)
     OK(mbm_line_usedAt(&line, 5));
 }
 
-static void lenient_is_refused_while_a_request_is_under_way(void **state)
+TEST(lenient_is_refused_while_a_request_is_under_way)
 {
-    (void)state;
     IS(MBM_PENDING, read_holding(0, 1));
     REFUSED(MBM_BUSY, m, mbm_node_setLenient(&m, 1));
     REFUSED(MBM_BUSY, m, mbm_node_readHoldingRegisters(&m, 0, 1));
@@ -487,9 +473,8 @@ static uint8_t answered_after(uint32_t ms)
     return run();
 }
 
-static void without_flush_a_timeout_counts_from_when_the_request_is_sent(void **state)
+TEST(without_flush_a_timeout_counts_from_when_the_request_is_sent)
 {
-    (void)state;
     port.flush = NULL;
     OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
     OK(mbm_line_setBaudRate(&line, 1200));
@@ -499,17 +484,15 @@ static void without_flush_a_timeout_counts_from_when_the_request_is_sent(void **
     IS(MBM_RESPONSE_TIMED_OUT, answered_after(4400));
 }
 
-static void a_port_that_knows_when_the_request_is_sent_adds_nothing(void **state)
+TEST(a_port_that_knows_when_the_request_is_sent_adds_nothing)
 {
-    (void)state;
     OK(mbm_line_setBaudRate(&line, 1200));
     OK(answered_after(1990));
     IS(MBM_RESPONSE_TIMED_OUT, answered_after(2010));
 }
 
-static void without_a_baud_rate_nothing_is_added(void **state)
+TEST(without_a_baud_rate_nothing_is_added)
 {
-    (void)state;
     port.flush = NULL;
     OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
     OK(answered_after(1990));
@@ -519,9 +502,8 @@ static void without_a_baud_rate_nothing_is_added(void **state)
     IS(MBM_RESPONSE_TIMED_OUT, answered_after(2010));
 }
 
-static void a_time_that_is_too_long_is_refused_and_not_cut(void **state)
+TEST(a_time_that_is_too_long_is_refused_and_not_cut)
 {
-    (void)state;
     OK(mbm_node_setResponseTimeout(&m, 100000));
     OK(mbm_node_setResponseTimeout(&m, 1000000));
     REFUSED(MBM_INVALID_ARGUMENT, m, mbm_node_setResponseTimeout(&m, 1000001));
@@ -535,33 +517,4 @@ static void a_time_that_is_too_long_is_refused_and_not_cut(void **state)
     IS(MBM_RESPONSE_TIMED_OUT, answered_after(100100));
     OK(mbm_line_setQuietTime(&line, 0));
     OK(answered_after(99900));
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, setup)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_quantity_and_an_address_have_the_limits_of_the_header),
-        TEST(single_writes_store_their_arguments),
-        TEST(requests_that_read_are_not_broadcast),
-        TEST(words_end_where_their_buffers_end),
-        TEST(the_words_of_a_read_are_received_once),
-        TEST(a_begin_is_refused_without_a_change),
-        TEST(a_line_without_a_frame_makes_no_request),
-        TEST(a_frame_is_used_only_while_a_request_is_under_way),
-        TEST(an_ended_request_leaves_its_frame_alone),
-        TEST(what_begin_keeps_and_drops),
-        TEST(a_line_gives_up_the_request_of_any_node),
-        TEST(the_gap_is_that_of_the_header),
-        TEST(a_master_without_settings_has_the_defaults_of_the_header),
-        TEST(settings_have_the_ranges_of_the_header),
-        TEST(lenient_is_refused_while_a_request_is_under_way),
-        TEST(without_flush_a_timeout_counts_from_when_the_request_is_sent),
-        TEST(a_port_that_knows_when_the_request_is_sent_adds_nothing),
-        TEST(without_a_baud_rate_nothing_is_added),
-        TEST(a_time_that_is_too_long_is_refused_and_not_cut),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

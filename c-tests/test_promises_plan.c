@@ -14,11 +14,10 @@ static mbm_plan none;
 
 /* A field of two values, a text of four characters, of every type; its index is
  * that of the type in `types`. */
-static int start(void **state)
+static void start(void)
 {
     uint8_t type;
 
-    (void)state;
     plan_device_begin(&d, 0);
     for (type = MBM_TYPE_BIT; type <= MBM_TYPE_TEXT; type++) {
         uint8_t table = type == MBM_TYPE_BIT ? MBM_TABLE_COILS : MBM_TABLE_HOLDING_REGISTERS;
@@ -28,8 +27,9 @@ static int start(void **state)
     }
     memset(d.registers, 0, sizeof d.registers);
     plan_device_start(&d);
-    return 0;
 }
+
+fixture each_test = {start, NULL};
 
 /* In the order of MBM_TYPE_... */
 static const struct {
@@ -60,11 +60,10 @@ static union {
 
 #define OK_IF(is) ((is) ? MBM_OK : MBM_INVALID_ARGUMENT)
 
-static void each_type_has_its_getters(void **state)
+TEST(each_type_has_its_getters)
 {
     unsigned i;
 
-    (void)state;
     assert_int_equal(COUNT(types), TYPES);
     plan_device_run(&d, 500);
     for (i = 0; i < COUNT(types); i++) {
@@ -112,20 +111,18 @@ static void every_call_returns(uint8_t status, mbm_plan *plan, uint16_t field)
     REFUSED(status, read, mbm_plan_getRead(plan, field, &read));
 }
 
-static void a_field_that_does_not_exist_is_refused(void **state)
+TEST(a_field_that_does_not_exist_is_refused)
 {
-    (void)state;
     plan_device_run(&d, 500);
     every_call_returns(MBM_INVALID_ARGUMENT, &d.plan, TYPES);
     every_call_returns(MBM_INVALID_ARGUMENT, &d.plan, 0xFFFF);
     IS(MBM_INVALID_ARGUMENT, mbm_plan_getRead(&d.plan, 0, NULL));
 }
 
-static void what_was_never_begun_is_refused(void **state)
+TEST(what_was_never_begun_is_refused)
 {
     static const uint16_t count = 1;
 
-    (void)state;
     every_call_returns(MBM_INVALID_ARGUMENT, NULL, 0);
     every_call_returns(MBM_NOT_INITIALISED, &none, 0);
     IS(MBM_INVALID_ARGUMENT, mbm_plan_poll(NULL));
@@ -146,12 +143,11 @@ static void what_was_never_begun_is_refused(void **state)
 #undef GROUPED
 }
 
-static void a_value_is_pending_before_the_first_reply_and_ages_after_it(void **state)
+TEST(a_value_is_pending_before_the_first_reply_and_ages_after_it)
 {
     mbm_planReadInfo read;
     uint32_t age = 0;
 
-    (void)state;
     IS(MBM_PENDING, mbm_plan_getStatus(&d.plan, UINT16_FIELD, &age));
     assert_int_equal(age, UINT32_MAX);
     GETS(MBM_PENDING, mbm_plan_getInteger(&d.plan, UINT16_FIELD, 0, &value.integer));
@@ -163,16 +159,4 @@ static void a_value_is_pending_before_the_first_reply_and_ages_after_it(void **s
     assert_in_range(age, 0, 500);
     OK(mbm_plan_end(&d.plan));
     IS(MBM_NOT_INITIALISED, mbm_plan_getStatus(&d.plan, 0, &age));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(each_type_has_its_getters, start),
-        cmocka_unit_test_setup(a_field_that_does_not_exist_is_refused, start),
-        cmocka_unit_test_setup(what_was_never_begun_is_refused, start),
-        cmocka_unit_test_setup(a_value_is_pending_before_the_first_reply_and_ages_after_it, start),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

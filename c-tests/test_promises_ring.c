@@ -9,20 +9,19 @@
 static mbm_ring ring;
 static uint8_t storage[65535];
 
-static int setup(void **state)
+static void setup(void)
 {
-    (void)state;
     memset(&ring, 0, sizeof ring);
-    return 0;
 }
 
-static void a_ring_that_was_never_begun_is_empty_and_takes_nothing(void **state)
+fixture each_test = {setup, NULL};
+
+TEST(a_ring_that_was_never_begun_is_empty_and_takes_nothing)
 {
     uint8_t bytes[4] = {1, 2, 3, 4};
     mbm_ring *rings[] = {&ring, NULL};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(rings); i++) {
         assert_int_equal(mbm_ring_put(rings[i], 1), 0);
         assert_int_equal(mbm_ring_write(rings[i], bytes, 4), 0);
@@ -33,9 +32,8 @@ static void a_ring_that_was_never_begun_is_empty_and_takes_nothing(void **state)
     assert_int_equal(bytes[0], 1);
 }
 
-static void a_refused_begin_changes_nothing(void **state)
+TEST(a_refused_begin_changes_nothing)
 {
-    (void)state;
     OK(mbm_ring_begin(&ring, storage, 8));
     mbm_ring_put(&ring, 5);
     REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, NULL, 8));
@@ -45,13 +43,12 @@ static void a_refused_begin_changes_nothing(void **state)
     assert_int_equal(mbm_ring_available(&ring), 1);
 }
 
-static void a_ring_holds_one_byte_less_than_its_storage(void **state)
+TEST(a_ring_holds_one_byte_less_than_its_storage)
 {
     static const uint16_t sizes[] = {2, 3, 255, 256, 257, 65535};
     static uint8_t bytes[65535], back[65535];
     unsigned i, at;
 
-    (void)state;
     for (at = 0; at < sizeof bytes; at++)
         bytes[at] = (uint8_t)(7 * at);
     for (i = 0; i < COUNT(sizes); i++) {
@@ -73,9 +70,8 @@ static void a_ring_holds_one_byte_less_than_its_storage(void **state)
     }
 }
 
-static void no_bytes_may_be_null(void **state)
+TEST(no_bytes_may_be_null)
 {
-    (void)state;
     OK(mbm_ring_begin(&ring, storage, 4));
     assert_int_equal(mbm_ring_write(&ring, NULL, 0), 0);
     mbm_ring_put(&ring, 1);
@@ -84,11 +80,10 @@ static void no_bytes_may_be_null(void **state)
     assert_int_equal(mbm_ring_lost(&ring), 0);
 }
 
-static void a_ring_that_was_read_empty_goes_on_counting(void **state)
+TEST(a_ring_that_was_read_empty_goes_on_counting)
 {
     uint8_t byte = 0;
 
-    (void)state;
     OK(mbm_ring_begin(&ring, storage, 2));
     mbm_ring_put(&ring, 1);
     mbm_ring_put(&ring, 2);
@@ -103,11 +98,10 @@ static void a_ring_that_was_read_empty_goes_on_counting(void **state)
     assert_int_equal(mbm_ring_lost(&ring), 0);
 }
 
-static void the_count_of_lost_bytes_wraps_at_65536(void **state)
+TEST(the_count_of_lost_bytes_wraps_at_65536)
 {
     unsigned i;
 
-    (void)state;
     OK(mbm_ring_begin(&ring, storage, 2));
     mbm_ring_put(&ring, 1);
     for (i = 0; i < 65535; i++)
@@ -115,20 +109,4 @@ static void the_count_of_lost_bytes_wraps_at_65536(void **state)
     assert_int_equal(mbm_ring_lost(&ring), 65535);
     mbm_ring_put(&ring, 2);
     assert_int_equal(mbm_ring_lost(&ring), 0);
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, setup)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_ring_that_was_never_begun_is_empty_and_takes_nothing),
-        TEST(a_refused_begin_changes_nothing),
-        TEST(a_ring_holds_one_byte_less_than_its_storage),
-        TEST(no_bytes_may_be_null),
-        TEST(a_ring_that_was_read_empty_goes_on_counting),
-        TEST(the_count_of_lost_bytes_wraps_at_65536),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,9 +17,8 @@ static mbm_bitTable bit_table;
 static uint16_t words[4];
 static uint8_t frame[MBM_MAX_ASCII_FRAME], bits[1];
 
-static int setup(void **state)
+static void setup(void)
 {
-    (void)state;
     memset(&wire, 0, sizeof wire);
     memset(&server, 0, sizeof server);
     memset(&unit, 0, sizeof unit);
@@ -32,8 +31,9 @@ static int setup(void **state)
     bit_table.bits = bits;
     bit_table.size = 8;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
-    return 0;
 }
+
+fixture each_test = {setup, NULL};
 
 typedef uint8_t (*begins_server)(mbm_server *server, const mbm_port *port, mbm_unit *units,
                                  uint8_t count, uint8_t *frame, uint16_t bytes);
@@ -51,7 +51,7 @@ static const struct {
 
 /* --- servers --- */
 
-static void a_begin_is_refused_without_a_change(void **state)
+TEST(a_begin_is_refused_without_a_change)
 {
     unsigned i;
 
@@ -60,7 +60,7 @@ static void a_begin_is_refused_without_a_change(void **state)
         uint16_t least = begins[i].least;
         mbm_port lacking;
 
-        setup(state);
+        setup();
         OK(begin(&server, &port, &unit, 1, frame, least));
         IS(MBM_INVALID_ARGUMENT, begin(NULL, &port, &unit, 1, frame, least));
         REFUSED(MBM_INVALID_ARGUMENT, server, begin(&server, NULL, &unit, 1, frame, least));
@@ -89,13 +89,13 @@ static uint32_t silence(void)
     return mbm_server_pollDelay(&server);
 }
 
-static void a_begin_restores_the_defaults_of_its_framing(void **state)
+TEST(a_begin_restores_the_defaults_of_its_framing)
 {
     unsigned i, first;
 
     for (first = 0; first < COUNT(begins); first++) {
         for (i = 0; i < COUNT(begins); i++) {
-            setup(state);
+            setup();
             OK(begins[first].begin(&server, &port, &unit, 1, frame, 300));
             OK(mbm_server_setSilence(&server, 77));
             OK(mbm_server_setReceiveLatency(&server, 7));
@@ -108,9 +108,8 @@ static void a_begin_restores_the_defaults_of_its_framing(void **state)
     }
 }
 
-static void a_server_that_was_never_begun_does_nothing(void **state)
+TEST(a_server_that_was_never_begun_does_nothing)
 {
-    (void)state;
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_poll(&server));
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setSilence(&server, 1));
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setReceiveLatency(&server, 1));
@@ -125,12 +124,12 @@ static void a_server_that_was_never_begun_does_nothing(void **state)
     assert_int_equal(mbm_server_pollDelay(NULL), 0xFFFFFFFF);
 }
 
-static void settings_of_rtu_are_refused_in_other_framings(void **state)
+TEST(settings_of_rtu_are_refused_in_other_framings)
 {
     unsigned i;
 
     for (i = 0; i < COUNT(begins); i++) {
-        setup(state);
+        setup();
         OK(begins[i].begin(&server, &port, &unit, 1, frame, 300));
         if (begins[i].is_rtu) {
             OK(mbm_server_setBaudRate(&server, 9600));
@@ -153,11 +152,10 @@ static void settings_of_rtu_are_refused_in_other_framings(void **state)
     }
 }
 
-static void a_poll_reports_what_its_comment_says(void **state)
+TEST(a_poll_reports_what_its_comment_says)
 {
     static const uint8_t no_tcp[8] = {1, 2, 3, 4, 5, 6, 7, 8};
 
-    (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, 256));
     assert_int_equal(mbm_server_pollDelay(&server), 0);
     OK(mbm_server_poll(&server));
@@ -179,7 +177,7 @@ static void a_poll_reports_what_its_comment_says(void **state)
 
 /* --- units --- */
 
-static void records_are_refused_without_a_change(void **state)
+TEST(records_are_refused_without_a_change)
 {
     static mbm_dataCallbacks cells;
     static mbm_custom custom;
@@ -193,7 +191,6 @@ static void records_are_refused_without_a_change(void **state)
     static mbm_registerTable other_table;
     unsigned code;
 
-    (void)state;
 #define NULLS(function, record)                                                                    \
     do {                                                                                           \
         REFUSED(MBM_INVALID_ARGUMENT, unit, function(&unit, NULL));                                \
@@ -241,13 +238,12 @@ static void records_are_refused_without_a_change(void **state)
     REFUSED(MBM_BUSY, unit, mbm_unit_serveDiagnostics(&unit, &other));
 }
 
-static void hooks_are_set_and_removed(void **state)
+TEST(hooks_are_set_and_removed)
 {
     static const mbm_accessHooks hooks;
     static mbm_dataCallbacks cells;
     static mbm_files files;
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_registerTable_setHooks(NULL, &hooks));
     IS(MBM_INVALID_ARGUMENT, mbm_bitTable_setHooks(NULL, &hooks));
     IS(MBM_INVALID_ARGUMENT, mbm_dataCallbacks_setHooks(NULL, &hooks));
@@ -265,12 +261,11 @@ static void hooks_are_set_and_removed(void **state)
 
 static mbm_fifos spare[MBM_MAX_SERVICES + 1];
 
-static void a_unit_has_as_many_records_as_the_header_says(void **state)
+TEST(a_unit_has_as_many_records_as_the_header_says)
 {
     static mbm_functionMask mask;
     unsigned i;
 
-    (void)state;
     /* One of them is the table of `setup`. */
     for (i = 1; i < MBM_MAX_SERVICES; i++)
         OK(mbm_unit_serveFifos(&unit, &spare[i]));
@@ -279,14 +274,13 @@ static void a_unit_has_as_many_records_as_the_header_says(void **state)
     REFUSED(MBM_BUFFER_TOO_SMALL, unit, mbm_unit_switchFunction(&unit, &mask, 3, 0));
 }
 
-static void a_function_that_is_off_is_illegal(void **state)
+TEST(a_function_that_is_off_is_illegal)
 {
     static mbm_functionMask mask;
     uint8_t request[260] = {17, 3, 0, 0, 0, 1};
     uint16_t response;
     unsigned round;
 
-    (void)state;
     memset(&mask, 0, sizeof mask);
     for (round = 0; round < 3; round++) {
         memcpy(request, "\x11\x03\0\0\0\1", 6);
@@ -300,7 +294,7 @@ static void a_function_that_is_off_is_illegal(void **state)
     }
 }
 
-static void a_response_has_no_bytes_where_no_device_answers(void **state)
+TEST(a_response_has_no_bytes_where_no_device_answers)
 {
     static const struct {
         uint8_t unit, damage;
@@ -309,7 +303,6 @@ static void a_response_has_no_bytes_where_no_device_answers(void **state)
     uint16_t response;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++) {
         memcpy(request, "\x11\x03\0\0\0\1", 6);
         request[0] = rows[i].unit;
@@ -332,24 +325,4 @@ static void a_response_has_no_bytes_where_no_device_answers(void **state)
     NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, FRAMING(0), request, 261, 260, &response));
     NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, FRAMING(9), request, 8, 260, &response));
     IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), request, 8, 260, NULL));
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, setup)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_begin_is_refused_without_a_change),
-        TEST(a_begin_restores_the_defaults_of_its_framing),
-        TEST(a_server_that_was_never_begun_does_nothing),
-        TEST(settings_of_rtu_are_refused_in_other_framings),
-        TEST(a_poll_reports_what_its_comment_says),
-        TEST(records_are_refused_without_a_change),
-        TEST(hooks_are_set_and_removed),
-        TEST(a_unit_has_as_many_records_as_the_header_says),
-        TEST(a_function_that_is_off_is_illegal),
-        TEST(a_response_has_no_bytes_where_no_device_answers),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

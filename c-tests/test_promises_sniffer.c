@@ -14,17 +14,17 @@ static hooked_port wire;
 static mbm_port port;
 static uint8_t buffer[2 * MBM_MAX_ASCII_FRAME];
 
-static int setup(void **state)
+static void setup(void)
 {
-    (void)state;
     memset(&s, 0, sizeof s);
     memset(&never, 0, sizeof never);
     memset(&t, 0, sizeof t);
     memset(&no_trace, 0, sizeof no_trace);
     memset(&wire, 0, sizeof wire);
     port = hooked_port_of(&wire);
-    return 0;
 }
+
+fixture each_test = {setup, NULL};
 
 /* --- sniffer --- */
 
@@ -73,12 +73,12 @@ static uint32_t frame_timeout(uint8_t framing)
     return event_after(framing, 4, MBM_EVENT_BAD_CRC, MBM_EVENT_NOISE);
 }
 
-static void a_sniffer_begins_in_every_framing_or_changes_nothing(void **state)
+TEST(a_sniffer_begins_in_every_framing_or_changes_nothing)
 {
     unsigned i;
 
     for (i = 0; i < COUNT(sniffers); i++) {
-        setup(state);
+        setup();
         OK(mbm_sniffer_begin(&s, sniffers[i].kind, buffer, MBM_MIN_SNIFFER_BUFFER));
         IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(NULL, sniffers[i].kind, buffer, 300));
         REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_begin(&s, sniffers[i].kind, NULL, 300));
@@ -99,13 +99,12 @@ static void a_sniffer_begins_in_every_framing_or_changes_nothing(void **state)
     }
 }
 
-static void times_and_declarations_of_a_sniffer_have_limits(void **state)
+TEST(times_and_declarations_of_a_sniffer_have_limits)
 {
     static const mbm_function wrong = {.code = 200};
     mbm_function right[MBM_MAX_SNIFFER_FUNCTIONS + 1];
     unsigned i;
 
-    (void)state;
     memset(right, 0, sizeof right);
     for (i = 0; i < COUNT(right); i++)
         right[i].code = (uint8_t)(65 + i);
@@ -136,13 +135,12 @@ static void times_and_declarations_of_a_sniffer_have_limits(void **state)
     }
 }
 
-static void a_sniffer_that_was_never_begun_reports_nothing(void **state)
+TEST(a_sniffer_that_was_never_begun_reports_nothing)
 {
     mbm_sniffer *const both[] = {NULL, &never};
     mbm_event event;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(both); i++) {
         uint8_t status = both[i] == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
 
@@ -187,7 +185,7 @@ static uint32_t trace_timeout(void)
     return ms - 1;
 }
 
-static void a_trace_begins_or_changes_nothing(void **state)
+TEST(a_trace_begins_or_changes_nothing)
 {
     static const uint8_t kinds[] = {MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
     static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = MBM_FRAMING_NONE};
@@ -197,7 +195,7 @@ static void a_trace_begins_or_changes_nothing(void **state)
     for (i = 0; i < COUNT(kinds); i++) {
         const uint8_t kind = kinds[i];
 
-        setup(state);
+        setup();
         OK(mbm_trace_begin(&t, kind, &port, &rtu, buffer, MBM_MIN_TRACE_BUFFER, hook, NULL));
         IS(MBM_INVALID_ARGUMENT, mbm_trace_begin(NULL, kind, &port, &rtu, buffer, 600, hook, NULL));
         REFUSED(MBM_INVALID_ARGUMENT, t,
@@ -233,14 +231,13 @@ static void a_trace_begins_or_changes_nothing(void **state)
     }
 }
 
-static void a_trace_that_was_never_begun_has_no_port(void **state)
+TEST(a_trace_that_was_never_begun_has_no_port)
 {
     mbm_trace *const both[] = {NULL, &no_trace};
     mbm_traceRecord record;
     mbm_event event;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(both); i++) {
         uint8_t status = both[i] == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
 
@@ -254,19 +251,4 @@ static void a_trace_that_was_never_begun_has_no_port(void **state)
     REFUSED(MBM_INVALID_ARGUMENT, record, mbm_trace_ofEvent(&event, &record));
     REFUSED(MBM_INVALID_ARGUMENT, record, mbm_trace_ofEvent(NULL, &record));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_ofEvent(&event, NULL));
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, setup)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_sniffer_begins_in_every_framing_or_changes_nothing),
-        TEST(times_and_declarations_of_a_sniffer_have_limits),
-        TEST(a_sniffer_that_was_never_begun_reports_nothing),
-        TEST(a_trace_begins_or_changes_nothing),
-        TEST(a_trace_that_was_never_begun_has_no_port),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

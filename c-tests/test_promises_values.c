@@ -22,16 +22,17 @@ static union {
     char text[16];
 } value;
 
-static int setup(void **state)
+static void setup(void)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(0x4142 + 0x0202 * i);
     memset(&value, VALUE, sizeof value);
-    return mbm_registers_intoWords(&r, words, WORDS, FIRST);
+    OK(mbm_registers_intoWords(&r, words, WORDS, FIRST));
 }
+
+fixture each_test = {setup, NULL};
 
 /* A function that gets or sets a value of `registers` registers, at an address, in an order. */
 typedef struct accessor {
@@ -95,7 +96,7 @@ static const accessor accessors[] = {
         assert_memory_equal(&view, &r, sizeof r);                                                  \
     } while (0)
 
-static void values_end_where_the_registers_end(void **state)
+TEST(values_end_where_the_registers_end)
 {
     unsigned i;
 
@@ -103,7 +104,7 @@ static void values_end_where_the_registers_end(void **state)
         const accessor *a = &accessors[i];
         uint16_t last = (uint16_t)(FIRST + WORDS - a->registers);
 
-        setup(state);
+        setup();
         OK(a->call(&r, FIRST, 0));
         OK(a->call(&r, last, 0));
         NOTHING(MBM_ILLEGAL_DATA_ADDRESS, a->call(&r, (uint16_t)(last + 1), 0));
@@ -114,14 +115,14 @@ static void values_end_where_the_registers_end(void **state)
     }
 }
 
-static void null_and_views_without_data_are_refused(void **state)
+TEST(null_and_views_without_data_are_refused)
 {
     unsigned i;
 
     for (i = 0; i < COUNT(accessors); i++) {
         const accessor *a = &accessors[i];
 
-        setup(state);
+        setup();
         NOTHING(MBM_INVALID_ARGUMENT, a->call(NULL, FIRST, 0));
         NOTHING(MBM_INVALID_ARGUMENT, a->null(&r));
         r.data = NULL;
@@ -129,7 +130,7 @@ static void null_and_views_without_data_are_refused(void **state)
     }
 }
 
-static void only_the_orders_and_kinds_of_the_header_are_accepted(void **state)
+TEST(only_the_orders_and_kinds_of_the_header_are_accepted)
 {
     unsigned i, order, kind;
 
@@ -137,12 +138,12 @@ static void only_the_orders_and_kinds_of_the_header_are_accepted(void **state)
         const accessor *a = &accessors[i];
 
         for (order = 0; order < 256; order++) {
-            setup(state);
+            setup();
             if (order <= MBM_ORDER_DCBA)
                 OK(a->call(&r, FIRST, (uint8_t)order));
             else if (a->has_order)
                 NOTHING(MBM_INVALID_ARGUMENT, a->call(&r, FIRST, (uint8_t)order));
-            setup(state);
+            setup();
             r.order = (uint8_t)order;
             if (order <= MBM_ORDER_DCBA)
                 OK(a->call(&r, FIRST, 0));
@@ -150,7 +151,7 @@ static void only_the_orders_and_kinds_of_the_header_are_accepted(void **state)
                 NOTHING(MBM_INVALID_ARGUMENT, a->call(&r, FIRST, 0));
         }
         for (kind = 0; kind < 256; kind++) {
-            setup(state);
+            setup();
             r.kind = (uint8_t)kind;
             if (kind == MBM_REGISTERS_INTO_WORDS || kind == MBM_REGISTERS_INTO_BYTES ||
                 (!a->sets && (kind == MBM_REGISTERS_OF_WORDS || kind == MBM_REGISTERS_OF_BYTES)))
@@ -161,12 +162,11 @@ static void only_the_orders_and_kinds_of_the_header_are_accepted(void **state)
     }
 }
 
-static void a_register_has_sixteen_bits_and_two_bytes(void **state)
+TEST(a_register_has_sixteen_bits_and_two_bytes)
 {
     unsigned bit;
     uint8_t on;
 
-    (void)state;
     for (bit = 0; bit < 256; bit++) {
         if (bit < 16) {
             words[1] = (uint16_t) ~(1u << bit);
@@ -191,9 +191,8 @@ static void a_register_has_sixteen_bits_and_two_bytes(void **state)
     assert_int_equal(on, 0x22);
 }
 
-static void a_text_ends_at_its_nul_or_with_its_field(void **state)
+TEST(a_text_ends_at_its_nul_or_with_its_field)
 {
-    (void)state;
     OK(mbm_registers_getString(&r, FIRST, 5, 0, value.text, 6));
     assert_string_equal(value.text, "ABCDE");
     NOTHING(MBM_BUFFER_TOO_SMALL, mbm_registers_getString(&r, FIRST, 5, 0, value.text, 5));
@@ -210,11 +209,10 @@ static void a_text_ends_at_its_nul_or_with_its_field(void **state)
     assert_string_equal(value.text, "ab");
 }
 
-static void an_odd_number_of_bytes_leaves_the_other_byte(void **state)
+TEST(an_odd_number_of_bytes_leaves_the_other_byte)
 {
     static const uint8_t three[] = {1, 2, 3};
 
-    (void)state;
     words[1] = 0xAAAA;
     OK(mbm_registers_setBytes(&r, FIRST, 0, three, 3));
     assert_int_equal(words[0], 0x0102);
@@ -223,9 +221,8 @@ static void an_odd_number_of_bytes_leaves_the_other_byte(void **state)
 
 /* --- views --- */
 
-static void data_of_no_length_may_be_null(void **state)
+TEST(data_of_no_length_may_be_null)
 {
-    (void)state;
     OK(mbm_registers_getBytes(&r, FIRST, 0, NULL, 0));
     OK(mbm_registers_setBytes(&r, FIRST, 0, NULL, 0));
 #define EMPTY(view)                                                                                \
@@ -242,11 +239,10 @@ static void data_of_no_length_may_be_null(void **state)
     OK(mbm_bits_unpack(NULL, 0, NULL, 0));
 }
 
-static void a_view_ends_at_address_65535(void **state)
+TEST(a_view_ends_at_address_65535)
 {
     static uint8_t bytes[4];
 
-    (void)state;
 #define VIEW(status, call)                                                                         \
     do {                                                                                           \
         memset(&r, 0x77, sizeof r);                                                                \
@@ -277,12 +273,11 @@ static void a_view_ends_at_address_65535(void **state)
 
 /* --- bits --- */
 
-static void bits_are_packed_from_the_lowest_on(void **state)
+TEST(bits_are_packed_from_the_lowest_on)
 {
     static const uint8_t coils[] = {1, 0, 200, 0, 0, 0, 0, 0, 0, 1};
     uint8_t bytes[3] = {0xEE, 0xEE, 0xEE}, back[10];
 
-    (void)state;
     REFUSED(MBM_BUFFER_TOO_SMALL, bytes, mbm_bits_pack(coils, 10, bytes, 1));
     REFUSED(MBM_INVALID_ARGUMENT, bytes, mbm_bits_pack(NULL, 10, bytes, 3));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_pack(coils, 10, NULL, 3));
@@ -296,12 +291,11 @@ static void bits_are_packed_from_the_lowest_on(void **state)
     assert_true(back[0] == 1 && back[1] == 0 && back[2] == 1 && back[9] == 1);
 }
 
-static void a_bit_is_found_by_its_address(void **state)
+TEST(a_bit_is_found_by_its_address)
 {
     uint8_t bytes[2] = {0, 0}, on = 7;
     uint16_t wide[1] = {0};
 
-    (void)state;
     OK(mbm_bits_set(bytes, 65526, 10, 65535, 3));
     assert_true(bytes[0] == 0 && bytes[1] == 2);
     OK(mbm_bits_isSet(bytes, 65526, 10, 65535, &on));
@@ -327,24 +321,4 @@ static void a_bit_is_found_by_its_address(void **state)
     REFUSED(MBM_INVALID_ARGUMENT, on, mbm_bits_isSetInWords(NULL, 10, 10, 10, &on));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_isSet(bytes, 10, 10, 10, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_bits_isSetInWords(wide, 10, 10, 10, NULL));
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, setup)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(values_end_where_the_registers_end),
-        TEST(null_and_views_without_data_are_refused),
-        TEST(only_the_orders_and_kinds_of_the_header_are_accepted),
-        TEST(a_register_has_sixteen_bits_and_two_bytes),
-        TEST(a_text_ends_at_its_nul_or_with_its_field),
-        TEST(an_odd_number_of_bytes_leaves_the_other_byte),
-        TEST(data_of_no_length_may_be_null),
-        TEST(a_view_ends_at_address_65535),
-        TEST(bits_are_packed_from_the_lowest_on),
-        TEST(a_bit_is_found_by_its_address),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

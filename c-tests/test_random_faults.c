@@ -18,6 +18,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+fixture each_test = {sim_setup, sim_teardown};
+
 enum { TIMEOUT_MS = 50, LEDGER = 64 };
 
 /* What may happen to a reply or to the request. */
@@ -365,22 +367,12 @@ static unsigned run_faults(sim *s, unsigned retries)
     return r->failed;
 }
 
-static void no_fault_makes_a_call_return_wrong_data(void **state)
+TEST(no_fault_makes_a_call_return_wrong_data)
 {
-    assert_true(run_faults((sim *)*state, 0) < transactions() / 2);
+    assert_true(run_faults(sim_of_test(), 0) < transactions() / 2);
 }
 
-static void with_two_retries_far_fewer_calls_fail(void **state)
+TEST(with_two_retries_far_fewer_calls_fail)
 {
-    assert_true(run_faults((sim *)*state, 2) < transactions() / 10);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        SIM_TEST(no_fault_makes_a_call_return_wrong_data),
-        SIM_TEST(with_two_retries_far_fewer_calls_fail),
-    };
-
-    return cmocka_run_group_tests_name("random faults", tests, NULL, NULL);
+    assert_true(run_faults(sim_of_test(), 2) < transactions() / 10);
 }

@@ -17,9 +17,8 @@ static mbm_node master;
 static mbm_server server;
 static mbm_unit unit;
 
-static int reset(void **state)
+static void reset(void)
 {
-    (void)state;
     memset(&wire, 0, sizeof wire);
     memset(&line, 0, sizeof line);
     memset(&master, 0, sizeof master);
@@ -29,8 +28,9 @@ static int reset(void **state)
     wire.step = 500;
     port = hooked_port_of(&wire);
     entered = 0;
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 /* --- master --- */
 
@@ -119,11 +119,10 @@ static void begin_master(void)
     is_pending = 0;
 }
 
-static void no_hook_of_a_masters_port_may_call_the_master(void **state)
+TEST(no_hook_of_a_masters_port_may_call_the_master)
 {
     int i;
 
-    (void)state;
     begin_master();
     is_pending = 1;
     OK(mbm_node_readHoldingRegisters(&master, 0, 1));
@@ -178,12 +177,11 @@ static void within_idle(int hook)
     }
 }
 
-static void an_idle_hook_may_call_its_master(void **state)
+TEST(an_idle_hook_may_call_its_master)
 {
     static const uint8_t ends[] = {MBM_OK, MBM_OK, MBM_CANCELLED, MBM_CANCELLED,
                                    MBM_NOT_INITIALISED};
 
-    (void)state;
     for (idle_does = 0; idle_does < (int)sizeof ends; idle_does++) {
         begin_master();
         entered = 0;
@@ -342,7 +340,7 @@ static size_t exchange(const char *pdu, size_t length)
 
 #define ASK(pdu) exchange(pdu, sizeof pdu - 1)
 
-static void no_hook_of_a_server_may_call_the_server(void **state)
+TEST(no_hook_of_a_server_may_call_the_server)
 {
     static const struct {
         const char *pdu;
@@ -362,7 +360,6 @@ static void no_hook_of_a_server_may_call_the_server(void **state)
     };
     unsigned i;
 
-    (void)state;
     serve_all();
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, small_frame, 256));
     wire.within = within_server;
@@ -394,11 +391,10 @@ static void start_over(void *context, uint8_t clears)
         OK(mbm_server_beginTcp(&server, &port, &unit, 1, other_frame, 260));
 }
 
-static void a_server_that_its_hook_zeroes_is_not_accessed_again(void **state)
+TEST(a_server_that_its_hook_zeroes_is_not_accessed_again)
 {
     static const mbm_server zero;
 
-    (void)state;
     for (begins_anew = 0; begins_anew < 2; begins_anew++) {
         unsigned i;
 
@@ -423,18 +419,4 @@ static void a_server_that_its_hook_zeroes_is_not_accessed_again(void **state)
         }
         memset(&server, 0, sizeof server);
     }
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(no_hook_of_a_masters_port_may_call_the_master),
-        TEST(an_idle_hook_may_call_its_master),
-        TEST(no_hook_of_a_server_may_call_the_server),
-        TEST(a_server_that_its_hook_zeroes_is_not_accessed_again),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,9 +16,8 @@ static mbm_client client;
 static mbm_clientRequest request, another;
 static mbm_identification identification;
 
-static int reset(void **state)
+static void reset(void)
 {
-    (void)state;
     memset(&wire, 0, sizeof wire);
     memset(&client, 0, sizeof client);
     memset(&request, 0, sizeof request);
@@ -28,8 +27,9 @@ static int reset(void **state)
     wire.step = 500;
     port = hooked_port_of(&wire);
     entered = 0;
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 static uint32_t random_number(void *context)
 {
@@ -178,11 +178,10 @@ static void poll_until_all_have_ended(void)
     assert_int_equal(mbm_client_pending(&client), 0);
 }
 
-static void no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client(void **state)
+TEST(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client)
 {
     int framing;
 
-    (void)state;
     for (framing = 0; framing < 4; framing++) {
         wire.within = framing == 2 ? NULL : within_client; /* the begin of TCP calls no hook */
         begin_client(framing);
@@ -267,9 +266,8 @@ static void done(void *context, mbm_clientRequest *ended)
     }
 }
 
-static void a_done_function_may_call_its_client(void **state)
+TEST(a_done_function_may_call_its_client)
 {
-    (void)state;
     for (framing_of_done = 0; framing_of_done < 4; framing_of_done++) {
         for (done_does = 0; done_does < 5; done_does++) {
             static mbm_clientRequest waits;
@@ -296,11 +294,10 @@ static void a_done_function_may_call_its_client(void **state)
     }
 }
 
-static void the_clock_may_not_call_the_client_that_gives_its_port_to_a_line(void **state)
+TEST(the_clock_may_not_call_the_client_that_gives_its_port_to_a_line)
 {
     static mbm_line line;
 
-    (void)state;
     memset(&line, 0, sizeof line);
     begin_client(0);
     request.unit = 17;
@@ -310,17 +307,4 @@ static void the_clock_may_not_call_the_client_that_gives_its_port_to_a_line(void
     wire.within = NULL;
     assert_int_equal(entered, 1);
     OK(mbm_client_resume(&client, &line));
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client),
-        TEST(a_done_function_may_call_its_client),
-        TEST(the_clock_may_not_call_the_client_that_gives_its_port_to_a_line),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

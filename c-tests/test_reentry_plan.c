@@ -103,9 +103,8 @@ static void update(void *context, mbm_plan *of, uint16_t field)
 
 static const uint8_t reply[] = {3, 6, 0x12, 0x34, 'a', 'b', 'c', 'd'};
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     memset(&wire, 0, sizeof wire);
     memset(&client, 0, sizeof client);
     memset(&own, 0, sizeof own);
@@ -127,8 +126,9 @@ static int begin(void **state)
     wire.step = 500;
     port = hooked_port_of(&wire);
     OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
-    return 0;
 }
+
+fixture each_test = {begin, NULL};
 
 /* Polls until the plan's request has ended. */
 static void run(void)
@@ -145,9 +145,8 @@ static void run(void)
     OK(requests[0].status);
 }
 
-static void no_hook_of_the_clients_port_may_change_the_plan(void **state)
+TEST(no_hook_of_the_clients_port_may_change_the_plan)
 {
-    (void)state;
     OK(mbm_plan_begin(&plan, &client, &setup, NULL));
     run();
     assert_true(entered > 3);
@@ -164,9 +163,8 @@ static void no_hook_of_the_clients_port_may_change_the_plan(void **state)
     OK(mbm_plan_end(&plan));
 }
 
-static void update_may_call_every_function(void **state)
+TEST(update_may_call_every_function)
 {
-    (void)state;
     setup.update = update;
     OK(mbm_plan_begin(&plan, &client, &setup, NULL));
     run();
@@ -190,11 +188,10 @@ static void done(void *context, mbm_clientRequest *ended)
     OK(mbm_plan_begin(&plan, &client, &setup, NULL));
 }
 
-static void done_of_another_request_may_call_every_function(void **state)
+TEST(done_of_another_request_may_call_every_function)
 {
     unsigned calls = 0, i;
 
-    (void)state;
     OK(mbm_client_setResponseTimeout(&client, 20));
     OK(mbm_plan_begin(&plan, &client, &setup, NULL));
     own.unit = 3;
@@ -206,15 +203,4 @@ static void done_of_another_request_may_call_every_function(void **state)
     assert_int_equal(calls, 1);
     IS(MBM_RESPONSE_TIMED_OUT, own.status);
     OK(mbm_plan_end(&plan));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(no_hook_of_the_clients_port_may_change_the_plan, begin),
-        cmocka_unit_test_setup(update_may_call_every_function, begin),
-        cmocka_unit_test_setup(done_of_another_request_may_call_every_function, begin),
-    };
-
-    return cmocka_run_group_tests_name("reentry_plan", tests, NULL, NULL);
 }

@@ -9,6 +9,8 @@
 #include "refused.h"
 #include "refused_wire.h"
 
+fixture each_test = {reset, NULL};
+
 /* --- server --- */
 
 static mbm_server server;
@@ -67,12 +69,11 @@ static void poll_for_a_while(void)
         OK(mbm_server_poll(&server));
 }
 
-static void a_server_goes_on_after_a_refused_begin(void **state)
+TEST(a_server_goes_on_after_a_refused_begin)
 {
     uint8_t *frame = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(20);
     mbm_custom custom = {.serve = later, .code = 65};
 
-    (void)state;
     memset(&server, 0, sizeof server);
     memset(&unit, 0, sizeof unit);
     memset(&table, 0, sizeof table);
@@ -109,23 +110,21 @@ static void a_server_goes_on_after_a_refused_begin(void **state)
     free(small);
 }
 
-static void a_zeroed_server_stays_zero_when_a_begin_is_refused(void **state)
+TEST(a_zeroed_server_stays_zero_when_a_begin_is_refused)
 {
     uint8_t *small = (uint8_t *)malloc(20);
     static const mbm_server zero;
 
-    (void)state;
     memset(&server, 0, sizeof server);
     all_begins_are_refused(small);
     assert_memory_equal(&server, &zero, sizeof server);
     free(small);
 }
 
-static void settings_of_a_server_that_are_refused_change_nothing(void **state)
+TEST(settings_of_a_server_that_are_refused_change_nothing)
 {
     static uint8_t frame[MBM_MAX_TCP_FRAME];
 
-    (void)state;
     memset(&server, 0, sizeof server);
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setSilence(&server, 1));
     REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setBaudRate(&server, 9600));
@@ -135,14 +134,13 @@ static void settings_of_a_server_that_are_refused_change_nothing(void **state)
 }
 
 /* Neither the records that are refused nor the units that refuse them change. */
-static void refused_records_are_unchanged(void **state)
+TEST(refused_records_are_unchanged)
 {
     mbm_registerTable fresh;
     mbm_dataCallbacks cells;
     mbm_custom custom;
     mbm_functionMask switches;
 
-    (void)state;
     memset(&unit, 0, sizeof unit);
     memset(&fresh, 0, sizeof fresh);
     memset(&cells, 0, sizeof cells);
@@ -172,7 +170,7 @@ static void refused_records_are_unchanged(void **state)
 
 /* --- master --- */
 
-static void a_master_goes_on_after_refused_calls(void **state)
+TEST(a_master_goes_on_after_refused_calls)
 {
     static mbm_line line;
     static mbm_node m;
@@ -182,7 +180,6 @@ static void a_master_goes_on_after_refused_calls(void **state)
     mbm_port mute = port;
     unsigned i;
 
-    (void)state;
     memset(&line, 0, sizeof line);
     memset(&m, 0, sizeof m);
     REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_beginRtu(&line, NULL, small, 8));
@@ -230,13 +227,12 @@ static void a_master_goes_on_after_refused_calls(void **state)
 
 /* --- sniffer and ring --- */
 
-static void a_sniffer_goes_on_after_refused_calls(void **state)
+TEST(a_sniffer_goes_on_after_refused_calls)
 {
     static mbm_sniffer sniffer;
     uint8_t *buffer = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(31);
     mbm_event event;
 
-    (void)state;
     memset(&sniffer, 0, sizeof sniffer);
     REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, small, 31));
     OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, buffer, MBM_MAX_FRAME));
@@ -258,12 +254,11 @@ static void a_sniffer_goes_on_after_refused_calls(void **state)
     free(small);
 }
 
-static void a_ring_keeps_its_bytes_when_a_begin_is_refused(void **state)
+TEST(a_ring_keeps_its_bytes_when_a_begin_is_refused)
 {
     mbm_ring ring = {0};
     uint8_t *bytes = (uint8_t *)malloc(8), *one = (uint8_t *)malloc(1), got[8];
 
-    (void)state;
     REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, one, 1));
     OK(mbm_ring_begin(&ring, bytes, 8));
     assert_int_equal(mbm_ring_write(&ring, (const uint8_t *)"abcd", 4), 4);
@@ -275,21 +270,4 @@ static void a_ring_keeps_its_bytes_when_a_begin_is_refused(void **state)
     assert_memory_equal(got, "abcd", 4);
     free(bytes);
     free(one);
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_server_goes_on_after_a_refused_begin),
-        TEST(a_zeroed_server_stays_zero_when_a_begin_is_refused),
-        TEST(settings_of_a_server_that_are_refused_change_nothing),
-        TEST(refused_records_are_unchanged),
-        TEST(a_master_goes_on_after_refused_calls),
-        TEST(a_sniffer_goes_on_after_refused_calls),
-        TEST(a_ring_keeps_its_bytes_when_a_begin_is_refused),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,6 +8,8 @@
 #include "refused.h"
 #include "refused_wire.h"
 
+fixture each_test = {reset, NULL};
+
 static mbm_client client;
 static mbm_line line;
 static mbm_node node;
@@ -38,12 +40,11 @@ static void all_client_begins_are(uint8_t status, const mbm_port *p, uint8_t *fr
     REFUSED(status, client, mbm_client_beginTcp(&client, p, frame, bytes, frame, 12));
 }
 
-static void a_zeroed_client_stays_zero_when_a_begin_is_refused(void **state)
+TEST(a_zeroed_client_stays_zero_when_a_begin_is_refused)
 {
     static uint8_t small[16];
     mbm_port mute = port;
 
-    (void)state;
     memset(&client, 0, sizeof client);
     mute.micros = NULL;
     all_client_begins_are(MBM_INVALID_ARGUMENT, &mute, small, 16);
@@ -72,7 +73,7 @@ static void all_settings_out_of_range_are_refused(int framing)
         REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setDelimiter(&client, '!'));
 }
 
-static void a_client_goes_on_after_refused_calls(void **state)
+TEST(a_client_goes_on_after_refused_calls)
 {
     static uint8_t small[20];
     static const mbm_line zero;
@@ -81,7 +82,6 @@ static void a_client_goes_on_after_refused_calls(void **state)
     uint32_t delay;
     int framing;
 
-    (void)state;
     for (framing = 0; framing < 4; framing++) {
         memset(&client, 0, sizeof client);
         memset(&request, 0, sizeof request);
@@ -150,13 +150,12 @@ static void a_client_goes_on_after_refused_calls(void **state)
     incoming = outgoing = NULL;
 }
 
-static void a_full_queue_and_a_suspended_client_change_nothing(void **state)
+TEST(a_full_queue_and_a_suspended_client_change_nothing)
 {
     static mbm_clientRequest requests[MBM_CLIENT_DEPTH + 1];
     static const mbm_line zero;
     unsigned i;
 
-    (void)state;
     memset(&client, 0, sizeof client);
     memset(&line, 0, sizeof line);
     memset(&node, 0, sizeof node);
@@ -191,13 +190,12 @@ static void a_full_queue_and_a_suspended_client_change_nothing(void **state)
 }
 
 /* A request is in the queue only once, even if the program zeroes it while it is pending. */
-static void a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice(void **state)
+TEST(a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice)
 {
     mbm_clientRequest *request = (mbm_clientRequest *)malloc(sizeof *request);
     unsigned i;
     int framing;
 
-    (void)state;
     for (framing = 0; framing < 4; framing++) {
         memset(&client, 0, sizeof client);
         OK(begin_client(framing, 600, 600));
@@ -229,18 +227,4 @@ static void a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice(voi
     free(incoming);
     free(outgoing);
     incoming = outgoing = NULL;
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_zeroed_client_stays_zero_when_a_begin_is_refused),
-        TEST(a_client_goes_on_after_refused_calls),
-        TEST(a_full_queue_and_a_suspended_client_change_nothing),
-        TEST(a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

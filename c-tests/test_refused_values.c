@@ -10,7 +10,7 @@
 
 /* --- values --- */
 
-static void refused_values_change_nothing(void **state)
+TEST(refused_values_change_nothing)
 {
     uint16_t *two = (uint16_t *)malloc(4);
     uint8_t *bytes = (uint8_t *)malloc(2), coils[20];
@@ -19,7 +19,6 @@ static void refused_values_change_nothing(void **state)
     const double longer = 1;
     mbm_registers r;
 
-    (void)state;
     two[0] = two[1] = 0x1111;
     memset(bytes, 0x22, 2);
     memset(coils, 1, sizeof coils);
@@ -55,7 +54,7 @@ static void refused_values_change_nothing(void **state)
 
 /* --- the caller's variables --- */
 
-static void a_refused_call_sets_its_length_to_0(void **state)
+TEST(a_refused_call_sets_its_length_to_0)
 {
     const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = 9};
     mbm_packet packet = {.function = 3, .quantity = 1, .unit = 17};
@@ -64,7 +63,6 @@ static void a_refused_call_sets_its_length_to_0(void **state)
     uint16_t length;
     mbm_unit unit;
 
-    (void)state;
 #define NO_LENGTH(status, call)                                                                    \
     do {                                                                                           \
         length = 0x7777;                                                                           \
@@ -109,7 +107,7 @@ static void a_refused_call_sets_its_length_to_0(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(PDU(NULL, 0), &packet, NULL));
 }
 
-static void a_refused_call_leaves_other_variables_unchanged(void **state)
+TEST(a_refused_call_leaves_other_variables_unchanged)
 {
     const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = 9};
     static mbm_sniffer sniffer;
@@ -123,7 +121,6 @@ static void a_refused_call_leaves_other_variables_unchanged(void **state)
     uint32_t wide = 0x77777777;
     char text[4] = "777";
 
-    (void)state;
     memset(&packet, 0x77, sizeof packet);
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&none, 0, frame, 8, &packet));
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&rtu, 2, frame, 8, &packet));
@@ -156,24 +153,9 @@ static void a_refused_call_leaves_other_variables_unchanged(void **state)
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, bytes, mbm_bits_unpack(frame, 0, bytes, 4));
 }
 
-static void the_text_of_invalid_argument_mentions_ranges(void **state)
+TEST(the_text_of_invalid_argument_mentions_ranges)
 {
-    (void)state;
     assert_non_null(strstr(mbm_status_text(MBM_INVALID_ARGUMENT), "out of range"));
     assert_non_null(strstr(mbm_status_text(MBM_INVALID_ARGUMENT), "NULL"));
     assert_non_null(strstr(mbm_status_text(MBM_BUSY), "hook"));
-}
-
-#define TEST(test) cmocka_unit_test(test)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(refused_values_change_nothing),
-        TEST(a_refused_call_sets_its_length_to_0),
-        TEST(a_refused_call_leaves_other_variables_unchanged),
-        TEST(the_text_of_invalid_argument_mentions_ranges),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

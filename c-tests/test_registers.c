@@ -33,7 +33,7 @@ static int same(const void *a, const void *b, size_t size)
     return memcmp(a, b, size) == 0;
 }
 
-static void a_double_word_is_read_in_four_orders(void **state)
+TEST(a_double_word_is_read_in_four_orders)
 {
     uint16_t words[2];
     mbm_registers r;
@@ -41,7 +41,6 @@ static void a_double_word_is_read_in_four_orders(void **state)
     int32_t negative;
     unsigned i, over_words;
 
-    (void)state;
     for (i = 0; i < 4; i++) {
         for (over_words = 0; over_words < 2; over_words++) {
             to_words(words, double_words[i], 2);
@@ -58,12 +57,11 @@ static void a_double_word_is_read_in_four_orders(void **state)
     }
 }
 
-static void the_default_order_is_high_word_first(void **state)
+TEST(the_default_order_is_high_word_first)
 {
     mbm_registers r;
     uint32_t value;
 
-    (void)state;
     OK(mbm_registers_ofBytes(&r, double_words[0], 4, 0));
     assert_int_equal(r.order, MBM_ORDER_ABCD);
     OK(mbm_registers_getUint32(&r, 0, MBM_ORDER_DEFAULT, &value));
@@ -73,7 +71,7 @@ static void the_default_order_is_high_word_first(void **state)
     assert_int_equal(value, 2923517522u);
 }
 
-static void floats_are_ieee_754(void **state)
+TEST(floats_are_ieee_754)
 {
     static const struct {
         float value;
@@ -88,7 +86,6 @@ static void floats_are_ieee_754(void **state)
     unsigned i;
     float value;
 
-    (void)state;
     OK(mbm_registers_intoWords(&r, words, 2, 0));
     for (i = 0; i < COUNT(cases); i++) {
         words[0] = cases[i].high;
@@ -108,7 +105,7 @@ static void floats_are_ieee_754(void **state)
     assert_int_equal(words[1], 0xC07F);
 }
 
-static void values_of_four_registers_have_four_orders_too(void **state)
+TEST(values_of_four_registers_have_four_orders_too)
 {
     mbm_registers r, w;
     uint64_t wide;
@@ -117,7 +114,6 @@ static void values_of_four_registers_have_four_orders_too(void **state)
     uint8_t bytes[8];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 4; i++) {
         OK(mbm_registers_ofBytes(&r, pi[i], 8, 100));
         OK(mbm_registers_getDouble(&r, 100, orders[i], &value));
@@ -142,14 +138,13 @@ static void values_of_four_registers_have_four_orders_too(void **state)
     }
 }
 
-static void a_double_word_is_written_in_four_orders(void **state)
+TEST(a_double_word_is_written_in_four_orders)
 {
     uint8_t bytes[4];
     uint16_t words[2], wanted[2];
     mbm_registers b, w;
     unsigned i;
 
-    (void)state;
     OK(mbm_registers_intoBytes(&b, bytes, 4, 9));
     OK(mbm_registers_intoWords(&w, words, 2, 9));
     for (i = 0; i < 4; i++) {
@@ -161,7 +156,7 @@ static void a_double_word_is_written_in_four_orders(void **state)
     }
 }
 
-static void one_register_is_read_as_number_bytes_and_bits(void **state)
+TEST(one_register_is_read_as_number_bytes_and_bits)
 {
     uint16_t words[] = {0x80FE, 0xAAAA};
     mbm_registers r;
@@ -170,7 +165,6 @@ static void one_register_is_read_as_number_bytes_and_bits(void **state)
     uint8_t byte;
     int8_t small;
 
-    (void)state;
     OK(mbm_registers_intoWords(&r, words, 2, 5));
     OK(mbm_registers_getUint16(&r, 5, MBM_ORDER_DEFAULT, &word));
     assert_int_equal(word, 0x80FE);
@@ -205,14 +199,13 @@ static void one_register_is_read_as_number_bytes_and_bits(void **state)
     assert_int_equal(words[1], 0xFFFE);
 }
 
-static void a_text_ends_at_its_first_nul_or_with_its_field(void **state)
+TEST(a_text_ends_at_its_first_nul_or_with_its_field)
 {
     static const uint8_t bytes[] = {'M', 'E', 'T', 'E', 'R', ' ', '7', 0, 'X', 'Y'};
     static const uint8_t swapped[] = {'E', 'M', 'E', 'T', ' ', 'R', 0, '7'};
     mbm_registers r;
     char text[11];
 
-    (void)state;
     OK(mbm_registers_ofBytes(&r, bytes, sizeof bytes, 10));
     OK(mbm_registers_getString(&r, 10, 10, MBM_ORDER_DEFAULT, text, sizeof text));
     assert_string_equal(text, "METER 7");
@@ -231,12 +224,11 @@ static void a_text_ends_at_its_first_nul_or_with_its_field(void **state)
     assert_string_equal(text, "METER 7");
 }
 
-static void a_text_is_written_with_zeros_after_it(void **state)
+TEST(a_text_is_written_with_zeros_after_it)
 {
     uint8_t bytes[9] = "........";
     mbm_registers r;
 
-    (void)state;
     OK(mbm_registers_intoBytes(&r, bytes, 8, 0));
     OK(mbm_registers_setString(&r, 0, 5, MBM_ORDER_DEFAULT, "ABC"));
     assert_memory_equal(bytes, "ABC\0\0\0..", 8);
@@ -247,14 +239,13 @@ static void a_text_is_written_with_zeros_after_it(void **state)
     assert_memory_equal(bytes, "ABBADC..", 8);
 }
 
-static void raw_bytes_are_copied_in_wire_order(void **state)
+TEST(raw_bytes_are_copied_in_wire_order)
 {
     static const uint8_t three[] = {3, 4, 5};
     uint16_t words[] = {0x0102, 0x0304, 0x0506};
     uint8_t bytes[3] = {0};
     mbm_registers r;
 
-    (void)state;
     OK(mbm_registers_intoWords(&r, words, 3, 40));
     r.order = MBM_ORDER_DCBA;
     OK(mbm_registers_getBytes(&r, 41, MBM_ORDER_ABCD, bytes, 3));
@@ -266,7 +257,7 @@ static void raw_bytes_are_copied_in_wire_order(void **state)
     assert_int_equal(words[2], 0x0506);
 }
 
-static void bytes_of_a_device_that_swaps_them_are_put_in_order(void **state)
+TEST(bytes_of_a_device_that_swaps_them_are_put_in_order)
 {
     static const uint8_t straight[] = {1, 2, 3, 4, 5}, swapped[] = {2, 1, 4, 3, 6};
     const uint8_t data[] = {1, 2, 3, 4, 5, 6};
@@ -275,7 +266,6 @@ static void bytes_of_a_device_that_swaps_them_are_put_in_order(void **state)
     mbm_registers r;
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(orders); i++) {
         const uint8_t *wanted = i < 2 ? straight : swapped;
 
@@ -305,7 +295,7 @@ static void bytes_of_a_device_that_swaps_them_are_put_in_order(void **state)
     assert_int_equal(bytes[0], 7);
 }
 
-static void an_access_outside_of_a_view_changes_nothing(void **state)
+TEST(an_access_outside_of_a_view_changes_nothing)
 {
     uint16_t words[4] = {0xAAAA, 0xAAAA, 0xAAAA, 0xAAAA};
     mbm_registers r;
@@ -314,7 +304,6 @@ static void an_access_outside_of_a_view_changes_nothing(void **state)
     float number = 5;
     unsigned address;
 
-    (void)state;
     OK(mbm_registers_intoWords(&r, words, 4, 65532));
     for (address = 0; address <= 65535; address++) {
         uint16_t at = (uint16_t)address;
@@ -337,13 +326,12 @@ static void an_access_outside_of_a_view_changes_nothing(void **state)
     assert_int_equal(words[3], 1);
 }
 
-static void a_view_beyond_register_65535_is_refused(void **state)
+TEST(a_view_beyond_register_65535_is_refused)
 {
     uint16_t words[2] = {0}, word;
     uint8_t bytes[4] = {0};
     mbm_registers r;
 
-    (void)state;
     OK(mbm_registers_ofWords(&r, words, 1, 65535));
     OK(mbm_registers_getUint16(&r, 65535, 0, &word));
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_ofWords(&r, words, 2, 65535));
@@ -358,7 +346,7 @@ static void a_view_beyond_register_65535_is_refused(void **state)
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getUint16(&r, 0, 0, &word));
 }
 
-static void null_and_bad_arguments_return_a_status(void **state)
+TEST(null_and_bad_arguments_return_a_status)
 {
     static const uint8_t bytes[4] = {1, 2, 3, 4};
     mbm_registers r, none = {0};
@@ -366,7 +354,6 @@ static void null_and_bad_arguments_return_a_status(void **state)
     uint32_t value;
     char text[4];
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(NULL, &word, 1, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(&r, NULL, 1, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, NULL, 2, 0));
@@ -402,13 +389,12 @@ static void null_and_bad_arguments_return_a_status(void **state)
     assert_int_equal(word, 9);
 }
 
-static void a_view_for_reading_is_not_written(void **state)
+TEST(a_view_for_reading_is_not_written)
 {
     uint16_t words[4] = {1, 2, 3, 4};
     uint8_t bytes[2] = {1, 2};
     mbm_registers r;
 
-    (void)state;
     OK(mbm_registers_ofWords(&r, words, 4, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(&r, 0, 0, 9));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setBit(&r, 0, 0, 0));
@@ -418,26 +404,4 @@ static void a_view_for_reading_is_not_written(void **state)
     OK(mbm_registers_ofBytes(&r, bytes, 2, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(&r, 0, 0, 9));
     assert_int_equal(bytes[1], 2);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_double_word_is_read_in_four_orders),
-        cmocka_unit_test(the_default_order_is_high_word_first),
-        cmocka_unit_test(floats_are_ieee_754),
-        cmocka_unit_test(values_of_four_registers_have_four_orders_too),
-        cmocka_unit_test(a_double_word_is_written_in_four_orders),
-        cmocka_unit_test(one_register_is_read_as_number_bytes_and_bits),
-        cmocka_unit_test(a_text_ends_at_its_first_nul_or_with_its_field),
-        cmocka_unit_test(a_text_is_written_with_zeros_after_it),
-        cmocka_unit_test(raw_bytes_are_copied_in_wire_order),
-        cmocka_unit_test(bytes_of_a_device_that_swaps_them_are_put_in_order),
-        cmocka_unit_test(an_access_outside_of_a_view_changes_nothing),
-        cmocka_unit_test(a_view_beyond_register_65535_is_refused),
-        cmocka_unit_test(null_and_bad_arguments_return_a_status),
-        cmocka_unit_test(a_view_for_reading_is_not_written),
-    };
-
-    return cmocka_run_group_tests_name("registers", tests, NULL, NULL);
 }

@@ -180,9 +180,8 @@ static void check_request(uint8_t kind, const mbm_packet *asked, const mbm_packe
     assert_reply_is(&wanted);
 }
 
-static void the_reply_of_each_function_is_the_packet_of_its_frame(void **state)
+TEST(the_reply_of_each_function_is_the_packet_of_its_frame)
 {
-    (void)state;
     with_each_exchange(check_request);
 }
 
@@ -197,9 +196,8 @@ static void check_forwarded(uint8_t kind, const mbm_packet *asked, const mbm_pac
     assert_reply_is(&wanted);
 }
 
-static void the_reply_of_a_forwarded_request_is_the_packet_of_its_frame(void **state)
+TEST(the_reply_of_a_forwarded_request_is_the_packet_of_its_frame)
 {
-    (void)state;
     with_each_exchange(check_forwarded);
 }
 
@@ -222,13 +220,12 @@ static void check_exception(uint8_t kind, const mbm_packet *asked, const mbm_pac
     assert_int_equal(wanted.exceptionCode, MBM_SERVER_DEVICE_FAILURE);
 }
 
-static void the_reply_of_a_refused_request_is_an_exception_packet(void **state)
+TEST(the_reply_of_a_refused_request_is_an_exception_packet)
 {
-    (void)state;
     with_each_exchange(check_exception);
 }
 
-static void one_file_record_has_its_head_again(void **state)
+TEST(one_file_record_has_its_head_again)
 {
     uint8_t received[MBM_MAX_ASCII_FRAME], bytes[8];
     mbm_packet response = {
@@ -237,7 +234,6 @@ static void one_file_record_has_its_head_again(void **state)
     mbm_packet wanted, found;
     uint16_t cursor = 0;
 
-    (void)state;
     hex_bytes(bytes, "05 06 0DFE 0020");
     begin(MBM_FRAMING_RTU);
     IS(MBM_PENDING, mbm_client_readFileRecord(&client, &request, 4, 1, 2));
@@ -264,7 +260,7 @@ static void one_file_record_has_its_head_again(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_client_reply(&request, pdu, sizeof pdu, &found));
 }
 
-static void unused_bits_are_zero(void **state)
+TEST(unused_bits_are_zero)
 {
     const mbm_packet response = {.kind = MBM_PACKET_RESPONSE,
                                  .function = 0x01,
@@ -273,7 +269,6 @@ static void unused_bits_are_zero(void **state)
     uint8_t received[MBM_MAX_ASCII_FRAME];
     mbm_packet wanted, found;
 
-    (void)state;
     begin(MBM_FRAMING_RTU);
     IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 11));
     OK(answer(MBM_FRAMING_RTU, &response, received, &wanted));
@@ -293,7 +288,7 @@ static void refuses(uint8_t status)
     assert_memory_equal(&found, &before, sizeof found);
 }
 
-static void a_request_without_a_reply_says_why(void **state)
+TEST(a_request_without_a_reply_says_why)
 {
     static const mbm_packet registers = {.kind = MBM_PACKET_RESPONSE,
                                          .function = 0x03,
@@ -306,7 +301,6 @@ static void a_request_without_a_reply_says_why(void **state)
     uint8_t received[MBM_MAX_ASCII_FRAME];
     mbm_packet wanted;
 
-    (void)state;
     begin(MBM_FRAMING_RTU);
     refuses(MBM_INVALID_ARGUMENT); /* never queued */
 
@@ -332,9 +326,8 @@ static void a_request_without_a_reply_says_why(void **state)
     refuses(MBM_BUFFER_TOO_SMALL);
 }
 
-static void a_request_that_no_device_answers_has_no_reply(void **state)
+TEST(a_request_that_no_device_answers_has_no_reply)
 {
-    (void)state;
     begin(MBM_FRAMING_RTU);
     request.unit = 0;
     IS(MBM_PENDING, mbm_client_writeSingleRegister(&client, &request, 1, 2));
@@ -349,14 +342,13 @@ static void a_request_that_no_device_answers_has_no_reply(void **state)
     refuses(MBM_INVALID_ARGUMENT);
 }
 
-static void a_refused_request_does_not_keep_an_earlier_exception(void **state)
+TEST(a_refused_request_does_not_keep_an_earlier_exception)
 {
     const mbm_packet refusal = {
         .kind = MBM_PACKET_EXCEPTION, .function = 0x03, .exceptionCode = MBM_ILLEGAL_DATA_VALUE};
     uint8_t received[MBM_MAX_ASCII_FRAME];
     mbm_packet wanted;
 
-    (void)state;
     begin(MBM_FRAMING_TCP);
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
     IS(MBM_ILLEGAL_DATA_VALUE, answer(MBM_FRAMING_TCP, &refusal, received, &wanted));
@@ -366,14 +358,13 @@ static void a_refused_request_does_not_keep_an_earlier_exception(void **state)
     refuses(MBM_ILLEGAL_DATA_VALUE);
 }
 
-static void a_log_that_the_client_accepted_may_be_malformed(void **state)
+TEST(a_log_that_the_client_accepted_may_be_malformed)
 {
     static const mbm_framing framing = {.kind = MBM_FRAMING_RTU};
     /* Two bytes do not hold the status, the events and the messages. */
     uint8_t short_log[] = {UNIT, 0x0C, 2, 0, 0, 0, 0};
     mbm_packet wanted;
 
-    (void)state;
     begin(MBM_FRAMING_RTU);
     IS(MBM_PENDING, mbm_client_getCommEventLog(&client, &request));
     memory_port_send(&m, &client);
@@ -385,7 +376,7 @@ static void a_log_that_the_client_accepted_may_be_malformed(void **state)
     IS(MBM_MALFORMED_REPLY, mbm_frame_parse(&framing, MBM_PACKET_RESPONSE, short_log, 7, &wanted));
 }
 
-static void memory_that_is_missing_too_small_or_shared_is_refused(void **state)
+TEST(memory_that_is_missing_too_small_or_shared_is_refused)
 {
     static const mbm_packet response = {.kind = MBM_PACKET_RESPONSE,
                                         .function = 0x03,
@@ -394,7 +385,6 @@ static void memory_that_is_missing_too_small_or_shared_is_refused(void **state)
     uint8_t received[MBM_MAX_ASCII_FRAME];
     mbm_packet wanted, found;
 
-    (void)state;
     begin(MBM_FRAMING_RTU);
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
     OK(answer(MBM_FRAMING_RTU, &response, received, &wanted));
@@ -415,14 +405,13 @@ static void read_reply(void *context, mbm_clientRequest *ended)
     status_in_done = mbm_client_reply(ended, pdu, sizeof pdu, (mbm_packet *)context);
 }
 
-static void done_may_read_the_reply(void **state)
+TEST(done_may_read_the_reply)
 {
     static const mbm_packet response = {
         .kind = MBM_PACKET_RESPONSE, .function = 0x0B, .commStatus = 0xFFFF, .eventCount = 0x108};
     uint8_t received[MBM_MAX_ASCII_FRAME];
     mbm_packet wanted, found;
 
-    (void)state;
     begin(MBM_FRAMING_TCP);
     request.done = read_reply;
     request.context = &found;
@@ -432,23 +421,4 @@ static void done_may_read_the_reply(void **state)
     OK(status_in_done);
     assert_same_packet(&found, &wanted);
     assert_int_equal(found.eventCount, 0x108);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_reply_of_each_function_is_the_packet_of_its_frame),
-        cmocka_unit_test(the_reply_of_a_forwarded_request_is_the_packet_of_its_frame),
-        cmocka_unit_test(the_reply_of_a_refused_request_is_an_exception_packet),
-        cmocka_unit_test(one_file_record_has_its_head_again),
-        cmocka_unit_test(unused_bits_are_zero),
-        cmocka_unit_test(a_request_without_a_reply_says_why),
-        cmocka_unit_test(a_request_that_no_device_answers_has_no_reply),
-        cmocka_unit_test(a_refused_request_does_not_keep_an_earlier_exception),
-        cmocka_unit_test(a_log_that_the_client_accepted_may_be_malformed),
-        cmocka_unit_test(memory_that_is_missing_too_small_or_shared_is_refused),
-        cmocka_unit_test(done_may_read_the_reply),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

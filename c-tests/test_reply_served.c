@@ -152,9 +152,8 @@ static void with_each_framing(void (*check)(void))
     }
 }
 
-static void the_fields_of_the_servers_replies_have_names(void **state)
+TEST(the_fields_of_the_servers_replies_have_names)
 {
-    (void)state;
     with_each_framing(check_fields);
 }
 
@@ -211,18 +210,7 @@ static void check_identification(void)
     assert_read(MBM_DEVICE_ID_INDIVIDUAL, 0x80 + 20, 1, 1);
 }
 
-static void an_identification_of_many_objects_is_read_to_its_end(void **state)
+TEST(an_identification_of_many_objects_is_read_to_its_end)
 {
-    (void)state;
     with_each_framing(check_identification);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_fields_of_the_servers_replies_have_names),
-        cmocka_unit_test(an_identification_of_many_objects_is_read_to_its_end),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

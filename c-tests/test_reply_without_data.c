@@ -176,12 +176,11 @@ static int is_standard(uint8_t function)
     return memchr(codes, function, sizeof codes) != NULL;
 }
 
-static void every_function_may_be_answered_without_data(void **state)
+TEST(every_function_may_be_answered_without_data)
 {
     static const mbm_rule silence = MBM_INIT;
     unsigned i, function;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (function = 1; function <= LAST; function++) {
             begin(framings[i], "", 0);
@@ -197,11 +196,10 @@ static void every_function_may_be_answered_without_data(void **state)
         }
 }
 
-static void every_function_that_the_standard_leaves_open_is_forwarded_without_data(void **state)
+TEST(every_function_that_the_standard_leaves_open_is_forwarded_without_data)
 {
     unsigned i, function;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (function = 1; function <= LAST; function++) {
             uint8_t queued;
@@ -223,12 +221,11 @@ static void every_function_that_the_standard_leaves_open_is_forwarded_without_da
         }
 }
 
-static void a_function_with_data_may_be_answered_without(void **state)
+TEST(a_function_with_data_may_be_answered_without)
 {
     static const mbm_rule silence = MBM_INIT;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i], "", 0);
         request.data = "abcde";
@@ -243,13 +240,12 @@ static void a_function_with_data_may_be_answered_without(void **state)
 }
 
 /* MEI type and sub-function are no data: the response repeats them. */
-static void a_reply_that_lacks_what_it_must_repeat_is_not_accepted(void **state)
+TEST(a_reply_that_lacks_what_it_must_repeat_is_not_accepted)
 {
     static const char *const bodies[] = {"\x0D\x01", "\x00\x15\x00\x00"};
     static const uint8_t functions[] = {0x2B, 0x08}, counts[] = {2, 4};
     unsigned i, k;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (k = 0; k < COUNT(functions); k++) {
             begin(framings[i], "", 0);
@@ -261,7 +257,7 @@ static void a_reply_that_lacks_what_it_must_repeat_is_not_accepted(void **state)
 }
 
 /* An answer whose bytes no function of the standard would have. */
-static void the_rule_of_the_program_holds_for_every_function(void **state)
+TEST(the_rule_of_the_program_holds_for_every_function)
 {
     static const struct {
         mbm_rule rule;
@@ -276,7 +272,6 @@ static void the_rule_of_the_program_holds_for_every_function(void **state)
     };
     unsigned i, k, function;
 
-    (void)state;
     for (i = 0; i < COUNT(framings); i++)
         for (k = 0; k < COUNT(cases); k++)
             for (function = 1; function <= LAST; function++) {
@@ -290,12 +285,11 @@ static void the_rule_of_the_program_holds_for_every_function(void **state)
 }
 
 /* Only Return Query Data (08, sub-function 00) carries data that tell its replies apart. */
-static void a_late_reply_to_a_function_08_of_the_program_is_not_taken(void **state)
+TEST(a_late_reply_to_a_function_08_of_the_program_is_not_taken)
 {
     static const mbm_rule fixed = {MBM_RULE_FIXED, 5, 0};
     static const uint8_t late[] = {UNIT, 8, 0, 0x0B, 0, 1}, right[] = {UNIT, 8, 0, 0x0B, 0, 2};
 
-    (void)state;
     begin(MBM_FRAMING_RTU, "", 0);
     request.data = "\x00\x0B\x00\x00";
     IS(MBM_PENDING, mbm_client_custom(&client, &request, 8, 4, &fixed));
@@ -310,18 +304,4 @@ static void a_late_reply_to_a_function_08_of_the_program_is_not_taken(void **sta
     IS(MBM_OK, memory_port_run(&near_end, &client, &request, 1000));
     assert_int_equal(request.length, 4);
     assert_memory_equal(reply, right + 2, 4);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_function_may_be_answered_without_data),
-        cmocka_unit_test(every_function_that_the_standard_leaves_open_is_forwarded_without_data),
-        cmocka_unit_test(a_function_with_data_may_be_answered_without),
-        cmocka_unit_test(a_reply_that_lacks_what_it_must_repeat_is_not_accepted),
-        cmocka_unit_test(the_rule_of_the_program_holds_for_every_function),
-        cmocka_unit_test(a_late_reply_to_a_function_08_of_the_program_is_not_taken),
-    };
-
-    return cmocka_run_group_tests_name("reply without data", tests, NULL, NULL);
 }

@@ -8,12 +8,11 @@
 
 enum { BYTES = 200000 };
 
-static void a_ring_returns_bytes_in_order(void **state)
+TEST(a_ring_returns_bytes_in_order)
 {
     static mbm_ring ring;
     uint8_t storage[8], taken[8];
 
-    (void)state;
     OK(mbm_ring_begin(&ring, storage, sizeof storage));
     assert_int_equal(mbm_ring_put(&ring, 'a'), 1);
     assert_int_equal(mbm_ring_write(&ring, (const uint8_t *)"bcd", 3), 3);
@@ -24,12 +23,11 @@ static void a_ring_returns_bytes_in_order(void **state)
     assert_int_equal(mbm_ring_read(&ring, taken, sizeof taken), 0);
 }
 
-static void bytes_beyond_the_capacity_are_counted_and_no_others_are_lost(void **state)
+TEST(bytes_beyond_the_capacity_are_counted_and_no_others_are_lost)
 {
     static mbm_ring ring;
     uint8_t storage[4], taken[8];
 
-    (void)state;
     OK(mbm_ring_begin(&ring, storage, sizeof storage));
     assert_int_equal(mbm_ring_write(&ring, (const uint8_t *)"abcde", 5), 3);
     assert_int_equal(mbm_ring_put(&ring, 'f'), 0);
@@ -42,14 +40,13 @@ static void bytes_beyond_the_capacity_are_counted_and_no_others_are_lost(void **
     assert_int_equal(mbm_ring_available(&ring), 0);
 }
 
-static void a_ring_that_was_never_begun_accepts_and_returns_nothing(void **state)
+TEST(a_ring_that_was_never_begun_accepts_and_returns_nothing)
 {
     static mbm_ring zeroed;
     mbm_ring *rings[2];
     uint8_t byte = 0;
     unsigned i;
 
-    (void)state;
     rings[0] = NULL;
     rings[1] = &zeroed;
     for (i = 0; i < COUNT(rings); i++) {
@@ -61,12 +58,11 @@ static void a_ring_that_was_never_begun_accepts_and_returns_nothing(void **state
     }
 }
 
-static void begin_refuses_bad_arguments(void **state)
+TEST(begin_refuses_bad_arguments)
 {
     static mbm_ring ring;
     uint8_t storage[4];
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_ring_begin(NULL, storage, sizeof storage));
     IS(MBM_INVALID_ARGUMENT, mbm_ring_begin(&ring, NULL, 4));
     IS(MBM_INVALID_ARGUMENT, mbm_ring_begin(&ring, storage, 1));
@@ -87,14 +83,13 @@ static void *put_all(void *context)
     return NULL;
 }
 
-static void one_thread_may_put_while_another_takes(void **state)
+TEST(one_thread_may_put_while_another_takes)
 {
     static mbm_ring ring;
     uint8_t storage[33], taken[9];
     uint32_t expected = 0;
     pthread_t thread;
 
-    (void)state;
     OK(mbm_ring_begin(&ring, storage, sizeof storage));
     assert_int_equal(pthread_create(&thread, NULL, put_all, &ring), 0);
     while (expected < BYTES) {
@@ -108,17 +103,4 @@ static void one_thread_may_put_while_another_takes(void **state)
     }
     pthread_join(thread, NULL);
     assert_int_equal(mbm_ring_available(&ring), 0);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_ring_returns_bytes_in_order),
-        cmocka_unit_test(bytes_beyond_the_capacity_are_counted_and_no_others_are_lost),
-        cmocka_unit_test(a_ring_that_was_never_begun_accepts_and_returns_nothing),
-        cmocka_unit_test(begin_refuses_bad_arguments),
-        cmocka_unit_test(one_thread_may_put_while_another_takes),
-    };
-
-    return cmocka_run_group_tests_name("ring", tests, NULL, NULL);
 }

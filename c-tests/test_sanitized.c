@@ -63,33 +63,21 @@ static int fills_ring(uint16_t bytes, char *report, size_t capacity)
     return WIFEXITED(result) && WEXITSTATUS(result) == 0;
 }
 
-static void a_store_by_the_archive_within_its_buffer_is_not_reported(void **state)
+TEST(a_store_by_the_archive_within_its_buffer_is_not_reported)
 {
     char report[16384];
 
-    (void)state;
     assert_true(fills_ring(BYTES, report, sizeof report));
     assert_string_equal(report, "");
 }
 
-static void a_store_by_the_archive_beyond_its_buffer_is_reported(void **state)
+TEST(a_store_by_the_archive_beyond_its_buffer_is_reported)
 {
     char report[16384];
 
-    (void)state;
     if (!SANITIZED)
         skip();
     assert_false(fills_ring(BYTES + 1, report, sizeof report));
     assert_non_null(strstr(report, "heap-buffer-overflow"));
     assert_non_null(strstr(report, "WRITE of size 1"));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_store_by_the_archive_within_its_buffer_is_not_reported),
-        cmocka_unit_test(a_store_by_the_archive_beyond_its_buffer_is_reported),
-    };
-
-    return cmocka_run_group_tests_name("sanitized", tests, NULL, NULL);
 }

@@ -128,11 +128,10 @@ static void all_are_answered(mbm_unit *unit)
         assert_int_equal(answered(unit, i), function(i));
 }
 
-static int reset(void **state)
+static void reset(void)
 {
     int i;
 
-    (void)state;
     memset(&first, 0, sizeof first);
     memset(units, 0, sizeof units);
     units[0].id = 17;
@@ -141,25 +140,24 @@ static int reset(void **state)
     for (i = 0; i < FAMILIES; i++)
         OK(serve(&units[0], &first, i));
     all_are_answered(&units[0]);
-    return 0;
 }
 
-static void a_record_that_is_served_again_leaves_the_others_served(void **state)
+fixture each_test = {reset, NULL};
+
+TEST(a_record_that_is_served_again_leaves_the_others_served)
 {
     int i;
 
-    (void)state;
     for (i = 0; i < FAMILIES; i++) {
         OK(serve(&units[0], &first, i));
         all_are_answered(&units[0]);
     }
 }
 
-static void a_record_that_is_zeroed_and_served_again_leaves_the_others_served(void **state)
+TEST(a_record_that_is_zeroed_and_served_again_leaves_the_others_served)
 {
     int i;
 
-    (void)state;
     for (i = 0; i < FAMILIES; i++) {
         zero(&first, i);
         OK(serve(&units[0], &first, i));
@@ -167,11 +165,10 @@ static void a_record_that_is_zeroed_and_served_again_leaves_the_others_served(vo
     }
 }
 
-static void a_record_that_is_zeroed_serves_nothing_and_the_others_go_on(void **state)
+TEST(a_record_that_is_zeroed_serves_nothing_and_the_others_go_on)
 {
     int i, other;
 
-    (void)state;
     for (i = 0; i < FAMILIES; i++) {
         zero(&first, i);
         for (other = 0; other < FAMILIES; other++)
@@ -181,11 +178,10 @@ static void a_record_that_is_zeroed_serves_nothing_and_the_others_go_on(void **s
     }
 }
 
-static void all_records_may_be_zeroed_and_served_again(void **state)
+TEST(all_records_may_be_zeroed_and_served_again)
 {
     int i;
 
-    (void)state;
     for (i = 0; i < FAMILIES; i++)
         zero(&first, i);
     for (i = 0; i < FAMILIES; i++)
@@ -195,12 +191,11 @@ static void all_records_may_be_zeroed_and_served_again(void **state)
     all_are_answered(&units[0]);
 }
 
-static void one_record_serves_two_units(void **state)
+TEST(one_record_serves_two_units)
 {
     static records own;
     int i;
 
-    (void)state;
     memset(&own, 0, sizeof own);
     /* The second unit has a record of its own first, then the records of the first unit. */
     OK(serve(&units[1], &own, 10));
@@ -220,9 +215,8 @@ static void one_record_serves_two_units(void **state)
     all_are_answered(&units[1]);
 }
 
-static void functions_16_and_17_stay_when_another_unit_is_given_the_table(void **state)
+TEST(functions_16_and_17_stay_when_another_unit_is_given_the_table)
 {
-    (void)state;
     OK(mbm_registerTable_serveMaskAndReadWrite(&first.holding));
     OK(serve(&units[1], &first, 2));
     assert_int_equal(answer(&units[0], 17, "\x16\0\0\xFF\xFF\0\0", 7), 0x16);
@@ -230,11 +224,10 @@ static void functions_16_and_17_stay_when_another_unit_is_given_the_table(void *
 }
 
 /* A table of another kind would answer other functions, on every unit that has it. */
-static void a_table_that_is_served_as_one_kind_is_refused_as_another(void **state)
+TEST(a_table_that_is_served_as_one_kind_is_refused_as_another)
 {
     records before;
 
-    (void)state;
     memcpy(&before, &first, sizeof first);
     IS(MBM_BUSY, mbm_unit_serveInputRegisters(&units[0], &first.holding));
     IS(MBM_BUSY, mbm_unit_serveInputRegisters(&units[1], &first.holding));
@@ -253,14 +246,13 @@ static void a_table_that_is_served_as_one_kind_is_refused_as_another(void **stat
 }
 
 /* A unit would call only the first of two. */
-static void a_second_record_of_a_kind_that_a_unit_has_once_is_refused(void **state)
+TEST(a_second_record_of_a_kind_that_a_unit_has_once_is_refused)
 {
     static records second;
     static const int once[] = {4, 5, 6, 9};
     mbm_unit before = units[0];
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(once); i++) {
         memset(&second, 0, sizeof second);
         IS(MBM_BUSY, serve(&units[0], &second, once[i]));
@@ -281,13 +273,12 @@ static void a_second_record_of_a_kind_that_a_unit_has_once_is_refused(void **sta
     all_are_answered(&units[0]);
 }
 
-static void a_service_without_a_free_place_is_refused(void **state)
+TEST(a_service_without_a_free_place_is_refused)
 {
     static mbm_custom more[MBM_MAX_SERVICES];
     mbm_unit before;
     int i, served = FAMILIES;
 
-    (void)state;
     memset(more, 0, sizeof more);
     for (i = 0; i < MBM_MAX_SERVICES; i++) {
         more[i].serve = echo;
@@ -329,13 +320,12 @@ static uint16_t give_diagnostics_and_decline(void *context, const mbm_request *r
     return MBM_REPLY_DECLINED;
 }
 
-static void a_function_that_declines_may_fill_the_last_place(void **state)
+TEST(a_function_that_declines_may_fill_the_last_place)
 {
     static mbm_custom all[MBM_MAX_SERVICES - 1];
     static mbm_unit full;
     int i;
 
-    (void)state;
     memset(all, 0, sizeof all);
     memset(&full, 0, sizeof full);
     memset(&late, 0, sizeof late);
@@ -351,13 +341,12 @@ static void a_function_that_declines_may_fill_the_last_place(void **state)
     assert_int_equal(answer(&full, 17, "\x43", 1), 0x43);
 }
 
-static void a_unit_with_all_places_taken_refuses_other_functions(void **state)
+TEST(a_unit_with_all_places_taken_refuses_other_functions)
 {
     static mbm_custom all[MBM_MAX_SERVICES];
     static mbm_unit full;
     int i;
 
-    (void)state;
     memset(all, 0, sizeof all);
     memset(&full, 0, sizeof full);
     memset(&late, 0, sizeof late);
@@ -382,9 +371,8 @@ static void a_unit_with_all_places_taken_refuses_other_functions(void **state)
     assert_int_equal(answer(&full, 17, "\x03\0\0\0\1", 5), 0x83);
 }
 
-static void switches_can_be_registered_again_like_any_record(void **state)
+TEST(switches_can_be_registered_again_like_any_record)
 {
-    (void)state;
     OK(mbm_unit_switchFunction(&units[0], &first.switches, 3, 0));
     assert_int_equal(answered(&units[0], 2), 0x83);
     memset(&first.switches, 0, sizeof first.switches);
@@ -400,26 +388,4 @@ static void switches_can_be_registered_again_like_any_record(void **state)
     OK(mbm_unit_switchFunction(&units[0], &first.switches, 3, 1));
     OK(mbm_unit_switchFunction(&units[0], &first.switches, 4, 1));
     all_are_answered(&units[0]);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(a_record_that_is_served_again_leaves_the_others_served, reset),
-        cmocka_unit_test_setup(a_record_that_is_zeroed_and_served_again_leaves_the_others_served,
-                               reset),
-        cmocka_unit_test_setup(a_record_that_is_zeroed_serves_nothing_and_the_others_go_on, reset),
-        cmocka_unit_test_setup(all_records_may_be_zeroed_and_served_again, reset),
-        cmocka_unit_test_setup(one_record_serves_two_units, reset),
-        cmocka_unit_test_setup(functions_16_and_17_stay_when_another_unit_is_given_the_table,
-                               reset),
-        cmocka_unit_test_setup(a_table_that_is_served_as_one_kind_is_refused_as_another, reset),
-        cmocka_unit_test_setup(a_function_that_declines_may_fill_the_last_place, reset),
-        cmocka_unit_test_setup(a_unit_with_all_places_taken_refuses_other_functions, reset),
-        cmocka_unit_test_setup(a_second_record_of_a_kind_that_a_unit_has_once_is_refused, reset),
-        cmocka_unit_test_setup(a_service_without_a_free_place_is_refused, reset),
-        cmocka_unit_test_setup(switches_can_be_registered_again_like_any_record, reset),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -66,9 +66,8 @@ static uint32_t wire_micros(void *context)
 static const mbm_port port = {
     .read = wire_read, .write = wire_write, .micros = wire_micros, .flush = wire_flush};
 
-static int reset(void **state)
+static void reset(void)
 {
-    (void)state;
     memset(&server, 0, sizeof server);
     memset(&unit, 0, sizeof unit);
     memset(&table, 0, sizeof table);
@@ -80,8 +79,9 @@ static int reset(void **state)
     unit.id = 17;
     table.words = words;
     table.size = 10;
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 /* Lets the frame of a PDU arrive and polls. Returns the length of what was sent. */
 static size_t exchange(uint8_t to, const char *pdu, size_t length)
@@ -100,9 +100,8 @@ static size_t exchange(uint8_t to, const char *pdu, size_t length)
 #define ASK(pdu) exchange(17, pdu, sizeof pdu - 1)
 #define BROADCAST(pdu) exchange(0, pdu, sizeof pdu - 1)
 
-static void an_object_that_was_never_begun_is_not_initialised(void **state)
+TEST(an_object_that_was_never_begun_is_not_initialised)
 {
-    (void)state;
     IS(MBM_NOT_INITIALISED, mbm_server_poll(&server));
     IS(MBM_NOT_INITIALISED, mbm_server_setSilence(&server, 1));
     IS(MBM_NOT_INITIALISED, mbm_server_setBaudRate(&server, 9600));
@@ -110,12 +109,11 @@ static void an_object_that_was_never_begun_is_not_initialised(void **state)
     assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
 }
 
-static void null_is_an_invalid_argument(void **state)
+TEST(null_is_an_invalid_argument)
 {
     const mbm_port without_read = {.write = wire_write, .micros = wire_micros};
     uint16_t length;
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_server_poll(NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setSilence(NULL, 1));
     assert_int_equal(mbm_server_pollDelay(NULL), 0xFFFFFFFFu);
@@ -156,20 +154,18 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 8, 256, &length));
 }
 
-static void a_function_that_is_not_served_gets_exception_01(void **state)
+TEST(a_function_that_is_not_served_gets_exception_01)
 {
-    (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     assert_int_equal(ASK("\x04\0\0\0\1"), 5);
     assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
 }
 
-static void a_unit_without_services_does_not_answer(void **state)
+TEST(a_unit_without_services_does_not_answer)
 {
     static mbm_unit places[3];
 
-    (void)state;
     memset(places, 0, sizeof places);
     OK(mbm_server_beginRtu(&server, &port, places, 3, frame, sizeof frame));
     assert_int_equal(ASK("\x03\0\0\0\1"), 0);
@@ -195,12 +191,11 @@ static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
     return (int16_t)capacity;
 }
 
-static void a_poll_ends_while_a_peer_floods(void **state)
+TEST(a_poll_ends_while_a_peer_floods)
 {
     static char request[] = "\0\1\0\0\0\6\x63\x03\0\0\0\1";
     mbm_port flooded = port;
 
-    (void)state;
     flooded.read = flooded_read;
     flooded.context = request;
     OK(mbm_server_beginTcp(&server, &flooded, &unit, 1, frame, sizeof frame));
@@ -218,9 +213,8 @@ static void a_poll_ends_while_a_peer_floods(void **state)
     assert_int_equal(wire.length, 0);
 }
 
-static void tables_without_storage_have_no_addresses(void **state)
+TEST(tables_without_storage_have_no_addresses)
 {
-    (void)state;
     table.words = NULL;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
@@ -228,11 +222,10 @@ static void tables_without_storage_have_no_addresses(void **state)
     assert_memory_equal(wire.sent, "\x11\x83\x02", 3);
 }
 
-static void registering_twice_is_the_same_as_once(void **state)
+TEST(registering_twice_is_the_same_as_once)
 {
     mbm_registerTable inputs = {.words = words, .size = 10};
 
-    (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_unit_serveInputRegisters(&unit, &inputs));
@@ -243,17 +236,15 @@ static void registering_twice_is_the_same_as_once(void **state)
     assert_memory_equal(wire.sent, "\x11\x85\x01", 3);
 }
 
-static void mask_and_read_write_need_holding_registers(void **state)
+TEST(mask_and_read_write_need_holding_registers)
 {
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_registerTable_serveMaskAndReadWrite(&table));
     OK(mbm_unit_serveInputRegisters(&unit, &table));
     IS(MBM_INVALID_ARGUMENT, mbm_registerTable_serveMaskAndReadWrite(&table));
 }
 
-static void a_function_is_switched_off_and_on(void **state)
+TEST(a_function_is_switched_off_and_on)
 {
-    (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_unit_switchFunction(&unit, &switches, MBM_FC_WRITE_SINGLE_REGISTER, 0));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
@@ -281,9 +272,8 @@ static uint16_t own(void *context, const mbm_request *request, uint8_t *response
     return custom_result;
 }
 
-static void a_custom_function_determines_the_response(void **state)
+TEST(a_custom_function_determines_the_response)
 {
-    (void)state;
     custom.serve = own;
     custom.context = &custom_result;
     custom.code = 0x64;
@@ -324,9 +314,8 @@ static void a_custom_function_determines_the_response(void **state)
     assert_int_equal(wire.length, 4);
 }
 
-static void a_custom_function_of_code_0_serves_all_others(void **state)
+TEST(a_custom_function_of_code_0_serves_all_others)
 {
-    (void)state;
     custom.serve = own;
     custom.context = &custom_result;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
@@ -351,11 +340,10 @@ static uint16_t count_reads(void *context, uint16_t address)
 }
 
 /* Serial line guide V1.02, 2.1: only writes may be broadcast. */
-static void a_broadcast_is_carried_out_only_if_it_only_writes(void **state)
+TEST(a_broadcast_is_carried_out_only_if_it_only_writes)
 {
     static mbm_dataCallbacks cells;
 
-    (void)state;
     memset(&cells, 0, sizeof cells);
     cells.get = count_reads;
     custom.serve = own;
@@ -388,9 +376,8 @@ static void a_broadcast_is_carried_out_only_if_it_only_writes(void **state)
     assert_int_equal(reads, 1);
 }
 
-static void a_response_that_the_port_accepts_in_pieces_is_sent_completely(void **state)
+TEST(a_response_that_the_port_accepts_in_pieces_is_sent_completely)
 {
-    (void)state;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     for (wire.piece = 1; wire.piece < 9; wire.piece++) {
@@ -401,14 +388,13 @@ static void a_response_that_the_port_accepts_in_pieces_is_sent_completely(void *
     }
 }
 
-static void the_length_rule_of_a_custom_function_frames_rtu_over_tcp(void **state)
+TEST(the_length_rule_of_a_custom_function_frames_rtu_over_tcp)
 {
     mbm_rule rules[] = {{MBM_RULE_FIXED, 4, 0}, {MBM_RULE_COUNTED, 1, 1}, {MBM_RULE_SILENCE, 0, 0}};
     const char *pdus[] = {"\144abc", "\144\1x!", "\14412345"};
     const size_t lengths[] = {4, 4, 6};
     unsigned i;
 
-    (void)state;
     custom.serve = own;
     custom.context = &custom_result;
     custom.code = 0x64;
@@ -444,9 +430,8 @@ static void restart(void *context, uint8_t clear_log)
     cleared += clear_log;
 }
 
-static void a_restart_is_reported(void **state)
+TEST(a_restart_is_reported)
 {
-    (void)state;
     diagnostics.restart = restart;
     diagnostics.context = &diagnostics;
     diagnostics.diagnosticRegister = 0xABCD;
@@ -460,9 +445,8 @@ static void a_restart_is_reported(void **state)
     assert_int_equal(restarts * 10 + cleared, 21);
 }
 
-static void a_lost_link_is_reported_and_poll_delay_is_the_silence(void **state)
+TEST(a_lost_link_is_reported_and_poll_delay_is_the_silence)
 {
-    (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_setSilence(&server, 5000));
     OK(mbm_server_poll(&server));
@@ -473,30 +457,4 @@ static void a_lost_link_is_reported_and_poll_delay_is_the_silence(void **state)
     assert_int_equal(mbm_server_pollDelay(&server), 4900);
     wire.lost = 1;
     IS(MBM_LINK_LOST, mbm_server_poll(&server));
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(an_object_that_was_never_begun_is_not_initialised),
-        TEST(null_is_an_invalid_argument),
-        TEST(a_function_that_is_not_served_gets_exception_01),
-        TEST(a_unit_without_services_does_not_answer),
-        TEST(a_poll_ends_while_a_peer_floods),
-        TEST(tables_without_storage_have_no_addresses),
-        TEST(registering_twice_is_the_same_as_once),
-        TEST(mask_and_read_write_need_holding_registers),
-        TEST(a_function_is_switched_off_and_on),
-        TEST(a_custom_function_determines_the_response),
-        TEST(a_custom_function_of_code_0_serves_all_others),
-        TEST(a_broadcast_is_carried_out_only_if_it_only_writes),
-        TEST(a_response_that_the_port_accepts_in_pieces_is_sent_completely),
-        TEST(the_length_rule_of_a_custom_function_frames_rtu_over_tcp),
-        TEST(a_restart_is_reported),
-        TEST(a_lost_link_is_reported_and_poll_delay_is_the_silence),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

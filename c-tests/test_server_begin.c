@@ -16,9 +16,8 @@ static uint8_t frame[MBM_MAX_ASCII_FRAME];
 static hooked_port wire;
 static mbm_port port;
 
-static int reset(void **state)
+static void reset(void)
 {
-    (void)state;
     memset(&server, 0, sizeof server);
     memset(&unit, 0, sizeof unit);
     memset(&table, 0, sizeof table);
@@ -30,8 +29,9 @@ static int reset(void **state)
     table.words = words;
     table.size = 10;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 /* Polls until a request that has arrived is answered. Returns the length of what was sent. */
 static size_t answer(void)
@@ -58,14 +58,13 @@ static void calls_within_the_driver_hook(int hook)
     }
 }
 
-static void a_begin_while_a_response_is_sent_switches_the_driver_off(void **state)
+TEST(a_begin_while_a_response_is_sent_switches_the_driver_off)
 {
     static const begin begins[] = {mbm_server_beginRtu, mbm_server_beginAscii, mbm_server_beginTcp,
                                    mbm_server_beginRtuOverTcp};
     mbm_port stuck = port, other = port;
     unsigned i;
 
-    (void)state;
     stuck.flush = never_drained;
     other.postTransmission = NULL;
     wire.within = calls_within_the_driver_hook;
@@ -88,12 +87,11 @@ static void a_begin_while_a_response_is_sent_switches_the_driver_off(void **stat
     assert_int_equal(answer(), 7);
 }
 
-static void a_baud_rate_is_refused_except_on_an_rtu_line(void **state)
+TEST(a_baud_rate_is_refused_except_on_an_rtu_line)
 {
     static const char request[] = ":110300000001EB\r\n", response[] = ":1103020000EA\r\n";
     unsigned i;
 
-    (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_setBaudRate(&server, 115200));
     OK(mbm_server_setEchoDiscard(&server, 1));
@@ -127,14 +125,13 @@ static int16_t noisy_read(void *context, uint8_t *bytes, uint16_t capacity)
     return (int16_t)capacity;
 }
 
-static void a_poll_reads_at_most_1200_bytes_of_noise(void **state)
+TEST(a_poll_reads_at_most_1200_bytes_of_noise)
 {
     static const begin begins[] = {mbm_server_beginRtu, mbm_server_beginAscii,
                                    mbm_server_beginRtuOverTcp};
     mbm_port noisy = port;
     unsigned i, polls;
 
-    (void)state;
     noisy.read = noisy_read;
     for (i = 0; i < COUNT(begins); i++) {
         OK(begins[i](&server, &noisy, &unit, 1, frame, 64));
@@ -146,12 +143,11 @@ static void a_poll_reads_at_most_1200_bytes_of_noise(void **state)
     }
 }
 
-static void a_frame_that_fills_the_buffer_after_noise_is_answered(void **state)
+TEST(a_frame_that_fills_the_buffer_after_noise_is_answered)
 {
     uint8_t bytes[120] = {0};
     unsigned noise;
 
-    (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, 16));
     for (noise = 0; noise < 100; noise++) {
         memset(bytes, 0x5A, noise);
@@ -161,18 +157,4 @@ static void a_frame_that_fills_the_buffer_after_noise_is_answered(void **state)
         assert_int_equal(answer(), 8);
         assert_int_equal(words[1], 0x0304);
     }
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_begin_while_a_response_is_sent_switches_the_driver_off),
-        TEST(a_baud_rate_is_refused_except_on_an_rtu_line),
-        TEST(a_poll_reads_at_most_1200_bytes_of_noise),
-        TEST(a_frame_that_fills_the_buffer_after_noise_is_answered),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

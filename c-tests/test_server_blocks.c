@@ -135,13 +135,12 @@ static int is_answered(const uart *from, uint32_t baud, unsigned quantity)
     return line.answers == 1 && line.other == 0;
 }
 
-static void requests_of_every_length_in_blocks_are_answered(void **state)
+TEST(requests_of_every_length_in_blocks_are_answered)
 {
     const char *path = getenv("MBM_FAULT_TABLE");
     FILE *table = path ? fopen(path, "w") : NULL;
     unsigned i, r, quantity;
 
-    (void)state;
     if (table)
         fprintf(table, "| the UART hands over | delay | 1200 baud | 9600 | 19200 | 115200 |\n"
                        "|---|---|---|---|---|---|\n");
@@ -175,13 +174,12 @@ static int16_t receive_from_ring(void *context, uint8_t *bytes, uint16_t capacit
 }
 
 /* The callback comes when half of the DMA's buffer is full, and when the line is idle. */
-static void a_ring_that_a_dma_callback_fills_gives_every_request(void **state)
+TEST(a_ring_that_a_dma_callback_fills_gives_every_request)
 {
     const mbm_port port = {.read = receive_from_ring, .write = transmit, .micros = micros};
     const uint32_t baud = 9600, character = BITS * 1000000u / baud;
     unsigned half, quantity;
 
-    (void)state;
     for (half = 8; half <= 128; half *= 2)
         for (quantity = 1; quantity <= MOST; quantity++) {
             uint8_t request[300] = {
@@ -266,14 +264,13 @@ static void poll_server(void)
         OK(mbm_server_poll(&server));
 }
 
-static void libmodbus_and_mbm_answer_a_request_through_an_adapter(void **state)
+TEST(libmodbus_and_mbm_answer_a_request_through_an_adapter)
 {
     pthread_t thread;
     mbm_tty tty;
     mbm_port port;
     pty ours;
 
-    (void)state;
     pty_open(&ours);
     theirs = modbus_new_rtu(ours.path, 9600, 'N', 8, 1);
     cells = modbus_mapping_new(0, 0, MOST, 0);
@@ -301,14 +298,13 @@ static void libmodbus_and_mbm_answer_a_request_through_an_adapter(void **state)
     pty_close(&ours);
 }
 
-static void a_server_that_waits_tells_a_program_how_long(void **state)
+TEST(a_server_that_waits_tells_a_program_how_long)
 {
     const uint32_t silence = 38500000 / 9600 + 1;
     const uint32_t missing = (247 + 10) * (BITS * 1000000u / 9600 + 1);
     static const int32_t latencies[] = {-1, 0, 20, 65535}; /* in ms; -1 is the default */
     size_t i;
 
-    (void)state;
     for (i = 0; i < sizeof latencies / sizeof *latencies; i++) {
         const uint32_t latency = 1000 * (uint32_t)(latencies[i] < 0 ? 50 : latencies[i]);
         const uint32_t wait = silence + missing + latency;
@@ -330,16 +326,4 @@ static void a_server_that_waits_tells_a_program_how_long(void **state)
         OK(mbm_server_poll(&server));
         assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFF);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(requests_of_every_length_in_blocks_are_answered),
-        cmocka_unit_test(a_ring_that_a_dma_callback_fills_gives_every_request),
-        cmocka_unit_test(libmodbus_and_mbm_answer_a_request_through_an_adapter),
-        cmocka_unit_test(a_server_that_waits_tells_a_program_how_long),
-    };
-
-    return cmocka_run_group_tests_name("a server and blocks of bytes", tests, NULL, NULL);
 }

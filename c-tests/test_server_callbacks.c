@@ -32,9 +32,8 @@ static void set(void *context, uint16_t address, uint16_t value)
     sets++;
 }
 
-static int reset(void **state)
+static void reset(void)
 {
-    (void)state;
     memset(&unit, 0, sizeof unit);
     memset(&cells, 0, sizeof cells);
     memset(&table, 0, sizeof table);
@@ -48,8 +47,9 @@ static int reset(void **state)
     bits.bits = coils;
     bits.size = 8;
     watched_reset();
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 /* Sends a PDU, a string literal without its final zero byte, and expects another. */
 #define ANSWERS(pdu, response) answers(pdu, sizeof pdu - 1, response, sizeof response - 1)
@@ -67,9 +67,8 @@ static void answers(const char *pdu, size_t length, const char *response, size_t
     assert_memory_equal(frame + 1, response, expected);
 }
 
-static void registers_without_set_are_read_only(void **state)
+TEST(registers_without_set_are_read_only)
 {
-    (void)state;
     OK(mbm_unit_serveCallbacks(&unit, &cells, 3));
     ANSWERS("\3\0\1\0\2", "\3\4\1\1\1\2");
     gets = 0;
@@ -80,9 +79,8 @@ static void registers_without_set_are_read_only(void **state)
     assert_int_equal(gets, 0);
 }
 
-static void coils_without_set_are_read_only(void **state)
+TEST(coils_without_set_are_read_only)
 {
-    (void)state;
     OK(mbm_unit_serveCallbacks(&unit, &cells, 1));
     ANSWERS("\1\0\1\0\3", "\1\1\7");
     gets = 0;
@@ -91,9 +89,8 @@ static void coils_without_set_are_read_only(void **state)
     assert_int_equal(gets, 0);
 }
 
-static void a_later_record_takes_the_writes_of_read_only_cells(void **state)
+TEST(a_later_record_takes_the_writes_of_read_only_cells)
 {
-    (void)state;
     OK(mbm_unit_serveCallbacks(&unit, &cells, 3));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_registerTable_serveMaskAndReadWrite(&table));
@@ -103,9 +100,8 @@ static void a_later_record_takes_the_writes_of_read_only_cells(void **state)
     assert_int_equal(words[1], 0x102);
 }
 
-static void cells_that_get_a_set_can_be_written_from_then_on(void **state)
+TEST(cells_that_get_a_set_can_be_written_from_then_on)
 {
-    (void)state;
     OK(mbm_unit_serveCallbacks(&unit, &cells, 3));
     ANSWERS("\6\0\1\0\2", "\x86\1");
     cells.set = set;
@@ -113,9 +109,8 @@ static void cells_that_get_a_set_can_be_written_from_then_on(void **state)
     assert_int_equal(sets, 1);
 }
 
-static void hooks_of_callbacks_are_called_with_the_arguments(void **state)
+TEST(hooks_of_callbacks_are_called_with_the_arguments)
 {
-    (void)state;
     cells.set = set;
     OK(mbm_unit_serveCallbacks(&unit, &cells, 3));
     OK(mbm_dataCallbacks_setHooks(&cells, &watching.hooks));
@@ -141,9 +136,8 @@ static void hooks_of_callbacks_are_called_with_the_arguments(void **state)
     assert_int_equal(gets + sets, 0);
 }
 
-static void hooks_of_bits_see_one_bit_for_each_cell(void **state)
+TEST(hooks_of_bits_see_one_bit_for_each_cell)
 {
-    (void)state;
     cells.set = set;
     OK(mbm_unit_serveCallbacks(&unit, &cells, 1));
     OK(mbm_dataCallbacks_setHooks(&cells, &watching.hooks));
@@ -153,12 +147,11 @@ static void hooks_of_bits_see_one_bit_for_each_cell(void **state)
 }
 
 /* Sets and removes the hooks of each kind of record. */
-static void hooks_are_set_before_or_after_registering_and_removed(void **state)
+TEST(hooks_are_set_before_or_after_registering_and_removed)
 {
     static mbm_files files;
     static mbm_file file;
 
-    (void)state;
     memset(&files, 0, sizeof files);
     file.records = words;
     file.size = 8;
@@ -197,11 +190,10 @@ static void hooks_are_set_before_or_after_registering_and_removed(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_files_setHooks(NULL, &watching.hooks));
 }
 
-static void hooks_that_are_all_null_change_nothing(void **state)
+TEST(hooks_that_are_all_null_change_nothing)
 {
     static const mbm_accessHooks none;
 
-    (void)state;
     OK(mbm_registerTable_setHooks(&table, &none));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_registerTable_serveMaskAndReadWrite(&table));
@@ -222,9 +214,8 @@ static void remove_hooks(char hook, const mbm_access *access)
     OK(mbm_registerTable_setHooks(&table, NULL));
 }
 
-static void a_hook_that_removes_the_hooks_is_the_last_for_its_request(void **state)
+TEST(a_hook_that_removes_the_hooks_is_the_last_for_its_request)
 {
-    (void)state;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_registerTable_setHooks(&table, &watching.hooks));
     watching.within = remove_hooks;
@@ -243,12 +234,11 @@ static void a_hook_that_removes_the_hooks_is_the_last_for_its_request(void **sta
     watched_were("");
 }
 
-static void a_response_that_does_not_fit_calls_no_hook(void **state)
+TEST(a_response_that_does_not_fit_calls_no_hook)
 {
     uint8_t small[12] = {UNIT, 3, 0, 0, 0, 8};
     uint16_t answered;
 
-    (void)state;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_registerTable_setHooks(&table, &watching.hooks));
     seal(small, 6);
@@ -256,24 +246,4 @@ static void a_response_that_does_not_fit_calls_no_hook(void **state)
                         &answered));
     assert_memory_equal(small, "\x11\x83\4", 3);
     watched_were("");
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(registers_without_set_are_read_only),
-        TEST(coils_without_set_are_read_only),
-        TEST(a_later_record_takes_the_writes_of_read_only_cells),
-        TEST(cells_that_get_a_set_can_be_written_from_then_on),
-        TEST(hooks_of_callbacks_are_called_with_the_arguments),
-        TEST(hooks_of_bits_see_one_bit_for_each_cell),
-        TEST(hooks_are_set_before_or_after_registering_and_removed),
-        TEST(hooks_that_are_all_null_change_nothing),
-        TEST(a_hook_that_removes_the_hooks_is_the_last_for_its_request),
-        TEST(a_response_that_does_not_fit_calls_no_hook),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

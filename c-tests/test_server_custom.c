@@ -64,9 +64,8 @@ static void add(unsigned which, uint8_t code)
     OK(mbm_unit_serveCustom(&unit, &ours[which]));
 }
 
-static int reset(void **state)
+static void reset(void)
 {
-    (void)state;
     memset(&server, 0, sizeof server);
     memset(&unit, 0, sizeof unit);
     memset(&table, 0, sizeof table);
@@ -75,8 +74,9 @@ static int reset(void **state)
     table.words = words;
     table.size = 4;
     OK(mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame));
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 /* Returns the number of the record that answers a request of this function, -1 for the
  * table, -2 for exception 01. */
@@ -97,7 +97,7 @@ static int answers(uint8_t function)
     return wire.length == HEAD + 2 ? wire.sent[HEAD + 1] : -1;
 }
 
-static void a_custom_function_is_found_at_any_place(void **state)
+TEST(a_custom_function_is_found_at_any_place)
 {
     unsigned count, at, i;
 
@@ -106,7 +106,7 @@ static void a_custom_function_is_found_at_any_place(void **state)
         for (at = 0; at <= MBM_MAX_SERVICES; at++) {
             if (count == MBM_MAX_SERVICES && at < MBM_MAX_SERVICES)
                 continue;
-            reset(state);
+            reset();
             for (i = 0; i < count; i++) {
                 if (i == at)
                     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
@@ -122,12 +122,12 @@ static void a_custom_function_is_found_at_any_place(void **state)
     }
 }
 
-static void a_custom_function_of_code_0_is_called_in_its_order(void **state)
+TEST(a_custom_function_of_code_0_is_called_in_its_order)
 {
     unsigned zero, i;
 
     for (zero = 0; zero < MBM_MAX_SERVICES; zero++) {
-        reset(state);
+        reset();
         for (i = 0; i < MBM_MAX_SERVICES; i++)
             add(i, i == zero ? 0 : (uint8_t)(FIRST_CODE + i));
         for (i = 0; i < MBM_MAX_SERVICES; i++)
@@ -136,11 +136,10 @@ static void a_custom_function_of_code_0_is_called_in_its_order(void **state)
     }
 }
 
-static void a_code_that_is_changed_counts_from_then_on(void **state)
+TEST(a_code_that_is_changed_counts_from_then_on)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < MBM_MAX_SERVICES; i++)
         add(i, (uint8_t)(FIRST_CODE + i));
     ours[13].code = 100;
@@ -148,11 +147,10 @@ static void a_code_that_is_changed_counts_from_then_on(void **state)
     assert_int_equal(answers(FIRST_CODE + 13), -2);
 }
 
-static void a_record_that_was_zeroed_serves_nothing(void **state)
+TEST(a_record_that_was_zeroed_serves_nothing)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < MBM_MAX_SERVICES; i++)
         add(i, (uint8_t)(FIRST_CODE + i));
     memset(&ours[6], 0, sizeof ours[6]);
@@ -191,13 +189,12 @@ static void add_declining(unsigned which, uint8_t code)
     OK(mbm_unit_serveCustom(&unit, &ours[which]));
 }
 
-static void a_function_that_declines_leaves_the_request_to_the_built_in_one(void **state)
+TEST(a_function_that_declines_leaves_the_request_to_the_built_in_one)
 {
     unsigned before, i;
 
-    (void)state;
     for (before = 0; before < MBM_MAX_SERVICES - 1; before++) {
-        reset(state);
+        reset();
         for (i = 0; i < before; i++)
             add(i, (uint8_t)(FIRST_CODE + i));
         add_declining(before, 3);
@@ -209,9 +206,8 @@ static void a_function_that_declines_leaves_the_request_to_the_built_in_one(void
     }
 }
 
-static void a_function_before_the_built_in_one_may_answer_or_refuse(void **state)
+TEST(a_function_before_the_built_in_one_may_answer_or_refuse)
 {
-    (void)state;
     add_declining(0, 3);
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     declining.reply = 1;
@@ -223,9 +219,8 @@ static void a_function_before_the_built_in_one_may_answer_or_refuse(void **state
     assert_int_equal(declining.calls, 3);
 }
 
-static void a_function_that_declines_leaves_the_request_to_the_next_of_its_code(void **state)
+TEST(a_function_that_declines_leaves_the_request_to_the_next_of_its_code)
 {
-    (void)state;
     add_declining(0, FIRST_CODE);
     add_declining(1, 0);
     add(2, FIRST_CODE);
@@ -234,20 +229,18 @@ static void a_function_that_declines_leaves_the_request_to_the_next_of_its_code(
     assert_int_equal(declining.calls, 2);
 }
 
-static void a_request_that_all_decline_is_answered_with_exception_01(void **state)
+TEST(a_request_that_all_decline_is_answered_with_exception_01)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < MBM_MAX_SERVICES; i++)
         add_declining(i, i % 2 ? FIRST_CODE : 0);
     assert_int_equal(answers(FIRST_CODE), -2);
     assert_int_equal(declining.calls, MBM_MAX_SERVICES);
 }
 
-static void a_function_that_was_pending_may_decline_then(void **state)
+TEST(a_function_that_was_pending_may_decline_then)
 {
-    (void)state;
     add_declining(0, 3);
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     declining.reply = MBM_REPLY_PENDING;
@@ -263,11 +256,10 @@ static void a_function_that_was_pending_may_decline_then(void **state)
     assert_int_equal(declining.calls, 3);
 }
 
-static void a_declined_request_is_counted_as_the_record_that_answers_has_it(void **state)
+TEST(a_declined_request_is_counted_as_the_record_that_answers_has_it)
 {
     static mbm_diagnostics diagnostics;
 
-    (void)state;
     memset(&diagnostics, 0, sizeof diagnostics);
     add_declining(0, 0);
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
@@ -280,9 +272,8 @@ static void a_declined_request_is_counted_as_the_record_that_answers_has_it(void
     assert_int_equal(diagnostics.exceptionErrors, 1);
 }
 
-static void a_decline_with_other_bits_is_exception_04(void **state)
+TEST(a_decline_with_other_bits_is_exception_04)
 {
-    (void)state;
     add_declining(0, 3);
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     declining.reply = MBM_REPLY_DECLINED | 1;
@@ -293,14 +284,13 @@ static void a_decline_with_other_bits_is_exception_04(void **state)
     assert_memory_equal(wire.sent + HEAD, "\x83\4", 2);
 }
 
-static void a_function_gets_the_connection_of_its_request(void **state)
+TEST(a_function_gets_the_connection_of_its_request)
 {
     int connection;
     mbm_port own = port;
     uint8_t request[MBM_MAX_FRAME] = {UNIT, FIRST_CODE, 7};
     uint16_t length;
 
-    (void)state;
     add_declining(0, FIRST_CODE);
     own.context = &connection;
     OK(mbm_server_beginTcp(&server, &own, &unit, 1, frame, sizeof frame));
@@ -314,26 +304,4 @@ static void a_function_gets_the_connection_of_its_request(void **state)
     assert_int_equal(length, 5);
     assert_int_equal(declining.first, 7);
     assert_ptr_equal(declining.connection, words);
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_custom_function_is_found_at_any_place),
-        TEST(a_custom_function_of_code_0_is_called_in_its_order),
-        TEST(a_code_that_is_changed_counts_from_then_on),
-        TEST(a_record_that_was_zeroed_serves_nothing),
-        TEST(a_function_that_declines_leaves_the_request_to_the_built_in_one),
-        TEST(a_function_before_the_built_in_one_may_answer_or_refuse),
-        TEST(a_function_that_declines_leaves_the_request_to_the_next_of_its_code),
-        TEST(a_request_that_all_decline_is_answered_with_exception_01),
-        TEST(a_function_that_was_pending_may_decline_then),
-        TEST(a_declined_request_is_counted_as_the_record_that_answers_has_it),
-        TEST(a_decline_with_other_bits_is_exception_04),
-        TEST(a_function_gets_the_connection_of_its_request),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -21,9 +21,8 @@ static modbus_t *ready(modbus_t *client)
     return client;
 }
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     watched_reset();
     served_prepare(&rtu);
     served_prepare(&ascii);
@@ -37,12 +36,10 @@ static int start(void **state)
     line = ready(modbus_new_rtu(rtu.line.path, 115200, 'N', 8, 1));
     first = ready(modbus_new_tcp("127.0.0.1", tcp.port));
     second = ready(modbus_new_tcp("127.0.0.1", tcp.port));
-    return 0;
 }
 
-static int stop(void **state)
+static void stop(void)
 {
-    (void)state;
     modbus_close(line);
     modbus_close(first);
     modbus_close(second);
@@ -52,15 +49,16 @@ static int stop(void **state)
     served_stop(&rtu);
     served_stop(&ascii);
     served_stop(&tcp);
-    return 0;
 }
 
-static int reset(void **state)
+fixture all_tests = {start, stop};
+
+static void reset(void)
 {
-    (void)state;
     watched_reset();
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 /* The result of a libmodbus call that an exception answers. */
 #define EXCEPTION(code, call)                                                                      \
@@ -82,12 +80,11 @@ static void reads_are_refused_by(modbus_t *client, uint8_t code)
     watched_were("r17/01 100+8;r17/02 101+3;r17/03 102+4;r17/04 103+1;");
 }
 
-static void a_read_is_refused_with_every_exception(void **state)
+TEST(a_read_is_refused_with_every_exception)
 {
     uint16_t word;
     uint8_t code;
 
-    (void)state;
     for (code = 1; code <= 11; code++) {
         watching.refuse_read = code;
         reads_are_refused_by(line, code);
@@ -98,11 +95,10 @@ static void a_read_is_refused_with_every_exception(void **state)
     assert_int_equal(word, served_pattern(SERVED_BASE));
 }
 
-static void a_code_that_is_no_exception_refuses_with_04(void **state)
+TEST(a_code_that_is_no_exception_refuses_with_04)
 {
     uint16_t word;
 
-    (void)state;
     for (watching.refuse_read = 255; watching.refuse_read > 127; watching.refuse_read--) {
         EXCEPTION(4, modbus_read_registers(first, SERVED_BASE, 1, &word));
         watching.refuse_write = watching.refuse_read;
@@ -131,12 +127,11 @@ static void refresh(char hook, const mbm_access *access)
             rtu.bits[i / 8] = (uint8_t)(refreshed % 2 ? 0x55 : 0xAA);
 }
 
-static void a_hook_refreshes_the_cells_that_are_read(void **state)
+TEST(a_hook_refreshes_the_cells_that_are_read)
 {
     uint16_t words[3];
     uint8_t bits[3];
 
-    (void)state;
     refreshed = 0;
     watching.within = refresh;
     assert_int_equal(modbus_read_registers(line, SERVED_BASE + 5, 3, words), 3);
@@ -167,18 +162,16 @@ static void writes_are_watched(modbus_t *client)
     watched_were("w17/10 101+3 00010203FFFF;a17/10 101+3 00010203FFFF;");
 }
 
-static void a_write_is_watched_with_its_arguments(void **state)
+TEST(a_write_is_watched_with_its_arguments)
 {
-    (void)state;
     writes_are_watched(line);
     assert_ptr_equal(watching.connection, &rtu.fds[0]);
     writes_are_watched(first);
     writes_are_watched(second);
 }
 
-static void a_write_over_ascii_is_watched_too(void **state)
+TEST(a_write_over_ascii_is_watched_too)
 {
-    (void)state;
     asked_frames(ascii.line.theirs, MBM_FRAMING_ASCII, SERVED_UNIT,
                  (const uint8_t *)"\x10\0\144\0\1\2\xAB\xCD", 8, (const uint8_t *)"\x10\0\144\0\1",
                  5);
@@ -189,14 +182,13 @@ static void a_write_over_ascii_is_watched_too(void **state)
     watched_were("r17/03 100+1;");
 }
 
-static void a_write_is_refused_with_every_exception(void **state)
+TEST(a_write_is_refused_with_every_exception)
 {
     static const uint16_t words[] = {1, 2};
     static const uint8_t bits[] = {1, 1};
     uint16_t before[sizeof rtu.words / 2];
     uint8_t coils[sizeof rtu.bits], code;
 
-    (void)state;
     memcpy(before, rtu.words, sizeof before);
     memcpy(coils, rtu.bits, sizeof coils);
     for (code = 1; code <= 11; code++) {
@@ -220,11 +212,10 @@ static void let_one_write(char hook, const mbm_access *access)
         (uint8_t)(hook != 'w' || access->connection == writer ? 0 : MBM_ILLEGAL_FUNCTION);
 }
 
-static void two_connections_are_told_apart(void **state)
+TEST(two_connections_are_told_apart)
 {
     uint16_t word;
 
-    (void)state;
     assert_int_equal(modbus_read_registers(first, SERVED_BASE, 1, &word), 1);
     writer = watching.connection;
     assert_int_equal(modbus_read_registers(second, SERVED_BASE, 1, &word), 1);
@@ -238,11 +229,10 @@ static void two_connections_are_told_apart(void **state)
     assert_int_equal(word, 77);
 }
 
-static void a_broadcast_is_watched_as_unit_0(void **state)
+TEST(a_broadcast_is_watched_as_unit_0)
 {
     uint16_t word;
 
-    (void)state;
     asked_frames(modbus_get_socket(line), MBM_FRAMING_RTU, 0, (const uint8_t *)"\x06\0\x64\x33\x44",
                  5, NULL, 0);
     AWAIT(rtu.words[0] == 0x3344);
@@ -256,12 +246,11 @@ static void a_broadcast_is_watched_as_unit_0(void **state)
     watched_were("r17/03 100+1;");
 }
 
-static void read_write_multiple_calls_all_hooks_before_it_writes(void **state)
+TEST(read_write_multiple_calls_all_hooks_before_it_writes)
 {
     static const uint16_t words[] = {0x1111, 0x2222};
     uint16_t back[3], before[sizeof rtu.words / 2];
 
-    (void)state;
     assert_int_equal(
         modbus_write_and_read_registers(line, SERVED_BASE + 1, 2, words, SERVED_BASE, 3, back), 3);
     watched_were("r17/17 100+3;w17/17 101+2 11112222;a17/17 101+2 11112222;");
@@ -286,21 +275,19 @@ static void answer_in_place(char hook, const mbm_access *access)
         rtu.words[access->address - SERVED_BASE] ^= 0xFFFF;
 }
 
-static void read_write_multiple_reads_what_the_hook_after_the_write_has_left(void **state)
+TEST(read_write_multiple_reads_what_the_hook_after_the_write_has_left)
 {
     static const uint16_t command = 0x1234;
     uint16_t back;
 
-    (void)state;
     watching.within = answer_in_place;
     assert_int_equal(
         modbus_write_and_read_registers(line, SERVED_BASE, 1, &command, SERVED_BASE, 1, &back), 1);
     assert_int_equal(back, 0xEDCB);
 }
 
-static void mask_write_calls_the_hooks_of_a_read_and_a_write(void **state)
+TEST(mask_write_calls_the_hooks_of_a_read_and_a_write)
 {
-    (void)state;
     assert_int_equal(modbus_write_register(line, SERVED_BASE, 0x12), 1);
     watched_were("w17/06 100+1 0012;a17/06 100+1 0012;");
     assert_int_equal(modbus_mask_write_register(line, SERVED_BASE, 0xF2, 0x25), 1);
@@ -316,7 +303,7 @@ static void mask_write_calls_the_hooks_of_a_read_and_a_write(void **state)
     assert_int_equal(rtu.words[0], 0x17);
 }
 
-static void a_wrong_request_calls_no_hook(void **state)
+TEST(a_wrong_request_calls_no_hook)
 {
     static const char *const wrong[] = {
         "\3\0\144\0\0",                   /* no register */
@@ -335,7 +322,6 @@ static void a_wrong_request_calls_no_hook(void **state)
     } of[] = {{5, 3}, {5, 2}, {5, 2}, {5, 2}, {5, 3}, {7, 3}, {7, 2}, {12, 2}, {12, 2}};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(wrong); i++) {
         const uint8_t response[] = {(uint8_t)(wrong[i][0] | 0x80), of[i].code};
 
@@ -345,13 +331,12 @@ static void a_wrong_request_calls_no_hook(void **state)
     watched_were("");
 }
 
-static void records_of_files_are_watched_in_each_group(void **state)
+TEST(records_of_files_are_watched_in_each_group)
 {
     static const char write[] = "\x15\x14\6\0\4\0\1\0\2\1\2\3\4\6\0\4\0\7\0\1\5\6";
     static const char read[] = "\x14\x0E\6\0\4\0\1\0\2\6\0\4\0\7\0\1";
     int fd = modbus_get_socket(first);
 
-    (void)state;
     asked_frames(fd, MBM_FRAMING_TCP, SERVED_UNIT, (const uint8_t *)write, sizeof write - 1,
                  (const uint8_t *)write, sizeof write - 1);
     watched_were(
@@ -367,27 +352,4 @@ static void records_of_files_are_watched_in_each_group(void **state)
                  (const uint8_t *)"\x94\x0A", 2);
     watched_were("w17/15 4:1+1 0707;r17/14 4:1+2;");
     assert_int_equal(tcp.records[1], 0x102);
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_read_is_refused_with_every_exception),
-        TEST(a_code_that_is_no_exception_refuses_with_04),
-        TEST(a_hook_refreshes_the_cells_that_are_read),
-        TEST(a_write_is_watched_with_its_arguments),
-        TEST(a_write_over_ascii_is_watched_too),
-        TEST(a_write_is_refused_with_every_exception),
-        TEST(two_connections_are_told_apart),
-        TEST(a_broadcast_is_watched_as_unit_0),
-        TEST(read_write_multiple_calls_all_hooks_before_it_writes),
-        TEST(read_write_multiple_reads_what_the_hook_after_the_write_has_left),
-        TEST(mask_write_calls_the_hooks_of_a_read_and_a_write),
-        TEST(a_wrong_request_calls_no_hook),
-        TEST(records_of_files_are_watched_in_each_group),
-    };
-
-    return cmocka_run_group_tests(tests, start, stop);
 }

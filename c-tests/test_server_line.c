@@ -10,95 +10,84 @@
 static served rtu, ascii;
 static modbus_t *client;
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     served_prepare(&rtu);
     served_on_line(&rtu, MBM_FRAMING_RTU);
     served_prepare(&ascii);
     served_on_line(&ascii, MBM_FRAMING_ASCII);
     client = modbus_new_rtu(rtu.line.path, 115200, 'N', 8, 1);
-    return asked_connect(client, SERVED_UNIT);
+    assert_int_equal(asked_connect(client, SERVED_UNIT), 0);
 }
 
-static int stop(void **state)
+static void stop(void)
 {
-    (void)state;
     modbus_close(client);
     modbus_free(client);
     served_stop(&rtu);
     served_stop(&ascii);
-    return 0;
 }
 
-static void libmodbus_reads_every_table(void **state)
+fixture each_test = {start, stop};
+
+TEST(libmodbus_reads_every_table)
 {
-    (void)state;
     asked_reads(client);
 }
 
-static void libmodbus_writes_every_table(void **state)
+TEST(libmodbus_writes_every_table)
 {
-    (void)state;
     asked_writes(client, &rtu);
 }
 
-static void accesses_at_the_limits_of_every_table_are_right(void **state)
+TEST(accesses_at_the_limits_of_every_table_are_right)
 {
-    (void)state;
     asked_edges(client);
 }
 
-static void a_refused_write_changes_nothing(void **state)
+TEST(a_refused_write_changes_nothing)
 {
-    (void)state;
     asked_refusals(client, &rtu);
 }
 
-static void the_server_id_is_reported(void **state)
+TEST(the_server_id_is_reported)
 {
     uint8_t id[64];
 
-    (void)state;
     assert_int_equal(modbus_report_slave_id(client, sizeof id, id), 8);
     assert_memory_equal(id, "mbm\xFFtest", 8);
 }
 
-static void every_function_is_served(void **state)
+TEST(every_function_is_served)
 {
-    (void)state;
     asked_functions(modbus_get_socket(client), MBM_FRAMING_RTU, &rtu);
 }
 
-static void wrong_byte_counts_are_refused_in_time(void **state)
+TEST(wrong_byte_counts_are_refused_in_time)
 {
-    (void)state;
     asked_lies(modbus_get_socket(client), MBM_FRAMING_RTU, &rtu);
 }
 
-static void ascii_serves_every_function_too(void **state)
+TEST(ascii_serves_every_function_too)
 {
-    (void)state;
     asked_functions(ascii.line.theirs, MBM_FRAMING_ASCII, &ascii);
     asked_lies(ascii.line.theirs, MBM_FRAMING_ASCII, &ascii);
 }
 
-static void a_broadcast_is_carried_out_and_not_answered(void **state)
+TEST(a_broadcast_is_carried_out_and_not_answered)
 {
-    (void)state;
     asked_frames(modbus_get_socket(client), MBM_FRAMING_RTU, 0,
                  (const uint8_t *)"\x06\0\x64\x33\x44", 5, NULL, 0);
     AWAIT(rtu.words[0] == 0x3344);
     assert_int_equal(modbus_write_register(client, SERVED_BASE, 1), 1);
 }
 
-static void foreign_frames_around_requests_are_ignored(void **state)
+TEST(foreign_frames_around_requests_are_ignored)
 {
     static const uint8_t ours[] = {SERVED_UNIT, 3, 0, SERVED_BASE, 0, 1, 0, 0};
     uint8_t bytes[600], answer[600];
     unsigned round, i;
 
-    (void)state;
     for (round = 0; round < 20; round++) {
         size_t n = 0;
 
@@ -119,12 +108,11 @@ static void foreign_frames_around_requests_are_ignored(void **state)
     }
 }
 
-static void damaged_and_cut_frames_are_not_answered(void **state)
+TEST(damaged_and_cut_frames_are_not_answered)
 {
     uint8_t bytes[8] = {SERVED_UNIT, 3, 0, SERVED_BASE, 0, 1}, answer[600];
     size_t length;
 
-    (void)state;
     seal(bytes, 6);
     for (length = 1; length < 8; length++)
         assert_int_equal(asked_bytes(modbus_get_socket(client), bytes, length, answer, 0), 0);
@@ -134,12 +122,11 @@ static void damaged_and_cut_frames_are_not_answered(void **state)
     assert_int_equal(asked_bytes(modbus_get_socket(client), bytes, 8, answer, 7), 7);
 }
 
-static void listen_only_mode_is_silent_until_a_restart(void **state)
+TEST(listen_only_mode_is_silent_until_a_restart)
 {
     int fd = modbus_get_socket(client);
     uint16_t messages;
 
-    (void)state;
     /* Each frame is followed by a wait: of two requests without silence between, only one
      * counts. */
     asked_frames(fd, MBM_FRAMING_RTU, SERVED_UNIT, (const uint8_t *)"\x08\0\x04\0\0", 5, NULL, 0);
@@ -152,27 +139,4 @@ static void listen_only_mode_is_silent_until_a_restart(void **state)
     AWAIT(rtu.diagnostics.listenOnly == 0);
     asked_frames(fd, MBM_FRAMING_RTU, SERVED_UNIT, (const uint8_t *)"\x07", 1,
                  (const uint8_t *)"\x07\x6D", 2);
-}
-
-/* Each test starts a server of its own, so that no test finds the state of another. */
-#define TEST(test) cmocka_unit_test_setup_teardown(test, start, stop)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(libmodbus_reads_every_table),
-        TEST(libmodbus_writes_every_table),
-        TEST(accesses_at_the_limits_of_every_table_are_right),
-        TEST(a_refused_write_changes_nothing),
-        TEST(the_server_id_is_reported),
-        TEST(every_function_is_served),
-        TEST(wrong_byte_counts_are_refused_in_time),
-        TEST(ascii_serves_every_function_too),
-        TEST(a_broadcast_is_carried_out_and_not_answered),
-        TEST(foreign_frames_around_requests_are_ignored),
-        TEST(damaged_and_cut_frames_are_not_answered),
-        TEST(listen_only_mode_is_silent_until_a_restart),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -241,11 +241,10 @@ static size_t some_request(uint8_t *pdu)
     }
 }
 
-static int prepare(void **state)
+static void prepare(void)
 {
     unsigned i;
 
-    (void)state;
     memset(&memory, 0xA5, sizeof memory);
     memset(memory.coils, 0, sizeof memory.coils);
     memset(memory.discrete, 0, sizeof memory.discrete);
@@ -268,11 +267,14 @@ static int prepare(void **state)
     holding.base = inputs.base = coils.base = discrete.base = BASE;
     holding.size = inputs.size = coils.size = discrete.size = CELLS;
     holding.valid = inputs.valid = coils.valid = discrete.valid = valid;
-    return mbm_unit_serveHoldingRegisters(&unit, &holding) |
-           mbm_unit_serveInputRegisters(&unit, &inputs) | mbm_unit_serveCoils(&unit, &coils) |
-           mbm_unit_serveDiscreteInputs(&unit, &discrete) |
-           mbm_registerTable_serveMaskAndReadWrite(&holding);
+    OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
+    OK(mbm_unit_serveInputRegisters(&unit, &inputs));
+    OK(mbm_unit_serveCoils(&unit, &coils));
+    OK(mbm_unit_serveDiscreteInputs(&unit, &discrete));
+    OK(mbm_registerTable_serveMaskAndReadWrite(&holding));
 }
+
+fixture all_tests = {prepare, NULL};
 
 /* The same memory, accessed by callback functions, register by register. */
 static mbm_unit called;
@@ -311,11 +313,10 @@ static void set(void *context, uint16_t address, uint16_t value)
     memory.coils[i / 8] |= (uint8_t)(value << i % 8);
 }
 
-static int prepare_callbacks(void **state)
+static void prepare_callbacks(void)
 {
     uint8_t i, status = MBM_OK;
 
-    (void)state;
     called.id = UNIT;
     for (i = 0; i < 4; i++) {
         callbacks[i].isValid = is_valid;
@@ -326,7 +327,7 @@ static int prepare_callbacks(void **state)
         status |= mbm_unit_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1));
     }
     IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCallbacks(&called, &callbacks[0], 5));
-    return status;
+    OK(status);
 }
 
 /* The same memory in several records: two tables of each kind, then callback functions. */
@@ -364,11 +365,10 @@ static uint8_t serve_piece(unsigned i)
     return status | mbm_unit_serveDiscreteInputs(&split, &bit_pieces[1][i]);
 }
 
-static int prepare_pieces(void **state)
+static void prepare_pieces(void)
 {
     uint8_t i, status = MBM_OK;
 
-    (void)state;
     split.id = UNIT;
     for (i = 0; i < 4; i++) {
         callbacks[i].context = &callbacks[i];
@@ -382,14 +382,12 @@ static int prepare_pieces(void **state)
         status |= mbm_unit_serveCallbacks(&split, &last_pieces[i], (uint8_t)(i + 1));
     status |= serve_piece(0);
     is_split = 1;
-    return status;
+    OK(status);
 }
 
-static int end_pieces(void **state)
+static void end_pieces(void)
 {
-    (void)state;
     is_split = 0;
-    return 0;
 }
 
 static int untouched(const void *guard, size_t bytes)
@@ -448,32 +446,17 @@ static void compare_with_model(mbm_unit *asked)
                 untouched(memory.bits_after, GUARD));
 }
 
-static void only_valid_writes_change_an_array(void **state)
+TEST(only_valid_writes_change_an_array)
 {
-    (void)state;
     compare_with_model(&unit);
 }
 
-static void only_valid_writes_reach_a_callback(void **state)
+TEST_WITH(only_valid_writes_reach_a_callback, prepare_callbacks, NULL)
 {
-    (void)state;
     compare_with_model(&called);
 }
 
-static void only_the_record_with_the_cells_changes_them(void **state)
+TEST_WITH(only_the_record_with_the_cells_changes_them, prepare_pieces, end_pieces)
 {
-    (void)state;
     compare_with_model(&split);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(only_valid_writes_change_an_array),
-        cmocka_unit_test_setup(only_valid_writes_reach_a_callback, prepare_callbacks),
-        cmocka_unit_test_setup_teardown(only_the_record_with_the_cells_changes_them, prepare_pieces,
-                                        end_pieces),
-    };
-
-    return cmocka_run_group_tests(tests, prepare, NULL);
 }

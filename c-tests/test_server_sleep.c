@@ -166,11 +166,10 @@ static int wait_for_tty(uint32_t timeoutUs)
     return mbm_tty_wait(&tty, timeoutUs);
 }
 
-static void on_a_tty_the_server_goes_on_after_the_reply(void **state)
+TEST(on_a_tty_the_server_goes_on_after_the_reply)
 {
     mbm_port port;
 
-    (void)state;
     reset();
     pty_open(&line);
     assert_int_equal(mbm_tty_open(&tty, line.path, 115200, 'E', 1), 0);
@@ -228,11 +227,10 @@ static void close_tcp(int in_set)
     close(link_.fd);
 }
 
-static void over_tcp_the_server_goes_on_after_the_reply(void **state)
+TEST(over_tcp_the_server_goes_on_after_the_reply)
 {
     int in_set, has_header;
 
-    (void)state;
     for (in_set = 0; in_set < 2; in_set++)
         for (has_header = 0; has_header < 2; has_header++) {
             open_tcp(in_set, has_header);
@@ -248,12 +246,11 @@ static int wait_for_udp(uint32_t timeoutUs)
     return mbm_udp_wait(&udp, 1, -1, timeoutUs);
 }
 
-static void over_udp_the_server_goes_on_after_the_reply(void **state)
+TEST(over_udp_the_server_goes_on_after_the_reply)
 {
     const mbm_port port = mbm_udp_port(&udp);
     struct sockaddr_in address = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
 
-    (void)state;
     reset();
     assert_int_equal(mbm_udp_listen(&udp, "127.0.0.1", "0"), 0);
     address.sin_port = htons(udp.port);
@@ -263,15 +260,4 @@ static void over_udp_the_server_goes_on_after_the_reply(void **state)
     goes_on_after_each_reply();
     mbm_udp_close(&udp);
     close(link_.fd);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(on_a_tty_the_server_goes_on_after_the_reply),
-        cmocka_unit_test(over_tcp_the_server_goes_on_after_the_reply),
-        cmocka_unit_test(over_udp_the_server_goes_on_after_the_reply),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

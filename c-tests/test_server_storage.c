@@ -251,14 +251,13 @@ static void flood(begin_function *how, unsigned size)
     }
 }
 
-static void a_frame_of_each_framing_is_kept_inside_a_buffer_of_any_size(void **state)
+TEST(a_frame_of_each_framing_is_kept_inside_a_buffer_of_any_size)
 {
     static begin_function *const all[] = {mbm_server_beginRtu, mbm_server_beginAscii,
                                           mbm_server_beginTcp, mbm_server_beginRtuOverTcp};
     static const unsigned least[] = {16, 32, 260, 16};
     unsigned how, size;
 
-    (void)state;
     for (how = 0; how < 4; how++) {
         for (size = least[how] - 1; size <= MOST; size += size < least[how] + 12 ? 1 : 61) {
             if (!begin(all[how], size)) {
@@ -271,11 +270,10 @@ static void a_frame_of_each_framing_is_kept_inside_a_buffer_of_any_size(void **s
     }
 }
 
-static void noise_of_any_length_is_kept_inside_the_buffer(void **state)
+TEST(noise_of_any_length_is_kept_inside_the_buffer)
 {
     unsigned size;
 
-    (void)state;
     for (size = 16; size <= 300; size += size < 24 ? 1 : 92)
         flood(mbm_server_beginRtu, size);
     flood(mbm_server_beginRtuOverTcp, 16);
@@ -289,13 +287,12 @@ static void noise_of_any_length_is_kept_inside_the_buffer(void **state)
         (void)mbm_server_poll(&server);
 }
 
-static void a_port_that_lies_is_kept_inside_the_buffer(void **state)
+TEST(a_port_that_lies_is_kept_inside_the_buffer)
 {
     static const uint8_t read[] = {3, 0, 0, 0, 2};
     uint8_t frame[2 * MOST];
     unsigned size, turn;
 
-    (void)state;
     for (size = 16; size < 40; size++) {
         assert_true(begin(mbm_server_beginRtu, size));
         line.lies = 1;
@@ -312,13 +309,12 @@ static void a_port_that_lies_is_kept_inside_the_buffer(void **state)
     }
 }
 
-static void an_echo_of_any_length_is_kept_inside_the_buffer(void **state)
+TEST(an_echo_of_any_length_is_kept_inside_the_buffer)
 {
     static const uint8_t read[] = {3, 0, 0, 0, 2};
     uint8_t frame[2 * MOST];
     unsigned size, length, pieces, more;
 
-    (void)state;
     length = framed(frame, mbm_server_beginRtu, read, sizeof read);
     for (size = 16; size < 24; size++) {
         for (pieces = 1; pieces < 12; pieces++) {
@@ -336,9 +332,8 @@ static void an_echo_of_any_length_is_kept_inside_the_buffer(void **state)
     }
 }
 
-static int prepare(void **state)
+static void prepare(void)
 {
-    (void)state;
     unit.id = UNIT;
     holding.words = words;
     holding.size = WORDS;
@@ -346,25 +341,14 @@ static int prepare(void **state)
     coils.size = 2000;
     custom.serve = fill;
     custom.code = ECHO_CODE;
-    return mbm_unit_serveHoldingRegisters(&unit, &holding) || mbm_unit_serveCoils(&unit, &coils) ||
-           mbm_unit_serveCustom(&unit, &custom);
+    OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
+    OK(mbm_unit_serveCoils(&unit, &coils));
+    OK(mbm_unit_serveCustom(&unit, &custom));
 }
 
-static int finish(void **state)
+static void finish(void)
 {
-    (void)state;
     free(line.frame);
-    return 0;
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_frame_of_each_framing_is_kept_inside_a_buffer_of_any_size),
-        cmocka_unit_test(noise_of_any_length_is_kept_inside_the_buffer),
-        cmocka_unit_test(a_port_that_lies_is_kept_inside_the_buffer),
-        cmocka_unit_test(an_echo_of_any_length_is_kept_inside_the_buffer),
-    };
-
-    return cmocka_run_group_tests(tests, prepare, finish);
-}
+fixture all_tests = {prepare, finish};

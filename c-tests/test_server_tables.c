@@ -30,9 +30,8 @@ static void fill(mbm_registerTable *table, uint16_t *words, uint16_t base)
 }
 
 /* Registers 100 to 103 and 200 to 203. */
-static int reset(void **state)
+static void reset(void)
 {
-    (void)state;
     memset(&unit, 0, sizeof unit);
     memset(&diagnostics, 0, sizeof diagnostics);
     memset(&custom, 0, sizeof custom);
@@ -40,8 +39,9 @@ static int reset(void **state)
     custom_calls = reads[0] = reads[1] = 0;
     fill(&low_table, low, 100);
     fill(&high_table, high, 200);
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 static void serve_both(void)
 {
@@ -74,9 +74,8 @@ static unsigned ask_unit(uint8_t id, const char *pdu, size_t length)
         assert_memory_equal(response, expected, sizeof expected - 1);                              \
     } while (0)
 
-static void a_register_of_either_table_is_read_and_written(void **state)
+TEST(a_register_of_either_table_is_read_and_written)
 {
-    (void)state;
     serve_both();
     IS_ANSWERED("\x03\0\144\0\4", "\x03\x08\0\144\0\145\0\146\0\147");
     IS_ANSWERED("\x03\0\310\0\1", "\x03\x02\0\310");
@@ -88,9 +87,8 @@ static void a_register_of_either_table_is_read_and_written(void **state)
     assert_int_equal(high[2], 0x9ABC);
 }
 
-static void cells_that_no_table_has_are_answered_with_exception_02(void **state)
+TEST(cells_that_no_table_has_are_answered_with_exception_02)
 {
-    (void)state;
     serve_both();
     IS_ANSWERED("\x03\0\150\0\1", "\x83\2");
     IS_ANSWERED("\x06\0\1\0\1", "\x86\2");
@@ -99,9 +97,8 @@ static void cells_that_no_table_has_are_answered_with_exception_02(void **state)
 }
 
 /* The tables need not have gaps between them. */
-static void a_request_that_needs_two_tables_is_answered_with_exception_02(void **state)
+TEST(a_request_that_needs_two_tables_is_answered_with_exception_02)
 {
-    (void)state;
     fill(&high_table, high, 104);
     serve_both();
     IS_ANSWERED("\x03\0\146\0\2", "\x03\x04\0\146\0\147");
@@ -112,9 +109,8 @@ static void a_request_that_needs_two_tables_is_answered_with_exception_02(void *
     assert_int_equal(high[0], 104);
 }
 
-static void the_first_of_two_tables_with_the_same_cell_answers(void **state)
+TEST(the_first_of_two_tables_with_the_same_cell_answers)
 {
-    (void)state;
     fill(&high_table, high, 102);
     high[0] = 9999;
     serve_both();
@@ -124,9 +120,8 @@ static void the_first_of_two_tables_with_the_same_cell_answers(void **state)
     IS_ANSWERED("\x03\0\146\0\4", "\x03\x08\x27\x0F\0\147\0\150\0\151");
 }
 
-static void functions_16_and_17_find_the_table_of_their_registers(void **state)
+TEST(functions_16_and_17_find_the_table_of_their_registers)
 {
-    (void)state;
     serve_both();
     OK(mbm_registerTable_serveMaskAndReadWrite(&low_table));
     OK(mbm_registerTable_serveMaskAndReadWrite(&high_table));
@@ -148,12 +143,11 @@ static uint8_t count_read(void *context, const mbm_access *access)
 }
 
 /* A hook that refuses a read with exception 02 decides for the whole request. */
-static void only_the_table_with_the_cells_calls_its_hooks(void **state)
+TEST(only_the_table_with_the_cells_calls_its_hooks)
 {
     static const mbm_accessHooks of_low = {.context = &reads[0], .beforeRead = count_read};
     static const mbm_accessHooks of_high = {.context = &reads[1], .beforeRead = count_read};
 
-    (void)state;
     fill(&high_table, high, 100);
     serve_both();
     OK(mbm_registerTable_setHooks(&low_table, &of_low));
@@ -176,11 +170,10 @@ static uint8_t is_valid(void *context, uint16_t address)
     return address >= 300;
 }
 
-static void a_table_and_callbacks_serve_one_kind_side_by_side(void **state)
+TEST(a_table_and_callbacks_serve_one_kind_side_by_side)
 {
     static mbm_dataCallbacks cells;
 
-    (void)state;
     memset(&cells, 0, sizeof cells);
     cells.get = get;
     cells.isValid = is_valid;
@@ -193,13 +186,12 @@ static void a_table_and_callbacks_serve_one_kind_side_by_side(void **state)
     IS_ANSWERED("\x03\0\1\0\1", "\x83\2");
 }
 
-static void bits_of_several_tables_are_read_and_written(void **state)
+TEST(bits_of_several_tables_are_read_and_written)
 {
     static uint8_t bits[2];
     static mbm_bitTable coils[2];
     unsigned i;
 
-    (void)state;
     memset(coils, 0, sizeof coils);
     for (i = 0; i < 2; i++) {
         bits[i] = 0;
@@ -233,9 +225,8 @@ static void serve_custom(uint8_t code)
 }
 
 /* The unit serves function 03; it only lacks the registers. */
-static void a_function_for_all_others_is_not_called_for_cells_that_tables_lack(void **state)
+TEST(a_function_for_all_others_is_not_called_for_cells_that_tables_lack)
 {
-    (void)state;
     custom_result = 1;
     OK(mbm_unit_serveHoldingRegisters(&unit, &low_table));
     serve_custom(CATCH_ALL);
@@ -248,9 +239,8 @@ static void a_function_for_all_others_is_not_called_for_cells_that_tables_lack(v
     IS_ANSWERED("\x04\0\1\0\1", "\x04\x5A");
 }
 
-static void a_function_after_a_table_answers_for_the_cells_that_it_lacks(void **state)
+TEST(a_function_after_a_table_answers_for_the_cells_that_it_lacks)
 {
-    (void)state;
     OK(mbm_unit_serveHoldingRegisters(&unit, &low_table));
     serve_custom(3);
     custom_result = 1;
@@ -264,9 +254,8 @@ static void a_function_after_a_table_answers_for_the_cells_that_it_lacks(void **
 }
 
 /* One that is registered first decides for all cells. */
-static void exception_02_of_a_function_before_the_tables_is_final(void **state)
+TEST(exception_02_of_a_function_before_the_tables_is_final)
 {
-    (void)state;
     serve_custom(3);
     serve_both();
     custom_result = MBM_REPLY_EXCEPTION | 2;
@@ -275,9 +264,8 @@ static void exception_02_of_a_function_before_the_tables_is_final(void **state)
     IS_ANSWERED("\x03\0\310\0\1", "\x03\x02\0\310");
 }
 
-static void a_unit_with_diagnostics_counts_a_request_once(void **state)
+TEST(a_unit_with_diagnostics_counts_a_request_once)
 {
-    (void)state;
     OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
     serve_both();
     IS_ANSWERED("\x03\0\310\0\1", "\x03\x02\0\310");
@@ -288,22 +276,20 @@ static void a_unit_with_diagnostics_counts_a_request_once(void **state)
     assert_int_equal(diagnostics.events, 1);
 }
 
-static void a_broadcast_reaches_the_table_that_has_the_cells(void **state)
+TEST(a_broadcast_reaches_the_table_that_has_the_cells)
 {
-    (void)state;
     serve_both();
     assert_int_equal(ask_unit(0, "\x06\0\311\x56\x78", 5), 0);
     assert_int_equal(high[1], 0x5678);
     assert_int_equal(ask_unit(0, "\x06\0\1\x56\x78", 5), 0);
 }
 
-static void files_of_several_records_are_read_and_written(void **state)
+TEST(files_of_several_records_are_read_and_written)
 {
     static const mbm_file files[2] = {{low, 4, 1}, {high, 4, 2}};
     static mbm_files records[2];
     unsigned i;
 
-    (void)state;
     memset(records, 0, sizeof records);
     for (i = 0; i < 2; i++) {
         records[i].files = &files[i];
@@ -316,13 +302,12 @@ static void files_of_several_records_are_read_and_written(void **state)
     assert_int_equal(high[1], 0x1234);
 }
 
-static void queues_of_several_records_are_read(void **state)
+TEST(queues_of_several_records_are_read)
 {
     static const mbm_fifo fifos[2] = {{low, 50, 1}, {high, 60, 2}};
     static mbm_fifos records[2];
     unsigned i;
 
-    (void)state;
     memset(records, 0, sizeof records);
     for (i = 0; i < 2; i++) {
         records[i].fifos = &fifos[i];
@@ -331,29 +316,4 @@ static void queues_of_several_records_are_read(void **state)
     }
     IS_ANSWERED("\x18\0\74", "\x18\0\6\0\2\0\310\0\311");
     IS_ANSWERED("\x18\0\1", "\x98\2");
-}
-
-#define TEST(name) cmocka_unit_test_setup(name, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_register_of_either_table_is_read_and_written),
-        TEST(cells_that_no_table_has_are_answered_with_exception_02),
-        TEST(a_request_that_needs_two_tables_is_answered_with_exception_02),
-        TEST(the_first_of_two_tables_with_the_same_cell_answers),
-        TEST(functions_16_and_17_find_the_table_of_their_registers),
-        TEST(only_the_table_with_the_cells_calls_its_hooks),
-        TEST(a_table_and_callbacks_serve_one_kind_side_by_side),
-        TEST(bits_of_several_tables_are_read_and_written),
-        TEST(a_function_for_all_others_is_not_called_for_cells_that_tables_lack),
-        TEST(a_function_after_a_table_answers_for_the_cells_that_it_lacks),
-        TEST(exception_02_of_a_function_before_the_tables_is_final),
-        TEST(a_unit_with_diagnostics_counts_a_request_once),
-        TEST(a_broadcast_reaches_the_table_that_has_the_cells),
-        TEST(files_of_several_records_are_read_and_written),
-        TEST(queues_of_several_records_are_read),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -20,26 +20,25 @@ static modbus_t *client;
 /* One of the server's places is the client's. */
 enum { FREE = SERVED_CONNECTIONS - 1 };
 
-static int start(void **state)
+static void start(void)
 {
-    (void)state;
     served_prepare(&tcp);
     served_on_tcp(&tcp, MBM_FRAMING_TCP);
     served_prepare(&rtu);
     served_on_tcp(&rtu, MBM_FRAMING_RTU_OVER_TCP);
     client = modbus_new_tcp("127.0.0.1", tcp.port);
-    return asked_connect(client, SERVED_UNIT);
+    assert_int_equal(asked_connect(client, SERVED_UNIT), 0);
 }
 
-static int stop(void **state)
+static void stop(void)
 {
-    (void)state;
     modbus_close(client);
     modbus_free(client);
     served_stop(&tcp);
     served_stop(&rtu);
-    return 0;
 }
+
+fixture each_test = {start, stop};
 
 /* Makes the server go through its loop, so that it has seen what its sockets received before. */
 static void go_round(void)
@@ -70,30 +69,27 @@ static void all_places_are_free(void)
     }
 }
 
-static void libmodbus_reads_and_writes_every_table(void **state)
+TEST(libmodbus_reads_and_writes_every_table)
 {
-    (void)state;
     asked_reads(client);
     asked_writes(client, &tcp);
     asked_edges(client);
     asked_refusals(client, &tcp);
 }
 
-static void libmodbus_without_a_unit_is_answered(void **state)
+TEST(libmodbus_without_a_unit_is_answered)
 {
     uint16_t word;
 
-    (void)state;
     modbus_set_slave(client, MODBUS_TCP_SLAVE);
     assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
     modbus_set_slave(client, SERVED_UNIT);
 }
 
-static void every_function_is_served(void **state)
+TEST(every_function_is_served)
 {
     int fd = tcp_connect((uint16_t)tcp.port), other = tcp_connect((uint16_t)rtu.port);
 
-    (void)state;
     asked_functions(fd, MBM_FRAMING_TCP, &tcp);
     asked_lies(fd, MBM_FRAMING_TCP, &tcp);
     asked_functions(other, MBM_FRAMING_RTU_OVER_TCP, &rtu);
@@ -102,14 +98,13 @@ static void every_function_is_served(void **state)
     close(other);
 }
 
-static void requests_in_one_segment_are_answered_in_turn(void **state)
+TEST(requests_in_one_segment_are_answered_in_turn)
 {
     static const uint8_t one[] = {0, 1, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 1};
     uint8_t bytes[20 * sizeof one], answer[600];
     int fd = tcp_connect((uint16_t)tcp.port);
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 20; i++) {
         memcpy(bytes + i * sizeof one, one, sizeof one);
         bytes[i * sizeof one + 1] = (uint8_t)i;
@@ -121,7 +116,7 @@ static void requests_in_one_segment_are_answered_in_turn(void **state)
 }
 
 /* One client sends a byte now and then, one sends nothing. The server serves the others. */
-static void slow_and_half_open_connections_do_not_stall_others(void **state)
+TEST(slow_and_half_open_connections_do_not_stall_others)
 {
     static const uint8_t one[] = {0, 7, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 1};
     int slow = tcp_connect((uint16_t)tcp.port), silent = tcp_connect((uint16_t)tcp.port);
@@ -129,7 +124,6 @@ static void slow_and_half_open_connections_do_not_stall_others(void **state)
     uint16_t word;
     unsigned i, k;
 
-    (void)state;
     assert_int_equal(write(silent, one, 5), 5);
     for (i = 0; i < sizeof one - 1; i++) {
         assert_int_equal(asked_bytes(slow, &one[i], 1, answer, 0), 0);
@@ -169,7 +163,7 @@ static int is_full(int fd)
 
 /* Sends until neither end accepts more bytes. Then all requests that were sent are
  * answered, in order. */
-static void a_client_that_reads_nothing_does_not_stall_others(void **state)
+TEST(a_client_that_reads_nothing_does_not_stall_others)
 {
     static uint8_t answers[300];
     uint8_t one[] = {0, 0, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 125};
@@ -177,7 +171,6 @@ static void a_client_that_reads_nothing_does_not_stall_others(void **state)
     size_t sent = 0, got, i;
     unsigned naps = 0;
 
-    (void)state;
     assert_true(asked_is_served(fd, SERVED_UNIT, 0x6D));
     theirs = far_end(fd);
     while (!is_full(fd) || !is_full(theirs)) {
@@ -214,12 +207,11 @@ static void a_client_that_reads_nothing_does_not_stall_others(void **state)
     close(fd);
 }
 
-static void further_connections_are_closed_and_the_others_served(void **state)
+TEST(further_connections_are_closed_and_the_others_served)
 {
     int fds[SERVED_CONNECTIONS + 8];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(fds); i++) {
         fds[i] = tcp_connect((uint16_t)tcp.port);
         go_round();
@@ -231,25 +223,23 @@ static void further_connections_are_closed_and_the_others_served(void **state)
     all_places_are_free();
 }
 
-static void a_stream_that_is_not_modbus_is_closed(void **state)
+TEST(a_stream_that_is_not_modbus_is_closed)
 {
     uint8_t byte;
     int fd = tcp_connect((uint16_t)tcp.port);
     struct pollfd readable = {fd, POLLIN, 0};
 
-    (void)state;
     assert_int_equal(write(fd, "GET / HTTP/1.0\r\n\r\n", 18), 18);
     assert_int_equal(poll(&readable, 1, PATIENCE_MS), 1);
     assert_true(read(fd, &byte, 1) <= 0);
     close(fd);
 }
 
-static void a_connection_that_breaks_frees_its_place(void **state)
+TEST(a_connection_that_breaks_frees_its_place)
 {
     const struct linger hard = {1, 0};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < 50; i++) {
         int fd = tcp_connect((uint16_t)tcp.port);
 
@@ -260,24 +250,4 @@ static void a_connection_that_breaks_frees_its_place(void **state)
         go_round();
     }
     all_places_are_free();
-}
-
-/* Each test starts a server of its own, so that no test finds the state of another. */
-#define TEST(test) cmocka_unit_test_setup_teardown(test, start, stop)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(libmodbus_reads_and_writes_every_table),
-        TEST(libmodbus_without_a_unit_is_answered),
-        TEST(every_function_is_served),
-        TEST(requests_in_one_segment_are_answered_in_turn),
-        TEST(slow_and_half_open_connections_do_not_stall_others),
-        TEST(a_client_that_reads_nothing_does_not_stall_others),
-        TEST(further_connections_are_closed_and_the_others_served),
-        TEST(a_stream_that_is_not_modbus_is_closed),
-        TEST(a_connection_that_breaks_frees_its_place),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

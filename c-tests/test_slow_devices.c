@@ -317,12 +317,11 @@ static void assert_never_wrong(int mixed, FILE *table)
         }
 }
 
-static void a_device_of_any_latency_never_gives_the_data_of_another_read(void **state)
+TEST(a_device_of_any_latency_never_gives_the_data_of_another_read)
 {
     const char *path = getenv("MBM_FAULT_TABLE");
     FILE *table = path ? fopen(path, "w") : NULL;
 
-    (void)state;
     if (table)
         fprintf(
             table,
@@ -333,18 +332,16 @@ static void a_device_of_any_latency_never_gives_the_data_of_another_read(void **
         (void)fclose(table);
 }
 
-static void reads_of_a_fast_device_in_between_do_not_shift_those_of_a_slow_one(void **state)
+TEST(reads_of_a_fast_device_in_between_do_not_shift_those_of_a_slow_one)
 {
-    (void)state;
     assert_never_wrong(1, NULL);
 }
 
 /* The second unit that does not answer must not make the master forget the first. */
-static void a_late_reply_is_expected_though_another_unit_is_silent(void **state)
+TEST(a_late_reply_is_expected_though_another_unit_is_silent)
 {
     int has_client;
 
-    (void)state;
     for (has_client = 0; has_client < 2; has_client++) {
         user *u = (user *)calloc(1, sizeof *u);
         uint16_t i, value;
@@ -363,15 +360,4 @@ static void a_late_reply_is_expected_though_another_unit_is_silent(void **state)
         }
         free(u);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_device_of_any_latency_never_gives_the_data_of_another_read),
-        cmocka_unit_test(reads_of_a_fast_device_in_between_do_not_shift_those_of_a_slow_one),
-        cmocka_unit_test(a_late_reply_is_expected_though_another_unit_is_silent),
-    };
-
-    return cmocka_run_group_tests_name("slow devices", tests, NULL, NULL);
 }

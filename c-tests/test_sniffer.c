@@ -57,13 +57,12 @@ static void assert_nothing(void)
     assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 0);
 }
 
-static void a_request_and_its_reply_are_reported_with_values_in_each_framing(void **state)
+TEST(a_request_and_its_reply_are_reported_with_values_in_each_framing)
 {
     uint8_t kind, frame[MBM_MAX_ASCII_FRAME];
     mbm_event event;
     uint16_t length;
 
-    (void)state;
     for (kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_RTU_OVER_TCP; kind++) {
         begin(kind);
         length = frame_of(kind, request, sizeof request, MBM_PACKET_REQUEST, frame);
@@ -97,7 +96,7 @@ static void a_request_and_its_reply_are_reported_with_values_in_each_framing(voi
     }
 }
 
-static void every_example_is_found_as_a_frame(void **state)
+TEST(every_example_is_found_as_a_frame)
 {
     uint8_t kind, pdu[MBM_MAX_PDU], frame[MBM_MAX_ASCII_FRAME];
     mbm_framing framing = {0};
@@ -106,7 +105,6 @@ static void every_example_is_found_as_a_frame(void **state)
     uint16_t length, size;
     size_t i;
 
-    (void)state;
     for (kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_TCP; kind++) {
         framing.kind = kind;
         for (i = 0; i < example_count; i++) {
@@ -132,12 +130,11 @@ static void every_example_is_found_as_a_frame(void **state)
     }
 }
 
-static void timeouts_damage_and_noise_are_reported(void **state)
+TEST(timeouts_damage_and_noise_are_reported)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     uint16_t length = frame_of(MBM_FRAMING_RTU, request, sizeof request, MBM_PACKET_REQUEST, frame);
 
-    (void)state;
     begin(MBM_FRAMING_RTU);
     OK(mbm_sniffer_setBaudRate(&sniffer, 19200));
     OK(mbm_sniffer_setResponseTimeout(&sniffer, 200));
@@ -160,7 +157,7 @@ static void timeouts_damage_and_noise_are_reported(void **state)
     assert_nothing();
 }
 
-static void more_bytes_than_the_buffer_holds_are_fed_in_parts(void **state)
+TEST(more_bytes_than_the_buffer_holds_are_fed_in_parts)
 {
     static uint8_t traffic[6000];
     uint8_t small[MBM_MAX_FRAME], frame[MBM_MAX_ASCII_FRAME];
@@ -168,7 +165,6 @@ static void more_bytes_than_the_buffer_holds_are_fed_in_parts(void **state)
     unsigned requests = 0, replies = 0;
     mbm_event event;
 
-    (void)state;
     while (length + 100u < sizeof traffic) {
         size = frame_of(MBM_FRAMING_RTU, request, sizeof request, MBM_PACKET_REQUEST, frame);
         memcpy(traffic + length, frame, size);
@@ -193,7 +189,7 @@ static void more_bytes_than_the_buffer_holds_are_fed_in_parts(void **state)
     assert_int_equal(replies, length / 19);
 }
 
-static void user_defined_functions_are_reported(void **state)
+TEST(user_defined_functions_are_reported)
 {
     const mbm_function own[] = {{0x55, {MBM_RULE_FIXED, 3, 0}, {MBM_RULE_COUNTED, 1, 0}}};
     mbm_function many[MBM_MAX_SNIFFER_FUNCTIONS + 1];
@@ -203,7 +199,6 @@ static void user_defined_functions_are_reported(void **state)
     uint16_t size;
     size_t i;
 
-    (void)state;
     framing.functions = own;
     framing.functionCount = 1;
     OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, buffer, sizeof buffer));
@@ -228,14 +223,13 @@ static void user_defined_functions_are_reported(void **state)
     OK(mbm_sniffer_setFunctions(&sniffer, NULL, 0));
 }
 
-static void another_delimiter_ends_ascii_frames(void **state)
+TEST(another_delimiter_ends_ascii_frames)
 {
     mbm_framing framing = {.kind = MBM_FRAMING_ASCII, .delimiter = '!'};
     mbm_packet packet = {.unit = 17, .function = 7};
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     uint16_t size;
 
-    (void)state;
     OK(mbm_frame_build(&framing, &packet, frame, sizeof frame, &size));
     assert_int_equal(frame[size - 1], '!');
     begin(MBM_FRAMING_ASCII);
@@ -246,12 +240,11 @@ static void another_delimiter_ends_ascii_frames(void **state)
     assert_next("unit 17  request    07 read exception status");
 }
 
-static void a_sniffer_that_was_not_begun_or_has_bad_arguments_is_refused(void **state)
+TEST(a_sniffer_that_was_not_begun_or_has_bad_arguments_is_refused)
 {
     static mbm_sniffer zeroed;
     mbm_event event;
 
-    (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(NULL, MBM_FRAMING_RTU, buffer, sizeof buffer));
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, MBM_FRAMING_ASCII, NULL, 64));
     IS(MBM_BUFFER_TOO_SMALL,
@@ -274,14 +267,13 @@ static void a_sniffer_that_was_not_begun_or_has_bad_arguments_is_refused(void **
     assert_int_equal(mbm_sniffer_next(&sniffer, 0, NULL), 0);
 }
 
-static void a_frame_is_explained_in_each_framing_and_refused_in_words(void **state)
+TEST(a_frame_is_explained_in_each_framing_and_refused_in_words)
 {
     uint8_t kind, frame[MBM_MAX_ASCII_FRAME];
     mbm_framing framing = {0};
     char text[100];
     uint16_t length;
 
-    (void)state;
     for (kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_RTU_OVER_TCP; kind++) {
         framing.kind = kind;
         length = frame_of(kind, reply, sizeof reply, MBM_PACKET_RESPONSE, frame);
@@ -306,7 +298,7 @@ static void a_frame_is_explained_in_each_framing_and_refused_in_words(void **sta
     assert_string_equal(text, "no frame, 1026 bytes");
 }
 
-static void a_text_that_does_not_fit_is_cut_and_terminated(void **state)
+TEST(a_text_that_does_not_fit_is_cut_and_terminated)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     mbm_framing framing = {0};
@@ -314,7 +306,6 @@ static void a_text_that_does_not_fit_is_cut_and_terminated(void **state)
     char text[57];
     uint16_t length = frame_of(MBM_FRAMING_RTU, reply, sizeof reply, MBM_PACKET_RESPONSE, frame);
 
-    (void)state;
     memset(text, 'x', sizeof text);
     IS(MBM_BUFFER_TOO_SMALL,
        mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 15));
@@ -335,21 +326,4 @@ static void a_text_that_does_not_fit_is_cut_and_terminated(void **state)
     event.kind = MBM_EVENT_TIMEOUT;
     event.requestHeadLength = 200;
     OK(mbm_event_text(&event, text, 57));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_request_and_its_reply_are_reported_with_values_in_each_framing),
-        cmocka_unit_test(every_example_is_found_as_a_frame),
-        cmocka_unit_test(timeouts_damage_and_noise_are_reported),
-        cmocka_unit_test(more_bytes_than_the_buffer_holds_are_fed_in_parts),
-        cmocka_unit_test(user_defined_functions_are_reported),
-        cmocka_unit_test(another_delimiter_ends_ascii_frames),
-        cmocka_unit_test(a_sniffer_that_was_not_begun_or_has_bad_arguments_is_refused),
-        cmocka_unit_test(a_frame_is_explained_in_each_framing_and_refused_in_words),
-        cmocka_unit_test(a_text_that_does_not_fit_is_cut_and_terminated),
-    };
-
-    return cmocka_run_group_tests_name("sniffer", tests, NULL, NULL);
 }

@@ -177,13 +177,12 @@ static void assert_all_reported(const modbus_mapping_t *mapping)
     assert_int_equal(t[23].event.status, MBM_ILLEGAL_DATA_ADDRESS);
 }
 
-static void frames_of_libmodbus_on_a_serial_line_are_reported(void **state)
+TEST(frames_of_libmodbus_on_a_serial_line_are_reported)
 {
     static server device;
     pty ours;
     modbus_t *client;
 
-    (void)state;
     server_start(&device, 17);
     pty_open(&ours);
     listen_between(ours.ours, device.line.ours, MBM_FRAMING_RTU, 0);
@@ -227,26 +226,12 @@ static void over_tcp(uint8_t apart)
     tcp_server_stop(&device);
 }
 
-static void frames_of_libmodbus_over_tcp_are_reported(void **state)
+TEST(frames_of_libmodbus_over_tcp_are_reported)
 {
-    (void)state;
     over_tcp(0);
 }
 
-static void frames_of_libmodbus_over_tcp_are_reported_with_known_direction(void **state)
+TEST(frames_of_libmodbus_over_tcp_are_reported_with_known_direction)
 {
-    (void)state;
     over_tcp(1);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(frames_of_libmodbus_on_a_serial_line_are_reported),
-        cmocka_unit_test(frames_of_libmodbus_over_tcp_are_reported),
-        cmocka_unit_test(frames_of_libmodbus_over_tcp_are_reported_with_known_direction),
-    };
-
-    return cmocka_run_group_tests_name("sniffer between libmodbus's client and server", tests, NULL,
-                                       NULL);
 }

@@ -23,22 +23,20 @@ static tcp_peer *peer;
 static uint16_t port;
 static int s;
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     peer = tcp_peer_new();
     port = tcp_peer_start(peer, 0);
     s = tcp_connect(port);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     close(s);
     tcp_peer_stop(peer);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 static int64_t now_ms(void)
 {
@@ -126,7 +124,7 @@ static void expect_silence(void)
     assert_int_equal(receive(&byte, 1, SHORT_MS), -1);
 }
 
-static void the_right_reply_comes_from_the_memory(void **state)
+TEST(the_right_reply_comes_from_the_memory)
 {
     const uint8_t write_one[12] = {0, 9, 0, 0, 0, 6, 7, 6, 0, 30, 0xAB, 0xCD};
     const uint8_t no_such[12] = {0, 9, 0, 0, 0, 6, 7, 3, 0xFF, 0, 0, 1};
@@ -134,7 +132,6 @@ static void the_right_reply_comes_from_the_memory(void **state)
     const uint8_t unknown[9] = {0, 9, 0, 0, 0, 3, 7, 0x87, 1};
     uint8_t reply[12];
 
-    (void)state;
     send_request(1);
     expect(1);
     assert_int_equal(send(s, write_one, 12, 0), 12);
@@ -152,13 +149,12 @@ static void the_right_reply_comes_from_the_memory(void **state)
     expect(2);
 }
 
-static void requests_in_one_send_and_in_pieces_are_found(void **state)
+TEST(requests_in_one_send_and_in_pieces_are_found)
 {
     const uint8_t two[24] = {0, 1, 0, 0, 0, 6, 7, 3, 0, 1, 0, 1,
                              0, 2, 0, 0, 0, 6, 7, 3, 0, 2, 0, 1};
     size_t i;
 
-    (void)state;
     assert_int_equal(send(s, two, sizeof two, 0), sizeof two);
     expect(1);
     expect(2);
@@ -172,11 +168,10 @@ static void requests_in_one_send_and_in_pieces_are_found(void **state)
     assert_int_equal(tcp_peer_count(peer).replies, 4);
 }
 
-static void a_delay_delays_one_reply_only(void **state)
+TEST(a_delay_delays_one_reply_only)
 {
     int64_t start = now_ms();
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_DELAY, 300);
     send_requests(1, 2);
     expect(2);
@@ -184,11 +179,10 @@ static void a_delay_delays_one_reply_only(void **state)
     assert_true(now_ms() - start >= 300);
 }
 
-static void hold_changes_the_order_of_replies(void **state)
+TEST(hold_changes_the_order_of_replies)
 {
     int64_t start;
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_HOLD, 2);
     tcp_peer_fault(peer, 4, FAULT_HOLD, 3);
     send_requests(1, 3);
@@ -202,13 +196,12 @@ static void hold_changes_the_order_of_replies(void **state)
     assert_true(now_ms() - start >= HELD_MS);
 }
 
-static void join_puts_replies_into_one_send(void **state)
+TEST(join_puts_replies_into_one_send)
 {
     uint8_t got[64], right[3 * REPLY];
     unsigned before = segments();
     int64_t start;
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_JOIN, 2);
     send_requests(1, 3);
     receive_all(got, sizeof right);
@@ -225,11 +218,10 @@ static void join_puts_replies_into_one_send(void **state)
     assert_true(now_ms() - start >= HELD_MS);
 }
 
-static void drop_carries_out_the_request_and_does_not_answer(void **state)
+TEST(drop_carries_out_the_request_and_does_not_answer)
 {
     const uint8_t write_one[12] = {0, 9, 0, 0, 0, 6, 7, 6, 0, 30, 0, 5};
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_DROP, 0);
     assert_int_equal(send(s, write_one, 12, 0), 12);
     expect_silence();
@@ -240,9 +232,8 @@ static void drop_carries_out_the_request_and_does_not_answer(void **state)
     assert_int_equal(tcp_peer_count(peer).replies, 1);
 }
 
-static void twice_sends_the_reply_twice(void **state)
+TEST(twice_sends_the_reply_twice)
 {
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_TWICE, 0);
     send_request(1);
     expect(1);
@@ -250,12 +241,11 @@ static void twice_sends_the_reply_twice(void **state)
     expect_silence();
 }
 
-static void split_sends_single_bytes(void **state)
+TEST(split_sends_single_bytes)
 {
     int64_t start = now_ms();
     unsigned before = segments();
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_SPLIT, 20);
     send_request(1);
     expect(1);
@@ -277,9 +267,8 @@ static void expect_changed(tcp_fault fault, unsigned argument, size_t at, uint8_
     assert_memory_equal(reply, right, sizeof right);
 }
 
-static void a_wrong_field_is_wrong_and_the_rest_is_right(void **state)
+TEST(a_wrong_field_is_wrong_and_the_rest_is_right)
 {
-    (void)state;
     expect_changed(FAULT_OTHER_ID, 3, 1, 8);
     expect_changed(FAULT_OTHER_ID, 0x8000, 0, 0x80);
     expect_changed(FAULT_WRONG_PROTOCOL, 1, 3, 1);
@@ -291,13 +280,12 @@ static void a_wrong_field_is_wrong_and_the_rest_is_right(void **state)
     expect(5);
 }
 
-static void an_exception_leaves_the_memory_alone(void **state)
+TEST(an_exception_leaves_the_memory_alone)
 {
     const uint8_t write_one[12] = {0, 9, 0, 0, 0, 6, 7, 6, 0, 30, 0, 5};
     const uint8_t busy[9] = {0, 9, 0, 0, 0, 3, 7, 0x86, 6};
     uint8_t reply[9];
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_EXCEPTION, 6);
     assert_int_equal(send(s, write_one, 12, 0), 12);
     receive_all(reply, 9);
@@ -305,12 +293,11 @@ static void an_exception_leaves_the_memory_alone(void **state)
     assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], tcp_peer_word(30));
 }
 
-static void garbage_comes_before_the_reply_and_is_no_header(void **state)
+TEST(garbage_comes_before_the_reply_and_is_no_header)
 {
     uint8_t got[7 + REPLY];
     size_t i;
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_GARBAGE, 7);
     send_request(0x100);
     receive_all(got, 7);
@@ -325,11 +312,10 @@ static void garbage_comes_before_the_reply_and_is_no_header(void **state)
     }
 }
 
-static void half_a_reply_is_followed_by_the_end_of_the_stream(void **state)
+TEST(half_a_reply_is_followed_by_the_end_of_the_stream)
 {
     uint8_t got[64];
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_HALF, 4);
     send_request(1);
     send_request(2);
@@ -338,11 +324,10 @@ static void half_a_reply_is_followed_by_the_end_of_the_stream(void **state)
     assert_int_equal(tcp_peer_count(peer).replies, 0);
 }
 
-static void close_ends_the_stream_and_reset_resets_it(void **state)
+TEST(close_ends_the_stream_and_reset_resets_it)
 {
     uint8_t byte;
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
     tcp_peer_fault(peer, 2, FAULT_RESET, 0);
     send_request(1);
@@ -359,24 +344,22 @@ static void close_ends_the_stream_and_reset_resets_it(void **state)
     assert_int_equal(tcp_peer_count(peer).connections, 3);
 }
 
-static void bytes_that_are_no_request_end_the_connection(void **state)
+TEST(bytes_that_are_no_request_end_the_connection)
 {
     const uint8_t nonsense[8] = {0, 1, 0, 1, 0, 6, 7, 3};
     uint8_t byte;
 
-    (void)state;
     assert_int_equal(send(s, nonsense, sizeof nonsense, 0), sizeof nonsense);
     assert_true(receive(&byte, 1, PATIENCE_MS) <= 0);
     assert_int_equal(tcp_peer_count(peer).malformed, 1);
 }
 
-static void a_connection_beyond_the_limit_is_refused(void **state)
+TEST(a_connection_beyond_the_limit_is_refused)
 {
     int others[TCP_PEER_CONNECTIONS], first = s;
     uint8_t byte;
     unsigned i;
 
-    (void)state;
     send_request(1);
     expect(1);
     for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
@@ -392,11 +375,10 @@ static void a_connection_beyond_the_limit_is_refused(void **state)
     s = first;
 }
 
-static void hang_up_and_a_restart_at_the_same_port(void **state)
+TEST(hang_up_and_a_restart_at_the_same_port)
 {
     uint8_t byte;
 
-    (void)state;
     send_request(1);
     expect(1);
     tcp_peer_hang_up(peer);
@@ -428,46 +410,19 @@ static tcp_peer_counts run_chaos(uint32_t seed)
     return counts;
 }
 
-static void random_faults_of_one_seed_repeat(void **state)
+TEST(random_faults_of_one_seed_repeat)
 {
     tcp_peer_counts first = run_chaos(7), again, other;
 
-    end(state);
-    begin(state);
+    end();
+    begin();
     again = run_chaos(7);
-    end(state);
-    begin(state);
+    end();
+    begin();
     other = run_chaos(8);
     assert_memory_equal(first.faults, again.faults, sizeof first.faults);
     assert_memory_not_equal(first.faults, other.faults, sizeof first.faults);
     assert_in_range(200 - first.faults[FAULT_NONE], 50, 110);
     assert_true(first.faults[FAULT_DROP] > 0 && first.faults[FAULT_GARBAGE] > 0);
     assert_int_equal(first.replies, 200 - first.faults[FAULT_DROP] - first.faults[FAULT_OTHER_ID]);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(the_right_reply_comes_from_the_memory),
-        TEST(requests_in_one_send_and_in_pieces_are_found),
-        TEST(a_delay_delays_one_reply_only),
-        TEST(hold_changes_the_order_of_replies),
-        TEST(join_puts_replies_into_one_send),
-        TEST(drop_carries_out_the_request_and_does_not_answer),
-        TEST(twice_sends_the_reply_twice),
-        TEST(split_sends_single_bytes),
-        TEST(a_wrong_field_is_wrong_and_the_rest_is_right),
-        TEST(an_exception_leaves_the_memory_alone),
-        TEST(garbage_comes_before_the_reply_and_is_no_header),
-        TEST(half_a_reply_is_followed_by_the_end_of_the_stream),
-        TEST(close_ends_the_stream_and_reset_resets_it),
-        TEST(bytes_that_are_no_request_end_the_connection),
-        TEST(a_connection_beyond_the_limit_is_refused),
-        TEST(hang_up_and_a_restart_at_the_same_port),
-        TEST(random_faults_of_one_seed_repeat),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -20,6 +20,8 @@
 #include <string.h>
 #include <unistd.h>
 
+fixture each_test = {begin, end};
+
 enum { SECOND = 1000000, PATIENCE = 1000 * PATIENCE_MS };
 
 /* Reads until `length` bytes have arrived or the link is lost. */
@@ -64,12 +66,11 @@ static int16_t read_register(void)
     return count;
 }
 
-static void a_client_asks_and_reads_the_reply(void **state)
+TEST(a_client_asks_and_reads_the_reply)
 {
     uint32_t before, after;
     double begun, took;
 
-    (void)state;
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(read_register(), 11);
     assert_int_equal(read_register(), 11);
@@ -91,9 +92,8 @@ static int option(int level, int name)
     return value;
 }
 
-static void a_socket_sends_at_once_and_finds_a_dead_peer(void **state)
+TEST(a_socket_sends_at_once_and_finds_a_dead_peer)
 {
-    (void)state;
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_true(option(IPPROTO_TCP, TCP_NODELAY));
     assert_true(option(SOL_SOCKET, SO_KEEPALIVE));
@@ -106,14 +106,13 @@ static void a_socket_sends_at_once_and_finds_a_dead_peer(void **state)
 }
 
 /* A listener whose queue is full completes no connection until it accepts one. */
-static void until_connected_nothing_is_read_or_written(void **state)
+TEST(until_connected_nothing_is_read_or_written)
 {
     struct sockaddr_in address = {0};
     socklen_t size = sizeof address;
     int listener = socket(AF_INET, SOCK_STREAM, 0), first, second, taken;
     uint8_t byte = 0;
 
-    (void)state;
     address.sin_family = AF_INET;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     assert_int_equal(bind(listener, (struct sockaddr *)&address, size), 0);
@@ -140,11 +139,10 @@ static void until_connected_nothing_is_read_or_written(void **state)
     close(listener);
 }
 
-static void a_refused_connection_is_a_lost_link(void **state)
+TEST(a_refused_connection_is_a_lost_link)
 {
     uint8_t byte = 0;
 
-    (void)state;
     tcp_peer_halt(peer);
     if (mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service) == 0) {
         await_connection();
@@ -155,16 +153,14 @@ static void a_refused_connection_is_a_lost_link(void **state)
     assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
 }
 
-static void of_several_addresses_the_one_that_answers_is_used(void **state)
+TEST(of_several_addresses_the_one_that_answers_is_used)
 {
-    (void)state;
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, NULL, service), 0);
     assert_int_equal(read_register(), 11);
 }
 
-static void a_failed_open_sets_errno(void **state)
+TEST(a_failed_open_sets_errno)
 {
-    (void)state;
     FAILS(ENXIO, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", "no-such-service"));
     FAILS(EBADF, mbm_tcp_attach(&tcp, -1));
     assert_int_equal(mbm_tcp_connect(&tcp), MBM_LINK_LOST);
@@ -175,11 +171,10 @@ static void a_failed_open_sets_errno(void **state)
     FAILS(EBUSY, mbm_tcp_attach(&tcp, 0));
 }
 
-static void the_end_of_a_stream_and_a_reset_have_different_errors(void **state)
+TEST(the_end_of_a_stream_and_a_reset_have_different_errors)
 {
     uint8_t byte;
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
     tcp_peer_fault(peer, 2, FAULT_RESET, 0);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
@@ -198,11 +193,10 @@ static void the_end_of_a_stream_and_a_reset_have_different_errors(void **state)
     assert_int_equal(tcp.error, 0);
 }
 
-static void bytes_before_the_end_of_the_stream_are_still_read(void **state)
+TEST(bytes_before_the_end_of_the_stream_are_still_read)
 {
     uint8_t bytes[4];
 
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_HALF, 4);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     await_connection();
@@ -212,11 +206,10 @@ static void bytes_before_the_end_of_the_stream_are_still_read(void **state)
     assert_int_equal(read_all(bytes, 1), -1);
 }
 
-static void a_disconnected_link_is_lost_until_it_is_connected(void **state)
+TEST(a_disconnected_link_is_lost_until_it_is_connected)
 {
     uint8_t byte = 0;
 
-    (void)state;
     mbm_tcp_disconnect(&tcp);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(read_register(), 11);
@@ -227,9 +220,8 @@ static void a_disconnected_link_is_lost_until_it_is_connected(void **state)
     assert_int_equal(tcp_peer_count(peer).connections, 2);
 }
 
-static void the_error_says_why_the_link_was_lost_until_it_is_opened_again(void **state)
+TEST(the_error_says_why_the_link_was_lost_until_it_is_opened_again)
 {
-    (void)state;
     tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(read_register(), -1);
@@ -242,13 +234,12 @@ static void the_error_says_why_the_link_was_lost_until_it_is_opened_again(void *
     assert_int_equal(tcp.error, ENOTCONN);
 }
 
-static void a_full_socket_accepts_no_bytes_until_wait_says_so(void **state)
+TEST(a_full_socket_accepts_no_bytes_until_wait_says_so)
 {
     static uint8_t much[60000];
     int pair[2], rounds = 0;
     int16_t taken;
 
-    (void)state;
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
     assert_int_equal(mbm_tcp_attach(&tcp, pair[0]), 0);
     while ((taken = port.write(port.context, much, sizeof much)) > 0)
@@ -266,7 +257,7 @@ static void a_full_socket_accepts_no_bytes_until_wait_says_so(void **state)
     assert_int_equal(tcp.error, EPIPE);
 }
 
-static void wait_ends_with_the_time_or_with_any_of_its_sockets(void **state)
+TEST(wait_ends_with_the_time_or_with_any_of_its_sockets)
 {
     static mbm_tcp many[MBM_TCP_WAITS];
     mbm_tcp_listener listener = {0};
@@ -274,7 +265,6 @@ static void wait_ends_with_the_time_or_with_any_of_its_sockets(void **state)
     double start = seconds();
     char byte;
 
-    (void)state;
     assert_int_equal(mbm_tcp_wait(many, MBM_TCP_WAITS - 2, NULL, -1, 20500), 0);
     assert_true(seconds() - start >= 0.0205);
     FAILS(EINVAL, mbm_tcp_wait(many, MBM_TCP_WAITS - 1, NULL, -1, 0));
@@ -310,7 +300,7 @@ static unsigned waiting(const mbm_tcp_listener *listener)
     return info.tcpi_unacked;
 }
 
-static void a_connection_without_a_place_is_ended_without_a_reset(void **state)
+TEST(a_connection_without_a_place_is_ended_without_a_reset)
 {
     mbm_tcp_listener listener = {0};
     mbm_tcp places[2] = {0};
@@ -318,7 +308,6 @@ static void a_connection_without_a_place_is_ended_without_a_reset(void **state)
     int clients[4], i;
     char byte;
 
-    (void)state;
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     FAILS(EAGAIN, mbm_tcp_accept(&listener, places, 2));
     for (i = 0; i < 4; i++) {
@@ -357,13 +346,12 @@ static void a_connection_without_a_place_is_ended_without_a_reset(void **state)
     FAILS(EBADF, mbm_tcp_accept(&listener, places, 2));
 }
 
-static void listening_at_a_port_in_use_fails(void **state)
+TEST(listening_at_a_port_in_use_fails)
 {
     mbm_tcp_listener first = {0}, second = {0};
     int listens = -1, tries;
     char number[8];
 
-    (void)state;
     /* Now and then another program may get the port between the two calls. */
     for (tries = 0; tries < 10 && listens < 0; tries++) {
         assert_int_equal(mbm_tcp_listen(&first, "127.0.0.1", "0"), 0);
@@ -406,7 +394,7 @@ static void *device(void *argument)
     return NULL;
 }
 
-static void a_master_reads_rtu_through_a_stream(void **state)
+TEST(a_master_reads_rtu_through_a_stream)
 {
     static mbm_line line;
     static mbm_node node;
@@ -417,7 +405,6 @@ static void a_master_reads_rtu_through_a_stream(void **state)
     pthread_t thread;
     unsigned i;
 
-    (void)state;
     model_start(&memory);
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     assert_int_equal(pthread_create(&thread, NULL, device, &listener), 0);
@@ -439,13 +426,12 @@ static void a_master_reads_rtu_through_a_stream(void **state)
 }
 
 /* The side that closes first keeps its port in TIME_WAIT. */
-static void a_server_listens_again_at_once_after_it_closed_a_connection(void **state)
+TEST(a_server_listens_again_at_once_after_it_closed_a_connection)
 {
     mbm_tcp_listener listener = MBM_INIT;
     mbm_tcp accepted = MBM_INIT;
     int client;
 
-    (void)state;
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     snprintf(service, sizeof service, "%u", listener.port);
     client = tcp_connect(listener.port);
@@ -456,30 +442,4 @@ static void a_server_listens_again_at_once_after_it_closed_a_connection(void **s
     mbm_tcp_closeListener(&listener);
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", service), 0);
     mbm_tcp_closeListener(&listener);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_client_asks_and_reads_the_reply),
-        TEST(a_socket_sends_at_once_and_finds_a_dead_peer),
-        TEST(until_connected_nothing_is_read_or_written),
-        TEST(a_refused_connection_is_a_lost_link),
-        TEST(of_several_addresses_the_one_that_answers_is_used),
-        TEST(a_failed_open_sets_errno),
-        TEST(the_end_of_a_stream_and_a_reset_have_different_errors),
-        TEST(bytes_before_the_end_of_the_stream_are_still_read),
-        TEST(a_disconnected_link_is_lost_until_it_is_connected),
-        TEST(the_error_says_why_the_link_was_lost_until_it_is_opened_again),
-        TEST(a_full_socket_accepts_no_bytes_until_wait_says_so),
-        TEST(wait_ends_with_the_time_or_with_any_of_its_sockets),
-        TEST(a_connection_without_a_place_is_ended_without_a_reset),
-        TEST(listening_at_a_port_in_use_fails),
-        TEST(a_server_listens_again_at_once_after_it_closed_a_connection),
-        TEST(a_master_reads_rtu_through_a_stream),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -47,9 +47,8 @@ int clock_gettime(clockid_t id, struct timespec *time)
     return result;
 }
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     alarm(3 * PATIENCE_MS / 1000);
     ahead = 0;
     stopped = (struct timespec){0};
@@ -60,14 +59,12 @@ static int begin(void **state)
     memset(tcps, 0, sizeof tcps);
     assert_int_equal(getrlimit(RLIMIT_NOFILE, &found), 0);
     assert_int_equal(mbm_tcp_openSet(&set), 0);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
     unsigned i;
 
-    (void)state;
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
     for (i = 0; i < MANY; i++)
         mbm_tcp_close(&tcps[i]);
@@ -80,8 +77,9 @@ static int end(void **state)
     mbm_tcp_closeSet(&set);
     mbm_tcp_closeSet(&set);
     alarm(0);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 /* Puts `count` sockets into the set, each connected with a peer. */
 static void fill(unsigned count)
@@ -128,19 +126,17 @@ static void expect_silence(void)
     assert_null(mbm_tcp_nextReady(&set));
 }
 
-static void a_connection_takes_little_memory(void **state)
+TEST(a_connection_takes_little_memory)
 {
-    (void)state;
     assert_true(sizeof(mbm_tcp) <= 64);
 }
 
-static void the_wait_says_which_of_many_sockets_are_ready(void **state)
+TEST(the_wait_says_which_of_many_sockets_are_ready)
 {
     uint8_t seen[MANY] = {0};
     unsigned i, count = 0;
     mbm_tcp *tcp;
 
-    (void)state;
     fill(MANY);
     expect_silence();
     peer_sends(7, "x");
@@ -163,9 +159,8 @@ static void the_wait_says_which_of_many_sockets_are_ready(void **state)
     expect_silence();
 }
 
-static void a_ready_socket_that_was_not_taken_is_reported_again(void **state)
+TEST(a_ready_socket_that_was_not_taken_is_reported_again)
 {
-    (void)state;
     fill(2);
     peer_sends(0, "x");
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
@@ -176,9 +171,8 @@ static void a_ready_socket_that_was_not_taken_is_reported_again(void **state)
     assert_null(mbm_tcp_nextReady(&set));
 }
 
-static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
+TEST(bytes_that_are_not_read_do_not_end_the_wait_again)
 {
-    (void)state;
     fill(2);
     peer_sends(0, "abcd");
     expect_ready(&tcps[0]);
@@ -203,12 +197,11 @@ static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
     expect_silence();
 }
 
-static void a_full_socket_is_ready_once_it_accepts_bytes_again(void **state)
+TEST(a_full_socket_is_ready_once_it_accepts_bytes_again)
 {
     static uint8_t much[60000];
     mbm_port port;
 
-    (void)state;
     fill(1);
     port = mbm_tcp_port(&tcps[0]);
     peer_sends(0, "x");
@@ -227,12 +220,11 @@ static void a_full_socket_is_ready_once_it_accepts_bytes_again(void **state)
     expect_silence();
 }
 
-static void a_closed_socket_is_not_reported(void **state)
+TEST(a_closed_socket_is_not_reported)
 {
     unsigned i;
     int other;
 
-    (void)state;
     fill(4);
     for (i = 0; i < 4; i++)
         peer_sends(i, "x");
@@ -252,14 +244,13 @@ static void a_closed_socket_is_not_reported(void **state)
     close(other);
 }
 
-static void a_connection_is_reported_when_it_is_made_and_made_anew(void **state)
+TEST(a_connection_is_reported_when_it_is_made_and_made_anew)
 {
     tcp_peer *peer = tcp_peer_new();
     mbm_tcp_addresses addresses;
     char service[8];
     unsigned round;
 
-    (void)state;
     snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
     assert_int_equal(mbm_tcp_open(&tcps[0], &addresses, "127.0.0.1", service), 0);
     assert_int_equal(mbm_tcp_add(&set, &tcps[0]), 0);
@@ -281,11 +272,10 @@ static void a_connection_is_reported_when_it_is_made_and_made_anew(void **state)
     tcp_peer_stop(peer);
 }
 
-static void a_failed_add_to_a_set_sets_errno(void **state)
+TEST(a_failed_add_to_a_set_sets_errno)
 {
     mbm_tcp_set closed = {0};
 
-    (void)state;
     FAILS(EBUSY, mbm_tcp_openSet(&set));
     FAILS(EBADF, mbm_tcp_waitSet(&closed, 0));
     FAILS(EBADF, mbm_tcp_add(&set, &tcps[0]));
@@ -298,9 +288,8 @@ static void a_failed_add_to_a_set_sets_errno(void **state)
     FAILS(EBUSY, mbm_tcp_addListener(&set, &listener));
 }
 
-static void a_socket_that_has_left_its_set_is_waited_for_alone(void **state)
+TEST(a_socket_that_has_left_its_set_is_waited_for_alone)
 {
-    (void)state;
     fill(2);
     peer_sends(0, "abc");
     expect_ready(&tcps[0]);
@@ -326,12 +315,11 @@ static void a_socket_that_has_left_its_set_is_waited_for_alone(void **state)
 }
 
 /* An object looks at the clock in each poll; a program need not. */
-static void the_idle_time_counts_from_the_last_byte(void **state)
+TEST(the_idle_time_counts_from_the_last_byte)
 {
     const mbm_port port = mbm_tcp_port(&tcps[0]);
     unsigned i;
 
-    (void)state;
     fill(1);
     mbm_tcp_remove(&tcps[0]);
     for (i = 0; i < 300; i++) {
@@ -384,9 +372,8 @@ static void take_all_places(void)
     FAILS(EAGAIN, accept_one());
 }
 
-static void an_accepted_connection_is_in_the_set_of_its_listener(void **state)
+TEST(an_accepted_connection_is_in_the_set_of_its_listener)
 {
-    (void)state;
     begin_to_listen();
     FAILS(EAGAIN, accept_one());
     connect_some(1);
@@ -402,9 +389,8 @@ static void an_accepted_connection_is_in_the_set_of_its_listener(void **state)
     expect_ready(&tcps[0]);
 }
 
-static void accept_looks_only_once_the_set_knows_of_a_connection(void **state)
+TEST(accept_looks_only_once_the_set_knows_of_a_connection)
 {
-    (void)state;
     begin_to_listen();
     FAILS(EAGAIN, accept_one());
     connect_some(1);
@@ -414,9 +400,8 @@ static void accept_looks_only_once_the_set_knows_of_a_connection(void **state)
     assert_int_equal(accept_one(), 0);
 }
 
-static void a_connection_that_is_closed_as_idle_is_ready(void **state)
+TEST(a_connection_that_is_closed_as_idle_is_ready)
 {
-    (void)state;
     begin_to_listen();
     listener.idleTimeMs = MINUTE_MS;
     take_all_places();
@@ -442,9 +427,8 @@ static void a_connection_that_is_closed_as_idle_is_ready(void **state)
 }
 
 /* On a slow machine time passes while accept looks at the connections. */
-static void of_connections_with_equal_idle_times_the_first_is_closed(void **state)
+TEST(of_connections_with_equal_idle_times_the_first_is_closed)
 {
-    (void)state;
     begin_to_listen();
     listener.idleTimeMs = MINUTE_MS;
     stopped.tv_sec = 1000;
@@ -474,9 +458,8 @@ static void leave_no_descriptor(void)
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
 }
 
-static void without_a_descriptor_the_set_sleeps_and_tries_again(void **state)
+TEST(without_a_descriptor_the_set_sleeps_and_tries_again)
 {
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     begin_to_listen();
     connect_some(1);
@@ -506,29 +489,4 @@ static void without_a_descriptor_the_set_sleeps_and_tries_again(void **state)
     ahead = 0;
     (void)mbm_tcp_waitSet(&set, MBM_TCP_FOREVER);
     assert_int_equal(accept_one(), 1);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_connection_takes_little_memory),
-        TEST(the_wait_says_which_of_many_sockets_are_ready),
-        TEST(a_ready_socket_that_was_not_taken_is_reported_again),
-        TEST(bytes_that_are_not_read_do_not_end_the_wait_again),
-        TEST(a_full_socket_is_ready_once_it_accepts_bytes_again),
-        TEST(a_closed_socket_is_not_reported),
-        TEST(a_connection_is_reported_when_it_is_made_and_made_anew),
-        TEST(a_socket_that_has_left_its_set_is_waited_for_alone),
-        TEST(the_idle_time_counts_from_the_last_byte),
-        TEST(a_failed_add_to_a_set_sets_errno),
-        TEST(an_accepted_connection_is_in_the_set_of_its_listener),
-        TEST(accept_looks_only_once_the_set_knows_of_a_connection),
-        TEST(a_connection_that_is_closed_as_idle_is_ready),
-        TEST(of_connections_with_equal_idle_times_the_first_is_closed),
-        TEST(without_a_descriptor_the_set_sleeps_and_tries_again),
-    };
-
-    return cmocka_run_group_tests_name("a set of sockets", tests, NULL, NULL);
 }

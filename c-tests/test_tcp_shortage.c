@@ -54,9 +54,8 @@ static void leave_no_descriptor(void)
     limit_descriptors((rlim_t)next);
 }
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     alarm(2 * PATIENCE_MS / 1000);
     ahead = 0;
     client_count = 0;
@@ -64,14 +63,12 @@ static int begin(void **state)
     memset(places, 0, sizeof places);
     assert_int_equal(getrlimit(RLIMIT_NOFILE, &found), 0);
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
     unsigned i;
 
-    (void)state;
     limit_descriptors(found.rlim_cur);
     for (i = 0; i < client_count; i++)
         close(clients[i]);
@@ -79,8 +76,9 @@ static int end(void **state)
         mbm_tcp_close(&places[i]);
     mbm_tcp_closeListener(&listener);
     alarm(0);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 static void connect_some(unsigned count)
 {
@@ -131,12 +129,11 @@ static int wait_for(uint32_t micros)
     return mbm_tcp_wait(places, PLACES, &listener, -1, micros);
 }
 
-static void a_place_is_in_use_until_it_is_closed(void **state)
+TEST(a_place_is_in_use_until_it_is_closed)
 {
     mbm_tcp_addresses addresses;
     mbm_tcp place;
 
-    (void)state;
     memset(&place, 0, sizeof place);
     assert_int_equal(mbm_tcp_isInUse(&place), 0);
     assert_int_equal(mbm_tcp_idleFor(&place), -1);
@@ -167,12 +164,11 @@ static void accept_one_and_let_two_wait(void)
     expect_none(EMFILE);
 }
 
-static void a_connection_without_a_descriptor_is_closed_at_once(void **state)
+TEST(a_connection_without_a_descriptor_is_closed_at_once)
 {
     unsigned i;
     char byte;
 
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     connect_some(1);
     assert_int_equal(accept_one(), 0);
@@ -195,9 +191,8 @@ static void a_connection_without_a_descriptor_is_closed_at_once(void **state)
     assert_int_equal(read(clients[client_count - 1], &byte, 1), 0);
 }
 
-static void a_flood_without_descriptors_is_closed_in_parts(void **state)
+TEST(a_flood_without_descriptors_is_closed_in_parts)
 {
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     connect_some(FLOOD);
     leave_no_descriptor();
@@ -209,9 +204,8 @@ static void a_flood_without_descriptors_is_closed_in_parts(void **state)
     assert_int_equal(wait_for(1000), 0);
 }
 
-static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
+TEST(a_listener_without_a_descriptor_lets_the_program_sleep)
 {
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     accept_one_and_let_two_wait();
     assert_int_equal(wait_for(1000), 0);
@@ -224,9 +218,8 @@ static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
     assert_int_equal(listener.refused, 0);
 }
 
-static void a_waiting_connection_is_accepted_once_a_descriptor_is_free(void **state)
+TEST(a_waiting_connection_is_accepted_once_a_descriptor_is_free)
 {
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     accept_one_and_let_two_wait();
     limit_descriptors(found.rlim_cur);
@@ -243,9 +236,8 @@ static void a_waiting_connection_is_accepted_once_a_descriptor_is_free(void **st
     assert_int_equal(listener.refused, 1);
 }
 
-static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
+TEST(an_idle_connection_gives_its_descriptor_to_a_new_one)
 {
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     listener.idleTimeMs = MINUTE_MS;
     connect_some(2);
@@ -261,9 +253,8 @@ static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
     assert_int_equal(listener.idle, 1);
 }
 
-static void without_a_descriptor_nothing_is_closed_while_no_connection_waits(void **state)
+TEST(without_a_descriptor_nothing_is_closed_while_no_connection_waits)
 {
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     listener.idleTimeMs = MINUTE_MS;
     connect_some(1);
@@ -275,9 +266,8 @@ static void without_a_descriptor_nothing_is_closed_while_no_connection_waits(voi
     assert_int_equal(listener.idle, 0);
 }
 
-static void if_the_system_refuses_to_poll_the_wait_sleeps_and_reports(void **state)
+TEST(if_the_system_refuses_to_poll_the_wait_sleeps_and_reports)
 {
-    (void)state;
     SKIP_WITHOUT_LIMITS();
     fill();
     assert_int_equal(write(clients[0], "x", 1), 1);
@@ -288,9 +278,8 @@ static void if_the_system_refuses_to_poll_the_wait_sleeps_and_reports(void **sta
     exchange_byte(0);
 }
 
-static void the_oldest_idle_connection_gives_its_place_to_a_new_one(void **state)
+TEST(the_oldest_idle_connection_gives_its_place_to_a_new_one)
 {
-    (void)state;
     listener.idleTimeMs = MINUTE_MS;
     fill();
     ahead = 30;
@@ -317,11 +306,10 @@ static void the_oldest_idle_connection_gives_its_place_to_a_new_one(void **state
     assert_int_equal(listener.refused, 0);
 }
 
-static void an_idle_connection_stays_while_no_other_needs_its_place(void **state)
+TEST(an_idle_connection_stays_while_no_other_needs_its_place)
 {
     unsigned i;
 
-    (void)state;
     listener.idleTimeMs = MINUTE_MS;
     fill();
     ahead = 3600;
@@ -345,11 +333,10 @@ static void expect_turned_away(uint32_t refused)
         assert_int_equal(is_lost(i), 0);
 }
 
-static void connections_that_are_not_idle_keep_their_places(void **state)
+TEST(connections_that_are_not_idle_keep_their_places)
 {
     unsigned i;
 
-    (void)state;
     fill();
     ahead = 3600;
     /* No idle time is set. */
@@ -368,9 +355,8 @@ static void connections_that_are_not_idle_keep_their_places(void **state)
     assert_int_equal(places[2].isBusy, 0);
 }
 
-static void a_flood_of_connections_is_turned_away_in_parts(void **state)
+TEST(a_flood_of_connections_is_turned_away_in_parts)
 {
-    (void)state;
     fill();
     connect_some(FLOOD);
     expect_none(EAGAIN);
@@ -381,13 +367,12 @@ static void a_flood_of_connections_is_turned_away_in_parts(void **state)
     assert_int_equal(wait_for(1000), 0);
 }
 
-static void a_failed_lookup_keeps_its_reason(void **state)
+TEST(a_failed_lookup_keeps_its_reason)
 {
     mbm_tcp_listener other = {0};
     mbm_tcp_addresses addresses;
     mbm_tcp place;
 
-    (void)state;
     memset(&place, 0, sizeof place);
     assert_int_equal(mbm_tcp_open(&place, &addresses, "no such host", "502"), -1);
     assert_int_not_equal(place.lookupError, 0);
@@ -396,27 +381,4 @@ static void a_failed_lookup_keeps_its_reason(void **state)
     assert_int_equal(mbm_tcp_listen(&other, "127.0.0.1", "0"), 0);
     assert_int_equal(other.lookupError, 0);
     mbm_tcp_closeListener(&other);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_place_is_in_use_until_it_is_closed),
-        TEST(a_connection_without_a_descriptor_is_closed_at_once),
-        TEST(a_flood_without_descriptors_is_closed_in_parts),
-        TEST(a_listener_without_a_descriptor_lets_the_program_sleep),
-        TEST(a_waiting_connection_is_accepted_once_a_descriptor_is_free),
-        TEST(an_idle_connection_gives_its_descriptor_to_a_new_one),
-        TEST(without_a_descriptor_nothing_is_closed_while_no_connection_waits),
-        TEST(if_the_system_refuses_to_poll_the_wait_sleeps_and_reports),
-        TEST(the_oldest_idle_connection_gives_its_place_to_a_new_one),
-        TEST(an_idle_connection_stays_while_no_other_needs_its_place),
-        TEST(connections_that_are_not_idle_keep_their_places),
-        TEST(a_flood_of_connections_is_turned_away_in_parts),
-        TEST(a_failed_lookup_keeps_its_reason),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,24 +7,24 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+fixture each_test = {begin, end};
+
 enum { SECOND = 1000000 };
 
-static void a_completed_connection_ends_the_wait_once(void **state)
+TEST(a_completed_connection_ends_the_wait_once)
 {
-    (void)state;
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 5 * SECOND), 1);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
 }
 
 /* The peer sends, and does not read. The program cannot answer, so it sleeps. */
-static void unread_bytes_do_not_end_the_wait_again(void **state)
+TEST(unread_bytes_do_not_end_the_wait_again)
 {
     static uint8_t much[60000];
     uint8_t bytes[4];
     int pair[2];
 
-    (void)state;
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
     assert_int_equal(mbm_tcp_attach(&tcp, pair[0]), 0);
     assert_int_equal(write(pair[1], "abcd", 4), 4);
@@ -51,16 +51,4 @@ static void unread_bytes_do_not_end_the_wait_again(void **state)
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
     assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
     assert_int_equal(tcp.error, EPIPE);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_completed_connection_ends_the_wait_once),
-        TEST(unread_bytes_do_not_end_the_wait_again),
-    };
-
-    return cmocka_run_group_tests_name("waiting for TCP", tests, NULL, NULL);
 }

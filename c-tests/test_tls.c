@@ -19,11 +19,10 @@ static mbm_clientRequest request;
 
 static const uint8_t secret[] = "Modbus in the clear";
 
-static int begin(void **state)
+static void begin(void)
 {
     unsigned i;
 
-    (void)state;
     tls_pair_begin(&pair, "operator", "server");
     memset(&unit, 0, sizeof unit);
     holding = (mbm_registerTable){.words = words, .base = FIRST, .size = WORDS};
@@ -38,15 +37,14 @@ static int begin(void **state)
     OK(mbm_client_beginTcp(&client, &pair.client.port, incoming, sizeof incoming, outgoing,
                            sizeof outgoing));
     OK(mbm_server_beginTcp(&server, &pair.server.port, &unit, 1, frame, sizeof frame));
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     tls_pair_end(&pair);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 /* Polls client and server, and nothing else, until the request has ended. */
 static void exchange(void)
@@ -92,9 +90,8 @@ static void assert_over(tls_end *one, uint8_t status)
     assert_null(mbm_tls_role(&one->tls));
 }
 
-static void a_request_is_answered_and_does_not_cross_the_wire_in_the_clear(void **state)
+TEST(a_request_is_answered_and_does_not_cross_the_wire_in_the_clear)
 {
-    (void)state;
     read_all_words();
     assert_int_equal(pair.client.tls.status, MBM_TLS_OPEN);
     assert_int_equal(pair.server.tls.status, MBM_TLS_OPEN);
@@ -104,20 +101,18 @@ static void a_request_is_answered_and_does_not_cross_the_wire_in_the_clear(void 
     assert_false(tls_lane_carried(&pair.to_client, words, 4));
 }
 
-static void the_handshake_and_requests_pass_in_pieces_of_one_byte(void **state)
+TEST(the_handshake_and_requests_pass_in_pieces_of_one_byte)
 {
-    (void)state;
     pair.to_server.piece = pair.to_client.piece = 1;
     read_all_words();
     read_all_words();
 }
 
 /* The wire holds few bytes, so each message waits for space in its middle. */
-static void a_wire_that_is_often_full_delays_everything_and_breaks_nothing(void **state)
+TEST(a_wire_that_is_often_full_delays_everything_and_breaks_nothing)
 {
     unsigned i;
 
-    (void)state;
     for (i = 1; i < 60; i += (unsigned)tls_step(19, 40)) {
         pair.to_server.capacity = pair.to_client.capacity = i;
         tls_pair_open(&pair, NULL);
@@ -127,11 +122,10 @@ static void a_wire_that_is_often_full_delays_everything_and_breaks_nothing(void 
     }
 }
 
-static void the_port_moves_no_byte_before_the_handshake_is_over(void **state)
+TEST(the_port_moves_no_byte_before_the_handshake_is_over)
 {
     uint8_t byte;
 
-    (void)state;
     assert_int_equal(send_from(&pair.client, secret, sizeof secret), 0);
     assert_int_equal(read_at(&pair.client, &byte, 1), 0);
     assert_int_equal(send_from(&pair.server, secret, sizeof secret), 0);
@@ -144,14 +138,13 @@ static void the_port_moves_no_byte_before_the_handshake_is_over(void **state)
     assert_false(tls_lane_carried(&pair.to_client, secret, 6));
 }
 
-static void a_long_write_is_accepted_in_parts_while_the_wire_is_full(void **state)
+TEST(a_long_write_is_accepted_in_parts_while_the_wire_is_full)
 {
     static uint8_t sent[3000], received[3000];
     size_t accepted = 0, have = 0;
     int16_t count;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < sizeof sent; i++)
         sent[i] = (uint8_t)(i * 7);
     tls_pair_run(&pair);
@@ -174,11 +167,10 @@ static void a_long_write_is_accepted_in_parts_while_the_wire_is_full(void **stat
 }
 
 /* One record has more bytes than the reader takes: no byte below would wake it for the rest. */
-static void bytes_that_stay_in_the_port_are_due_at_once_and_are_told_once(void **state)
+TEST(bytes_that_stay_in_the_port_are_due_at_once_and_are_told_once)
 {
     uint8_t part[8];
 
-    (void)state;
     tls_pair_run(&pair);
     assert_int_equal(mbm_tls_pollDelay(&pair.server.tls), UINT32_MAX);
     assert_int_equal(send_from(&pair.client, secret, 20), 20);
@@ -194,13 +186,12 @@ static void bytes_that_stay_in_the_port_are_due_at_once_and_are_told_once(void *
 }
 
 /* No byte below reports the requests that are left after one poll. */
-static void requests_in_one_record_are_answered_in_turn(void **state)
+TEST(requests_in_one_record_are_answered_in_turn)
 {
     static const uint8_t one[] = {0, 1, 0, 0, 0, 6, 17, 3, 0, FIRST, 0, 1};
     uint8_t all[20 * sizeof one], reply[11];
     unsigned i;
 
-    (void)state;
     tls_pair_run(&pair);
     for (i = 0; i < 20; i++) {
         memcpy(all + i * sizeof one, one, sizeof one);
@@ -217,11 +208,10 @@ static void requests_in_one_record_are_answered_in_turn(void **state)
     }
 }
 
-static void a_poll_keeps_the_bytes_that_arrive(void **state)
+TEST(a_poll_keeps_the_bytes_that_arrive)
 {
     uint8_t bytes[20];
 
-    (void)state;
     tls_pair_run(&pair);
     assert_int_equal(send_from(&pair.client, secret, 20), 20);
     assert_int_equal(mbm_tls_poll(&pair.server.tls), MBM_TLS_OPEN);
@@ -230,9 +220,8 @@ static void a_poll_keeps_the_bytes_that_arrive(void **state)
     assert_memory_equal(bytes, secret, 20);
 }
 
-static void a_peer_that_is_silent_in_the_handshake_is_given_up_in_time(void **state)
+TEST(a_peer_that_is_silent_in_the_handshake_is_given_up_in_time)
 {
-    (void)state;
     assert_int_equal(mbm_tls_poll(&pair.server.tls), MBM_TLS_HANDSHAKE);
     assert_int_equal(mbm_tls_pollDelay(&pair.server.tls), TLS_HANDSHAKE_US);
     pair.now -= 65000; /* the clock steps back */
@@ -250,12 +239,11 @@ static void a_peer_that_is_silent_in_the_handshake_is_given_up_in_time(void **st
 }
 
 /* The client is gone after each number of bytes that it sends in a handshake. */
-static void a_peer_that_is_gone_in_the_handshake_is_a_lost_link(void **state)
+TEST(a_peer_that_is_gone_in_the_handshake_is_a_lost_link)
 {
     size_t whole, cut;
     unsigned polls;
 
-    (void)state;
     tls_pair_run(&pair);
     whole = pair.to_server.moved;
     assert_true(whole > 500);
@@ -275,11 +263,10 @@ static void a_peer_that_is_gone_in_the_handshake_is_a_lost_link(void **state)
 }
 
 /* A message may take a long computation. Between two, the program can poll other connections. */
-static void one_poll_takes_the_handshake_on_by_one_message(void **state)
+TEST(one_poll_takes_the_handshake_on_by_one_message)
 {
     unsigned polls = 0;
 
-    (void)state;
     (void)mbm_tls_poll(&pair.client.tls);
     (void)mbm_tls_poll(&pair.server.tls);
     assert_int_equal(mbm_tls_progress(&pair.server.tls), MBM_TLS_GREETED);
@@ -297,9 +284,8 @@ static void one_poll_takes_the_handshake_on_by_one_message(void **state)
     assert_int_equal(mbm_tls_progress(&pair.server.tls), MBM_TLS_PROVEN);
 }
 
-static void a_peer_that_ends_the_session_is_told_from_a_lost_link(void **state)
+TEST(a_peer_that_ends_the_session_is_told_from_a_lost_link)
 {
-    (void)state;
     tls_pair_run(&pair);
     assert_int_equal(mbm_tls_shutDown(&pair.client.tls), MBM_TLS_CLOSED);
     assert_over(&pair.client, MBM_TLS_CLOSED);
@@ -314,11 +300,10 @@ static void a_peer_that_ends_the_session_is_told_from_a_lost_link(void **state)
     assert_int_equal(mbm_tls_shutDown(&pair.server.tls), MBM_TLS_LINK_LOST);
 }
 
-static void the_end_of_the_session_waits_for_a_full_wire(void **state)
+TEST(the_end_of_the_session_waits_for_a_full_wire)
 {
     uint8_t bytes[20];
 
-    (void)state;
     tls_pair_run(&pair);
     pair.to_server.capacity = 10;
     assert_int_equal(send_from(&pair.client, secret, 20), 20);
@@ -336,12 +321,11 @@ static void the_end_of_the_session_waits_for_a_full_wire(void **state)
 }
 
 /* A byte in each part of a record is changed: none of its plain text comes out. */
-static void a_forged_record_ends_the_session(void **state)
+TEST(a_forged_record_ends_the_session)
 {
     uint8_t bytes[64];
     size_t i, length = 1;
 
-    (void)state;
     for (i = 0; i < length; i += tls_step(6, 24)) {
         tls_pair_open(&pair, NULL);
         tls_pair_run(&pair);
@@ -358,12 +342,11 @@ static void a_forged_record_ends_the_session(void **state)
     assert_in_range(length, 40, 60);
 }
 
-static void a_record_that_is_sent_twice_ends_the_session(void **state)
+TEST(a_record_that_is_sent_twice_ends_the_session)
 {
     uint8_t bytes[64], copy[64];
     size_t length;
 
-    (void)state;
     tls_pair_run(&pair);
     assert_int_equal(send_from(&pair.client, secret, 20), 20);
     length = pair.to_server.count;
@@ -376,11 +359,10 @@ static void a_record_that_is_sent_twice_ends_the_session(void **state)
     assert_over(&pair.server, MBM_TLS_BAD_STREAM);
 }
 
-static void a_plain_request_is_not_served(void **state)
+TEST(a_plain_request_is_not_served)
 {
     static const uint8_t plain[] = {0, 1, 0, 0, 0, 6, 17, 3, 0, FIRST, 0, 1};
 
-    (void)state;
     memcpy(pair.to_server.bytes, plain, sizeof plain);
     pair.to_server.count = sizeof plain;
     (void)mbm_server_poll(&server);
@@ -409,14 +391,13 @@ static uint8_t join(void *context)
     return connect_status;
 }
 
-static void a_client_connects_anew_with_a_new_handshake(void **state)
+TEST(a_client_connects_anew_with_a_new_handshake)
 {
     const mbm_linkHooks below = {.disconnect = cut, .connect = join};
     const mbm_linkHooks link = {
         .context = &pair.client.tls, .disconnect = mbm_tls_disconnect, .connect = mbm_tls_connect};
     unsigned i;
 
-    (void)state;
     connects = 0;
     connect_status = MBM_PENDING;
     mbm_tls_close(&pair.client.tls);
@@ -446,14 +427,13 @@ static void a_client_connects_anew_with_a_new_handshake(void **state)
     assert_over(&pair.client, MBM_TLS_LINK_LOST);
 }
 
-static void calls_out_of_order_are_refused_and_change_nothing(void **state)
+TEST(calls_out_of_order_are_refused_and_change_nothing)
 {
     const mbm_port none = {0};
     mbm_tls zero = {0};
     mbm_port port = mbm_tls_port(&zero), below = pair.client.tls.below;
     uint8_t byte;
 
-    (void)state;
     assert_true(port.read(&zero, &byte, 1) < 0 && port.write(&zero, &byte, 1) < 0);
     assert_int_equal(port.micros(&zero), 0);
     assert_int_equal(port.flush(&zero), 1);
@@ -480,43 +460,13 @@ static void calls_out_of_order_are_refused_and_change_nothing(void **state)
     assert_over(&pair.client, MBM_TLS_CLOSED);
 }
 
-static void every_status_has_a_text(void **state)
+TEST(every_status_has_a_text)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i <= MBM_TLS_AUTHORITY_NOT_YET_VALID; i++)
         assert_string_not_equal(mbm_tls_text((uint8_t)i), "unknown status");
     assert_string_equal(mbm_tls_text(MBM_TLS_AUTHORITY_NOT_YET_VALID + 1), "unknown status");
     assert_string_equal(mbm_tls_alertText(48), "unknown ca");
     assert_string_equal(mbm_tls_alertText(255), "unknown alert");
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_request_is_answered_and_does_not_cross_the_wire_in_the_clear),
-        TEST(the_handshake_and_requests_pass_in_pieces_of_one_byte),
-        TEST(a_wire_that_is_often_full_delays_everything_and_breaks_nothing),
-        TEST(the_port_moves_no_byte_before_the_handshake_is_over),
-        TEST(a_long_write_is_accepted_in_parts_while_the_wire_is_full),
-        TEST(bytes_that_stay_in_the_port_are_due_at_once_and_are_told_once),
-        TEST(requests_in_one_record_are_answered_in_turn),
-        TEST(a_poll_keeps_the_bytes_that_arrive),
-        TEST(a_peer_that_is_silent_in_the_handshake_is_given_up_in_time),
-        TEST(a_peer_that_is_gone_in_the_handshake_is_a_lost_link),
-        TEST(one_poll_takes_the_handshake_on_by_one_message),
-        TEST(a_peer_that_ends_the_session_is_told_from_a_lost_link),
-        TEST(the_end_of_the_session_waits_for_a_full_wire),
-        TEST(a_forged_record_ends_the_session),
-        TEST(a_record_that_is_sent_twice_ends_the_session),
-        TEST(a_plain_request_is_not_served),
-        TEST(a_client_connects_anew_with_a_new_handshake),
-        TEST(calls_out_of_order_are_refused_and_change_nothing),
-        TEST(every_status_has_a_text),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,19 +11,17 @@
 static tls_pair pair;
 static mbm_tls_files files;
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     tls_pair_begin(&pair, "operator", "server");
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     tls_pair_end(&pair);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 /* The authorities that client and server know. */
 static const char *client_knows = "authority", *server_knows = "authority";
@@ -86,11 +84,10 @@ static void client_has_role(const char *client, const char *role)
     assert_int_equal(pair.server.tls.flags, 0);
 }
 
-static void the_role_of_the_client_is_the_whole_string(void **state)
+TEST(the_role_of_the_client_is_the_whole_string)
 {
     char longest[65] = {0};
 
-    (void)state;
     memset(longest, '0', 64);
     client_has_role("operator", "Operator");
     client_has_role("viewer", "Viewer");
@@ -101,9 +98,8 @@ static void the_role_of_the_client_is_the_whole_string(void **state)
                                  "d");
 }
 
-static void a_malformed_role_is_refused(void **state)
+TEST(a_malformed_role_is_refused)
 {
-    (void)state;
     server_refuses("role-printable", MBM_TLS_BAD_ROLE);
     server_refuses("role-empty", MBM_TLS_BAD_ROLE);
     server_refuses("role-zero", MBM_TLS_BAD_ROLE);
@@ -111,16 +107,14 @@ static void a_malformed_role_is_refused(void **state)
     server_refuses("role-65", MBM_TLS_BAD_ROLE);
 }
 
-static void a_client_of_another_authority_is_refused(void **state)
+TEST(a_client_of_another_authority_is_refused)
 {
-    (void)state;
     server_refuses("stranger", MBM_TLS_UNKNOWN_AUTHORITY);
     assert_int_equal(pair.client.tls.alert, 48);
 }
 
-static void a_client_whose_time_is_over_or_not_come_is_refused(void **state)
+TEST(a_client_whose_time_is_over_or_not_come_is_refused)
 {
-    (void)state;
     assert_int_equal(MBM_TLS_CHECKS_DATES, 1);
     server_refuses("expired", MBM_TLS_EXPIRED);
     assert_int_equal(pair.client.tls.alert, 45);
@@ -128,27 +122,24 @@ static void a_client_whose_time_is_over_or_not_come_is_refused(void **state)
 }
 
 /* A certificate says what it is for. */
-static void a_client_with_the_certificate_of_a_server_is_refused(void **state)
+TEST(a_client_with_the_certificate_of_a_server_is_refused)
 {
-    (void)state;
     server_refuses("server", MBM_TLS_BAD_CERTIFICATE);
 }
 
-static void a_server_of_another_authority_is_refused(void **state)
+TEST(a_server_of_another_authority_is_refused)
 {
-    (void)state;
     client_refuses("stranger-server", "localhost", MBM_TLS_UNKNOWN_AUTHORITY);
     client_refuses("stranger-server", NULL, MBM_TLS_UNKNOWN_AUTHORITY);
 }
 
-static void a_server_whose_time_is_over_is_refused(void **state)
+TEST(a_server_whose_time_is_over_is_refused)
 {
-    (void)state;
     client_refuses("expired-server", "localhost", MBM_TLS_EXPIRED);
 }
 
 /* The peer's certificate is right. It is this side's authority whose time is over. */
-static void an_authority_of_this_side_whose_time_is_over_or_not_come_is_named(void **state)
+TEST(an_authority_of_this_side_whose_time_is_over_or_not_come_is_named)
 {
     static const struct {
         const char *authority;
@@ -157,7 +148,6 @@ static void an_authority_of_this_side_whose_time_is_over_or_not_come_is_named(vo
                  {"future-authority", MBM_TLS_AUTHORITY_NOT_YET_VALID}};
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(dates); i++) {
         server_knows = dates[i].authority;
         server_refuses("operator", dates[i].reason);
@@ -174,9 +164,8 @@ static void an_authority_of_this_side_whose_time_is_over_or_not_come_is_named(vo
     server_knows = client_knows = "authority";
 }
 
-static void a_server_of_another_name_is_refused(void **state)
+TEST(a_server_of_another_name_is_refused)
 {
-    (void)state;
     client_refuses("server", "pump.example", MBM_TLS_OTHER_NAME);
     meet("operator", "server", "meter.example");
     assert_int_equal(pair.client.tls.status, MBM_TLS_OPEN);
@@ -198,12 +187,11 @@ static mbm_tls_options options_of(const char *name, const char *authorities)
     return options;
 }
 
-static void a_revoked_certificate_is_refused(void **state)
+TEST(a_revoked_certificate_is_refused)
 {
     static mbm_tls_files lists;
     mbm_tls_options options = options_of("server", "authority.pem"), other = {0};
 
-    (void)state;
     assert_int_equal(mbm_tls_load(&lists, &other, TLS_FOLDER "revocations.pem",
                                   TLS_FOLDER "server.key.pem", TLS_FOLDER "authority.pem"),
                      0);
@@ -224,11 +212,10 @@ static void a_revoked_certificate_is_refused(void **state)
     assert_int_equal(mbm_tls_begin(&(mbm_tls_identity){0}, &options), MBM_TLS_OWN_REVOKED);
 }
 
-static void der_is_used_where_it_is(void **state)
+TEST(der_is_used_where_it_is)
 {
     mbm_tls_options options = {0};
 
-    (void)state;
     assert_int_equal(mbm_tls_load(&files, &options, TLS_FOLDER "operator.der",
                                   TLS_FOLDER "operator.key.der", TLS_FOLDER "authority.der"),
                      0);
@@ -244,13 +231,12 @@ static void der_is_used_where_it_is(void **state)
     assert_string_equal(mbm_tls_role(&pair.server.tls), "Operator");
 }
 
-static void what_cannot_be_read_is_named_and_changes_nothing(void **state)
+TEST(what_cannot_be_read_is_named_and_changes_nothing)
 {
     mbm_tls_options right = options_of("operator", "authority.pem"), wrong = right;
     mbm_tls_identity identity = {0}, zero = {0};
     static const uint8_t noise[] = "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n";
 
-    (void)state;
     wrong.certificate = noise;
     wrong.certificateBytes = sizeof noise;
     assert_int_equal(mbm_tls_begin(&identity, &wrong), MBM_TLS_OWN_CERTIFICATE);
@@ -288,18 +274,17 @@ static void what_cannot_be_read_is_named_and_changes_nothing(void **state)
     mbm_tls_end(&identity);
 }
 
-static void a_key_of_another_certificate_is_refused(void **state)
+TEST(a_key_of_another_certificate_is_refused)
 {
     mbm_tls_options options = {0};
 
-    (void)state;
     assert_int_equal(mbm_tls_load(&files, &options, TLS_FOLDER "operator.pem",
                                   TLS_FOLDER "viewer.key.pem", TLS_FOLDER "authority.pem"),
                      0);
     assert_int_equal(mbm_tls_begin(&(mbm_tls_identity){0}, &options), MBM_TLS_OWN_KEY);
 }
 
-static void a_file_that_is_missing_empty_or_too_long_is_refused(void **state)
+TEST(a_file_that_is_missing_empty_or_too_long_is_refused)
 {
     const char *own = TLS_FOLDER "server.pem", *known = TLS_FOLDER "authority.pem";
     mbm_tls_options options = {0};
@@ -307,7 +292,6 @@ static void a_file_that_is_missing_empty_or_too_long_is_refused(void **state)
     int fd = mkstemp(path), i;
     FILE *file = fdopen(fd, "w");
 
-    (void)state;
     assert_int_equal(mbm_tls_load(&files, &options, own, TLS_FOLDER "none.pem", known), -1);
     assert_int_equal(errno, ENOENT);
     assert_int_equal(mbm_tls_load(&files, &options, own, path, known), -1);
@@ -327,12 +311,11 @@ static int some_random(void *context, unsigned char *bytes, size_t count)
     return *(const int *)context ? mbm_tls_random(NULL, bytes, count) : -1;
 }
 
-static void without_random_bytes_nothing_is_sent(void **state)
+TEST(without_random_bytes_nothing_is_sent)
 {
     static int has_random = 1;
     mbm_tls_options options = options_of("operator", "authority.pem");
 
-    (void)state;
     mbm_tls_close(&pair.client.tls);
     mbm_tls_end(&pair.client_identity);
     options.random = some_random;
@@ -346,13 +329,12 @@ static void without_random_bytes_nothing_is_sent(void **state)
     assert_int_equal(pair.to_server.moved, 0);
 }
 
-static void sides_without_a_common_cipher_refuse_each_other(void **state)
+TEST(sides_without_a_common_cipher_refuse_each_other)
 {
     static const int one[] = {MBEDTLS_TLS_ECDHE_ECDSA_WITH_AES_128_GCM_SHA256, 0};
     static const int other[] = {MBEDTLS_TLS_ECDHE_ECDSA_WITH_AES_256_GCM_SHA384, 0};
     mbm_tls_options options = options_of("operator", "authority.pem");
 
-    (void)state;
     mbm_tls_close(&pair.client.tls);
     mbm_tls_close(&pair.server.tls);
     mbm_tls_end(&pair.client_identity);
@@ -372,30 +354,4 @@ static void sides_without_a_common_cipher_refuse_each_other(void **state)
     assert_int_equal(pair.server.tls.status, MBM_TLS_NO_COMMON_CIPHER);
     assert_int_equal(pair.client.tls.status, MBM_TLS_REFUSED_BY_PEER);
     assert_int_equal(pair.client.tls.alert, 40);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(the_role_of_the_client_is_the_whole_string),
-        TEST(a_malformed_role_is_refused),
-        TEST(a_client_of_another_authority_is_refused),
-        TEST(a_client_whose_time_is_over_or_not_come_is_refused),
-        TEST(a_client_with_the_certificate_of_a_server_is_refused),
-        TEST(a_server_of_another_authority_is_refused),
-        TEST(a_server_whose_time_is_over_is_refused),
-        TEST(an_authority_of_this_side_whose_time_is_over_or_not_come_is_named),
-        TEST(a_server_of_another_name_is_refused),
-        TEST(a_revoked_certificate_is_refused),
-        TEST(der_is_used_where_it_is),
-        TEST(what_cannot_be_read_is_named_and_changes_nothing),
-        TEST(a_key_of_another_certificate_is_refused),
-        TEST(a_file_that_is_missing_empty_or_too_long_is_refused),
-        TEST(without_random_bytes_nothing_is_sent),
-        TEST(sides_without_a_common_cipher_refuse_each_other),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

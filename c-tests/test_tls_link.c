@@ -24,14 +24,12 @@ static mbm_registerTable holding = {.words = words, .base = FIRST, .size = 3};
 static mbm_unit unit;
 static char role[MBM_TLS_ROLE_BYTES + 1]; /* of the session that was polled last */
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     memset(&unit, 0, sizeof unit);
     unit.id = 17;
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
     tls_identify(&identity, "server", "authority", 1);
-    return 0;
 }
 
 static void leave(unsigned place)
@@ -40,17 +38,17 @@ static void leave(unsigned place)
     mbm_tcp_close(&tcps[place]);
 }
 
-static int end(void **state)
+static void end(void)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < PLACES; i++)
         leave(i);
     mbm_tcp_closeListener(&listener);
     mbm_tls_end(&identity);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 /* One round of the server's loop, without a wait. */
 static void go_round(void)
@@ -154,7 +152,7 @@ static void read_by_link(linked *l)
     assert_memory_equal(l->a.words, words, sizeof l->a.words);
 }
 
-static void a_link_opens_a_session_anew_when_it_was_lost(void **state)
+TEST(a_link_opens_a_session_anew_when_it_was_lost)
 {
     static linked l;
     mbm_tls_identity who = {0};
@@ -163,7 +161,6 @@ static void a_link_opens_a_session_anew_when_it_was_lost(void **state)
     char service[8];
     unsigned i, k;
 
-    (void)state;
     snprintf(service, sizeof service, "%u", at);
     tls_identify(&who, "operator", "authority", 0);
     /* Before there is a server. */
@@ -186,13 +183,12 @@ static void a_link_opens_a_session_anew_when_it_was_lost(void **state)
     close(reserved);
 }
 
-static void a_request_finds_the_session_closed_and_is_answered_in_a_new_one(void **state)
+TEST(a_request_finds_the_session_closed_and_is_answered_in_a_new_one)
 {
     static linked l;
     mbm_tls_identity who = {0};
     unsigned i, k;
 
-    (void)state;
     tls_identify(&who, "operator", "authority", 0);
     assert_int_equal(mbm_tls_listen(&listener, "127.0.0.1", "0"), 0);
     keep(&l, &who, listener.port);
@@ -210,7 +206,7 @@ static void a_request_finds_the_session_closed_and_is_answered_in_a_new_one(void
     mbm_tls_end(&who);
 }
 
-static void a_peer_that_never_answers_is_a_timeout_of_the_connection(void **state)
+TEST(a_peer_that_never_answers_is_a_timeout_of_the_connection)
 {
     const char *const reasons[] = {"the connection was not made in time",
                                    "the handshake took too long"};
@@ -219,7 +215,6 @@ static void a_peer_that_never_answers_is_a_timeout_of_the_connection(void **stat
     int silent;
     uint16_t at;
 
-    (void)state;
     silent = tcp_listen(&at);
     tls_identify(&who, "operator", "authority", 0);
     who.handshakeUs = 20000;
@@ -239,8 +234,6 @@ static void a_peer_that_never_answers_is_a_timeout_of_the_connection(void **stat
     mbm_tls_end(&who);
     close(silent);
 }
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
 
 /* --- in a loop --- */
 
@@ -294,13 +287,12 @@ static uint32_t accept_one(mbm_loop_entry *entry)
             assert_true(mbm_loop_wait(&loop, MBM_LOOP_FOREVER) >= 0);                              \
     } while (0)
 
-static void a_loop_polls_client_and_server_and_a_lost_session_comes_back(void **state)
+TEST(a_loop_polls_client_and_server_and_a_lost_session_comes_back)
 {
     static linked l;
     mbm_tls_identity own = {0};
     unsigned round, i;
 
-    (void)state;
     assert_int_equal(mbm_tls_listen(&listener, "127.0.0.1", "0"), 0);
     tls_identify(&own, "operator", "authority", 0);
     keep(&l, &own, listener.port);
@@ -334,16 +326,4 @@ static void a_loop_polls_client_and_server_and_a_lost_session_comes_back(void **
     mbm_tcp_close(&l.a.tcp);
     mbm_loop_close(&loop);
     mbm_tls_end(&own);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_link_opens_a_session_anew_when_it_was_lost),
-        TEST(a_request_finds_the_session_closed_and_is_answered_in_a_new_one),
-        TEST(a_peer_that_never_answers_is_a_timeout_of_the_connection),
-        TEST(a_loop_polls_client_and_server_and_a_lost_session_comes_back),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

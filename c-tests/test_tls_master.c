@@ -24,11 +24,10 @@ static void serve(void)
     (void)mbm_server_poll(&server);
 }
 
-static int begin(void **state)
+static void begin(void)
 {
     unsigned i;
 
-    (void)state;
     tls_pair_begin(&pair, "operator", "server");
     pair.idle = serve;
     memset(&unit, 0, sizeof unit);
@@ -40,21 +39,19 @@ static int begin(void **state)
     OK(mbm_server_beginRtuOverTcp(&server, &pair.server.port, &unit, 1, frame, sizeof frame));
     OK(mbm_line_beginRtu(&line, &pair.client.port, own_frame, sizeof own_frame));
     OK(mbm_node_begin(&master, &line, UNIT, response, WORDS, NULL, 0));
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     tls_pair_end(&pair);
-    return 0;
 }
 
-static void a_master_reads_while_its_idle_hook_lets_the_port_below_sleep(void **state)
+fixture each_test = {begin, end};
+
+TEST(a_master_reads_while_its_idle_hook_lets_the_port_below_sleep)
 {
     unsigned i;
 
-    (void)state;
     tls_pair_run(&pair);
     idles = 0;
     for (i = 0; i < 3; i++) {
@@ -65,20 +62,8 @@ static void a_master_reads_while_its_idle_hook_lets_the_port_below_sleep(void **
     assert_true(idles > 0);
 }
 
-static void a_master_without_a_session_reports_a_lost_link(void **state)
+TEST(a_master_without_a_session_reports_a_lost_link)
 {
-    (void)state;
     mbm_tls_close(&pair.client.tls);
     IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&master, FIRST, WORDS));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(
-            a_master_reads_while_its_idle_hook_lets_the_port_below_sleep, begin, end),
-        cmocka_unit_test_setup_teardown(a_master_without_a_session_reports_a_lost_link, begin, end),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -45,11 +45,10 @@ static const char authorities[] = TLS_FOLDER "authority.pem";
 static const uint8_t ask[] = {0x12, 0x34, 0, 0, 0, 6, 17, 3, 0, FIRST, 0, 3};
 static const uint8_t reply[] = {0x12, 0x34, 0, 0, 0, 9, 17, 3, 6, 0xA0, 0, 0xA0, 1, 0xA0, 2};
 
-static int begin(void **state)
+static void begin(void)
 {
     unsigned i;
 
-    (void)state;
     memset(&unit, 0, sizeof unit);
     unit.id = 17;
     for (i = 0; i < COUNT_OF_WORDS; i++)
@@ -61,7 +60,6 @@ static int begin(void **state)
     endings = 0;
     ended = MBM_TLS_CLOSED;
     memset(role, 0, sizeof role);
-    return 0;
 }
 
 static void leave(unsigned place)
@@ -70,17 +68,17 @@ static void leave(unsigned place)
     mbm_tcp_close(&tcps[place]);
 }
 
-static int end(void **state)
+static void end(void)
 {
     unsigned i;
 
-    (void)state;
     for (i = 0; i < PLACES; i++)
         leave(i);
     mbm_tcp_closeListener(&listener);
     mbm_tls_end(&identity);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 static void keep_role(const mbm_tls *tls)
 {
@@ -202,9 +200,8 @@ static void is_answered(const char *name, const char *const *more, const char *e
 
 #define ARGUMENTS(...) ((const char *const[]){__VA_ARGS__, NULL})
 
-static void openssl_asks_and_gets_the_bytes_of_the_reply(void **state)
+TEST(openssl_asks_and_gets_the_bytes_of_the_reply)
 {
-    (void)state;
     is_answered("operator", NULL, "Operator");
     is_answered("norole", NULL, "(none)");
     is_answered("rsa", ARGUMENTS("-tls1_2"), "Operator");
@@ -212,9 +209,8 @@ static void openssl_asks_and_gets_the_bytes_of_the_reply(void **state)
                 "Viewer");
 }
 
-static void openssl_without_a_right_certificate_is_refused(void **state)
+TEST(openssl_without_a_right_certificate_is_refused)
 {
-    (void)state;
     is_refused(NULL, NULL, MBM_TLS_NO_CERTIFICATE);
     is_refused("stranger", NULL, MBM_TLS_UNKNOWN_AUTHORITY);
     is_refused("expired", NULL, MBM_TLS_EXPIRED);
@@ -223,15 +219,13 @@ static void openssl_without_a_right_certificate_is_refused(void **state)
 }
 
 /* Mbed TLS does not know the extension, and so must refuse it where it is critical. */
-static void a_critical_role_is_refused(void **state)
+TEST(a_critical_role_is_refused)
 {
-    (void)state;
     is_refused("role-critical", NULL, MBM_TLS_BAD_CERTIFICATE);
 }
 
-static void other_versions_and_ciphers_that_hide_nothing_are_refused(void **state)
+TEST(other_versions_and_ciphers_that_hide_nothing_are_refused)
 {
-    (void)state;
     is_refused("operator", ARGUMENTS("-tls1_1", "-cipher", "DEFAULT:@SECLEVEL=0"),
                MBM_TLS_NO_COMMON_VERSION);
     is_refused("operator", ARGUMENTS("-tls1_3"), MBM_TLS_NO_COMMON_CIPHER);
@@ -255,13 +249,12 @@ static size_t read_to_end(int fd, uint8_t *bytes, size_t capacity)
     return have;
 }
 
-static void a_client_without_tls_is_refused(void **state)
+TEST(a_client_without_tls_is_refused)
 {
     int fd = tcp_connect(listener.port);
     uint8_t received[64];
     size_t have;
 
-    (void)state;
     assert_int_equal(write(fd, ask, sizeof ask), sizeof ask);
     have = read_to_end(fd, received, sizeof received);
     assert_int_equal(ended, MBM_TLS_NOT_TLS);
@@ -269,13 +262,12 @@ static void a_client_without_tls_is_refused(void **state)
     assert_true(have == 0 || (have == 7 && received[0] == 21));
 }
 
-static void a_client_that_closes_its_half_in_the_handshake_is_dropped(void **state)
+TEST(a_client_that_closes_its_half_in_the_handshake_is_dropped)
 {
     static const uint8_t part[] = {22, 3, 1, 0, 200, 1, 0, 0, 196};
     int fd = tcp_connect(listener.port);
     uint8_t received[64];
 
-    (void)state;
     assert_int_equal(write(fd, part, sizeof part), sizeof part);
     assert_int_equal(shutdown(fd, SHUT_WR), 0);
     (void)read_to_end(fd, received, sizeof received);
@@ -384,21 +376,19 @@ static uint8_t ask_server(asker *a, const char *server, const char *client, cons
     return a->request.status;
 }
 
-static void openssl_answers_a_request(void **state)
+TEST(openssl_answers_a_request)
 {
     static asker a;
 
-    (void)state;
     IS(MBM_OK, ask_server(&a, "server", "operator", NULL));
     assert_memory_equal(a.words, words, sizeof a.words);
     IS(MBM_OK, ask_server(&a, "server", "rsa", "-tls1_2"));
 }
 
-static void a_server_without_a_right_certificate_gets_no_request(void **state)
+TEST(a_server_without_a_right_certificate_gets_no_request)
 {
     static asker a;
 
-    (void)state;
     IS(MBM_LINK_LOST, ask_server(&a, "stranger-server", "operator", NULL));
     assert_int_equal(a.tls.status, MBM_TLS_UNKNOWN_AUTHORITY);
     IS(MBM_LINK_LOST, ask_server(&a, "expired-server", "operator", NULL));
@@ -411,11 +401,10 @@ static void a_server_without_a_right_certificate_gets_no_request(void **state)
 }
 
 /* The server closes the socket after its alert, while the client still sends. */
-static void a_server_that_refuses_the_client_says_why(void **state)
+TEST(a_server_that_refuses_the_client_says_why)
 {
     static asker a;
 
-    (void)state;
     IS(MBM_LINK_LOST, ask_server(&a, "server", "stranger", "-tls1_2"));
     assert_int_equal(a.tls.status, MBM_TLS_REFUSED_BY_PEER);
     assert_int_equal(a.tls.alert, 48);
@@ -424,7 +413,7 @@ static void a_server_that_refuses_the_client_says_why(void **state)
     assert_int_equal(a.tls.alert, 45);
 }
 
-static void many_connections_keep_their_roles_apart(void **state)
+TEST(many_connections_keep_their_roles_apart)
 {
     const unsigned count = getenv("MBM_TRANSACTIONS") ? 6 : PLACES;
     const char *const names[] = {"operator", "viewer", "norole"};
@@ -434,7 +423,6 @@ static void many_connections_keep_their_roles_apart(void **state)
     char service[8];
     unsigned i, pending;
 
-    (void)state;
     memset(askers, 0, sizeof askers);
     snprintf(service, sizeof service, "%u", listener.port);
     for (i = 0; i < 3; i++)
@@ -465,24 +453,4 @@ static void many_connections_keep_their_roles_apart(void **state)
     assert_int_equal(ended, MBM_TLS_PEER_CLOSED);
     for (i = 0; i < 3; i++)
         mbm_tls_end(&who[i]);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(openssl_asks_and_gets_the_bytes_of_the_reply),
-        TEST(openssl_without_a_right_certificate_is_refused),
-        TEST(a_critical_role_is_refused),
-        TEST(other_versions_and_ciphers_that_hide_nothing_are_refused),
-        TEST(a_client_without_tls_is_refused),
-        TEST(a_client_that_closes_its_half_in_the_handshake_is_dropped),
-        TEST(openssl_answers_a_request),
-        TEST(a_server_without_a_right_certificate_gets_no_request),
-        TEST(a_server_that_refuses_the_client_says_why),
-        TEST(many_connections_keep_their_roles_apart),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

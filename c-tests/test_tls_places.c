@@ -91,9 +91,8 @@ static void record_hello(void)
     mbm_tls_close(&tls);
 }
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     ahead = 0;
     looks = 0;
     memset(&unit, 0, sizeof unit);
@@ -104,7 +103,6 @@ static int begin(void **state)
     tls_identify(&operator_identity, "operator", "authority", 0);
     record_hello();
     assert_int_equal(mbm_tls_listen(&listener, "127.0.0.1", "0"), 0);
-    return 0;
 }
 
 static void leave(int place)
@@ -113,18 +111,18 @@ static void leave(int place)
     mbm_tcp_close(&tcps[place]);
 }
 
-static int end(void **state)
+static void end(void)
 {
     int i;
 
-    (void)state;
     for (i = 0; i < PLACES; i++)
         leave(i);
     mbm_tcp_closeListener(&listener);
     mbm_tls_end(&identity);
     mbm_tls_end(&operator_identity);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 /* One round of the server's loop. The wait also ends when there are bytes at `fd`. */
 static void go_round(int fd)
@@ -224,12 +222,11 @@ static int is_closed(int fd)
     return count == 0 || errno == ECONNRESET;
 }
 
-static void the_oldest_unfinished_handshake_leaves_for_a_new_client(void **state)
+TEST(the_oldest_unfinished_handshake_leaves_for_a_new_client)
 {
     int fds[2 * PLACES];
     unsigned i, k;
 
-    (void)state;
     for (i = 0; i < PLACES; i++)
         fds[i] = get_half_open("127.0.0.1");
     for (; i < 2 * PLACES; i++) {
@@ -243,12 +240,11 @@ static void the_oldest_unfinished_handshake_leaves_for_a_new_client(void **state
 }
 
 /* As on a busy machine, which may stop a program between two looks at the clock. */
-static void the_oldest_leaves_also_if_time_passes_while_handshakes_are_compared(void **state)
+TEST(the_oldest_leaves_also_if_time_passes_while_handshakes_are_compared)
 {
     int fds[PLACES + 1];
     unsigned i, jump;
 
-    (void)state;
     for (jump = 1; jump <= PLACES; jump++) {
         for (i = 0; i <= PLACES; i++) {
             looks = i == PLACES ? jump : 0;
@@ -264,12 +260,11 @@ static void the_oldest_leaves_also_if_time_passes_while_handshakes_are_compared(
     }
 }
 
-static void a_client_whose_first_message_is_there_stays_longer_than_one_that_sent_half(void **state)
+TEST(a_client_whose_first_message_is_there_stays_longer_than_one_that_sent_half)
 {
     int fds[PLACES + 1];
     unsigned i;
 
-    (void)state;
     fds[0] = get_place("127.0.0.1", hello, hello_bytes, MBM_TLS_GREETED);
     for (i = 1; i <= PLACES; i++)
         fds[i] = get_half_open("127.0.0.1");
@@ -279,12 +274,11 @@ static void a_client_whose_first_message_is_there_stays_longer_than_one_that_sen
 }
 
 /* However far its handshakes have come, and however old that of the other is. */
-static void the_address_with_the_most_unfinished_handshakes_loses_one_first(void **state)
+TEST(the_address_with_the_most_unfinished_handshakes_loses_one_first)
 {
     int fds[PLACES + 1];
     unsigned i;
 
-    (void)state;
     fds[0] = get_half_open("127.0.0.2");
     for (i = 1; i <= PLACES; i++)
         fds[i] = get_place("127.0.0.1", hello, hello_bytes, MBM_TLS_GREETED);
@@ -293,12 +287,11 @@ static void the_address_with_the_most_unfinished_handshakes_loses_one_first(void
     close_all(fds, PLACES + 1);
 }
 
-static void clients_that_say_nothing_get_no_place(void **state)
+TEST(clients_that_say_nothing_get_no_place)
 {
     int fds[MANY], other;
     unsigned i;
 
-    (void)state;
     for (i = 0; i < MANY; i++)
         fds[i] = come("127.0.0.1", NULL, 0);
     other = get_half_open("127.0.0.1");
@@ -368,13 +361,12 @@ static unsigned refill(int *fds, unsigned count)
     return closed;
 }
 
-static void openssl_gets_in_while_half_open_connections_fill_every_place_again(void **state)
+TEST(openssl_gets_in_while_half_open_connections_fill_every_place_again)
 {
     int fds[2 * PLACES];
     unsigned rounds = 0, closed = 0;
     program p;
 
-    (void)state;
     memset(fds, -1, sizeof fds);
     (void)refill(fds, 2 * PLACES);
     UNTIL(place_of(fds[2 * PLACES - 1]) >= 0);
@@ -390,13 +382,12 @@ static void openssl_gets_in_while_half_open_connections_fill_every_place_again(v
     close_all(fds, 2 * PLACES);
 }
 
-static void a_client_whose_handshake_is_over_keeps_its_place(void **state)
+TEST(a_client_whose_handshake_is_over_keeps_its_place)
 {
     int fds[2 * PLACES];
     unsigned i;
     program p;
 
-    (void)state;
     start_openssl(&p);
     UNTIL(is_answered(&p));
     for (i = 0; i < 2 * PLACES; i++)
@@ -405,21 +396,4 @@ static void a_client_whose_handshake_is_over_keeps_its_place(void **state)
     UNTIL(is_answered(&p));
     stop_openssl(&p);
     close_all(fds, 2 * PLACES);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(the_oldest_unfinished_handshake_leaves_for_a_new_client),
-        TEST(the_oldest_leaves_also_if_time_passes_while_handshakes_are_compared),
-        TEST(a_client_whose_first_message_is_there_stays_longer_than_one_that_sent_half),
-        TEST(the_address_with_the_most_unfinished_handshakes_loses_one_first),
-        TEST(clients_that_say_nothing_get_no_place),
-        TEST(openssl_gets_in_while_half_open_connections_fill_every_place_again),
-        TEST(a_client_whose_handshake_is_over_keeps_its_place),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -57,12 +57,11 @@ static int find(const extensions *e, size_t length, char *role)
     return result;
 }
 
-static void the_role_is_found_among_other_extensions(void **state)
+TEST(the_role_is_found_among_other_extensions)
 {
     char role[MBM_TLS_ROLE_BYTES + 1];
     extensions e = {.length = 0};
 
-    (void)state;
     assert_int_equal(find(&e, 0, role), MBM_TLS_NO_ROLE);
     add(&e, constraint, sizeof constraint);
     add(&e, other_oid, sizeof other_oid);
@@ -79,12 +78,11 @@ static void the_role_is_found_among_other_extensions(void **state)
     assert_string_equal(role, "CD");
 }
 
-static void two_roles_are_no_role(void **state)
+TEST(two_roles_are_no_role)
 {
     char role[MBM_TLS_ROLE_BYTES + 1];
     extensions e = {.length = 0};
 
-    (void)state;
     add(&e, role_plain, sizeof role_plain);
     add(&e, role_critical, sizeof role_critical);
     assert_int_equal(find(&e, e.length, role), MBM_TLS_WRONG_ROLE);
@@ -92,14 +90,13 @@ static void two_roles_are_no_role(void **state)
 
 /* No length and no change of a byte makes the search leave the extensions, or find a role that
  * is not two characters long. */
-static void damaged_extensions_are_read_within_their_bounds(void **state)
+TEST(damaged_extensions_are_read_within_their_bounds)
 {
     char role[MBM_TLS_ROLE_BYTES + 1];
     extensions e = {.length = 0}, changed;
     size_t i, length;
     unsigned value;
 
-    (void)state;
     add(&e, constraint, sizeof constraint);
     add(&e, role_critical, sizeof role_critical);
     for (length = 1; length < e.length; length++)
@@ -214,9 +211,8 @@ static uint8_t write_one(uint16_t address, uint16_t word)
     return see_through();
 }
 
-static void a_function_that_the_role_does_not_allow_is_exception_01(void **state)
+TEST(a_function_that_the_role_does_not_allow_is_exception_01)
 {
-    (void)state;
     begin_unit(1);
     connect_as("operator");
     IS(MBM_OK, read_all());
@@ -237,9 +233,8 @@ static void a_function_that_the_role_does_not_allow_is_exception_01(void **state
     tls_pair_end(&pair);
 }
 
-static void a_hook_of_a_table_gets_the_connection_and_its_role(void **state)
+TEST(a_hook_of_a_table_gets_the_connection_and_its_role)
 {
-    (void)state;
     begin_unit(0);
     connect_as("viewer");
     IS(MBM_OK, write_one(FIRST + 2, 1));
@@ -250,17 +245,4 @@ static void a_hook_of_a_table_gets_the_connection_and_its_role(void **state)
     IS(MBM_OK, write_one(FIRST + 3, 1));
     assert_int_equal(words[3], 1);
     tls_pair_end(&pair);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_role_is_found_among_other_extensions),
-        cmocka_unit_test(two_roles_are_no_role),
-        cmocka_unit_test(damaged_extensions_are_read_within_their_bounds),
-        cmocka_unit_test(a_function_that_the_role_does_not_allow_is_exception_01),
-        cmocka_unit_test(a_hook_of_a_table_gets_the_connection_and_its_role),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -32,9 +32,8 @@ static uint8_t buffer[2 * MBM_MAX_ASCII_FRAME], frame[MBM_MAX_ASCII_FRAME],
     other[MBM_MAX_TCP_FRAME];
 static uint16_t words[8];
 
-static int reset(void **state)
+static void reset(void)
 {
-    (void)state;
     memset(&wire, 0, sizeof wire);
     memset(&trace, 0, sizeof trace);
     memset(&master, 0, sizeof master);
@@ -47,8 +46,9 @@ static int reset(void **state)
     port = hooked_port_of(&wire);
     count = 0;
     within_hook = NULL;
-    return 0;
 }
+
+fixture each_test = {reset, NULL};
 
 static void keep(void *context, const mbm_traceRecord *record)
 {
@@ -85,9 +85,8 @@ static void begin_master(void)
 
 static const uint8_t READ[] = {17, 3, 0, 1, 0, 2}, REPLY[] = {17, 3, 4, 0, 1, 0, 2};
 
-static void a_blocking_master_works_through_a_trace(void **state)
+TEST(a_blocking_master_works_through_a_trace)
 {
-    (void)state;
     begin_master();
     hooked_port_arrive_rtu(&wire, 17, REPLY + 1, sizeof REPLY - 1);
     wire.last = 0; /* it arrives after the request */
@@ -114,12 +113,11 @@ static void a_blocking_master_works_through_a_trace(void **state)
     assert_int_equal(count, 3);
 }
 
-static void optional_hooks_are_passed_on_only_where_the_port_has_them(void **state)
+TEST(optional_hooks_are_passed_on_only_where_the_port_has_them)
 {
     const mbm_port *traced;
     int i;
 
-    (void)state;
     for (i = 0; i < 2; i++) {
         if (i == 1) {
             port.flush = NULL;
@@ -137,7 +135,7 @@ static void optional_hooks_are_passed_on_only_where_the_port_has_them(void **sta
     }
 }
 
-static void a_client_of_each_framing_works_through_a_trace(void **state)
+TEST(a_client_of_each_framing_works_through_a_trace)
 {
     unsigned kind;
 
@@ -148,7 +146,7 @@ static void a_client_of_each_framing_works_through_a_trace(void **state)
         const mbm_port *traced;
         uint16_t length;
 
-        reset(state);
+        reset();
         OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, framing, buffer, sizeof buffer, keep,
                            NULL));
         traced = mbm_trace_port(&trace);
@@ -181,9 +179,8 @@ static void a_client_of_each_framing_works_through_a_trace(void **state)
     }
 }
 
-static void a_server_works_through_a_trace(void **state)
+TEST(a_server_works_through_a_trace)
 {
-    (void)state;
     unit.id = 17;
     words[1] = 0x1234;
     table.words = words;
@@ -200,13 +197,12 @@ static void a_server_works_through_a_trace(void **state)
     is_record(1, MBM_TRACE_SENT, MBM_PACKET_RESPONSE, MBM_OK, wire.sent, 9);
 }
 
-static void two_masters_share_a_traced_port(void **state)
+TEST(two_masters_share_a_traced_port)
 {
     static mbm_line second_line;
     static mbm_node second;
     static uint8_t more[16];
 
-    (void)state;
     begin_master();
     memset(&second_line, 0, sizeof second_line);
     memset(&second, 0, sizeof second);
@@ -221,12 +217,11 @@ static void two_masters_share_a_traced_port(void **state)
     assert_int_equal(records[1].bytes[0], 18);
 }
 
-static void two_links_are_told_apart_by_their_contexts(void **state)
+TEST(two_links_are_told_apart_by_their_contexts)
 {
     static mbm_trace second;
     static uint8_t more[64];
 
-    (void)state;
     memset(&second, 0, sizeof second);
     begin_master();
     /* A trace before a trace: both hand the frame out. */
@@ -241,12 +236,11 @@ static void two_links_are_told_apart_by_their_contexts(void **state)
     assert_memory_equal(records[0].bytes, records[1].bytes, 8);
 }
 
-static void the_rest_is_handed_out_by_flush(void **state)
+TEST(the_rest_is_handed_out_by_flush)
 {
     uint8_t bytes[8];
     const mbm_port *traced;
 
-    (void)state;
     begin_master();
     traced = mbm_trace_port(&trace);
     hooked_port_arrive(&wire, REPLY, 5);
@@ -259,12 +253,11 @@ static void the_rest_is_handed_out_by_flush(void **state)
     assert_int_equal(count, 1);
 }
 
-static void the_frame_timeout_can_be_set(void **state)
+TEST(the_frame_timeout_can_be_set)
 {
     uint8_t bytes[8];
     const mbm_port *traced;
 
-    (void)state;
     begin_master();
     traced = mbm_trace_port(&trace);
     OK(mbm_trace_setFrameTimeout(&trace, 200));
@@ -278,12 +271,11 @@ static void the_frame_timeout_can_be_set(void **state)
     assert_int_equal(count, 1);
 }
 
-static void a_trace_begun_again_drops_what_it_has_not_handed_out(void **state)
+TEST(a_trace_begun_again_drops_what_it_has_not_handed_out)
 {
     uint8_t bytes[8];
     const mbm_port *traced;
 
-    (void)state;
     begin_master();
     traced = mbm_trace_port(&trace);
     OK(mbm_trace_setFrameTimeout(&trace, 60000));
@@ -301,7 +293,7 @@ static void a_trace_begun_again_drops_what_it_has_not_handed_out(void **state)
     assert_int_equal(count, 1);
 }
 
-static void a_trace_goes_on_after_refused_calls(void **state)
+TEST(a_trace_goes_on_after_refused_calls)
 {
     const mbm_function wrong = {.code = 0};
     const mbm_framing rtu = {0}, no_frames = {.kind = MBM_FRAMING_NONE}, unknown = {.kind = 5},
@@ -315,7 +307,6 @@ static void a_trace_goes_on_after_refused_calls(void **state)
     uint8_t bytes[16];
     size_t i;
 
-    (void)state;
     incomplete.micros = NULL;
     IS(MBM_NOT_INITIALISED, mbm_trace_flush(&trace));
     IS(MBM_NOT_INITIALISED, mbm_trace_setFrameTimeout(&trace, 1));
@@ -376,9 +367,8 @@ static void try_from_the_port(int hook)
         try_everything();
 }
 
-static void calls_from_within_the_hook_are_refused(void **state)
+TEST(calls_from_within_the_hook_are_refused)
 {
-    (void)state;
     begin_master();
     OK(mbm_node_setResponseTimeout(&master, 10));
     within_hook = try_everything;
@@ -411,14 +401,13 @@ static void use_the_port(void)
     assert_int_equal(p->flush(p->context), 1);
 }
 
-static void the_port_of_a_trace_neither_reads_nor_writes_within_the_hook(void **state)
+TEST(the_port_of_a_trace_neither_reads_nor_writes_within_the_hook)
 {
     const mbm_framing rtu = {0};
     const mbm_port *traced;
     uint8_t sent[8] = {17, 5, 0, 1, 0xFF, 0};
     uint16_t crc;
 
-    (void)state;
     OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, buffer, 64, keep, NULL));
     traced_port = traced = mbm_trace_port(&trace);
     crc = mbm_frame_crc16(sent, 6);
@@ -432,7 +421,7 @@ static void the_port_of_a_trace_neither_reads_nor_writes_within_the_hook(void **
     assert_int_equal(wire.length, 8);
 }
 
-static void an_event_of_a_sniffer_becomes_a_record(void **state)
+TEST(an_event_of_a_sniffer_becomes_a_record)
 {
     static mbm_sniffer sniffer;
     static const uint8_t status_of[] = {MBM_OK, MBM_OK, MBM_INVALID_CRC, MBM_MALFORMED_FRAME};
@@ -443,7 +432,6 @@ static void an_event_of_a_sniffer_becomes_a_record(void **state)
     uint32_t now = 1000;
     unsigned piece;
 
-    (void)state;
     memset(&sniffer, 0, sizeof sniffer);
     OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, frame, sizeof frame));
     for (piece = 0; piece < 5; piece++) {
@@ -476,27 +464,4 @@ static void an_event_of_a_sniffer_becomes_a_record(void **state)
     assert_int_equal(found, COUNT(status_of));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_ofEvent(NULL, &record));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_ofEvent(&event, NULL));
-}
-
-#define TEST(test) cmocka_unit_test_setup(test, reset)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_blocking_master_works_through_a_trace),
-        TEST(optional_hooks_are_passed_on_only_where_the_port_has_them),
-        TEST(a_client_of_each_framing_works_through_a_trace),
-        TEST(a_server_works_through_a_trace),
-        TEST(two_masters_share_a_traced_port),
-        TEST(two_links_are_told_apart_by_their_contexts),
-        TEST(the_rest_is_handed_out_by_flush),
-        TEST(the_frame_timeout_can_be_set),
-        TEST(a_trace_begun_again_drops_what_it_has_not_handed_out),
-        TEST(a_trace_goes_on_after_refused_calls),
-        TEST(calls_from_within_the_hook_are_refused),
-        TEST(the_port_of_a_trace_neither_reads_nor_writes_within_the_hook),
-        TEST(an_event_of_a_sniffer_becomes_a_record),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

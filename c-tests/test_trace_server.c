@@ -57,7 +57,7 @@ static uint8_t before_read(void *context, const mbm_access *access)
     return 0;
 }
 
-static void a_hook_finds_its_connection_behind_a_trace(void **state)
+TEST(a_hook_finds_its_connection_behind_a_trace)
 {
     static const uint8_t request[8] = {17, 3, 0, 0, 0, 1, 0x86, 0x9A};
     static const mbm_accessHooks hooks = {.beforeRead = before_read};
@@ -71,7 +71,6 @@ static void a_hook_finds_its_connection_behind_a_trace(void **state)
         .context = &wire, .read = read_wire, .write = write_wire, .micros = micros};
     int polls;
 
-    (void)state;
     OK(mbm_registerTable_setHooks(&table, &hooks));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_trace_begin(&server_trace.trace, MBM_PACKET_RESPONSE, &port, &rtu, buffer, sizeof buffer,
@@ -84,13 +83,4 @@ static void a_hook_finds_its_connection_behind_a_trace(void **state)
         OK(mbm_server_poll(&server));
     assert_int_equal(wire.sent, 7);
     assert_ptr_equal(accessed, &wire);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_hook_finds_its_connection_behind_a_trace),
-    };
-
-    return cmocka_run_group_tests_name("trace of a server", tests, NULL, NULL);
 }

@@ -73,20 +73,18 @@ int ioctl(int fd, unsigned long request, ...)
     return (int)syscall(SYS_ioctl, fd, request, argument);
 }
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     memset(&driver, 0, sizeof driver);
     pty_open(&line);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     pty_close(&line);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 static struct termios settings_of(int fd)
 {
@@ -105,7 +103,7 @@ static void assert_same(const struct termios *a, const struct termios *b)
     assert_memory_equal(a->c_cc, b->c_cc, sizeof a->c_cc);
 }
 
-static void every_rate_of_termios_can_be_set(void **state)
+TEST(every_rate_of_termios_can_be_set)
 {
     static const struct {
         uint32_t baud;
@@ -116,7 +114,6 @@ static void every_rate_of_termios_can_be_set(void **state)
                 {3000000, B3000000}, {4000000, B4000000}};
     size_t i;
 
-    (void)state;
     SKIP_IF_EMULATED();
     for (i = 0; i < COUNT(rows); i++) {
         struct termios settings;
@@ -138,7 +135,7 @@ static uint32_t rate_of(int fd)
     return settings[10];
 }
 
-static void any_rate_is_set_if_the_options_allow_it(void **state)
+TEST(any_rate_is_set_if_the_options_allow_it)
 {
     static const uint32_t rates[] = {76800, 100000, 250000, 19201, 3250000, 9600};
     struct termios before = settings_of(line.theirs), after;
@@ -147,7 +144,6 @@ static void any_rate_is_set_if_the_options_allow_it(void **state)
     mbm_tty tty;
     size_t i;
 
-    (void)state;
     SKIP_IF_EMULATED();
     rate = rate_of(line.theirs);
     options.anyRate = 1;
@@ -174,7 +170,7 @@ static void any_rate_is_set_if_the_options_allow_it(void **state)
 }
 
 /* The C library fails if the terminal takes none of the changes. */
-static void a_pty_that_lacks_only_the_parity_is_opened(void **state)
+TEST(a_pty_that_lacks_only_the_parity_is_opened)
 {
     const mbm_tty_options frames[] = {PLAIN,
                                       {.baud = 19200, .parity = 'O', .stop = 1},
@@ -182,7 +178,6 @@ static void a_pty_that_lacks_only_the_parity_is_opened(void **state)
     mbm_tty left_open, tty;
     size_t i;
 
-    (void)state;
     assert_int_equal(mbm_tty_open(&left_open, line.path, 19200, 'N', 1), 0);
     for (i = 0; i < COUNT(frames); i++) {
         assert_int_equal(mbm_tty_openWith(&tty, line.path, &frames[i]), 0);
@@ -191,7 +186,7 @@ static void a_pty_that_lacks_only_the_parity_is_opened(void **state)
     mbm_tty_close(&left_open);
 }
 
-static void options_that_no_terminal_has_are_refused_with_einval(void **state)
+TEST(options_that_no_terminal_has_are_refused_with_einval)
 {
     static const mbm_tty_options bad[] = {
         {.baud = 0, .parity = 'N', .stop = 1},
@@ -208,7 +203,6 @@ static void options_that_no_terminal_has_are_refused_with_einval(void **state)
     mbm_tty tty;
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(bad); i++) {
         FAILS(EINVAL, mbm_tty_openWith(&tty, line.path, &bad[i]));
         assert_int_equal(tty.fd, -1);
@@ -218,11 +212,10 @@ static void options_that_no_terminal_has_are_refused_with_einval(void **state)
     FAILS(EINVAL, mbm_tty_open(&tty, line.path, 9600, 'N', -255));
 }
 
-static void a_failed_open_sets_errno(void **state)
+TEST(a_failed_open_sets_errno)
 {
     mbm_tty tty;
 
-    (void)state;
     FAILS(ENOENT, mbm_tty_openWith(&tty, "/dev/no-such-terminal", &PLAIN));
     FAILS(ENOTTY, mbm_tty_openWith(&tty, "/dev/null", &PLAIN));
     assert_int_equal(tty.fd, -1);
@@ -231,12 +224,11 @@ static void a_failed_open_sets_errno(void **state)
     mbm_tty_close(&tty);
 }
 
-static void close_leaves_the_terminal_as_it_was_found(void **state)
+TEST(close_leaves_the_terminal_as_it_was_found)
 {
     struct termios found = settings_of(line.theirs), now;
     mbm_tty tty;
 
-    (void)state;
     found.c_lflag |= ECHO | ICANON;
     found.c_cc[VMIN] = 7;
     cfsetispeed(&found, B1200);
@@ -255,13 +247,12 @@ static void close_leaves_the_terminal_as_it_was_found(void **state)
     mbm_tty_close(&tty);
 }
 
-static void detach_gives_the_descriptor_back_as_it_was(void **state)
+TEST(detach_gives_the_descriptor_back_as_it_was)
 {
     struct termios found, now;
     int flags = fcntl(line.ours, F_GETFL);
     mbm_tty tty;
 
-    (void)state;
     found = settings_of(line.ours);
     found.c_lflag |= ECHO;
     assert_int_equal(tcsetattr(line.ours, TCSANOW, &found), 0);
@@ -275,14 +266,13 @@ static void detach_gives_the_descriptor_back_as_it_was(void **state)
     assert_same(&now, &found);
 }
 
-static void an_exclusive_terminal_is_busy_for_a_second_one(void **state)
+TEST(an_exclusive_terminal_is_busy_for_a_second_one)
 {
     mbm_tty_options options = PLAIN;
     struct termios before, after;
     mbm_tty first, second;
     int exclusive = 0;
 
-    (void)state;
     SKIP_IF_EMULATED();
     options.exclusive = 1;
     assert_int_equal(mbm_tty_openWith(&first, line.path, &options), 0);
@@ -301,13 +291,12 @@ static void an_exclusive_terminal_is_busy_for_a_second_one(void **state)
     mbm_tty_close(&second);
 }
 
-static void a_shared_terminal_is_open_to_others_that_share_it(void **state)
+TEST(a_shared_terminal_is_open_to_others_that_share_it)
 {
     mbm_tty_options shared = PLAIN, exclusive = PLAIN;
     mbm_tty first, second;
     int is_exclusive = 1;
 
-    (void)state;
     SKIP_IF_EMULATED();
     shared.shared = 1;
     exclusive.exclusive = 1;
@@ -326,13 +315,12 @@ static void a_shared_terminal_is_open_to_others_that_share_it(void **state)
     mbm_tty_close(&first);
 }
 
-static void without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed(void **state)
+TEST(without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed)
 {
     struct termios before = settings_of(line.theirs), after;
     mbm_tty_options options = PLAIN;
     mbm_tty tty;
 
-    (void)state;
     SKIP_IF_EMULATED();
     options.rs485 = 1;
     FAILS(ENOTTY, mbm_tty_openWith(&tty, line.path, &options));
@@ -341,12 +329,11 @@ static void without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed(void
     assert_same(&before, &after);
 }
 
-static void rs485_sets_up_the_driver_and_close_restores_it(void **state)
+TEST(rs485_sets_up_the_driver_and_close_restores_it)
 {
     mbm_tty_options options = PLAIN;
     mbm_tty tty;
 
-    (void)state;
     driver.there = 1;
     driver.longest = 100;
     driver.state.delay_rts_after_send = 42;
@@ -369,13 +356,12 @@ static void rs485_sets_up_the_driver_and_close_restores_it(void **state)
     mbm_tty_close(&tty);
 }
 
-static void received_bytes_are_handed_over_at_once_if_the_driver_can(void **state)
+TEST(received_bytes_are_handed_over_at_once_if_the_driver_can)
 {
     const int other = (int)ASYNC_SKIP_TEST, at_once = (int)ASYNC_LOW_LATENCY;
     mbm_tty tty;
     int i;
 
-    (void)state;
     driver.serial.closing_wait = 77;
     for (i = 0; i < 4; i++) {
         const int before = i & 1 ? other | at_once : other;
@@ -391,12 +377,11 @@ static void received_bytes_are_handed_over_at_once_if_the_driver_can(void **stat
     driver.has_latency = 0;
 }
 
-static void an_rs485_delay_that_the_driver_shortens_is_refused(void **state)
+TEST(an_rs485_delay_that_the_driver_shortens_is_refused)
 {
     mbm_tty_options options = PLAIN;
     mbm_tty tty;
 
-    (void)state;
     driver.there = 1;
     driver.longest = 100;
     options.rs485 = 1;
@@ -405,13 +390,12 @@ static void an_rs485_delay_that_the_driver_shortens_is_refused(void **state)
     assert_int_equal(driver.state.flags, 0);
 }
 
-static void a_lost_line_is_reported_with_its_errno(void **state)
+TEST(a_lost_line_is_reported_with_its_errno)
 {
     uint8_t byte;
     mbm_port port;
     mbm_tty tty;
 
-    (void)state;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
     port = mbm_tty_port(&tty);
     assert_int_equal(port.read(port.context, &byte, 1), 0);
@@ -428,7 +412,7 @@ static void a_lost_line_is_reported_with_its_errno(void **state)
     mbm_tty_close(&tty);
 }
 
-static void a_full_line_accepts_no_bytes_and_is_not_lost(void **state)
+TEST(a_full_line_accepts_no_bytes_and_is_not_lost)
 {
     static uint8_t much[40000];
     int16_t taken;
@@ -436,7 +420,6 @@ static void a_full_line_accepts_no_bytes_and_is_not_lost(void **state)
     mbm_tty tty;
     unsigned rounds = 0;
 
-    (void)state;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
     port = mbm_tty_port(&tty);
     while ((taken = port.write(port.context, much, sizeof much)) > 0)
@@ -446,14 +429,13 @@ static void a_full_line_accepts_no_bytes_and_is_not_lost(void **state)
     mbm_tty_close(&tty);
 }
 
-static void a_socket_can_be_attached(void **state)
+TEST(a_socket_can_be_attached)
 {
     int pair[2];
     mbm_tty tty;
     mbm_port port;
     uint8_t byte;
 
-    (void)state;
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
     assert_int_equal(mbm_tty_attach(&tty, pair[0]), 0);
     port = mbm_tty_port(&tty);
@@ -464,30 +446,4 @@ static void a_socket_can_be_attached(void **state)
     assert_int_equal(port.read(port.context, &byte, 1), -1);
     assert_int_equal(tty.error, EPIPE);
     mbm_tty_close(&tty);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(every_rate_of_termios_can_be_set),
-        TEST(any_rate_is_set_if_the_options_allow_it),
-        TEST(a_pty_that_lacks_only_the_parity_is_opened),
-        TEST(options_that_no_terminal_has_are_refused_with_einval),
-        TEST(a_failed_open_sets_errno),
-        TEST(close_leaves_the_terminal_as_it_was_found),
-        TEST(detach_gives_the_descriptor_back_as_it_was),
-        TEST(an_exclusive_terminal_is_busy_for_a_second_one),
-        TEST(a_shared_terminal_is_open_to_others_that_share_it),
-        TEST(without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed),
-        TEST(rs485_sets_up_the_driver_and_close_restores_it),
-        TEST(received_bytes_are_handed_over_at_once_if_the_driver_can),
-        TEST(an_rs485_delay_that_the_driver_shortens_is_refused),
-        TEST(a_lost_line_is_reported_with_its_errno),
-        TEST(a_full_line_accepts_no_bytes_and_is_not_lost),
-        TEST(a_socket_can_be_attached),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -31,9 +31,8 @@ static mbm_tcp_listener listener;
 static node first, second;
 static char service[8];
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     alarm(PATIENCE_MS / 1000);
     memset(&tty, 0, sizeof tty);
     memset(&tcp, 0, sizeof tcp);
@@ -42,19 +41,18 @@ static int begin(void **state)
     pty_open(&line);
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     snprintf(service, sizeof service, "%u", listener.port);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     mbm_tty_close(&tty);
     mbm_tcp_close(&tcp);
     mbm_tcp_closeListener(&listener);
     pty_close(&line);
     alarm(0);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 static void begin_node(node *n, uint8_t unit, const mbm_port *port)
 {
@@ -88,11 +86,10 @@ static mbm_port open_socket(void)
     return mbm_tcp_port(&tcp);
 }
 
-static void a_tty_closed_and_opened_again_keeps_its_port(void **state)
+TEST(a_tty_closed_and_opened_again_keeps_its_port)
 {
     mbm_port port = open_tty();
 
-    (void)state;
     begin_node(&first, 1, &port);
     times_out(&first);
     mbm_tty_close(&tty);
@@ -101,11 +98,10 @@ static void a_tty_closed_and_opened_again_keeps_its_port(void **state)
     times_out(&first);
 }
 
-static void a_port_made_before_the_tty_is_open_works_once_it_is(void **state)
+TEST(a_port_made_before_the_tty_is_open_works_once_it_is)
 {
     mbm_port port = mbm_tty_port(&tty);
 
-    (void)state;
     begin_node(&first, 1, &port);
     /* The descriptor in a zeroed tty is 0, the program's standard input. */
     IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&first.node, 0, 1));
@@ -117,43 +113,39 @@ static void a_port_made_before_the_tty_is_open_works_once_it_is(void **state)
     times_out(&first);
 }
 
-static void two_masters_on_one_tty_each_end_in_time(void **state)
+TEST(two_masters_on_one_tty_each_end_in_time)
 {
     mbm_port port = open_tty();
 
-    (void)state;
     begin_node(&first, 1, &port);
     port = mbm_tty_port(&tty);
     begin_node(&second, 2, &port);
     both_time_out();
 }
 
-static void two_masters_with_one_port_struct_each_end_in_time(void **state)
+TEST(two_masters_with_one_port_struct_each_end_in_time)
 {
     mbm_port port = open_tty();
 
-    (void)state;
     begin_node(&first, 1, &port);
     begin_node(&second, 2, &port);
     both_time_out();
 }
 
 /* Bytes that are no reply arrive. Whenever the master looks, more of them are there. */
-static void noise_does_not_keep_a_request_from_ending(void **state)
+TEST(noise_does_not_keep_a_request_from_ending)
 {
     mbm_port port = open_tty();
 
-    (void)state;
     begin_node(&first, 1, &port);
     assert_int_equal(write(line.ours, "\x07\x03\x02", 3), 3);
     IS(MBM_RESPONSE_TIMED_OUT, mbm_node_readHoldingRegisters(&first.node, 0, 1));
 }
 
-static void a_socket_closed_and_opened_again_keeps_its_port(void **state)
+TEST(a_socket_closed_and_opened_again_keeps_its_port)
 {
     mbm_port port = open_socket();
 
-    (void)state;
     begin_node(&first, 1, &port);
     times_out(&first);
     mbm_tcp_close(&tcp);
@@ -162,41 +154,21 @@ static void a_socket_closed_and_opened_again_keeps_its_port(void **state)
     times_out(&first);
 }
 
-static void a_port_made_before_the_socket_is_open_works_once_it_is(void **state)
+TEST(a_port_made_before_the_socket_is_open_works_once_it_is)
 {
     mbm_port port = mbm_tcp_port(&tcp);
 
-    (void)state;
     begin_node(&first, 1, &port);
     IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&first.node, 0, 1));
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     times_out(&first);
 }
 
-static void two_masters_on_one_socket_each_end_in_time(void **state)
+TEST(two_masters_on_one_socket_each_end_in_time)
 {
     mbm_port port = open_socket();
 
-    (void)state;
     begin_node(&first, 1, &port);
     begin_node(&second, 2, &port);
     both_time_out();
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_tty_closed_and_opened_again_keeps_its_port),
-        TEST(a_port_made_before_the_tty_is_open_works_once_it_is),
-        TEST(two_masters_on_one_tty_each_end_in_time),
-        TEST(two_masters_with_one_port_struct_each_end_in_time),
-        TEST(noise_does_not_keep_a_request_from_ending),
-        TEST(a_socket_closed_and_opened_again_keeps_its_port),
-        TEST(a_port_made_before_the_socket_is_open_works_once_it_is),
-        TEST(two_masters_on_one_socket_each_end_in_time),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

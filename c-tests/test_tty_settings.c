@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-static void parity_stop_and_data_bits_become_settings(void **state)
+TEST(parity_stop_and_data_bits_become_settings)
 {
     static const struct {
         char parity;
@@ -19,7 +19,6 @@ static void parity_stop_and_data_bits_become_settings(void **state)
     const tcflag_t all = CSIZE | PARENB | PARODD | CSTOPB | CRTSCTS | HUPCL | CLOCAL | CREAD;
     size_t i;
 
-    (void)state;
     for (i = 0; i < COUNT(rows); i++) {
         mbm_tty_options options = {.baud = 9600};
         struct termios settings;
@@ -36,13 +35,4 @@ static void parity_stop_and_data_bits_become_settings(void **state)
         assert_int_equal(cfgetospeed(&settings), B9600);
         assert_int_equal(cfgetispeed(&settings), B9600);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(parity_stop_and_data_bits_become_settings),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,30 +13,27 @@
 static pty line;
 static const mbm_tty_options PLAIN = {.baud = 19200, .parity = 'E', .stop = 1};
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     alarm(2 * PATIENCE_MS / 1000);
     pty_open(&line);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     pty_close(&line);
     alarm(0);
-    return 0;
 }
 
-static void wait_ends_with_a_byte_with_the_time_or_with_the_line(void **state)
+fixture each_test = {begin, end};
+
+TEST(wait_ends_with_a_byte_with_the_time_or_with_the_line)
 {
     mbm_port port;
     uint8_t byte;
     mbm_tty tty;
     double start;
 
-    (void)state;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
     port = mbm_tty_port(&tty);
     assert_int_equal(mbm_tty_wait(&tty, 0), 0);
@@ -53,13 +50,12 @@ static void wait_ends_with_a_byte_with_the_time_or_with_the_line(void **state)
 }
 
 /* A server whose function is pending reads nothing, so its program sleeps. */
-static void bytes_that_are_not_read_do_not_end_the_next_wait(void **state)
+TEST(bytes_that_are_not_read_do_not_end_the_next_wait)
 {
     mbm_port port;
     uint8_t byte;
     mbm_tty tty;
 
-    (void)state;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
     port = mbm_tty_port(&tty);
     assert_int_equal(write(line.ours, "ab", 2), 2);
@@ -74,12 +70,11 @@ static void bytes_that_are_not_read_do_not_end_the_next_wait(void **state)
 }
 
 /* A program that has sent something waits for what comes back, also if it has not read before. */
-static void after_a_write_bytes_end_the_wait_again(void **state)
+TEST(after_a_write_bytes_end_the_wait_again)
 {
     mbm_port port;
     mbm_tty tty;
 
-    (void)state;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
     port = mbm_tty_port(&tty);
     assert_int_equal(write(line.ours, "a", 1), 1);
@@ -102,7 +97,7 @@ static uint16_t pending(void *context, const mbm_request *request, uint8_t *resp
 
 /* The program's loop of the server while its function is pending: each round sleeps for the
  * time of pollDelay, though the next request has arrived. */
-static void a_server_with_a_pending_function_sleeps_between_polls(void **state)
+TEST(a_server_with_a_pending_function_sleeps_between_polls)
 {
     static const uint8_t request[] = {0x11, 0x41, 0xCD, 0xD0};
     static mbm_server server;
@@ -113,7 +108,6 @@ static void a_server_with_a_pending_function_sleeps_between_polls(void **state)
     mbm_tty tty;
     unsigned i;
 
-    (void)state;
     unit.id = 0x11;
     custom.code = 0x41;
     custom.serve = pending;
@@ -149,14 +143,13 @@ static void *interrupt(void *thread)
     return NULL;
 }
 
-static void a_signal_ends_the_wait(void **state)
+TEST(a_signal_ends_the_wait)
 {
     struct sigaction action = {0};
     pthread_t self = pthread_self(), other;
     double start = seconds();
     mbm_tty tty;
 
-    (void)state;
     action.sa_handler = ignore_signal;
     sigaction(SIGUSR1, &action, NULL);
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
@@ -166,19 +159,4 @@ static void a_signal_ends_the_wait(void **state)
     pthread_join(other, NULL);
     assert_true(seconds() - start < 50);
     mbm_tty_close(&tty);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(wait_ends_with_a_byte_with_the_time_or_with_the_line),
-        TEST(bytes_that_are_not_read_do_not_end_the_next_wait),
-        TEST(after_a_write_bytes_end_the_wait_again),
-        TEST(a_server_with_a_pending_function_sleeps_between_polls),
-        TEST(a_signal_ends_the_wait),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

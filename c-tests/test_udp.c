@@ -33,12 +33,11 @@ static void listen_again(void)
     OK(mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame));
 }
 
-static int begin(void **state)
+static void begin(void)
 {
     const mbm_port port = mbm_udp_port(&sender);
     unsigned i;
 
-    (void)state;
     memset(&unit, 0, sizeof unit);
     unit.id = UNIT;
     holding = (mbm_registerTable){.words = words, .base = FIRST, .size = WORDS};
@@ -55,16 +54,15 @@ static int begin(void **state)
     request.unit = UNIT;
     request.reply = read_words;
     request.replyBytes = sizeof read_words;
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     mbm_udp_close(&receiver);
     mbm_udp_close(&sender);
-    return 0;
 }
+
+fixture each_test = {begin, end};
 
 /* Lets the server serve until it has received what was sent. The loopback loses nothing. */
 static void serve(void)
@@ -130,22 +128,20 @@ static void assert_silent(int fd)
     assert_int_equal(errno, EAGAIN);
 }
 
-static void a_request_and_its_reply_are_a_datagram_each(void **state)
+TEST(a_request_and_its_reply_are_a_datagram_each)
 {
-    (void)state;
     ask(WORDS);
     exchange();
     is_answered(WORDS);
     assert_int_equal(receiver.dropped + sender.dropped + sender.unsent, 0);
 }
 
-static void requests_of_one_write_are_a_datagram_each(void **state)
+TEST(requests_of_one_write_are_a_datagram_each)
 {
     static mbm_clientRequest more[16];
     static uint16_t values[16];
     unsigned i;
 
-    (void)state;
     memset(more, 0, sizeof more);
     for (i = 0; i < COUNT(more); i++) {
         more[i].unit = UNIT;
@@ -161,12 +157,11 @@ static void requests_of_one_write_are_a_datagram_each(void **state)
     }
 }
 
-static void each_client_gets_the_responses_to_its_own_requests(void **state)
+TEST(each_client_gets_the_responses_to_its_own_requests)
 {
     int fds[8];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < COUNT(fds); i++)
         fds[i] = plain_socket(receiver.port);
     /* All use the same number. */
@@ -184,12 +179,11 @@ static void each_client_gets_the_responses_to_its_own_requests(void **state)
 }
 
 /* The device answers no request to another unit. */
-static void a_request_without_a_response_does_not_shift_the_next(void **state)
+TEST(a_request_without_a_response_does_not_shift_the_next)
 {
     static const uint8_t other[FRAME] = {0, 1, 0, 0, 0, 6, UNIT + 1, 3, 0, FIRST, 0, 1};
     int first = plain_socket(receiver.port), second = plain_socket(receiver.port);
 
-    (void)state;
     assert_int_equal(write(first, other, sizeof other), sizeof other);
     send_request(second, 2, FIRST + 1);
     serve();
@@ -199,13 +193,12 @@ static void a_request_without_a_response_does_not_shift_the_next(void **state)
     close(second);
 }
 
-static void a_datagram_that_is_not_one_frame_is_dropped_and_counted(void **state)
+TEST(a_datagram_that_is_not_one_frame_is_dropped_and_counted)
 {
     uint8_t bytes[1400] = {0, 1, 0, 0, 0, 6, UNIT, 3, 0, FIRST, 0, 1};
     int fd = plain_socket(receiver.port);
     unsigned i, wrong = 0;
 
-    (void)state;
     for (i = 0; i < FRAME; i++, wrong++) /* too short, also empty */
         assert_int_equal(write(fd, bytes, i), i);
     assert_int_equal(write(fd, bytes, FRAME + 1), FRAME + 1);
@@ -255,13 +248,12 @@ static void the_client_finishes(void)
 }
 
 /* The first request is lost, and its reply comes later than that to the repetition. */
-static void a_lost_datagram_is_repeated_and_a_late_or_second_reply_is_passed_over(void **state)
+TEST(a_lost_datagram_is_repeated_and_a_late_or_second_reply_is_passed_over)
 {
     struct sockaddr_in own = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}}, from;
     const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     uint8_t first, second;
 
-    (void)state;
     own.sin_port = htons(receiver.port);
     mbm_udp_close(&receiver);
     assert_int_equal(bind(fd, (const struct sockaddr *)&own, sizeof own), 0);
@@ -288,12 +280,11 @@ static void a_lost_datagram_is_repeated_and_a_late_or_second_reply_is_passed_ove
     close(fd);
 }
 
-static void datagrams_of_others_do_not_reach_the_client(void **state)
+TEST(datagrams_of_others_do_not_reach_the_client)
 {
     struct sockaddr_in own = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
     const int stranger = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
 
-    (void)state;
     own.sin_port = htons(sender.port);
     ask(1);
     IS(MBM_PENDING, mbm_client_poll(&client));
@@ -305,11 +296,10 @@ static void datagrams_of_others_do_not_reach_the_client(void **state)
 }
 
 /* The system reports that no program listens there. The datagram counts as lost. */
-static void a_server_that_is_not_there_yet_is_no_lost_link(void **state)
+TEST(a_server_that_is_not_there_yet_is_no_lost_link)
 {
     const mbm_port port = mbm_udp_port(&receiver);
 
-    (void)state;
     mbm_udp_close(&receiver);
     OK(mbm_client_setResponseTimeout(&client, 30));
     OK(mbm_client_setRetries(&client, 255));
@@ -325,14 +315,13 @@ static void a_server_that_is_not_there_yet_is_no_lost_link(void **state)
     is_answered(5);
 }
 
-static void a_frame_is_sent_when_its_last_byte_is_written(void **state)
+TEST(a_frame_is_sent_when_its_last_byte_is_written)
 {
     const mbm_port port = mbm_udp_port(&sender);
     const uint8_t bytes[FRAME] = {0, 1, 0, 0, 0, 6, UNIT, 3, 0, FIRST, 0, 1};
     uint8_t reply[REPLY];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < FRAME; i++) {
         assert_int_equal(mbm_udp_wait(&receiver, 1, -1, 0), 0);
         assert_int_equal(port.write(&sender, &bytes[i], 1), 1);
@@ -344,36 +333,33 @@ static void a_frame_is_sent_when_its_last_byte_is_written(void **state)
     assert_int_equal(reply[9] << 8 | reply[10], words[0]);
 }
 
-static void bytes_that_are_no_frame_lose_the_link(void **state)
+TEST(bytes_that_are_no_frame_lose_the_link)
 {
     const mbm_port port = mbm_udp_port(&sender);
     const uint8_t bytes[] = {17, 3, 0, FIRST, 0, 1, 0, 0};
     uint8_t byte;
 
-    (void)state;
     assert_int_equal(port.write(&sender, bytes, sizeof bytes), -1);
     assert_int_equal(sender.error, EPROTO);
     assert_int_equal(port.read(&sender, &byte, 1), -1);
     assert_int_equal(mbm_udp_wait(&receiver, 1, -1, 0), 0);
 }
 
-static void a_server_without_a_request_cannot_send(void **state)
+TEST(a_server_without_a_request_cannot_send)
 {
     const mbm_port port = mbm_udp_port(&receiver);
     const uint8_t bytes[REPLY] = {0, 1, 0, 0, 0, 5, UNIT, 3, 2, 0, 0};
 
-    (void)state;
     assert_int_equal(port.write(&receiver, bytes, sizeof bytes), -1);
     assert_int_equal(receiver.error, EDESTADDRREQ);
 }
 
-static void calls_out_of_order_are_refused(void **state)
+TEST(calls_out_of_order_are_refused)
 {
     mbm_udp zero = {0}, *many = &zero;
     const mbm_port port = mbm_udp_port(&zero);
     uint8_t byte = 0;
 
-    (void)state;
     assert_int_equal(port.read(&zero, &byte, 1), -1);
     assert_int_equal(port.write(&zero, &byte, 1), -1);
     mbm_udp_close(&zero);
@@ -388,26 +374,4 @@ static void calls_out_of_order_are_refused(void **state)
     assert_int_equal(zero.port, 0);
     assert_int_equal(mbm_udp_wait(many, MBM_UDP_WAITS + 1, -1, 0), -1);
     assert_int_equal(errno, EINVAL);
-}
-
-#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        TEST(a_request_and_its_reply_are_a_datagram_each),
-        TEST(requests_of_one_write_are_a_datagram_each),
-        TEST(each_client_gets_the_responses_to_its_own_requests),
-        TEST(a_request_without_a_response_does_not_shift_the_next),
-        TEST(a_datagram_that_is_not_one_frame_is_dropped_and_counted),
-        TEST(a_lost_datagram_is_repeated_and_a_late_or_second_reply_is_passed_over),
-        TEST(datagrams_of_others_do_not_reach_the_client),
-        TEST(a_server_that_is_not_there_yet_is_no_lost_link),
-        TEST(a_frame_is_sent_when_its_last_byte_is_written),
-        TEST(bytes_that_are_no_frame_lose_the_link),
-        TEST(a_server_without_a_request_cannot_send),
-        TEST(calls_out_of_order_are_refused),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

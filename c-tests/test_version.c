@@ -18,24 +18,14 @@ static void read_version(const char *path, char *version)
     (void)fclose(file);
 }
 
-static void the_version_is_that_of_the_packages_in_header_and_archive(void **state)
+TEST(the_version_is_that_of_the_packages_in_header_and_archive)
 {
     char numbers[20], package[20];
 
-    (void)state;
     snprintf(numbers, sizeof numbers, "%d.%d.%d", MBM_VERSION_MAJOR, MBM_VERSION_MINOR,
              MBM_VERSION_PATCH);
     assert_string_equal(MBM_VERSION, numbers);
     assert_string_equal(mbm_version(), numbers);
     read_version("Cargo.toml", package);
     assert_string_equal(package, numbers);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_version_is_that_of_the_packages_in_header_and_archive),
-    };
-
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -71,15 +71,12 @@ public:
 };
 
 /* Sets the board to its state after a reset. */
-inline int reset_board(void **)
+inline void reset_board()
 {
     board() = Board();
     pins() = Pins();
     for (unsigned i = 0; i < 4; i++)
         shimSerial(i).reset();
-    return 0;
 }
-
-#define TEST(test) cmocka_unit_test_setup(test, reset_board)
 
 #endif

@@ -8,11 +8,9 @@ enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS, SECOND = 1000 };
 
 static plan_device d;
 
-static inline int rtu(void **state)
+static inline void rtu(void)
 {
-    (void)state;
     plan_device_begin(&d, 0);
-    return 0;
 }
 
 static inline void add(uint8_t unit, uint16_t address, uint32_t intervalMs)

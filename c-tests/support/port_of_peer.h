@@ -14,22 +14,18 @@ static mbm_tcp_addresses addresses;
 static mbm_port port;
 static char service[8];
 
-static int begin(void **state)
+static void begin(void)
 {
-    (void)state;
     peer = tcp_peer_new();
     snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
     memset(&tcp, 0, sizeof tcp);
     port = mbm_tcp_port(&tcp);
-    return 0;
 }
 
-static int end(void **state)
+static void end(void)
 {
-    (void)state;
     mbm_tcp_close(&tcp);
     tcp_peer_stop(peer);
-    return 0;
 }
 
 #endif

@@ -9,13 +9,11 @@
 static hooked_port wire;
 static mbm_port port;
 
-static int reset(void **state)
+static void reset(void)
 {
-    (void)state;
     memset(&wire, 0, sizeof wire);
     wire.step = 100;
     port = hooked_port_of(&wire);
-    return 0;
 }
 
 #endif

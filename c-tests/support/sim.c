@@ -243,13 +243,18 @@ void sim_node(sim *s, uint8_t unit)
                      MBM_OK);
 }
 
-int sim_setup(void **state)
-{
-    sim *s = (sim *)calloc(1, sizeof *s);
+static sim *current;
 
-    if (!s)
-        return -1;
-    *state = s;
+sim *sim_of_test(void)
+{
+    return current;
+}
+
+void sim_setup(void)
+{
+    sim *s = current = (sim *)calloc(1, sizeof *s);
+
+    assert_non_null(s);
     s->step = 2;
     s->idle_step = 20;
     s->character = 100;
@@ -257,15 +262,14 @@ int sim_setup(void **state)
     sim_begin(s, 17);
     assert_int_equal(mbm_line_setCounters(&s->line, &s->counters), MBM_OK);
     s->last_byte = s->now;
-    return 0;
 }
 
-int sim_teardown(void **state)
+void sim_teardown(void)
 {
-    sim *s = (sim *)*state, end = *s;
+    sim end = *current;
     unsigned i, cut = 0;
 
-    free(s); /* before the checks, since they may not return */
+    free(current); /* before the checks, since they may not return */
     for (i = 0; i < end.sent; i++)
         cut += !end.frames[i].whole;
     assert_int_equal(cut, end.cut_allowed);
@@ -274,7 +278,6 @@ int sim_teardown(void **state)
     assert_int_equal(end.driver_on, 0);
     if (cut == 0 && !end.flush_lies && !end.flush_never)
         assert_int_equal(end.post_before_last_bit, 0);
-    return 0;
 }
 
 size_t sim_bytes(uint8_t *bytes, const char *text)

@@ -80,10 +80,11 @@ struct sim {
     uint16_t busy;
 };
 
-/* cmocka's setup and teardown. Setup makes a line with a node that is begun for unit 17, with full
- * buffers, in *state. Teardown fails if a malformed frame was sent. */
-int sim_setup(void **state);
-int sim_teardown(void **state);
+/* The fixture of a test. The setup makes a line with a node that is begun for unit 17, with full
+ * buffers. The teardown fails if a malformed frame was sent. */
+void sim_setup(void);
+void sim_teardown(void);
+sim *sim_of_test(void);
 
 /* Begins the line on the simulated wire, with its hooks, and the node for `unit`. */
 void sim_begin(sim *s, uint8_t unit);
@@ -131,11 +132,9 @@ void sim_reads(sim *s, uint32_t delay);
 void sim_node(sim *s, uint8_t unit);
 
 /* Declares the simulation in a test; the simulation and its node. */
-#define SIM sim *s = (sim *)*state
+#define SIM sim *s = sim_of_test()
 #define NODE                                                                                       \
     SIM;                                                                                           \
     mbm_node *n = &s->node
-
-#define SIM_TEST(test) cmocka_unit_test_setup_teardown(test, sim_setup, sim_teardown)
 
 #endif

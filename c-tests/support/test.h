@@ -1,4 +1,5 @@
-/* cmocka, with the headers that it needs included first. */
+/* cmocka, with the headers that it needs included first, and tests that add themselves to their
+ * program. */
 #ifndef TEST_H
 #define TEST_H
 
@@ -10,6 +11,25 @@
 #include <cmocka.h>
 
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
+
+/* What runs before and after a test; NULL is nothing. A program may define `each_test`, which each
+ * TEST has, and `all_tests`, which runs before the first and after the last test. */
+typedef struct fixture {
+    void (*setup)(void), (*teardown)(void);
+} fixture;
+extern fixture each_test, all_tests;
+
+void test_add(const char *name, void (*test)(void), void (*setup)(void), void (*teardown)(void));
+
+/* Begins a test. The tests of a program run in the order of their definitions. */
+#define TEST(name) TEST_WITH(name, each_test.setup, each_test.teardown)
+#define TEST_WITH(name, setup, teardown)                                                           \
+    static void name(void);                                                                        \
+    __attribute__((constructor)) static void add_##name(void)                                      \
+    {                                                                                              \
+        test_add(#name, name, setup, teardown);                                                    \
+    }                                                                                              \
+    static void name(void)
 
 /* Compares the status that a function of mbm.h returns. */
 #define IS(status, call) assert_int_equal(call, status)
