@@ -93,7 +93,7 @@ FEATURES := defmt,embedded-io,embedded-io-async
 .PHONY: check
 check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header, docs, functions, spelling, symbols
 	@$(CARGO) fmt --all --check
-	@for crate in fuzz bench model examples/rust; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
+	@for crate in bench model examples/rust; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
 	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus,$(FEATURES) -- -D warnings
 	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
 	@for feature in $(subst $(comma), ,$(FEATURES)); do \
@@ -125,7 +125,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 format: ## Format Rust, C and C++ as `make check` requires
 	@scripts/need clang-format
 	@$(CARGO) fmt --all
-	@for crate in fuzz bench model examples/rust; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
+	@for crate in bench model examples/rust; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
 	@clang-format -i $(C_SOURCES)
 
 # --- tests. Compiling and tests that wait run side by side.

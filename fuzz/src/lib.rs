@@ -6,7 +6,9 @@ pub mod asked;
 pub mod lengths;
 pub mod naive;
 pub mod search;
+pub mod seeds;
 pub mod stream;
+pub mod targets;
 
 /// Reads a fuzz input from its front; returns zeros after its end.
 pub struct Input<'a>(pub &'a [u8]);

@@ -30,9 +30,9 @@ LICENCE = "MIT OR Apache-2.0"
 # first has the library.
 MANIFESTS = [
     (["Cargo.toml"], "tests"),
+    (["Cargo.toml", "--features=mbm-fuzz/libfuzzer"], "fuzzing"),
     (["Cargo.toml", "--all-features"], "features of the crate"),
     (["examples/rust/Cargo.toml"], "an example"),
-    (["fuzz/Cargo.toml"], "fuzzing"),
     (["bench/Cargo.toml"], "benchmarks"),
     (["model/Cargo.toml"], "model checking"),
 ]

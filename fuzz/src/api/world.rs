@@ -7,12 +7,15 @@ use mbm_c::*;
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::ops::Deref;
-use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The number of API calls of all inputs so far.
 pub static CALLS: AtomicU64 = AtomicU64::new(0);
-/// The state of the current run. Hooks use it because their context may be NULL.
-static CURRENT: AtomicPtr<World> = AtomicPtr::new(std::ptr::null_mut());
+
+thread_local! {
+    /// The state of the current run. Hooks use it because their context may be NULL.
+    static CURRENT: Cell<*const World> = const { Cell::new(std::ptr::null()) };
+}
 
 /// The greatest number of hook calls within one call at the top level. A call that makes more
 /// is assumed never to end.
@@ -123,14 +126,14 @@ impl World {
             records: Default::default(),
             device: Cell::new(std::ptr::null_mut()),
         });
-        CURRENT.store((&raw const *world).cast_mut(), Ordering::Relaxed);
+        CURRENT.set(&raw const *world);
         world
     }
 
     /// The state of the current run, for hooks.
     pub fn current<'a>() -> &'a World {
         // SAFETY: hooks run only while `run` holds a world.
-        unsafe { &*CURRENT.load(Ordering::Relaxed) }
+        unsafe { &*CURRENT.get() }
     }
 
     /// True if the run is over.

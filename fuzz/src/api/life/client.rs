@@ -359,13 +359,14 @@ pub fn master_request(life: &Life, pass_times: fn(&Life, u8)) {
     let w = &life.w;
     let index = usize::from(w.byte()) % life.masters.len();
     let own: &Master = &life.masters[index];
-    let has_port = life
-        .lines
-        .iter()
-        .any(|line| line.borrower.get() == Some(index));
+    // A function of the program may take the line back while time passes.
+    let has_port = || {
+        let mut borrowers = life.lines.iter().map(|line| line.borrower.get());
+        borrowers.any(|borrower| borrower == Some(index))
+    };
     let asker = usize::from(w.byte() & 1);
-    request_of(life, own, asker, has_port);
-    if life.inside.get() > 0 || !has_port || w.byte() & 3 != 0 {
+    request_of(life, own, asker, has_port());
+    if life.inside.get() > 0 || !has_port() || w.byte() & 3 != 0 {
         return;
     }
     // Cancelled, perhaps after it was sent: the next one waits for its unit, until another node has
@@ -375,7 +376,7 @@ pub fn master_request(life: &Life, pass_times: fn(&Life, u8)) {
         cancel_master(life, own);
     }
     for asker in [asker, 1 - asker] {
-        request_of(life, own, asker, has_port);
+        request_of(life, own, asker, has_port());
         pass_times(life, w.byte() % 4);
     }
 }

@@ -52,10 +52,8 @@ pub fn act(life: &Life) {
     let side = &life.plan;
     let plan = side.plan;
     match w.byte() % 8 {
-        0 if side.is_begun.get() => {
-            if call!(w, plan, mbm_plan_end(plan)) == OK {
-                side.is_begun.set(false);
-            }
+        0 if side.is_begun.get() && call!(w, plan, mbm_plan_end(plan)) == OK => {
+            side.is_begun.set(false);
         }
         1 if side.is_begun.get() => {
             let field = u16::from(w.byte()) % FIELDS as u16;

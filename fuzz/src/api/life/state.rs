@@ -6,14 +6,15 @@ use crate::api::world::World;
 use mbm_c::*;
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::sync::atomic::{AtomicPtr, Ordering};
 
 pub const LINES: usize = 3;
 pub const JOBS: usize = 24;
 /// The first address that stands for a request. Lower addresses are those of the plan.
 pub const FIRST_ID: u16 = 0x1000;
 
-static CURRENT: AtomicPtr<Life> = AtomicPtr::new(std::ptr::null_mut());
+thread_local! {
+    static CURRENT: Cell<*const Life> = const { Cell::new(std::ptr::null()) };
+}
 
 pub const CONNECTIONS: usize = 2;
 /// Places for requests.
@@ -180,14 +181,14 @@ impl Life {
             at_once: Cell::new(0),
             w,
         });
-        CURRENT.store((&raw const *life).cast_mut(), Ordering::Relaxed);
+        CURRENT.set(&raw const *life);
         life
     }
 
     /// The life that runs, for hooks.
     pub fn current<'a>() -> &'a Life {
         // SAFETY: hooks run only while `run` holds a life.
-        unsafe { &*CURRENT.load(Ordering::Relaxed) }
+        unsafe { &*CURRENT.get() }
     }
 
     /// Any of the lines.
