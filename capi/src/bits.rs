@@ -24,24 +24,20 @@ unsafe fn is_set<T: Packed>(
     address: u16,
     on: *mut u8,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    code(unsafe {
-        slice(units, self::units::<T>(quantity)).and_then(|units| {
-            put_result(on, || {
-                bits::is_set(units, first, quantity, address).map(u8::from)
-            })
+    code(slice(units, self::units::<T>(quantity)).and_then(|units| {
+        put_result(on, || {
+            bits::is_set(units, first, quantity, address).map(u8::from)
         })
-    })
+    }))
 }
 
 /// # Safety
 /// As [`slice_mut`] demands of `units`, which hold `quantity` bits.
 unsafe fn set<T: Packed>(units: *mut T, first: u16, quantity: u16, address: u16, on: u8) -> u8 {
-    // SAFETY: as the caller promises.
-    code(unsafe {
+    code(
         slice_mut(units, self::units::<T>(quantity))
-            .and_then(|units| bits::set(units, first, quantity, address, on != 0))
-    })
+            .and_then(|units| bits::set(units, first, quantity, address, on != 0)),
+    )
 }
 
 /// Packs coils into bytes for a write. The first coil goes into the lowest bit of the

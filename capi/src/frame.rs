@@ -38,20 +38,17 @@ unsafe fn format(
     framing: *const mbm_framing,
     code: impl FnOnce(Option<Framing>) -> Option<u8>,
 ) -> Result<FrameFormat, Error> {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let description = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
-        let framing = description.core()?;
-        Ok(FrameFormat {
-            framing,
-            end: description.end(),
-            own: own(
-                description.functions,
-                description.functionCount,
-                code(framing),
-            )?,
-        })
-    }
+    let description = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
+    let framing = description.core()?;
+    Ok(FrameFormat {
+        framing,
+        end: description.end(),
+        own: own(
+            description.functions,
+            description.functionCount,
+            code(framing),
+        )?,
+    })
 }
 
 /// Writes the frame of a packet: a request, a response or an exception. It never builds a
@@ -74,28 +71,26 @@ pub unsafe extern "C" fn mbm_frame_build(
     capacity: u16,
     length: *mut u16,
 ) -> u8 {
-    // SAFETY: as the header demands; data and buffer do not overlap.
-    unsafe {
-        let build = || {
-            let packet = get(packet).filter(|packet| !packet.lies_in(frame, capacity));
-            let mut packet = packet.ok_or(Error::INVALID_ARGUMENT)?;
-            let format = format(framing, |_| Some(packet.function))?;
-            let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
-            let buffer = buffer.ok_or(Error::INVALID_ARGUMENT)?;
-            let data = packet.data()?;
-            let Head {
-                transaction, unit, ..
-            } = packet.head()?;
-            let own = format.own.as_slice();
-            match format.framing {
-                Some(framing) => framing.emit(buffer, transaction, unit, format.end, |pdu| {
-                    packet.emit(data, own, pdu)
-                }),
-                None => packet.emit(data, own, buffer),
-            }
-        };
-        put_length(length, build())
-    }
+    // Data and buffer do not overlap.
+    let build = || {
+        let packet = get(packet).filter(|packet| !packet.lies_in(frame, capacity));
+        let mut packet = packet.ok_or(Error::INVALID_ARGUMENT)?;
+        let format = format(framing, |_| Some(packet.function))?;
+        let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
+        let buffer = buffer.ok_or(Error::INVALID_ARGUMENT)?;
+        let data = packet.data()?;
+        let Head {
+            transaction, unit, ..
+        } = packet.head()?;
+        let own = format.own.as_slice();
+        match format.framing {
+            Some(framing) => framing.emit(buffer, transaction, unit, format.end, |pdu| {
+                packet.emit(data, own, pdu)
+            }),
+            None => packet.emit(data, own, buffer),
+        }
+    };
+    put_length(length, build())
 }
 
 /// Parses a frame into a packet. The packet's data point into the frame.
@@ -126,15 +121,12 @@ pub unsafe extern "C" fn mbm_frame_parse(
     frameLength: u16,
     packet: *mut mbm_packet,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    let arguments = unsafe {
-        side(kind).and_then(|pdu_kind| {
-            let bytes = buffer(frame, frameLength).filter(|_| !packet.is_null());
-            let bytes = bytes.ok_or(Error::INVALID_ARGUMENT)?;
-            let format = format(framing, |framing| function(framing, bytes))?;
-            Ok((pdu_kind, bytes, format))
-        })
-    };
+    let arguments = side(kind).and_then(|pdu_kind| {
+        let bytes = buffer(frame, frameLength).filter(|_| !packet.is_null());
+        let bytes = bytes.ok_or(Error::INVALID_ARGUMENT)?;
+        let format = format(framing, |framing| function(framing, bytes))?;
+        Ok((pdu_kind, bytes, format))
+    });
     let (pdu_kind, bytes, format) = match arguments {
         Ok(arguments) => arguments,
         Err(refused) => return refused.code(),

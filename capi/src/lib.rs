@@ -19,9 +19,9 @@
     clippy::undocumented_unsafe_blocks
 )]
 #![allow(non_camel_case_types, non_snake_case)]
-// The safety rules are the same for every exported function: see the rules above. Its body relies on
-// what its comment demands of the C program; a block with a SAFETY line stands where more is to be
-// shown, and in every other function.
+// The safety rules are the same for every exported function: see the rules above. The body of an
+// unsafe function relies on what its comment demands of the caller. A block with a SAFETY line
+// stands where more is to be shown, and in every function that is safe.
 #![allow(clippy::missing_safety_doc)]
 
 #[cfg(feature = "capi")]

@@ -14,8 +14,7 @@ pub(crate) unsafe fn array<'a, T>(first: *const T, count: usize) -> Option<&'a [
     if first.is_null() || count > isize::MAX as usize / size_of::<T>() {
         return None;
     }
-    // SAFETY: not NULL and not too long; the rest as the caller promises.
-    Some(unsafe { from_raw_parts(first, count) })
+    Some(from_raw_parts(first, count))
 }
 
 /// As [`array`], but `first` may also be NULL if `count` is 0.
@@ -26,8 +25,7 @@ pub(crate) unsafe fn array_or_empty<'a, T>(first: *const T, count: usize) -> Opt
     if count == 0 {
         return Some(&[]);
     }
-    // SAFETY: as the caller promises.
-    unsafe { array(first, count) }
+    array(first, count)
 }
 
 /// The writable buffer of `capacity` bytes at `first`. `None` if `first` is NULL.
@@ -40,8 +38,7 @@ pub(crate) unsafe fn buffer<'a>(first: *mut u8, capacity: u16) -> Option<&'a mut
     if first.is_null() || capacity > isize::MAX as usize {
         return None;
     }
-    // SAFETY: not NULL and not too long; the rest as the caller promises.
-    Some(unsafe { from_raw_parts_mut(first, capacity) })
+    Some(from_raw_parts_mut(first, capacity))
 }
 
 /// True if the `bytes` bytes at `one` and the `more` bytes at `other` have a byte in common.
@@ -55,8 +52,7 @@ pub(crate) fn overlap(one: *const u8, bytes: u16, other: *const u8, more: u16) -
 /// # Safety
 /// `place` is NULL or points to a value.
 pub(crate) unsafe fn get<T: Copy>(place: *const T) -> Option<T> {
-    // SAFETY: as the caller promises.
-    (!place.is_null()).then(|| unsafe { place.read() })
+    (!place.is_null()).then(|| place.read())
 }
 
 /// Writes a value to `place`. Returns the code of [`Status::OK`], or of
@@ -68,8 +64,7 @@ pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
     if place.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: not NULL; the rest as the caller promises.
-    unsafe { place.write(value) }
+    place.write(value);
     Status::OK.code()
 }
 
@@ -79,11 +74,9 @@ pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
 /// As for [`put`].
 pub(crate) unsafe fn put_length(place: *mut u16, length: Result<usize, Error>) -> u8 {
     match length {
-        // SAFETY: as the caller promises.
-        Ok(length) => unsafe { put(place, length as u16) },
+        Ok(length) => put(place, length as u16),
         Err(refused) => {
-            // SAFETY: as the caller promises.
-            unsafe { put(place, 0) };
+            put(place, 0);
             refused.code()
         }
     }
@@ -115,6 +108,46 @@ pub(crate) unsafe trait CObject: Sized {
     unsafe fn access<'a>(object: *mut Self) -> Self::Access<'a>;
 }
 
+/// Makes `$storage` the storage of an `Object`, with a field `mark`: C programs see only its size.
+/// `$access` is what functions of this library get: a reference to the object or to one of its
+/// fields; or a pointer, if hooks that run meanwhile may pass the object to this library. Those
+/// functions read the mark, so no reference includes it.
+macro_rules! c_object {
+    ($storage:ident, $($access:tt)*) => {
+        const _: () = {
+            let (space, used) = (size_of::<$storage>(), size_of::<Object>());
+            assert!(align_of::<$storage>() >= align_of::<Object>());
+            assert!(used <= space);
+            // Hiding the fields may waste 5 % where RAM is scarce.
+            assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
+        };
+
+        // SAFETY: the mark is a field of its own.
+        unsafe impl $crate::pointers::CObject for $storage {
+            unsafe fn mark(object: *const $storage) -> *mut u8 {
+                &raw mut (*object.cast::<Object>().cast_mut()).mark
+            }
+
+            $crate::pointers::c_object! { @ $storage $($access)* }
+        }
+    };
+    (@ $storage:ident &mut $type:ty $(, $field:ident)?) => {
+        type Access<'a> = &'a mut $type;
+
+        unsafe fn access<'a>(object: *mut $storage) -> Self::Access<'a> {
+            &mut (*object.cast::<Object>())$(.$field)?
+        }
+    };
+    (@ $storage:ident *mut $type:ty $(, $field:ident)?) => {
+        type Access<'a> = *mut $type;
+
+        unsafe fn access<'a>(object: *mut $storage) -> Self::Access<'a> {
+            &raw mut (*object.cast::<Object>())$(.$field)?
+        }
+    };
+}
+pub(crate) use c_object;
+
 /// The mark of an object that was begun. Zeroed storage does not have it.
 pub(crate) const BEGUN: u8 = IN_HOOK & !1;
 
@@ -131,8 +164,7 @@ const _: () = assert!(IN_HOOK & 1 != 0);
 /// `object` is NULL or points to storage of an object, zeroed or begun.
 #[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
 pub(crate) unsafe fn check<O: CObject>(object: *const O) -> Status {
-    // SAFETY: as the caller promises.
-    unsafe { check_once(object) }
+    check_once(object)
 }
 
 /// As [`check`], inlined: for a function that is, in most images, the only one of its
@@ -153,8 +185,7 @@ pub(crate) unsafe fn check_once<O: CObject>(object: *const O) -> Status {
 /// # Safety
 /// `object` points to storage of an object, zeroed or begun.
 pub(crate) unsafe fn check_mark<O: CObject>(object: *const O) -> Status {
-    // SAFETY: as the caller promises.
-    match unsafe { O::mark(object).read() } {
+    match O::mark(object).read() {
         BEGUN => Status::OK,
         IN_HOOK => Status::BUSY,
         _ => Status::NOT_INITIALISED,
@@ -166,8 +197,7 @@ pub(crate) unsafe fn check_mark<O: CObject>(object: *const O) -> Status {
 /// # Safety
 /// As for [`CObject::access`]; every object is writable storage.
 pub(crate) unsafe fn object<'a, O: CObject>(object: *const O) -> O::Access<'a> {
-    // SAFETY: as the caller promises.
-    unsafe { O::access(object.cast_mut()) }
+    O::access(object.cast_mut())
 }
 
 /// Runs `action`, which may call hooks of an object. If a hook calls this library on the
@@ -178,14 +208,11 @@ pub(crate) unsafe fn object<'a, O: CObject>(object: *const O) -> O::Access<'a> {
 /// [`check`] returned [`Status::OK`] for the object, or the object is being begun. No
 /// reference to it lives.
 pub(crate) unsafe fn with_hooks<O: CObject, T>(object: *const O, action: impl FnOnce() -> T) -> T {
-    // SAFETY: as the caller promises; every object is writable storage.
-    unsafe {
-        let mark = O::mark(object);
-        mark.write(IN_HOOK);
-        let result = action();
-        mark.write(BEGUN);
-        result
-    }
+    let mark = O::mark(object);
+    mark.write(IN_HOOK);
+    let result = action();
+    mark.write(BEGUN);
+    result
 }
 
 /// Zeroes the storage of an object. (A loop instead of memset: libc's memset is larger, and
@@ -195,16 +222,14 @@ pub(crate) unsafe fn with_hooks<O: CObject, T>(object: *const O, action: impl Fn
 /// `object` points to storage of an object, which nothing else uses.
 pub(crate) unsafe fn zero<O: CObject>(object: *mut O) {
     const { assert!(size_of::<O>().is_multiple_of(size_of::<usize>())) }
-    // SAFETY: as the caller promises; the storage is a number of words.
-    unsafe {
-        let mut word = object.cast::<usize>();
-        let end = object.add(1).cast::<usize>();
-        loop {
-            word.write_volatile(0);
-            word = word.add(1);
-            if word == end {
-                return;
-            }
+    // The storage is a number of words.
+    let mut word = object.cast::<usize>();
+    let end = object.add(1).cast::<usize>();
+    loop {
+        word.write_volatile(0);
+        word = word.add(1);
+        if word == end {
+            return;
         }
     }
 }
@@ -217,8 +242,7 @@ pub(crate) unsafe fn zero<O: CObject>(object: *mut O) {
 #[inline(always)]
 pub(crate) unsafe fn zero_on_host<O: CObject>(object: *mut O) {
     if !cfg!(target_os = "none") {
-        // SAFETY: as the caller promises.
-        unsafe { zero(object) }
+        zero(object)
     }
 }
 
@@ -231,12 +255,9 @@ pub(crate) unsafe fn with<'a, O: CObject>(
     object: *mut O,
     action: impl FnOnce(O::Access<'a>) -> Status,
 ) -> u8 {
-    // SAFETY: checked; exclusive as the caller promises.
-    let status = unsafe {
-        match check(object) {
-            Status::OK => action(O::access(object)),
-            refused => refused,
-        }
+    let status = match check(object) {
+        Status::OK => action(O::access(object)),
+        refused => refused,
     };
     status.code()
 }
@@ -251,13 +272,9 @@ pub(crate) unsafe fn read<'a, O: CObject, T>(
     otherwise: T,
     getter: impl FnOnce(O::Access<'a>) -> T,
 ) -> T {
-    // SAFETY: checked; exclusive as the caller promises, and every object is
-    // writable storage.
-    unsafe {
-        match check(object) {
-            Status::OK => getter(O::access(object.cast_mut())),
-            _ => otherwise,
-        }
+    match check(object) {
+        Status::OK => getter(O::access(object.cast_mut())),
+        _ => otherwise,
     }
 }
 

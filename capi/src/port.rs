@@ -81,11 +81,8 @@ impl mbm_port {
 /// # Safety
 /// `port` points to a complete port.
 pub(super) unsafe fn now(port: *const mbm_port) -> u32 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let (micros, context) = ((*port).micros, (*port).context);
-        micros.unwrap_unchecked()(context)
-    }
+    let (micros, context) = ((*port).micros, (*port).context);
+    micros.unwrap_unchecked()(context)
 }
 
 /// The number of bytes of a buffer that is used: at most as many as the `i16` that a port's
@@ -201,11 +198,8 @@ impl PortRef {
     /// `this` refers to a port. No reference to the object that holds `this` lives, because
     /// the hook may use that object.
     pub(super) unsafe fn idle(this: *const PortRef, node: *mut mbm_node) {
-        // SAFETY: as the caller promises.
-        unsafe {
-            if let Some(idle) = (*(*this).port).idle {
-                idle((*(*this).port).context, node);
-            }
+        if let Some(idle) = (*(*this).port).idle {
+            idle((*(*this).port).context, node);
         }
     }
 }

@@ -86,8 +86,7 @@ unsafe fn words<'a>(first: *mut u16, count: u8) -> &'a mut [u16] {
     if first.is_null() {
         return &mut [];
     }
-    // SAFETY: not NULL; the rest as the caller promises.
-    unsafe { from_raw_parts_mut(first, count.into()) }
+    from_raw_parts_mut(first, count.into())
 }
 
 /// Implements the functions of [`Storage`] for a struct with the fields `frame`,

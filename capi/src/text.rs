@@ -13,8 +13,8 @@ use mbm::text::{self, TextWriter};
 /// # Safety
 /// `text` is NULL or points to `size` bytes, which nothing else uses meanwhile.
 pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<TextWriter<'a>, Error> {
-    // SAFETY: as the caller promises; a character is a byte.
-    let text = unsafe { buffer(text.cast(), size) }.ok_or(Error::INVALID_ARGUMENT)?;
+    // A character is a byte.
+    let text = buffer(text.cast(), size).ok_or(Error::INVALID_ARGUMENT)?;
     match text.first_mut() {
         Some(first) => *first = 0,
         None => return Err(Error::BUFFER_TOO_SMALL),

@@ -22,32 +22,28 @@ unsafe fn begin(
     frame_bytes: u16,
     kind: &'static TransportKind,
 ) -> u8 {
-    // SAFETY: as the header demands: each pointer is NULL or valid, and the object is
-    // storage, zeroed or begun. Zero is a valid value of every field except `kind`, which
-    // is set before it is used.
-    let status = unsafe {
-        match port.as_ref() {
-            Some(port)
-                if !frame.is_null()
-                    && frame_bytes >= u16::from(kind.min_frame_bytes)
-                    && port.is_complete() =>
-            {
-                let status = give_up(pointer);
-                if status != Status::NOT_INITIALISED {
-                    return status.code();
-                }
-                let object = pointers::object(pointer);
-                (*object).kind = kind;
-                (*object).queue.connected = true;
-                (*kind.port(object)).copy(port);
-                let storage = kind.storage(object);
-                storage.frame = frame;
-                storage.frame_bytes = countable(frame_bytes);
-                pointers::with_hooks(pointer, || (kind.start)(object));
-                Status::OK
+    // Zero is a valid value of every field except `kind`, which is set before it is used.
+    let status = match port.as_ref() {
+        Some(port)
+            if !frame.is_null()
+                && frame_bytes >= u16::from(kind.min_frame_bytes)
+                && port.is_complete() =>
+        {
+            let status = give_up(pointer);
+            if status != Status::NOT_INITIALISED {
+                return status.code();
             }
-            _ => Status::INVALID_ARGUMENT,
+            let object = pointers::object(pointer);
+            (*object).kind = kind;
+            (*object).queue.connected = true;
+            (*kind.port(object)).copy(port);
+            let storage = kind.storage(object);
+            storage.frame = frame;
+            storage.frame_bytes = countable(frame_bytes);
+            pointers::with_hooks(pointer, || (kind.start)(object));
+            Status::OK
         }
+        _ => Status::INVALID_ARGUMENT,
     };
     status.code()
 }
@@ -59,28 +55,26 @@ unsafe fn begin(
 /// # Safety
 /// As for [`pointers::check`].
 unsafe fn give_up(client: *mut mbm_client) -> Status {
-    // SAFETY: as the caller promises. While `release` calls hooks, the mark refuses their calls
-    // on the object, and no reference into it lives. Zero is a valid value of every field
-    // except `kind`, which is set before it is used.
-    unsafe {
-        let status = pointers::check(client);
-        if status == Status::OK {
-            let object = pointers::object(client);
-            if (*object).queue.suspended {
-                return Status::BUSY;
-            }
-            mbm_client::mark(client).write(pointers::IN_HOOK);
-            ((*(*object).kind).release)(object, None);
-            queue(object).cancel_all();
-            if (*object).linked {
-                (*(*object).kind.cast::<LinkedKind>().cast_mut()).client = null_mut();
-            }
-        } else if status != Status::NOT_INITIALISED {
-            return status;
+    // While `release` calls hooks, the mark refuses their calls on the object, and no reference
+    // into it lives. Zero is a valid value of every field except `kind`, which is set before it
+    // is used.
+    let status = pointers::check(client);
+    if status == Status::OK {
+        let object = pointers::object(client);
+        if (*object).queue.suspended {
+            return Status::BUSY;
         }
-        pointers::zero(client);
-        Status::NOT_INITIALISED
+        mbm_client::mark(client).write(pointers::IN_HOOK);
+        ((*(*object).kind).release)(object, None);
+        queue(object).cancel_all();
+        if (*object).linked {
+            (*(*object).kind.cast::<LinkedKind>().cast_mut()).client = null_mut();
+        }
+    } else if status != Status::NOT_INITIALISED {
+        return status;
     }
+    pointers::zero(client);
+    Status::NOT_INITIALISED
 }
 
 /// Begins a client of a serial line with RTU frames (serial line guide V1.02, 2.5.1).
@@ -182,16 +176,13 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
     if outgoing.is_null() || outgoingBytes < 12 {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = begin(client, port, incoming, incomingBytes, &kind::TCP);
-        if status == Status::OK.code() {
-            let storage = &mut transport::<TcpTransport>(pointers::object(client)).storage;
-            storage.outgoing = outgoing;
-            storage.outgoing_bytes = countable(outgoingBytes);
-        }
-        status
+    let status = begin(client, port, incoming, incomingBytes, &kind::TCP);
+    if status == Status::OK.code() {
+        let storage = &mut transport::<TcpTransport>(pointers::object(client)).storage;
+        storage.outgoing = outgoing;
+        storage.outgoing_bytes = countable(outgoingBytes);
     }
+    status
 }
 
 /// Sets how many requests may be in flight at once on TCP. More are faster, if the server accepts
@@ -217,6 +208,5 @@ pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u
 /// # Safety
 /// The client is NULL or storage, zeroed or begun.
 pub(crate) unsafe fn has_tcp_frames(client: *const mbm_client) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe { pointers::read(client, false, |object| (*object).queue.has_transaction_ids) }
+    pointers::read(client, false, |object| (*object).queue.has_transaction_ids)
 }

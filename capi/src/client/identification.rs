@@ -91,31 +91,29 @@ pub unsafe extern "C" fn mbm_identification_read(
     if identification.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: as the header demands. The request is not pending, so only this call uses it.
-    // While `object` runs, its call is refused.
-    unsafe {
-        let request = &raw mut (*identification).request;
-        if (*request).status == Status::PENDING.code() || (*identification).handingOut != 0 {
-            return Status::BUSY.code();
-        }
-        if (*request).reply.is_null() {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        let before = request.read();
-        (*request).done = Some(replied);
-        (*request).context = identification.cast();
-        (*request).data = null_mut();
-        let status = mbm_client_readDeviceIdentification(client, request, code, object);
-        if status != Status::PENDING.code() {
-            request.write(before);
-            return status;
-        }
-        (*identification).client = client;
-        (*identification).count = 0;
-        (*identification).conformity = 0;
-        stream(identification).write(ObjectStream::new(code, object));
-        status
+    // The request is not pending, so only this call uses it. While `object` runs, its call is
+    // refused.
+    let request = &raw mut (*identification).request;
+    if (*request).status == Status::PENDING.code() || (*identification).handingOut != 0 {
+        return Status::BUSY.code();
     }
+    if (*request).reply.is_null() {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    let before = request.read();
+    (*request).done = Some(replied);
+    (*request).context = identification.cast();
+    (*request).data = null_mut();
+    let status = mbm_client_readDeviceIdentification(client, request, code, object);
+    if status != Status::PENDING.code() {
+        request.write(before);
+        return status;
+    }
+    (*identification).client = client;
+    (*identification).count = 0;
+    (*identification).conformity = 0;
+    stream(identification).write(ObjectStream::new(code, object));
+    status
 }
 
 /// The state of the stream.
@@ -123,8 +121,8 @@ pub unsafe extern "C" fn mbm_identification_read(
 /// # Safety
 /// `identification` points to an identification.
 unsafe fn stream(identification: *mut mbm_identification) -> *mut ObjectStream {
-    // SAFETY: as the caller promises; the storage is large enough.
-    unsafe { (&raw mut (*identification).stream).cast() }
+    // The storage is large enough.
+    (&raw mut (*identification).stream).cast()
 }
 
 /// Parses the reply and takes it into the stream.
@@ -132,16 +130,14 @@ unsafe fn stream(identification: *mut mbm_identification) -> *mut ObjectStream {
 /// # Safety
 /// `identification` points to an identification whose request has a reply of `length` bytes.
 unsafe fn accept(identification: *mut mbm_identification, length: u8) -> Result<Next, Error> {
-    // SAFETY: as the caller promises; nothing else uses the reply during this call.
-    unsafe {
-        let bytes = from_raw_parts((*identification).request.reply.cast(), length.into());
-        let mut state = stream(identification).read();
-        let reply = IdentificationReply::parse(state.code(), bytes)?;
-        let next = state.take(&reply)?;
-        stream(identification).write(state);
-        (*identification).conformity = reply.conformity;
-        Ok(next)
-    }
+    // Nothing else uses the reply during this call.
+    let bytes = from_raw_parts((*identification).request.reply.cast(), length.into());
+    let mut state = stream(identification).read();
+    let reply = IdentificationReply::parse(state.code(), bytes)?;
+    let next = state.take(&reply)?;
+    stream(identification).write(state);
+    (*identification).conformity = reply.conformity;
+    Ok(next)
 }
 
 /// Calls `object` for each object of a reply of `length` bytes, until the request has another
@@ -150,28 +146,26 @@ unsafe fn accept(identification: *mut mbm_identification, length: u8) -> Result<
 /// # Safety
 /// As for [`accept`]. No reference to the identification lives.
 unsafe fn hand_out(identification: *mut mbm_identification, length: u8, status: u8) {
-    // SAFETY: as the caller promises. No reference to the reply lives during a call of
-    // `object`, which may overwrite it: each object is read anew.
-    unsafe {
-        let reply: *const u8 = (*identification).request.reply.cast();
-        let mut at = OBJECTS;
-        while (*identification).request.status == status {
-            let bytes = from_raw_parts(reply, length.into());
-            let Some((id, value, size)) = bytes.get(at..).and_then(groups::object) else {
-                return;
-            };
-            let found = mbm_object {
-                data: value.as_ptr(),
-                length: value.len() as u8,
-                id,
-            };
-            at += size;
-            (*identification).count = (*identification).count.wrapping_add(1);
-            if let Some(object) = (*identification).object {
-                (*identification).handingOut = 1;
-                object((*identification).context, &raw const found);
-                (*identification).handingOut = 0;
-            }
+    // No reference to the reply lives during a call of `object`, which may overwrite it: each
+    // object is read anew.
+    let reply: *const u8 = (*identification).request.reply.cast();
+    let mut at = OBJECTS;
+    while (*identification).request.status == status {
+        let bytes = from_raw_parts(reply, length.into());
+        let Some((id, value, size)) = bytes.get(at..).and_then(groups::object) else {
+            return;
+        };
+        let found = mbm_object {
+            data: value.as_ptr(),
+            length: value.len() as u8,
+            id,
+        };
+        at += size;
+        (*identification).count = (*identification).count.wrapping_add(1);
+        if let Some(object) = (*identification).object {
+            (*identification).handingOut = 1;
+            object((*identification).context, &raw const found);
+            (*identification).handingOut = 0;
         }
     }
 }

@@ -62,66 +62,50 @@ unsafe fn advance<T: Transport<RequestPtr>>(
     now: u32,
     fresh: bool,
 ) -> Option<RequestPtr> {
-    // SAFETY: as the caller promises; the transport is apart from the queue.
-    unsafe { transport::<T>(object).advance(&mut (*object).queue, now, fresh) }
+    // The transport is apart from the queue.
+    transport::<T>(object).advance(&mut (*object).queue, now, fresh)
 }
 
 /// # Safety
 /// As for [`transport`].
 unsafe fn release<T: Transport<RequestPtr>>(object: *mut Object, request: Option<&RequestPtr>) {
-    // SAFETY: as the caller promises.
-    unsafe { transport::<T>(object).release(request) }
+    transport::<T>(object).release(request)
 }
 
 /// # Safety
 /// As for [`transport`].
 unsafe fn release_stream(object: *mut Object, request: Option<&RequestPtr>) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        release::<SerialTransport>(object, request);
-        if request.is_none() {
-            let line = transport::<SerialTransport>(object);
-            Transport::<RequestPtr>::forget_late_replies(line);
-        }
+    release::<SerialTransport>(object, request);
+    if request.is_none() {
+        let line = transport::<SerialTransport>(object);
+        Transport::<RequestPtr>::forget_late_replies(line);
     }
 }
 
 /// # Safety
 /// As for [`transport`].
 unsafe fn start_rtu(object: *mut Object) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        (*object).queue.has_broadcast = true;
-        transport::<SerialTransport>(object).engine.line_used();
-    }
+    (*object).queue.has_broadcast = true;
+    transport::<SerialTransport>(object).engine.line_used();
 }
 
 /// # Safety
 /// As for [`transport`].
 unsafe fn start_stream(object: *mut Object) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let transport = transport::<SerialTransport>(object);
-        transport.set_stream();
-        transport.engine.line_used();
-    }
+    let transport = transport::<SerialTransport>(object);
+    transport.set_stream();
+    transport.engine.line_used();
 }
 
 /// # Safety
 /// As for [`transport`].
 unsafe fn start_ascii(object: *mut Object) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        start_rtu(object);
-        transport::<SerialTransport>(object).set_ascii();
-    }
+    start_rtu(object);
+    transport::<SerialTransport>(object).set_ascii();
 }
 
 /// # Safety
 /// As for [`transport`].
 unsafe fn start_tcp(object: *mut Object) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        (*object).queue.has_transaction_ids = true;
-    }
+    (*object).queue.has_transaction_ids = true;
 }

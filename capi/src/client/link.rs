@@ -40,34 +40,31 @@ pub unsafe extern "C" fn mbm_client_reconnect(
     client: *mut mbm_client,
     link: *const mbm_linkHooks,
 ) -> u8 {
-    // SAFETY: as the header demands. No reference to the client lives while the
-    // hooks of the link are called.
-    unsafe {
-        let status = pointers::with(client, |object| {
-            if queue(object).suspended {
-                return Status::BUSY;
-            }
-            let release = (*(*object).kind).release;
-            pointers::with_hooks(client, || release(object, None));
-            queue(object).interrupt();
-            queue(object).connected = true;
-            Status::OK
-        });
-        if status != Status::OK.code() || link.is_null() {
-            return status;
+    // No reference to the client lives while the hooks of the link are called.
+    let status = pointers::with(client, |object| {
+        if queue(object).suspended {
+            return Status::BUSY;
         }
-        if let Some(disconnect) = (*link).disconnect {
-            disconnect((*link).context);
-        }
-        let Some(connect) = (*link).connect else {
-            return status;
-        };
-        let status = connect((*link).context);
-        if status != Status::OK.code() {
-            queue(pointers::object(client)).connected = false;
-        }
-        status
+        let release = (*(*object).kind).release;
+        pointers::with_hooks(client, || release(object, None));
+        queue(object).interrupt();
+        queue(object).connected = true;
+        Status::OK
+    });
+    if status != Status::OK.code() || link.is_null() {
+        return status;
     }
+    if let Some(disconnect) = (*link).disconnect {
+        disconnect((*link).context);
+    }
+    let Some(connect) = (*link).connect else {
+        return status;
+    };
+    let status = connect((*link).context);
+    if status != Status::OK.code() {
+        queue(pointers::object(client)).connected = false;
+    }
+    status
 }
 
 /// Returns whether the link works, as far as the client knows.

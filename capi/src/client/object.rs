@@ -4,7 +4,7 @@ use super::request::RequestPtr;
 use super::storage::ClientBuffers;
 use super::MBM_CLIENT_DEPTH;
 use crate::line::mbm_line;
-use crate::pointers::CObject;
+use crate::pointers::c_object;
 use crate::port::mbm_port;
 use core::ffi::c_void;
 use core::mem::ManuallyDrop;
@@ -46,38 +46,14 @@ pub struct Object {
     pub(super) transport: Transports,
 }
 
-const _: () = {
-    let space = size_of::<mbm_client>();
-    let used = size_of::<Object>();
-    assert!(align_of::<mbm_client>() >= align_of::<Object>());
-    assert!(used <= space);
-    // Hiding the fields may waste 5 % where RAM is scarce.
-    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
-};
-
-// SAFETY: the mark is a field of its own.
-unsafe impl CObject for mbm_client {
-    // A pointer: hooks run while the client is in use, and may pass it to functions of this
-    // library, which then read the mark. No reference may include the mark.
-    type Access<'a> = *mut Object;
-
-    unsafe fn mark(client: *const mbm_client) -> *mut u8 {
-        // SAFETY: as the caller promises; every object is writable storage.
-        unsafe { &raw mut (*client.cast::<Object>().cast_mut()).mark }
-    }
-
-    unsafe fn access<'a>(client: *mut mbm_client) -> Self::Access<'a> {
-        client.cast()
-    }
-}
+c_object! { mbm_client, *mut Object }
 
 /// The queue of a client, which every kind of transport uses. It does not include the mark.
 ///
 /// # Safety
 /// `object` is begun, and nothing else uses its client while the reference lives.
 pub(crate) unsafe fn queue<'a>(object: *mut Object) -> &'a mut RequestQueue<RequestPtr, DEPTH> {
-    // SAFETY: as the caller promises.
-    unsafe { &mut (*object).queue }
+    &mut (*object).queue
 }
 
 pub(super) type SerialTransport = Serial<mbm_port, ClientBuffers, RequestPtr>;
@@ -127,22 +103,21 @@ impl TransportKind {
     /// # Safety
     /// As for [`transport`], of this kind.
     pub(crate) unsafe fn port(&self, object: *mut Object) -> *mut mbm_port {
-        // SAFETY: as the caller promises.
-        unsafe { object.byte_add(self.port.into()).cast() }
+        object.byte_add(self.port.into()).cast()
     }
 
     /// # Safety
     /// As for [`transport`], of this kind.
     pub(crate) unsafe fn settings<'a>(&self, object: *mut Object) -> &'a mut Settings {
-        // SAFETY: as the caller promises; the offset is that of the settings.
-        unsafe { &mut *object.byte_add(self.settings.into()).cast() }
+        // The offset is that of the settings.
+        &mut *object.byte_add(self.settings.into()).cast()
     }
 
     /// # Safety
     /// As for [`transport`], of this kind.
     pub(crate) unsafe fn storage<'a>(&self, object: *mut Object) -> &'a mut ClientBuffers {
-        // SAFETY: as the caller promises; the offset is that of the storage.
-        unsafe { &mut *object.byte_add(self.storage.into()).cast() }
+        // The offset is that of the storage.
+        &mut *object.byte_add(self.storage.into()).cast()
     }
 }
 
@@ -152,8 +127,7 @@ impl TransportKind {
 /// `object` is a client with a transport of the type `T`, and nothing else uses the
 /// transport while the reference lives.
 pub(super) unsafe fn transport<'a, T>(object: *mut Object) -> &'a mut T {
-    // SAFETY: as the caller promises.
-    unsafe { &mut *(&raw mut (*object).transport).cast() }
+    &mut *(&raw mut (*object).transport).cast()
 }
 
 /// Evaluates an expression with the transport of an object, of either type. Only functions

@@ -15,8 +15,7 @@ use mbm::error::Status;
 /// # Safety
 /// `object` is begun; no reference into it lives, as the clock is a hook.
 unsafe fn now(object: *mut Object) -> u32 {
-    // SAFETY: as the caller promises.
-    unsafe { port::now((*(*object).kind).port(object)) }
+    port::now((*(*object).kind).port(object))
 }
 
 /// The time on the clock of a client's port, in microseconds.
@@ -24,8 +23,7 @@ unsafe fn now(object: *mut Object) -> u32 {
 /// # Safety
 /// [`pointers::check`] found a client; no reference into it lives.
 pub(crate) unsafe fn clock(client: *mut mbm_client) -> u32 {
-    // SAFETY: as the caller promises.
-    unsafe { pointers::with_hooks(client, || now(pointers::object(client))) }
+    pointers::with_hooks(client, || now(pointers::object(client)))
 }
 
 /// Microseconds for which the line of a client leaves a unit alone, because it may still answer a
@@ -34,22 +32,20 @@ pub(crate) unsafe fn clock(client: *mut mbm_client) -> u32 {
 /// # Safety
 /// `client` is NULL or storage of a client, zeroed or begun.
 pub(crate) unsafe fn rest(client: *mut mbm_client, unit: u8) -> u32 {
-    // SAFETY: as the caller promises. No reference lives while the clock is read.
-    unsafe {
-        if pointers::check(client) != Status::OK {
-            return 0;
-        }
-        let object = pointers::object(client);
-        let kind = &*(*object).kind;
-        if kind.late_units == 0 {
-            return 0;
-        }
-        let late_units = object.byte_add(kind.late_units.into()).cast::<LateUnits>();
-        let now = clock(client);
-        let mut state = RequestState::NONE;
-        state.unit = unit.into();
-        late_rest(&state, &mut *late_units, kind.settings(object), now)
+    // No reference lives while the clock is read.
+    if pointers::check(client) != Status::OK {
+        return 0;
     }
+    let object = pointers::object(client);
+    let kind = &*(*object).kind;
+    if kind.late_units == 0 {
+        return 0;
+    }
+    let late_units = object.byte_add(kind.late_units.into()).cast::<LateUnits>();
+    let now = clock(client);
+    let mut state = RequestState::NONE;
+    state.unit = unit.into();
+    late_rest(&state, &mut *late_units, kind.settings(object), now)
 }
 
 /// Sends and receives for all requests, without waiting, and calls `done` of those that have
@@ -77,31 +73,28 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
 /// `client` is begun, and `advance` is that of its transport; no reference into it lives.
 unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
     let object = pointers::object(client);
-    // SAFETY: as the caller promises. No reference lives while `done` is called, because
-    // `done` may use the object. If `done` zeroed the object, or began it again, `polling`
-    // is false and the loop ends.
-    unsafe {
-        let now = pointers::with_hooks(client, || now(object));
-        (*object).polling = true;
-        let mut rounds = MBM_CLIENT_DEPTH + 1;
-        // `done` may have given the line away.
-        while rounds > 0 && !(*object).queue.suspended {
-            let fresh = rounds > MBM_CLIENT_DEPTH;
-            match pointers::with_hooks(client, || advance(object, now, fresh)) {
-                Some(request) => request.call_done(),
-                None => break,
-            }
-            if !(*object).polling {
-                return Status::OK;
-            }
-            rounds -= 1;
+    // No reference lives while `done` is called, because `done` may use the object. If `done`
+    // zeroed the object, or began it again, `polling` is false and the loop ends.
+    let now = pointers::with_hooks(client, || now(object));
+    (*object).polling = true;
+    let mut rounds = MBM_CLIENT_DEPTH + 1;
+    // `done` may have given the line away.
+    while rounds > 0 && !(*object).queue.suspended {
+        let fresh = rounds > MBM_CLIENT_DEPTH;
+        match pointers::with_hooks(client, || advance(object, now, fresh)) {
+            Some(request) => request.call_done(),
+            None => break,
         }
-        (*object).polling = false;
-        if (*object).queue.is_empty() {
-            Status::OK
-        } else {
-            Status::PENDING
+        if !(*object).polling {
+            return Status::OK;
         }
+        rounds -= 1;
+    }
+    (*object).polling = false;
+    if (*object).queue.is_empty() {
+        Status::OK
+    } else {
+        Status::PENDING
     }
 }
 
@@ -176,6 +169,5 @@ pub unsafe extern "C" fn mbm_client_cancel(
 ///         0 may also be the identifier of a frame
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_wireTransaction(request: *const mbm_clientRequest) -> u16 {
-    // SAFETY: as the header demands: NULL, or a request that is zeroed or was used.
-    unsafe { RequestPtr::new(request.cast_mut()).map_or(0, |request| request.state().wire()) }
+    RequestPtr::new(request.cast_mut()).map_or(0, |request| request.state().wire())
 }

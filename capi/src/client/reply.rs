@@ -87,21 +87,17 @@ pub unsafe extern "C" fn mbm_client_reply(
     capacity: u16,
     packet: *mut mbm_packet,
 ) -> u8 {
-    // SAFETY: as the header demands: a request that is zeroed or was used, and a `pdu` apart
-    // from its data.
-    unsafe {
-        let made = || {
-            let request = RequestPtr::new(request.cast_mut());
-            let request = request.ok_or(Error::INVALID_ARGUMENT)?;
-            if request.lies_in(|bytes, length| overlap(bytes, length, pdu, capacity)) {
-                return Err(Error::INVALID_ARGUMENT);
-            }
-            let place = buffer(pdu, capacity).filter(|_| !packet.is_null());
-            packet_of(request, place.ok_or(Error::INVALID_ARGUMENT)?)
-        };
-        match made() {
-            Ok(made) => put(packet, made),
-            Err(refused) => refused.code(),
+    let made = || {
+        let request = RequestPtr::new(request.cast_mut());
+        let request = request.ok_or(Error::INVALID_ARGUMENT)?;
+        if request.lies_in(|bytes, length| overlap(bytes, length, pdu, capacity)) {
+            return Err(Error::INVALID_ARGUMENT);
         }
+        let place = buffer(pdu, capacity).filter(|_| !packet.is_null());
+        packet_of(request, place.ok_or(Error::INVALID_ARGUMENT)?)
+    };
+    match made() {
+        Ok(made) => put(packet, made),
+        Err(refused) => refused.code(),
     }
 }

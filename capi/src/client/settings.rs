@@ -23,17 +23,14 @@ pub(super) struct Parts<'a> {
 /// # Safety
 /// As for [`pointers::with`].
 pub(super) unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        pointers::with(client, |object| {
-            let kind = &*(*object).kind;
-            change(Parts {
-                settings: kind.settings(object),
-                storage: kind.storage(object),
-                queue: queue(object),
-            })
+    pointers::with(client, |object| {
+        let kind = &*(*object).kind;
+        change(Parts {
+            settings: kind.settings(object),
+            storage: kind.storage(object),
+            queue: queue(object),
         })
-    }
+    })
 }
 
 /// Changes a setting that has no effect on TCP, and whose code only those programs contain that
@@ -42,17 +39,14 @@ pub(super) unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> 
 /// # Safety
 /// As for [`pointers::with`].
 unsafe fn set_extra(client: *mut mbm_client, change: impl FnOnce(&mut Settings)) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        pointers::with(client, |object| {
-            let kind = &*(*object).kind;
-            change(kind.settings(object));
-            if kind.framing != MBM_FRAMING_TCP {
-                transport::<SerialTransport>(object).engine.use_extras();
-            }
-            Status::OK
-        })
-    }
+    pointers::with(client, |object| {
+        let kind = &*(*object).kind;
+        change(kind.settings(object));
+        if kind.framing != MBM_FRAMING_TCP {
+            transport::<SerialTransport>(object).engine.use_extras();
+        }
+        Status::OK
+    })
 }
 
 /// Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the

@@ -26,29 +26,26 @@ pub unsafe extern "C" fn mbm_gateway_begin(
     if config.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: not NULL; the rest as the header demands.
-    unsafe {
-        let status = match check(&*config) {
-            Status::OK => give_up(gateway),
-            refused => refused,
-        };
-        if status == Status::OK {
-            // Zero is a valid value of every field of the object.
-            let core = &mut *pointers::object(gateway);
-            let parts = &mut core.storage;
-            copy(&mut parts.config, &*config);
-            (parts.serve, parts.forward_declared) = (None, None);
-            for index in 0..parts.config.requestCount {
-                // The client of the line that had it, if any, has it no more.
-                let place: *mut mbm_gatewayRequest = parts.config.requests.add(index.into());
-                (*place).request.status = Status::OK.code();
-                (*place).request.done = None;
-            }
-            core.reset();
-            mbm_gateway::mark(gateway).write(BEGUN);
+    let status = match check(&*config) {
+        Status::OK => give_up(gateway),
+        refused => refused,
+    };
+    if status == Status::OK {
+        // Zero is a valid value of every field of the object.
+        let core = &mut *pointers::object(gateway);
+        let parts = &mut core.storage;
+        copy(&mut parts.config, &*config);
+        (parts.serve, parts.forward_declared) = (None, None);
+        for index in 0..parts.config.requestCount {
+            // The client of the line that had it, if any, has it no more.
+            let place: *mut mbm_gatewayRequest = parts.config.requests.add(index.into());
+            (*place).request.status = Status::OK.code();
+            (*place).request.done = None;
         }
-        status.code()
+        core.reset();
+        mbm_gateway::mark(gateway).write(BEGUN);
     }
+    status.code()
 }
 
 /// Copies a config. (The assignment of the whole struct calls memcpy, which most firmware does
@@ -78,15 +75,14 @@ unsafe fn check(config: &mbm_gatewayConfig) -> Status {
         || config.lineCount >= super::MBM_GATEWAY_LOCAL
         || config.requestCount < config.connectionCount.into()
         || config.requestCount == u16::MAX
-        // SAFETY: as the caller promises.
-        || !unsafe { config.routes() }
+        || !config
+            .routes()
             .iter()
             .all(|route| route.is_valid(config.lineCount))
     {
         return Status::INVALID_ARGUMENT;
     }
-    // SAFETY: as the caller promises.
-    unsafe { config.check_clients() }
+    config.check_clients()
 }
 
 /// Gives up the connections of a gateway that was begun before.
@@ -94,22 +90,19 @@ unsafe fn check(config: &mbm_gatewayConfig) -> Status {
 /// # Safety
 /// `gateway` is NULL, or storage of a gateway, zeroed or begun.
 unsafe fn give_up(gateway: *mut mbm_gateway) -> Status {
-    // SAFETY: as the caller promises.
-    unsafe {
-        match pointers::check(gateway) {
-            Status::OK => {}
-            Status::NOT_INITIALISED => return Status::OK,
-            refused => return refused,
-        }
-        let core: *mut Core = pointers::object(gateway);
-        if (*core).storage.config.check_clients() == Status::BUSY {
-            return Status::BUSY;
-        }
-        pointers::with_hooks(gateway, || {
-            for connection in 0..(*core).storage.config.connectionCount {
-                (*core).close(connection);
-            }
-        });
+    match pointers::check(gateway) {
+        Status::OK => {}
+        Status::NOT_INITIALISED => return Status::OK,
+        refused => return refused,
     }
+    let core: *mut Core = pointers::object(gateway);
+    if (*core).storage.config.check_clients() == Status::BUSY {
+        return Status::BUSY;
+    }
+    pointers::with_hooks(gateway, || {
+        for connection in 0..(*core).storage.config.connectionCount {
+            (*core).close(connection);
+        }
+    });
     Status::OK
 }

@@ -15,15 +15,12 @@ unsafe fn with_place(
     connection: u8,
     action: impl FnOnce(*mut Core) -> Status,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        pointers::with(gateway, |core| {
-            if connection >= (*core).storage.config.connectionCount {
-                return Status::INVALID_ARGUMENT;
-            }
-            action(core)
-        })
-    }
+    pointers::with(gateway, |core| {
+        if connection >= (*core).storage.config.connectionCount {
+            return Status::INVALID_ARGUMENT;
+        }
+        action(core)
+    })
 }
 
 /// Reads something of a place for a connection; `otherwise` if the gateway has no such place.
@@ -36,13 +33,10 @@ unsafe fn read_place<T>(
     otherwise: T,
     getter: impl FnOnce(&mut Core) -> T,
 ) -> T {
-    // SAFETY: as the caller promises.
-    unsafe {
-        pointers::read(gateway, None, |core| {
-            let is_there = connection < (*core).storage.config.connectionCount;
-            is_there.then(|| getter(&mut *core))
-        })
-    }
+    pointers::read(gateway, None, |core| {
+        let is_there = connection < (*core).storage.config.connectionCount;
+        is_there.then(|| getter(&mut *core))
+    })
     .unwrap_or(otherwise)
 }
 

@@ -1,7 +1,7 @@
 //! The gateway object.
 
 use super::storage::Parts;
-use crate::pointers::CObject;
+use crate::pointers::c_object;
 use core::ffi::c_void;
 use mbm::gateway::Gateway;
 
@@ -33,29 +33,4 @@ pub(super) struct Object {
     mark: u8,
 }
 
-const _: () = {
-    let space = size_of::<mbm_gateway>();
-    let used = size_of::<Object>();
-    assert!(align_of::<mbm_gateway>() >= align_of::<Object>());
-    assert!(used <= space);
-    // On a 16-bit or 32-bit machine, where RAM is scarce, at most 5 % of the storage may
-    // be unused.
-    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
-};
-
-// SAFETY: the mark is a field of its own.
-unsafe impl CObject for mbm_gateway {
-    // A pointer, because hooks may pass the gateway to functions of this library during a
-    // poll. Those functions read the mark, which is outside of the core.
-    type Access<'a> = *mut Core;
-
-    unsafe fn mark(gateway: *const mbm_gateway) -> *mut u8 {
-        // SAFETY: as the caller promises; every object is writable storage.
-        unsafe { &raw mut (*gateway.cast::<Object>().cast_mut()).mark }
-    }
-
-    unsafe fn access<'a>(gateway: *mut mbm_gateway) -> Self::Access<'a> {
-        // SAFETY: as the caller promises.
-        unsafe { &raw mut (*gateway.cast::<Object>()).core }
-    }
-}
+c_object! { mbm_gateway, *mut Core, core }

@@ -131,8 +131,8 @@ impl mbm_gatewayConfig {
     /// # Safety
     /// The config has `routeCount` routes.
     pub(super) unsafe fn routes(&self) -> &[Route] {
-        // SAFETY: as the caller promises; both types have the same fields.
-        unsafe { from_raw_parts(self.routes.cast(), self.routeCount.into()) }
+        // Both types have the same fields.
+        from_raw_parts(self.routes.cast(), self.routeCount.into())
     }
 
     /// [`Status::OK`] if the clients of all lines can be used, otherwise why not.
@@ -141,8 +141,7 @@ impl mbm_gatewayConfig {
     /// The config has `lineCount` lines; the client of each is NULL or storage, zeroed or begun.
     pub(super) unsafe fn check_clients(&self) -> Status {
         for index in 0..self.lineCount {
-            // SAFETY: as the caller promises.
-            let status = unsafe { pointers::check((*self.lines.add(index.into())).client) };
+            let status = pointers::check((*self.lines.add(index.into())).client);
             if status != Status::OK {
                 return status;
             }

@@ -12,16 +12,14 @@ use mbm::error::Status;
 /// @return a status; MBM_BUSY also from within a hook of a port of its lines
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_poll(gateway: *mut mbm_gateway) -> u8 {
-    // SAFETY: as the header demands. No reference includes the mark.
-    unsafe {
-        pointers::with(gateway, |core| {
-            if (*core).storage.config.check_clients() == Status::BUSY {
-                return Status::BUSY;
-            }
-            pointers::with_hooks(gateway, || (*core).poll());
-            Status::OK
-        })
-    }
+    // No reference includes the mark.
+    pointers::with(gateway, |core| {
+        if (*core).storage.config.check_clients() == Status::BUSY {
+            return Status::BUSY;
+        }
+        pointers::with_hooks(gateway, || (*core).poll());
+        Status::OK
+    })
 }
 
 /// Returns for how long mbm_gateway_poll will have nothing to do, unless a byte arrives on a
@@ -33,15 +31,13 @@ pub unsafe extern "C" fn mbm_gateway_poll(gateway: *mut mbm_gateway) -> u8 {
 ///         function of the gateway's own units returns MBM_REPLY_PENDING, it is at most 1000
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_pollDelay(gateway: *mut mbm_gateway) -> u32 {
-    // SAFETY: as the header demands. No reference includes the mark.
-    unsafe {
-        match pointers::check(gateway) {
-            Status::OK => {
-                let core = pointers::object(gateway);
-                pointers::with_hooks(gateway, || (*core).poll_delay())
-            }
-            Status::BUSY => 0,
-            _ => u32::MAX,
+    // No reference includes the mark.
+    match pointers::check(gateway) {
+        Status::OK => {
+            let core = pointers::object(gateway);
+            pointers::with_hooks(gateway, || (*core).poll_delay())
         }
+        Status::BUSY => 0,
+        _ => u32::MAX,
     }
 }

@@ -6,7 +6,7 @@ mod settings;
 pub use object::*;
 pub use settings::*;
 
-use crate::pointers::{self, CObject};
+use crate::pointers::{self, c_object, CObject};
 use crate::port::{mbm_port, PortRef};
 use crate::storage::LineStorage;
 use core::ptr::null_mut;
@@ -22,29 +22,7 @@ struct Object {
 
 pub(crate) type Core = Line<PortRef, LineStorage>;
 
-const _: () = {
-    let space = size_of::<mbm_line>();
-    let used = size_of::<Object>();
-    assert!(align_of::<mbm_line>() >= align_of::<Object>());
-    assert!(used <= space);
-    // Hiding the fields may waste 5 % where RAM is scarce.
-    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
-};
-
-// SAFETY: the mark is a field of its own, which the core does not include.
-unsafe impl CObject for mbm_line {
-    type Access<'a> = &'a mut Core;
-
-    unsafe fn mark(line: *const mbm_line) -> *mut u8 {
-        // SAFETY: as the caller promises; every object is writable storage.
-        unsafe { &raw mut (*line.cast::<Object>().cast_mut()).mark }
-    }
-
-    unsafe fn access<'a>(line: *mut mbm_line) -> &'a mut Core {
-        // SAFETY: begun, so every field is valid; exclusive as the caller promises.
-        unsafe { &mut (*line.cast::<Object>()).core }
-    }
-}
+c_object! { mbm_line, &mut Core, core }
 
 /// Whether the port and the buffers of the line may be changed: [`Status::OK`];
 /// [`Status::BUSY`] while a request is pending; [`Status::INVALID_ARGUMENT`] for NULL. Makes
@@ -53,18 +31,15 @@ unsafe impl CObject for mbm_line {
 /// # Safety
 /// As for [`pointers::with`].
 pub(crate) unsafe fn prepare(line: *mut mbm_line) -> Status {
-    // SAFETY: as the caller promises; storage that was not begun is zeroed, and zero is a
-    // valid value of every field.
-    unsafe {
-        match pointers::check_once(line) {
-            Status::NOT_INITIALISED => {
-                pointers::zero_on_host(line);
-                mbm_line::mark(line).write(pointers::BEGUN);
-                Status::OK
-            }
-            Status::OK if pointers::object(line).is_pending() => Status::BUSY,
-            other => other,
+    // Storage that was not begun is zeroed, and zero is a valid value of every field.
+    match pointers::check_once(line) {
+        Status::NOT_INITIALISED => {
+            pointers::zero_on_host(line);
+            mbm_line::mark(line).write(pointers::BEGUN);
+            Status::OK
         }
+        Status::OK if pointers::object(line).is_pending() => Status::BUSY,
+        other => other,
     }
 }
 
@@ -83,8 +58,7 @@ pub(crate) unsafe fn with_hooks<T>(line: *mut mbm_line, action: impl FnOnce(&mut
 /// # Safety
 /// `line` points to storage of a line, zeroed or begun.
 pub(crate) unsafe fn core_of(line: *mut mbm_line) -> *mut Core {
-    // SAFETY: as the caller promises.
-    unsafe { &raw mut (*line.cast::<Object>()).core }
+    &raw mut (*line.cast::<Object>()).core
 }
 
 /// Begins a line with RTU frames on a port.
@@ -145,14 +119,11 @@ pub unsafe extern "C" fn mbm_line_setFrame(
     if is_frame_refused(frame, frameBytes) {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = prepare(line);
-        if status == Status::OK {
-            pointers::object(line).storage.set_frame(frame, frameBytes);
-        }
-        status.code()
+    let status = prepare(line);
+    if status == Status::OK {
+        pointers::object(line).storage.set_frame(frame, frameBytes);
     }
+    status.code()
 }
 
 /// Gives up the pending request, whichever node has made it, and switches the driver off. The

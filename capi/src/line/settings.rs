@@ -156,16 +156,13 @@ pub unsafe extern "C" fn mbm_line_used(line: *mut mbm_line) -> u8 {
 /// # Safety
 /// As for [`crate::pointers::with`].
 unsafe fn note_use(line: *mut mbm_line, note: impl FnOnce(&mut Core)) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let status = check(line);
-        if status == Status::OK {
-            with_hooks(line, |core| {
-                if core.port.is_ready() {
-                    note(core);
-                }
-            });
-        }
-        status.code()
+    let status = check(line);
+    if status == Status::OK {
+        with_hooks(line, |core| {
+            if core.port.is_ready() {
+                note(core);
+            }
+        });
     }
+    status.code()
 }

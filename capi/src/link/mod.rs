@@ -83,13 +83,9 @@ pub unsafe extern "C" fn mbm_link_begin(
     client: *mut mbm_client,
     hooks: *const mbm_linkHooks,
 ) -> u8 {
-    // SAFETY: as the header demands: each pointer is NULL or valid, and the object is storage,
-    // zeroed or begun. Zero is a valid value of every field but those that are set here.
-    let status = unsafe {
-        match hooks.as_ref() {
-            Some(hooks) if hooks.connect.is_some() && !link.is_null() => begin(link, client, hooks),
-            _ => Status::INVALID_ARGUMENT,
-        }
+    let status = match hooks.as_ref() {
+        Some(hooks) if hooks.connect.is_some() && !link.is_null() => begin(link, client, hooks),
+        _ => Status::INVALID_ARGUMENT,
     };
     status.code()
 }
@@ -99,46 +95,44 @@ pub unsafe extern "C" fn mbm_link_begin(
 /// # Safety
 /// As for [`mbm_link_begin`]; `link` is not NULL.
 unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHooks) -> Status {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let status = pointers::check(client);
-        if status != Status::OK {
-            return status;
-        }
-        let target = pointers::object(client);
-        let object = pointers::object(link);
-        if (*target).queue.suspended || (*target).linked && !is_of(object, target) {
-            return Status::BUSY;
-        }
-        match pointers::check(link) {
-            Status::NOT_INITIALISED => {}
-            Status::OK => {
-                let status = end(object);
-                if status != Status::OK {
-                    return status;
-                }
-            }
-            refused => return refused,
-        }
-        pointers::zero(link);
-        let transport = (*target).kind;
-        (*object).transport = transport;
-        (*object).hooks = *hooks;
-        (*object).port.copy(&*(*transport).port(target));
-        (*object).request.done = Some(report);
-        (*object).request.context = link.cast();
-        (*object).core.begin();
-        if !(*target).queue.has_broadcast {
-            (*object).core.replace_after = REPLACE_AFTER;
-        }
-        let port = port::port(object);
-        (*(*transport).port(target)).copy(&port);
-        (&raw mut (*object).kind).write(linked(&*transport, client));
-        (*target).kind = (&raw const (*object).kind).cast();
-        (*target).linked = true;
-        mbm_link::mark(link).write(pointers::BEGUN);
-        Status::OK
+    let status = pointers::check(client);
+    if status != Status::OK {
+        return status;
     }
+    let target = pointers::object(client);
+    let object = pointers::object(link);
+    if (*target).queue.suspended || (*target).linked && !is_of(object, target) {
+        return Status::BUSY;
+    }
+    match pointers::check(link) {
+        Status::NOT_INITIALISED => {}
+        Status::OK => {
+            let status = end(object);
+            if status != Status::OK {
+                return status;
+            }
+        }
+        refused => return refused,
+    }
+    // Zero is a valid value of every field but those that are set here.
+    pointers::zero(link);
+    let transport = (*target).kind;
+    (*object).transport = transport;
+    (*object).hooks = *hooks;
+    (*object).port.copy(&*(*transport).port(target));
+    (*object).request.done = Some(report);
+    (*object).request.context = link.cast();
+    (*object).core.begin();
+    if !(*target).queue.has_broadcast {
+        (*object).core.replace_after = REPLACE_AFTER;
+    }
+    let port = port::port(object);
+    (*(*transport).port(target)).copy(&port);
+    (&raw mut (*object).kind).write(linked(&*transport, client));
+    (*target).kind = (&raw const (*object).kind).cast();
+    (*target).linked = true;
+    mbm_link::mark(link).write(pointers::BEGUN);
+    Status::OK
 }
 
 /// The functions and numbers of `client`, which gets a link and whose transport is `transport`.
@@ -159,8 +153,7 @@ fn linked(transport: &TransportKind, client: *mut mbm_client) -> LinkedKind {
 /// # Safety
 /// `link` and `client` are storage of such objects.
 unsafe fn is_of(link: *mut Object, client: *mut client::Object) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe { (*client).linked && (*client).kind.cast::<Object>() == link.cast_const() }
+    (*client).linked && (*client).kind.cast::<Object>() == link.cast_const()
 }
 
 /// Restores the client as it was before the link began.
@@ -168,25 +161,22 @@ unsafe fn is_of(link: *mut Object, client: *mut client::Object) -> bool {
 /// # Safety
 /// `link` is begun, and its client's storage is valid.
 unsafe fn end(link: *mut Object) -> Status {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let client = (*link).kind.client;
-        if client.is_null() {
-            return Status::OK;
-        }
-        let object = pointers::object(client);
-        if !is_of(link, object) {
-            return Status::OK;
-        }
-        if pointers::check(client) != Status::OK || (*object).queue.suspended {
-            return Status::BUSY;
-        }
-        let transport = (*link).transport;
-        (*object).kind = transport;
-        (*object).linked = false;
-        (*(*transport).port(object)).copy(&(*link).port);
-        Status::OK
+    let client = (*link).kind.client;
+    if client.is_null() {
+        return Status::OK;
     }
+    let object = pointers::object(client);
+    if !is_of(link, object) {
+        return Status::OK;
+    }
+    if pointers::check(client) != Status::OK || (*object).queue.suspended {
+        return Status::BUSY;
+    }
+    let transport = (*link).transport;
+    (*object).kind = transport;
+    (*object).linked = false;
+    (*(*transport).port(object)).copy(&(*link).port);
+    Status::OK
 }
 
 /// Ends a link. The client and its requests stay; the link itself stays open or closed as it

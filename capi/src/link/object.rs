@@ -4,7 +4,7 @@ use crate::client::mbm_clientRequest;
 use crate::client::mbm_linkHooks;
 use crate::client::object::{self as client, LinkedKind, TransportKind};
 use crate::client::request::RequestPtr;
-use crate::pointers::{self, CObject};
+use crate::pointers::{self, c_object};
 use crate::port::mbm_port;
 use core::ffi::c_void;
 use mbm::client::{ClientRequest as _, Link, LinkEvent, LinkHooks, LinkState};
@@ -63,29 +63,7 @@ pub struct Object {
     pub(super) request: mbm_clientRequest,
 }
 
-const _: () = {
-    let space = size_of::<mbm_link>();
-    let used = size_of::<Object>();
-    assert!(align_of::<mbm_link>() >= align_of::<Object>());
-    assert!(used <= space);
-    // Hiding the fields may waste 5 % where RAM is scarce.
-    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
-};
-
-// SAFETY: the mark is a field of its own.
-unsafe impl CObject for mbm_link {
-    // A pointer, for the reason that `mbm_client` has.
-    type Access<'a> = *mut Object;
-
-    unsafe fn mark(link: *const mbm_link) -> *mut u8 {
-        // SAFETY: as the caller promises; every object is writable storage.
-        unsafe { &raw mut (*link.cast::<Object>().cast_mut()).mark }
-    }
-
-    unsafe fn access<'a>(link: *mut mbm_link) -> Self::Access<'a> {
-        link.cast()
-    }
-}
+c_object! { mbm_link, *mut Object }
 
 /// The hooks of a link, as the core calls them.
 struct Hooks {
@@ -142,12 +120,9 @@ impl LinkHooks for Hooks {
 /// # Safety
 /// `link` is that of its client; the port's hooks that this calls must not use either.
 unsafe fn close(link: *mut Object) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let object = (*link).kind.client.cast();
-        ((*(*link).transport).release)(object, None);
-        client::queue(object).interrupt();
-    }
+    let object = (*link).kind.client.cast();
+    ((*(*link).transport).release)(object, None);
+    client::queue(object).interrupt();
 }
 
 /// Counts one event, if there are counters.
@@ -155,12 +130,10 @@ unsafe fn close(link: *mut Object) {
 /// # Safety
 /// `link` is begun.
 unsafe fn count(link: *mut Object, counter: fn(&mut mbm_linkCounters) -> &mut u32) {
-    // SAFETY: as the caller promises; the counters are valid as mbm_link_setCounters demands.
-    unsafe {
-        if let Some(counters) = (*link).counters.as_mut() {
-            let counter = counter(counters);
-            *counter = counter.wrapping_add(1);
-        }
+    // The counters are valid as mbm_link_setCounters demands.
+    if let Some(counters) = (*link).counters.as_mut() {
+        let counter = counter(counters);
+        *counter = counter.wrapping_add(1);
     }
 }
 
@@ -173,17 +146,14 @@ pub(super) unsafe fn advance(
     now: u32,
     fresh: bool,
 ) -> Option<RequestPtr> {
-    // SAFETY: as the caller promises. `done` of a request may have ended the link during this
-    // poll of the client.
-    unsafe {
-        if !(*object).linked {
-            return ((*(*object).kind).advance)(object, now, fresh);
-        }
-        let link = (*object).kind.cast::<Object>().cast_mut();
-        pointers::with_hooks(link.cast::<mbm_link>().cast_const(), || {
-            advance_linked(link, object, now, fresh)
-        })
+    // `done` of a request may have ended the link during this poll of the client.
+    if !(*object).linked {
+        return ((*(*object).kind).advance)(object, now, fresh);
     }
+    let link = (*object).kind.cast::<Object>().cast_mut();
+    pointers::with_hooks(link.cast::<mbm_link>().cast_const(), || {
+        advance_linked(link, object, now, fresh)
+    })
 }
 
 /// As [`advance`].
@@ -196,52 +166,50 @@ unsafe fn advance_linked(
     now: u32,
     fresh: bool,
 ) -> Option<RequestPtr> {
-    // SAFETY: as the caller promises. No reference into link or client lives while the port's
-    // hooks run; the core is not used by the hooks of the link, whose calls are refused.
-    unsafe {
-        if (*link).core.is_up() {
-            close_if_silent(link, object, now);
-        }
-        if (*link).core.is_up() {
-            let ended = advance_transport(link, object, now, fresh);
-            if (*link).core.is_up() || ended.is_some() {
-                return ended;
-            }
-        }
-        let mut hooks = Hooks {
-            hooks: (*link).hooks,
-            link,
-        };
-        let is_wanted = client::queue(object).has_waiting();
-        let happened = (*link).core.step(now, fresh, is_wanted, &mut hooks);
-        if (*link).core.state() == LinkState::Down {
-            close(link);
-        }
-        if let Some((event, status)) = happened {
-            let queue = client::queue(object);
-            queue.connected = event == LinkEvent::Connected;
-            queue.unanswered = 0;
-            return note(link, event, status);
-        }
-        if (*link).core.is_up() {
-            // `fresh` is over, or the link was up before: there is nothing to do.
-            return None;
-        }
-        let queue = client::queue(object);
-        if (*link).core.fails_requests() {
-            queue.fail_all();
-        } else if let (Some(since), false) = ((*link).core.waits_since(), queue.has_lost()) {
-            let transport = &*(*link).transport;
-            let timeout = transport.settings(object).response_timeout.get();
-            queue.fail_overdue(now, since, timeout, transport.storage(object));
-            (*link).core.has_timed_out = queue.has_lost();
-        }
-        let mut ended = queue.end_lost(now, (*(*link).transport).storage(object))?;
-        if (*link).core.has_timed_out {
-            ended.state_mut().status = Status::CONNECT_TIMED_OUT;
-        }
-        Some(ended)
+    // No reference into link or client lives while the port's hooks run; the core is not used by
+    // the hooks of the link, whose calls are refused.
+    if (*link).core.is_up() {
+        close_if_silent(link, object, now);
     }
+    if (*link).core.is_up() {
+        let ended = advance_transport(link, object, now, fresh);
+        if (*link).core.is_up() || ended.is_some() {
+            return ended;
+        }
+    }
+    let mut hooks = Hooks {
+        hooks: (*link).hooks,
+        link,
+    };
+    let is_wanted = client::queue(object).has_waiting();
+    let happened = (*link).core.step(now, fresh, is_wanted, &mut hooks);
+    if (*link).core.state() == LinkState::Down {
+        close(link);
+    }
+    if let Some((event, status)) = happened {
+        let queue = client::queue(object);
+        queue.connected = event == LinkEvent::Connected;
+        queue.unanswered = 0;
+        return note(link, event, status);
+    }
+    if (*link).core.is_up() {
+        // `fresh` is over, or the link was up before: there is nothing to do.
+        return None;
+    }
+    let queue = client::queue(object);
+    if (*link).core.fails_requests() {
+        queue.fail_all();
+    } else if let (Some(since), false) = ((*link).core.waits_since(), queue.has_lost()) {
+        let transport = &*(*link).transport;
+        let timeout = transport.settings(object).response_timeout.get();
+        queue.fail_overdue(now, since, timeout, transport.storage(object));
+        (*link).core.has_timed_out = queue.has_lost();
+    }
+    let mut ended = queue.end_lost(now, (*(*link).transport).storage(object))?;
+    if (*link).core.has_timed_out {
+        ended.state_mut().status = Status::CONNECT_TIMED_OUT;
+    }
+    Some(ended)
 }
 
 /// Advances the client's requests. An idle client reads and drops what arrives.
@@ -254,39 +222,37 @@ unsafe fn advance_transport(
     now: u32,
     fresh: bool,
 ) -> Option<RequestPtr> {
-    // SAFETY: as the caller promises. The request of the link is in no queue.
-    unsafe {
-        // The link's own step, which calls no hook while the link is up.
-        let mut hooks = Hooks {
-            hooks: (*link).hooks,
-            link,
-        };
-        (*link).core.step(now, false, false, &mut hooks);
-        if !fresh || !client::queue(object).is_empty() {
-            let mut fresh = fresh;
-            if client::queue(object).may_send(now) {
-                // Only reading shows whether the peer has closed the link. Bytes that are sent
-                // over a closed link are lost.
-                client::queue(object).is_held = true;
-                let ended = read_all(link, object, now);
-                client::queue(object).is_held = false;
-                if ended.is_some() || (*link).core.is_lost {
-                    return ended;
-                }
-                fresh = false;
+    // The request of the link is in no queue.
+    // The link's own step, which calls no hook while the link is up.
+    let mut hooks = Hooks {
+        hooks: (*link).hooks,
+        link,
+    };
+    (*link).core.step(now, false, false, &mut hooks);
+    if !fresh || !client::queue(object).is_empty() {
+        let mut fresh = fresh;
+        if client::queue(object).may_send(now) {
+            // Only reading shows whether the peer has closed the link. Bytes that are sent
+            // over a closed link are lost.
+            client::queue(object).is_held = true;
+            let ended = read_all(link, object, now);
+            client::queue(object).is_held = false;
+            if ended.is_some() || (*link).core.is_lost {
+                return ended;
             }
-            let mut ended = advance_noting(link, object, now, fresh)?;
-            if (*link).core.is_lost && ended.state().status.is_failure() {
-                ended.state_mut().status = Status::LINK_LOST;
-            }
-            return Some(ended);
+            fresh = false;
         }
-        let placeholder = RequestPtr::new(&raw mut (*link).request)?;
-        client::queue(object).begin_idle(placeholder, now);
-        advance_noting(link, object, now, true);
-        client::queue(object).end_idle();
-        None
+        let mut ended = advance_noting(link, object, now, fresh)?;
+        if (*link).core.is_lost && ended.state().status.is_failure() {
+            ended.state_mut().status = Status::LINK_LOST;
+        }
+        return Some(ended);
     }
+    let placeholder = RequestPtr::new(&raw mut (*link).request)?;
+    client::queue(object).begin_idle(placeholder, now);
+    advance_noting(link, object, now, true);
+    client::queue(object).end_idle();
+    None
 }
 
 /// Reads all bytes that have arrived, also if they are more than the client's buffer holds.
@@ -296,16 +262,13 @@ unsafe fn advance_transport(
 /// As for [`advance_linked`].
 unsafe fn read_all(link: *mut Object, object: *mut client::Object, now: u32) -> Option<RequestPtr> {
     const MOST_READS: u8 = 16;
-    // SAFETY: as the caller promises.
-    unsafe {
-        for _ in 0..MOST_READS {
-            let ended = advance_noting(link, object, now, true);
-            if ended.is_some() || !(*link).has_read {
-                return ended;
-            }
+    for _ in 0..MOST_READS {
+        let ended = advance_noting(link, object, now, true);
+        if ended.is_some() || !(*link).has_read {
+            return ended;
         }
-        None
     }
+    None
 }
 
 /// Advances the client's transport, and notes whether bytes have arrived.
@@ -318,15 +281,12 @@ unsafe fn advance_noting(
     now: u32,
     fresh: bool,
 ) -> Option<RequestPtr> {
-    // SAFETY: as the caller promises.
-    unsafe {
-        (*link).has_read = false;
-        let ended = ((*(*link).transport).advance)(object, now, fresh);
-        if (*link).has_read {
-            client::queue(object).received();
-        }
-        ended
+    (*link).has_read = false;
+    let ended = ((*(*link).transport).advance)(object, now, fresh);
+    if (*link).has_read {
+        client::queue(object).received();
     }
+    ended
 }
 
 /// Closes the link if the device has fallen silent.
@@ -334,15 +294,12 @@ unsafe fn advance_noting(
 /// # Safety
 /// As for [`advance_linked`].
 unsafe fn close_if_silent(link: *mut Object, object: *mut client::Object, now: u32) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let queue = client::queue(object);
-        let timeout = (*(*link).transport).settings(object).response_timeout.get();
-        let (unanswered, in_flight) = (queue.unanswered, queue.in_flight());
-        (*link)
-            .core
-            .close_if_silent(unanswered, in_flight, timeout, now);
-    }
+    let queue = client::queue(object);
+    let timeout = (*(*link).transport).settings(object).response_timeout.get();
+    let (unanswered, in_flight) = (queue.unanswered, queue.in_flight());
+    (*link)
+        .core
+        .close_if_silent(unanswered, in_flight, timeout, now);
 }
 
 /// Notes that a request in flight was cancelled, and discards its state.
@@ -350,14 +307,11 @@ unsafe fn close_if_silent(link: *mut Object, object: *mut client::Object, now: u
 /// # Safety
 /// As for [`TransportKind::release`]; `object` has a link.
 pub(super) unsafe fn release(object: *mut client::Object, request: Option<&RequestPtr>) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let link = (*object).kind.cast::<Object>().cast_mut();
-        if request.is_some() {
-            (*link).core.cancelled = (*link).core.cancelled.saturating_add(1);
-        }
-        ((*(*link).transport).release)(object, request);
+    let link = (*object).kind.cast::<Object>().cast_mut();
+    if request.is_some() {
+        (*link).core.cancelled = (*link).core.cancelled.saturating_add(1);
     }
+    ((*(*link).transport).release)(object, request);
 }
 
 /// Counts an event. Returns the request whose `done` reports the event, if the program wants
@@ -366,21 +320,18 @@ pub(super) unsafe fn release(object: *mut client::Object, request: Option<&Reque
 /// # Safety
 /// As for [`advance_linked`].
 unsafe fn note(link: *mut Object, event: LinkEvent, status: Status) -> Option<RequestPtr> {
-    // SAFETY: as the caller promises.
-    unsafe {
-        count(
-            link,
-            match event {
-                LinkEvent::Connected => |counters| &mut counters.connected,
-                LinkEvent::Lost => |counters| &mut counters.lost,
-                LinkEvent::Failed => |counters| &mut counters.failed,
-            },
-        );
-        (*link).callback?;
-        (*link).event = event as u8;
-        (*link).status = status.code();
-        RequestPtr::new(&raw mut (*link).request)
-    }
+    count(
+        link,
+        match event {
+            LinkEvent::Connected => |counters| &mut counters.connected,
+            LinkEvent::Lost => |counters| &mut counters.lost,
+            LinkEvent::Failed => |counters| &mut counters.failed,
+        },
+    );
+    (*link).callback?;
+    (*link).event = event as u8;
+    (*link).status = status.code();
+    RequestPtr::new(&raw mut (*link).request)
 }
 
 /// Reports an event to the program: `done` of the link's request.
@@ -389,11 +340,9 @@ unsafe fn note(link: *mut Object, event: LinkEvent, status: Status) -> Option<Re
 /// `context` is a link that is begun.
 pub(super) unsafe extern "C" fn report(context: *mut c_void, _: *mut mbm_clientRequest) {
     let link = context.cast::<Object>();
-    // SAFETY: as the caller promises; no reference lives while the hook runs.
-    unsafe {
-        if let Some(callback) = (*link).callback {
-            callback((*link).callback_context, (*link).event, (*link).status);
-        }
+    // No reference lives while the hook runs.
+    if let Some(callback) = (*link).callback {
+        callback((*link).callback_context, (*link).event, (*link).status);
     }
 }
 
@@ -402,17 +351,14 @@ pub(super) unsafe extern "C" fn report(context: *mut c_void, _: *mut mbm_clientR
 /// # Safety
 /// As for [`advance`]; `object` has a link.
 pub(super) unsafe fn delay(object: *mut client::Object, now: u32, delay: u32) -> u32 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let link = (*object).kind.cast::<Object>();
-        let queue = client::queue(object);
-        if queue.suspended {
-            return u32::MAX;
-        }
-        let fails = (*link).core.fails_requests() && !queue.is_empty();
-        if (*link).core.state() != LinkState::Up && (fails || queue.has_lost()) {
-            return 0;
-        }
-        (*link).core.delay(now, delay, queue.has_waiting())
+    let link = (*object).kind.cast::<Object>();
+    let queue = client::queue(object);
+    if queue.suspended {
+        return u32::MAX;
     }
+    let fails = (*link).core.fails_requests() && !queue.is_empty();
+    if (*link).core.state() != LinkState::Up && (fails || queue.has_lost()) {
+        return 0;
+    }
+    (*link).core.delay(now, delay, queue.has_waiting())
 }

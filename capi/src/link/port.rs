@@ -14,8 +14,7 @@ use core::ffi::c_void;
 /// # Safety
 /// `link` is being begun, and has the client's own port.
 pub(super) unsafe fn port(link: *mut Object) -> mbm_port {
-    // SAFETY: as the caller promises.
-    let own = unsafe { &(*link).port };
+    let own = &(*link).port;
     mbm_port {
         context: link.cast(),
         read: Some(read),

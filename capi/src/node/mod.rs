@@ -11,7 +11,7 @@ pub use settings::*;
 pub use words::*;
 
 use super::line::{self, mbm_line};
-use super::pointers::{self, CObject};
+use super::pointers::{self, c_object, CObject};
 use super::port::PortRef;
 use super::storage::{LineStorage, NodeWords};
 use mbm::engine::Extension;
@@ -31,30 +31,9 @@ pub(super) struct Object {
     lenient: Option<Extension<PortRef, LineStorage, MasterRequest>>,
 }
 
-const _: () = {
-    let space = size_of::<mbm_node>();
-    let used = size_of::<Object>();
-    assert!(align_of::<mbm_node>() >= align_of::<Object>());
-    assert!(used <= space);
-    // Hiding the fields may waste 5 % where RAM is scarce.
-    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
-};
-
-// SAFETY: the mark is a field of its own. No function changes it while the object is used: the
-// mark of the line refuses the calls that a hook must not make.
-unsafe impl CObject for mbm_node {
-    type Access<'a> = &'a mut Object;
-
-    unsafe fn mark(node: *const mbm_node) -> *mut u8 {
-        // SAFETY: as the caller promises; every object is writable storage.
-        unsafe { &raw mut (*node.cast::<Object>().cast_mut()).mark }
-    }
-
-    unsafe fn access<'a>(node: *mut mbm_node) -> &'a mut Object {
-        // SAFETY: begun, so every field is valid; exclusive as the caller promises.
-        unsafe { &mut *node.cast() }
-    }
-}
+// The reference includes the mark, which no function changes while the object is used: the mark
+// of the line refuses the calls that a hook must not make.
+c_object! { mbm_node, &mut Object }
 
 /// Begins a node: a unit on a line, with your words for its requests and replies.
 ///
@@ -88,27 +67,25 @@ pub unsafe extern "C" fn mbm_node_begin(
         || (response.is_null() && responseWords > 0)
         || (transmit.is_null() && transmitWords > 0)
         || (responseWords | transmitWords) > 255;
-    // SAFETY: as the header demands; not NULL.
-    unsafe {
-        if is_refused {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        if pointers::check_once(node) != Status::OK {
-            pointers::zero_on_host(node);
-            mbm_node::mark(node).write(pointers::BEGUN);
-        }
-        if (*node.cast::<Object>()).core.is_pending() {
-            return Status::BUSY.code();
-        }
-        let object = pointers::object(node);
-        object.core.begin(unit);
-        object.line = line;
-        object.words.response_words = responseWords as u8;
-        object.words.transmit_words = transmitWords as u8;
-        object.words.response = response;
-        object.words.transmit = transmit;
-        Status::OK.code()
+    // Not NULL.
+    if is_refused {
+        return Status::INVALID_ARGUMENT.code();
     }
+    if pointers::check_once(node) != Status::OK {
+        pointers::zero_on_host(node);
+        mbm_node::mark(node).write(pointers::BEGUN);
+    }
+    if (*node.cast::<Object>()).core.is_pending() {
+        return Status::BUSY.code();
+    }
+    let object = pointers::object(node);
+    object.core.begin(unit);
+    object.line = line;
+    object.words.response_words = responseWords as u8;
+    object.words.transmit_words = transmitWords as u8;
+    object.words.response = response;
+    object.words.transmit = transmit;
+    Status::OK.code()
 }
 
 /// Whether a hook of the line's port makes the call: [`Status::BUSY`], otherwise [`Status::OK`];
@@ -117,8 +94,7 @@ pub unsafe extern "C" fn mbm_node_begin(
 /// # Safety
 /// The node was begun, so it has a line.
 unsafe fn check_line(object: *mut Object) -> Status {
-    // SAFETY: as the caller promises.
-    unsafe { pointers::check_mark((*object).line) }
+    pointers::check_mark((*object).line)
 }
 
 /// True if the pending request of the line is that of the node.
@@ -126,8 +102,8 @@ unsafe fn check_line(object: *mut Object) -> Status {
 /// # Safety
 /// [`check_line`] returned [`Status::OK`] for the node.
 unsafe fn has_line(object: *mut Object) -> bool {
-    // SAFETY: as the caller promises, so the line was begun and has no reference.
-    unsafe { pointers::object((*object).line).storage.words == &raw mut (*object).words }
+    // The line was begun and has no reference.
+    pointers::object((*object).line).storage.words == &raw mut (*object).words
 }
 
 /// Sends and receives for a non-blocking request, without waiting.
@@ -147,34 +123,31 @@ pub unsafe extern "C" fn mbm_node_poll(node: *mut mbm_node) -> u8 {
 /// # Safety
 /// As for [`pointers::with`].
 unsafe extern "C" fn poll(node: *mut mbm_node) -> u8 {
-    // SAFETY: as the caller promises. No reference to the node lives while hooks run; the line's
-    // mark keeps them from the line.
-    unsafe {
-        match pointers::check(node) {
+    // No reference to the node lives while hooks run; the line's mark keeps them from the line.
+    match pointers::check(node) {
+        Status::OK => {}
+        refused => return refused.code(),
+    }
+    let object = node.cast::<Object>();
+    let core = &raw mut (*object).core;
+    if (*core).is_pending() {
+        match check_line(object) {
             Status::OK => {}
             refused => return refused.code(),
         }
-        let object = node.cast::<Object>();
-        let core = &raw mut (*object).core;
-        if (*core).is_pending() {
-            match check_line(object) {
-                Status::OK => {}
-                refused => return refused.code(),
-            }
-            if has_line(object) {
-                let line = (*object).line;
-                let status = line::with_hooks(line, |line| {
-                    let now = line.port.micros();
-                    line.poll(now)
-                });
-                let _ = (*core).take(status, pointers::object(line));
-            } else {
-                // The line has given the request up.
-                (*core).end(Status::CANCELLED);
-            }
+        if has_line(object) {
+            let line = (*object).line;
+            let status = line::with_hooks(line, |line| {
+                let now = line.port.micros();
+                line.poll(now)
+            });
+            let _ = (*core).take(status, pointers::object(line));
+        } else {
+            // The line has given the request up.
+            (*core).end(Status::CANCELLED);
         }
-        (*core).status().code()
     }
+    (*core).status().code()
 }
 
 /// Returns how long mbm_node_poll will have nothing to do unless a byte arrives. A program
@@ -205,21 +178,19 @@ pub unsafe extern "C" fn mbm_node_pollDelay(node: *mut mbm_node) -> u32 {
 /// mbm_line_setQuietTime.
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
-    // SAFETY: as the header demands. No reference to the node lives while hooks run.
-    unsafe {
-        let mut status = pointers::check(node);
-        let object = node.cast::<Object>();
-        if status == Status::OK && (*object).core.is_pending() {
-            status = check_line(object);
-            if status == Status::OK {
-                if has_line(object) {
-                    line::with_hooks((*object).line, line::Core::cancel);
-                }
-                (*object).core.end(Status::CANCELLED);
+    // No reference to the node lives while hooks run.
+    let mut status = pointers::check(node);
+    let object = node.cast::<Object>();
+    if status == Status::OK && (*object).core.is_pending() {
+        status = check_line(object);
+        if status == Status::OK {
+            if has_line(object) {
+                line::with_hooks((*object).line, line::Core::cancel);
             }
+            (*object).core.end(Status::CANCELLED);
         }
-        status.code()
     }
+    status.code()
 }
 
 /// Returns the status of the last request.
@@ -227,13 +198,11 @@ pub unsafe extern "C" fn mbm_node_cancel(node: *mut mbm_node) -> u8 {
 /// @return the status: MBM_PENDING while the request is pending, MBM_OK if there was no request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_status(node: *const mbm_node) -> u8 {
-    // SAFETY: as the header demands; every object is writable storage.
-    unsafe {
-        pointers::with(node.cast_mut(), |node| match check_line(node) {
-            Status::BUSY if node.core.is_pending() => Status::BUSY,
-            _ => node.core.status(),
-        })
-    }
+    // Every object is writable storage.
+    pointers::with(node.cast_mut(), |node| match check_line(node) {
+        Status::BUSY if node.core.is_pending() => Status::BUSY,
+        _ => node.core.status(),
+    })
 }
 
 /// Returns the exception code of the last reply as received, also a code that the standard
@@ -251,12 +220,9 @@ pub unsafe extern "C" fn mbm_node_getExceptionCode(node: *const mbm_node) -> u8 
 /// # Safety
 /// As for [`pointers::with`].
 unsafe fn call(pointer: *mut mbm_node, address: u16, word: u16, function: u8) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        request(pointer, |node, line| {
-            node.request(line, address, word, function)
-        })
-    }
+    request(pointer, |node, line| {
+        node.request(line, address, word, function)
+    })
 }
 
 /// Starts a request and, in blocking mode, polls until it has ended.
@@ -267,15 +233,13 @@ unsafe fn request(
     pointer: *mut mbm_node,
     start: impl FnOnce(&mut Node, &mut line::Core) -> Status,
 ) -> u8 {
-    // SAFETY: as the caller promises. The line reads the node's words, which are not in its core.
-    unsafe {
-        let mut status = take_line(pointer);
-        if status == Status::OK {
-            let object = pointer.cast::<Object>();
-            status = start(&mut (*object).core, pointers::object((*object).line));
-        }
-        finish(pointer, status.code())
+    // The line reads the node's words, which are not in its core.
+    let mut status = take_line(pointer);
+    if status == Status::OK {
+        let object = pointer.cast::<Object>();
+        status = start(&mut (*object).core, pointers::object((*object).line));
     }
+    finish(pointer, status.code())
 }
 
 /// Gives the line the words and the timeout of the node, if the node may make a request:
@@ -284,33 +248,30 @@ unsafe fn request(
 /// # Safety
 /// As for [`pointers::with`].
 unsafe fn take_line(node: *mut mbm_node) -> Status {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let mut status = pointers::check(node);
-        let object = node.cast::<Object>();
-        if status == Status::OK {
-            status = check_line(object);
-        }
-        if status == Status::OK {
-            let line = pointers::object((*object).line);
-            if line.waits_for_unit()
-                && !(*object).core.is_pending()
-                && (*line.storage.words).is_non_blocking
-            {
-                // The request of another node gives way. It was not sent.
-                line.cancel();
-            }
-            status = line.ready();
-            if status != Status::BUSY {
-                (*object).core.end(status);
-            }
-            if status == Status::OK {
-                line.storage.words = &raw mut (*object).words;
-                line.set_lenient((*object).lenient);
-            }
-        }
-        status
+    let mut status = pointers::check(node);
+    let object = node.cast::<Object>();
+    if status == Status::OK {
+        status = check_line(object);
     }
+    if status == Status::OK {
+        let line = pointers::object((*object).line);
+        if line.waits_for_unit()
+            && !(*object).core.is_pending()
+            && (*line.storage.words).is_non_blocking
+        {
+            // The request of another node gives way. It was not sent.
+            line.cancel();
+        }
+        status = line.ready();
+        if status != Status::BUSY {
+            (*object).core.end(status);
+        }
+        if status == Status::OK {
+            line.storage.words = &raw mut (*object).words;
+            line.set_lenient((*object).lenient);
+        }
+    }
+    status
 }
 
 /// In blocking mode, polls until the request has ended, and calls the hook `idle` whenever

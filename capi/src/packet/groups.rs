@@ -47,18 +47,15 @@ unsafe fn next<T>(
     group: *mut T,
     first: impl FnOnce(&mbm_packet, &[u8]) -> Option<(T, usize)>,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let found = || {
-            let (packet, at) = (get(packet).filter(|_| !group.is_null())?, get(cursor)?);
-            let rest = packet.data().ok()?.get(at.into()..)?;
-            let (found, length) = first(&packet, rest)?;
-            put(cursor, at.saturating_add(length as u16));
-            put(group, found);
-            Some(())
-        };
-        found().is_some().into()
-    }
+    let found = || {
+        let (packet, at) = (get(packet).filter(|_| !group.is_null())?, get(cursor)?);
+        let rest = packet.data().ok()?.get(at.into()..)?;
+        let (found, length) = first(&packet, rest)?;
+        put(cursor, at.saturating_add(length as u16));
+        put(group, found);
+        Some(())
+    };
+    found().is_some().into()
 }
 
 /// Reads the records of function 14 or 15 (hex) one by one:
@@ -147,22 +144,20 @@ unsafe fn add(
     write: impl FnOnce(&mut mbm_packet, &[u8], &mut [u8]) -> Result<usize, Error>,
 ) -> Result<(), Error> {
     let refused = Error::INVALID_ARGUMENT;
-    // SAFETY: as the caller promises; data and storage do not overlap.
-    unsafe {
-        let mut extended = get(packet).ok_or(refused)?;
-        let is_contiguous = extended.dataLength == 0 || core::ptr::eq(extended.data, storage);
-        if !is_contiguous || (length > 0 && overlap(data, length, storage, capacity)) {
-            return Err(refused);
-        }
-        let data = array_or_empty(data, length.into()).ok_or(refused)?;
-        let place = buffer(storage, capacity).ok_or(refused)?;
-        let used = extended.dataLength;
-        let space = place.get_mut(used.into()..).ok_or(refused)?;
-        let more = write(&mut extended, data, space)?;
-        extended.data = storage;
-        extended.dataLength = used.saturating_add(more as u16);
-        put(packet, extended);
+    // Data and storage do not overlap.
+    let mut extended = get(packet).ok_or(refused)?;
+    let is_contiguous = extended.dataLength == 0 || core::ptr::eq(extended.data, storage);
+    if !is_contiguous || (length > 0 && overlap(data, length, storage, capacity)) {
+        return Err(refused);
     }
+    let data = array_or_empty(data, length.into()).ok_or(refused)?;
+    let place = buffer(storage, capacity).ok_or(refused)?;
+    let used = extended.dataLength;
+    let space = place.get_mut(used.into()..).ok_or(refused)?;
+    let more = write(&mut extended, data, space)?;
+    extended.data = storage;
+    extended.dataLength = used.saturating_add(more as u16);
+    put(packet, extended);
     Ok(())
 }
 

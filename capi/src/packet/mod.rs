@@ -162,8 +162,7 @@ impl mbm_packet {
     /// # Safety
     /// `data` is NULL or points to `dataLength` bytes.
     pub(super) unsafe fn data<'a>(&self) -> Result<&'a [u8], Error> {
-        // SAFETY: as the caller promises.
-        let data = unsafe { array_or_empty(self.data, self.dataLength.into()) };
+        let data = array_or_empty(self.data, self.dataLength.into());
         data.ok_or(Error::INVALID_ARGUMENT)
     }
 
@@ -232,8 +231,7 @@ pub(super) unsafe fn own(
     count: u8,
     code: Option<u8>,
 ) -> Result<Option<Function>, Error> {
-    // SAFETY: as the caller promises.
-    let functions = unsafe { array_or_empty(functions, count.into()) };
+    let functions = array_or_empty(functions, count.into());
     declared(functions.ok_or(Error::INVALID_ARGUMENT)?, code)
 }
 
@@ -249,8 +247,7 @@ pub(super) unsafe fn reply_length(
     if packet.kind != MBM_PACKET_REQUEST {
         return Err(Error::INVALID_ARGUMENT);
     }
-    // SAFETY: as the caller promises.
-    let request = packet.request(unsafe { packet.data() }?)?;
+    let request = packet.request(packet.data()?)?;
     packet::emit_request(&request, functions, &mut [0; MAX_PDU])?;
     Ok(measure(&request))
 }
@@ -265,8 +262,7 @@ pub(super) unsafe fn put_expected(place: *mut mbm_length, length: Result<Length,
         Ok(length) => length,
         Err(_) => Length::Unknown,
     };
-    // SAFETY: as the caller promises.
-    let status = unsafe { put(place, known.into()) };
+    let status = put(place, known.into());
     match length {
         Err(refused) if status == Status::OK.code() => refused.code(),
         _ => status,

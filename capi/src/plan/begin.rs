@@ -43,15 +43,10 @@ pub unsafe extern "C" fn mbm_plan_begin(
     field: *mut u16,
 ) -> u8 {
     let group = |setup: &mbm_planSetup, positions: &mut [Position], reads: &mut [Read]| {
-        // SAFETY: the setup is complete.
-        let fields = unsafe { setup.fields() };
-        group::group(fields, setup, positions, reads, setup.dataWords)
+        group::group(setup.fields(), setup, positions, reads, setup.dataWords)
     };
-    // SAFETY: as the header demands: each is NULL or what it says.
-    unsafe {
-        let has_limits = setup.as_ref().is_some_and(mbm_planSetup::has_limits);
-        begin(plan, client, setup, field, has_limits, group)
-    }
+    let has_limits = setup.as_ref().is_some_and(mbm_planSetup::has_limits);
+    begin(plan, client, setup, field, has_limits, group)
 }
 
 /// As mbm_plan_begin, for fields that were grouped before: `mbm header` writes such a table. A
@@ -80,12 +75,10 @@ pub unsafe extern "C" fn mbm_plan_beginGrouped(
     field: *mut u16,
 ) -> u8 {
     let group = |setup: &mbm_planSetup, positions: &mut [Position], reads: &mut [Read]| {
-        // SAFETY: the setup is complete, and `counts` is an array, as the header demands.
-        let (fields, counts) = unsafe { (setup.fields(), from_raw_parts(counts, reads.len())) };
-        group::take_groups(fields, counts, positions, reads, setup.dataWords)
+        let counts = from_raw_parts(counts, reads.len());
+        group::take_groups(setup.fields(), counts, positions, reads, setup.dataWords)
     };
-    // SAFETY: as the header demands: each is NULL or what it says.
-    unsafe { begin(plan, client, setup, field, !counts.is_null(), group) }
+    begin(plan, client, setup, field, !counts.is_null(), group)
 }
 
 /// Begins a plan with the reads that `group` makes. It is refused if `is_usable` is false.
@@ -101,12 +94,10 @@ unsafe fn begin(
     group: impl FnOnce(&mbm_planSetup, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
 ) -> u8 {
     let mut wrong = u16::MAX;
-    // SAFETY: as the caller promises; `field` is NULL or what the header says.
-    unsafe {
-        let status = attempt(plan, client, setup, is_usable, group, &mut wrong);
-        pointers::put(field, wrong);
-        status.code()
-    }
+    // `field` is NULL or what the header says.
+    let status = attempt(plan, client, setup, is_usable, group, &mut wrong);
+    pointers::put(field, wrong);
+    status.code()
 }
 
 /// As [`begin`]; writes the index of the field that is wrong, if it is one.
@@ -122,48 +113,46 @@ unsafe fn attempt(
     group: impl FnOnce(&mbm_planSetup, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
     wrong: &mut u16,
 ) -> Status {
-    // SAFETY: as the caller promises. Nothing uses the storage of a plan that is not begun.
-    unsafe {
-        if plan.is_null() {
-            return Status::INVALID_ARGUMENT;
-        }
-        let usable = pointers::check(client);
-        if usable != Status::OK {
-            return usable;
-        }
-        let Some(given) = setup
-            .as_ref()
-            .filter(|setup| is_usable && setup.is_complete())
-        else {
-            return Status::INVALID_ARGUMENT;
-        };
-        if mbm_plan_end(plan) == Status::BUSY.code() {
-            return Status::BUSY;
-        }
-        let count = usize::from(given.fieldCount);
-        let positions = from_raw_parts_mut(given.positions.cast(), count);
-        let reads = from_raw_parts_mut(given.reads.cast(), given.readCount.into());
-        let count = match group(given, positions, reads) {
-            Ok(count) => count as u16,
-            Err(refusal) => {
-                *wrong = refusal.field as u16;
-                return refusal.status;
-            }
-        };
-        for slot in 0..given.requestCount {
-            (*given.requests.add(slot.into())).context = null_mut();
-        }
-        let object = pointers::object(plan);
-        (*object).read_count = count;
-        (*object).setup = setup;
-        (*object).client = client;
-        (*object).begins = (*object).begins.wrapping_add(1);
-        (*object).millis = 0;
-        (*object).micros = client::clock(client);
-        (*object).mark = pointers::BEGUN;
-        (*object).schedule.start((*object).reads(), 0);
-        Status::OK
+    // Nothing uses the storage of a plan that is not begun.
+    if plan.is_null() {
+        return Status::INVALID_ARGUMENT;
     }
+    let usable = pointers::check(client);
+    if usable != Status::OK {
+        return usable;
+    }
+    let Some(given) = setup
+        .as_ref()
+        .filter(|setup| is_usable && setup.is_complete())
+    else {
+        return Status::INVALID_ARGUMENT;
+    };
+    if mbm_plan_end(plan) == Status::BUSY.code() {
+        return Status::BUSY;
+    }
+    let count = usize::from(given.fieldCount);
+    let positions = from_raw_parts_mut(given.positions.cast(), count);
+    let reads = from_raw_parts_mut(given.reads.cast(), given.readCount.into());
+    let count = match group(given, positions, reads) {
+        Ok(count) => count as u16,
+        Err(refusal) => {
+            *wrong = refusal.field as u16;
+            return refusal.status;
+        }
+    };
+    for slot in 0..given.requestCount {
+        (*given.requests.add(slot.into())).context = null_mut();
+    }
+    let object = pointers::object(plan);
+    (*object).read_count = count;
+    (*object).setup = setup;
+    (*object).client = client;
+    (*object).begins = (*object).begins.wrapping_add(1);
+    (*object).millis = 0;
+    (*object).micros = client::clock(client);
+    (*object).mark = pointers::BEGUN;
+    (*object).schedule.start((*object).reads(), 0);
+    Status::OK
 }
 
 /// Ends a plan: gives its requests up and lets go of its storage.

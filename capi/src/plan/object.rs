@@ -3,7 +3,7 @@
 use super::setup::mbm_planSetup;
 use super::storage::mbm_plan;
 use crate::client::{self, mbm_client};
-use crate::pointers::{self, CObject};
+use crate::pointers::{self, c_object};
 use core::slice::from_raw_parts;
 use mbm::error::Status;
 use mbm::plan::divide::divide;
@@ -27,26 +27,8 @@ pub struct Object {
     pub(super) schedule: Schedule,
 }
 
-const _: () = {
-    assert!(align_of::<mbm_plan>() >= align_of::<Object>());
-    assert!(size_of::<Object>() <= size_of::<mbm_plan>());
-};
-
-// SAFETY: the mark is a field of its own.
-unsafe impl CObject for mbm_plan {
-    // `update` runs while the plan is in use and may call its functions: no reference covers
-    // the object then.
-    type Access<'a> = *mut Object;
-
-    unsafe fn mark(plan: *const mbm_plan) -> *mut u8 {
-        // SAFETY: as the caller promises; every object is writable storage.
-        unsafe { &raw mut (*plan.cast::<Object>().cast_mut()).mark }
-    }
-
-    unsafe fn access<'a>(plan: *mut mbm_plan) -> Self::Access<'a> {
-        plan.cast()
-    }
-}
+// `update` runs while the plan is in use and may call its functions.
+c_object! { mbm_plan, *mut Object }
 
 impl Object {
     /// The setup of the plan.
@@ -74,18 +56,15 @@ impl Object {
 /// # Safety
 /// `object` is begun, and no reference into it or its client lives.
 pub(super) unsafe fn time(object: *mut Object) -> u32 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let client = (*object).client;
-        if pointers::check(client) == Status::OK {
-            let now = client::clock(client);
-            let passed = mbm::time::elapsed(now, (*object).micros);
-            if passed >= 1000 {
-                let (millis, rest) = divide(passed, 1000);
-                (*object).micros = now.wrapping_sub(rest);
-                (*object).millis = (*object).millis.wrapping_add(millis);
-            }
+    let client = (*object).client;
+    if pointers::check(client) == Status::OK {
+        let now = client::clock(client);
+        let passed = mbm::time::elapsed(now, (*object).micros);
+        if passed >= 1000 {
+            let (millis, rest) = divide(passed, 1000);
+            (*object).micros = now.wrapping_sub(rest);
+            (*object).millis = (*object).millis.wrapping_add(millis);
         }
-        (*object).millis
     }
+    (*object).millis
 }

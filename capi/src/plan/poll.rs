@@ -66,23 +66,21 @@ unsafe fn read_of<'a>(request: *const mbm_clientRequest) -> Option<&'a Read> {
 /// # Safety
 /// `object` is begun, with this request and this read. The request is not pending.
 unsafe fn queue(object: *const Object, request: *mut mbm_clientRequest, read: &Read) {
-    // SAFETY: as the caller promises. The data of a read lie within the plan's words.
-    unsafe {
-        (*request).done = None;
-        (*request).reply = (*object).setup().data.add(read.offset.into()).cast();
-        (*request).replyBytes = read.words() * 2;
-        (*request).transaction = 0;
-        (*request).unit = read.unit.into();
-        let (address, quantity) = (read.address, read.quantity);
-        let status = client::read_table((*object).client, request, read.table, address, quantity);
-        match Status::from_code(status) {
-            // Not now.
-            Status::BUSY | Status::QUEUE_FULL => {}
-            // If it was refused, the next poll ends the read.
-            _ => {
-                (*request).context = (&raw const *read).cast_mut().cast();
-                (*object).schedule.begin((*object).reads());
-            }
+    // The data of a read lie within the plan's words.
+    (*request).done = None;
+    (*request).reply = (*object).setup().data.add(read.offset.into()).cast();
+    (*request).replyBytes = read.words() * 2;
+    (*request).transaction = 0;
+    (*request).unit = read.unit.into();
+    let (address, quantity) = (read.address, read.quantity);
+    let status = client::read_table((*object).client, request, read.table, address, quantity);
+    match Status::from_code(status) {
+        // Not now.
+        Status::BUSY | Status::QUEUE_FULL => {}
+        // If it was refused, the next poll ends the read.
+        _ => {
+            (*request).context = (&raw const *read).cast_mut().cast();
+            (*object).schedule.begin((*object).reads());
         }
     }
 }
@@ -94,38 +92,36 @@ unsafe fn queue(object: *const Object, request: *mut mbm_clientRequest, read: &R
 /// `plan` is begun; no reference into it lives, for `update` may use it, begin it again,
 /// end it and zero it.
 unsafe fn update(plan: *mut mbm_plan, ended: *const Read, is_of_unit: bool) -> bool {
-    // SAFETY: as the caller promises; looked at again after every call of `update`.
-    unsafe {
-        let object = pointers::object(plan);
-        let begins = (*object).begins;
-        // These stay as they are until the plan ends.
-        let setup = (*object).setup;
-        let positions: *const Position = (*setup).positions.cast();
-        let reads: *const Read = (*setup).reads.cast();
-        let index = ended.offset_from(reads) as usize;
-        let mut place = if is_of_unit {
-            0
-        } else {
-            (*positions.add(index)).first()
-        };
-        while place < (*setup).fieldCount.into() {
-            let field = (*positions.add(place)).field();
-            let read = reads.add((*positions.add(field)).read());
-            if read != ended && !is_of_unit {
-                break;
-            }
-            if (*read).unit == (*ended).unit {
-                if let Some(update) = (*setup).update {
-                    update((*setup).context, plan, field as u16);
-                    if pointers::check(plan) != Status::OK || (*object).begins != begins {
-                        return false;
-                    }
+    // Looked at again after every call of `update`.
+    let object = pointers::object(plan);
+    let begins = (*object).begins;
+    // These stay as they are until the plan ends.
+    let setup = (*object).setup;
+    let positions: *const Position = (*setup).positions.cast();
+    let reads: *const Read = (*setup).reads.cast();
+    let index = ended.offset_from(reads) as usize;
+    let mut place = if is_of_unit {
+        0
+    } else {
+        (*positions.add(index)).first()
+    };
+    while place < (*setup).fieldCount.into() {
+        let field = (*positions.add(place)).field();
+        let read = reads.add((*positions.add(field)).read());
+        if read != ended && !is_of_unit {
+            break;
+        }
+        if (*read).unit == (*ended).unit {
+            if let Some(update) = (*setup).update {
+                update((*setup).context, plan, field as u16);
+                if pointers::check(plan) != Status::OK || (*object).begins != begins {
+                    return false;
                 }
             }
-            place += 1;
         }
-        true
+        place += 1;
     }
+    true
 }
 
 /// How long mbm_plan_poll has nothing to do, so that a program may sleep until then or until

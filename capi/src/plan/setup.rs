@@ -191,8 +191,8 @@ impl mbm_planSetup {
     /// The program passed this setup to mbm_plan_begin, whose comment demands arrays of these
     /// lengths, and it is complete.
     pub(super) unsafe fn fields<'a>(&self) -> &'a [Field] {
-        // SAFETY: as the caller promises. The types of C and of the core have the same layout.
-        unsafe { from_raw_parts(self.fields.cast(), self.fieldCount.into()) }
+        // The types of C and of the core have the same layout.
+        from_raw_parts(self.fields.cast(), self.fieldCount.into())
     }
 }
 

@@ -43,26 +43,24 @@ struct Found<'a> {
 /// `plan` is NULL or storage of a plan.
 #[inline(always)]
 unsafe fn find(plan: *const mbm_plan, field: u16, found: &mut MaybeUninit<Found>) -> Status {
-    // SAFETY: as the caller promises. Every field has a position and a read.
-    unsafe {
-        match pointers::check(plan) {
-            Status::OK => {}
-            refused => return refused,
-        }
-        let object = pointers::object(plan);
-        let setup = (*object).setup();
-        if field >= setup.fieldCount {
-            return Status::INVALID_ARGUMENT;
-        }
-        let position: *const Position = setup.positions.add(field.into()).cast();
-        let read: *const Read = setup.reads.add((*position).read()).cast();
-        found.write(Found {
-            object,
-            field: &*setup.fields.add(field.into()).cast(),
-            read: &*read,
-        });
-        Status::OK
+    // Every field has a position and a read.
+    match pointers::check(plan) {
+        Status::OK => {}
+        refused => return refused,
     }
+    let object = pointers::object(plan);
+    let setup = (*object).setup();
+    if field >= setup.fieldCount {
+        return Status::INVALID_ARGUMENT;
+    }
+    let position: *const Position = setup.positions.add(field.into()).cast();
+    let read: *const Read = setup.reads.add((*position).read()).cast();
+    found.write(Found {
+        object,
+        field: &*setup.fields.add(field.into()).cast(),
+        read: &*read,
+    });
+    Status::OK
 }
 
 /// Finds the words of a field that has a value. Without a value it returns the status of the
@@ -76,33 +74,31 @@ unsafe fn find_words(
     index: u16,
     words: &mut MaybeUninit<Words>,
 ) -> Status {
-    // SAFETY: as the caller promises. The data of a read lie within the plan's words.
-    unsafe {
-        let mut found = MaybeUninit::uninit();
-        match find(plan, field, &mut found) {
-            Status::OK => {}
-            refused => return refused,
-        }
-        let Found {
-            object,
-            field,
-            read,
-        } = found.assume_init();
-        if !read.has_data() {
-            return read.status();
-        }
-        let (first, before) = match place(field, read.address, index) {
-            Ok(place) => place,
-            Err(refused) => return refused.status(),
-        };
-        let data = (*object).setup().data.add((read.offset + first).into());
-        words.write(Words {
-            words: from_raw_parts(data, (read.words() - first).into()),
-            before,
-            field,
-        });
-        Status::OK
+    // The data of a read lie within the plan's words.
+    let mut found = MaybeUninit::uninit();
+    match find(plan, field, &mut found) {
+        Status::OK => {}
+        refused => return refused,
     }
+    let Found {
+        object,
+        field,
+        read,
+    } = found.assume_init();
+    if !read.has_data() {
+        return read.status();
+    }
+    let (first, before) = match place(field, read.address, index) {
+        Ok(place) => place,
+        Err(refused) => return refused.status(),
+    };
+    let data = (*object).setup().data.add((read.offset + first).into());
+    words.write(Words {
+        words: from_raw_parts(data, (read.words() - first).into()),
+        before,
+        field,
+    });
+    Status::OK
 }
 
 /// Finds something in the words of a field and puts it where C wants it. Without a value it is
@@ -117,15 +113,12 @@ unsafe fn get<T>(
     place: *mut T,
     find: impl FnOnce(&Words) -> Result<T, Error>,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let mut words = MaybeUninit::uninit();
-        let result = pointers::put_result(place, || {
-            find_words(plan, field, index, &mut words).result()?;
-            find(words.assume_init_ref())
-        });
-        Status::from(result).code()
-    }
+    let mut words = MaybeUninit::uninit();
+    let result = pointers::put_result(place, || {
+        find_words(plan, field, index, &mut words).result()?;
+        find(words.assume_init_ref())
+    });
+    Status::from(result).code()
 }
 
 /// How the last read of a field ended, and how old its value is. The functions that get a value
@@ -208,14 +201,14 @@ pub unsafe extern "C" fn mbm_plan_getNumber(
     index: u16,
     value: *mut f64,
 ) -> u8 {
-    // SAFETY: as the header demands; a double is its bits.
+    // A double is its bits.
     #[cfg(not(target_arch = "avr"))]
-    unsafe {
+    {
         get(plan, field, index, value.cast(), |words| words.number())
     }
-    // SAFETY: as the header demands; C's double is a float here.
+    // C's double is a float here.
     #[cfg(target_arch = "avr")]
-    unsafe {
+    {
         get(plan, field, index, value.cast(), |words| {
             Ok(ShortDouble::from_bytes(words.number()?.to_be_bytes()).0)
         })
@@ -233,8 +226,8 @@ pub unsafe extern "C" fn mbm_plan_getFloat(
     index: u16,
     value: *mut f32,
 ) -> u8 {
-    // SAFETY: as the header demands; a float is its bits.
-    unsafe { get(plan, field, index, value.cast(), |words| words.float()) }
+    // A float is its bits.
+    get(plan, field, index, value.cast(), |words| words.float())
 }
 
 /// A text, which ends at its first NUL or with its field. In an order with the low byte first,
@@ -261,13 +254,10 @@ pub unsafe extern "C" fn mbm_plan_getText(
     if text.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: as the header demands.
-    unsafe {
-        let mut words = MaybeUninit::uninit();
-        match find_words(plan, field, 0, &mut words) {
-            Status::OK => Status::from(copy(words.assume_init_ref())).code(),
-            refused => refused.code(),
-        }
+    let mut words = MaybeUninit::uninit();
+    match find_words(plan, field, 0, &mut words) {
+        Status::OK => Status::from(copy(words.assume_init_ref())).code(),
+        refused => refused.code(),
     }
 }
 
@@ -330,11 +320,8 @@ pub unsafe extern "C" fn mbm_plan_getRead(
     read: *mut mbm_planReadInfo,
 ) -> u8 {
     let find = || {
-        // SAFETY: as the header demands.
-        let own = unsafe {
-            pointers::check(plan).result()?;
-            (*pointers::object(plan)).reads().get(usize::from(index))
-        };
+        pointers::check(plan).result()?;
+        let own = (*pointers::object(plan)).reads().get(usize::from(index));
         let own = own.ok_or(Error::INVALID_ARGUMENT)?;
         Ok(mbm_planReadInfo {
             intervalMs: own.interval_ms,

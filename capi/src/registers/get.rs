@@ -17,11 +17,10 @@ unsafe fn get_value<T>(
     value: *mut T,
     find: impl FnOnce(&Registers<BorrowedRegisters>) -> Result<T, Error>,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    code(unsafe {
+    code(
         view(registers, MBM_ORDER_DEFAULT, false)
-            .and_then(|registers| pointers::put_result(value, || find(&registers)))
-    })
+            .and_then(|registers| pointers::put_result(value, || find(&registers))),
+    )
 }
 
 /// Writes the bytes of a number to `number`, in the byte order of this machine. One
@@ -39,13 +38,10 @@ unsafe fn get(
     if number.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: as the caller promises.
-    code(unsafe {
-        view(registers, order, false).and_then(|registers| {
-            let mask = registers.order.mask(size) ^ machine_order_mask(size);
-            registers.load(address, mask, slice_mut(number, size)?)
-        })
-    })
+    code(view(registers, order, false).and_then(|registers| {
+        let mask = registers.order.mask(size) ^ machine_order_mask(size);
+        registers.load(address, mask, slice_mut(number, size)?)
+    }))
 }
 
 functions! {
@@ -103,14 +99,13 @@ pub unsafe extern "C" fn mbm_registers_getDouble(
     order: u8,
     value: *mut f64,
 ) -> u8 {
-    // SAFETY: as the header demands.
     #[cfg(not(target_arch = "avr"))]
-    unsafe {
+    {
         get(registers, address, order, value.cast(), 8)
     }
-    // SAFETY: as the header demands; C's double is a float here.
+    // C's double is a float here.
     #[cfg(target_arch = "avr")]
-    unsafe {
+    {
         let mut bytes = [0; 8];
         let status = get(registers, address, order, bytes.as_mut_ptr(), 8);
         if status != Status::OK.code() {
@@ -147,16 +142,13 @@ pub unsafe extern "C" fn mbm_registers_getString(
     if text.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: as the header demands.
-    code(unsafe {
-        view(registers, order, false).and_then(|registers| {
-            let text = slice_mut::<u8>(text.cast(), capacity.into())?;
-            let (end, place) = text.split_last_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
-            let count = registers.text(address, length.into(), place)?.len();
-            *place.get_mut(count).unwrap_or(end) = 0;
-            Ok(())
-        })
-    })
+    code(view(registers, order, false).and_then(|registers| {
+        let text = slice_mut::<u8>(text.cast(), capacity.into())?;
+        let (end, place) = text.split_last_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
+        let count = registers.text(address, length.into(), place)?.len();
+        *place.get_mut(count).unwrap_or(end) = 0;
+        Ok(())
+    }))
 }
 
 /// Reads raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register
@@ -176,11 +168,8 @@ pub unsafe extern "C" fn mbm_registers_getBytes(
     bytes: *mut u8,
     length: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    code(unsafe {
-        view(registers, order, false).and_then(|registers| {
-            let bytes = slice_mut(bytes, length.into())?;
-            registers.bytes_in(registers.order, address, bytes)
-        })
-    })
+    code(view(registers, order, false).and_then(|registers| {
+        let bytes = slice_mut(bytes, length.into())?;
+        registers.bytes_in(registers.order, address, bytes)
+    }))
 }

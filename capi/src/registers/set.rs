@@ -20,8 +20,7 @@ unsafe fn with(
     order: u8,
     action: impl FnOnce(&mut Registers<BorrowedRegisters>) -> Result<(), Error>,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    code(unsafe { view(registers, order, true) }.and_then(|mut registers| action(&mut registers)))
+    code(view(registers, order, true).and_then(|mut registers| action(&mut registers)))
 }
 
 /// Sets a number from its bytes in the byte order of this machine. One function for all
@@ -36,13 +35,10 @@ unsafe fn set(
     number: *const u8,
     size: usize,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        with(registers, order, |registers| {
-            let mask = registers.order.mask(size) ^ machine_order_mask(size);
-            registers.store(address, mask, slice(number, size)?)
-        })
-    }
+    with(registers, order, |registers| {
+        let mask = registers.order.mask(size) ^ machine_order_mask(size);
+        registers.store(address, mask, slice(number, size)?)
+    })
 }
 
 functions! {
@@ -102,14 +98,13 @@ pub unsafe extern "C" fn mbm_registers_setDouble(
     order: u8,
     value: *const f64,
 ) -> u8 {
-    // SAFETY: as the header demands.
     #[cfg(not(target_arch = "avr"))]
-    unsafe {
+    {
         set(registers, address, order, value.cast(), 8)
     }
-    // SAFETY: as the header demands; C's double is a float here.
+    // C's double is a float here.
     #[cfg(target_arch = "avr")]
-    unsafe {
+    {
         match pointers::get(value.cast::<ShortDouble>()) {
             Some(double) => {
                 let mut bytes = double.to_bytes();
@@ -141,12 +136,9 @@ pub unsafe extern "C" fn mbm_registers_setString(
     text: *const c_char,
 ) -> u8 {
     let length = usize::from(length);
-    // SAFETY: as the header demands.
-    unsafe {
-        with(registers, order, |registers| {
-            registers.set_text(address, length, pointers::text(text.cast(), length)?)
-        })
-    }
+    with(registers, order, |registers| {
+        registers.set_text(address, length, pointers::text(text.cast(), length)?)
+    })
 }
 
 /// Writes raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each

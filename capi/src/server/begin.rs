@@ -151,18 +151,15 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
     frame: *mut u8,
     bytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        begin(
-            server,
-            port,
-            units,
-            count,
-            frame,
-            bytes,
-            Core::begin_rtu_over_tcp,
-        )
-    }
+    begin(
+        server,
+        port,
+        units,
+        count,
+        frame,
+        bytes,
+        Core::begin_rtu_over_tcp,
+    )
     .code()
 }
 
@@ -174,14 +171,11 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
 ///                   counts as 2^31
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceUs: u32) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = check(server);
-        if status == Status::OK {
-            (*object(server)).set_silence(silenceUs);
-        }
-        status.code()
+    let status = check(server);
+    if status == Status::OK {
+        (*object(server)).set_silence(silenceUs);
     }
+    status.code()
 }
 
 /// Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
@@ -214,14 +208,11 @@ pub unsafe extern "C" fn mbm_server_setReceiveLatency(
     server: *mut mbm_server,
     latencyMs: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = check(server);
-        if status == Status::OK {
-            (*object(server)).set_receive_latency(latencyMs);
-        }
-        status.code()
+    let status = check(server);
+    if status == Status::OK {
+        (*object(server)).set_receive_latency(latencyMs);
     }
+    status.code()
 }
 
 /// Says whether the receiver of an RTU line gets what the driver sends (a local echo). Without

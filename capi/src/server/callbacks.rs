@@ -126,29 +126,26 @@ impl DataModel for Callbacks {
 /// `service` is the head of a `mbm_dataCallbacks`; `pdu` has the length and the space that
 /// `info` gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let record = service.cast::<mbm_dataCallbacks>();
-        let kind = TableKind::from_code((*record).service.kind);
-        if is_ignored_broadcast(info, *pdu) {
-            return Reply::NOT_HANDLED.code();
-        }
-        let function = *pdu;
-        let is_mask_or_read_write =
-            kind == TableKind::HOLDING_REGISTERS && table::is_mask_or_read_write(function);
-        if (*record).set.is_none() && function != kind.code() {
-            return Reply::NOT_HANDLED.code();
-        }
-        let mut cells = Callbacks(record, HookCaller::new((*record).hooks, info, function));
-        let (pdu, length) = request(pdu, info);
-        let reply = if is_mask_or_read_write {
-            let cells: &mut dyn TableAccess = &mut cells;
-            table::serve_mask_and_read_write(cells, pdu, length)
-        } else {
-            table::serve(kind, &mut cells, pdu, length)
-        };
-        reply.code()
+    let record = service.cast::<mbm_dataCallbacks>();
+    let kind = TableKind::from_code((*record).service.kind);
+    if is_ignored_broadcast(info, *pdu) {
+        return Reply::NOT_HANDLED.code();
     }
+    let function = *pdu;
+    let is_mask_or_read_write =
+        kind == TableKind::HOLDING_REGISTERS && table::is_mask_or_read_write(function);
+    if (*record).set.is_none() && function != kind.code() {
+        return Reply::NOT_HANDLED.code();
+    }
+    let mut cells = Callbacks(record, HookCaller::new((*record).hooks, info, function));
+    let (pdu, length) = request(pdu, info);
+    let reply = if is_mask_or_read_write {
+        let cells: &mut dyn TableAccess = &mut cells;
+        table::serve_mask_and_read_write(cells, pdu, length)
+    } else {
+        table::serve(kind, &mut cells, pdu, length)
+    };
+    reply.code()
 }
 
 /// Serves cells that your functions get and set.
@@ -179,12 +176,9 @@ pub unsafe extern "C" fn mbm_dataCallbacks_setHooks(
     cells: *mut mbm_dataCallbacks,
     hooks: *const mbm_accessHooks,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if cells.is_null() {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        (*cells).hooks = mbm_recordHooks::new(hooks);
+    if cells.is_null() {
+        return Status::INVALID_ARGUMENT.code();
     }
+    (*cells).hooks = mbm_recordHooks::new(hooks);
     Status::OK.code()
 }

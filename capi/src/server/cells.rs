@@ -8,19 +8,16 @@ use mbm::server::table::{MachineByte, TableKind};
 /// The bitmap has these bits. `quantity` is at least 1.
 #[cfg_attr(target_os = "none", inline(always))]
 pub(super) unsafe fn are_all_on(map: *const u8, first: usize, quantity: usize) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let mut bit = Place::of_cells(map.cast_mut(), TableKind::COILS, first);
-        let mut left = quantity;
-        loop {
-            if MachineByte::from(*bit.byte) & bit.mask == 0 {
-                return false;
-            }
-            bit.step();
-            left -= 1;
-            if left == 0 {
-                return true;
-            }
+    let mut bit = Place::of_cells(map.cast_mut(), TableKind::COILS, first);
+    let mut left = quantity;
+    loop {
+        if MachineByte::from(*bit.byte) & bit.mask == 0 {
+            return false;
+        }
+        bit.step();
+        left -= 1;
+        if left == 0 {
+            return true;
         }
     }
 }
@@ -38,15 +35,12 @@ impl Place {
     /// # Safety
     /// The cell exists.
     pub(super) unsafe fn of_cells(cells: *mut u8, kind: TableKind, index: usize) -> Place {
-        // SAFETY: as the caller promises.
-        unsafe {
-            if kind.is_bits() {
-                let (byte, mask) = (cells.add(index >> 3), 1 << (index & 7));
-                Place { byte, mask }
-            } else {
-                let byte = cells.add(2 * index);
-                Place { byte, mask: 0 }
-            }
+        if kind.is_bits() {
+            let (byte, mask) = (cells.add(index >> 3), 1 << (index & 7));
+            Place { byte, mask }
+        } else {
+            let byte = cells.add(2 * index);
+            Place { byte, mask: 0 }
         }
     }
 
@@ -70,30 +64,27 @@ impl Place {
 /// # Safety
 /// Both positions have `left` cells, which nothing else uses meanwhile.
 pub(super) unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        loop {
-            if from.mask == 0 {
-                // Swaps between the byte order of the machine and that of the wire; the
-                // same code does both directions.
-                let high = usize::from(cfg!(target_endian = "little"));
-                *to.byte = *from.byte.add(high);
-                *to.byte.add(1) = *from.byte.add(1 - high);
-                from.byte = from.byte.add(2);
-                to.byte = to.byte.add(2);
-            } else {
-                let mut byte = MachineByte::from(*to.byte) & !to.mask;
-                if MachineByte::from(*from.byte) & from.mask != 0 {
-                    byte |= to.mask;
-                }
-                *to.byte = byte as u8;
-                from.step();
-                to.step();
+    loop {
+        if from.mask == 0 {
+            // Swaps between the byte order of the machine and that of the wire; the
+            // same code does both directions.
+            let high = usize::from(cfg!(target_endian = "little"));
+            *to.byte = *from.byte.add(high);
+            *to.byte.add(1) = *from.byte.add(1 - high);
+            from.byte = from.byte.add(2);
+            to.byte = to.byte.add(2);
+        } else {
+            let mut byte = MachineByte::from(*to.byte) & !to.mask;
+            if MachineByte::from(*from.byte) & from.mask != 0 {
+                byte |= to.mask;
             }
-            left -= 1;
-            if left == 0 {
-                return;
-            }
+            *to.byte = byte as u8;
+            from.step();
+            to.step();
+        }
+        left -= 1;
+        if left == 0 {
+            return;
         }
     }
 }

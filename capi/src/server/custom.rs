@@ -37,14 +37,11 @@ pub struct mbm_functionMask {
 /// `service` is the head of a `mbm_custom`; `pdu` has the length and the space that `info`
 /// gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let code = (*service.cast::<mbm_custom>()).code;
-        if code != *pdu && (code != 0 || are_absent(info)) {
-            return Reply::NOT_HANDLED.code();
-        }
-        call_handler(service.cast(), pdu, info)
+    let code = (*service.cast::<mbm_custom>()).code;
+    if code != *pdu && (code != 0 || are_absent(info)) {
+        return Reply::NOT_HANDLED.code();
     }
+    call_handler(service.cast(), pdu, info)
 }
 
 /// Calls the handler of the record. A function of its own, so that a request for another
@@ -53,41 +50,38 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
 /// # Safety
 /// As for [`serve`].
 unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_void) -> usize {
-    // SAFETY: as the caller promises; no reference to the record is kept while its
-    // function runs.
-    unsafe {
-        let to = (*info.cast::<Indication>()).to;
-        let connection = connection(info);
-        let (pdu, length) = request(pdu, info);
-        let function = pdu.first().copied().unwrap_or(0);
-        if is_ignored_broadcast(info, function) {
-            return Reply::NOT_HANDLED.code();
-        }
-        let Some(handler) = (*record).serve else {
-            return Reply::NOT_HANDLED.code();
-        };
-        let context = (*record).context;
-        custom::serve(pdu, length, |data, space| {
-            let request = mbm_request {
-                connection,
-                data: data.as_ptr(),
-                length: data.len() as u16,
-                unit: to,
-                function,
-            };
-            let capacity = space.len() as u16;
-            let returned = handler(context, &raw const request, space.as_mut_ptr(), capacity);
-            match (returned & 0xFF00, returned as u8) {
-                (0, bytes) => Outcome::Data(bytes.into()),
-                (MBM_REPLY_EXCEPTION, code @ 1..=0x7F) => Outcome::Exception(code),
-                (MBM_REPLY_NONE, 0) => Outcome::NoResponse,
-                (MBM_REPLY_PENDING, 0) => Outcome::Pending,
-                (MBM_REPLY_DECLINED, 0) => Outcome::Declined,
-                _ => Outcome::Exception(Reply::SERVER_DEVICE_FAILURE.exception_code()),
-            }
-        })
-        .code()
+    // No reference to the record is kept while its function runs.
+    let to = (*info.cast::<Indication>()).to;
+    let connection = connection(info);
+    let (pdu, length) = request(pdu, info);
+    let function = pdu.first().copied().unwrap_or(0);
+    if is_ignored_broadcast(info, function) {
+        return Reply::NOT_HANDLED.code();
     }
+    let Some(handler) = (*record).serve else {
+        return Reply::NOT_HANDLED.code();
+    };
+    let context = (*record).context;
+    custom::serve(pdu, length, |data, space| {
+        let request = mbm_request {
+            connection,
+            data: data.as_ptr(),
+            length: data.len() as u16,
+            unit: to,
+            function,
+        };
+        let capacity = space.len() as u16;
+        let returned = handler(context, &raw const request, space.as_mut_ptr(), capacity);
+        match (returned & 0xFF00, returned as u8) {
+            (0, bytes) => Outcome::Data(bytes.into()),
+            (MBM_REPLY_EXCEPTION, code @ 1..=0x7F) => Outcome::Exception(code),
+            (MBM_REPLY_NONE, 0) => Outcome::NoResponse,
+            (MBM_REPLY_PENDING, 0) => Outcome::Pending,
+            (MBM_REPLY_DECLINED, 0) => Outcome::Declined,
+            _ => Outcome::Exception(Reply::SERVER_DEVICE_FAILURE.exception_code()),
+        }
+    })
+    .code()
 }
 
 /// The length rule of `function`, if this is the head of the record for that function.
@@ -95,17 +89,15 @@ unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_voi
 /// # Safety
 /// `service` is the head of a record of any kind.
 unsafe fn rule_of(service: *const mbm_service, function: u8) -> Option<Rule> {
-    // SAFETY: as the caller promises; a record of that kind is a `mbm_custom`.
-    unsafe {
-        if !is_custom(service) {
-            return None;
-        }
-        let record = service.cast::<mbm_custom>();
-        if (*record).code != function {
-            return None;
-        }
-        functions::rule((*record).length)
+    // A record of that kind is a `mbm_custom`.
+    if !is_custom(service) {
+        return None;
     }
+    let record = service.cast::<mbm_custom>();
+    if (*record).code != function {
+        return None;
+    }
+    functions::rule((*record).length)
 }
 
 /// The length rule that the units have for a user's function.
@@ -113,13 +105,10 @@ unsafe fn rule_of(service: *const mbm_service, function: u8) -> Option<Rule> {
 /// # Safety
 /// `units` points to `count` units.
 pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Option<Rule> {
-    // SAFETY: as the caller promises.
-    unsafe {
-        for index in 0..count {
-            for service in Services::new(units.add(index.into())) {
-                if let Some(rule) = rule_of(service, function) {
-                    return Some(rule);
-                }
+    for index in 0..count {
+        for service in Services::new(units.add(index.into())) {
+            if let Some(rule) = rule_of(service, function) {
+                return Some(rule);
             }
         }
     }
@@ -152,14 +141,11 @@ unsafe extern "C" fn refuse_disabled(
     pdu: *mut u8,
     _info: *const c_void,
 ) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let off = custom::DisabledFunctions((*service.cast::<mbm_functionMask>()).off);
-        if off.is_disabled(*pdu) {
-            Reply::ILLEGAL_FUNCTION.code()
-        } else {
-            Reply::NOT_HANDLED.code()
-        }
+    let off = custom::DisabledFunctions((*service.cast::<mbm_functionMask>()).off);
+    if off.is_disabled(*pdu) {
+        Reply::ILLEGAL_FUNCTION.code()
+    } else {
+        Reply::NOT_HANDLED.code()
     }
 }
 
@@ -168,8 +154,8 @@ unsafe extern "C" fn refuse_disabled(
 /// # Safety
 /// `mask` is valid; `code` is at most 127.
 unsafe fn mask_byte(mask: *mut mbm_functionMask, code: u8) -> *mut u8 {
-    // SAFETY: as the caller promises; code 127 is in the last of the 16 bytes.
-    unsafe { (&raw mut (*mask).off).cast::<u8>().add((code / 8).into()) }
+    // Code 127 is in the last of the 16 bytes.
+    (&raw mut (*mask).off).cast::<u8>().add((code / 8).into())
 }
 
 /// Switches a function of a unit off or on. The unit answers a function that is off with

@@ -12,9 +12,8 @@ use mbm::server::{Addressing, Indication, Reply};
 /// # Safety
 /// `record` is valid, and nothing else uses it while the reference lives.
 unsafe fn core_fields<'a>(record: *mut mbm_diagnostics) -> &'a mut Diagnostics {
-    // SAFETY: as the caller promises; records.rs asserts that the fields have the layout
-    // of the core's struct.
-    unsafe { &mut *(&raw mut (*record).diagnosticRegister).cast() }
+    // `records.rs` asserts that the fields have the layout of the core's struct.
+    &mut *(&raw mut (*record).diagnosticRegister).cast()
 }
 
 /// Serves functions 08, 0B and 0C (hex).
@@ -23,16 +22,14 @@ unsafe fn core_fields<'a>(record: *mut mbm_diagnostics) -> &'a mut Diagnostics {
 /// `service` is the head of a `mbm_diagnostics`; `pdu` has the length and the space that
 /// `info` gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
-    // SAFETY: as the caller promises; no reference lives while the hook runs.
-    unsafe {
-        let record = service.cast::<mbm_diagnostics>();
-        let (pdu, length) = request(pdu, info);
-        let (reply, restart) = core_fields(record).serve(pdu, length);
-        if let (true, Some(hook)) = (restart != Restart::None, (*record).restart) {
-            hook((*record).context, (restart == Restart::ClearLog).into());
-        }
-        reply.code()
+    // No reference lives while the hook runs.
+    let record = service.cast::<mbm_diagnostics>();
+    let (pdu, length) = request(pdu, info);
+    let (reply, restart) = core_fields(record).serve(pdu, length);
+    if let (true, Some(hook)) = (restart != Restart::None, (*record).restart) {
+        hook((*record).context, (restart == Restart::ClearLog).into());
     }
+    reply.code()
 }
 
 /// Counts a frame, has the unit serve it if it is for this unit, and counts the outcome.
@@ -45,28 +42,25 @@ unsafe extern "C" fn monitor(
     addressing: u8,
     pdu: *mut u8,
 ) -> usize {
-    // SAFETY: as the caller promises; no reference to the record lives while services
-    // run.
-    unsafe {
-        let record = (*unit).diagnostics;
-        let addressing = match addressing {
-            1 => Addressing::OWN,
-            2 if !is_ignored_broadcast(info, *pdu) => Addressing::BROADCAST,
-            _ => Addressing::FOREIGN,
-        };
-        let (bytes, length) = request(pdu, info);
-        let function = bytes.first().copied().unwrap_or(0);
-        let info = info.cast::<Indication>();
-        let request = bytes.get(..length).unwrap_or_default();
-        if !core_fields(record).count_frame(&*info, addressing, request) {
-            return Reply::NO_RESPONSE.code();
-        }
-        let reply = call_services(unit, info.cast(), pdu);
-        if reply != Reply::PENDING.code() {
-            core_fields(record).count_outcome(addressing, function, Reply::from_number(reply));
-        }
-        reply
+    // No reference to the record lives while services run.
+    let record = (*unit).diagnostics;
+    let addressing = match addressing {
+        1 => Addressing::OWN,
+        2 if !is_ignored_broadcast(info, *pdu) => Addressing::BROADCAST,
+        _ => Addressing::FOREIGN,
+    };
+    let (bytes, length) = request(pdu, info);
+    let function = bytes.first().copied().unwrap_or(0);
+    let info = info.cast::<Indication>();
+    let request = bytes.get(..length).unwrap_or_default();
+    if !core_fields(record).count_frame(&*info, addressing, request) {
+        return Reply::NO_RESPONSE.code();
     }
+    let reply = call_services(unit, info.cast(), pdu);
+    if reply != Reply::PENDING.code() {
+        core_fields(record).count_outcome(addressing, function, Reply::from_number(reply));
+    }
+    reply
 }
 
 /// Serves diagnostics: functions 08, 0B and 0C (hex). Function 08 has the sub-functions

@@ -71,8 +71,7 @@ struct CFifos(*mut mbm_fifos);
 /// `words` points to `data.len() / 2` registers.
 unsafe fn load(words: *const u16, data: &mut [u8]) {
     for (index, pair) in data.as_chunks_mut().0.iter_mut().enumerate() {
-        // SAFETY: as the caller promises.
-        *pair = unsafe { words.add(index).read() }.to_be_bytes();
+        *pair = words.add(index).read().to_be_bytes();
     }
 }
 
@@ -185,13 +184,10 @@ unsafe extern "C" fn serve_files(
     pdu: *mut u8,
     info: *const c_void,
 ) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let record = service.cast::<mbm_files>();
-        let mut files = CFiles(record, HookCaller::new((*record).hooks, info, *pdu));
-        let (pdu, length) = request(pdu, info);
-        files::serve(&mut files, pdu, length).code()
-    }
+    let record = service.cast::<mbm_files>();
+    let mut files = CFiles(record, HookCaller::new((*record).hooks, info, *pdu));
+    let (pdu, length) = request(pdu, info);
+    files::serve(&mut files, pdu, length).code()
 }
 
 /// # Safety
@@ -201,8 +197,7 @@ unsafe extern "C" fn serve_fifos(
     pdu: *mut u8,
     info: *const c_void,
 ) -> usize {
-    // SAFETY: as the caller promises.
-    let (pdu, length) = unsafe { request(pdu, info) };
+    let (pdu, length) = request(pdu, info);
     files::serve_fifos(&CFifos(service.cast()), pdu, length).code()
 }
 
@@ -226,13 +221,10 @@ pub unsafe extern "C" fn mbm_files_setHooks(
     files: *mut mbm_files,
     hooks: *const mbm_accessHooks,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if files.is_null() {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        (*files).hooks = mbm_recordHooks::new(hooks);
+    if files.is_null() {
+        return Status::INVALID_ARGUMENT.code();
     }
+    (*files).hooks = mbm_recordHooks::new(hooks);
     Status::OK.code()
 }
 

@@ -161,11 +161,9 @@ pub(super) enum Hook {
 /// # Safety
 /// `info` is the field `request` of a server, as for [`super::records::Serve`].
 pub(super) unsafe fn connection(info: *const c_void) -> *mut c_void {
-    // SAFETY: as the caller promises; the pointer is valid for the whole server.
-    unsafe {
-        let server = info.byte_sub(offset_of!(Core, request)).cast::<Core>();
-        (*server).port.context
-    }
+    // The pointer is valid for the whole server.
+    let server = info.byte_sub(offset_of!(Core, request)).cast::<Core>();
+    (*server).port.context
 }
 
 /// Calls a hook. The function sets the fields `connection` and `unit` of `access`, which are
@@ -180,24 +178,22 @@ pub(super) unsafe extern "C" fn call_hook(
     hook: Hook,
     access: *mut mbm_access,
 ) -> u8 {
-    // SAFETY: as the caller promises; no reference to the hooks or the server is kept.
-    unsafe {
-        (*access).connection = connection(info);
-        (*access).unit = (*info.cast::<Indication>()).to;
-        let context = (*hooks).context;
-        let before = match hook {
-            Hook::BeforeRead => (*hooks).beforeRead,
-            Hook::BeforeWrite => (*hooks).beforeWrite,
-            Hook::AfterWrite => {
-                if let Some(after) = (*hooks).afterWrite {
-                    after(context, access);
-                }
-                return 0;
+    // No reference to the hooks or the server is kept.
+    (*access).connection = connection(info);
+    (*access).unit = (*info.cast::<Indication>()).to;
+    let context = (*hooks).context;
+    let before = match hook {
+        Hook::BeforeRead => (*hooks).beforeRead,
+        Hook::BeforeWrite => (*hooks).beforeWrite,
+        Hook::AfterWrite => {
+            if let Some(after) = (*hooks).afterWrite {
+                after(context, access);
             }
-        };
-        match before.map_or(0, |before| before(context, access)) {
-            refused @ 0..=127 => refused,
-            _ => Reply::SERVER_DEVICE_FAILURE.exception_code(),
+            return 0;
         }
+    };
+    match before.map_or(0, |before| before(context, access)) {
+        refused @ 0..=127 => refused,
+        _ => Reply::SERVER_DEVICE_FAILURE.exception_code(),
     }
 }

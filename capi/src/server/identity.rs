@@ -62,12 +62,9 @@ unsafe extern "C" fn serve_exception_status(
     pdu: *mut u8,
     info: *const c_void,
 ) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let outputs = (*service.cast::<mbm_exceptionStatus>()).outputs;
-        let (pdu, length) = request(pdu, info);
-        identity::serve_exception_status(outputs, pdu, length).code()
-    }
+    let outputs = (*service.cast::<mbm_exceptionStatus>()).outputs;
+    let (pdu, length) = request(pdu, info);
+    identity::serve_exception_status(outputs, pdu, length).code()
 }
 
 /// The `length` bytes at a pointer; an empty slice for NULL.
@@ -78,8 +75,7 @@ unsafe fn bytes<'a>(first: *const u8, length: u8) -> &'a [u8] {
     if first.is_null() {
         return &[];
     }
-    // SAFETY: not NULL; the rest as the caller promises.
-    unsafe { from_raw_parts(first, length.into()) }
+    from_raw_parts(first, length.into())
 }
 
 unsafe extern "C" fn serve_server_id(
@@ -87,15 +83,12 @@ unsafe extern "C" fn serve_server_id(
     pdu: *mut u8,
     info: *const c_void,
 ) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let record = service.cast::<mbm_serverId>();
-        let id = bytes((*record).id, (*record).idLength);
-        let additional = bytes((*record).additional, (*record).additionalLength);
-        let running = (*record).running != 0;
-        let (pdu, length) = request(pdu, info);
-        identity::serve_server_id(id, running, additional, pdu, length).code()
-    }
+    let record = service.cast::<mbm_serverId>();
+    let id = bytes((*record).id, (*record).idLength);
+    let additional = bytes((*record).additional, (*record).additionalLength);
+    let running = (*record).running != 0;
+    let (pdu, length) = request(pdu, info);
+    identity::serve_server_id(id, running, additional, pdu, length).code()
 }
 
 /// The objects of C.
@@ -126,8 +119,7 @@ unsafe extern "C" fn serve_identification(
     pdu: *mut u8,
     info: *const c_void,
 ) -> usize {
-    // SAFETY: as the caller promises.
-    let (pdu, length) = unsafe { request(pdu, info) };
+    let (pdu, length) = request(pdu, info);
     identity::serve_identification(&CObjects(service.cast()), pdu, length).code()
 }
 

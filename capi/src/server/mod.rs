@@ -28,7 +28,7 @@ pub use table_hooks::*;
 pub use tables::*;
 pub use units::*;
 
-use super::pointers::{check, check_once, object, with_hooks, CObject, BEGUN, IN_HOOK};
+use super::pointers::{c_object, check, check_once, object, with_hooks, CObject, BEGUN, IN_HOOK};
 use super::port;
 use buffers::{Core, ServerBuffers};
 use core::ffi::c_void;
@@ -63,16 +63,6 @@ struct Object {
     mark: u8,
     core: Core,
 }
-
-const _: () = {
-    let space = size_of::<mbm_server>();
-    let used = size_of::<Object>();
-    assert!(align_of::<mbm_server>() >= align_of::<Object>());
-    assert!(used <= space);
-    // On a 16-bit or 32-bit machine, where RAM is scarce, at most 5 % of the storage may
-    // be unused.
-    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
-};
 
 impl ServerStorage for ServerBuffers {
     fn frame(&mut self) -> &mut [u8] {
@@ -126,22 +116,7 @@ impl ServerStorage for ServerBuffers {
     }
 }
 
-// SAFETY: the mark is a field of its own.
-unsafe impl CObject for mbm_server {
-    // A pointer, because hooks may pass the server to functions of this library during a
-    // poll. Those functions read the mark, which is outside of the core.
-    type Access<'a> = *mut Core;
-
-    unsafe fn mark(server: *const mbm_server) -> *mut u8 {
-        // SAFETY: as the caller promises; every object is writable storage.
-        unsafe { &raw mut (*server.cast::<Object>().cast_mut()).mark }
-    }
-
-    unsafe fn access<'a>(server: *mut mbm_server) -> Self::Access<'a> {
-        // SAFETY: as the caller promises.
-        unsafe { &raw mut (*server.cast::<Object>()).core }
-    }
-}
+c_object! { mbm_server, *mut Core, core }
 
 /// Polls the server, without waiting: receives bytes, carries out a complete request, and
 /// sends the response.
@@ -172,26 +147,23 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
 /// `core` belongs to an object that was begun. The mark of the object is `IN_HOOK`, so
 /// no function of this file uses the object meanwhile.
 unsafe fn poll(core: *mut Core, mark: *const u8) -> Status {
-    // SAFETY: as the caller promises. Units and the clock are code of the program; no
-    // reference to the core lives while they run.
-    unsafe {
-        let now = port::now(&raw const (*core).port);
-        core::hint::assert_unchecked((*core).has_framing());
-        let status = (*core).look(now);
-        if status == Status::PENDING {
-            let info = &raw const (*core).request;
-            let storage = &raw const (*core).storage;
-            let pdu = (*storage).frame.add((*info).head.into());
-            let reply = units::serve((*storage).units, (*storage).count, info, pdu);
-            core::hint::assert_unchecked(mark.read() != IN_HOOK || (*core).has_framing());
-            if mark.read() != IN_HOOK || !(*core).answer_served(Reply::from_number(reply)) {
-                return Status::OK;
-            }
-        } else if status != Status::OK {
-            return status;
+    // Units and the clock are code of the program; no reference to the core lives while they run.
+    let now = port::now(&raw const (*core).port);
+    core::hint::assert_unchecked((*core).has_framing());
+    let status = (*core).look(now);
+    if status == Status::PENDING {
+        let info = &raw const (*core).request;
+        let storage = &raw const (*core).storage;
+        let pdu = (*storage).frame.add((*info).head.into());
+        let reply = units::serve((*storage).units, (*storage).count, info, pdu);
+        core::hint::assert_unchecked(mark.read() != IN_HOOK || (*core).has_framing());
+        if mark.read() != IN_HOOK || !(*core).answer_served(Reply::from_number(reply)) {
+            return Status::OK;
         }
-        (*core).go_on()
+    } else if status != Status::OK {
+        return status;
     }
+    (*core).go_on()
 }
 
 /// Returns how long the program may sleep before the next mbm_server_poll, unless bytes
@@ -208,16 +180,14 @@ unsafe fn poll(core: *mut Core, mark: *const u8) -> Status {
 ///         so bytes that arrived meanwhile need not end a sleep
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 {
-    // SAFETY: as the header requires; no reference lives while the clock is read.
-    unsafe {
-        match check(server) {
-            Status::OK => {
-                let core = object(server);
-                let now = with_hooks(server, || port::now(&raw const (*core).port));
-                (*core).poll_delay(now)
-            }
-            Status::BUSY => 0,
-            _ => u32::MAX,
+    // No reference lives while the clock is read.
+    match check(server) {
+        Status::OK => {
+            let core = object(server);
+            let now = with_hooks(server, || port::now(&raw const (*core).port));
+            (*core).poll_delay(now)
         }
+        Status::BUSY => 0,
+        _ => u32::MAX,
     }
 }

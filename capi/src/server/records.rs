@@ -85,8 +85,7 @@ pub(super) const CUSTOM: u8 = 0x80;
 /// # Safety
 /// `service` is the head of a record of any kind.
 pub(super) unsafe fn is_custom(service: *const mbm_service) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe { (*service).kind == CUSTOM }
+    (*service).kind == CUSTOM
 }
 
 /// The counters, the event log and the listen only mode of a unit. Initialise the struct with

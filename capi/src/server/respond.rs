@@ -72,26 +72,22 @@ pub unsafe extern "C" fn mbm_unit_respond(
         Ok(framing) if !units.is_null() && !frame.is_null() && !response.is_null() => framing,
         _ => return Status::INVALID_ARGUMENT.code(),
     };
-    // SAFETY: not NULL; the rest as the header demands.
-    if length > capacity || !unsafe { units::have_ids(units, count) } {
+    if length > capacity || !units::have_ids(units, count) {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: not NULL; the rest as the header demands.
-    unsafe {
-        let buffer = from_raw_parts_mut(frame, capacity.into());
-        let answer = respond(
-            framing,
-            delimiter,
-            buffer,
-            length.into(),
-            &mut RespondUnits(units, count, connection),
-        );
-        match answer {
-            Ok(length) => {
-                response.write(length as u16);
-                Status::OK.code()
-            }
-            Err(status) => status.code(),
+    let buffer = from_raw_parts_mut(frame, capacity.into());
+    let answer = respond(
+        framing,
+        delimiter,
+        buffer,
+        length.into(),
+        &mut RespondUnits(units, count, connection),
+    );
+    match answer {
+        Ok(length) => {
+            response.write(length as u16);
+            Status::OK.code()
         }
+        Err(status) => status.code(),
     }
 }

@@ -22,48 +22,46 @@ unsafe fn access(
     operation: TableOperation,
     pdu: *mut u8,
 ) -> Reply {
-    // SAFETY: as the caller promises. The copy has the fields that the table had when the
-    // request came: a hook may change those of the table.
-    unsafe {
-        let hooks = (*table).hooks.hooks;
-        let mut copy = table.read();
-        copy.hooks.call = None;
-        let reads = operation.reads();
-        let word = |at| u16::from_be_bytes([*pdu.add(at), *pdu.add(at + 1)]);
-        let quantity = match operation {
-            TableOperation::WRITE_ONE => 1,
-            _ => word(3),
-        };
-        let mut access = mbm_access {
-            connection: null_mut(),
-            data: null(),
-            address: word(1),
-            quantity,
-            file: 0,
-            unit: 0,
-            function: *pdu,
-        };
-        let mut hook = Hook::BeforeRead;
-        if !reads {
-            hook = Hook::BeforeWrite;
-            access.data = pdu.add(operation.data());
-        }
-        let refused = call_hook(hooks, info, hook, &raw mut access);
-        if refused != 0 {
-            return Reply::exception(refused);
-        }
-        if operation == TableOperation::ASK {
-            return Reply::NOT_HANDLED;
-        }
-        let quantity = quantity.into();
-        let bytes = TableKind::from_code(copy.service.kind).bytes(quantity);
-        let pdu = from_raw_parts_mut(pdu, operation.data() + bytes);
-        let reply = Table(&raw mut copy, info).access(operation, quantity, bytes, pdu);
-        if reply == WRITTEN && !reads {
-            call_hook(hooks, info, Hook::AfterWrite, &raw mut access);
-        }
-        reply
+    // The copy has the fields that the table had when the request came: a hook may change those
+    // of the table.
+    let hooks = (*table).hooks.hooks;
+    let mut copy = table.read();
+    copy.hooks.call = None;
+    let reads = operation.reads();
+    let word = |at| u16::from_be_bytes([*pdu.add(at), *pdu.add(at + 1)]);
+    let quantity = match operation {
+        TableOperation::WRITE_ONE => 1,
+        _ => word(3),
+    };
+    let mut access = mbm_access {
+        connection: null_mut(),
+        data: null(),
+        address: word(1),
+        quantity,
+        file: 0,
+        unit: 0,
+        function: *pdu,
+    };
+    let mut hook = Hook::BeforeRead;
+    if !reads {
+        hook = Hook::BeforeWrite;
+        access.data = pdu.add(operation.data());
     }
+    let refused = call_hook(hooks, info, hook, &raw mut access);
+    if refused != 0 {
+        return Reply::exception(refused);
+    }
+    if operation == TableOperation::ASK {
+        return Reply::NOT_HANDLED;
+    }
+    let quantity = quantity.into();
+    let bytes = TableKind::from_code(copy.service.kind).bytes(quantity);
+    let pdu = from_raw_parts_mut(pdu, operation.data() + bytes);
+    let reply = Table(&raw mut copy, info).access(operation, quantity, bytes, pdu);
+    if reply == WRITTEN && !reads {
+        call_hook(hooks, info, Hook::AfterWrite, &raw mut access);
+    }
+    reply
 }
 
 /// The hooks of a table.
@@ -85,13 +83,10 @@ pub unsafe extern "C" fn mbm_registerTable_setHooks(
     table: *mut mbm_registerTable,
     hooks: *const mbm_accessHooks,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if table.is_null() {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        (*table).hooks = table_hooks(hooks);
+    if table.is_null() {
+        return Status::INVALID_ARGUMENT.code();
     }
+    (*table).hooks = table_hooks(hooks);
     Status::OK.code()
 }
 
@@ -104,6 +99,6 @@ pub unsafe extern "C" fn mbm_bitTable_setHooks(
     table: *mut mbm_bitTable,
     hooks: *const mbm_accessHooks,
 ) -> u8 {
-    // SAFETY: as the header demands; both structs have the same layout.
-    unsafe { mbm_registerTable_setHooks(table.cast(), hooks) }
+    // Both structs have the same layout.
+    mbm_registerTable_setHooks(table.cast(), hooks)
 }

@@ -73,8 +73,8 @@ pub(super) type AccessWithHooks = unsafe fn(
 /// # Safety
 /// `table` is a table.
 unsafe fn access_with_hooks(table: *const mbm_registerTable) -> Option<AccessWithHooks> {
-    // SAFETY: as the caller promises; `call` of a table is NULL or such a function.
-    unsafe { transmute((*table).hooks.call) }
+    // `call` of a table is NULL or such a function.
+    transmute((*table).hooks.call)
 }
 
 // Both structs have the same layout; only the type of the array differs.
@@ -136,15 +136,12 @@ impl TableAccess for Table {
 /// # Safety
 /// `table` is a table; `valid` is NULL or has `size` bits.
 unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usize) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let size = usize::from((*table).size);
-        if first >= size || quantity > size - first {
-            return false;
-        }
-        let valid = (*table).valid;
-        valid.is_null() || are_all_on(valid, first, quantity)
+    let size = usize::from((*table).size);
+    if first >= size || quantity > size - first {
+        return false;
     }
+    let valid = (*table).valid;
+    valid.is_null() || are_all_on(valid, first, quantity)
 }
 
 /// As [`Table`], for functions that read and write: a copy of the table. It has the fields that
@@ -190,15 +187,12 @@ impl TableAccess for TableSnapshot {
 /// # Safety
 /// `service` is the head of a table; `pdu` has the length and the space that `info` gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let table = service.cast::<mbm_registerTable>();
-        let kind = TableKind::from_code((*table).service.kind);
-        let operation = table::operation(kind, *pdu);
-        let (pdu, length) = request(pdu, info);
-        let cells = &mut Table(table, info);
-        table::serve_as(operation, kind, cells, pdu, length).code()
-    }
+    let table = service.cast::<mbm_registerTable>();
+    let kind = TableKind::from_code((*table).service.kind);
+    let operation = table::operation(kind, *pdu);
+    let (pdu, length) = request(pdu, info);
+    let cells = &mut Table(table, info);
+    table::serve_as(operation, kind, cells, pdu, length).code()
 }
 
 /// Serves functions 16 and 17 (hex) of a table of holding registers.
@@ -210,13 +204,10 @@ unsafe fn serve_mask_and_read_write(
     pdu: *mut u8,
     info: *const c_void,
 ) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let (pdu, length) = request(pdu, info);
-        let mut cells = TableSnapshot(table.read(), info);
-        let cells: &mut dyn TableAccess = &mut cells;
-        table::serve_mask_and_read_write(cells, pdu, length).code()
-    }
+    let (pdu, length) = request(pdu, info);
+    let mut cells = TableSnapshot(table.read(), info);
+    let cells: &mut dyn TableAccess = &mut cells;
+    table::serve_mask_and_read_write(cells, pdu, length).code()
 }
 
 /// Serves holding registers, functions 16 and 17 (hex) too.
@@ -228,15 +219,12 @@ unsafe extern "C" fn serve_holding_registers(
     pdu: *mut u8,
     info: *const c_void,
 ) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        if !table::is_mask_or_read_write(*pdu) {
-            serve(service, pdu, info)
-        } else if is_ignored_broadcast(info, *pdu) {
-            Reply::NOT_HANDLED.code()
-        } else {
-            serve_mask_and_read_write(service.cast(), pdu, info)
-        }
+    if !table::is_mask_or_read_write(*pdu) {
+        serve(service, pdu, info)
+    } else if is_ignored_broadcast(info, *pdu) {
+        Reply::NOT_HANDLED.code()
+    } else {
+        serve_mask_and_read_write(service.cast(), pdu, info)
     }
 }
 
@@ -249,8 +237,7 @@ unsafe extern "C" fn add_table(
     table: *mut mbm_registerTable,
     kind: TableKind,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe { add_as(unit, table.cast(), kind.code(), serve) }.code()
+    add_as(unit, table.cast(), kind.code(), serve).code()
 }
 
 functions! {
@@ -293,12 +280,9 @@ functions! {
 pub unsafe extern "C" fn mbm_registerTable_serveMaskAndReadWrite(
     table: *mut mbm_registerTable,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if table.is_null() || (*table).service.kind != TableKind::HOLDING_REGISTERS.code() {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        (*table).service.serve = Some(serve_holding_registers);
+    if table.is_null() || (*table).service.kind != TableKind::HOLDING_REGISTERS.code() {
+        return Status::INVALID_ARGUMENT.code();
     }
+    (*table).service.serve = Some(serve_holding_registers);
     Status::OK.code()
 }

@@ -93,8 +93,7 @@ pub(super) unsafe fn add_as(
 /// # Safety
 /// As for [`add_as`].
 pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: Serve) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe { add_as(unit, service, 1, serve) }.code()
+    add_as(unit, service, 1, serve).code()
 }
 
 /// As [`add`], for a family of records of which a unit serves only one: the unit would never
@@ -103,17 +102,14 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
 /// # Safety
 /// As for [`add`].
 pub(super) unsafe fn add_only(unit: *mut mbm_unit, service: *mut mbm_service, serve: Serve) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let is_other = |known: *mut mbm_service| {
-            let same = |other| core::ptr::fn_addr_eq(other, serve);
-            known != service && (*known).serve.is_some_and(same)
-        };
-        if !unit.is_null() && Services::new(unit).any(is_other) {
-            return Status::BUSY.code();
-        }
-        add(unit, service, serve)
+    let is_other = |known: *mut mbm_service| {
+        let same = |other| core::ptr::fn_addr_eq(other, serve);
+        known != service && (*known).serve.is_some_and(same)
+    };
+    if !unit.is_null() && Services::new(unit).any(is_other) {
+        return Status::BUSY.code();
     }
+    add(unit, service, serve)
 }
 
 /// The services of a unit, one after the other, up to the first free place. The code that
@@ -127,12 +123,9 @@ impl Services {
     /// # Safety
     /// `unit` is a unit, and stays one while the iterator is used.
     pub(super) unsafe fn new(unit: *const mbm_unit) -> Services {
-        // SAFETY: as the caller promises.
-        unsafe {
-            let place = (&raw const (*unit).services).cast::<*mut mbm_service>();
-            let end = place.add(MBM_MAX_SERVICES.into());
-            Services { place, end }
-        }
+        let place = (&raw const (*unit).services).cast::<*mut mbm_service>();
+        let end = place.add(MBM_MAX_SERVICES.into());
+        Services { place, end }
     }
 }
 
@@ -158,13 +151,10 @@ impl Iterator for Services {
 /// # Safety
 /// As for [`Serve`]; nothing else uses the PDU while the slice lives.
 pub(super) unsafe fn request<'a>(pdu: *mut u8, info: *const c_void) -> (&'a mut [u8], usize) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let info = info.cast::<Indication>();
-        let (space, length) = ((*info).space.into(), (*info).length.into());
-        core::hint::assert_unchecked(length <= space);
-        (from_raw_parts_mut(pdu, space), length)
-    }
+    let info = info.cast::<Indication>();
+    let (space, length) = ((*info).space.into(), (*info).length.into());
+    core::hint::assert_unchecked(length <= space);
+    (from_raw_parts_mut(pdu, space), length)
 }
 
 /// Calls the services of a unit one after the other until one of them answers the request.
@@ -178,24 +168,21 @@ pub(super) unsafe fn call_services(
     info: *const c_void,
     pdu: *mut u8,
 ) -> usize {
-    // SAFETY: as the caller promises. The loop ends at the next field, the pointer to the
-    // monitor function: see the assertion below. It is not NULL if a service that declines
-    // has added diagnostics to the unit.
-    unsafe {
-        begin_refusal(info);
-        let mut place = unit
-            .byte_add(offset_of!(mbm_unit, services))
-            .cast::<*mut mbm_service>();
-        let end = (&raw mut (*unit).monitor).cast();
-        while place != end && !(*place).is_null() {
-            let reply = call_service(*place, info, pdu);
-            if take_reply(reply, info) {
-                return reply;
-            }
-            place = place.add(1);
+    // The loop ends at the next field, the pointer to the monitor function: see the assertion
+    // below. It is not NULL if a service that declines has added diagnostics to the unit.
+    begin_refusal(info);
+    let mut place = unit
+        .byte_add(offset_of!(mbm_unit, services))
+        .cast::<*mut mbm_service>();
+    let end = (&raw mut (*unit).monitor).cast();
+    while place != end && !(*place).is_null() {
+        let reply = call_service(*place, info, pdu);
+        if take_reply(reply, info) {
+            return reply;
         }
-        refusal(info)
+        place = place.add(1);
     }
+    refusal(info)
 }
 
 /// The field `refusal` of the request.
@@ -203,8 +190,8 @@ pub(super) unsafe fn call_services(
 /// # Safety
 /// As for [`Serve`].
 unsafe fn refusal_field(info: *const c_void) -> *mut u8 {
-    // SAFETY: as the caller promises; `info` is part of a server, which is not constant.
-    unsafe { &raw mut (*info.cast::<Indication>().cast_mut()).refusal }
+    // `info` is part of a server, which is not constant.
+    &raw mut (*info.cast::<Indication>().cast_mut()).refusal
 }
 
 /// Before the services of a unit are called.
@@ -212,8 +199,7 @@ unsafe fn refusal_field(info: *const c_void) -> *mut u8 {
 /// # Safety
 /// As for [`Serve`].
 unsafe fn begin_refusal(info: *const c_void) {
-    // SAFETY: as the caller promises.
-    unsafe { refusal_field(info).write(Reply::ILLEGAL_FUNCTION.exception_code()) }
+    refusal_field(info).write(Reply::ILLEGAL_FUNCTION.exception_code())
 }
 
 /// Takes the reply of a service. Returns false if the next service is called too, and notes it if
@@ -228,8 +214,7 @@ unsafe fn take_reply(reply: usize, info: *const c_void) -> bool {
     if !Reply::from_number(reply).is_absent() {
         return true;
     }
-    // SAFETY: as the caller promises.
-    unsafe { refusal_field(info).write(Reply::ILLEGAL_DATA_ADDRESS.exception_code()) }
+    refusal_field(info).write(Reply::ILLEGAL_DATA_ADDRESS.exception_code());
     false
 }
 
@@ -238,8 +223,7 @@ unsafe fn take_reply(reply: usize, info: *const c_void) -> bool {
 /// # Safety
 /// As for [`Serve`].
 unsafe fn refusal(info: *const c_void) -> usize {
-    // SAFETY: as the caller promises.
-    Reply::exception(unsafe { refusal_field(info).read() }).code()
+    Reply::exception(refusal_field(info).read()).code()
 }
 
 /// True if a service before this one serves the function, but lacks cells of the request.
@@ -247,8 +231,7 @@ unsafe fn refusal(info: *const c_void) -> usize {
 /// # Safety
 /// As for [`Serve`].
 pub(super) unsafe fn are_absent(info: *const c_void) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe { refusal_field(info).read() != Reply::ILLEGAL_FUNCTION.exception_code() }
+    refusal_field(info).read() != Reply::ILLEGAL_FUNCTION.exception_code()
 }
 
 const _: () = {
@@ -261,12 +244,9 @@ const _: () = {
 /// # Safety
 /// As for [`Serve`].
 unsafe fn call_service(service: *mut mbm_service, info: *const c_void, pdu: *mut u8) -> usize {
-    // SAFETY: as the caller promises.
-    unsafe {
-        match (*service).serve {
-            Some(serve) => serve(service, pdu, info),
-            None => Reply::NOT_HANDLED.code(),
-        }
+    match (*service).serve {
+        Some(serve) => serve(service, pdu, info),
+        None => Reply::NOT_HANDLED.code(),
     }
 }
 
@@ -275,11 +255,8 @@ unsafe fn call_service(service: *mut mbm_service, info: *const c_void, pdu: *mut
 /// # Safety
 /// `unit` is a unit.
 unsafe fn serves(unit: *const mbm_unit) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let first = (&raw const (*unit).services).cast::<*mut mbm_service>();
-        !(*first).is_null()
-    }
+    let first = (&raw const (*unit).services).cast::<*mut mbm_service>();
+    !(*first).is_null()
 }
 
 /// True if every unit has an id that a request can have.
@@ -291,13 +268,10 @@ unsafe fn serves(unit: *const mbm_unit) -> bool {
 pub(crate) unsafe fn have_ids(units: *const mbm_unit, count: u8) -> bool {
     let (mut unit, mut left) = (units, count);
     while left != 0 {
-        // SAFETY: as the caller promises.
-        unsafe {
-            if (*unit).id > u8::MAX.into() {
-                return false;
-            }
-            unit = unit.add(1);
+        if (*unit).id > u8::MAX.into() {
+            return false;
         }
+        unit = unit.add(1);
         left -= 1;
     }
     true
@@ -310,14 +284,11 @@ pub(crate) unsafe fn have_ids(units: *const mbm_unit, count: u8) -> bool {
 pub(super) unsafe fn have(units: *const mbm_unit, count: u8, id: u8) -> bool {
     let (mut unit, mut left) = (units, count);
     while left != 0 {
-        // SAFETY: as the caller promises.
-        unsafe {
-            let known = (*unit).id;
-            if id == 0 || known == 0 || known == id.into() {
-                return true;
-            }
-            unit = unit.add(1);
+        let known = (*unit).id;
+        if id == 0 || known == 0 || known == id.into() {
+            return true;
         }
+        unit = unit.add(1);
         left -= 1;
     }
     false
@@ -334,9 +305,8 @@ pub(super) unsafe fn serve(
     info: *const Indication,
     pdu: *mut u8,
 ) -> usize {
-    // SAFETY: as the caller promises. The PDU has space for a function code, even after a damaged
-    // frame.
-    let all = unsafe { (*info).addressing_of_all(*pdu) };
+    // The PDU has space for a function code, even after a damaged frame.
+    let all = (*info).addressing_of_all(*pdu);
     let mut frame = UnitsForFrame {
         unit: units,
         left: count,
@@ -403,8 +373,7 @@ impl Dispatch for UnitsForFrame {
 /// # Safety
 /// As for [`Serve`].
 pub(super) unsafe fn is_ignored_broadcast(info: *const c_void, function: u8) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe { (*info.cast::<Indication>()).is_broadcast() && !only_writes(function) }
+    (*info.cast::<Indication>()).is_broadcast() && !only_writes(function)
 }
 
 /// As [`add`], but puts the service before all others of the unit.
@@ -412,21 +381,18 @@ pub(super) unsafe fn is_ignored_broadcast(info: *const c_void, function: u8) -> 
 /// # Safety
 /// As for [`add`].
 pub(super) unsafe fn add_first(unit: *mut mbm_unit, new: *mut mbm_service, serve: Serve) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let status = add(unit, new, serve);
-        if status == Status::OK.code() {
-            let mut moved = new;
-            let mut place = (&raw mut (*unit).services).cast::<*mut mbm_service>();
-            // The loop ends at the place where `add` put `new`.
-            loop {
-                core::ptr::swap(place, &raw mut moved);
-                if moved == new {
-                    break;
-                }
-                place = place.add(1);
+    let status = add(unit, new, serve);
+    if status == Status::OK.code() {
+        let mut moved = new;
+        let mut place = (&raw mut (*unit).services).cast::<*mut mbm_service>();
+        // The loop ends at the place where `add` put `new`.
+        loop {
+            core::ptr::swap(place, &raw mut moved);
+            if moved == new {
+                break;
             }
+            place = place.add(1);
         }
-        status
     }
+    status
 }

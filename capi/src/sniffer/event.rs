@@ -147,13 +147,10 @@ impl mbm_event {
     /// # Safety
     /// `frame` and `pdu` are NULL or point to as many bytes as their lengths say.
     unsafe fn core_event<'a>(&self) -> Result<Event<'a>, Error> {
-        // SAFETY: as the caller promises.
-        let (frame, pdu) = unsafe {
-            (
-                array_or_empty(self.frame, self.frameLength.into()),
-                array_or_empty(self.pdu, self.pduLength.into()),
-            )
-        };
+        let (frame, pdu) = (
+            array_or_empty(self.frame, self.frameLength.into()),
+            array_or_empty(self.pdu, self.pduLength.into()),
+        );
         let head = self.requestHead.get(..self.requestHeadLength.into());
         let asked = head
             .map(RequestStart::new)

@@ -6,7 +6,7 @@ pub use event::*;
 
 use crate::framing::is_delimiter;
 use crate::functions::{declared, mbm_function};
-use crate::pointers::{self, array_or_empty, buffer, put, read, CObject, BEGUN};
+use crate::pointers::{self, array_or_empty, buffer, c_object, put, read, BEGUN};
 use core::ffi::c_void;
 use mbm::error::{Error, Status};
 use mbm::frame::Framing;
@@ -57,43 +57,17 @@ pub(super) struct Object {
     core: Sniffer,
 }
 
-const _: () = {
-    let space = size_of::<mbm_sniffer>();
-    let used = size_of::<Object>();
-    assert!(align_of::<mbm_sniffer>() >= align_of::<Object>());
-    assert!(used <= space);
-    // On a 16-bit or 32-bit machine, where RAM is scarce, at most 5 % of the storage may
-    // be unused.
-    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
-};
-
-// SAFETY: the mark is a field of its own.
-unsafe impl CObject for mbm_sniffer {
-    type Access<'a> = &'a mut Object;
-
-    unsafe fn mark(sniffer: *const mbm_sniffer) -> *mut u8 {
-        // SAFETY: as the caller promises; every object is writable storage.
-        unsafe { &raw mut (*sniffer.cast::<Object>().cast_mut()).mark }
-    }
-
-    unsafe fn access<'a>(sniffer: *mut mbm_sniffer) -> &'a mut Object {
-        // SAFETY: begun, so every field is valid; exclusive as the caller promises.
-        unsafe { &mut *sniffer.cast() }
-    }
-}
+c_object! { mbm_sniffer, &mut Object }
 
 /// Changes the settings of a sniffer, or returns the status that says why not.
 ///
 /// # Safety
 /// As for [`pointers::with`].
 unsafe fn with(sniffer: *mut mbm_sniffer, change: impl FnOnce(&mut Sniffer)) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        pointers::with(sniffer, |object| {
-            change(&mut object.core);
-            Status::OK
-        })
-    }
+    pointers::with(sniffer, |object| {
+        change(&mut object.core);
+        Status::OK
+    })
 }
 
 const NO_FUNCTION: Function = Function {
@@ -268,17 +242,15 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
         MBM_DIRECTION_SERVER => BusDirection::Server,
         _ => return 0,
     };
-    // SAFETY: as the header demands; begin demands that the buffer is valid.
-    unsafe {
-        let bytes = array_or_empty(bytes, length.into());
-        let Some(bytes) = bytes else { return 0 };
-        read(sniffer, 0, |object| {
-            match buffer(object.buffer, object.size) {
-                Some(buffer) => object.core.feed(buffer, direction, bytes, nowUs) as u16,
-                None => 0,
-            }
-        })
-    }
+    // Begin demands that the buffer is valid.
+    let bytes = array_or_empty(bytes, length.into());
+    let Some(bytes) = bytes else { return 0 };
+    read(sniffer, 0, |object| {
+        match buffer(object.buffer, object.size) {
+            Some(buffer) => object.core.feed(buffer, direction, bytes, nowUs) as u16,
+            None => 0,
+        }
+    })
 }
 
 /// Returns the next event on the bus, in order of time. Call it after each feed until it
@@ -301,15 +273,13 @@ pub unsafe extern "C" fn mbm_sniffer_next(
     if event.is_null() {
         return 0;
     }
-    // SAFETY: as the header demands; begin demands that the buffer is valid.
-    unsafe {
-        read(sniffer, 0, |object| {
-            if object.core.is_idle(nowUs) {
-                return 0;
-            }
-            next(object, nowUs, event)
-        })
-    }
+    // Begin demands that the buffer is valid.
+    read(sniffer, 0, |object| {
+        if object.core.is_idle(nowUs) {
+            return 0;
+        }
+        next(object, nowUs, event)
+    })
 }
 
 /// [`mbm_sniffer_next`] for the case that the sniffer has to examine data. A function of
@@ -320,19 +290,16 @@ pub unsafe extern "C" fn mbm_sniffer_next(
 /// The object was begun with a buffer that is still valid. `event` points to an event.
 #[inline(never)]
 unsafe fn next(object: &mut Object, now: u32, event: *mut mbm_event) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let Some(buffer) = buffer(object.buffer, object.size) else {
-            return 0;
-        };
-        let functions = object.functions.get(..object.count.into());
-        let functions = functions.unwrap_or_default();
-        match object.core.next(buffer, functions, now) {
-            Some(found) => {
-                put(event, mbm_event::from_event(&found, functions));
-                1
-            }
-            None => 0,
+    let Some(buffer) = buffer(object.buffer, object.size) else {
+        return 0;
+    };
+    let functions = object.functions.get(..object.count.into());
+    let functions = functions.unwrap_or_default();
+    match object.core.next(buffer, functions, now) {
+        Some(found) => {
+            put(event, mbm_event::from_event(&found, functions));
+            1
         }
+        None => 0,
     }
 }

@@ -9,7 +9,7 @@ use crate::functions::declared;
 use crate::node::mbm_node;
 use crate::packet::side;
 use crate::pointers::{
-    array_or_empty, check, get, object, with, with_hooks, CObject, BEGUN, IN_HOOK,
+    array_or_empty, c_object, check, get, object, with, with_hooks, CObject, BEGUN, IN_HOOK,
 };
 use crate::port::{countable, mbm_port, PortRef};
 use core::ffi::c_void;
@@ -69,30 +69,7 @@ impl AsMut<[u8]> for CBuffer {
     }
 }
 
-const _: () = {
-    let space = size_of::<mbm_trace>();
-    let used = size_of::<Object>();
-    assert!(align_of::<mbm_trace>() >= align_of::<Object>());
-    assert!(used <= space);
-    // On a 16-bit or 32-bit machine, where RAM is scarce, at most 5 % of the storage may
-    // be unused.
-    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
-};
-
-// SAFETY: the mark is a field of its own.
-unsafe impl CObject for mbm_trace {
-    type Access<'a> = *mut Core;
-
-    unsafe fn mark(trace: *const mbm_trace) -> *mut u8 {
-        // SAFETY: as the caller promises; every object is writable storage.
-        unsafe { &raw mut (*trace.cast::<Object>().cast_mut()).mark }
-    }
-
-    unsafe fn access<'a>(trace: *mut mbm_trace) -> Self::Access<'a> {
-        // SAFETY: as the caller promises.
-        unsafe { &raw mut (*trace.cast::<Object>()).core }
-    }
-}
+c_object! { mbm_trace, *mut Core, core }
 
 /// Runs `action` on the core of a trace, or returns the status that says why not. `action` may
 /// call hooks.
@@ -103,16 +80,13 @@ unsafe fn with_core<T>(
     trace: *mut mbm_trace,
     action: impl FnOnce(&mut Core) -> T,
 ) -> Result<T, Error> {
-    // SAFETY: as the caller promises. Nothing else makes a reference to the core of a marked
-    // object.
-    unsafe {
-        match check(trace).result() {
-            Ok(()) => {
-                let core = object(trace);
-                Ok(with_hooks(trace, || action(&mut *core)))
-            }
-            Err(refused) => Err(refused),
+    // Nothing else makes a reference to the core of a marked object.
+    match check(trace).result() {
+        Ok(()) => {
+            let core = object(trace);
+            Ok(with_hooks(trace, || action(&mut *core)))
         }
+        Err(refused) => Err(refused),
     }
 }
 
@@ -121,8 +95,7 @@ unsafe fn with_core<T>(
 /// # Safety
 /// `context` points to a trace that was begun.
 unsafe fn inner(context: *mut c_void) -> *const mbm_port {
-    // SAFETY: as the caller promises.
-    unsafe { &raw const (*context.cast::<Object>()).inner }
+    &raw const (*context.cast::<Object>()).inner
 }
 
 // SAFETY, here and below: only a port of a trace has these hooks, and their context is the
@@ -265,12 +238,8 @@ unsafe fn begin(
 /// # Safety
 /// `framing` is NULL or points to a description whose declarations are valid.
 unsafe fn described(framing: *const mbm_framing) -> Result<(mbm_framing, Framing), Error> {
-    // SAFETY: as the caller promises.
-    let (described, functions) = unsafe {
-        let described = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
-        let count = described.functionCount;
-        (described, array_or_empty(described.functions, count.into()))
-    };
+    let described = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
+    let functions = array_or_empty(described.functions, described.functionCount.into());
     declared(functions.ok_or(Error::INVALID_ARGUMENT)?, None)?;
     if !is_delimiter(described.end()) {
         return Err(Error::INVALID_ARGUMENT);
@@ -353,13 +322,10 @@ pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeou
         Ok(timeout) if timeout > 0 => millis(timeout),
         _ => return Status::INVALID_ARGUMENT.code(),
     };
-    // SAFETY: as the header demands.
-    unsafe {
-        with(trace, |core| {
-            (*core).set_frame_timeout(timeout);
-            Status::OK
-        })
-    }
+    with(trace, |core| {
+        (*core).set_frame_timeout(timeout);
+        Status::OK
+    })
 }
 
 /// Calls the hook for the bytes that wait for the rest of their frame: before the program

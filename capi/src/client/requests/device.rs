@@ -194,43 +194,41 @@ pub unsafe fn forward<const MAY_LACK_COUNT: bool>(
     body: *const u8,
     bytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands. `data` is set to the last bytes of the body.
-    unsafe {
-        let fields = request.cast::<RequestFields>();
-        let previous_data = match fields.as_ref() {
-            Some(fields) => fields.data,
-            None => body,
-        };
-        let words = [function.into(), bytes.into(), body.expose_provenance(), 0];
-        let status = with_more(
-            client,
-            request,
-            FunctionSpec::CUSTOM,
-            words,
-            Some(|fields, words, _| {
-                let body = core::ptr::with_exposed_provenance(words[2]);
-                let header = &mut fields.state.header;
-                let Some(bytes) = array_or_empty(body, words[1]) else {
-                    return Status::INVALID_ARGUMENT;
-                };
-                let function = words[0] as u8;
-                let status = if MAY_LACK_COUNT {
-                    header.forward_groups(function, bytes)
-                } else {
-                    header.forward(function, bytes)
-                };
-                if status == Status::OK {
-                    let head = words[1] - usize::from(header.data_length());
-                    fields.data = body.wrapping_add(head);
-                }
-                status
-            }),
-        );
-        if status != Status::PENDING.code() && !fields.is_null() {
-            (*fields).data = previous_data;
-        }
-        status
+    // `data` is set to the last bytes of the body.
+    let fields = request.cast::<RequestFields>();
+    let previous_data = match fields.as_ref() {
+        Some(fields) => fields.data,
+        None => body,
+    };
+    let words = [function.into(), bytes.into(), body.expose_provenance(), 0];
+    let status = with_more(
+        client,
+        request,
+        FunctionSpec::CUSTOM,
+        words,
+        Some(|fields, words, _| {
+            let body = core::ptr::with_exposed_provenance(words[2]);
+            let header = &mut fields.state.header;
+            let Some(bytes) = array_or_empty(body, words[1]) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            let function = words[0] as u8;
+            let status = if MAY_LACK_COUNT {
+                header.forward_groups(function, bytes)
+            } else {
+                header.forward(function, bytes)
+            };
+            if status == Status::OK {
+                let head = words[1] - usize::from(header.data_length());
+                fields.data = body.wrapping_add(head);
+            }
+            status
+        }),
+    );
+    if status != Status::PENDING.code() && !fields.is_null() {
+        (*fields).data = previous_data;
     }
+    status
 }
 
 /// The words of a request for a device identification, and its code.

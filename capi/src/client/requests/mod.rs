@@ -39,23 +39,18 @@ type More = unsafe fn(&mut RequestFields, &[usize; 4], Status) -> Status;
 /// # Safety
 /// As the header demands.
 unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) -> Status {
-    // SAFETY: as the caller promises.
-    unsafe {
-        match pointers::check(client) {
-            Status::OK if request.is_null() => Status::INVALID_ARGUMENT,
-            Status::OK if (*request).status == Status::PENDING.code() => Status::BUSY,
-            Status::OK => {
-                // The C program may have zeroed a pending request, so search the queue.
-                let object = pointers::object(client);
-                match RequestPtr::new(request) {
-                    Some(request) if queue(object).holds(|queued| *queued == request) => {
-                        Status::BUSY
-                    }
-                    _ => Status::OK,
-                }
+    match pointers::check(client) {
+        Status::OK if request.is_null() => Status::INVALID_ARGUMENT,
+        Status::OK if (*request).status == Status::PENDING.code() => Status::BUSY,
+        Status::OK => {
+            // The C program may have zeroed a pending request, so search the queue.
+            let object = pointers::object(client);
+            match RequestPtr::new(request) {
+                Some(request) if queue(object).holds(|queued| *queued == request) => Status::BUSY,
+                _ => Status::OK,
             }
-            other => other,
         }
+        other => other,
     }
 }
 
@@ -70,31 +65,28 @@ unsafe fn submit(
     arguments: &Arguments,
     more: Option<More>,
 ) -> Status {
-    // SAFETY: as the caller promises, so nothing else uses the request.
-    unsafe {
-        let fields = &mut *request.cast::<RequestFields>();
-        let header = &mut fields.state.header;
-        let mut status = header.set_all(arguments.function, &arguments.words);
-        if let Some(more) = more {
-            status = more(fields, &arguments.words, status);
-        }
-        let header = &fields.state.header;
-        if status != Status::OK {
-        } else if header.data_length() > 0 && fields.data.is_null() {
-            status = Status::INVALID_ARGUMENT;
-        } else if !fields.reply.is_null() && u16::from(header.known_data()) > fields.state.capacity
-        {
-            status = Status::BUFFER_TOO_SMALL;
-        } else if let Some(request) = RequestPtr::new(request) {
-            return match queue(pointers::object(client)).enqueue(request) {
-                Ok(()) => Status::PENDING,
-                Err(refused) => refused.state().status,
-            };
-        }
-        fields.state.status = status;
-        fields.state.exception = 0;
-        status
+    // Nothing else uses the request.
+    let fields = &mut *request.cast::<RequestFields>();
+    let header = &mut fields.state.header;
+    let mut status = header.set_all(arguments.function, &arguments.words);
+    if let Some(more) = more {
+        status = more(fields, &arguments.words, status);
     }
+    let header = &fields.state.header;
+    if status != Status::OK {
+    } else if header.data_length() > 0 && fields.data.is_null() {
+        status = Status::INVALID_ARGUMENT;
+    } else if !fields.reply.is_null() && u16::from(header.known_data()) > fields.state.capacity {
+        status = Status::BUFFER_TOO_SMALL;
+    } else if let Some(request) = RequestPtr::new(request) {
+        return match queue(pointers::object(client)).enqueue(request) {
+            Ok(()) => Status::PENDING,
+            Err(refused) => refused.state().status,
+        };
+    }
+    fields.state.status = status;
+    fields.state.exception = 0;
+    status
 }
 
 /// Queues a request. (The calling convention of C extends the status to a word, as the calling
@@ -109,14 +101,12 @@ unsafe extern "C" fn queue_request(
     arguments: &Arguments,
     more: Option<More>,
 ) -> u8 {
-    // SAFETY: as the caller promises; `prepare` returned OK before `submit`.
-    unsafe {
-        let status = match prepare(client, request) {
-            Status::OK => submit(client, request, arguments, more),
-            refused => refused,
-        };
-        status.code()
-    }
+    // `prepare` returned OK before `submit`.
+    let status = match prepare(client, request) {
+        Status::OK => submit(client, request, arguments, more),
+        refused => refused,
+    };
+    status.code()
 }
 
 /// Queues a request that has at most two words.
@@ -131,8 +121,7 @@ unsafe extern "C" fn two_words(
     function: FunctionSpec,
 ) -> u8 {
     let arguments = Arguments::two_words(function, first, second);
-    // SAFETY: as the caller promises.
-    unsafe { queue_request(client, request, &arguments, None) }
+    queue_request(client, request, &arguments, None)
 }
 
 /// Queues a read of a table of the data model, by the number of its function, 01 to 04.
@@ -147,8 +136,7 @@ pub(crate) unsafe fn read_table(
     quantity: u16,
 ) -> u8 {
     let function = FunctionSpec::reads_table(function);
-    // SAFETY: as the caller promises.
-    unsafe { two_words(client, request, address, quantity, function) }
+    two_words(client, request, address, quantity, function)
 }
 
 /// Queues a request that consists of its function code only.
@@ -160,8 +148,7 @@ unsafe extern "C" fn code_only(
     request: *mut mbm_clientRequest,
     function: FunctionSpec,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe { two_words(client, request, 0, 0, function) }
+    two_words(client, request, 0, 0, function)
 }
 
 /// Queues a request that needs up to four words, or further steps.
@@ -176,6 +163,5 @@ unsafe fn with_more(
     words: [usize; 4],
     more: Option<More>,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    unsafe { queue_request(client, request, &Arguments { function, words }, more) }
+    queue_request(client, request, &Arguments { function, words }, more)
 }
