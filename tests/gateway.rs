@@ -9,6 +9,7 @@ use mbm::gateway::{
     ConnectionState, Gateway, GatewayStorage, LineState, Outcome, Route, Transaction, ALL_LINES,
     LOCAL,
 };
+use std::cell::Cell;
 use std::collections::{HashMap, VecDeque};
 
 const CONNECTIONS: usize = 4;
@@ -52,7 +53,7 @@ struct Held {
 }
 
 struct World {
-    seed: u64,
+    seed: Cell<u64>,
     /// Lines are always ready, and connections take and give all bytes.
     is_smooth: bool,
     now: u32,
@@ -71,11 +72,13 @@ struct World {
 }
 
 impl World {
-    fn random(&mut self, below: u32) -> u32 {
-        self.seed ^= self.seed << 13;
-        self.seed ^= self.seed >> 7;
-        self.seed ^= self.seed << 17;
-        (self.seed >> 24) as u32 % below
+    fn random(&self, below: u32) -> u32 {
+        let mut seed = self.seed.get();
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        self.seed.set(seed);
+        (seed >> 24) as u32 % below
     }
 }
 
@@ -98,7 +101,10 @@ impl GatewayStorage for World {
     fn frame(&mut self, request: u16) -> &mut [u8] {
         &mut self.frames[usize::from(request)]
     }
-    fn connection(&mut self, connection: u8) -> &mut ConnectionState {
+    fn connection(&self, connection: u8) -> &ConnectionState {
+        &self.connections[usize::from(connection)]
+    }
+    fn connection_mut(&mut self, connection: u8) -> &mut ConnectionState {
         &mut self.connections[usize::from(connection)]
     }
     fn line(&mut self, line: u8) -> &mut LineState {
@@ -181,7 +187,7 @@ impl GatewayStorage for World {
     fn line_depth(&self, line: u8) -> u16 {
         1 + u16::from(line)
     }
-    fn is_ready(&mut self, _: u8) -> bool {
+    fn is_ready(&self, _: u8) -> bool {
         self.is_smooth || self.random(20) != 0
     }
     fn forward(&mut self, line: u8, request: u16, unit: u8, length: u16) -> Status {
@@ -277,7 +283,7 @@ fn takes_turns(starts: &[(usize, u8)]) {
 
 fn gateway(seed: u64) -> Gateway<World> {
     let mut gateway = Gateway::new(World {
-        seed: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1,
+        seed: Cell::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1),
         is_smooth: false,
         now: 0,
         transactions: [Transaction::FREE; REQUESTS],

@@ -17,7 +17,7 @@ fn units<T: Packed>(quantity: u16) -> usize {
 /// # Safety
 /// As [`slice`] demands of `units`, which hold `quantity` bits; `on` is NULL or
 /// points to a byte.
-unsafe fn is_set<T: Packed>(
+unsafe fn read_bit<T: Packed>(
     units: *const T,
     first: u16,
     quantity: u16,
@@ -102,7 +102,7 @@ pub unsafe extern "C" fn mbm_bits_isSet(
     address: u16,
     on: *mut u8,
 ) -> u8 {
-    is_set(bytes, first, quantity, address, on)
+    read_bit(bytes, first, quantity, address, on)
 }
 
 /// Sets one coil of a write, by its address in the device. The other coils do not change.
@@ -142,7 +142,7 @@ pub unsafe extern "C" fn mbm_bits_isSetInWords(
     address: u16,
     on: *mut u8,
 ) -> u8 {
-    is_set(words, first, quantity, address, on)
+    read_bit(words, first, quantity, address, on)
 }
 
 /// As mbm_bits_set, but in words, for example the transmit words of a node.

@@ -1,4 +1,4 @@
-"""Tests of scripts that write or judge texts: scripts/check/dependencies, scripts/check/real,
+"""Tests of scripts that write or judge texts: scripts/check/functions, scripts/check/dependencies, scripts/check/real,
 packaging/debian/changelog, scripts/build/project.py, and packaging/sbom; and of the choice of the compiler
 in scripts/build/archive. `make test-scripts` has the
 library for the SBOM."""
@@ -24,6 +24,21 @@ def load(path):
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
     loader.exec_module(module)
     return module
+
+
+# --- scripts/check/functions: a question changes nothing
+
+functions = load("scripts/check/functions")
+
+
+class Names(unittest.TestCase):
+    def test_a_question_that_reads_is_accepted(self):
+        source = "pub fn is_due(&self, now: u32) -> bool {}\nunsafe fn has_line(node: *const Node) -> bool {}"
+        self.assertEqual(functions.acting_questions(source), [])
+
+    def test_a_question_that_may_change_something_is_refused(self):
+        source = "fn ends_echo(&mut self) -> bool {}\nunsafe fn is_of<T>(\n    link: *mut T,\n) -> bool {}\nfn take_echo(&mut self) {}"
+        self.assertEqual(functions.acting_questions(source), ["ends_echo", "is_of"])
 
 
 # --- scripts/check/dependencies holds docs/dependencies.md to what there is

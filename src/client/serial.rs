@@ -185,7 +185,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
             // The engine does not have the request now, so it takes the timeout of the line.
             let timeout = request
                 .state()
-                .response_timeout(&mut engine.storage, line.get());
+                .response_timeout(&engine.storage, line.get());
             engine.settings.response_timeout = Setting::new(timeout);
         }
         engine.cancel();

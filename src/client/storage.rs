@@ -22,24 +22,29 @@ pub trait ClientStorage: Storage<Count = u16> {
     }
 
     /// Records of units that need their own delay or counts.
-    fn units(&mut self) -> &mut [UnitRecord] {
+    fn units(&self) -> &[UnitRecord] {
+        &[]
+    }
+
+    /// The same records, to be changed.
+    fn units_mut(&mut self) -> &mut [UnitRecord] {
         &mut []
     }
 
     /// Microseconds until the unit may get its next request.
     fn rest(&mut self, unit: u8, now: u32) -> u32 {
-        rest(self.units(), unit, now)
+        rest(self.units_mut(), unit, now)
     }
 
     /// Records that a request to a unit ended with `status`. `again` is true if the
     /// client will retry it.
     fn note(&mut self, unit: u8, status: Status, again: bool, now: u32) {
-        note(self.units(), unit, status, again, now);
+        note(self.units_mut(), unit, status, again, now);
     }
 
     /// The response timeout of a unit in milliseconds; 0 for that of the line. The client has
     /// just called [`ClientStorage::rest`] for the unit.
-    fn unit_timeout_ms(&mut self, unit: u8) -> u32 {
+    fn unit_timeout_ms(&self, unit: u8) -> u32 {
         find(self.units(), unit).map_or(0, |unit| unit.timeout_ms)
     }
 
@@ -134,7 +139,7 @@ impl RequestState {
     }
 
     /// The response timeout in microseconds, if it is `line` on this line.
-    pub(super) fn response_timeout(&self, storage: &mut impl ClientStorage, line: u32) -> u32 {
+    pub(super) fn response_timeout(&self, storage: &impl ClientStorage, line: u32) -> u32 {
         let timeout = match self.timeout_ms {
             0 => storage.unit_timeout_ms(self.unit()),
             own => own,

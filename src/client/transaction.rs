@@ -97,10 +97,10 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         self.header().returns_query_data()
     }
 
-    fn response_timeout(engine: &mut ClientEngine<P, S, J>) -> u32 {
+    fn response_timeout(engine: &ClientEngine<P, S, J>) -> u32 {
         let line = engine.settings.response_timeout.get();
         match &engine.request.client_request {
-            Some(request) => request.state().response_timeout(&mut engine.storage, line),
+            Some(request) => request.state().response_timeout(&engine.storage, line),
             None => line,
         }
     }
@@ -127,7 +127,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         }
     }
 
-    fn is_reply(engine: &mut ClientEngine<P, S, J>, front: u16, length: u16) -> bool {
+    fn is_reply(engine: &ClientEngine<P, S, J>, front: u16, length: u16) -> bool {
         let whole = length - rtu::OVERHEAD as u16;
         let pdu = engine.storage.slice(front + rtu::PDU as u16, whole);
         let Some(client_request) = &engine.request.client_request else {
@@ -137,7 +137,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         header.validate(pdu, data_of(client_request)) != Status::MALFORMED_REPLY
     }
 
-    fn is_echo(engine: &mut ClientEngine<P, S, J>, front: u16) -> bool {
+    fn is_echo(engine: &ClientEngine<P, S, J>, front: u16) -> bool {
         let header = engine.request.header();
         let length = u16::from(header.request_length());
         header.matches_echo(engine.storage.slice(front + rtu::PDU as u16, length))

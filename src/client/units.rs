@@ -88,7 +88,12 @@ impl UnitRecord {
 }
 
 /// The record of a unit, if there is one.
-pub fn find(units: &mut [UnitRecord], unit: u8) -> Option<&mut UnitRecord> {
+pub fn find(units: &[UnitRecord], unit: u8) -> Option<&UnitRecord> {
+    units.iter().find(|record| record.unit == u16::from(unit))
+}
+
+/// The record of a unit, if there is one, to be changed.
+pub fn find_mut(units: &mut [UnitRecord], unit: u8) -> Option<&mut UnitRecord> {
     units
         .iter_mut()
         .find(|record| record.unit == u16::from(unit))
@@ -97,13 +102,13 @@ pub fn find(units: &mut [UnitRecord], unit: u8) -> Option<&mut UnitRecord> {
 /// Microseconds until a unit may get its next request, by its record in `units`; 0 if it
 /// has no record.
 pub fn rest(units: &mut [UnitRecord], unit: u8, now: u32) -> u32 {
-    find(units, unit).map_or(0, |unit| unit.rest(now))
+    find_mut(units, unit).map_or(0, |unit| unit.rest(now))
 }
 
 /// Records in `units`, if the unit has a record there, that a request to it ended with
 /// `status`. `again` is true if the client will retry the request.
 pub fn note(units: &mut [UnitRecord], unit: u8, status: Status, again: bool, now: u32) {
-    if let Some(unit) = find(units, unit) {
+    if let Some(unit) = find_mut(units, unit) {
         unit.note(status, again, now);
     }
 }

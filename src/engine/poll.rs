@@ -300,7 +300,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// True if the wait and the response timeout after it have passed since the time `since`.
-    pub(super) fn is_overdue(&mut self, since: u32) -> bool {
+    pub(super) fn is_overdue(&self, since: u32) -> bool {
         let limit = self.wait.wrapping_add(Q::response_timeout(self));
         has_elapsed(limit, self.now, since)
     }

@@ -31,7 +31,7 @@ pub trait Transaction<P, S: Storage>: Sized {
     }
 
     /// Microseconds that the reply may take, and that the request may wait for the line.
-    fn response_timeout(engine: &mut Engine<P, S, Self>) -> u32 {
+    fn response_timeout(engine: &Engine<P, S, Self>) -> u32 {
         engine.settings.response_timeout.get()
     }
 
@@ -47,11 +47,11 @@ pub trait Transaction<P, S: Storage>: Sized {
 
     /// True if the frame of `length` bytes at `front`, whose unit, function code and CRC are
     /// right and which is no exception, answers the request.
-    fn is_reply(engine: &mut Engine<P, S, Self>, front: S::Count, length: S::Count) -> bool;
+    fn is_reply(engine: &Engine<P, S, Self>, front: S::Count, length: S::Count) -> bool;
 
     /// True if the frame at `front`, which is as long as the request and has its unit and
     /// function code, begins as the request does.
-    fn is_echo(engine: &mut Engine<P, S, Self>, front: S::Count) -> bool;
+    fn is_echo(engine: &Engine<P, S, Self>, front: S::Count) -> bool;
 
     /// For a reply whose length the request does not determine: the length of the reply's frame
     /// that ends with the last received byte, with a right CRC; 0 if there is none. `is_silent`

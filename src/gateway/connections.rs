@@ -18,13 +18,13 @@ const SHORTEST: u16 = tcp::PDU as u16 + 1;
 impl<S: GatewayStorage> Gateway<S> {
     /// Reads requests from an open connection, until it has no more bytes or no place for them.
     pub(super) fn receive(&mut self, connection: u8) {
-        self.storage.connection(connection).is_held = false;
+        self.storage.connection_mut(connection).is_held = false;
         for _ in 0..MOST_READS {
-            if !self.storage.connection(connection).is_open() {
+            if !self.storage.connection_mut(connection).is_open() {
                 return;
             }
             let Some(request) = self.place(connection) else {
-                self.storage.connection(connection).is_held = true;
+                self.storage.connection_mut(connection).is_held = true;
                 return;
             };
             let have = self.storage.request(request).length;
@@ -33,7 +33,7 @@ impl<S: GatewayStorage> Gateway<S> {
                 0 => {
                     if have == 0 {
                         // Another connection may need the place.
-                        self.storage.connection(connection).receiving = NONE;
+                        self.storage.connection_mut(connection).receiving = NONE;
                         self.release(request);
                     }
                     return;
@@ -68,7 +68,7 @@ impl<S: GatewayStorage> Gateway<S> {
                 state.stage = Stage::Receiving;
                 state.connection = connection;
                 state.length = 0;
-                let state = self.storage.connection(connection);
+                let state = self.storage.connection_mut(connection);
                 state.receiving = request;
                 state.requests = state.requests.saturating_add(1);
                 return Some(request);
@@ -83,7 +83,7 @@ impl<S: GatewayStorage> Gateway<S> {
         let bytes = self.storage.frame(request).get(..have.into());
         match tcp::header(bytes.unwrap_or_default()) {
             Ok(header) if have >= header.total as u16 => {
-                self.storage.connection(connection).receiving = NONE;
+                self.storage.connection_mut(connection).receiving = NONE;
                 self.direct(connection, request, header.unit);
             }
             Err(Error::MALFORMED_FRAME) => self.lose(connection, Status::MALFORMED_FRAME),
@@ -144,9 +144,9 @@ impl<S: GatewayStorage> Gateway<S> {
     /// Sends the responses of a connection, until there are no more or the connection takes
     /// no more bytes.
     pub(super) fn send(&mut self, connection: u8) {
-        self.storage.connection(connection).is_blocked = false;
+        self.storage.connection_mut(connection).is_blocked = false;
         while let Some(request) = self.next_response(connection) {
-            self.storage.connection(connection).sending = request;
+            self.storage.connection_mut(connection).sending = request;
             let state = self.storage.request(request);
             let (sent, length) = (state.sent, state.length);
             let count = self.storage.write(connection, request, sent, length);
@@ -156,10 +156,10 @@ impl<S: GatewayStorage> Gateway<S> {
             let sent = sent.saturating_add(count as u16);
             self.storage.request(request).sent = sent;
             if sent < length {
-                self.storage.connection(connection).is_blocked = true;
+                self.storage.connection_mut(connection).is_blocked = true;
                 return;
             }
-            self.storage.connection(connection).sending = NONE;
+            self.storage.connection_mut(connection).sending = NONE;
             self.release(request);
         }
     }

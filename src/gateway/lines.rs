@@ -36,7 +36,7 @@ impl<S: GatewayStorage> Gateway<S> {
             return self.end_broadcast(request);
         }
         match outcome.status {
-            Status::OK if self.is_unanswered(request) => self.release(request),
+            Status::OK if is_unanswered(self.storage.frame(request)) => self.release(request),
             Status::OK => self.answer(request, outcome.length + 1),
             _ if outcome.exception != 0 => self.refuse(request, outcome.exception),
             Status::LINK_LOST
@@ -61,15 +61,6 @@ impl<S: GatewayStorage> Gateway<S> {
         state.line = next;
         state.stage = Stage::Queued;
         state.order = order;
-    }
-
-    /// True for 08 with sub-function 04, Force Listen Only Mode: no device responds to it
-    /// (V1.1b3, 6.8.1).
-    fn is_unanswered(&mut self, request: u16) -> bool {
-        match self.storage.frame(request).get(tcp::PDU..tcp::PDU + 3) {
-            Some(&[DIAGNOSTICS, high, low]) => u16::from_be_bytes([high, low]) == FORCE_LISTEN_ONLY,
-            _ => false,
-        }
     }
 
     /// Gives requests that wait to a line, as many as it may have.
@@ -165,5 +156,14 @@ impl<S: GatewayStorage> Gateway<S> {
         let now = self.storage.now(connection);
         let since = self.storage.request(request).since;
         self.queue_time.saturating_sub(elapsed(now, since))
+    }
+}
+
+/// True for 08 with sub-function 04, Force Listen Only Mode: no device responds to it
+/// (V1.1b3, 6.8.1).
+fn is_unanswered(frame: &[u8]) -> bool {
+    match frame.get(tcp::PDU..tcp::PDU + 3) {
+        Some(&[DIAGNOSTICS, high, low]) => u16::from_be_bytes([high, low]) == FORCE_LISTEN_ONLY,
+        _ => false,
     }
 }

@@ -49,7 +49,7 @@ impl<S: GatewayStorage> Gateway<S> {
             self.storage.request(request).stage = Stage::Free;
         }
         for connection in 0..self.storage.connection_count() {
-            let state = self.storage.connection(connection);
+            let state = self.storage.connection_mut(connection);
             state.clear(false, Status::OK);
         }
         for line in 0..self.storage.line_count() {
@@ -69,7 +69,9 @@ impl<S: GatewayStorage> Gateway<S> {
 
     /// Serves the connection that the storage has at this place from now on.
     pub fn open(&mut self, connection: u8) {
-        self.storage.connection(connection).clear(true, Status::OK);
+        self.storage
+            .connection_mut(connection)
+            .clear(true, Status::OK);
     }
 
     /// Gives up a connection and its requests. Its place is free then.
@@ -80,7 +82,7 @@ impl<S: GatewayStorage> Gateway<S> {
     /// [`Status::OK`] while the connection is open; [`Status::LINK_LOST`] or
     /// [`Status::MALFORMED_FRAME`] if the gateway has given it up;
     /// [`Status::NOT_INITIALISED`] for a free place.
-    pub fn status(&mut self, connection: u8) -> Status {
+    pub fn status(&self, connection: u8) -> Status {
         let state = self.storage.connection(connection);
         match state.end {
             _ if state.is_open => Status::OK,
@@ -90,7 +92,7 @@ impl<S: GatewayStorage> Gateway<S> {
     }
 
     /// How many requests of a connection are complete and not answered yet.
-    pub fn pending(&mut self, connection: u8) -> u16 {
+    pub fn pending(&self, connection: u8) -> u16 {
         let state = self.storage.connection(connection);
         let receiving = u16::from(state.receiving != NONE);
         state.requests.saturating_sub(receiving)
@@ -98,14 +100,14 @@ impl<S: GatewayStorage> Gateway<S> {
 
     /// True if the next poll reads bytes from a connection. Otherwise it has as many pending
     /// requests as it may have.
-    pub fn is_reading(&mut self, connection: u8) -> bool {
+    pub fn is_reading(&self, connection: u8) -> bool {
         let state = *self.storage.connection(connection);
         state.is_open() && (state.receiving != NONE || self.may_have_more(connection))
     }
 
     /// True if a connection may have another request. Each place for a connection keeps one
     /// place for a request, so that no client takes all of them.
-    pub(super) fn may_have_more(&mut self, connection: u8) -> bool {
+    pub(super) fn may_have_more(&self, connection: u8) -> bool {
         let own = self.storage.connection(connection).requests;
         let (mut free, mut kept) = (self.storage.request_count(), 0);
         for other in 0..self.storage.connection_count() {
@@ -132,7 +134,7 @@ impl<S: GatewayStorage> Gateway<S> {
             }
             self.storage.request(request).stage = Stage::Free;
         }
-        self.storage.connection(connection).clear(false, status);
+        self.storage.connection_mut(connection).clear(false, status);
     }
 
     /// The connection of a request. It is checked, because the caller may let two gateways use
@@ -152,7 +154,7 @@ impl<S: GatewayStorage> Gateway<S> {
     pub(super) fn release(&mut self, request: u16) {
         self.storage.request(request).stage = Stage::Free;
         let connection = self.connection_of(request);
-        let state = self.storage.connection(connection);
+        let state = self.storage.connection_mut(connection);
         state.requests = state.requests.saturating_sub(1);
     }
 

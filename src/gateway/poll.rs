@@ -48,7 +48,7 @@ impl<S: GatewayStorage> Gateway<S> {
     }
 
     fn send_if_open(&mut self, connection: u8) {
-        if self.storage.connection(connection).is_open() {
+        if self.storage.connection_mut(connection).is_open() {
             self.send(connection);
         }
     }
@@ -66,7 +66,7 @@ impl<S: GatewayStorage> Gateway<S> {
                 Stage::Local => EXTERNAL_POLL_DELAY,
                 Stage::Answered => {
                     let connection = self.connection_of(request);
-                    match self.storage.connection(connection).is_blocked {
+                    match self.storage.connection_mut(connection).is_blocked {
                         true => EXTERNAL_POLL_DELAY,
                         false => 0,
                     }
@@ -78,7 +78,7 @@ impl<S: GatewayStorage> Gateway<S> {
         }
         for connection in 0..self.storage.connection_count() {
             // A place for another request became free after the connection was last read.
-            if self.storage.connection(connection).is_held && self.may_have_more(connection) {
+            if self.storage.connection_mut(connection).is_held && self.may_have_more(connection) {
                 delay = 0;
             }
         }

@@ -36,7 +36,9 @@ pub trait GatewayStorage {
     /// The frame of a request, of [`MAX_FRAME`](crate::frame::tcp::MAX_FRAME) bytes.
     fn frame(&mut self, request: u16) -> &mut [u8];
     /// A connection.
-    fn connection(&mut self, connection: u8) -> &mut ConnectionState;
+    fn connection(&self, connection: u8) -> &ConnectionState;
+    /// The same connection, to be changed.
+    fn connection_mut(&mut self, connection: u8) -> &mut ConnectionState;
     /// A line.
     fn line(&mut self, line: u8) -> &mut LineState;
 
@@ -63,7 +65,7 @@ pub trait GatewayStorage {
     /// that was cancelled.
     fn rest(&mut self, line: u8, unit: u8) -> u32;
     /// True if a line can take a request now.
-    fn is_ready(&mut self, line: u8) -> bool;
+    fn is_ready(&self, line: u8) -> bool;
     /// Gives the request in a frame, whose body has `length` bytes, to a line, for the unit
     /// `unit` there. Returns [`Status::PENDING`] if the line has taken it.
     fn forward(&mut self, line: u8, request: u16, unit: u8, length: u16) -> Status;

@@ -271,7 +271,7 @@ impl<P, S: Words> Transaction<P, S> for MasterRequest {
         !self.is_read()
     }
 
-    fn response_timeout(engine: &mut Line<P, S>) -> u32 {
+    fn response_timeout(engine: &Line<P, S>) -> u32 {
         engine.storage.response_timeout(&engine.settings)
     }
 
@@ -287,7 +287,7 @@ impl<P, S: Words> Transaction<P, S> for MasterRequest {
         write(engine);
     }
 
-    fn is_reply(engine: &mut Line<P, S>, front: u8, _length: u8) -> bool {
+    fn is_reply(engine: &Line<P, S>, front: u8, _length: u8) -> bool {
         if engine.request.is_read() {
             engine.storage.byte(front + 2) == engine.request.reads()
         } else {
@@ -295,7 +295,7 @@ impl<P, S: Words> Transaction<P, S> for MasterRequest {
         }
     }
 
-    fn is_echo(engine: &mut Line<P, S>, front: u8) -> bool {
+    fn is_echo(engine: &Line<P, S>, front: u8) -> bool {
         let mut index = engine.request.head_length();
         while index > 0 {
             let byte = engine.storage.byte(front + index);

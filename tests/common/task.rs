@@ -73,7 +73,11 @@ impl ClientStorage for Lent {
         &mut self.outgoing
     }
 
-    fn units(&mut self) -> &mut [UnitRecord] {
+    fn units(&self) -> &[UnitRecord] {
+        &self.units
+    }
+
+    fn units_mut(&mut self) -> &mut [UnitRecord] {
         &mut self.units
     }
 

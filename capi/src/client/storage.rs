@@ -2,7 +2,7 @@
 
 use crate::storage::{frame_storage, mbm_counters};
 use core::ffi::c_void;
-use core::slice::from_raw_parts_mut;
+use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::client::{ClientStorage, Policy, RequestState, UnitRecord};
 use mbm::engine::Storage;
 use mbm::error::Status;
@@ -61,7 +61,15 @@ impl ClientStorage for ClientBuffers {
         unsafe { from_raw_parts_mut(self.outgoing.add(from.into()), (to - from).into()) }
     }
 
-    fn units(&mut self) -> &mut [UnitRecord] {
+    fn units(&self) -> &[UnitRecord] {
+        if self.units.is_null() {
+            return &[];
+        }
+        // SAFETY: see above.
+        unsafe { from_raw_parts(self.units, self.unit_count.into()) }
+    }
+
+    fn units_mut(&mut self) -> &mut [UnitRecord] {
         if self.units.is_null() {
             return &mut [];
         }
@@ -82,7 +90,7 @@ impl ClientStorage for ClientBuffers {
         }
     }
 
-    fn unit_timeout_ms(&mut self, _: u8) -> u32 {
+    fn unit_timeout_ms(&self, _: u8) -> u32 {
         self.unit_timeout_ms
     }
 

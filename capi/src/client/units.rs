@@ -102,8 +102,10 @@ pub unsafe extern "C" fn mbm_client_getResponseTimeout(client: *const mbm_client
 const UNIT_RECORDS: UnitRecords = UnitRecords {
     rest: |storage, unit, now| {
         storage.unit_timeout_ms = find(storage.units(), unit).map_or(0, |unit| unit.timeout_ms);
-        rest(storage.units(), unit, now)
+        rest(storage.units_mut(), unit, now)
     },
     retry_limit: |storage, unit| find(storage.units(), unit).map_or(0, |unit| unit.retry_limit),
-    note: |storage, unit, ended, now| note(storage.units(), unit, ended.status, ended.again, now),
+    note: |storage, unit, ended, now| {
+        note(storage.units_mut(), unit, ended.status, ended.again, now)
+    },
 };

@@ -106,7 +106,12 @@ impl GatewayStorage for Parts {
         self.bytes(request, 0, MBM_MAX_TCP_FRAME)
     }
 
-    fn connection(&mut self, connection: u8) -> &mut ConnectionState {
+    fn connection(&self, connection: u8) -> &ConnectionState {
+        // SAFETY: see above.
+        unsafe { &*mbm_gatewayConnection::state(self.connection_at(connection)) }
+    }
+
+    fn connection_mut(&mut self, connection: u8) -> &mut ConnectionState {
         // SAFETY: see above.
         unsafe { &mut *mbm_gatewayConnection::state(self.connection_at(connection)) }
     }
@@ -163,7 +168,7 @@ impl GatewayStorage for Parts {
         unsafe { client::rest(self.client(line), unit) }
     }
 
-    fn is_ready(&mut self, line: u8) -> bool {
+    fn is_ready(&self, line: u8) -> bool {
         let line = self.line_at(line);
         // SAFETY: see above; the hook keeps the contract of its comment.
         unsafe {

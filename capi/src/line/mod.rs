@@ -95,7 +95,7 @@ pub unsafe extern "C" fn mbm_line_beginRtu(
 }
 
 /// True for a frame buffer that cannot hold an exception or a request of two words.
-fn is_frame_refused(frame: *mut u8, bytes: u16) -> bool {
+fn is_frame_refused(frame: *const u8, bytes: u16) -> bool {
     frame.is_null() || bytes < 8
 }
 

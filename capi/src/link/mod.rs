@@ -152,8 +152,8 @@ fn linked(transport: &TransportKind, client: *mut mbm_client) -> LinkedKind {
 ///
 /// # Safety
 /// `link` and `client` are storage of such objects.
-unsafe fn is_of(link: *mut Object, client: *mut client::Object) -> bool {
-    (*client).linked && (*client).kind.cast::<Object>() == link.cast_const()
+unsafe fn is_of(link: *const Object, client: *const client::Object) -> bool {
+    (*client).linked && (*client).kind.cast::<Object>() == link
 }
 
 /// Restores the client as it was before the link began.

@@ -101,9 +101,9 @@ unsafe fn check_line(object: *mut Object) -> Status {
 ///
 /// # Safety
 /// [`check_line`] returned [`Status::OK`] for the node.
-unsafe fn has_line(object: *mut Object) -> bool {
+unsafe fn has_line(object: *const Object) -> bool {
     // The line was begun and has no reference.
-    pointers::object((*object).line).storage.words == &raw mut (*object).words
+    pointers::object((*object).line).storage.words.cast_const() == &raw const (*object).words
 }
 
 /// Sends and receives for a non-blocking request, without waiting.

@@ -270,7 +270,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     /// Microseconds for which a request waits when it was sent.
     fn time_of(&mut self, state: &RequestState) -> u32 {
         if state.header.is_answered() {
-            state.response_timeout(&mut self.storage, self.settings.response_timeout.get())
+            state.response_timeout(&self.storage, self.settings.response_timeout.get())
         } else {
             self.settings.turnaround_delay.get()
         }
