@@ -8,7 +8,7 @@
  * and prints for each the seconds, and p50 and p99 of one transaction in microseconds bench_client
  * names            prints the names, and whether each is over TCP bench_client polls prints how
  * long a poll without anything to do takes bench_client pollN COUNT      polls with N requests
- * under way, for callgrind */
+ * in flight, for callgrind */
 #define _GNU_SOURCE
 #include "bench_client.h"
 
@@ -438,7 +438,7 @@ static uint32_t quiet_micros(void *context)
     return 0;
 }
 
-/* Makes `count` polls while `flight` requests are under way. No timeout is due. */
+/* Makes `count` polls while `flight` requests are in flight. No timeout is due. */
 static void poll_with(unsigned flight, unsigned long count)
 {
     static bench b;

@@ -1,5 +1,5 @@
 /* Counts what a transaction takes in a program with many links, with the wait: 1000 links of which
- * 100 have a request under way. Three programs: one that waits with a set of sockets and forgets
+ * 100 have a pending request. Three programs: one that waits with a set of sockets and forgets
  * the timeouts, one that asks each client for its pollDelay before each wait, and one with
  * mbm_loop.
  *
@@ -290,7 +290,7 @@ static void end_program(const char *kind, const char *name, unsigned count)
     mbm_loop_close(&loop);
 }
 
-/* Each client has one request under way, and queues the next one when it ends. */
+/* Each client has one pending request, and queues the next one when it ends. */
 static void count_requests(program which, unsigned count, int has_links)
 {
     unsigned i, round;

@@ -317,7 +317,7 @@ static pid_t start_other(const char *program, uint16_t *port)
     return child;
 }
 
-/* 32 connections, each with one request under way. */
+/* 32 connections, each with one pending request. */
 typedef struct crowd {
     int wait;
     int fds[CLIENTS];

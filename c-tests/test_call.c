@@ -152,7 +152,7 @@ static void *hang_up(void *unused)
     char byte;
 
     (void)unused;
-    /* Only when the request is under way. */
+    /* Only when the request is in flight. */
     assert_int_equal(read(ends[1], &byte, 1), 1);
     shutdown(ends[1], SHUT_RDWR);
     return NULL;

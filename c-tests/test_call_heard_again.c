@@ -39,7 +39,7 @@ static uint16_t word;
 /* The device at the other end of the terminal: what was sent to it, and its reply. */
 static unsigned sent, received, requests, lost;
 static uint8_t frame[8], reply[7];
-static int64_t reply_at; /* 0: none is under way */
+static int64_t reply_at; /* 0: no reply is due */
 
 static int16_t count_written(void *context, const uint8_t *bytes, uint16_t length)
 {

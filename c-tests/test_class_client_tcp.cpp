@@ -98,7 +98,7 @@ TEST(writes_reach_libmodbus)
                      MBM_ILLEGAL_DATA_ADDRESS);
 }
 
-TEST(many_requests_are_under_way_at_once)
+TEST(many_requests_are_in_flight_at_once)
 {
     ModbusRequestOf<1> a(255), b(255), c(255);
     unsigned sum = 0;

@@ -296,7 +296,7 @@ TEST(copies_have_buffers_and_callbacks_of_their_own)
     assert_in_range(board().now - Serial.sentAt, 40000, 40200);
 }
 
-TEST(a_copy_leaves_a_request_under_way_to_the_original)
+TEST(a_copy_leaves_a_pending_request_to_the_original)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -314,7 +314,7 @@ TEST(a_copy_leaves_a_request_under_way_to_the_original)
     assert_int_equal(copy.getResponseBuffer(0), 0);
 }
 
-TEST(an_assignment_cancels_the_request_under_way)
+TEST(an_assignment_cancels_the_pending_request)
 {
     ModbusMaster node, other;
     node.begin(1, Serial);

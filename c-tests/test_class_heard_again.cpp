@@ -104,8 +104,8 @@ TEST(a_node_that_waits_for_its_unit_does_not_keep_another_one_from_the_line)
     assert_int_equal(node.poll(), MBM_CANCELLED);
 }
 
-/* It is refused, and the one under way still reads from its own Stream. */
-TEST(a_request_that_is_refused_leaves_the_one_under_way_to_its_node)
+/* It is refused, and the pending one still reads from its own Stream. */
+TEST(a_request_that_is_refused_leaves_the_pending_one_to_its_node)
 {
     ModbusMaster other;
     HardwareSerial another_line;

@@ -14,7 +14,7 @@ TEST(objects_have_a_line_each)
                     2 * (125 + 123) + sizeof(mbm_line) + sizeof(mbm_node) + 255, 1300);
 }
 
-TEST(two_objects_have_a_request_under_way_at_the_same_time)
+TEST(two_objects_have_a_pending_request_at_the_same_time)
 {
     ModbusMaster first, second;
     first.begin(1, Serial);

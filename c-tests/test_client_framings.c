@@ -257,8 +257,8 @@ TEST(an_impossible_delimiter_is_refused)
     end();
 }
 
-/* Queues 16 requests. Returns how many of them were under way at once. */
-static uint32_t most_under_way(void)
+/* Queues 16 requests. Returns how many of them were in flight at once. */
+static uint32_t most_in_flight(void)
 {
     mbm_clientRequest requests[MBM_CLIENT_DEPTH];
     uint16_t words[MBM_CLIENT_DEPTH];
@@ -283,18 +283,18 @@ static uint32_t most_under_way(void)
 }
 
 /* Devices that take one request at a time lose the others. */
-TEST(one_request_is_under_way_over_tcp_unless_the_program_allows_more)
+TEST(one_request_is_in_flight_over_tcp_unless_the_program_allows_more)
 {
     begin(MBM_FRAMING_TCP);
-    assert_int_equal(most_under_way(), 1);
+    assert_int_equal(most_in_flight(), 1);
     OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
-    assert_int_equal(most_under_way(), MBM_CLIENT_DEPTH);
+    assert_int_equal(most_in_flight(), MBM_CLIENT_DEPTH);
     OK(mbm_client_setInFlight(&a.client, 1));
-    assert_int_equal(most_under_way(), 1);
+    assert_int_equal(most_in_flight(), 1);
     end();
 }
 
-TEST(requests_under_way_over_tcp_are_1_to_16)
+TEST(requests_in_flight_over_tcp_are_1_to_16)
 {
     static mbm_client fresh;
 

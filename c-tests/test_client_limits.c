@@ -1,5 +1,5 @@
 /* The response timeout and the retries of one request and of one unit, and repetitions while
- * a device is busy: in every framing over a port in memory, and with many requests under way
+ * a device is busy: in every framing over a port in memory, and with many requests in flight
  * against a TCP peer whose replies and exceptions libmodbus makes. */
 #include "client.h"
 #include "memory_port.h"
@@ -356,7 +356,7 @@ static void end_peer(void)
     tcp_peer_stop(peer);
 }
 
-TEST_WITH(requests_under_way_at_once_have_their_own_timeouts_and_retries, begin_peer, end_peer)
+TEST_WITH(requests_in_flight_at_once_have_their_own_timeouts_and_retries, begin_peer, end_peer)
 {
     static mbm_clientRequest requests[8];
     static uint16_t replies[8][2];

@@ -159,7 +159,7 @@ TEST(responses_in_one_segment_are_separated)
         is_right(i);
 }
 
-TEST(a_reset_ends_all_requests_under_way)
+TEST(a_reset_ends_all_requests_in_flight)
 {
     unsigned i, lost = 0;
 

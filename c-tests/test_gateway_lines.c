@@ -166,7 +166,7 @@ TEST(an_ascii_line_works)
     EXPECT(0, 2, 102, VALUE);
 }
 
-/* A line that is a TCP connection has as many requests under way as `inFlight` says. */
+/* A line that is a TCP connection has as many requests in flight as `inFlight` says. */
 TEST(a_line_may_be_a_tcp_connection)
 {
     static uint8_t outgoing[MBM_MAX_TCP_FRAME];

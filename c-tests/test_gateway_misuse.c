@@ -81,7 +81,7 @@ TEST(a_gateway_goes_on_after_a_refused_begin)
     refuses_config(MBM_INVALID_ARGUMENT, config); /* no client */
     line.client = &none;
     refuses_config(MBM_NOT_INITIALISED, config);
-    /* The request is still under way. */
+    /* The request is still pending. */
     REPLY(0, 2, VALUE);
     EXPECT(0, 1, 2, VALUE);
 }

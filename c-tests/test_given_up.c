@@ -253,7 +253,7 @@ TEST(begin_mid_send_is_refused_until_the_request_is_given_up)
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
-TEST(a_refused_begin_leaves_the_request_under_way)
+TEST(a_refused_begin_leaves_the_pending_request)
 {
     mbm_port empty;
     NODE;

@@ -296,7 +296,7 @@ TEST(a_read_from_unit_0_is_sent_and_its_reply_accepted)
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
 }
 
-TEST(it_cannot_be_set_while_a_request_is_under_way)
+TEST(it_cannot_be_set_while_a_request_is_pending)
 {
     LENIENT;
 

@@ -393,7 +393,7 @@ TEST(a_response_of_the_old_connection_is_not_taken_for_one_of_the_new)
 }
 
 /* Two requests time out while three that were sent later may still be answered. */
-TEST(requests_under_way_have_their_time_before_a_connection_is_replaced)
+TEST(requests_in_flight_have_their_time_before_a_connection_is_replaced)
 {
     static mbm_clientRequest late[3];
     uint8_t reply[11] = {0, 0, 0, 0, 0, 5, UNIT, 3, 2, 0x12, 0x34};

@@ -1,5 +1,5 @@
 /* A client's link against real peers: libmodbus's replies over TCP, and a libmodbus server on
- * a pty. The peers go away, while the client is idle and while requests are under way, and
+ * a pty. The peers go away, while the client is idle and while requests are in flight, and
  * come back. */
 #define _GNU_SOURCE
 #include "await.h"
@@ -186,7 +186,7 @@ TEST(a_server_that_was_away_is_found_again)
     assert_int_equal(counters.connected, 2);
 }
 
-TEST(requests_under_way_when_the_server_dies_end_and_the_others_wait)
+TEST(requests_in_flight_when_the_server_dies_end_and_the_others_wait)
 {
     unsigned i, lost = 0;
 
@@ -292,7 +292,7 @@ TEST_WITH(a_terminal_that_is_unplugged_during_a_request_ends_it, NULL, NULL)
     keep(&hooks);
     OK(mbm_link_setRequestsWait(&kept, 1));
     read_over_tty();
-    /* No device answers the first request. So it is under way, and the second waits. */
+    /* No device answers the first request. So it is in flight, and the second waits. */
     requests[3] = asker_request(UNIT + 1, words[3], sizeof words[3], NULL);
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[3], 0, 2));
     queue_read(4);

@@ -61,7 +61,7 @@ TEST(each_node_keeps_its_result)
     assert_int_equal(mbm_node_available(&o.node), 0);
 }
 
-TEST(a_request_is_refused_while_another_node_has_one_under_way)
+TEST(a_request_is_refused_while_another_node_has_one_pending)
 {
     other o;
     NODE;

@@ -183,7 +183,7 @@ TEST(the_programs_own_requests_go_beside_the_plan)
     assert_int_equal(plan_device_updates(&d, 0), 5);
 }
 
-TEST_WITH(many_requests_are_under_way_on_tcp, NULL, NULL)
+TEST_WITH(many_requests_are_in_flight_on_tcp, NULL, NULL)
 {
     unsigned i;
 

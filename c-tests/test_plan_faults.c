@@ -146,7 +146,7 @@ TEST_WITH(many_timeouts_at_once_count_as_one, NULL, NULL)
         OK(status((uint16_t)i));
 }
 
-TEST(a_client_that_is_begun_again_loses_the_reads_under_way_only)
+TEST(a_client_that_is_begun_again_loses_the_reads_in_flight_only)
 {
     mbm_port port = memory_port_of(&d.memory);
 

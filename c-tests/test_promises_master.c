@@ -277,7 +277,7 @@ static uint8_t read_by_the_stack(uint8_t quantity)
     return run();
 }
 
-TEST(a_frame_is_used_only_while_a_request_is_under_way)
+TEST(a_frame_is_used_only_while_a_request_is_pending)
 {
     REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_setFrame(&line, NULL, 8));
     REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_setFrame(&line, NULL, 0));
@@ -439,7 +439,7 @@ TEST(settings_have_the_ranges_of_the_header)
     OK(mbm_line_usedAt(&line, 5));
 }
 
-TEST(lenient_is_refused_while_a_request_is_under_way)
+TEST(lenient_is_refused_while_a_request_is_pending)
 {
     IS(MBM_PENDING, read_holding(0, 1));
     REFUSED(MBM_BUSY, m, mbm_node_setLenient(&m, 1));

@@ -67,7 +67,7 @@ static void every_function_of_the_line_is_busy(void)
     IS(MBM_BUSY, mbm_node_readWriteQueuedRegisters(m, 0, 1));
 }
 
-/* Of a node whose request is under way. */
+/* Of a node whose request is pending. */
 static void its_request_is_busy(void)
 {
     IS(MBM_BUSY, mbm_node_setLenient(&master, 1));
@@ -93,7 +93,7 @@ static void its_words_and_settings_are_free(void)
     assert_int_equal(mbm_node_receive(m), 0xFFFF);
 }
 
-/* A request is under way. */
+/* A request is pending. */
 static int is_pending;
 
 static void within_master(int hook)

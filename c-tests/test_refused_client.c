@@ -174,7 +174,7 @@ TEST(a_full_queue_and_a_suspended_client_change_nothing)
     REFUSED(MBM_BUSY, client, mbm_client_reconnect(&client, NULL));
     OK(mbm_client_resume(&client, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_resume(&client, NULL));
-    /* While a master has a request under way, it can be neither given the line nor lose it. */
+    /* While a master has a pending request, it can be neither given the line nor lose it. */
     OK(mbm_line_setFrame(&line, line_frame, 16));
     OK(mbm_node_begin(&node, &line, 1, node_words, 2, node_words, 0));
     OK(mbm_client_suspend(&client, &line));
@@ -210,7 +210,7 @@ TEST(a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice)
         for (i = 0; i < 1000 && mbm_client_pending(&client) > 0; i++) {
             mbm_client_poll(&client);
             if (mbm_client_pending(&client) > 0)
-                IS(MBM_BUSY, mbm_client_readCoils(&client, request, 0, 1)); /* under way */
+                IS(MBM_BUSY, mbm_client_readCoils(&client, request, 0, 1)); /* in flight */
         }
         assert_int_equal(mbm_client_pending(&client), 0);
         /* The same with a request that has ended before. */

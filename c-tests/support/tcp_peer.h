@@ -85,7 +85,7 @@ void tcp_peer_hang_up(tcp_peer *peer);
 /* Returns the counts since the start. */
 tcp_peer_counts tcp_peer_count(tcp_peer *peer);
 
-/* The memory. Other threads may read it while no request is under way. */
+/* The memory. Other threads may read it while no request is pending. */
 modbus_mapping_t *tcp_peer_memory(tcp_peer *peer);
 
 /* The values that the tables hold at first. */

@@ -1,4 +1,4 @@
-/* A link that begins, or is closed, while requests of its client are under way: they end, and
+/* A link that begins, or is closed, while requests of its client are in flight: they end, and
  * nothing of them is sent or received over the link that is opened then. */
 #include "linked.h"
 
@@ -27,9 +27,9 @@ static void driver_off(void *context)
     driver--;
 }
 
-/* A client without a link. Then `request` is queued and polled until it is under way, or, if the
+/* A client without a link. Then `request` is queued and polled until it is in flight, or, if the
  * port accepts nothing, until it waits for the port. */
-static void begin_under_way(int framing, uint16_t accepted)
+static void begin_in_flight(int framing, uint16_t accepted)
 {
     mbm_port port = memory_port_of(&m);
 
@@ -103,14 +103,14 @@ static const struct {
     {MBM_PENDING, MBM_OK}, /* status fails later, and connect succeeds */
 };
 
-static void requests_under_way_end_when_the_link_was_closed(uint16_t accepted)
+static void requests_in_flight_end_when_the_link_was_closed(uint16_t accepted)
 {
     unsigned i, j, waits;
 
     for (i = 0; i < COUNT(framings); i++)
         for (j = 0; j < COUNT(courses); j++)
             for (waits = 0; waits < 2; waits++) {
-                begin_under_way(framings[i], accepted);
+                begin_in_flight(framings[i], accepted);
                 m.is_lost = 1;
                 status_is = courses[j].status_is;
                 connects_with = courses[j].connects_with;
@@ -130,12 +130,12 @@ static void requests_under_way_end_when_the_link_was_closed(uint16_t accepted)
 
 TEST(requests_that_were_sent_end_when_a_link_begins_that_is_closed)
 {
-    requests_under_way_end_when_the_link_was_closed(ALL);
+    requests_in_flight_end_when_the_link_was_closed(ALL);
 }
 
 TEST(a_request_that_the_port_took_in_part_is_not_sent_on_over_the_new_link)
 {
-    requests_under_way_end_when_the_link_was_closed(5);
+    requests_in_flight_end_when_the_link_was_closed(5);
 }
 
 TEST(a_request_that_ended_with_the_old_link_is_never_sent)
@@ -144,7 +144,7 @@ TEST(a_request_that_ended_with_the_old_link_is_never_sent)
 
     for (i = 0; i < COUNT(framings); i++)
         for (j = 0; j < COUNT(courses); j++) {
-            begin_under_way(framings[i], NOTHING);
+            begin_in_flight(framings[i], NOTHING);
             assert_int_equal(m.sent_count, 0);
             status_is = courses[j].status_is;
             connects_with = courses[j].connects_with;
@@ -165,7 +165,7 @@ TEST(half_a_reply_of_the_old_peer_is_dropped)
     unsigned i;
 
     for (i = 0; i < COUNT(framings); i++) {
-        begin_under_way(framings[i], ALL);
+        begin_in_flight(framings[i], ALL);
         if (framings[i] == MBM_FRAMING_TCP)
             memory_port_bytes(&m, half_tcp, sizeof half_tcp);
         else if (framings[i] == MBM_FRAMING_ASCII)
@@ -182,7 +182,7 @@ TEST(half_a_reply_of_the_old_peer_is_dropped)
     }
 }
 
-TEST(a_request_under_way_goes_on_if_the_link_is_found_open)
+TEST(a_request_in_flight_goes_on_if_the_link_is_found_open)
 {
     static const uint8_t reply[] = {UNIT, 6, 0, 7, 0xBE, 0xEF};
     uint8_t tcp[] = {0, 0, 0, 0, 0, 6, UNIT, 6, 0, 7, 0xBE, 0xEF};
@@ -190,7 +190,7 @@ TEST(a_request_under_way_goes_on_if_the_link_is_found_open)
 
     for (i = 0; i < COUNT(framings); i++)
         for (waits = 0; waits < 2; waits++) {
-            begin_under_way(framings[i], ALL);
+            begin_in_flight(framings[i], ALL);
             status_is = waits ? MBM_PENDING : MBM_OK;
             begin_link();
             IS(MBM_PENDING, mbm_client_poll(&client));
@@ -217,7 +217,7 @@ TEST(a_link_that_the_program_closes_while_it_is_being_made_sends_nothing_old)
     for (i = 0; i < COUNT(framings); i++) {
         mbm_clientRequest second = {.unit = UNIT};
 
-        begin_under_way(framings[i], NOTHING);
+        begin_in_flight(framings[i], NOTHING);
         status_is = MBM_PENDING;
         begin_link();
         IS(MBM_PENDING, mbm_client_poll(&client));
@@ -252,7 +252,7 @@ TEST(a_client_whose_link_ends_in_its_callback_sends_nothing_old)
 
     for (i = 0; i < COUNT(framings); i++)
         for (j = 1; j < COUNT(courses); j++) {
-            begin_under_way(framings[i], NOTHING);
+            begin_in_flight(framings[i], NOTHING);
             status_is = courses[j].status_is;
             connects_with = courses[j].connects_with;
             begin_link();
@@ -278,7 +278,7 @@ TEST(a_request_that_was_answered_before_it_was_sent_is_not_sent)
 {
     static const uint8_t reply[] = {0, 0, 0, 0, 0, 6, UNIT, 6, 0, 7, 0xBE, 0xEF};
 
-    begin_under_way(MBM_FRAMING_TCP, NOTHING);
+    begin_in_flight(MBM_FRAMING_TCP, NOTHING);
     memory_port_bytes(&m, reply, sizeof reply);
     IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
     status_is = MBM_OK;
