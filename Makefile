@@ -423,11 +423,13 @@ man: tool ## Make the man pages of that tool, build/man
 	@scripts/need help2man
 	@cli/man $(BUILD)/plain/mbm $(BUILD)/man
 
-.PHONY: check-tool
-check-tool: man ## Check that tool on servers of libmodbus and pymodbus, also with the sanitizers
-	@scripts/need python3 python3-venv clang libclang-rt-14-dev pkg-config libmodbus-dev openssl
+# ONLY is an expression of pytest's -k: words of names, with and, or and not.
+.PHONY: test-tool
+test-tool: man ## Test that tool, also with the sanitizers, on other clients, servers and brokers: ONLY="tls or udp"
+	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev gcc-avr avr-libc gcc-arm-none-eabi libnewlib-arm-none-eabi \
+		pkg-config libmodbus-dev mbpoll openssl strace
 	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(BUILD)/plain/linux/calls $(PEERS)
-	@$(BUILD)/venv/bin/python scripts/check/tool $(BUILD)/plain $(BUILD)/certificates $(BUILD)/plain/mbm $(BUILD)/sanitized/mbm
+	@$(BUILD)/venv/bin/python -B -m pytest -c tests/tool/pytest.ini --rootdir tests/tool tests/tool $(if $(ONLY),-k "$(ONLY)")
 
 .PHONY: trace
 trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
@@ -440,13 +442,6 @@ gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients an
 	@scripts/need python3 python3-venv gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev strace
 	@$(MAKE) --no-print-directory venv tool $(BUILD)/sanitized/mbm $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain $(BUILD)/sanitized/mbm
-
-.PHONY: check-serve
-check-serve: tool ## Check mbm serve, its faults, mbm poll and mbm header with other clients and compilers, also with the sanitizers
-	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev gcc-avr avr-libc gcc-arm-none-eabi libnewlib-arm-none-eabi \
-		mbpoll openssl strace
-	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm
-	@$(BUILD)/venv/bin/python scripts/check/serve $(BUILD)/certificates $(BUILD)/plain/mbm $(BUILD)/sanitized/mbm
 
 .PHONY: demo
 demo: tool ## Show every function against a libmodbus server, frame by frame, and a plan at work

@@ -1,5 +1,5 @@
 /* Gets and sets every field of cells.yaml by the functions that mbm header writes.
- * scripts/check/serve compiles and runs it. Licence: MIT OR Apache-2.0. */
+ * tests/tool/test_header.py compiles and runs it. Licence: MIT OR Apache-2.0. */
 #define CELLS_SERVER
 #include "cells.h"
 

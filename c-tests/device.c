@@ -1,5 +1,5 @@
 /* A program from the header that mbm header writes: a client with a plan, and a server with its
- * tables. scripts/check/serve compiles it for each device of examples/devices and holds it against
+ * tables. tests/tool/test_header.py compiles it for each device of examples/devices and holds it against
  * mbm serve and mbm poll.
  *
  *     device poll HOST PORT     reads every field once, and prints the values of each in a line
