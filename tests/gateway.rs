@@ -6,8 +6,8 @@
 use mbm::error::Status;
 use mbm::frame::tcp;
 use mbm::gateway::{
-    ConnectionState, Gateway, GatewayStorage, LineState, Outcome, Route, Transaction, ALL_LINES,
-    LOCAL,
+    ConnectionState, Gateway, GatewayStorage, LineState, RequestResult, Route, Transaction,
+    ALL_LINES, LOCAL,
 };
 use std::cell::Cell;
 use std::collections::{HashMap, VecDeque};
@@ -65,7 +65,7 @@ struct World {
     outgoing: [Vec<u8>; CONNECTIONS],
     lost: [bool; CONNECTIONS],
     on_line: [Vec<Held>; LINES],
-    ended: HashMap<u16, Outcome>,
+    ended: HashMap<u16, RequestResult>,
     /// The connection and line of each request that went to a line.
     starts: Vec<(usize, u8)>,
     broadcasts: usize,
@@ -156,12 +156,12 @@ impl GatewayStorage for World {
             // it answers.
             frame[11] = frame[11].wrapping_add(1);
             let exception = if held.status.is_exception() { 2 } else { 0 };
-            let outcome = Outcome {
+            let result = RequestResult {
                 status: held.status,
                 exception,
                 length: if held.unit == 0 { 0 } else { 4 },
             };
-            self.ended.insert(held.request, outcome);
+            self.ended.insert(held.request, result);
             false
         });
         let status = if held.is_empty() {
@@ -221,8 +221,8 @@ impl GatewayStorage for World {
         });
         Status::PENDING
     }
-    fn outcome(&mut self, request: u16) -> Outcome {
-        self.ended.get(&request).copied().unwrap_or(Outcome {
+    fn result(&mut self, request: u16) -> RequestResult {
+        self.ended.get(&request).copied().unwrap_or(RequestResult {
             status: Status::PENDING,
             exception: 0,
             length: 0,

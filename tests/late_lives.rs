@@ -293,7 +293,14 @@ impl Reader<'_> {
 
     /// Reads a register of the unit at `index`, until `limit` has passed: then it cancels the
     /// request.
-    fn read(&mut self, wire: &Wire, index: usize, unit: u8, address: u16, limit: u32) -> Outcome {
+    fn read(
+        &mut self,
+        wire: &Wire,
+        index: usize,
+        unit: u8,
+        address: u16,
+        limit: u32,
+    ) -> HandlerResult {
         let timeout = wire.0.borrow().timeout;
         let end = wire.now().saturating_add(limit);
         let left = |wire: &Wire| end.saturating_sub(wire.now());
@@ -366,7 +373,7 @@ impl Reader<'_> {
 }
 
 /// The value, or the status; none after a limit.
-type Outcome = Result<u16, Option<u8>>;
+type HandlerResult = Result<u16, Option<u8>>;
 
 /// What a program does.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ mod common;
 use common::device::Device;
 use common::line::{Line, CHARACTER, SILENCE};
 use mbm::frame::Framing;
-use mbm::server::custom::Outcome;
+use mbm::server::custom::HandlerResult;
 
 const READ: [u8; 6] = [17, 3, 0, 100, 0, 2];
 const WRITE: [u8; 6] = [17, 6, 0, 100, 1, 2];
@@ -57,7 +57,7 @@ fn line(framing: Framing) -> Line {
     line.device = Device::new();
     line.device.custom = |data, space| {
         space[..data.len()].copy_from_slice(data);
-        Outcome::Data(data.len())
+        HandlerResult::Data(data.len())
     };
     line
 }

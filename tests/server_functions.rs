@@ -4,7 +4,7 @@ mod common;
 
 use common::device::{ask, sealed, Device};
 use mbm::frame::Framing;
-use mbm::server::custom::Outcome;
+use mbm::server::custom::HandlerResult;
 use mbm::server::respond;
 use mbm::server::storage::{HoldingRegisters, RegisterArray};
 use mbm::server::Unit;
@@ -187,25 +187,25 @@ fn a_user_defined_function_gets_the_request_data_and_writes_the_response_data() 
         for (place, byte) in space.iter_mut().zip(data) {
             *place = !byte;
         }
-        Outcome::Data(data.len() * 2)
+        HandlerResult::Data(data.len() * 2)
     };
     assert_eq!(ask(&mut device, &[0x42]), [0x42]);
     assert_eq!(ask(&mut device, &[0x42, 1, 2])[..3], [0x42, 0xFE, 0xFD]);
-    device.custom = |_, _| Outcome::Exception(0x0B);
+    device.custom = |_, _| HandlerResult::Exception(0x0B);
     assert_eq!(ask(&mut device, &[0x42, 1, 2]), [0xC2, 0x0B]);
-    device.custom = |_, _| Outcome::NoResponse;
+    device.custom = |_, _| HandlerResult::NoResponse;
     assert_eq!(ask(&mut device, &[0x42, 1, 2]), []);
     // More data than the response can hold.
-    device.custom = |_, space| Outcome::Data(space.len() + 1);
+    device.custom = |_, space| HandlerResult::Data(space.len() + 1);
     assert_eq!(ask(&mut device, &[0x42, 1, 2]), [0xC2, 4]);
-    device.custom = |_, space| Outcome::Data(space.len());
+    device.custom = |_, space| HandlerResult::Data(space.len());
     assert_eq!(ask(&mut device, &[0x42, 1, 2]).len(), 1 + 250);
 }
 
 #[test]
 fn a_function_that_returns_pending_is_called_again() {
     let mut device = Device::new();
-    device.custom = |_, _| Outcome::Pending;
+    device.custom = |_, _| HandlerResult::Pending;
     let mut line = common::line::Line::new(Framing::Tcp);
     line.device = device;
     line.arrive(0, &[0, 1, 0, 0, 0, 3, 17, 0x42, 7]);
@@ -213,7 +213,7 @@ fn a_function_that_returns_pending_is_called_again() {
     assert_eq!(line.device.diagnostics.server_messages, 1);
     line.device.custom = |data, space| {
         space[0] = data[0];
-        Outcome::Data(1)
+        HandlerResult::Data(1)
     };
     assert_eq!(line.frames(1_000, 100), [[0, 1, 0, 0, 0, 3, 17, 0x42, 7]]);
     assert_eq!(line.device.diagnostics.events, 1);

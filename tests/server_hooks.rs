@@ -1,6 +1,6 @@
 //! The hooks of the data model in Rust, and functions of users that decline.
 
-use mbm::server::custom::{Custom, Outcome};
+use mbm::server::custom::{Custom, HandlerResult};
 use mbm::server::storage::{HoldingRegisters, RegisterArray};
 use mbm::server::table::{DataModel, Direction};
 use mbm::server::{Reply, Service};
@@ -160,7 +160,7 @@ fn a_function_that_declines_is_not_handled() {
         function: 3,
         handler: |_, _: &[u8], space: &mut [u8]| {
             space.fill(0xEE);
-            Outcome::Declined
+            HandlerResult::Declined
         },
     };
     let mut pdu = [3, 0, 0, 0, 1, 0, 0];

@@ -1,7 +1,7 @@
 //! Finds the reply among the received characters of an ASCII line. Every frame begins with a
 //! colon; characters before a colon are noise.
 
-use super::{Count, Engine, Outcome, Phase, Storage, Transaction};
+use super::{Count, Engine, Finding, Phase, Storage, Transaction};
 use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::ascii::{self, find, Decoded};
@@ -63,10 +63,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.content = S::Count::ZERO;
         if held > S::Count::ZERO {
             self.note_foreign_frame();
-            self.seen = Outcome::NOTHING;
+            self.seen = Finding::NOTHING;
             self.drop_until(held);
         } else {
-            self.note(Outcome::TOO_LONG);
+            self.note(Finding::TOO_LONG);
             self.is_early = true;
             self.end = S::Count::ZERO;
         }
@@ -114,30 +114,30 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         // the CRC.
         let whole = content + rtu::CRC.into();
         let kind = if self.storage.byte(front) != self.unit {
-            Outcome::OTHER_UNIT
+            Finding::OTHER_UNIT
         } else if function & !EXCEPTION != self.function {
-            Outcome::OTHER_FUNCTION
+            Finding::OTHER_FUNCTION
         } else if function & EXCEPTION != 0 {
             let code = self.storage.byte(front + 2u8.into());
             let is_valid = Status::exception(code) != Status::MALFORMED_REPLY;
             if is_valid && content == EXCEPTION_CONTENT.into() {
                 self.exception = code;
-                self.seen = Outcome(code);
+                self.seen = Finding(code);
                 self.content = S::Count::ZERO;
                 return true;
             }
-            Outcome::MALFORMED
+            Finding::MALFORMED
         } else if length == self.outgoing && Q::is_echo(self, front) {
             self.outgoing = S::Count::ZERO;
             return false;
         } else if Q::is_reply(self, front, whole) {
             self.exception = 0;
-            self.seen = Outcome::OK;
+            self.seen = Finding::OK;
             self.storage.move_down(front, content);
             self.content = content;
             return true;
         } else {
-            Outcome::MALFORMED
+            Finding::MALFORMED
         };
         self.note_foreign_frame();
         // A frame as long as the request may be its echo.

@@ -3,7 +3,7 @@
 //! Only [`Engine::use_extras`] and [`Engine::set_counting`] name this code. A program in C contains
 //! it if it calls them.
 
-use super::{Count, Counter, Engine, Moment, Outcome, Phase, Storage, Transaction};
+use super::{Count, Counter, Engine, Finding, Moment, Phase, Storage, Transaction};
 use crate::error::Status;
 use crate::port::Port;
 
@@ -62,7 +62,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Begins the request again if it has failed and has retries left, and returns true then.
     fn repeat_if_allowed(&mut self) -> bool {
         let retries = self.settings.retries;
-        let is_final = self.seen.is_response() || self.seen == Outcome::TOO_LONG;
+        let is_final = self.seen.is_response() || self.seen == Finding::TOO_LONG;
         if !Q::HAS_FIXED_REPLY || self.retries >= retries || is_final {
             return false;
         }

@@ -24,7 +24,7 @@
 //! be late.
 
 use super::late_units::{ANY, CANCELLED, LATE_UNITS, REPLIES, SLOW};
-use super::{Engine, Outcome, Phase, Storage, Transaction, BROADCAST};
+use super::{Engine, Finding, Phase, Storage, Transaction, BROADCAST};
 use crate::port::Port;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
@@ -71,7 +71,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     pub(super) fn expect_late_reply(&mut self, is_cancelled: bool) {
         self.is_late = true;
         self.add_owed_reply(is_cancelled);
-        let has_heard_unit = self.is_held || self.seen > Outcome::OTHER_UNIT;
+        let has_heard_unit = self.is_held || self.seen > Finding::OTHER_UNIT;
         if has_heard_unit {
             self.begun = self.now;
         }
@@ -84,7 +84,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if self.owed & REPLIES != REPLIES {
             self.owed += 1;
         }
-        let has_damaged_reply = self.phase == Phase::Reply && self.seen == Outcome::BAD_CRC;
+        let has_damaged_reply = self.phase == Phase::Reply && self.seen == Finding::BAD_CRC;
         if !has_damaged_reply {
             self.owed |= SLOW;
         }

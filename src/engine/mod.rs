@@ -76,8 +76,8 @@ pub struct Engine<P, S: Storage, Q> {
     retries: u8,
     /// The exception code of the last reply; 0 if the reply was no exception.
     pub(crate) exception: u8,
-    /// What the request ends with if no more bytes arrive.
-    pub(crate) seen: Outcome,
+    /// The finding with which the request ends if no more bytes arrive.
+    pub(crate) seen: Finding,
     /// The response or damaged reply in `seen` may lie within another frame, so a silence must
     /// follow it.
     pub(crate) is_early: bool,
@@ -93,7 +93,7 @@ pub struct Engine<P, S: Storage, Q> {
     has_more: bool,
     /// The kind of the frame that is being received, if it ends with a right CRC. It is known
     /// from its second byte on: see `kind_of_frame`.
-    run_kind: Outcome,
+    run_kind: Finding,
     /// How many bytes have arrived since the last frame ended.
     pub(crate) run_length: S::Count,
     /// Length of the reply's frame that is no exception; 0 if the request does not determine it.
@@ -159,7 +159,7 @@ pub enum Moment {
     /// The search has not ended with the byte that has arrived. `true` if that ends no frame,
     /// although the CRC is right.
     Missed,
-    /// The request ends with the outcome in `seen`. `true` if it is repeated.
+    /// The request ends with the finding in `seen`. `true` if it is repeated.
     End,
 }
 
@@ -167,30 +167,30 @@ pub enum Moment {
 /// or the most severe fault in the received bytes. The more severe fault is the greater one. The
 /// low hexadecimal digit of a fault is the low digit of its status.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
-pub struct Outcome(u8);
+pub struct Finding(u8);
 
-impl Outcome {
+impl Finding {
     /// A right reply, or a broadcast that was sent.
-    pub const OK: Outcome = Outcome(0x00);
+    pub const OK: Finding = Finding(0x00);
     /// No frame arrived.
-    pub const NOTHING: Outcome = Outcome(0x82);
+    pub const NOTHING: Finding = Finding(0x82);
     /// A frame of another unit.
-    pub const OTHER_UNIT: Outcome = Outcome(0x90);
+    pub const OTHER_UNIT: Finding = Finding(0x90);
     /// A frame of our unit with another function.
-    pub const OTHER_FUNCTION: Outcome = Outcome(0xA1);
+    pub const OTHER_FUNCTION: Finding = Finding(0xA1);
     /// A frame of our unit and function that is not the reply.
-    pub const MALFORMED: Outcome = Outcome(0xB5);
+    pub const MALFORMED: Finding = Finding(0xB5);
     /// A complete frame of our unit and function with a wrong CRC.
-    pub const BAD_CRC: Outcome = Outcome(0xC3);
+    pub const BAD_CRC: Finding = Finding(0xC3);
     /// No response, and the frame buffer cannot hold the reply.
-    pub const TOO_LONG: Outcome = Outcome(0xD9);
+    pub const TOO_LONG: Finding = Finding(0xD9);
 
     /// True for a response of the device: the right reply or an exception.
     pub const fn is_response(self) -> bool {
         self.0 < 0x80
     }
 
-    /// The status of a request that ends with this outcome.
+    /// The status of a request that ends with this finding.
     pub const fn status(self) -> Status {
         if self.is_response() {
             Status::from_code(self.0)
@@ -201,12 +201,12 @@ impl Outcome {
 }
 
 const _: () = {
-    assert!(Outcome::NOTHING.status().code() == Status::RESPONSE_TIMED_OUT.code());
-    assert!(Outcome::OTHER_UNIT.status().code() == Status::INVALID_SLAVE_ID.code());
-    assert!(Outcome::OTHER_FUNCTION.status().code() == Status::INVALID_FUNCTION.code());
-    assert!(Outcome::MALFORMED.status().code() == Status::MALFORMED_REPLY.code());
-    assert!(Outcome::BAD_CRC.status().code() == Status::INVALID_CRC.code());
-    assert!(Outcome::TOO_LONG.status().code() == Status::BUFFER_TOO_SMALL.code());
+    assert!(Finding::NOTHING.status().code() == Status::RESPONSE_TIMED_OUT.code());
+    assert!(Finding::OTHER_UNIT.status().code() == Status::INVALID_SLAVE_ID.code());
+    assert!(Finding::OTHER_FUNCTION.status().code() == Status::INVALID_FUNCTION.code());
+    assert!(Finding::MALFORMED.status().code() == Status::MALFORMED_REPLY.code());
+    assert!(Finding::BAD_CRC.status().code() == Status::INVALID_CRC.code());
+    assert!(Finding::TOO_LONG.status().code() == Status::BUFFER_TOO_SMALL.code());
 };
 
 impl<P, S: Storage, Q> Engine<P, S, Q> {

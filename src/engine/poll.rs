@@ -1,6 +1,6 @@
 //! Moves a request on, from its start to its end.
 
-use super::{Count, Engine, LateUnits, Moment, Outcome, Phase, Settings, Storage, Transaction};
+use super::{Count, Engine, Finding, LateUnits, Moment, Phase, Settings, Storage, Transaction};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::port::Port;
@@ -79,14 +79,14 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             function: 0,
             retries: 0,
             exception: 0,
-            seen: Outcome::OK,
+            seen: Finding::OK,
             is_early: false,
             owed: 0,
             is_held: false,
             is_late: false,
             awaits_end: false,
             has_more: false,
-            run_kind: Outcome::MALFORMED,
+            run_kind: Finding::MALFORMED,
             run_length: S::Count::ZERO,
             length: S::Count::ZERO,
             end: S::Count::ZERO,
@@ -173,7 +173,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if has_elapsed(self.settings.silence.get(), now, self.since)
             || self.end == self.space()
             || self.run_length > self.end
-            || self.seen != Outcome::NOTHING
+            || self.seen != Finding::NOTHING
         {
             self.end = S::Count::ZERO;
             self.begin_frame();
@@ -294,7 +294,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             return Status::PENDING;
         }
         if self.is_held_in_vain() && self.seen.is_response() {
-            self.seen = Outcome::NOTHING;
+            self.seen = Finding::NOTHING;
         }
         self.settle()
     }
@@ -305,7 +305,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         has_elapsed(limit, self.now, since)
     }
 
-    /// Lets silence end the wait for the reply if the outcome of the request is known, and sets how
+    /// Lets silence end the wait for the reply if it is known how the request ends, and sets how
     /// long the silence must last. Returns false if it is not known.
     fn wait_for_silence(&mut self) -> bool {
         if self.is_held {
@@ -340,7 +340,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.has_expired()
     }
 
-    /// Ends the request with the outcome in `seen`.
+    /// Ends the request with the finding in `seen`.
     fn settle(&mut self) -> Status {
         if self.run_extension(Moment::End) {
             return Status::PENDING;

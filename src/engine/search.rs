@@ -10,7 +10,7 @@
 //! these bytes were a whole frame. If that frame is not the reply, it is skipped, and an
 //! exception or a damaged reply that seemed to lie in it is forgotten.
 
-use super::{Count, Engine, Moment, Outcome, Phase, Storage, Transaction};
+use super::{Count, Engine, Finding, Moment, Phase, Storage, Transaction};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::frame::rtu::{self, MIN_FRAME};
@@ -97,18 +97,18 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         is_whole && !goes_on && self.skip_frame()
     }
 
-    /// Makes the exception at the end of the buffer the outcome. False if its code is invalid.
+    /// Makes the exception at the end of the buffer the finding. False if its code is invalid.
     fn accept_exception(&mut self) -> bool {
         let code = self.storage.byte(self.end - 3u8.into());
         if !self.is_held {
             self.exception = code;
         }
         if let Status::MALFORMED_REPLY = Status::exception(code) {
-            self.note(Outcome::MALFORMED);
+            self.note(Finding::MALFORMED);
             return false;
         }
         self.exception = code;
-        self.seen = Outcome(code);
+        self.seen = Finding(code);
         self.content = S::Count::ZERO;
         // It may lie within another frame, unless it is a whole frame itself.
         self.is_early = self.run_length != EXCEPTION_FRAME.into();
@@ -128,19 +128,19 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// The kind of a frame that begins with the last two bytes and is not the reply.
-    fn kind_of_frame(&self) -> Outcome {
+    fn kind_of_frame(&self) -> Finding {
         // Bytes that were dropped were not of our unit.
         if self.end < 2u8.into() {
-            return Outcome::OTHER_UNIT;
+            return Finding::OTHER_UNIT;
         }
         let front = self.end - 2u8.into();
         let function = self.storage.byte(front + 1u8.into());
         if self.storage.byte(front) != self.unit {
-            Outcome::OTHER_UNIT
+            Finding::OTHER_UNIT
         } else if function & !EXCEPTION == self.function {
-            Outcome::MALFORMED
+            Finding::MALFORMED
         } else {
-            Outcome::OTHER_FUNCTION
+            Finding::OTHER_FUNCTION
         }
     }
 
@@ -149,7 +149,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     pub(super) fn accept(&mut self, length: S::Count) -> bool {
         let front = self.end - length;
         if !Q::is_reply(self, front, length) {
-            self.note(Outcome::MALFORMED);
+            self.note(Finding::MALFORMED);
             return false;
         }
         // By chance, the CRC may be right within the reply. Then that was no frame.
@@ -157,7 +157,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             self.foreign_frames = self.foreign_frames.wrapping_sub(1);
         }
         self.is_early = self.run_length > length;
-        self.seen = Outcome::OK;
+        self.seen = Finding::OK;
         self.exception = 0;
         self.content = length - rtu::CRC.into();
         if front > S::Count::ZERO {
@@ -203,9 +203,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     #[inline(always)]
     pub(super) fn note_damaged(&mut self) {
         if self.is_held {
-            self.seen = Outcome::BAD_CRC;
+            self.seen = Finding::BAD_CRC;
         }
-        self.note(Outcome::BAD_CRC);
+        self.note(Finding::BAD_CRC);
     }
 
     /// The next byte begins a frame.
@@ -236,7 +236,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// and the frame may be the reply: that ends the request.
     fn skip_frame(&mut self) -> bool {
         let kind = self.run_kind;
-        if self.seen == Outcome::TOO_LONG && kind == Outcome::MALFORMED {
+        if self.seen == Finding::TOO_LONG && kind == Finding::MALFORMED {
             return true;
         }
         self.note_foreign_frame();
@@ -245,11 +245,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if self.is_held {
             // A damaged reply that seemed to follow the held one lies in this frame.
             self.seen = if self.content > S::Count::ZERO || self.exception > 0 {
-                Outcome(self.exception)
+                Finding(self.exception)
             } else {
-                Outcome::NOTHING
+                Finding::NOTHING
             };
-        } else if self.is_early || self.seen == Outcome::BAD_CRC {
+        } else if self.is_early || self.seen == Finding::BAD_CRC {
             self.forget();
         }
         self.note(kind);
@@ -263,7 +263,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
         let front = self.end - self.run_length;
         let unit = self.storage.byte(front);
-        if self.run_kind == Outcome::MALFORMED {
+        if self.run_kind == Finding::MALFORMED {
             // It is neither the echo of the request nor the beginning of its reply, in which
             // the CRC is right by chance.
             let count = self.storage.byte(front + 2u8.into());
@@ -286,14 +286,14 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Sets the outcome of a request for which no bytes arrive.
+    /// Sets the finding of a request for which no bytes arrive.
     pub(crate) fn see_nothing(&mut self) {
         self.is_early = false;
         self.exception = 0;
         self.seen = if Q::HAS_FIXED_REPLY && self.length > self.storage.capacity() {
-            Outcome::TOO_LONG
+            Finding::TOO_LONG
         } else {
-            Outcome::NOTHING
+            Finding::NOTHING
         };
     }
 
@@ -304,7 +304,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Notes a fault if it is more severe than the noted one. A response stays.
     #[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
-    pub(crate) fn note(&mut self, fault: Outcome) {
+    pub(crate) fn note(&mut self, fault: Finding) {
         if !self.seen.is_response() && self.seen < fault {
             self.seen = fault;
         }
@@ -322,7 +322,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         let mut keep = self.end - self.content;
         if self.content > S::Count::ZERO {
             self.note_foreign_frame();
-            self.seen = Outcome::NOTHING;
+            self.seen = Finding::NOTHING;
         } else {
             keep -= 1u8.into();
         }

@@ -2,7 +2,7 @@
 
 use super::object::{Gateway, PATH_UNAVAILABLE, TARGET_FAILED};
 use super::state::Stage;
-use super::storage::{GatewayStorage, Outcome};
+use super::storage::{GatewayStorage, RequestResult};
 use crate::error::Status;
 use crate::frame::tcp;
 use crate::pdu::diagnostics::sub_function::FORCE_LISTEN_ONLY;
@@ -17,28 +17,28 @@ impl<S: GatewayStorage> Gateway<S> {
             if self.storage.request(request).line() != Some(line) {
                 continue;
             }
-            let mut outcome = self.storage.outcome(request);
-            if outcome.status == Status::PENDING {
+            let mut result = self.storage.result(request);
+            if result.status == Status::PENDING {
                 if status == Status::PENDING || status == Status::BUSY {
                     continue;
                 }
                 // The line was begun anew, or is no line any more.
-                outcome.status = Status::CANCELLED;
+                result.status = Status::CANCELLED;
             }
-            self.end(request, outcome);
+            self.end(request, result);
         }
     }
 
     /// Answers a request that has ended on its line.
-    fn end(&mut self, request: u16, outcome: Outcome) {
+    fn end(&mut self, request: u16, result: RequestResult) {
         let is_broadcast = self.storage.request(request).unit == 0;
         if is_broadcast {
             return self.end_broadcast(request);
         }
-        match outcome.status {
+        match result.status {
             Status::OK if is_unanswered(self.storage.frame(request)) => self.release(request),
-            Status::OK => self.answer(request, outcome.length + 1),
-            _ if outcome.exception != 0 => self.refuse(request, outcome.exception),
+            Status::OK => self.answer(request, result.length + 1),
+            _ if result.exception != 0 => self.refuse(request, result.exception),
             Status::LINK_LOST
             | Status::CONNECT_TIMED_OUT
             | Status::LINE_BUSY

@@ -21,4 +21,4 @@ mod storage;
 pub use object::Gateway;
 pub use route::{Destination, Route, ALL_LINES, LOCAL};
 pub use state::{ConnectionState, LineState, Transaction};
-pub use storage::{GatewayStorage, Outcome};
+pub use storage::{GatewayStorage, RequestResult};

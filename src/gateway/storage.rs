@@ -4,9 +4,9 @@ use super::route::Route;
 use super::state::{ConnectionState, LineState, Transaction};
 use crate::error::Status;
 
-/// How a request stands at its line.
+/// The result of a request on its line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Outcome {
+pub struct RequestResult {
     /// [`Status::PENDING`]; [`Status::OK`] after a reply; else why there is none.
     pub status: Status,
     /// The exception code of the reply; 0 if it was none.
@@ -69,8 +69,8 @@ pub trait GatewayStorage {
     /// Gives the request in a frame, whose body has `length` bytes, to a line, for the unit
     /// `unit` there. Returns [`Status::PENDING`] if the line has taken it.
     fn forward(&mut self, line: u8, request: u16, unit: u8, length: u16) -> Status;
-    /// How a request stands that a line has taken.
-    fn outcome(&mut self, request: u16) -> Outcome;
+    /// The result of a request that a line has taken.
+    fn result(&mut self, request: u16) -> RequestResult;
     /// Takes a request back from a line.
     fn cancel(&mut self, line: u8, request: u16);
 

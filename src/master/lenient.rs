@@ -12,7 +12,7 @@
 //! contains none of this code.
 
 use super::request::MasterRequest;
-use crate::engine::{Engine, Extension, Moment, Outcome, Words};
+use crate::engine::{Engine, Extension, Finding, Moment, Words};
 use crate::frame::rtu;
 use crate::port::Port;
 
@@ -71,7 +71,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
             return false;
         }
         if is_whole && self.run_length.wrapping_add(1) == self.kept_length() {
-            self.note(Outcome::MALFORMED);
+            self.note(Finding::MALFORMED);
             return true;
         }
         let words = u16::from(self.storage.response_words());
@@ -170,7 +170,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
             }
             self.exception = 0;
             self.is_early = false;
-            self.seen = Outcome::OK;
+            self.seen = Finding::OK;
         } else if self.awaits_end {
             self.note_foreign_frame();
         }

@@ -11,19 +11,19 @@ use core::cell::Cell;
 pub fn serve(
     pdu: &mut [u8],
     length: usize,
-    handler: impl FnOnce(&[u8], &mut [u8]) -> Outcome,
+    handler: impl FnOnce(&[u8], &mut [u8]) -> HandlerResult,
 ) -> Reply {
     let Some((request, space)) = pdu.split_at_mut_checked(length) else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
     let data = request.get(1..).unwrap_or_default();
     let bytes = match handler(data, space) {
-        Outcome::Data(bytes) if bytes <= space.len() && bytes < MAX_PDU => bytes,
-        Outcome::Data(_) => return Reply::SERVER_DEVICE_FAILURE,
-        Outcome::Exception(code) => return Reply::exception(code),
-        Outcome::NoResponse => return Reply::NO_RESPONSE,
-        Outcome::Pending => return Reply::PENDING,
-        Outcome::Declined => return Reply::NOT_HANDLED,
+        HandlerResult::Data(bytes) if bytes <= space.len() && bytes < MAX_PDU => bytes,
+        HandlerResult::Data(_) => return Reply::SERVER_DEVICE_FAILURE,
+        HandlerResult::Exception(code) => return Reply::exception(code),
+        HandlerResult::NoResponse => return Reply::NO_RESPONSE,
+        HandlerResult::Pending => return Reply::PENDING,
+        HandlerResult::Declined => return Reply::NOT_HANDLED,
     };
     // Move the response's data to directly after the function code.
     let cells = Cell::from_mut(pdu).as_slice_of_cells();
@@ -34,7 +34,7 @@ pub fn serve(
 
 /// The result of the handler of a user-defined function.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Outcome {
+pub enum HandlerResult {
     /// A response with this number of data bytes.
     Data(usize),
     /// An exception with this code.
@@ -56,7 +56,7 @@ pub struct Custom<F> {
     pub handler: F,
 }
 
-impl<F: FnMut(u8, &[u8], &mut [u8]) -> Outcome> Service for Custom<F> {
+impl<F: FnMut(u8, &[u8], &mut [u8]) -> HandlerResult> Service for Custom<F> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
         match pdu.first() {
             Some(&function) if self.function == 0 || self.function == function => {

@@ -3,7 +3,7 @@
 use mbm::frame::checksum::crc16;
 use mbm::frame::Framing;
 use mbm::pdu::files::Record;
-use mbm::server::custom::{Custom, DisabledFunctions, Outcome};
+use mbm::server::custom::{Custom, DisabledFunctions, HandlerResult};
 use mbm::server::diagnostics::Diagnostics;
 use mbm::server::files::{self, Fifos, Files};
 use mbm::server::identity::{self, Objects};
@@ -41,7 +41,7 @@ pub struct Device {
     pub diagnostics: Diagnostics,
     pub off: [u8; 16],
     /// Carries out function 0x42.
-    pub custom: fn(&[u8], &mut [u8]) -> Outcome,
+    pub custom: fn(&[u8], &mut [u8]) -> HandlerResult,
 }
 
 struct Stored<'a>(&'a mut [[u16; 10]; 2]);
@@ -135,7 +135,7 @@ impl Device {
             objects: Vec::new(),
             diagnostics: Diagnostics::NEW,
             off: [0; 16],
-            custom: |_, _| Outcome::Exception(1),
+            custom: |_, _| HandlerResult::Exception(1),
         }
     }
 

@@ -12,7 +12,7 @@ use crate::server::mbm_unit;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
-use mbm::gateway::{ConnectionState, GatewayStorage, LineState, Outcome, Route, Transaction};
+use mbm::gateway::{ConnectionState, GatewayStorage, LineState, RequestResult, Route, Transaction};
 use mbm::port::Port as _;
 
 /// Bytes of a frame before the body: the header and the function code.
@@ -206,11 +206,11 @@ impl GatewayStorage for Parts {
         }
     }
 
-    fn outcome(&mut self, request: u16) -> Outcome {
+    fn result(&mut self, request: u16) -> RequestResult {
         // SAFETY: see above.
         unsafe {
             let request = &raw const (*self.request_at(request)).request;
-            Outcome {
+            RequestResult {
                 status: Status::from_code((*request).status),
                 exception: (*request).exception,
                 length: (*request).length.into(),

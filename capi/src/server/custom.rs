@@ -8,7 +8,7 @@ use crate::functions;
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
-use mbm::server::custom::{self, Outcome};
+use mbm::server::custom::{self, HandlerResult};
 use mbm::server::{Indication, Reply};
 
 /// A function of yours returns this, or-ed with the exception code (1 to 127), to answer
@@ -73,12 +73,12 @@ unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_voi
         let capacity = space.len() as u16;
         let returned = handler(context, &raw const request, space.as_mut_ptr(), capacity);
         match (returned & 0xFF00, returned as u8) {
-            (0, bytes) => Outcome::Data(bytes.into()),
-            (MBM_REPLY_EXCEPTION, code @ 1..=0x7F) => Outcome::Exception(code),
-            (MBM_REPLY_NONE, 0) => Outcome::NoResponse,
-            (MBM_REPLY_PENDING, 0) => Outcome::Pending,
-            (MBM_REPLY_DECLINED, 0) => Outcome::Declined,
-            _ => Outcome::Exception(Reply::SERVER_DEVICE_FAILURE.exception_code()),
+            (0, bytes) => HandlerResult::Data(bytes.into()),
+            (MBM_REPLY_EXCEPTION, code @ 1..=0x7F) => HandlerResult::Exception(code),
+            (MBM_REPLY_NONE, 0) => HandlerResult::NoResponse,
+            (MBM_REPLY_PENDING, 0) => HandlerResult::Pending,
+            (MBM_REPLY_DECLINED, 0) => HandlerResult::Declined,
+            _ => HandlerResult::Exception(Reply::SERVER_DEVICE_FAILURE.exception_code()),
         }
     })
     .code()

@@ -22,7 +22,7 @@ const SOON: u64 = 3_000_000;
 /// The pause before a frame of a scripted peer.
 const GAP: u64 = 5_000;
 
-type Outcome = Result<(), (usize, String)>;
+type PlayResult = Result<(), (usize, String)>;
 
 /// A response that a device will send.
 struct Due {
@@ -542,7 +542,7 @@ impl<'a> World<'a> {
         }
     }
 
-    fn play(&mut self, steps: &[(usize, Step)], round: u32) -> Outcome {
+    fn play(&mut self, steps: &[(usize, Step)], round: u32) -> PlayResult {
         for (line, step) in steps {
             if let Step::Times(count, inner) = step {
                 for round in 0..*count {
@@ -564,7 +564,7 @@ impl<'a> World<'a> {
 }
 
 /// Plays the whole case.
-pub fn play(case: &Case, role: Role, block: Block) -> Outcome {
+pub fn play(case: &Case, role: Role, block: Block) -> PlayResult {
     let mut world = World::new(case, role, block).map_err(|why| (1, why))?;
     if case.framing.is_stream() && role == Role::Client {
         // The link opens the connection.
