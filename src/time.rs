@@ -5,6 +5,13 @@
 
 use core::sync::atomic::{compiler_fence, Ordering};
 
+/// Microseconds: how long something lasts, or a time of a clock that wraps at 2^32.
+pub type Micros = u32;
+/// Microseconds of one character.
+pub type Micros16 = u16;
+/// Milliseconds: how long something lasts, or a time of a clock that wraps at 2^32.
+pub type Millis = u32;
+
 /// How far the clock may step back, in microseconds. A clock that adds a hardware counter to
 /// millisecond ticks steps back if it is read after the counter has wrapped and before the
 /// interrupt has counted the tick.

@@ -6,7 +6,7 @@ mod common;
 use common::uart::{Bench, Wire, CHARACTER};
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
-use mbm::engine::{Buffers, Counter, Setting};
+use mbm::engine::{Buffers, Counter, MicrosSetting};
 use mbm::error::Error;
 use mbm::master::AsyncMaster;
 use std::cell::RefCell;
@@ -88,7 +88,7 @@ fn master(bench: &Bench) -> AsyncMaster<Uart, impl FnMut() -> u32, Delay, Words,
     let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
     let mut master = AsyncMaster::with_driver(17, uart, clock, delay, buffers, driver);
     master.settings().set_baud_rate(115_200);
-    master.settings().response_timeout = Setting::new(100_000);
+    master.settings().response_timeout = MicrosSetting::new(100_000);
     master
 }
 
@@ -218,7 +218,7 @@ fn a_device_that_receives_nothing_times_out_and_is_asked_again() {
 fn the_driver_goes_off_when_the_hold_is_over() {
     let mut bench = Bench::new();
     let mut master = master(&bench);
-    master.settings().post_flush_hold = 7;
+    master.settings().post_flush_characters = 7;
     let mut words = [0];
     let (mut sent, mut off) = (0, 0);
     let mut read = pin!(master.read_holding_registers(100, &mut words));

@@ -9,7 +9,7 @@ mod wire;
 
 use exchanges::{Case, CASES};
 use mbm::client::{Client, Serial};
-use mbm::engine::{Frame, Setting, Storage as _};
+use mbm::engine::{Frame, MicrosSetting, Storage as _};
 use mbm::error::Status;
 use mbm::frame::{ascii, Framing};
 use proptest::prelude::*;
@@ -82,7 +82,7 @@ proptest! {
             };
             let settings = &mut line.engine.settings;
             settings.echo_discard = echo;
-            settings.response_timeout = Setting::new(200_000);
+            settings.response_timeout = MicrosSetting::new(200_000);
             let mut client: Client<_, _, 4> = Client::new(line);
             // The arrival time of the last byte of the previous round. It may end a reply too.
             let mut until = None;

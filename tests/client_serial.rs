@@ -7,7 +7,7 @@ mod wire;
 
 use exchanges::CASES;
 use mbm::client::{Client, Serial};
-use mbm::engine::{Frame, Setting};
+use mbm::engine::{Frame, MicrosSetting};
 use mbm::error::Status;
 use mbm::frame::{ascii, rtu};
 use mbm::pdu::custom::Rule;
@@ -375,7 +375,7 @@ fn a_request_longer_than_the_frame_buffer_has_no_exception_of_the_request_before
 /// reply looks like the reply to the next request.
 fn a_late_reply_is_passed_over(line: (End, Transport), encode: fn(u8, &[u8]) -> Vec<u8>) {
     let (end, mut client) = line;
-    client.line.engine.settings.response_timeout = Setting::new(500_000);
+    client.line.engine.settings.response_timeout = MicrosSetting::new(500_000);
     let reply = |value: u8| encode(17, &[3, 2, 0, value]);
     assert!(client.queue(read(17, 1)).is_ok());
     assert_eq!(

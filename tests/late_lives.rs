@@ -8,7 +8,7 @@
 //! `MBM_LIVES` in the environment is the number of lives of each test, `MBM_SEED` the first one.
 
 use mbm::client::{Client, Request, Serial, Settings};
-use mbm::engine::{Buffers, Frame, Setting};
+use mbm::engine::{Buffers, Frame, MicrosSetting};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::master::Master;
@@ -251,8 +251,8 @@ enum Reader<'a> {
 }
 
 fn set(settings: &mut Settings) {
-    settings.response_timeout = Setting::new(TIMEOUT);
-    settings.quiet_time = Setting::new(QUIET);
+    settings.response_timeout = MicrosSetting::new(TIMEOUT);
+    settings.quiet_time = MicrosSetting::new(QUIET);
 }
 
 fn buffers() -> Storage {
@@ -307,7 +307,7 @@ impl Reader<'_> {
         match self {
             Reader::Master(master) => {
                 master.set_unit(unit);
-                master.settings().response_timeout = Setting::new(timeout);
+                master.settings().response_timeout = MicrosSetting::new(timeout);
                 master.read_holding_registers(address, 1).unwrap();
                 loop {
                     if let std::task::Poll::Ready(result) = master.poll() {
@@ -324,7 +324,7 @@ impl Reader<'_> {
             Reader::Nodes(line, nodes) => {
                 let node = &mut nodes[index];
                 assert_eq!(line.ready(), Status::OK);
-                line.settings.response_timeout = Setting::new(timeout);
+                line.settings.response_timeout = MicrosSetting::new(timeout);
                 let function = FunctionSpec::READ_HOLDING_REGISTERS.short();
                 let started = node.request(line, address, 1, function);
                 assert_eq!(started, Status::PENDING);

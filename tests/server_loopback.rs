@@ -3,7 +3,7 @@
 mod common;
 
 use common::device::Device;
-use mbm::engine::{Buffers, Setting};
+use mbm::engine::{Buffers, MicrosSetting};
 use mbm::error::{Error, Status};
 use mbm::frame::Framing;
 use mbm::master::Master;
@@ -96,7 +96,7 @@ impl Loop {
         let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
         let mut master = Master::new(17, End(wire.clone(), 0), buffers);
         master.settings().set_baud_rate(115_200);
-        master.settings().response_timeout = Setting::new(100_000);
+        master.settings().response_timeout = MicrosSetting::new(100_000);
         let mut server = Server::with_framing(Framing::Rtu, End(wire.clone(), 1), [0; 256]);
         server.set_silence(mbm::time::silence(115_200));
         Loop {

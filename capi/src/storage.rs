@@ -1,7 +1,7 @@
 //! The buffers and counters that belong to the C program.
 
 use core::slice::from_raw_parts_mut;
-use mbm::engine::{Setting, Settings, Storage, Words, COUNTERS};
+use mbm::engine::{MicrosSetting, Settings, Storage, Words, COUNTERS};
 use mbm::time::millis;
 
 /// Counters of the events on the line since you zeroed them. Each wraps at 2^32.
@@ -38,7 +38,7 @@ pub(super) struct NodeWords {
     pub(super) transmit_words: u8,
     /// The node's functions do not wait for the reply.
     pub(super) is_non_blocking: bool,
-    pub(super) response_timeout: Setting<{ millis(2000) }>,
+    pub(super) response_timeout: MicrosSetting<{ millis(2000) }>,
     pub(super) response: *mut u16,
     pub(super) transmit: *mut u16,
 }

@@ -8,7 +8,7 @@
 mod wire;
 
 use mbm::client::{Client, Serial};
-use mbm::engine::Setting;
+use mbm::engine::MicrosSetting;
 use mbm::error::Status;
 use mbm::frame::rtu;
 use mbm::pdu::functions::FunctionSpec;
@@ -175,10 +175,10 @@ pub fn play(schedule: Schedule, quiet_time: u32) -> Ended {
     let end = End::default();
     let mut line = Serial::new(end.clone(), Lent::default());
     let settings = &mut line.engine.settings;
-    settings.gap = Setting::new(SILENCE);
-    settings.silence = Setting::new(SILENCE);
-    settings.response_timeout = Setting::new(TIMEOUT);
-    settings.quiet_time = Setting::new(quiet_time);
+    settings.gap = MicrosSetting::new(SILENCE);
+    settings.silence = MicrosSetting::new(SILENCE);
+    settings.response_timeout = MicrosSetting::new(TIMEOUT);
+    settings.quiet_time = MicrosSetting::new(quiet_time);
     let mut client: Client<_, Task, 4> = Client::new(line);
     let mut device = Device {
         late: [schedule.first, schedule.second].into(),

@@ -1,7 +1,7 @@
 //! A master, devices that answer in order, and an adversary between them.
 
 use crate::wire::{self, Lent, Wire};
-use mbm::engine::Setting;
+use mbm::engine::MicrosSetting;
 use mbm::error::Status;
 use mbm::frame::rtu;
 use mbm::master::request::Line;
@@ -230,10 +230,10 @@ impl State {
     fn of(buffer: usize, retries: u8, quiet_time: u32, devices: usize) -> Self {
         let mut master = Master::new(UNIT, Wire::default(), wire::lent(buffer));
         let settings = master.settings();
-        settings.gap = Setting::new(SILENCE);
-        settings.silence = Setting::new(SILENCE);
-        settings.response_timeout = Setting::new(TIMEOUT);
-        settings.quiet_time = Setting::new(quiet_time);
+        settings.gap = MicrosSetting::new(SILENCE);
+        settings.silence = MicrosSetting::new(SILENCE);
+        settings.response_timeout = MicrosSetting::new(TIMEOUT);
+        settings.quiet_time = MicrosSetting::new(quiet_time);
         settings.retries = retries;
         let device = Device {
             owed: Vec::new(),

@@ -3,7 +3,7 @@
 //! and each byte that makes the CRC of a frame of the unit right, wherever that frame began.
 
 use crate::wire::Wire;
-use mbm::engine::{Buffers, Setting};
+use mbm::engine::{Buffers, MicrosSetting};
 use mbm::error::Status;
 use mbm::master::Master;
 use std::time::Instant;
@@ -162,10 +162,10 @@ fn waiting(request: Request, before: Before) -> Tried {
     let buffers = Buffers::new([0; 20], [0], []);
     let mut master = Master::new(UNIT, Wire::default(), buffers);
     let settings = master.settings();
-    settings.gap = Setting::new(SILENCE);
-    settings.silence = Setting::new(SILENCE);
-    settings.response_timeout = Setting::new(TIMEOUT);
-    settings.quiet_time = Setting::new(QUIET);
+    settings.gap = MicrosSetting::new(SILENCE);
+    settings.silence = MicrosSetting::new(SILENCE);
+    settings.response_timeout = MicrosSetting::new(TIMEOUT);
+    settings.quiet_time = MicrosSetting::new(QUIET);
     if before == Before::Timeout {
         request.start(&mut master);
         let outcome = outcome_of(&mut master);

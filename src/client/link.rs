@@ -2,7 +2,7 @@
 
 use super::policy::{Backoff, Policy};
 use crate::error::Status;
-use crate::time::{elapsed, has_elapsed, millis};
+use crate::time::{elapsed, has_elapsed, millis, Micros};
 
 /// The longest time between two looks at a link that is idle, in microseconds.
 pub const IDLE_DELAY: u32 = millis(1000);
@@ -103,12 +103,12 @@ pub struct Link {
     /// The wait before an attempt, its growth and jitter.
     pub policy: Policy,
     /// How long a connection may take to be made, in microseconds; 0 for no limit.
-    pub connect_timeout: u32,
+    pub connect_timeout: Micros,
     /// The time at which the state began, and how long it lasts.
-    since: u32,
-    wait: u32,
+    since: Micros,
+    wait: Micros,
     /// No request was in flight, or a byte arrived, at this time or later.
-    heard: u32,
+    heard: Micros,
 }
 
 impl Link {

@@ -34,7 +34,7 @@ pub use units::UnitRecord;
 #[doc(hidden)]
 pub use units::{find, note, rest};
 
-pub use crate::engine::{Count, Counter, Frame, Setting, Settings, Storage};
+pub use crate::engine::{Count, Counter, Frame, MicrosSetting, Settings, Storage};
 
 #[cfg(doc)]
 use crate::error::{Error, Status};

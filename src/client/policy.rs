@@ -2,7 +2,7 @@
 
 use super::request::RequestState;
 use crate::error::Status;
-use crate::time::millis;
+use crate::time::{millis, Micros};
 
 /// How the wait before a retry grows from one retry to the next. `wait` and `most` are
 /// the arguments of [`Policy::set_backoff`].
@@ -42,9 +42,9 @@ type Grow = fn(&Policy, u8, u32) -> u32;
 #[derive(Clone, Copy, Debug)]
 pub struct Policy {
     /// The wait before the first retry.
-    wait: u32,
+    wait: Micros,
     /// The longest wait.
-    max_wait: u32,
+    max_wait: Micros,
     /// Computes the wait; `None` if there is no wait. (A pointer, so that firmware
     /// without a backoff does not contain its code.)
     grow: Option<Grow>,

@@ -6,7 +6,7 @@ use super::request::{ClientRequest, RequestState, Stage};
 use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
 use crate::error::Status;
-use crate::time::{elapsed, has_elapsed, LONGEST};
+use crate::time::{elapsed, has_elapsed, Micros, LONGEST};
 use heapless::Vec;
 
 /// The requests and the policy of a client.
@@ -31,8 +31,8 @@ pub struct RequestQueue<J, const N: usize> {
     /// it is the number of requests in flight below 0, since these do not count.
     pub unanswered: i8,
     /// No request is due until `wait` microseconds have passed since `since`.
-    since: u32,
-    wait: u32,
+    since: Micros,
+    wait: Micros,
     /// The policy for retries.
     pub policy: Policy,
     /// The request in flight on a serial line. It is not in `queue`, but still counts, so

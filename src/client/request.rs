@@ -5,7 +5,7 @@ use crate::engine::BROADCAST;
 use crate::error::Error;
 use crate::error::Status;
 use crate::pdu::header::RequestHeader;
-use crate::time::LONGEST_TIMEOUT_MS;
+use crate::time::{Micros, LONGEST_TIMEOUT_MS};
 use core::fmt;
 
 /// The stage of a request.
@@ -55,8 +55,8 @@ pub struct RequestState {
     /// The transaction identifier of its TCP frame.
     pub(super) wire: u16,
     /// The request is due when `wait` microseconds have passed since `since`.
-    pub(super) since: u32,
-    pub(super) wait: u32,
+    pub(super) since: Micros,
+    pub(super) wait: Micros,
     /// The function and its arguments.
     pub header: RequestHeader,
 }

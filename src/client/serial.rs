@@ -7,7 +7,7 @@ use super::storage::ClientStorage;
 use super::transaction::ClientEngine;
 use super::Transport;
 use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
-use crate::engine::{Engine, LateUnits, Setting, Settings};
+use crate::engine::{Engine, LateUnits, MicrosSetting, Settings};
 use crate::error::Status;
 use crate::frame::{ascii, rtu};
 use crate::port::Port;
@@ -40,15 +40,15 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// without a character ends an incomplete frame.
     pub fn set_ascii(&mut self) {
         self.engine.request().set_ascii(ascii::END);
-        self.engine.settings.gap = Setting::new(0);
-        self.engine.settings.silence = Setting::new(ASCII_SILENCE);
+        self.engine.settings.gap = MicrosSetting::new(0);
+        self.engine.settings.silence = MicrosSetting::new(ASCII_SILENCE);
     }
 
     /// Changes the line to a TCP stream: no silence before a request, and
     /// [`STREAM_SILENCE`] ends a frame.
     pub fn set_stream(&mut self) {
-        self.engine.settings.gap = Setting::new(0);
-        self.engine.settings.silence = Setting::new(STREAM_SILENCE);
+        self.engine.settings.gap = MicrosSetting::new(0);
+        self.engine.settings.silence = MicrosSetting::new(STREAM_SILENCE);
     }
 }
 
@@ -186,7 +186,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
             let timeout = request
                 .state()
                 .response_timeout(&engine.storage, line.get());
-            engine.settings.response_timeout = Setting::new(timeout);
+            engine.settings.response_timeout = MicrosSetting::new(timeout);
         }
         engine.cancel();
         engine.settings.response_timeout = line;

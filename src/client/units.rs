@@ -1,7 +1,7 @@
 //! Records of units, in storage that the caller supplies.
 
 use crate::error::Status;
-use crate::time::{clamped, elapsed, LONGEST_TIMEOUT_MS};
+use crate::time::{clamped, elapsed, Micros, LONGEST_TIMEOUT_MS};
 
 /// The settings and counts of one unit. The counts wrap at 2^32.
 #[repr(C)]
@@ -16,9 +16,9 @@ pub struct UnitRecord {
     /// Retries of all requests.
     pub retries: u32,
     /// Microseconds from the end of one request to this unit to the start of the next.
-    pub delay: u32,
+    pub delay: Micros,
     /// Time at which the last request to this unit ended.
-    last: u32,
+    last: Micros,
     /// Response timeout of this unit, in milliseconds; 0 for that of the line. One above
     /// [`LONGEST_TIMEOUT_MS`] counts as that.
     pub timeout_ms: u32,

@@ -8,7 +8,7 @@ use crate::error::Status;
 use crate::port::Port;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
-    /// Makes the settings `retries`, `echo_discard` and `post_flush_hold` effective.
+    /// Makes the settings `retries`, `echo_discard` and `post_flush_characters` effective.
     pub fn use_extras(&mut self) {
         self.extras = Some(Engine::extras);
         if self.extension.is_none() {
@@ -47,7 +47,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Keeps the driver on after the port has sent the last bit, for the post-flush hold. Returns
     /// false when it is over.
     fn hold_driver(&mut self) -> bool {
-        let hold = self.settings.post_flush_hold;
+        let hold = self.settings.post_flush_characters;
         if self.phase == Phase::PostFlush {
             return !self.has_expired();
         }

@@ -1,5 +1,7 @@
 //! The units of a line that may still answer earlier requests. See `late`.
 
+use crate::time::Micros;
+
 /// How many units are remembered exactly that owe replies at the same time: 10 on a host, 4 where
 /// pointers have 32 bits, 1 on an AVR, where each takes 8 bytes of 2048.
 pub(super) const LATE_UNITS: usize = match size_of::<usize>() {
@@ -28,7 +30,7 @@ pub struct LateUnit {
     /// clock mean that it has been clean for long.
     pub(super) most: u16,
     /// When the unit is clean: it has been silent for long enough since its last request.
-    pub(super) clean: u32,
+    pub(super) clean: Micros,
 }
 
 impl LateUnit {

@@ -25,12 +25,13 @@ mod storage;
 mod transaction;
 
 pub use late_units::LateUnits;
-pub use settings::{Setting, Settings};
+pub use settings::{MicrosSetting, Settings};
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 pub use transaction::Transaction;
 
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
+use crate::time::Micros;
 
 /// The unit address of a broadcast (serial line guide V1.02, 2.2).
 pub const BROADCAST: u8 = 0;
@@ -126,13 +127,13 @@ pub struct Engine<P, S: Storage, Q> {
     /// The byte stream.
     pub port: P,
     /// When the wait began. Before and between requests: when the line was last in use.
-    pub(crate) since: u32,
+    pub(crate) since: Micros,
     /// How long the wait lasts.
-    pub(crate) wait: u32,
+    pub(crate) wait: Micros,
     /// The time of the current poll.
-    pub(crate) now: u32,
+    pub(crate) now: Micros,
     /// When the phase began.
-    begun: u32,
+    begun: Micros,
     /// Counts attempts and bytes. (A pointer, so that a program without counters does not
     /// contain its code.)
     tally: Option<fn(&mut Self, Status)>,

@@ -1,18 +1,18 @@
 //! Times and options of requests.
 
 use crate::error::Error;
-use crate::time::{self, millis, DEFAULT_SILENCE};
+use crate::time::{self, millis, Micros16, DEFAULT_SILENCE};
 
 /// A time in microseconds with a default. It stores the difference from the default, so zeroed
 /// memory is the default, and no code has to set it.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 #[repr(transparent)]
-pub struct Setting<const DEFAULT: u32>(u32);
+pub struct MicrosSetting<const DEFAULT: u32>(u32);
 
-impl<const DEFAULT: u32> Setting<DEFAULT> {
+impl<const DEFAULT: u32> MicrosSetting<DEFAULT> {
     /// The setting of a time.
     pub const fn new(microseconds: u32) -> Self {
-        Setting(microseconds.wrapping_sub(DEFAULT))
+        MicrosSetting(microseconds.wrapping_sub(DEFAULT))
     }
 
     /// The time in microseconds.
@@ -29,7 +29,7 @@ impl<const DEFAULT: u32> Setting<DEFAULT> {
         let Some(timeout) = time::timeout(milliseconds) else {
             return Err(Error::INVALID_ARGUMENT);
         };
-        *self = Setting::new(timeout);
+        *self = MicrosSetting::new(timeout);
         Ok(())
     }
 
@@ -41,7 +41,7 @@ impl<const DEFAULT: u32> Setting<DEFAULT> {
         let Ok(delay) = u16::try_from(milliseconds) else {
             return Err(Error::INVALID_ARGUMENT);
         };
-        *self = Setting::new(millis(delay));
+        *self = MicrosSetting::new(millis(delay));
         Ok(())
     }
 }
@@ -50,36 +50,36 @@ impl<const DEFAULT: u32> Setting<DEFAULT> {
 /// default.
 ///
 /// ```
-/// use mbm::master::{Setting, Settings};
+/// use mbm::master::{MicrosSetting, Settings};
 ///
 /// let mut settings = Settings::DEFAULT;
 /// settings.set_baud_rate(19200);
 /// settings.retries = 2;
 /// // A timeout of 1 s, in milliseconds and in microseconds.
 /// settings.response_timeout.set_timeout(1000)?;
-/// assert_eq!(settings.response_timeout, Setting::new(1_000_000));
+/// assert_eq!(settings.response_timeout, MicrosSetting::new(1_000_000));
 /// # Ok::<(), mbm::Error>(())
 /// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 #[repr(C)]
 pub struct Settings {
     /// Response timeout: from the end of the request to the end of the reply. The default is 2 s.
-    pub response_timeout: Setting<{ millis(2000) }>,
+    pub response_timeout: MicrosSetting<{ millis(2000) }>,
     /// The silence t3.5 that ends a frame (serial line guide V1.02, 2.5.1.1). The default is 4 ms.
-    pub silence: Setting<DEFAULT_SILENCE>,
+    pub silence: MicrosSetting<DEFAULT_SILENCE>,
     /// Silence before a request. Set it with [`Settings::set_gap`]. The default is 4 ms.
-    pub gap: Setting<DEFAULT_SILENCE>,
+    pub gap: MicrosSetting<DEFAULT_SILENCE>,
     /// Quiet time: the silence before the next request after a request without a reply, so
     /// that a late reply can pass. The default is 100 ms.
-    pub quiet_time: Setting<{ millis(100) }>,
+    pub quiet_time: MicrosSetting<{ millis(100) }>,
     /// Turnaround delay: the time that slaves get to carry out a broadcast. The default is 100 ms.
-    pub turnaround_delay: Setting<{ millis(100) }>,
+    pub turnaround_delay: MicrosSetting<{ millis(100) }>,
     /// Time of one character in microseconds; 0 if the baud rate is unknown.
-    pub character: u16,
+    pub character: Micros16,
     /// How often an unanswered request is repeated.
     pub retries: u8,
     /// How long the driver stays on after the flush, in characters.
-    pub post_flush_hold: u8,
+    pub post_flush_characters: u8,
     /// True if the line echoes each request before its reply.
     pub echo_discard: bool,
 }
@@ -87,26 +87,26 @@ pub struct Settings {
 impl Settings {
     /// The settings of a new master or client.
     pub const DEFAULT: Settings = Settings {
-        response_timeout: Setting(0),
-        silence: Setting(0),
-        gap: Setting(0),
-        quiet_time: Setting(0),
-        turnaround_delay: Setting(0),
+        response_timeout: MicrosSetting(0),
+        silence: MicrosSetting(0),
+        gap: MicrosSetting(0),
+        quiet_time: MicrosSetting(0),
+        turnaround_delay: MicrosSetting(0),
         character: 0,
         retries: 0,
-        post_flush_hold: 0,
+        post_flush_characters: 0,
         echo_discard: false,
     };
 
     /// Sets the silence before a request, in microseconds.
     pub const fn set_gap(&mut self, microseconds: u32) {
-        self.gap = Setting::new(time::clamped(microseconds));
+        self.gap = MicrosSetting::new(time::clamped(microseconds));
     }
 
     /// Derives gap, silence and character time from the baud rate in bits per second; 0 means that
     /// the rate is unknown.
     pub const fn set_baud_rate(&mut self, baud: u32) {
-        self.silence = Setting::new(time::silence(baud));
+        self.silence = MicrosSetting::new(time::silence(baud));
         self.gap = self.silence;
         self.character = if baud == 0 { 0 } else { time::character(baud) };
     }

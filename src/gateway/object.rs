@@ -5,7 +5,7 @@ use super::storage::GatewayStorage;
 use crate::error::Status;
 use crate::frame::tcp;
 use crate::pdu::EXCEPTION;
-use crate::time;
+use crate::time::{self, Micros};
 
 /// Index of the function code in a frame.
 pub(super) const FUNCTION: usize = tcp::PDU;
@@ -22,7 +22,7 @@ pub struct Gateway<S> {
     /// The number that the next request or response gets in the order.
     pub(super) order: u32,
     /// How long a request may wait for its line, in microseconds; 0 for ever.
-    pub(super) queue_time: u32,
+    pub(super) queue_time: Micros,
     /// The most requests of one connection.
     pub(super) most: u16,
     /// The caller's memory, connections, lines and units.

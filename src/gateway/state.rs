@@ -1,6 +1,7 @@
 //! The state of each request, each connection and each line of the gateway.
 
 use crate::error::Status;
+use crate::time::Micros;
 
 /// The stage of a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -44,7 +45,7 @@ pub struct Transaction {
     /// The lower number came first.
     pub(super) order: u32,
     /// Time at which it began to wait for its line.
-    pub(super) since: u32,
+    pub(super) since: Micros,
 }
 
 impl Transaction {

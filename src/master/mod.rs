@@ -12,7 +12,9 @@ pub mod request;
 #[cfg(feature = "embedded-io-async")]
 pub use self::asynchronous::AsyncMaster;
 
-pub use crate::engine::{Buffers, Count, Counter, Setting, Settings, Storage, Words, COUNTERS};
+pub use crate::engine::{
+    Buffers, Count, Counter, MicrosSetting, Settings, Storage, Words, COUNTERS,
+};
 use crate::error::{Error, Status};
 use crate::pdu::functions::FunctionSpec;
 use crate::port::Port;

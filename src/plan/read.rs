@@ -2,6 +2,7 @@
 
 use super::field::Field;
 use crate::error::Status;
+use crate::time::Millis;
 use core::cell::Cell;
 
 /// One for each field. While the plan groups its fields, position `n` holds the field that is
@@ -72,9 +73,9 @@ pub(super) const QUEUED: u8 = 16;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Read {
     /// When it is next due, in milliseconds.
-    pub(super) due: Cell<u32>,
+    pub(super) due: Cell<Millis>,
     /// It is not sent before this time.
-    pub(super) not_before: Cell<u32>,
+    pub(super) not_before: Cell<Millis>,
     /// When its last good reply arrived.
     pub(super) read_at: Cell<u32>,
     /// The time from one read to the next, in milliseconds.

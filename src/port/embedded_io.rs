@@ -2,7 +2,7 @@
 
 use super::Port;
 use crate::error::Error;
-use crate::time::{character, elapsed};
+use crate::time::{character, elapsed, Micros, Micros16};
 use ::embedded_io::{Read, ReadReady, Write, WriteReady};
 
 /// A [`Port`] over a device that implements [`Read`], [`ReadReady`], [`Write`] and
@@ -19,10 +19,10 @@ pub struct EmbeddedIo<D, C, E = fn(bool)> {
     /// A read that fails has lost characters, and not the link.
     is_serial: bool,
     /// The time of a character, with an RS-485 driver; 0 without one.
-    character: u16,
+    character: Micros16,
     /// The accepted bytes have left `wait` microseconds after `since`.
-    since: u32,
-    wait: u32,
+    since: Micros,
+    wait: Micros,
 }
 
 impl<D, C> EmbeddedIo<D, C> {

@@ -13,7 +13,7 @@ use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::Rule;
 use crate::pdu::MAX_PDU;
 use crate::port::Port;
-use crate::time::{self, elapsed, sure_to_be_sending};
+use crate::time::{self, elapsed, sure_to_be_sending, Micros, Micros16};
 
 /// Time until the next poll if only the port or a service can bring progress.
 const EXTERNAL_POLL_DELAY: u32 = time::millis(1);
@@ -127,7 +127,7 @@ pub struct Server<P, B> {
     pub request: Indication,
     /// The time up to which further bytes of a frame or of an echo may arrive; see
     /// [`Server::keeps_time`].
-    pub(super) deadline: u32,
+    pub(super) deadline: Micros,
     /// The storage that the caller supplies.
     pub storage: B,
     /// The end character of ASCII frames.
@@ -135,12 +135,12 @@ pub struct Server<P, B> {
     /// Over TCP: how many bytes of the next frame are stored in `receive_latency`.
     pub(super) read_ahead: u8,
     /// On an RTU line: the length of a character in microseconds.
-    pub(super) character: u16,
-    pub(super) now: u32,
+    pub(super) character: Micros16,
+    pub(super) now: Micros,
     /// The silence that ends a frame. Set it with [`Server::set_silence`].
-    pub silence: u32,
+    pub silence: Micros,
     /// See [`Server::set_receive_latency`].
-    pub(super) receive_latency: u32,
+    pub(super) receive_latency: Micros,
     pub(super) receive: Option<Receive<P, B>>,
     pub(super) encode_adu: Option<EncodeAdu<P, B>>,
     /// The byte stream.

@@ -6,6 +6,7 @@ use crate::pdu::custom::Function;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 use crate::text::{self, TextWriter};
+use crate::time::Micros;
 
 /// The kind of an event.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -40,10 +41,10 @@ pub struct Event<'a> {
     /// than the buffer.
     pub status: Status,
     /// Time of the last byte, in microseconds; of a timeout, the time at which it expired.
-    pub time: u32,
+    pub time: Micros,
     /// Microseconds from the last byte of the request to the last byte of its reply, or to the
     /// timeout; otherwise 0.
-    pub response_time: u32,
+    pub response_time: Micros,
     /// The transaction identifier of a TCP frame; otherwise 0.
     pub transaction: u16,
     /// The unit id; for a damaged frame the byte in its place.

@@ -10,6 +10,7 @@ use crate::pdu::custom::Function;
 use crate::pdu::functions::{DIAGNOSTICS, REPORT_SERVER_ID};
 use crate::pdu::length::Length;
 use crate::pdu::EXCEPTION;
+use crate::time::Micros;
 
 /// The kind of the bytes at the place of the search.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -42,7 +43,7 @@ pub(super) struct Context<'a> {
     pub response: bool,
     /// The end character of ASCII frames.
     pub end: u8,
-    pub now: u32,
+    pub now: Micros,
 }
 
 impl Context<'_> {

@@ -18,7 +18,7 @@ pub use pairing::RequestStart;
 use crate::error::Status;
 use crate::frame::{ascii, Framing};
 use crate::pdu::custom::Function;
-use crate::time::{character, silence, DEFAULT_CHARACTER, DEFAULT_SILENCE};
+use crate::time::{character, silence, Micros, DEFAULT_CHARACTER, DEFAULT_SILENCE};
 use find::{Candidate, Context};
 use pairing::Requests;
 use stream::{RxStream, Timing};
@@ -70,14 +70,14 @@ pub struct Sniffer {
     is_separate: bool,
     /// The frame timeout follows from the baud rate.
     has_rtu_timeout: bool,
-    timeout: u32,
+    timeout: Micros,
     timing: Timing,
     streams: [RxStream; 2],
     requests: Requests,
     /// From `idle_from` on, for `idle_for` microseconds, no event comes from the passing of time
     /// alone: no request was stored or removed since, and none times out.
-    idle_from: u32,
-    idle_for: u32,
+    idle_from: Micros,
+    idle_for: Micros,
 }
 
 /// The lengths in the stream that the next event covers.

@@ -7,6 +7,7 @@ use crate::pdu::length::Length;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 use crate::pdu::{identification, EXCEPTION};
+use crate::time::Micros;
 
 pub use crate::text::HEAD;
 
@@ -74,7 +75,7 @@ pub(super) struct OpenRequest {
     pub state: State,
     pub unit: u8,
     pub transaction: u16,
-    pub time: u32,
+    pub time: Micros,
     pub asked: RequestStart,
     /// Lengths of the request PDU and of its reply PDU; 0 if only the reply shows its length.
     length: u8,

@@ -1,13 +1,13 @@
 //! One stream of a bus: its bytes, and the times at which they arrived.
 
 use crate::bytes::move_items;
-use crate::time::elapsed;
+use crate::time::{elapsed, Micros};
 use core::cell::Cell;
 
 /// The time of arrival of bytes: the last byte before `end` arrived at `time`.
 #[derive(Clone, Copy, Debug)]
 struct Mark {
-    time: u32,
+    time: Micros,
     end: u16,
     /// The line was silent after them.
     silent: bool,
@@ -21,11 +21,11 @@ const MARKS: usize = 8;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timing {
     /// Time of one character; 0 if it is unknown.
-    pub character: u32,
+    pub character: Micros,
     /// Silence between two frames.
-    pub silence: u32,
+    pub silence: Micros,
     /// How long to wait for the rest of an incomplete frame.
-    pub frame_timeout: u32,
+    pub frame_timeout: Micros,
 }
 
 impl Timing {
@@ -58,10 +58,10 @@ pub(super) struct RxStream {
     /// How many marks are followed by silence.
     silent: u8,
     /// Time of the last byte, and of the last byte before the first mark.
-    last: u32,
-    floor: u32,
+    last: Micros,
+    floor: Micros,
     /// ...or the line has been silent for this time.
-    quiet_limit: u32,
+    quiet_limit: Micros,
     marks: [Mark; MARKS],
 }
 

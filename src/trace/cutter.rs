@@ -7,7 +7,7 @@ use crate::frame::{ascii, rtu, Framing};
 use crate::packet::{length, PduKind};
 use crate::pdu::custom::Function;
 use crate::pdu::length::Length;
-use crate::time::elapsed;
+use crate::time::{elapsed, Micros};
 use core::cell::Cell;
 
 /// The form of the frames of one direction.
@@ -148,9 +148,9 @@ pub(super) struct Cutter {
     /// Index of the first byte that arrived last.
     last_at: u16,
     /// Time of the first byte.
-    first: u32,
+    first: Micros,
     /// Time of the bytes that arrived last.
-    last: u32,
+    last: Micros,
 }
 
 impl Cutter {
@@ -340,7 +340,7 @@ pub struct Record<'a> {
     pub status: Status,
     /// Time of the first byte, in microseconds, by the clock of the port. The time of a frame that
     /// followed other bytes without a pause is estimated.
-    pub time: u32,
+    pub time: Micros,
     /// The bytes, as they are on the line.
     pub bytes: &'a [u8],
 }

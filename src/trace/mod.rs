@@ -14,6 +14,7 @@ use crate::error::Error;
 use crate::frame::Framing;
 use crate::packet::PduKind;
 use crate::port::{result, Port};
+use crate::time::Micros;
 use cutter::{Cutter, Rules};
 
 /// The smallest buffer, in bytes. Each direction uses a half of it.
@@ -38,7 +39,7 @@ pub struct Trace<P, B, O> {
     end: u8,
     /// The kind of PDU that is sent.
     sends: PduKind,
-    frame_timeout: u32,
+    frame_timeout: Micros,
     sent: Cutter,
     received: Cutter,
 }

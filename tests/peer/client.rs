@@ -7,7 +7,7 @@ mod task;
 use crate::live_server::{pattern, LiveServer, PEER_TIMEOUT};
 use crate::UNIT;
 use mbm::client::{Client, Serial, Tcp, Transport};
-use mbm::engine::Setting;
+use mbm::engine::MicrosSetting;
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::Rule;
@@ -242,7 +242,7 @@ impl<L: Transport<Task>> Requester<L> {
 }
 
 fn serial(mut line: Serial<Wire, Lent, Task>) -> Requester<Serial<Wire, Lent, Task>> {
-    line.engine.settings.response_timeout = Setting::new(TIMEOUT);
+    line.engine.settings.response_timeout = MicrosSetting::new(TIMEOUT);
     Requester::new(line)
 }
 
@@ -259,7 +259,7 @@ fn the_client_reads_every_response_of_a_pymodbus_server_over_ascii() {
 #[test]
 fn the_client_reads_every_response_of_a_pymodbus_server_over_tcp() {
     let mut line = Tcp::new(Wire::new(Framing::Tcp), Lent::default());
-    line.settings.response_timeout = Setting::new(TIMEOUT);
+    line.settings.response_timeout = MicrosSetting::new(TIMEOUT);
     Requester::new(line).check_every_function();
 }
 
@@ -268,6 +268,6 @@ fn the_client_reads_every_response_of_a_pymodbus_server_over_rtu_in_tcp() {
     let wire = Wire::new(Framing::RtuOverTcp);
     let mut client: Client<Serial<Wire, Lent, Task>, Task, 4> =
         Client::over_tcp(wire, Lent::default());
-    client.line.engine.settings.response_timeout = Setting::new(TIMEOUT);
+    client.line.engine.settings.response_timeout = MicrosSetting::new(TIMEOUT);
     Requester::with(client).check_every_function();
 }

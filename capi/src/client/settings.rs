@@ -146,7 +146,9 @@ pub unsafe extern "C" fn mbm_client_setPostFlushHold(
     client: *mut mbm_client,
     characters: u8,
 ) -> u8 {
-    set_extra(client, |settings| settings.post_flush_hold = characters)
+    set_extra(client, |settings| {
+        settings.post_flush_characters = characters
+    })
 }
 
 /// Sets your storage for counters, in which the client counts from now on. You may read and

@@ -25,7 +25,7 @@ pub struct mbm_clientUnit {
     /// unit, in microseconds; a value above 2^31 (36 minutes) means 2^31.
     pub delayUs: u32,
     /// Private.
-    last: u32,
+    lastUs: u32,
     /// Set by you: the response timeout of this unit in milliseconds, 1 to 1000000 (16
     /// minutes); 0: that of mbm_client_setResponseTimeout. mbm_client_setUnits refuses a
     /// greater number. If you set it later, it means 1000000.

@@ -111,7 +111,7 @@ pub unsafe extern "C" fn mbm_line_setEchoDiscard(line: *mut mbm_line, on: u8) ->
 #[no_mangle]
 pub unsafe extern "C" fn mbm_line_setPostFlushHold(line: *mut mbm_line, characters: u8) -> u8 {
     with(line, |line| {
-        line.settings.post_flush_hold = characters;
+        line.settings.post_flush_characters = characters;
         line.use_extras();
         Status::OK
     })

@@ -7,7 +7,7 @@ use crate::search::Search;
 use crate::stream::{event, Event};
 use crate::Input;
 use mbm::engine::{
-    Buffers, Counter, Engine, Setting, Settings, Storage as _, Words as _, BROADCAST,
+    Buffers, Counter, Engine, MicrosSetting, Settings, Storage as _, Words as _, BROADCAST,
 };
 use mbm::error::Status;
 use mbm::master::request::MasterRequest;
@@ -141,14 +141,14 @@ fn requests<const SINGLE: bool>(input: &mut Input) {
     let mut engine = Engine::new(line, buffers);
     let time = |input: &mut Input| u32::from(input.u8()) * 64;
     engine.settings = Settings {
-        gap: Setting::new(time(input)),
-        silence: Setting::new(time(input)),
-        response_timeout: Setting::new(1000 + 4 * time(input)),
-        turnaround_delay: Setting::new(time(input)),
-        quiet_time: Setting::new(2 * time(input)),
+        gap: MicrosSetting::new(time(input)),
+        silence: MicrosSetting::new(time(input)),
+        response_timeout: MicrosSetting::new(1000 + 4 * time(input)),
+        turnaround_delay: MicrosSetting::new(time(input)),
+        quiet_time: MicrosSetting::new(2 * time(input)),
         character: u16::from(input.u8()),
         retries: input.u8() % 3,
-        post_flush_hold: input.u8() % 4,
+        post_flush_characters: input.u8() % 4,
         echo_discard: input.u8() & 1 == 1,
     };
     // A right reply arrived before a request was sent.
