@@ -338,8 +338,8 @@ TEST(rs485_sets_up_the_driver_and_close_restores_it)
     driver.longest = 100;
     driver.state.delay_rts_after_send = 42;
     options.rs485 = 1;
-    options.rtsDelayBefore = 3;
-    options.rtsDelayAfter = 5;
+    options.rtsDelayBeforeMs = 3;
+    options.rtsDelayAfterMs = 5;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &options), 0);
     assert_int_equal(driver.state.flags, SER_RS485_ENABLED | SER_RS485_RTS_ON_SEND);
     assert_int_equal(driver.state.delay_rts_before_send, 3);
@@ -385,7 +385,7 @@ TEST(an_rs485_delay_that_the_driver_shortens_is_refused)
     driver.there = 1;
     driver.longest = 100;
     options.rs485 = 1;
-    options.rtsDelayBefore = 101;
+    options.rtsDelayBeforeMs = 101;
     FAILS(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
     assert_int_equal(driver.state.flags, 0);
 }

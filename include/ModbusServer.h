@@ -248,7 +248,7 @@ public:
     void setSilence(uint32_t us)
     {
         if (mbm_server_setSilence(&state.server, us / 2) != MBM_BUSY)
-            state.silence = us;
+            state.silenceUs = us;
     }
 
     /**
@@ -281,8 +281,8 @@ private:
         Stream *stream;
         ModbusTransmissionHook onPre;
         ModbusTransmissionHook onPost;
-        uint32_t receivedAt; // microseconds: when the last byte was read
-        uint32_t silence;
+        uint32_t receivedAtUs; // when the last byte was read
+        uint32_t silenceUs;
         bool ready; // a response waits for the silence to end
         mbm_server server;
         uint8_t frame[MODBUSSERVER_FRAME_BYTES];
@@ -305,7 +305,7 @@ private:
                                       MODBUSSERVER_FRAME_BYTES);
         if (status == MBM_OK) {
             state.stream = &stream;
-            state.silence = 0;
+            state.silenceUs = 0;
             state.ready = false;
         }
         return status;
@@ -339,7 +339,7 @@ private:
         for (; left > 0 && stream.available() > 0; left--)
             *bytes++ = static_cast<uint8_t>(stream.read());
         if (left != capacity)
-            stateOf(context).receivedAt = clockHook(context);
+            stateOf(context).receivedAtUs = clockHook(context);
         return static_cast<int16_t>(capacity - left);
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
@@ -347,9 +347,9 @@ private:
         State &state = stateOf(context);
         if (state.ready) {
             // Waits here for the last 100 us of the silence, because loop may take longer.
-            if (clockHook(context) - state.receivedAt + shortWait < state.silence)
+            if (clockHook(context) - state.receivedAtUs + shortWait < state.silenceUs)
                 return 0;
-            while (clockHook(context) - state.receivedAt < state.silence) {
+            while (clockHook(context) - state.receivedAtUs < state.silenceUs) {
             }
             state.ready = false;
             state.onPre.call();

@@ -46,7 +46,7 @@ static int16_t line_write(void *context, const uint8_t *bytes, uint16_t length)
     if (!line->isOpen)
         return -1;
     length = length < MBM_MAX_FRAME ? length : MBM_MAX_FRAME;
-    line->sentAt = esp_timer_get_time() + sending_micros(line, length);
+    line->sentAtUs = esp_timer_get_time() + sending_micros(line, length);
     return (int16_t)uart_write_bytes(line->uart, bytes, length);
 }
 
@@ -64,7 +64,7 @@ static uint8_t line_flush(void *context)
 
     if (!line->isOpen)
         return 1;
-    return esp_timer_get_time() >= line->sentAt &&
+    return esp_timer_get_time() >= line->sentAtUs &&
            uart_wait_tx_done(line->uart, 0) != ESP_ERR_TIMEOUT;
 }
 

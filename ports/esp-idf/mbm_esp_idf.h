@@ -36,7 +36,7 @@ typedef struct mbm_espIdfLine {
     int baud;                /**< bits per second */
     uart_parity_t parity;    /**< Modbus's default is UART_PARITY_EVEN */
     uint8_t isOpen;          /**< private */
-    int64_t sentAt;          /**< private */
+    int64_t sentAtUs;        /**< private */
 } mbm_espIdfLine;
 
 /**

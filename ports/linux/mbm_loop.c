@@ -90,7 +90,7 @@ static inline void put(mbm_loop *loop, uint32_t at, mbm_loop_place place)
 /* Puts a place, of which the one at `at` is free, at `at` or higher up. */
 static void rise(mbm_loop *loop, uint32_t at, mbm_loop_place place)
 {
-    while (at > 1 && loop->places[at / 2 - 1].time > place.time) {
+    while (at > 1 && loop->places[at / 2 - 1].timeUs > place.timeUs) {
         put(loop, at, loop->places[at / 2 - 1]);
         at /= 2;
     }
@@ -104,7 +104,7 @@ static inline uint32_t first_below(const mbm_loop *loop, uint32_t at)
 
     if (one >= loop->timed)
         return one == loop->timed ? one : 0;
-    return loop->places[one].time < loop->places[one - 1].time ? one + 1 : one;
+    return loop->places[one].timeUs < loop->places[one - 1].timeUs ? one + 1 : one;
 }
 
 /* Puts a place, of which the one at `at` is free, at `at` or further down. */
@@ -112,7 +112,7 @@ static void sink(mbm_loop *loop, uint32_t at, mbm_loop_place place)
 {
     uint32_t next = first_below(loop, at);
 
-    while (next != 0 && loop->places[next - 1].time < place.time) {
+    while (next != 0 && loop->places[next - 1].timeUs < place.timeUs) {
         put(loop, at, loop->places[next - 1]);
         at = next;
         next = first_below(loop, at);
@@ -132,7 +132,7 @@ static void leave_heap(mbm_loop_entry *entry)
     last = loop->places[--loop->timed];
     if (at > loop->timed)
         return;
-    if (at > 1 && loop->places[at / 2 - 1].time > last.time)
+    if (at > 1 && loop->places[at / 2 - 1].timeUs > last.timeUs)
         rise(loop, at, last);
     else
         sink(loop, at, last);
@@ -143,9 +143,9 @@ static void set_due(mbm_loop_entry *entry, int64_t due)
 {
     mbm_loop *loop = entry->loop;
 
-    entry->due = due;
+    entry->dueUs = due;
     if (entry->place != 0) {
-        if (due < loop->places[entry->place - 1].time)
+        if (due < loop->places[entry->place - 1].timeUs)
             rise(loop, entry->place, (mbm_loop_place){due, entry});
     } else if (due != NEVER) {
         rise(loop, ++loop->timed, (mbm_loop_place){due, entry});
@@ -156,15 +156,15 @@ static void set_due(mbm_loop_entry *entry, int64_t due)
  * their entry's time. */
 static mbm_loop_entry *find_due(mbm_loop *loop, int64_t now)
 {
-    while (loop->timed > 0 && loop->places[0].time <= now) {
+    while (loop->timed > 0 && loop->places[0].timeUs <= now) {
         mbm_loop_entry *entry = loop->places[0].entry;
 
-        if (entry->due <= now)
+        if (entry->dueUs <= now)
             return entry;
-        if (entry->due == NEVER)
+        if (entry->dueUs == NEVER)
             leave_heap(entry);
         else
-            sink(loop, 1, (mbm_loop_place){entry->due, entry});
+            sink(loop, 1, (mbm_loop_place){entry->dueUs, entry});
     }
     return NULL;
 }
@@ -262,7 +262,7 @@ __attribute__((noinline)) static uint32_t follow_port(mbm_loop_entry *entry, uin
 
 static void poll_entry(mbm_loop *loop, mbm_loop_entry *entry)
 {
-    int64_t now = loop->now;
+    int64_t now = loop->nowUs;
     uint32_t delay;
 
     if (entry->awake.next)
@@ -277,8 +277,8 @@ static void poll_entry(mbm_loop *loop, mbm_loop_entry *entry)
         /* The delay counts from when the entry has looked at the clock. */
         const mbm_tcp *tcp = (const mbm_tcp *)entry->port;
 
-        if (tcp->clock > now)
-            now = tcp->clock;
+        if (tcp->clockUs > now)
+            now = tcp->clockUs;
     } else {
         delay = follow_port(entry, delay);
     }
@@ -326,10 +326,10 @@ static void poll_due(mbm_loop *loop)
 {
     mbm_loop_entry *entry;
 
-    while ((entry = find_due(loop, loop->now))) {
+    while ((entry = find_due(loop, loop->nowUs))) {
         if (entry->kind == OF_LISTENER)
             ((mbm_tcp_listener *)entry->port)->nothingToAccept = 0;
-        entry->due = NEVER;
+        entry->dueUs = NEVER;
         poll_entry(loop, entry);
     }
 }
@@ -360,7 +360,7 @@ static void poll_listed(mbm_loop *loop)
 /* Waits until a descriptor is ready, at most until `until`. Returns the number of descriptors. */
 static int wait_until(const mbm_loop *loop, int64_t until, struct epoll_event *events)
 {
-    const int64_t left = until == NEVER ? NEVER : until - loop->now;
+    const int64_t left = until == NEVER ? NEVER : until - loop->nowUs;
     struct pollfd wait = {loop->set.fd, POLLIN, 0};
     struct timespec time;
     int count;
@@ -391,19 +391,19 @@ int mbm_loop_wait(mbm_loop *loop, uint32_t timeoutUs)
     if (loop->isPolling)
         return refuse(EBUSY);
     loop->polled = 0;
-    loop->now = clock_now();
-    end = timeoutUs == MBM_LOOP_FOREVER ? NEVER : loop->now + timeoutUs;
+    loop->nowUs = clock_now();
+    end = timeoutUs == MBM_LOOP_FOREVER ? NEVER : loop->nowUs + timeoutUs;
     do {
         until = end;
-        if (!is_empty(&loop->awake) || loop->set.first || find_due(loop, loop->now))
-            until = loop->now;
-        else if (loop->timed > 0 && loop->places[0].time < until)
-            until = loop->places[0].time;
+        if (!is_empty(&loop->awake) || loop->set.first || find_due(loop, loop->nowUs))
+            until = loop->nowUs;
+        else if (loop->timed > 0 && loop->places[0].timeUs < until)
+            until = loop->places[0].timeUs;
         count = wait_until(loop, until, events);
         if (count < 0 && errno != EINTR)
             return -1;
-        loop->now = clock_now();
-        loop->set.now = loop->now / 1000;
+        loop->nowUs = clock_now();
+        loop->set.nowMs = loop->nowUs / 1000;
         loop->ready = events;
         loop->readyCount = count;
         loop->isPolling = 1;
@@ -413,7 +413,7 @@ int mbm_loop_wait(mbm_loop *loop, uint32_t timeoutUs)
         poll_listed(loop);
         loop->isPolling = 0;
         loop->readyCount = 0;
-    } while (loop->polled == 0 && count >= 0 && loop->now < end);
+    } while (loop->polled == 0 && count >= 0 && loop->nowUs < end);
     return (int)(loop->polled < INT32_MAX ? loop->polled : INT32_MAX);
 }
 
@@ -425,7 +425,7 @@ uint32_t mbm_loop_pollDelay(const mbm_loop *loop)
         return MBM_LOOP_FOREVER;
     if (!is_empty(&loop->awake) || loop->set.first)
         return 0;
-    left = loop->places[0].time - clock_now();
+    left = loop->places[0].timeUs - clock_now();
     if (left <= 0)
         return 0;
     return left < MBM_LOOP_FOREVER ? (uint32_t)left : MBM_LOOP_FOREVER - 1;
@@ -476,7 +476,7 @@ static void begin_entry(mbm_loop *loop, mbm_loop_entry *entry, uint8_t kind, voi
     entry->loop = loop;
     entry->kind = kind;
     entry->port = port;
-    entry->due = NEVER;
+    entry->dueUs = NEVER;
     entry->place = 0;
     entry->fd = -1;
     entry->events = 0;

@@ -73,7 +73,7 @@ typedef struct mbm_loop_entry {
     mbm_loop_link awake;   /**< private */
     struct mbm_loop *loop; /**< private */
     void *port;            /**< private */
-    int64_t due;           /**< private */
+    int64_t dueUs;         /**< private */
     uint32_t place;        /**< private */
     int fd;                /**< private */
     uint8_t kind;          /**< private */
@@ -82,7 +82,7 @@ typedef struct mbm_loop_entry {
 
 /** Storage of a loop, one for each entry. */
 typedef struct mbm_loop_place {
-    int64_t time;          /**< private */
+    int64_t timeUs;        /**< private */
     mbm_loop_entry *entry; /**< private */
 } mbm_loop_place;
 
@@ -96,7 +96,7 @@ typedef struct mbm_loop {
     uint32_t count;            /**< private */
     uint32_t timed;            /**< private */
     uint32_t polled;           /**< private */
-    int64_t now;               /**< private */
+    int64_t nowUs;             /**< private */
     mbm_loop_link awake;       /**< private */
     mbm_loop_entry *current;   /**< private */
     mbm_loop_entry *accepting; /**< private */

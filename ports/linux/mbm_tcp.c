@@ -128,10 +128,10 @@ static inline void report_again(mbm_tcp *tcp)
  * enough; else in a set that of the last wait is. */
 static inline void note_activity(mbm_tcp *tcp)
 {
-    if (tcp->clock != 0)
-        tcp->lastActivity = tcp->clock;
+    if (tcp->clockUs != 0)
+        tcp->lastActivityUs = tcp->clockUs;
     else
-        tcp->lastActivity = (tcp->set ? tcp->set->now : mbm_tcp_milliseconds()) * 1000;
+        tcp->lastActivityUs = (tcp->set ? tcp->set->nowMs : mbm_tcp_milliseconds()) * 1000;
 }
 
 static void set(int fd, int level, int option, int value)
@@ -269,7 +269,7 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd)
         return -1;
     memset(tcp, 0, sizeof *tcp);
     tcp->fd = fd;
-    tcp->lastActivity = mbm_tcp_milliseconds() * 1000;
+    tcp->lastActivityUs = mbm_tcp_milliseconds() * 1000;
     enter(tcp, CONNECTED);
     return 0;
 }
@@ -286,7 +286,7 @@ int64_t mbm_tcp_idleFor(const mbm_tcp *tcp)
     if (tcp->state != CONNECTED)
         return -1;
     /* The clock of the port is finer, and so a little ahead. */
-    idle = mbm_tcp_milliseconds() - tcp->lastActivity / 1000;
+    idle = mbm_tcp_milliseconds() - tcp->lastActivityUs / 1000;
     return idle > 0 ? idle : 0;
 }
 
@@ -308,7 +308,7 @@ void mbm_tcp_close(mbm_tcp *tcp)
     remove_from_ready(tcp);
     /* A waiting connection may need the descriptor that this frees. */
     if (tcp->set && tcp->set->listener)
-        tcp->set->listener->retryAt = 0;
+        tcp->set->listener->retryAtMs = 0;
     tcp->set = NULL;
 }
 
@@ -469,7 +469,7 @@ static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
     report_again(tcp);
     note_activity(tcp);
     /* If the next read or write comes without a look at the clock, this time is too old for it. */
-    tcp->clock = 0;
+    tcp->clockUs = 0;
     return (int16_t)count;
 }
 
@@ -479,8 +479,8 @@ static uint32_t tcp_micros(void *context)
     struct timespec now;
 
     clock_gettime(CLOCK_MONOTONIC, &now);
-    tcp->clock = (int64_t)now.tv_sec * 1000000 + (uint32_t)now.tv_nsec / 1000u;
-    return (uint32_t)tcp->clock;
+    tcp->clockUs = (int64_t)now.tv_sec * 1000000 + (uint32_t)now.tv_nsec / 1000u;
+    return (uint32_t)tcp->clockUs;
 }
 
 static void tcp_idle(void *context, mbm_node *node)

@@ -77,8 +77,8 @@ typedef struct mbm_tcp {
     uint8_t state;   /**< private */
     uint8_t events;  /**< what to poll it for: POLLIN, and POLLOUT while it accepts no more bytes */
     uint8_t readiness;            /**< private */
-    int64_t lastActivity;         /**< private */
-    int64_t clock;                /**< private */
+    int64_t lastActivityUs;       /**< private */
+    int64_t clockUs;              /**< private */
     mbm_tcp_addresses *addresses; /**< private */
     struct mbm_tcp_set *set;      /**< private */
     struct mbm_tcp *next;         /**< private */
@@ -99,7 +99,7 @@ typedef struct mbm_tcp_listener {
     uint32_t refused;    /**< number of connections that were closed for lack of a place or of a
                             descriptor */
     uint32_t idle;       /**< number of connections that were closed because they were idle */
-    int64_t retryAt;     /**< private */
+    int64_t retryAtMs;   /**< private */
     struct mbm_tcp_set *set; /**< private */
 } mbm_tcp_listener;
 
@@ -108,7 +108,7 @@ typedef struct mbm_tcp_set {
     int fd;                     /**< the descriptor of epoll: a program that polls other descriptors
                                      too polls it for POLLIN, and then calls mbm_tcp_waitSet */
     uint8_t isOpen;             /**< private */
-    int64_t now;                /**< private */
+    int64_t nowMs;              /**< private */
     mbm_tcp *first;             /**< private */
     mbm_tcp **end;              /**< private */
     mbm_tcp_listener *listener; /**< private */

@@ -131,7 +131,7 @@ static int close_oldest(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         /* Compares the times of the last bytes, since the idle times grow from one call to
          * the next. */
         if (!tcps[i].isBusy && mbm_tcp_idleFor(&tcps[i]) >= (int64_t)listener->idleTimeMs &&
-            (!oldest || tcps[i].lastActivity < oldest->lastActivity))
+            (!oldest || tcps[i].lastActivityUs < oldest->lastActivityUs))
             oldest = &tcps[i];
     }
     if (!oldest)
@@ -256,7 +256,7 @@ int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
     set_events(listener, place >= 0 || error == EAGAIN ? POLLIN : 0);
     if (place < 0 && listener->set) {
         listener->nothingToAccept = 1;
-        listener->retryAt = mbm_tcp_milliseconds() + MBM_TCP_RETRY / 1000;
+        listener->retryAtMs = mbm_tcp_milliseconds() + MBM_TCP_RETRY / 1000;
     }
     errno = error;
     return place;

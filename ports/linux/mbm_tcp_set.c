@@ -51,7 +51,7 @@ int mbm_tcp_openSet(mbm_tcp_set *set)
     if (set->fd < 0)
         return -1;
     set->isOpen = 1;
-    set->now = mbm_tcp_milliseconds();
+    set->nowMs = mbm_tcp_milliseconds();
     set->first = NULL;
     set->end = &set->first;
     set->listener = NULL;
@@ -108,7 +108,7 @@ static int64_t until_retry(mbm_tcp_set *set)
 
     if (!listener || listener->events != 0)
         return -1;
-    left = listener->retryAt - set->now;
+    left = listener->retryAtMs - set->nowMs;
     if (left > 0)
         return left;
     listener->nothingToAccept = 0;
@@ -128,7 +128,7 @@ static int wait_once(mbm_tcp_set *set, int64_t time)
     else if (retry >= 0 && (time < 0 || time > retry))
         time = retry;
     count = epoll_wait(set->fd, events, MBM_TCP_READY, (int)time);
-    set->now = mbm_tcp_milliseconds();
+    set->nowMs = mbm_tcp_milliseconds();
     for (i = 0; i < count; i++) {
         mbm_tcp *tcp = (mbm_tcp *)events[i].data.ptr;
 

@@ -240,14 +240,14 @@ static uint32_t now(const mbm_tls *tls)
  * ahead. */
 static uint32_t age_of(const mbm_tls *tls)
 {
-    const uint32_t time = now(tls) - tls->startedAt;
+    const uint32_t time = now(tls) - tls->startedAtUs;
 
     return time <= INT32_MAX ? time : 0;
 }
 
 int mbm_tls_isOlder(const mbm_tls *tls, const mbm_tls *other)
 {
-    return tls->startedAt - other->startedAt > INT32_MAX;
+    return tls->startedAtUs - other->startedAtUs > INT32_MAX;
 }
 
 static int state_of(const mbm_tls *tls)
@@ -273,7 +273,7 @@ static void begin_handshake(mbm_tls *tls)
     tls->flags = tls->authorityFlags = 0;
     tls->sent = tls->toSend = 0;
     memset(tls->role, 0, sizeof tls->role);
-    tls->startedAt = now(tls);
+    tls->startedAtUs = now(tls);
     tls->status = MBM_TLS_HANDSHAKE;
 }
 

@@ -161,7 +161,7 @@ typedef struct mbm_tls {
     uint8_t ahead[7];                   /**< private */
     uint8_t sending[MBM_MAX_TCP_FRAME]; /**< private */
     uint16_t sent, toSend;              /**< private */
-    uint32_t startedAt;                 /**< private */
+    uint32_t startedAtUs;               /**< private */
     const mbm_tls_identity *identity;   /**< private */
     mbm_port below;                     /**< private */
     mbm_linkHooks link;                 /**< private */

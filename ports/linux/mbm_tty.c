@@ -147,16 +147,17 @@ static int begin_rs485(mbm_tty *tty, const mbm_tty_options *options)
     now.flags |= options->rtsLow ? SER_RS485_RTS_AFTER_SEND : SER_RS485_RTS_ON_SEND;
     if (options->hearSelf)
         now.flags |= SER_RS485_RX_DURING_TX;
-    now.delay_rts_before_send = options->rtsDelayBefore;
-    now.delay_rts_after_send = options->rtsDelayAfter;
+    now.delay_rts_before_send = options->rtsDelayBeforeMs;
+    now.delay_rts_after_send = options->rtsDelayAfterMs;
     if (ioctl(tty->fd, TIOCSRS485, &now) < 0)
         return -1;
     tty->is_rs485 = 1;
     /* The driver drops settings that it cannot do, and only this shows it. */
     if (ioctl(tty->fd, TIOCGRS485, &now) < 0)
         return -1;
-    if (!(now.flags & SER_RS485_ENABLED) || now.delay_rts_before_send != options->rtsDelayBefore ||
-        now.delay_rts_after_send != options->rtsDelayAfter)
+    if (!(now.flags & SER_RS485_ENABLED) ||
+        now.delay_rts_before_send != options->rtsDelayBeforeMs ||
+        now.delay_rts_after_send != options->rtsDelayAfterMs)
         return refuse(EINVAL);
     return 0;
 }

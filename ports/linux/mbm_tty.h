@@ -27,18 +27,18 @@ extern "C" {
 
 /** The settings of a serial line. */
 typedef struct mbm_tty_options {
-    uint32_t baud;           /**< bits per second: any rate for which termios has a constant */
-    uint8_t anyRate;         /**< 1: other rates too, to within 2 %, if the system can, as Linux */
-    char parity;             /**< 'N', 'E' or 'O' */
-    uint8_t stop;            /**< stop bits, 1 or 2 */
-    uint8_t data;            /**< data bits: 8 (or 0, which means 8), or 7 for ASCII */
-    uint8_t exclusive;       /**< 1: no other program may open the terminal meanwhile */
-    uint8_t rs485;           /**< 1: the driver of the system switches RTS for RS-485 */
-    uint8_t rtsLow;          /**< with rs485, 1: RTS is low while sending, else high */
-    uint8_t hearSelf;        /**< with rs485, 1: the receiver also receives what is sent */
-    uint16_t rtsDelayBefore; /**< with rs485: from RTS to the first bit, milliseconds */
-    uint16_t rtsDelayAfter;  /**< with rs485: from the last bit to RTS, milliseconds */
-    uint8_t shared;          /**< 1: others may open it too, but none has it exclusively */
+    uint32_t baud;     /**< bits per second: any rate for which termios has a constant */
+    uint8_t anyRate;   /**< 1: other rates too, to within 2 %, if the system can, as Linux */
+    char parity;       /**< 'N', 'E' or 'O' */
+    uint8_t stop;      /**< stop bits, 1 or 2 */
+    uint8_t data;      /**< data bits: 8 (or 0, which means 8), or 7 for ASCII */
+    uint8_t exclusive; /**< 1: no other program may open the terminal meanwhile */
+    uint8_t rs485;     /**< 1: the driver of the system switches RTS for RS-485 */
+    uint8_t rtsLow;    /**< with rs485, 1: RTS is low while sending, else high */
+    uint8_t hearSelf;  /**< with rs485, 1: the receiver also receives what is sent */
+    uint16_t rtsDelayBeforeMs; /**< with rs485: from RTS to the first bit, milliseconds */
+    uint16_t rtsDelayAfterMs;  /**< with rs485: from the last bit to RTS, milliseconds */
+    uint8_t shared;            /**< 1: others may open it too, but none has it exclusively */
 } mbm_tty_options;
 
 /** A terminal in use as a port. Initialise it with MBM_INIT. */

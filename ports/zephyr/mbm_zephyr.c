@@ -93,8 +93,8 @@ static int16_t line_write(void *context, const uint8_t *bytes, uint16_t length)
     memcpy(line->toSend, bytes, length);
     line->next = 0;
     line->end = length;
-    line->beganAt = k_cycle_get_32();
-    line->lasts = k_us_to_cyc_ceil32(sending_micros(line, length));
+    line->beganAtCycles = k_cycle_get_32();
+    line->lastsCycles = k_us_to_cyc_ceil32(sending_micros(line, length));
     line->isSending = true;
     uart_irq_tx_enable(line->uart);
     return (int16_t)length;
@@ -106,7 +106,7 @@ static uint8_t line_flush(void *context)
 {
     mbm_zephyrLine *line = context;
 
-    return !line->isSending && k_cycle_get_32() - line->beganAt >= line->lasts;
+    return !line->isSending && k_cycle_get_32() - line->beganAtCycles >= line->lastsCycles;
 }
 
 static void driver_on(void *context)

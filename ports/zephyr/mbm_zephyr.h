@@ -44,8 +44,8 @@ typedef struct mbm_zephyrLine {
     volatile uint16_t next;               /**< private: the first byte that is not in the FIFO */
     volatile uint16_t end;                /**< private: the end of the bytes to send */
     volatile bool isSending;              /**< private */
-    uint32_t beganAt;                     /**< private */
-    uint32_t lasts;                       /**< private */
+    uint32_t beganAtCycles;               /**< private */
+    uint32_t lastsCycles;                 /**< private */
     struct k_sem received;                /**< private */
 } mbm_zephyrLine;
 
