@@ -90,15 +90,15 @@ header: ## Generate include/mbm.h and its parts from the source
 
 # The features of the core that add a crate.
 FEATURES := defmt,embedded-io,embedded-io-async
+# The others need another target, or compile C first.
+LINTED := --workspace --exclude mbm-example --exclude mbm-bench
 .PHONY: check
 check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header, docs, functions, spelling, symbols
 	@$(CARGO) fmt --all --check
-	@for crate in bench model examples/rust; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
-	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus,$(FEATURES) -- -D warnings
-	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
+	@$(CARGO) clippy --quiet $(LINTED) --all-targets --features pymodbus,$(FEATURES) -- -D warnings
+	@$(CARGO) clippy --quiet $(LINTED) --all-targets -- -D warnings
 	@for feature in $(subst $(comma), ,$(FEATURES)); do \
 		$(CARGO) clippy --quiet --features $$feature -- -D warnings || exit 1; done
-	@$(CARGO) clippy --quiet --manifest-path model/Cargo.toml --target-dir $(BUILD)/model --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps -p mbm --features $(FEATURES)
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
@@ -125,7 +125,6 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 format: ## Format Rust, C and C++ as `make check` requires
 	@scripts/need clang-format
 	@$(CARGO) fmt --all
-	@for crate in bench model examples/rust; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
 	@clang-format -i $(C_SOURCES)
 
 # --- tests. Compiling and tests that wait run side by side.
@@ -187,7 +186,7 @@ fuzz-api: ## Fuzz the C API with sequences of calls, CALLS in total (10000000)
 	@CARGO="$(CARGO)" MBM_API_CALLS=$(CALLS) scripts/check/fuzz c_api
 
 MODEL_SECONDS ?= 300
-MODEL := --quiet --release --manifest-path model/Cargo.toml --target-dir $(BUILD)/model
+MODEL := --quiet --profile model --package mbm-model --target-dir $(BUILD)/model
 .PHONY: model
 model: ## Try every order of events around a request, then every stream of bytes, each for MODEL_SECONDS (300)
 	@mkdir -p $(BUILD)

@@ -26,17 +26,17 @@ from cyclonedx.output.json import JsonV1Dot6
 from packageurl import PackageURL
 
 LICENCE = "MIT OR Apache-2.0"
-# The manifests whose lock files say what is built, with options of Cargo, and what each is for. The
-# first has the library.
-MANIFESTS = [
-    (["Cargo.toml"], "tests"),
-    (["Cargo.toml", "--features=mbm-fuzz/libfuzzer"], "fuzzing"),
-    (["Cargo.toml", "--all-features"], "features of the crate"),
-    (["examples/rust/Cargo.toml"], "an example"),
-    (["bench/Cargo.toml"], "benchmarks"),
-    (["model/Cargo.toml"], "model checking"),
-]
+# What the crates of the workspace are for, with options of `cargo tree` that choose them. The library comes first.
 SHIPPED = "mbm-archive"
+PURPOSES = [
+    (None, [f"--package={SHIPPED}", "--edges=normal"]),
+    ("tests", ["--package=mbm", "--package=mbm-c", "--package=mbm-tools"]),
+    ("features of the crate", ["--package=mbm", "--all-features"]),
+    ("an example", ["--package=mbm-example"]),
+    ("fuzzing", ["--package=mbm-fuzz", "--all-features"]),
+    ("benchmarks", ["--package=mbm-bench"]),
+    ("model checking", ["--package=mbm-model"]),
+]
 TOOLS = "checking and building"
 TOOL = re.compile(r"scripts/cargo-tool ([a-z][a-z-]*) (?:(\d+\.\d+\.\d+)|\$\((\w+)\))")
 REQUIREMENT = re.compile(r"^([A-Za-z0-9._-]+)==(\S+)")
@@ -60,58 +60,38 @@ def component(kind, name, version, *, licence, purpose=None, sha256=(), descript
     )
 
 
-def metadata(manifest):
-    command = ["cargo", "metadata", "--format-version=1", "--locked", "--manifest-path", *manifest]
-    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
+def cargo(command, *options):
+    return subprocess.run(["cargo", command, "--locked", *options], check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
-def checksums(manifest):
-    lock = tomllib.loads(pathlib.Path(manifest).with_name("Cargo.lock").read_text())
-    return {(package["name"], package["version"]): package.get("checksum") for package in lock["package"]}
-
-
-def shipped(resolve, root):
-    """The ids of all packages that are compiled into the package with the id `root`."""
-    nodes = {node["id"]: node for node in resolve["nodes"]}
-    found, todo = set(), [root]
-    while todo:
-        current = todo.pop()
-        if current in found:
-            continue
-        found.add(current)
-        for dep in nodes[current]["deps"]:
-            if any(kind["kind"] is None for kind in dep["dep_kinds"]):
-                todo.append(dep["pkg"])
-    return found
+def tree(options):
+    """The names and versions of all crates that the chosen ones are built of."""
+    lines = cargo("tree", "--target=all", "--prefix=none", "--format={p}", *options).splitlines()
+    return [(name, version.removeprefix("v")) for name, version, *_ in map(str.split, filter(None, lines))]
 
 
 def crates():
-    """The components of all lock files, and for those in the library what each depends on."""
-    components, edges = {}, {}
-    for manifest, purpose in MANIFESTS:
-        data, sums = metadata(manifest), checksums(manifest[0])
-        packages = {package["id"]: package for package in data["packages"]}
-        inside = set()
-        if manifest == MANIFESTS[0][0]:
-            root = next(id for id, package in packages.items() if package["name"] == SHIPPED)
-            inside = shipped(data["resolve"], root)
-            for node in data["resolve"]["nodes"]:
-                if node["id"] in inside:
-                    edges[key(packages[node["id"]])] = {
-                        key(packages[dep["pkg"]]) for dep in node["deps"] if dep["pkg"] in inside
-                    }
-        for id, package in packages.items():
+    """The components of the lock file, and for those in the library what each depends on."""
+    data = json.loads(cargo("metadata", "--format-version=1", "--all-features"))
+    packages = {key(package): package for package in data["packages"]}
+    lock = tomllib.loads(pathlib.Path("Cargo.lock").read_text())
+    sums = {key(package): package.get("checksum") for package in lock["package"]}
+    components = {}
+    chosen = [(purpose, tree(options)) for purpose, options in PURPOSES]
+    # The lock file has crates too that only other features of crates would bring.
+    for purpose, names in [*chosen, ("nothing that is built", packages)]:
+        for crate in names:
             # Programs of this repository are no components.
-            if package["source"] is None and id not in inside:
-                continue
-            if key(package) not in components:
-                components[key(package)] = component(
-                    "cargo",
-                    *key(package),
-                    licence=package["license"],
-                    purpose=None if id in inside else purpose,
-                    sha256=[sum for sum in [sums[key(package)]] if sum],
+            if crate not in components and (packages[crate]["source"] or purpose is None):
+                components[crate] = component(
+                    "cargo", *crate, licence=packages[crate]["license"], purpose=purpose, sha256=[sum for sum in [sums[crate]] if sum]
                 )
+    inside = {crate for crate, part in components.items() if part.scope == ComponentScope.REQUIRED}
+    names = {package["id"]: key(package) for package in data["packages"]}
+    edges = {
+        names[node["id"]]: {names[dep["pkg"]] for dep in node["deps"]} & inside
+        for node in data["resolve"]["nodes"] if names[node["id"]] in inside
+    }  # fmt: skip
     return components, edges
 
 
