@@ -60,13 +60,12 @@ static void all_others_answer(mbm_line *l, mbm_node *m, uint8_t status)
     assert_int_equal(mbm_node_receive(m), 0xFFFF);
 }
 
-TEST(null_is_an_invalid_argument_everywhere)
+SIM_TEST(null_is_an_invalid_argument_everywhere)
 {
     mbm_line l = MBM_INIT;
     mbm_node m = MBM_INIT;
     uint16_t words[2] = {0, 0};
     uint8_t frame[16];
-    SIM;
 
     all_requests_answer(NULL, MBM_INVALID_ARGUMENT);
     all_others_answer(NULL, NULL, MBM_INVALID_ARGUMENT);
@@ -100,20 +99,17 @@ TEST(a_zeroed_object_is_not_initialised_and_stays_zero)
 
 TEST(every_status_has_a_text)
 {
-    unsigned status;
-
-    for (status = 0; status < 256; status++) {
+    for (unsigned status = 0; status < 256; status++) {
         assert_non_null(mbm_status_text((uint8_t)status));
         assert_true(strlen(mbm_status_text((uint8_t)status)) > 0);
     }
     assert_string_not_equal(mbm_status_text(MBM_OK), mbm_status_text(MBM_INVALID_CRC));
 }
 
-TEST(a_line_without_a_frame_buffer_sends_no_request)
+SIM_TEST(a_line_without_a_frame_buffer_sends_no_request)
 {
     mbm_line l = MBM_INIT;
     mbm_node m = MBM_INIT;
-    SIM;
 
     OK(mbm_line_beginRtu(&l, &s->port, NULL, 0));
     OK(mbm_node_begin(&m, &l, 17, NULL, 0, NULL, 0));
@@ -141,12 +137,11 @@ TEST(a_line_without_a_port_sends_no_request)
     OK(mbm_node_cancel(&m));
 }
 
-TEST(a_port_without_its_three_hooks_is_refused)
+SIM_TEST(a_port_without_its_three_hooks_is_refused)
 {
     mbm_port read_less, write_less, clock_less, empty;
     mbm_line l = MBM_INIT;
     mbm_node m = MBM_INIT;
-    NODE;
 
     read_less = write_less = clock_less = s->port;
     read_less.read = NULL;
@@ -166,20 +161,18 @@ TEST(a_port_without_its_three_hooks_is_refused)
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
-TEST(forbidden_quantities_return_3_and_nothing_is_sent)
+SIM_TEST(forbidden_quantities_return_3_and_nothing_is_sent)
 {
     static const uint16_t beyond[] = {0, 2001, 2048, 4096, 32768, 65535};
     static const uint16_t registers[] = {0, 126, 128, 256, 257, 512, 32769, 65535};
-    size_t i;
-    NODE;
 
-    for (i = 0; i < COUNT(beyond); i++) {
+    for (size_t i = 0; i < COUNT(beyond); i++) {
         IS(3, mbm_node_readCoils(n, 0, beyond[i]));
         IS(3, mbm_node_readDiscreteInputs(n, 0, beyond[i]));
         IS(3, mbm_node_writeMultipleCoils(n, 0, beyond[i]));
     }
     IS(3, mbm_node_writeMultipleCoils(n, 0, 1969));
-    for (i = 0; i < COUNT(registers); i++) {
+    for (size_t i = 0; i < COUNT(registers); i++) {
         IS(3, mbm_node_readHoldingRegisters(n, 0, registers[i]));
         IS(3, mbm_node_readInputRegisters(n, 0, registers[i]));
         IS(3, mbm_node_writeMultipleRegisters(n, 0, registers[i]));
@@ -193,10 +186,8 @@ TEST(forbidden_quantities_return_3_and_nothing_is_sent)
     sim_assert_order(s, "PWO", "");
 }
 
-TEST(ranges_beyond_65535_return_2_and_nothing_is_sent)
+SIM_TEST(ranges_beyond_65535_return_2_and_nothing_is_sent)
 {
-    NODE;
-
     IS(2, mbm_node_readCoils(n, 65535, 2));
     IS(2, mbm_node_readDiscreteInputs(n, 63537, 2000));
     IS(2, mbm_node_readHoldingRegisters(n, 65412, 125));
@@ -210,10 +201,8 @@ TEST(ranges_beyond_65535_return_2_and_nothing_is_sent)
     assert_int_equal(s->sent, 0);
 }
 
-TEST(the_last_address_can_be_read_and_written)
+SIM_TEST(the_last_address_can_be_read_and_written)
 {
-    NODE;
-
     sim_answer(s, 1, 500, "11 03 02 00 07 +");
     OK(mbm_node_readHoldingRegisters(n, 65535, 1));
     sim_answer(s, 1, 500, "11 0F FF FE 00 02 +");
@@ -253,28 +242,22 @@ static void free_buffers(sim *s, buffers b)
     free(b.frame);
 }
 
-TEST(a_frame_buffer_below_8_bytes_is_refused)
+SIM_TEST(a_frame_buffer_below_8_bytes_is_refused)
 {
-    uint16_t bytes;
-    SIM;
-
-    for (bytes = 1; bytes < 8; bytes++)
+    for (uint16_t bytes = 1; bytes < 8; bytes++)
         IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&s->line, &s->port, s->buffer, bytes));
-    for (bytes = 0; bytes < 8; bytes++)
+    for (uint16_t bytes = 0; bytes < 8; bytes++)
         IS(MBM_INVALID_ARGUMENT, mbm_line_setFrame(&s->line, s->buffer, bytes));
     OK(mbm_line_setFrame(&s->line, s->buffer, 8));
     OK(mbm_line_beginRtu(&s->line, &s->port, s->buffer, 8));
 }
 
-TEST(a_request_is_sent_whole_or_not_at_all)
+SIM_TEST(a_request_is_sent_whole_or_not_at_all)
 {
-    uint16_t bytes;
-    NODE;
-
     mbm_line_setGap(&s->line, 0);
     mbm_line_setQuietTime(&s->line, 0);
     mbm_node_setResponseTimeout(n, 50);
-    for (bytes = 8; bytes < 24; bytes++) {
+    for (uint16_t bytes = 8; bytes < 24; bytes++) {
         buffers b = give_buffers(s, 4, 4, bytes);
 
         s->sent = 0;
@@ -296,12 +279,9 @@ TEST(a_request_is_sent_whole_or_not_at_all)
     }
 }
 
-TEST(a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing)
+SIM_TEST(a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing)
 {
-    uint16_t bytes;
-    NODE;
-
-    for (bytes = 8; bytes <= 13; bytes++) {
+    for (uint16_t bytes = 8; bytes <= 13; bytes++) {
         buffers b = give_buffers(s, 4, 4, bytes);
 
         s->answered = 0;
@@ -327,10 +307,8 @@ static void ends_in_12_bytes(sim *s, mbm_node *n, uint8_t status, const char *re
     free_buffers(s, b);
 }
 
-TEST(a_read_that_the_frame_buffer_is_too_small_for_ends_so_or_with_an_exception)
+SIM_TEST(a_read_that_the_frame_buffer_is_too_small_for_ends_so_or_with_an_exception)
 {
-    NODE;
-
     mbm_line_setQuietTime(&s->line, 0);
     ends_in_12_bytes(s, n, MBM_BUFFER_TOO_SMALL, "");
     ends_in_12_bytes(s, n, MBM_BUFFER_TOO_SMALL,
@@ -339,40 +317,35 @@ TEST(a_read_that_the_frame_buffer_is_too_small_for_ends_so_or_with_an_exception)
     ends_in_12_bytes(s, n, MBM_ILLEGAL_DATA_ADDRESS, "12 03 04 11 03 08 00 + / 11 83 02 +");
 }
 
-TEST(a_whole_reply_longer_than_the_frame_buffer_ends_the_request_at_once)
+SIM_TEST(a_whole_reply_longer_than_the_frame_buffer_ends_the_request_at_once)
 {
-    NODE;
-
     ends_in_12_bytes(s, n, MBM_BUFFER_TOO_SMALL, "11 03 08 11 11 22 22 33 33 44 44 +");
     assert_true(s->now < 100000);
 }
 
-TEST(a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception)
+SIM_TEST(a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception)
 {
     char reply[600] = "11 03 84";
-    unsigned i;
     buffers b;
-    NODE;
 
     b = give_buffers(s, 64, 64, MBM_FRAME_BYTES(64));
     sim_answer(s, 1, 500, "11 83 02 +");
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_readHoldingRegisters(n, 0, 66));
     sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
-    for (i = 0; i < 132; i++)
+    for (unsigned i = 0; i < 132; i++)
         strcat(reply, " 77");
     strcat(reply, " +");
     sim_answer(s, 1, 500, reply);
     IS(MBM_BUFFER_TOO_SMALL, mbm_node_readHoldingRegisters(n, 0, 66));
-    for (i = 0; i < 64; i++)
+    for (unsigned i = 0; i < 64; i++)
         assert_int_equal(b.response[i], 0);
     assert_int_equal(mbm_node_available(n), 0);
     free_buffers(s, b);
 }
 
-TEST(a_reply_longer_than_the_response_words_changes_none)
+SIM_TEST(a_reply_longer_than_the_response_words_changes_none)
 {
     buffers b;
-    NODE;
 
     b = give_buffers(s, 2, 0, 256);
     sim_answer(s, 1, 500, "11 03 06 11 11 22 22 33 33 +");
@@ -391,10 +364,9 @@ TEST(a_reply_longer_than_the_response_words_changes_none)
     free_buffers(s, b);
 }
 
-TEST(writes_beyond_the_transmit_words_return_3_and_nothing_is_sent)
+SIM_TEST(writes_beyond_the_transmit_words_return_3_and_nothing_is_sent)
 {
     buffers b;
-    NODE;
 
     b = give_buffers(s, 2, 2, 256);
     IS(3, mbm_node_writeMultipleRegisters(n, 0, 3));
@@ -408,10 +380,9 @@ TEST(writes_beyond_the_transmit_words_return_3_and_nothing_is_sent)
     free_buffers(s, b);
 }
 
-TEST(single_writes_need_no_transmit_words)
+SIM_TEST(single_writes_need_no_transmit_words)
 {
     buffers b;
-    NODE;
 
     b = give_buffers(s, 0, 0, 16);
     sim_answer(s, 1, 500, "11 06 00 01 12 34 +");
@@ -423,10 +394,9 @@ TEST(single_writes_need_no_transmit_words)
     free_buffers(s, b);
 }
 
-TEST(a_frame_buffer_of_64_kilobytes_works)
+SIM_TEST(a_frame_buffer_of_64_kilobytes_works)
 {
     buffers b;
-    NODE;
 
     b = give_buffers(s, 125, 123, 65535);
     sim_answer(s, 1, 500, "00 00 / 11 03 02 12 34 +");

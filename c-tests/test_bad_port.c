@@ -5,13 +5,10 @@
 
 fixture each_test = {sim_setup, sim_teardown};
 
-TEST(write_may_accept_a_byte_at_a_time)
+SIM_TEST(write_may_accept_a_byte_at_a_time)
 {
-    unsigned i;
-    NODE;
-
     s->write_piece = 1;
-    for (i = 0; i < 123; i++)
+    for (unsigned i = 0; i < 123; i++)
         s->transmit[i] = (uint16_t)(i * 0x0101);
     sim_answer(s, 1, 500, "11 10 00 00 00 7B +");
     OK(mbm_node_writeMultipleRegisters(n, 0, 123));
@@ -19,19 +16,15 @@ TEST(write_may_accept_a_byte_at_a_time)
     assert_int_equal(s->frames[0].bytes[7 + 2 * 99], 99);
 }
 
-TEST(read_may_return_a_byte_at_a_time)
+SIM_TEST(read_may_return_a_byte_at_a_time)
 {
-    SIM;
-
     s->read_piece = 1;
     sim_deliver_text(s, s->now, "01 02 03 04 05");
     sim_reads(s, 500);
 }
 
-TEST(a_write_that_never_accepts_a_byte_is_a_busy_line)
+SIM_TEST(a_write_that_never_accepts_a_byte_is_a_busy_line)
 {
-    SIM;
-
     s->write_never = 1;
     IS(MBM_LINE_BUSY, sim_read_one(s));
     assert_int_equal(s->sent, 0);
@@ -41,10 +34,8 @@ TEST(a_write_that_never_accepts_a_byte_is_a_busy_line)
     sim_reads(s, 500);
 }
 
-TEST(a_flush_that_never_drains_is_a_busy_line)
+SIM_TEST(a_flush_that_never_drains_is_a_busy_line)
 {
-    SIM;
-
     s->flush_never = 1;
     IS(MBM_LINE_BUSY, sim_read_one(s));
     sim_assert_order(s, "PO", "PO");
@@ -53,10 +44,8 @@ TEST(a_flush_that_never_drains_is_a_busy_line)
     sim_reads(s, 500);
 }
 
-TEST(a_link_lost_in_the_gap_sends_nothing)
+SIM_TEST(a_link_lost_in_the_gap_sends_nothing)
 {
-    NODE;
-
     s->read_dead = 1;
     IS(MBM_LINK_LOST, sim_read_one(s));
     IS(MBM_LINK_LOST, mbm_node_status(n));
@@ -72,10 +61,8 @@ static void die_mid_reply(sim *s)
         s->read_dead = 1;
 }
 
-TEST(a_link_lost_mid_reply_ends_the_request_at_once)
+SIM_TEST(a_link_lost_mid_reply_ends_the_request_at_once)
 {
-    SIM;
-
     mbm_line_setRetries(&s->line, 3);
     s->on_idle = die_mid_reply;
     sim_answer(s, 1, 500, "11 03 02 00 07 +");
@@ -87,13 +74,10 @@ TEST(a_link_lost_mid_reply_ends_the_request_at_once)
     sim_reads(s, 500);
 }
 
-TEST(a_link_lost_mid_write_switches_the_driver_off)
+SIM_TEST(a_link_lost_mid_write_switches_the_driver_off)
 {
-    uint16_t at;
-    SIM;
-
     s->cut_allowed = 7;
-    for (at = 1; at <= 8; at++) {
+    for (uint16_t at = 1; at <= 8; at++) {
         s->write_dies_at = at;
         IS(MBM_LINK_LOST, sim_read_one(s));
         assert_int_equal(s->driver_on, 0);
@@ -105,10 +89,8 @@ TEST(a_link_lost_mid_write_switches_the_driver_off)
 
 /* Without the gap, a device would take the sent half of the request and the next request
  * for one frame. */
-TEST(the_gap_is_kept_after_a_link_lost_mid_write)
+SIM_TEST(the_gap_is_kept_after_a_link_lost_mid_write)
 {
-    SIM;
-
     s->character = 0; /* bytes are on the wire as soon as they are handed over */
     s->cut_allowed = 1;
     s->write_dies_at = 5;
@@ -118,10 +100,8 @@ TEST(the_gap_is_kept_after_a_link_lost_mid_write)
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
-TEST(hooks_that_claim_too_many_bytes_do_no_harm)
+SIM_TEST(hooks_that_claim_too_many_bytes_do_no_harm)
 {
-    SIM;
-
     s->overclaim = 1000;
     sim_reads(s, 500);
     assert_int_equal(s->counters.bytesSent, 8);
@@ -135,9 +115,7 @@ TEST(hooks_that_claim_too_many_bytes_do_no_harm)
  * character in this time. */
 TEST(the_clock_may_wrap_at_any_time_of_a_transaction)
 {
-    uint32_t ahead;
-
-    for (ahead = 0; ahead < 12000; ahead += 25) {
+    for (uint32_t ahead = 0; ahead < 12000; ahead += 25) {
         SIM;
 
         s->clock_start = (uint32_t)(0u - ahead - s->now);
@@ -158,9 +136,8 @@ TEST(the_clock_may_wrap_at_any_time_of_a_transaction)
 TEST(the_clock_may_wrap_in_a_long_wait)
 {
     static const uint32_t ahead[] = {100, 5000, 50000, 500000, 1999000, 2050000, 2100000};
-    size_t i;
 
-    for (i = 0; i < COUNT(ahead); i++) {
+    for (size_t i = 0; i < COUNT(ahead); i++) {
         SIM;
 
         s->clock_start = (uint32_t)(0u - ahead[i] - s->now);

@@ -12,8 +12,6 @@
 /* Returns '.' for right data, 'F' for a failed call, 'W' for success with wrong data. */
 static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
 {
-    unsigned i;
-
     if (f->function == 6) {
         *status = mbm_node_writeSingleRegister(&n->node, (uint16_t)number, (uint16_t)~number);
         return *status == MBM_OK ? '.' : 'F';
@@ -21,7 +19,7 @@ static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
     *status = mbm_node_readHoldingRegisters(&n->node, (uint16_t)(100 * number), FAULT_REGISTERS);
     if (*status != MBM_OK)
         return 'F';
-    for (i = 0; i < FAULT_REGISTERS; i++)
+    for (unsigned i = 0; i < FAULT_REGISTERS; i++)
         if (n->response[i] != fault_value(100 * number + i))
             return 'W';
     return '.';
@@ -34,7 +32,6 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     node n;
     mbm_port port;
     uint8_t first = MBM_OK, status;
-    unsigned i;
 
     fault_start(&device, f);
     node_begin(&n, device.line.ours, FAULT_UNIT);
@@ -44,7 +41,7 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     mbm_node_setResponseTimeout(&n.node, 400);
     mbm_line_setEchoDiscard(&n.line, f->echo);
     mbm_line_setRetries(&n.line, retries);
-    for (i = 0; i < FAULT_TRANSACTIONS; i++) {
+    for (unsigned i = 0; i < FAULT_TRANSACTIONS; i++) {
         outcomes[i] = transact(&n, f, i + 1, &status);
         if (i == 0)
             first = status;
@@ -60,13 +57,12 @@ TEST(no_row_of_the_fault_table_gets_worse)
     FILE *table = path ? fopen(path, "w") : NULL;
     char plain[FAULT_TRANSACTIONS + 1], retried[FAULT_TRANSACTIONS + 1];
     int worse = 0;
-    unsigned i;
 
     if (table)
         fprintf(
             table,
             "| fault | no retry | one retry | status of the first call without a retry |\n|---|---|---|---|\n");
-    for (i = 0; i < fault_count; i++) {
+    for (unsigned i = 0; i < fault_count; i++) {
         const fault *f = &faults[i];
         uint8_t status = outcome(f, 0, plain);
 

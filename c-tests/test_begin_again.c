@@ -1,11 +1,10 @@
 /* What begins an object that was begun already: it gives up all that was pending. */
+#include "refused.h"
 #include "hooked_port.h"
 #include "mbm.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 static hooked_port wire, other_wire;
 static mbm_port port, other_port;
@@ -27,8 +26,6 @@ static void count_done(void *context, mbm_clientRequest *request)
 
 static void reset(void)
 {
-    size_t i;
-
     memset(&client, 0, sizeof client);
     memset(&line, 0, sizeof line);
     memset(&master, 0, sizeof master);
@@ -38,7 +35,7 @@ static void reset(void)
     wire.step = other_wire.step = 100;
     port = hooked_port_of(&wire);
     other_port = hooked_port_of(&other_wire);
-    for (i = 0; i < COUNT(requests); i++) {
+    for (size_t i = 0; i < COUNT(requests); i++) {
         requests[i].unit = 17;
         requests[i].transaction = (uint16_t)(i + 1);
         requests[i].reply = words;
@@ -64,12 +61,10 @@ static uint8_t begin(unsigned framing, const mbm_port *on)
 
 static void ask_three_times(void)
 {
-    size_t i;
-
-    for (i = 0; i < COUNT(requests); i++)
+    for (size_t i = 0; i < COUNT(requests); i++)
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &requests[i], 0, 1));
     wire.length = 0;
-    for (i = 0; i < 1000 && wire.length == 0; i++)
+    for (size_t i = 0; i < 1000 && wire.length == 0; i++)
         IS(MBM_PENDING, mbm_client_poll(&client));
     assert_true(wire.length > 0);
 }
@@ -78,16 +73,15 @@ static void ask_three_times(void)
 static void ask_over_the_other_port(unsigned framing)
 {
     mbm_clientRequest *const request = &requests[0];
-    unsigned i;
 
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, request, 0, 1));
-    for (i = 0; i < 1000 && other_wire.length == 0; i++)
+    for (unsigned i = 0; i < 1000 && other_wire.length == 0; i++)
         IS(MBM_PENDING, mbm_client_poll(&client));
     assert_true(other_wire.length > 0);
     if (framing != MBM_FRAMING_RTU && framing != MBM_FRAMING_RTU_OVER_TCP)
         return;
     hooked_port_arrive_rtu(&other_wire, 17, "\x03\x02\x12\x34", 4);
-    for (i = 0; i < 1000 && request->status == MBM_PENDING; i++)
+    for (unsigned i = 0; i < 1000 && request->status == MBM_PENDING; i++)
         mbm_client_poll(&client);
     OK(request->status);
     assert_int_equal(words[0], 0x1234);
@@ -95,18 +89,15 @@ static void ask_over_the_other_port(unsigned framing)
 
 TEST(a_client_gives_up_its_requests_whatever_its_framing_was_and_becomes)
 {
-    unsigned from, to;
-    size_t i;
-
-    for (from = 0; from < 4; from++) {
-        for (to = 0; to < 4; to++) {
+    for (unsigned from = 0; from < 4; from++) {
+        for (unsigned to = 0; to < 4; to++) {
             reset();
             OK(begin(from, &port));
             ask_three_times();
             assert_int_equal(mbm_client_pending(&client), 3);
             wire.length = 0;
             OK(begin(to, &other_port));
-            for (i = 0; i < COUNT(requests); i++)
+            for (size_t i = 0; i < COUNT(requests); i++)
                 IS(MBM_CANCELLED, requests[i].status);
             assert_int_equal(ended, 0);
             assert_int_equal(mbm_client_pending(&client), 0);
@@ -165,12 +156,10 @@ TEST(a_client_that_begins_again_switches_the_driver_of_the_old_port_off)
 
 TEST(a_client_that_is_suspended_is_not_begun_again)
 {
-    unsigned framing;
-
     OK(begin(MBM_FRAMING_RTU, &port));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &requests[0], 0, 1));
     OK(mbm_client_suspend(&client, &line));
-    for (framing = 0; framing < 4; framing++)
+    for (unsigned framing = 0; framing < 4; framing++)
         REFUSED(MBM_BUSY, client, begin(framing, &other_port));
     IS(MBM_PENDING, requests[0].status);
     OK(mbm_client_resume(&client, &line));
@@ -188,13 +177,11 @@ static void begin_another(void *context, mbm_clientRequest *request)
 
 TEST(a_client_may_begin_again_when_a_request_is_done)
 {
-    unsigned i;
-
     requests[0].done = begin_another;
     OK(begin(MBM_FRAMING_RTU, &port));
     ask_three_times();
     hooked_port_arrive_rtu(&wire, 17, "\x03\x02\x12\x34", 4);
-    for (i = 0; i < 100 && ended == 0; i++)
+    for (unsigned i = 0; i < 100 && ended == 0; i++)
         mbm_client_poll(&client);
     assert_int_equal(ended, 1);
     OK(requests[0].status);
@@ -208,14 +195,13 @@ TEST(a_client_may_begin_again_when_a_request_is_done)
 TEST(a_line_and_a_node_keep_their_settings)
 {
     mbm_counters counters = {0};
-    unsigned i;
 
     OK(mbm_line_beginRtu(&line, &port, other_frame, 256));
     OK(mbm_node_begin(&master, &line, 17, words, 4, NULL, 0));
     OK(mbm_node_setBlocking(&master, 0));
     OK(mbm_line_setCounters(&line, &counters));
     IS(MBM_PENDING, mbm_node_readHoldingRegisters(&master, 0, 1));
-    for (i = 0; i < 1000 && wire.length == 0; i++)
+    for (unsigned i = 0; i < 1000 && wire.length == 0; i++)
         IS(MBM_PENDING, mbm_node_poll(&master));
     IS(MBM_BUSY, mbm_line_beginRtu(&line, &other_port, other_frame, 256));
     OK(mbm_node_cancel(&master));
@@ -224,11 +210,11 @@ TEST(a_line_and_a_node_keep_their_settings)
     IS(MBM_CANCELLED, mbm_node_status(&master));
     IS(MBM_CANCELLED, mbm_node_poll(&master));
     IS(MBM_PENDING, mbm_node_readHoldingRegisters(&master, 0, 1));
-    for (i = 0; i < 10000 && other_wire.called[HOOK_POST] == 0; i++)
+    for (unsigned i = 0; i < 10000 && other_wire.called[HOOK_POST] == 0; i++)
         IS(MBM_PENDING, mbm_node_poll(&master));
     hooked_port_arrive_rtu(&other_wire, 18, "\x03\x02\x56\x78", 4);
     /* After a request that was given up, a reply is held for the quiet time. */
-    for (i = 0; i < 10000 && mbm_node_poll(&master) == MBM_PENDING; i++)
+    for (unsigned i = 0; i < 10000 && mbm_node_poll(&master) == MBM_PENDING; i++)
         ;
     OK(mbm_node_status(&master));
     assert_int_equal(words[0], 0x5678);
@@ -240,7 +226,6 @@ TEST(a_server_drops_what_it_received_and_serves_the_new_port)
     static mbm_server server;
     static mbm_unit unit;
     static mbm_registerTable table;
-    unsigned i;
 
     unit.id = 17;
     table.words = words;
@@ -251,17 +236,17 @@ TEST(a_server_drops_what_it_received_and_serves_the_new_port)
     hooked_port_arrive_rtu(&wire, 17, "\x03\x00\x00\x00\x01", 5);
     OK(mbm_server_poll(&server));
     OK(mbm_server_beginRtu(&server, &other_port, &unit, 1, other_frame, sizeof other_frame));
-    for (i = 0; i < 100; i++)
+    for (unsigned i = 0; i < 100; i++)
         OK(mbm_server_poll(&server));
     assert_int_equal(wire.length + other_wire.length, 0);
     hooked_port_arrive_rtu(&other_wire, 17, "\x03\x00\x00\x00\x01", 5);
-    for (i = 0; i < 100; i++)
+    for (unsigned i = 0; i < 100; i++)
         OK(mbm_server_poll(&server));
     assert_int_equal(other_wire.length, 7);
     /* The echo is no longer discarded: the second request is answered too. */
     other_wire.length = 0;
     hooked_port_arrive_rtu(&other_wire, 17, "\x03\x00\x00\x00\x01", 5);
-    for (i = 0; i < 100; i++)
+    for (unsigned i = 0; i < 100; i++)
         OK(mbm_server_poll(&server));
     assert_int_equal(other_wire.length, 7);
 }

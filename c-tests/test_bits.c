@@ -9,10 +9,9 @@ static const uint8_t on_19[19] = {1, 0, 1, 1, 0, 0, 1, 1, 1, 1, 0, 1, 0, 1, 1, 0
 
 TEST(a_coil_is_found_by_its_address)
 {
-    unsigned i;
     uint8_t on;
 
-    for (i = 0; i < 19; i++) {
+    for (unsigned i = 0; i < 19; i++) {
         OK(mbm_bits_isSet(coils_19, 19, 19, (uint16_t)(19 + i), &on));
         assert_int_equal(on, on_19[i]);
         OK(mbm_bits_isSetInWords(words_19, 19, 19, (uint16_t)(19 + i), &on));
@@ -25,10 +24,9 @@ TEST(a_coil_outside_of_the_words_has_no_state)
     static const uint16_t outside[] = {0, 18, 38, 39, 65535};
     uint8_t bytes[3] = {0};
     uint16_t words[2] = {0};
-    unsigned i;
     uint8_t on = 7;
 
-    for (i = 0; i < COUNT(outside); i++) {
+    for (unsigned i = 0; i < COUNT(outside); i++) {
         IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_isSet(coils_19, 19, 19, outside[i], &on));
         IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_isSetInWords(words_19, 19, 19, outside[i], &on));
         IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_set(bytes, 19, 19, outside[i], 1));
@@ -64,13 +62,12 @@ TEST(coils_are_packed_lowest_bit_first)
     static const uint8_t coils[] = {1, 0, 0xFF, 1, 0, 0, 2, 1, 1, 0};
     uint8_t bytes[] = {0xFF, 0xFF, 0xFF};
     uint16_t words[] = {0, 0xFFFF};
-    unsigned i;
 
     OK(mbm_bits_pack(coils, 10, bytes, 3));
     assert_int_equal(bytes[0], 0xCD);
     assert_int_equal(bytes[1], 0x01);
     assert_int_equal(bytes[2], 0xFF);
-    for (i = 0; i < COUNT(coils); i++)
+    for (unsigned i = 0; i < COUNT(coils); i++)
         OK(mbm_bits_setInWords(words, 0, 10, (uint16_t)i, coils[i]));
     assert_int_equal(words[0], 0x01CD);
     assert_int_equal(words[1], 0xFFFF);

@@ -89,10 +89,9 @@ static void asks_everything(mbm_caller *with)
 {
     static const uint16_t written[] = {0x1234, 0xFEDC};
     static const uint8_t bits[] = {0x05};
-    unsigned i;
 
     OK(mbm_call(with, read_words(125)));
-    for (i = 0; i < 125; i++)
+    for (unsigned i = 0; i < 125; i++)
         assert_int_equal(words[i], server_pattern(FIRST + i));
     OK(mbm_call(with, mbm_client_writeSingleRegister(&client, &request, 7, 0xABCD)));
     request.data = written;
@@ -184,11 +183,10 @@ TEST(a_link_that_is_lost_ends_the_call)
 static void *interrupt_and_answer(void *unused)
 {
     uint8_t frame[12];
-    int i;
 
     (void)unused;
     assert_int_equal(read(ends[1], frame, sizeof frame), sizeof frame);
-    for (i = 0; i < 20; i++) {
+    for (int i = 0; i < 20; i++) {
         pthread_kill(main_thread, SIGUSR1);
         usleep(1000);
     }

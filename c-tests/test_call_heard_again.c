@@ -151,9 +151,8 @@ static int64_t time_to_hear_it_again(void)
 TEST(after_one_lost_reply_a_device_is_heard_again_within_five_limits)
 {
     static const uint32_t limits[] = {50, 200, 500, 1000};
-    unsigned i;
 
-    for (i = 0; i < COUNT(limits); i++) {
+    for (unsigned i = 0; i < COUNT(limits); i++) {
         begin();
         caller.timeoutMs = limits[i];
         /* Two limits of silence and the quiet time, 100 ms. */
@@ -166,9 +165,8 @@ TEST(after_one_lost_reply_a_device_is_heard_again_within_five_limits)
 TEST(the_timeout_of_a_request_is_as_before_after_the_call)
 {
     static const uint32_t own[] = {0, 150, 5000};
-    unsigned i;
 
-    for (i = 0; i < COUNT(own); i++) {
+    for (unsigned i = 0; i < COUNT(own); i++) {
         begin();
         caller.timeoutMs = 200;
         request.timeoutMs = own[i];
@@ -186,9 +184,8 @@ TEST(a_limit_longer_than_the_response_timeout_changes_nothing)
 {
     static const uint32_t limits[] = {0, 5000, MBM_CALL_FOREVER};
     int64_t times[COUNT(limits)];
-    unsigned i;
 
-    for (i = 0; i < COUNT(limits); i++) {
+    for (unsigned i = 0; i < COUNT(limits); i++) {
         begin();
         caller.timeoutMs = limits[i];
         times[i] = time_to_hear_it_again();

@@ -65,9 +65,8 @@ TEST(a_write_goes_on_with_the_old_table_if_its_hook_changes_it)
         {.beforeWrite = shrink_before},
         {.beforeWrite = become_bits},
     };
-    int i;
 
-    for (i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         serve(&hooks[i]);
         assert_int_equal(answer(&unit, 17, "\x10\0\0\0\4\x08\0\1\0\2\0\3\0\4", 14), 0x10);
         assert_int_equal(words[3], 4);
@@ -100,10 +99,9 @@ TEST(a_read_goes_on_with_the_old_table_if_its_hook_changes_it)
         {"\x16\0\3\0\xFF\x0F\0", 7, 0x0FF0},
         {"\x17\0\0\0\4\0\3\0\1\2\x0F\xF0", 12, 0x0FF0},
     };
-    int i, j;
 
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 3; j++) {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
             serve(&hooks[j]);
             assert_int_equal(answer(&unit, 17, requests[i].pdu, requests[i].length),
                              requests[i].pdu[0]);

@@ -28,16 +28,15 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     uint8_t bits[250], coils[] = {0xCD, 0x01};
     mbm_client *c = &a.client;
     mbm_clientRequest r = asker_request(UNIT, bits, sizeof bits, NULL);
-    unsigned i;
 
     ends(MBM_OK, &r, mbm_client_readCoils(c, &r, 3, 1999));
     assert_int_equal(r.length, 250);
-    for (i = 0; i < 1999; i++)
+    for (unsigned i = 0; i < 1999; i++)
         assert_int_equal(bits[i / 8] >> i % 8 & 1, memory->tab_bits[3 + i]);
     ends(MBM_OK, &r, mbm_client_readDiscreteInputs(c, &r, 5, 13));
     assert_int_equal(r.length, 2);
     assert_int_equal(bits[1] >> 5, 0);
-    for (i = 0; i < 13; i++)
+    for (unsigned i = 0; i < 13; i++)
         assert_int_equal(bits[i / 8] >> i % 8 & 1, memory->tab_input_bits[5 + i]);
     ends(MBM_OK, &r, mbm_client_readCoils(c, &r, 9, 1));
     assert_int_equal(bits[0], memory->tab_bits[9]);
@@ -64,7 +63,7 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     assert_int_equal(memory->tab_registers[12], 0xBEEF);
     r.data = coils;
     ends(MBM_OK, &r, mbm_client_writeMultipleCoils(c, &r, 20, 9));
-    for (i = 0; i < 9; i++)
+    for (unsigned i = 0; i < 9; i++)
         assert_int_equal(memory->tab_bits[20 + i], coils[i / 8] >> i % 8 & 1);
     r.data = values;
     ends(MBM_OK, &r, mbm_client_writeMultipleRegisters(c, &r, 30, 3));
@@ -114,12 +113,12 @@ TEST(sixteen_requests_are_pipelined)
     mbm_clientRequest requests[MBM_CLIENT_DEPTH + 1];
     uint16_t words[MBM_CLIENT_DEPTH][10];
     tcp_server s;
-    unsigned i, round;
+    unsigned i;
 
     tcp_server_start(&s);
     asker_begin_tcp(&a, s.port);
     OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
-    for (round = 0; round < 20; round++) {
+    for (unsigned round = 0; round < 20; round++) {
         for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
             requests[i] = asker_request(UNIT, words[i], sizeof words[i], NULL);
             requests[i].transaction = (uint16_t)(i + 1);

@@ -283,13 +283,12 @@ static void begin(unsigned seed)
 {
     uint16_t received = (uint16_t)(chance(2) ? 256 + chance(800) : 9 + chance(60));
     uint16_t sent = (uint16_t)(chance(2) ? 260 + chance(800) : 12 + chance(60));
-    unsigned i;
 
     memset(&client, 0, sizeof client);
     memset(jobs, 0, sizeof jobs);
     memset(&wire, 0, sizeof wire);
     memset(units, 0, sizeof units);
-    for (i = 0; i < COUNT(units); i++) {
+    for (unsigned i = 0; i < COUNT(units); i++) {
         units[i].unit = (uint8_t)i;
         units[i].delayUs = chance(500000);
     }

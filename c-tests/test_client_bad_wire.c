@@ -12,7 +12,6 @@ static char transact(asker *a, const fault *f, unsigned number, uint8_t *status)
 {
     uint16_t words[FAULT_REGISTERS];
     mbm_clientRequest request = {0};
-    unsigned i;
 
     request.unit = FAULT_UNIT;
     request.reply = words;
@@ -26,7 +25,7 @@ static char transact(asker *a, const fault *f, unsigned number, uint8_t *status)
     *status = asker_wait(a, &request);
     if (*status != MBM_OK)
         return 'F';
-    for (i = 0; i < FAULT_REGISTERS && f->function == 3; i++)
+    for (unsigned i = 0; i < FAULT_REGISTERS && f->function == 3; i++)
         if (words[i] != fault_value(100 * number + i))
             return 'W';
     return '.';
@@ -38,7 +37,6 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     responder device;
     asker a;
     uint8_t first = MBM_OK, status;
-    unsigned i;
 
     fault_start(&device, f);
     memset(&a, 0, sizeof a);
@@ -50,7 +48,7 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     OK(mbm_client_setResponseTimeout(&a.client, 400));
     OK(mbm_client_setEchoDiscard(&a.client, f->echo));
     OK(mbm_client_setRetries(&a.client, retries));
-    for (i = 0; i < FAULT_TRANSACTIONS; i++) {
+    for (unsigned i = 0; i < FAULT_TRANSACTIONS; i++) {
         outcomes[i] = transact(&a, f, i + 1, &status);
         if (i == 0)
             first = status;
@@ -64,9 +62,8 @@ TEST(no_row_of_the_fault_table_is_worse_for_the_client)
 {
     char plain[FAULT_TRANSACTIONS + 1], retried[FAULT_TRANSACTIONS + 1];
     int worse = 0;
-    unsigned i;
 
-    for (i = 0; i < fault_count; i++) {
+    for (unsigned i = 0; i < fault_count; i++) {
         const fault *f = &faults[i];
         uint8_t status = outcome(f, 0, plain);
 

@@ -131,12 +131,11 @@ static void queue_request(line *l, mbm_clientRequest *request)
 TEST(no_byte_outside_of_the_buffers_is_touched)
 {
     static line l;
-    unsigned round, step, i;
 
     random_state = 7;
-    for (round = 0; round < ROUNDS; round++) {
+    for (unsigned round = 0; round < ROUNDS; round++) {
         begin(&l, round % 4);
-        for (step = 0; step < STEPS; step++) {
+        for (unsigned step = 0; step < STEPS; step++) {
             mbm_clientRequest *request = &l.requests[chance(REQUESTS)];
 
             l.now += chance(chance(8) ? 3000 : 60000);
@@ -152,7 +151,7 @@ TEST(no_byte_outside_of_the_buffers_is_touched)
             default: (void)mbm_client_poll(&l.client);
             }
         }
-        for (i = 0; i < REQUESTS; i++)
+        for (unsigned i = 0; i < REQUESTS; i++)
             if (l.requests[i].status == MBM_PENDING)
                 OK(mbm_client_cancel(&l.client, &l.requests[i]));
         assert_int_equal(mbm_client_pending(&l.client), 0);

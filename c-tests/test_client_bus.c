@@ -42,8 +42,6 @@ static uint32_t any(void *context)
 
 static void begin(void)
 {
-    unsigned i, word;
-
     bus_start(&line);
     memset(servers, 0, sizeof servers);
     memset(units, 0, sizeof units);
@@ -51,10 +49,10 @@ static void begin(void)
     memset(askers, 0, sizeof askers);
     right = failed = wrong = doubled = 0;
     random_state = 1;
-    for (i = 0; i < SERVERS; i++) {
+    for (unsigned i = 0; i < SERVERS; i++) {
         mbm_port port = bus_port(&line, 0xFFFF0000u + 0x1234567u * i);
 
-        for (word = 0; word < COUNT(held[i]); word++)
+        for (unsigned word = 0; word < COUNT(held[i]); word++)
             held[i][word] = (uint16_t)(1000 * (i + 1) + word);
         tables[i].words = held[i];
         tables[i].size = COUNT(held[i]);
@@ -63,7 +61,7 @@ static void begin(void)
         OK(mbm_server_beginRtu(&servers[i], &port, &units[i], 1, frames[i], sizeof frames[i]));
         OK(mbm_server_setBaudRate(&servers[i], BUS_BAUD));
     }
-    for (i = 0; i < CLIENTS; i++) {
+    for (unsigned i = 0; i < CLIENTS; i++) {
         mbm_port port = bus_port(&line, 0xFFFFFF00u * (i + 1));
         asker *a = &askers[i];
 
@@ -79,10 +77,8 @@ fixture each_test = {begin, NULL};
 
 static void pass(void)
 {
-    unsigned i;
-
     line.now += STEP;
-    for (i = 0; i < SERVERS; i++)
+    for (unsigned i = 0; i < SERVERS; i++)
         (void)mbm_server_poll(&servers[i]);
 }
 
@@ -106,9 +102,7 @@ static void done(void *context, mbm_clientRequest *request)
 /* Queues reads of some of the units at a client. */
 static void queue_reads(asker *a, unsigned first, unsigned count, unsigned requests)
 {
-    unsigned i;
-
-    for (i = 0; i < requests; i++) {
+    for (unsigned i = 0; i < requests; i++) {
         job *j = &a->jobs[i];
 
         memset(j, 0, sizeof *j);
@@ -126,9 +120,7 @@ static void queue_reads(asker *a, unsigned first, unsigned count, unsigned reque
 
 TEST(clients_that_take_turns_are_answered_by_every_server)
 {
-    unsigned round, i;
-
-    for (round = 0; round < ROUNDS; round++) {
+    for (unsigned round = 0; round < ROUNDS; round++) {
         asker *a = &askers[round % CLIENTS];
 
         queue_reads(a, 1, SERVERS, MBM_CLIENT_DEPTH);
@@ -138,7 +130,7 @@ TEST(clients_that_take_turns_are_answered_by_every_server)
     assert_int_equal(right, ROUNDS * MBM_CLIENT_DEPTH);
     assert_int_equal(failed + wrong + doubled, 0);
     assert_int_equal(line.collisions, 0);
-    for (i = 0; i < CLIENTS; i++) {
+    for (unsigned i = 0; i < CLIENTS; i++) {
         assert_int_equal(askers[i].counters.requests, ROUNDS / CLIENTS * MBM_CLIENT_DEPTH);
         assert_int_equal(askers[i].counters.badCrc + askers[i].counters.timeouts, 0);
     }
@@ -148,13 +140,12 @@ TEST(a_broadcast_reaches_every_server_at_once)
 {
     static const uint16_t words[] = {0xBEEF, 0xCAFE};
     mbm_clientRequest r = {.unit = 0, .data = words};
-    unsigned i;
 
     IS(MBM_PENDING, mbm_client_writeMultipleRegisters(&askers[0].client, &r, 97, 2));
     while (mbm_client_poll(&askers[0].client) == MBM_PENDING)
         pass();
     assert_int_equal(r.status, MBM_OK);
-    for (i = 0; i < SERVERS; i++)
+    for (unsigned i = 0; i < SERVERS; i++)
         assert_memory_equal(held[i] + 97, words, sizeof words);
     assert_int_equal(line.collisions, 0);
 }

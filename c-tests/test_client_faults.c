@@ -112,9 +112,8 @@ static void send_due(device *d)
     uint8_t all[HELD * 64];
     size_t length = 0, sent = 0;
     int64_t now = held_clock_now(&d->clock);
-    unsigned i;
 
-    for (i = 0; i < d->count;) {
+    for (unsigned i = 0; i < d->count;) {
         unsigned at = i;
 
         if (chance(&d->random, 3) == 0)
@@ -144,9 +143,8 @@ static void send_due(device *d)
 static void set_clock_due(device *d)
 {
     int64_t due = HELD_CLOCK_NEVER;
-    unsigned i;
 
-    for (i = 0; i < d->count; i++)
+    for (unsigned i = 0; i < d->count; i++)
         if (d->held[i].at < due)
             due = d->held[i].at;
     held_clock_due(&d->clock, due);
@@ -262,7 +260,6 @@ TEST(every_request_ends_once_and_with_its_own_data)
     static device d;
     unsigned long reconnected = 0;
     uint16_t port;
-    unsigned i;
 
     total = fewer ? strtoul(fewer, NULL, 10) : 200000;
     d.listener = tcp_listen(&port);
@@ -274,7 +271,7 @@ TEST(every_request_ends_once_and_with_its_own_data)
     OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
     OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
     OK(mbm_client_setRetries(&a.client, 1));
-    for (i = 0; i < MBM_CLIENT_DEPTH && queued < total; i++)
+    for (unsigned i = 0; i < MBM_CLIENT_DEPTH && queued < total; i++)
         queue_job(&jobs[i]);
     while (mbm_client_poll(&a.client) == MBM_PENDING) {
         if (!mbm_client_isConnected(&a.client) && mbm_tcp_isConnected(&a.tcp) < 0) {

@@ -108,10 +108,8 @@ static uint8_t exchange_once(int framing, const exchange *e, const uint8_t *resp
 
 TEST(every_function_and_its_response_are_forwarded_unchanged)
 {
-    unsigned i, k;
-
-    for (i = 0; i < COUNT(framings); i++)
-        for (k = 0; k < COUNT(exchanges); k++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned k = 0; k < COUNT(exchanges); k++) {
             const exchange *e = &exchanges[k];
             uint8_t exception[] = {(uint8_t)(e->request[0] | 0x80), 4};
 
@@ -133,16 +131,15 @@ TEST(a_response_whose_repeated_bytes_differ_is_not_accepted)
     } repeated[] = {{1, 1, 1},    {2, 1, 1},    {3, 1, 1},    {4, 1, 1},    {5, 1, 4},
                     {6, 1, 4},    {0x0F, 1, 4}, {0x10, 1, 4}, {0x14, 1, 3}, {0x15, 1, 14},
                     {0x16, 1, 6}, {0x17, 1, 1}, {0x2B, 1, 2}};
-    unsigned i, k, r, at;
 
-    for (i = 0; i < COUNT(framings); i++)
-        for (k = 0; k < COUNT(exchanges) - 2; k++)
-            for (r = 0; r < COUNT(repeated); r++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned k = 0; k < COUNT(exchanges) - 2; k++)
+            for (unsigned r = 0; r < COUNT(repeated); r++) {
                 const exchange *e = &exchanges[k];
 
                 if ((uint8_t)e->request[0] != repeated[r].function)
                     continue;
-                for (at = repeated[r].first; at <= repeated[r].last; at++) {
+                for (unsigned at = repeated[r].first; at <= repeated[r].last; at++) {
                     uint8_t other[64];
 
                     memcpy(other, e->response, e->response_bytes);
@@ -155,9 +152,7 @@ TEST(a_response_whose_repeated_bytes_differ_is_not_accepted)
 
 TEST(force_listen_only_mode_ends_without_a_response)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         IS(MBM_PENDING, forward("\x08\x00\x04\x00\x00", 5));
         IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
@@ -225,10 +220,9 @@ static void is_sent_as_built(int framing, const mbm_packet *packet, const uint8_
 TEST(every_request_that_is_built_is_forwarded)
 {
     unsigned i, forwarded = 0;
-    size_t k;
 
     for (i = 0; i < COUNT(framings); i++)
-        for (k = 0; k < example_count; k++) {
+        for (size_t k = 0; k < example_count; k++) {
             uint8_t pdu[MBM_MAX_PDU];
             mbm_packet packet;
 
@@ -261,10 +255,9 @@ static void records_are_forwarded(int framing, uint8_t function, uint16_t length
 TEST(records_are_forwarded_as_they_were_added)
 {
     static const uint16_t lengths[] = {1, 2, 3, 7, 60, 122};
-    unsigned i, k;
 
-    for (i = 0; i < COUNT(framings); i++)
-        for (k = 0; k < COUNT(lengths); k++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned k = 0; k < COUNT(lengths); k++) {
             if (lengths[k] <= 121)
                 records_are_forwarded(framings[i], MBM_FC_READ_FILE_RECORD, lengths[k]);
             records_are_forwarded(framings[i], MBM_FC_WRITE_FILE_RECORD, lengths[k]);

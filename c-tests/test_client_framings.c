@@ -237,7 +237,6 @@ TEST(an_impossible_delimiter_is_refused)
     static mbm_client fresh;
     uint16_t words[2];
     mbm_clientRequest r = asker_request(SERVED_UNIT, words, sizeof words, NULL);
-    unsigned i;
 
     IS(MBM_INVALID_ARGUMENT, mbm_client_setDelimiter(NULL, '!'));
     IS(MBM_NOT_INITIALISED, mbm_client_setDelimiter(&fresh, '!'));
@@ -248,7 +247,7 @@ TEST(an_impossible_delimiter_is_refused)
     IS(MBM_INVALID_ARGUMENT, mbm_client_setDelimiter(&a.client, '!'));
     end();
     begin(MBM_FRAMING_ASCII);
-    for (i = 0; i < sizeof wrong; i++)
+    for (unsigned i = 0; i < sizeof wrong; i++)
         IS(MBM_INVALID_ARGUMENT, mbm_client_setDelimiter(&a.client, wrong[i]));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
     (void)mbm_client_poll(&a.client);
@@ -263,9 +262,8 @@ static uint32_t most_in_flight(void)
     mbm_clientRequest requests[MBM_CLIENT_DEPTH];
     uint16_t words[MBM_CLIENT_DEPTH];
     uint32_t most = 0;
-    unsigned i;
 
-    for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+    for (unsigned i = 0; i < MBM_CLIENT_DEPTH; i++) {
         requests[i] = asker_request(SERVED_UNIT, &words[i], sizeof words[i], NULL);
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[i],
                                                         (uint16_t)(SERVED_BASE + i), 1));
@@ -275,7 +273,7 @@ static uint32_t most_in_flight(void)
             most = a.counters.requests - a.counters.replies;
         asker_rest(&a);
     }
-    for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+    for (unsigned i = 0; i < MBM_CLIENT_DEPTH; i++) {
         assert_int_equal(requests[i].status, MBM_OK);
         assert_int_equal(words[i], s.words[i]);
     }

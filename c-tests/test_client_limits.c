@@ -1,6 +1,7 @@
 /* The response timeout and the retries of one request and of one unit, and repetitions while
  * a device is busy: in every framing over a port in memory, and with many requests in flight
  * against a TCP peer whose replies and exceptions libmodbus makes. */
+#include "refused.h"
 #include "client.h"
 #include "memory_port.h"
 #include "tcp_peer.h"
@@ -8,8 +9,6 @@
 
 #include <stdio.h>
 #include <string.h>
-
-#include "refused.h"
 
 enum { UNIT = 7, MS = 1000, STEPS = 1000 };
 /* Timeouts in milliseconds. */
@@ -76,9 +75,7 @@ static uint32_t time_of_read(void)
 
 TEST(the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_client)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         assert_int_equal(time_of_read(), CLIENTS);
         request.timeoutMs = OWN;
@@ -111,9 +108,7 @@ TEST(the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_client)
 
 TEST(a_unit_and_a_timeout_that_are_too_large_are_refused)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         request.unit = 300; /* not 44 */
         REFUSED(MBM_INVALID_ARGUMENT, client,
@@ -143,9 +138,7 @@ TEST(a_unit_and_a_timeout_that_are_too_large_are_refused)
 
 TEST(a_record_with_a_unit_or_a_timeout_that_is_too_large_is_refused)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         units[1].timeoutMs = UNITS;
         OK(mbm_client_setUnits(&client, units, 2));
@@ -185,9 +178,7 @@ static unsigned sendings(void)
 
 TEST(the_retries_of_a_request_override_those_of_the_unit_and_of_the_client)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         assert_int_equal(sendings(), 1);
         OK(mbm_client_setRetries(&client, 2));
@@ -225,9 +216,7 @@ TEST(the_retries_of_a_request_override_those_of_the_unit_and_of_the_client)
 
 TEST(a_client_that_repeats_nothing_refuses_a_request_with_retries)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         request.retryLimit = 1;
         IS(MBM_INVALID_ARGUMENT, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
@@ -292,9 +281,8 @@ static unsigned refusals(int framing, uint8_t function, uint8_t code, uint32_t w
 TEST(a_busy_device_gets_its_request_again_after_the_wait)
 {
     enum { WAIT = 250 };
-    unsigned i;
 
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         assert_int_equal(refusals(framings[i], 3, SERVER_DEVICE_BUSY, 0), 1);
         OK(mbm_client_setRetries(&client, 9));
@@ -316,15 +304,13 @@ TEST(a_busy_device_gets_its_request_again_after_the_wait)
 
 TEST(refusals_and_lost_replies_are_counted_apart)
 {
-    unsigned i, k;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         OK(mbm_client_setUnits(&client, units, 2));
         OK(mbm_client_setRetries(&client, 1));
         OK(mbm_client_setBusyRetries(&client, 2, 20));
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
-        for (k = 0; k < 4; k++) {
+        for (unsigned k = 0; k < 4; k++) {
             m.sent_count = 0;
             memory_port_send(&m, &client);
             if (k < 2)
@@ -360,11 +346,10 @@ TEST_WITH(requests_in_flight_at_once_have_their_own_timeouts_and_retries, begin_
 {
     static mbm_clientRequest requests[8];
     static uint16_t replies[8][2];
-    unsigned i;
 
     OK(mbm_client_setRetries(&a.client, 0));
     OK(mbm_client_setBusyRetries(&a.client, 1, 5));
-    for (i = 0; i < 8; i++) {
+    for (unsigned i = 0; i < 8; i++) {
         requests[i] = asker_request(7, replies[i], sizeof replies[i], NULL);
         tcp_peer_fault(peer, i + 1, FAULT_DELAY, 400);
     }
@@ -375,13 +360,13 @@ TEST_WITH(requests_in_flight_at_once_have_their_own_timeouts_and_retries, begin_
     requests[7].timeoutMs = 20;
     tcp_peer_fault(peer, 6, FAULT_EXCEPTION, SERVER_DEVICE_BUSY);
     tcp_peer_fault(peer, 7, FAULT_EXCEPTION, ACKNOWLEDGE);
-    for (i = 0; i < 8; i++)
+    for (unsigned i = 0; i < 8; i++)
         IS(MBM_PENDING,
            mbm_client_readHoldingRegisters(&a.client, &requests[i], (uint16_t)(10 * i), 2));
     asker_wait_all(&a);
-    for (i = 0; i < 8; i++)
+    for (unsigned i = 0; i < 8; i++)
         IS(i < 3 || i == 7 ? MBM_RESPONSE_TIMED_OUT : MBM_OK, requests[i].status);
-    for (i = 3; i < 7; i++)
+    for (unsigned i = 3; i < 7; i++)
         assert_int_equal(replies[i][1], tcp_peer_word(10 * i + 1));
     assert_int_equal(tcp_peer_count(peer).requests, 8 + 3);
 }

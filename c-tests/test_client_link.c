@@ -76,10 +76,9 @@ TEST(a_link_is_connected_once_connect_succeeds_or_a_reply_arrives)
 {
     static const uint8_t statuses[] = {MBM_OK, MBM_PENDING, MBM_LINK_LOST, MBM_INVALID_ARGUMENT};
     const mbm_linkHooks link = {.connect = reconnected};
-    unsigned i, k;
 
-    for (i = 0; i < COUNT(framings); i++)
-        for (k = 0; k < COUNT(statuses); k++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned k = 0; k < COUNT(statuses); k++) {
             begin(framings[i]);
             assert_int_equal(mbm_client_isConnected(&client), 1);
             m.is_lost = 1;
@@ -106,9 +105,8 @@ TEST(a_link_is_connected_once_connect_succeeds_or_a_reply_arrives)
 TEST(a_link_that_the_program_connected_is_connected)
 {
     const mbm_linkHooks none = {.connect = NULL};
-    unsigned i;
 
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         m.is_lost = 1;
         queue_read();
@@ -146,9 +144,8 @@ static uint32_t of_upper_bits(void *context)
 TEST(any_random_function_gives_the_whole_range_of_jitter)
 {
     uint32_t (*const generators[])(void *) = {of_32_bits, of_15_bits, of_16_bits, of_upper_bits};
-    unsigned i, k;
 
-    for (i = 0; i < COUNT(generators); i++) {
+    for (unsigned i = 0; i < COUNT(generators); i++) {
         uint32_t least = UINT32_MAX, most = 0, sum = 0;
 
         begin(MBM_FRAMING_TCP);
@@ -158,7 +155,7 @@ TEST(any_random_function_gives_the_whole_range_of_jitter)
         OK(mbm_client_setJitter(&client, 100, generators[i], NULL));
         queue_read();
         memory_port_send(&m, &client);
-        for (k = 0; k < 255; k++) {
+        for (unsigned k = 0; k < 255; k++) {
             uint32_t sent_at = m.now, wait;
 
             m.sent_count = 0;

@@ -117,9 +117,7 @@ TEST(a_server_id_with_a_right_byte_count_ends_without_a_wait)
 
 TEST(a_wrong_server_id_is_refused)
 {
-    size_t i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (size_t i = 0; i < COUNT(framings); i++) {
         begin_function begin = framings[i];
 
         /* The byte count is larger than the data. */

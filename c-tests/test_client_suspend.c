@@ -1,12 +1,11 @@
 /* A client that gives its line away takes it back from the one to whom it was given, and from no
  * other. After that the master has no line: nothing of the client is used any more. */
+#include "refused.h"
 #include "memory_port.h"
 #include "test.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#include "refused.h"
 
 static memory_port m, other_m;
 static mbm_client *client; /* on the heap, so that the sanitizer finds each use after its end */
@@ -61,9 +60,8 @@ static void end(void)
 static void each_variant(void (*test)(void))
 {
     static const int framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_RTU_OVER_TCP};
-    unsigned i;
 
-    for (i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++) {
         begin(framings[i / 2], i % 2);
         test();
         end();
@@ -202,19 +200,18 @@ static void lend(void *context, mbm_clientRequest *request)
 static void suspend_when_done(void)
 {
     static const uint8_t reply[] = {17, 6, 0, 1, 0, 2};
-    unsigned i;
 
     memset(requests, 0, sizeof requests);
     ended = 0;
     requests[0].done = lend;
-    for (i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         requests[i].unit = 17;
         IS(MBM_PENDING, mbm_client_writeSingleRegister(client, &requests[i], 1, 2));
     }
     memory_port_send(&m, client);
     assert_int_equal(m.sent_count, 8);
     memory_port_rtu(&m, reply, sizeof reply);
-    for (i = 0; i < 100 && ended == 0; i++, m.now += 10000)
+    for (unsigned i = 0; i < 100 && ended == 0; i++, m.now += 10000)
         IS(MBM_PENDING, mbm_client_poll(client));
     assert_int_equal(ended, 1);
     /* The line is the master's: the next request waits. */
@@ -223,7 +220,7 @@ static void suspend_when_done(void)
     OK(mbm_node_cancel(&node));
     OK(mbm_client_resume(client, &line));
     IS(MBM_PENDING, requests[1].status);
-    for (i = 0; i < 100 && m.sent_count == 8; i++, m.now += 10000)
+    for (unsigned i = 0; i < 100 && m.sent_count == 8; i++, m.now += 10000)
         IS(MBM_PENDING, mbm_client_poll(client));
     assert_int_equal(m.sent_count, 16);
 }

@@ -48,10 +48,8 @@ static void queue_read(unsigned i)
 
 static void is_right(unsigned i)
 {
-    unsigned word;
-
     assert_int_equal(requests[i].status, MBM_OK);
-    for (word = 0; word < WORDS; word++)
+    for (unsigned word = 0; word < WORDS; word++)
         assert_int_equal(words[i][word], tcp_peer_word(20 * i + word));
 }
 
@@ -67,10 +65,8 @@ static void finish(void)
 /* Makes eight requests, one after the other. The third meets the fault. */
 static void assert_ends_with(tcp_fault fault, unsigned argument, uint8_t status)
 {
-    unsigned i;
-
     tcp_peer_fault(peer, MET, fault, argument);
-    for (i = 1; i <= ASKED; i++) {
+    for (unsigned i = 1; i <= ASKED; i++) {
         queue_read(i - 1);
         finish();
         if (i == MET && status != MBM_OK)
@@ -85,11 +81,9 @@ static void assert_ends_with(tcp_fault fault, unsigned argument, uint8_t status)
 /* The same with one retry. A lost link and an exception are not retried. */
 static void meets_and_retries(tcp_fault fault, unsigned argument)
 {
-    unsigned i;
-
     OK(mbm_client_setRetries(&a.client, 1));
     tcp_peer_fault(peer, MET, fault, argument);
-    for (i = 0; i < ASKED; i++) {
+    for (unsigned i = 0; i < ASKED; i++) {
         queue_read(i);
         finish();
         is_right(i);
@@ -134,28 +128,24 @@ MEETS_AND_RETRIES(a_length_that_is_too_small_is_malformed, FAULT_SHORT_LENGTH, 2
 
 TEST(responses_in_another_order_are_matched)
 {
-    unsigned i;
-
     tcp_peer_fault(peer, 1, FAULT_HOLD, 5);
     tcp_peer_fault(peer, 2, FAULT_HOLD, 2);
     tcp_peer_fault(peer, 5, FAULT_DELAY, 20);
-    for (i = 0; i < ASKED; i++)
+    for (unsigned i = 0; i < ASKED; i++)
         queue_read(i);
     finish();
-    for (i = 0; i < ASKED; i++)
+    for (unsigned i = 0; i < ASKED; i++)
         is_right(i);
     assert_int_equal(a.counters.foreignFrames, 0);
 }
 
 TEST(responses_in_one_segment_are_separated)
 {
-    unsigned i;
-
     tcp_peer_fault(peer, 1, FAULT_JOIN, ASKED - 1);
-    for (i = 0; i < ASKED; i++)
+    for (unsigned i = 0; i < ASKED; i++)
         queue_read(i);
     finish();
-    for (i = 0; i < ASKED; i++)
+    for (unsigned i = 0; i < ASKED; i++)
         is_right(i);
 }
 

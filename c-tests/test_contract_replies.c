@@ -6,8 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-fixture each_test = {sim_setup, sim_teardown};
-
 #define WORD(index) s->response[index]
 
 static uint8_t read_words(sim *s, uint16_t quantity, const char *reply)
@@ -34,12 +32,9 @@ static void found_after(sim *s, const char *noise)
     recovers_at_once(s);
 }
 
-TEST(exception_codes_of_the_device_are_returned_unchanged)
+SIM_TEST(exception_codes_of_the_device_are_returned_unchanged)
 {
-    unsigned code;
-    NODE;
-
-    for (code = 1; code < 0x80; code++) {
+    for (unsigned code = 1; code < 0x80; code++) {
         char reply[20];
 
         snprintf(reply, sizeof reply, "11 83 %02X +", code);
@@ -55,10 +50,8 @@ TEST(exception_codes_of_the_device_are_returned_unchanged)
     assert_int_equal(mbm_node_getExceptionCode(n), 0);
 }
 
-TEST(an_exception_code_of_0_or_from_80_on_is_malformed_and_kept)
+SIM_TEST(an_exception_code_of_0_or_from_80_on_is_malformed_and_kept)
 {
-    NODE;
-
     assert_int_equal(read_words(s, 1, "11 83 00 +"), MBM_MALFORMED_REPLY);
     assert_int_equal(mbm_node_getExceptionCode(n), 0);
     assert_int_equal(read_words(s, 1, "11 83 80 +"), MBM_MALFORMED_REPLY);
@@ -68,17 +61,15 @@ TEST(an_exception_code_of_0_or_from_80_on_is_malformed_and_kept)
     recovers_at_once(s);
 }
 
-TEST(an_exception_with_a_bad_crc_is_no_exception)
+SIM_TEST(an_exception_with_a_bad_crc_is_no_exception)
 {
-    NODE;
-
     assert_int_equal(read_words(s, 1, "11 83 02 00 00"), MBM_INVALID_CRC);
     assert_int_equal(mbm_node_getExceptionCode(n), 0);
     assert_int_equal(s->counters.badCrc, 1);
     recovers_at_once(s);
 }
 
-TEST(response_words_survive_a_failure)
+SIM_TEST(response_words_survive_a_failure)
 {
     static const char *const replies[] = {
         "11 83 02 +",
@@ -89,11 +80,9 @@ TEST(response_words_survive_a_failure)
         "11 03 04 AA",
         "",
     };
-    size_t i;
-    SIM;
 
     OK(read_words(s, 2, "11 03 04 12 34 56 78 +"));
-    for (i = 0; i < COUNT(replies); i++) {
+    for (size_t i = 0; i < COUNT(replies); i++) {
         assert_int_not_equal(read_words(s, 2, replies[i]), MBM_OK);
         assert_int_equal(WORD(0), 0x1234);
         assert_int_equal(WORD(1), 0x5678);
@@ -101,10 +90,8 @@ TEST(response_words_survive_a_failure)
     }
 }
 
-TEST(each_failure_has_its_status)
+SIM_TEST(each_failure_has_its_status)
 {
-    SIM;
-
     assert_int_equal(read_words(s, 1, ""), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_words(s, 1, "12 03 02 00 01 +"), MBM_INVALID_SLAVE_ID);
     assert_int_equal(read_words(s, 1, "11 04 02 00 01 +"), MBM_INVALID_FUNCTION);
@@ -115,10 +102,8 @@ TEST(each_failure_has_its_status)
     recovers_at_once(s);
 }
 
-TEST(the_most_specific_failure_is_reported)
+SIM_TEST(the_most_specific_failure_is_reported)
 {
-    SIM;
-
     assert_int_equal(read_words(s, 1, "12 03 02 00 01 + / 11 04 02 00 01 +"), MBM_INVALID_FUNCTION);
     assert_int_equal(read_words(s, 1, "11 04 02 00 01 + / 12 03 02 00 01 +"), MBM_INVALID_FUNCTION);
     assert_int_equal(read_words(s, 1, "11 03 04 00 01 00 02 + / 11 04 02 00 01 +"),
@@ -126,54 +111,47 @@ TEST(the_most_specific_failure_is_reported)
     recovers_at_once(s);
 }
 
-TEST(a_bad_crc_fails_after_t35_and_not_after_the_timeout)
+SIM_TEST(a_bad_crc_fails_after_t35_and_not_after_the_timeout)
 {
     uint64_t over;
-    SIM;
 
     assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
     over = s->frames[0].end + 500 + 7 * s->character;
     assert_in_range(s->now, over + 4000, over + 4100);
 }
 
-TEST(all_125_registers_and_2000_bits_are_readable)
+SIM_TEST(all_125_registers_and_2000_bits_are_readable)
 {
     uint8_t reply[256];
     char text[1024];
-    unsigned i, at;
-    NODE;
+    unsigned at;
 
     at = (unsigned)snprintf(text, sizeof text, "11 03 FA ");
-    for (i = 0; i < 250; i++)
+    for (unsigned i = 0; i < 250; i++)
         at += (unsigned)snprintf(text + at, sizeof text - at, "%02X ", i);
     snprintf(text + at, sizeof text - at, "+");
     assert_int_equal(sim_bytes(reply, text), 255);
     OK(read_words(s, 125, text));
     assert_int_equal(mbm_node_available(n), 125);
-    for (i = 0; i < 125; i++)
+    for (unsigned i = 0; i < 125; i++)
         assert_int_equal(mbm_node_receive(n), (2 * i) << 8 | (2 * i + 1));
     text[4] = '1';
     sim_answer(s, 1, 500, text);
     OK(mbm_node_readCoils(n, 0, 2000));
-    for (i = 0; i < 125; i++)
+    for (unsigned i = 0; i < 125; i++)
         assert_int_equal(WORD((uint8_t)i), (2 * i + 1) << 8 | (2 * i));
 }
 
-TEST(reads_of_65_registers_and_more_are_sent)
+SIM_TEST(reads_of_65_registers_and_more_are_sent)
 {
-    SIM;
-
     assert_int_equal(read_words(s, 66, "11 83 02 +"), MBM_ILLEGAL_DATA_ADDRESS);
     sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
 }
 
-TEST(a_byte_count_of_251_to_255_is_malformed)
+SIM_TEST(a_byte_count_of_251_to_255_is_malformed)
 {
-    unsigned count;
-    NODE;
-
     mbm_node_setResponseTimeout(n, 100);
-    for (count = 251; count < 256; count++) {
+    for (unsigned count = 251; count < 256; count++) {
         char reply[40];
 
         snprintf(reply, sizeof reply, "11 03 %02X 12 34 56 78 +", count);
@@ -185,10 +163,8 @@ TEST(a_byte_count_of_251_to_255_is_malformed)
     recovers_at_once(s);
 }
 
-TEST(a_byte_count_that_does_not_suit_the_request_is_malformed)
+SIM_TEST(a_byte_count_that_does_not_suit_the_request_is_malformed)
 {
-    NODE;
-
     OK(read_words(s, 2, "11 03 04 11 11 22 22 +"));
     assert_int_equal(read_words(s, 4, "11 03 02 AA AA +"), MBM_MALFORMED_REPLY);
     assert_int_equal(WORD(0), 0x1111);
@@ -205,10 +181,8 @@ static void malformed(sim *s, uint8_t status)
     recovers_at_once(s);
 }
 
-TEST(an_echo_with_another_address_or_value_is_malformed)
+SIM_TEST(an_echo_with_another_address_or_value_is_malformed)
 {
-    NODE;
-
     mbm_node_setResponseTimeout(n, 100);
     sim_answer(s, 1, 500, "11 05 00 02 FF 00 +");
     malformed(s, mbm_node_writeSingleCoil(n, 1, 1));
@@ -232,10 +206,8 @@ TEST(an_echo_with_another_address_or_value_is_malformed)
     malformed(s, mbm_node_maskWriteRegister(n, 1, 2, 3));
 }
 
-TEST(the_reply_is_found_after_stray_bytes)
+SIM_TEST(the_reply_is_found_after_stray_bytes)
 {
-    SIM;
-
     found_after(s, "00");
     found_after(s, "FF FE 7F 00 33");
     found_after(s, "11");
@@ -243,10 +215,8 @@ TEST(the_reply_is_found_after_stray_bytes)
     assert_int_equal(s->counters.resynchronisations, 4);
 }
 
-TEST(the_reply_is_found_after_noise_that_looks_like_its_header)
+SIM_TEST(the_reply_is_found_after_noise_that_looks_like_its_header)
 {
-    SIM;
-
     found_after(s, "11 03");
     found_after(s, "11 03 04");
     found_after(s, "11 03 04 00");
@@ -259,10 +229,8 @@ TEST(the_reply_is_found_after_noise_that_looks_like_its_header)
 
 /* Four bytes that look like the start of a longer reply. An exception after them is found,
  * also if the line was silent between. */
-TEST(an_exception_after_noise_that_looks_like_a_longer_reply_is_found)
+SIM_TEST(an_exception_after_noise_that_looks_like_a_longer_reply_is_found)
 {
-    NODE;
-
     (void)n;
     assert_int_equal(read_words(s, 10, "11 03 14 00 / 11 83 02 +"), MBM_ILLEGAL_DATA_ADDRESS);
     sim_answer(s, 1, 500, "11 03 14 00");
@@ -271,30 +239,24 @@ TEST(an_exception_after_noise_that_looks_like_a_longer_reply_is_found)
     assert_true(s->now - s->frames[1].end < 30000);
 }
 
-TEST(the_reply_is_found_after_a_frame_of_another_unit)
+SIM_TEST(the_reply_is_found_after_a_frame_of_another_unit)
 {
-    SIM;
-
     found_after(s, "12 03 04 AA AA BB BB +");
     found_after(s, "12 83 02 +");
     found_after(s, "12 03 00 00 00 02 + / 12 03 04 AA AA BB BB +");
     assert_int_equal(s->counters.foreignFrames, 4);
 }
 
-TEST(the_reply_is_found_after_a_late_reply_of_another_function_or_length)
+SIM_TEST(the_reply_is_found_after_a_late_reply_of_another_function_or_length)
 {
-    SIM;
-
     found_after(s, "11 04 04 AA AA BB BB +");
     found_after(s, "11 03 02 AA AA +");
     found_after(s, "11 06 00 01 00 02 +");
     found_after(s, "11 84 02 +");
 }
 
-TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second)
+SIM_TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second)
 {
-    NODE;
-
     sim_answer(s, 1, 500, "11 03 04 12 34");
     /* The CRC of the whole frame, as a device would send it. */
     sim_answer(s, 1, 50000, "56 78 90 C6");
@@ -304,10 +266,9 @@ TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second)
 
 /* Noise that looks like the start of our reply, then a pause, then the reply. However the
  * first call ends, its reply must not become the second call's data. */
-TEST(a_reply_after_noise_and_a_pause_is_not_taken_for_the_next)
+SIM_TEST(a_reply_after_noise_and_a_pause_is_not_taken_for_the_next)
 {
     uint8_t status;
-    NODE;
 
     sim_answer(s, 1, 500, "11 03 02 00 00 00 00");
     sim_answer(s, 1, 6500, "11 03 02 11 11 +");
@@ -319,29 +280,23 @@ TEST(a_reply_after_noise_and_a_pause_is_not_taken_for_the_next)
 }
 
 /* Data may have any value, so a pause within the data must not end the request. */
-TEST(a_pause_after_data_like_a_damaged_exception_does_not_end_the_request)
+SIM_TEST(a_pause_after_data_like_a_damaged_exception_does_not_end_the_request)
 {
-    NODE;
-
     sim_answer(s, 1, 500, "11 03 08 11 83 01 02 03 04");
     sim_answer(s, 1, 50000, "05 06 09 D9");
     OK(mbm_node_readHoldingRegisters(n, 0, 4));
     assert_int_equal(WORD(3), 0x0506);
 }
 
-TEST(foreign_data_like_our_damaged_reply_do_not_end_the_request)
+SIM_TEST(foreign_data_like_our_damaged_reply_do_not_end_the_request)
 {
-    NODE;
-
     sim_answer(s, 1, 500, "12 03 06 11 83 01 02 03 04 +");
     sim_answer(s, 1, 20000, "11 03 02 00 2A +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
-TEST(an_echo_is_dropped_with_echo_discard_on)
+SIM_TEST(an_echo_is_dropped_with_echo_discard_on)
 {
-    NODE;
-
     OK(mbm_line_setEchoDiscard(&s->line, 1));
     s->echo = 1;
     OK(read_words(s, 1, "11 03 02 00 2A +"));
@@ -359,10 +314,8 @@ TEST(an_echo_is_dropped_with_echo_discard_on)
     OK(mbm_node_writeSingleCoil(n, 1, 1));
 }
 
-TEST(a_damaged_echo_does_not_hide_the_reply)
+SIM_TEST(a_damaged_echo_does_not_hide_the_reply)
 {
-    NODE;
-
     OK(mbm_line_setEchoDiscard(&s->line, 1));
     s->transmit[0] = 0x1111;
     s->transmit[1] = 0x2222;
@@ -374,20 +327,16 @@ TEST(a_damaged_echo_does_not_hide_the_reply)
     OK(mbm_node_writeMultipleRegisters(n, 1, 2));
 }
 
-TEST(noise_before_the_echo_does_not_hide_a_foreign_frame_after_it)
+SIM_TEST(noise_before_the_echo_does_not_hide_a_foreign_frame_after_it)
 {
-    SIM;
-
     OK(mbm_line_setEchoDiscard(&s->line, 1));
     assert_int_equal(read_words(s, 1, "00 / 11 03 00 00 00 01 + / 12 03 02 00 01 +"),
                      MBM_INVALID_SLAVE_ID);
     assert_int_equal(s->counters.foreignFrames, 1);
 }
 
-TEST(an_echo_alone_is_no_success)
+SIM_TEST(an_echo_alone_is_no_success)
 {
-    NODE;
-
     OK(mbm_line_setEchoDiscard(&s->line, 1));
     OK(mbm_node_setResponseTimeout(n, 100));
     s->echo = 1;
@@ -397,28 +346,22 @@ TEST(an_echo_alone_is_no_success)
     assert_int_equal(mbm_node_maskWriteRegister(n, 1, 2, 3), MBM_RESPONSE_TIMED_OUT);
 }
 
-TEST(with_discard_off_an_echo_that_is_no_reply_is_skipped)
+SIM_TEST(with_discard_off_an_echo_that_is_no_reply_is_skipped)
 {
-    NODE;
-
     s->echo = 1;
     OK(read_words(s, 1, "11 03 02 00 2A +"));
     sim_answer(s, 1, 500, "11 10 00 01 00 02 +");
     OK(mbm_node_writeMultipleRegisters(n, 1, 2));
 }
 
-TEST(a_device_that_does_not_echo_still_answers_reads_with_discard_on)
+SIM_TEST(a_device_that_does_not_echo_still_answers_reads_with_discard_on)
 {
-    SIM;
-
     OK(mbm_line_setEchoDiscard(&s->line, 1));
     OK(read_words(s, 1, "11 03 02 00 2A +"));
 }
 
-TEST(counters_count_what_happened)
+SIM_TEST(counters_count_what_happened)
 {
-    NODE;
-
     mbm_node_setResponseTimeout(n, 100);
     recovers_at_once(s);
     assert_int_equal(read_words(s, 1, "11 83 02 +"), 2);
@@ -436,12 +379,9 @@ TEST(counters_count_what_happened)
     assert_int_equal(s->counters.requests, 4);
 }
 
-TEST(counters_miss_no_frame_of_a_crowded_line)
+SIM_TEST(counters_miss_no_frame_of_a_crowded_line)
 {
-    int i;
-    NODE;
-
-    for (i = 0; i < 30; i++)
+    for (int i = 0; i < 30; i++)
         sim_answer(s, 1, 30000 * (unsigned)i, TEN("12 07 + / "));
     sim_answer(s, 1, 900000, "11 03 02 00 2A +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
@@ -451,10 +391,8 @@ TEST(counters_miss_no_frame_of_a_crowded_line)
 }
 
 /* So the exception begins as a reply of one register does. */
-TEST(an_exception_whose_code_is_the_byte_count_is_a_whole_frame)
+SIM_TEST(an_exception_whose_code_is_the_byte_count_is_a_whole_frame)
 {
-    SIM;
-
     sim_answer(s, 1, 500, "11 83 02 +");
     IS(2, sim_read_one(s));
     assert_int_equal(s->counters.exceptions, 1);
@@ -462,10 +400,8 @@ TEST(an_exception_whose_code_is_the_byte_count_is_a_whole_frame)
     assert_int_equal(s->counters.foreignFrames, 0);
 }
 
-TEST(a_right_crc_within_the_reply_is_no_frame)
+SIM_TEST(a_right_crc_within_the_reply_is_no_frame)
 {
-    SIM;
-
     s->read_piece = 3; /* a reply that comes at once is not searched on a host */
     OK(read_words(s, 4, "11 03 08 12 34 + 56 78 9A BC +"));
     assert_int_equal(s->response[0], 0x1234);

@@ -6,15 +6,11 @@
 
 #include <string.h>
 
-fixture each_test = {sim_setup, sim_teardown};
-
 #define WORD(index) s->response[index]
 #define LAST(text) sim_assert_sent(s, s->sent - 1, text)
 
-TEST(reads_coils_and_inputs_as_the_specification_shows)
+SIM_TEST(reads_coils_and_inputs_as_the_specification_shows)
 {
-    NODE;
-
     sim_answer(s, 1, 500, "11 01 03 CD 6B 05 +");
     OK(mbm_node_readCoils(n, 19, 19));
     LAST("11 01 00 13 00 13 +");
@@ -27,10 +23,8 @@ TEST(reads_coils_and_inputs_as_the_specification_shows)
     assert_int_equal(WORD(1), 0x0035);
 }
 
-TEST(reads_registers_as_the_specification_shows)
+SIM_TEST(reads_registers_as_the_specification_shows)
 {
-    NODE;
-
     sim_answer(s, 1, 500, "11 03 06 02 2B 00 00 00 64 +");
     OK(mbm_node_readHoldingRegisters(n, 107, 3));
     LAST("11 03 00 6B 00 03 +");
@@ -43,10 +37,8 @@ TEST(reads_registers_as_the_specification_shows)
     assert_int_equal(WORD(0), 10);
 }
 
-TEST(writes_single_cells_as_the_specification_shows)
+SIM_TEST(writes_single_cells_as_the_specification_shows)
 {
-    NODE;
-
     sim_answer(s, 1, 500, "11 05 00 AC FF 00 +");
     OK(mbm_node_writeSingleCoil(n, 172, 1));
     LAST("11 05 00 AC FF 00 +");
@@ -58,23 +50,19 @@ TEST(writes_single_cells_as_the_specification_shows)
     LAST("11 06 00 01 00 03 +");
 }
 
-TEST(any_state_except_zero_is_on)
+SIM_TEST(any_state_except_zero_is_on)
 {
     static const uint8_t states[] = {1, 2, 0x80, 0xFF};
-    size_t i;
-    NODE;
 
-    for (i = 0; i < COUNT(states); i++) {
+    for (size_t i = 0; i < COUNT(states); i++) {
         sim_answer(s, 1, 500, "11 05 00 00 FF 00 +");
         OK(mbm_node_writeSingleCoil(n, 0, states[i]));
         LAST("11 05 00 00 FF 00 +");
     }
 }
 
-TEST(writes_many_cells_as_the_specification_shows)
+SIM_TEST(writes_many_cells_as_the_specification_shows)
 {
-    NODE;
-
     s->transmit[0] = 0x01CD;
     sim_answer(s, 1, 500, "11 0F 00 13 00 0A +");
     OK(mbm_node_writeMultipleCoils(n, 19, 10));
@@ -86,21 +74,16 @@ TEST(writes_many_cells_as_the_specification_shows)
     LAST("11 10 00 01 00 02 04 00 0A 01 02 +");
 }
 
-TEST(mask_writes_as_the_specification_shows)
+SIM_TEST(mask_writes_as_the_specification_shows)
 {
-    NODE;
-
     sim_answer(s, 1, 500, "11 16 00 04 00 F2 00 25 +");
     OK(mbm_node_maskWriteRegister(n, 4, 0x00F2, 0x0025));
     LAST("11 16 00 04 00 F2 00 25 66 E2");
 }
 
-TEST(reads_and_writes_at_once_as_the_specification_shows)
+SIM_TEST(reads_and_writes_at_once_as_the_specification_shows)
 {
-    uint8_t i;
-    NODE;
-
-    for (i = 0; i < 3; i++)
+    for (uint8_t i = 0; i < 3; i++)
         s->transmit[i] = 0x00FF;
     sim_answer(s, 1, 500, "11 17 0C 00 FE 0A CD 00 01 00 03 00 0D 00 FF +");
     OK(mbm_node_readWriteMultipleRegisters(n, 3, 6, 14, 3));
@@ -111,10 +94,8 @@ TEST(reads_and_writes_at_once_as_the_specification_shows)
 }
 
 /* Complete frames with their CRC, as the documentation of another library shows them. */
-TEST(frames_are_the_same_as_in_the_documentation_of_another_library)
+SIM_TEST(frames_are_the_same_as_in_the_documentation_of_another_library)
 {
-    NODE;
-
     mbm_node_setResponseTimeout(n, 1);
     mbm_line_setGap(&s->line, 0);
     mbm_line_setQuietTime(&s->line, 0);
@@ -154,10 +135,8 @@ TEST(frames_are_the_same_as_in_the_documentation_of_another_library)
     LAST("11 17 04 10 00 01 01 12 00 02 04 00 C8 00 82 64 E2");
 }
 
-TEST(units_248_to_255_are_accepted)
+SIM_TEST(units_248_to_255_are_accepted)
 {
-    NODE;
-
     mbm_node_setSlaveID(n, 248);
     sim_answer(s, 1, 100, "F8 03 02 00 01 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
@@ -168,10 +147,8 @@ TEST(units_248_to_255_are_accepted)
     LAST("FF 03 00 00 00 01 +");
 }
 
-TEST(the_last_odd_byte_of_coils_is_padded_with_zero)
+SIM_TEST(the_last_odd_byte_of_coils_is_padded_with_zero)
 {
-    NODE;
-
     memset(s->response, 0xFF, sizeof s->response);
     sim_answer(s, 1, 100, "11 01 03 CD 6B FF +");
     OK(mbm_node_readCoils(n, 0, 24));
@@ -183,10 +160,8 @@ TEST(the_last_odd_byte_of_coils_is_padded_with_zero)
     assert_int_equal(WORD(0), 0x0007);
 }
 
-TEST(coil_pad_bits_are_sent_as_zero)
+SIM_TEST(coil_pad_bits_are_sent_as_zero)
 {
-    NODE;
-
     s->transmit[0] = 0xFFFF;
     sim_answer(s, 1, 100, "11 0F 00 00 00 03 +");
     OK(mbm_node_writeMultipleCoils(n, 0, 3));
@@ -196,10 +171,8 @@ TEST(coil_pad_bits_are_sent_as_zero)
     LAST("11 0F 00 00 00 09 02 FF 01 +");
 }
 
-TEST(a_transmit_word_that_the_program_sets_leaves_the_queue)
+SIM_TEST(a_transmit_word_that_the_program_sets_leaves_the_queue)
 {
-    NODE;
-
     mbm_node_beginTransmission(n, 7);
     s->transmit[122] = 1;
     s->transmit[0] = 0xAAAA;
@@ -209,10 +182,8 @@ TEST(a_transmit_word_that_the_program_sets_leaves_the_queue)
     LAST("11 10 00 07 00 01 02 BB BB +");
 }
 
-TEST(words_that_the_program_changes_leave_the_indices_alone)
+SIM_TEST(words_that_the_program_changes_leave_the_indices_alone)
 {
-    NODE;
-
     sim_answer(s, 1, 100, "11 03 04 00 01 00 02 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 2));
     assert_int_equal(mbm_node_receive(n), 1);
@@ -228,10 +199,8 @@ TEST(words_that_the_program_changes_leave_the_indices_alone)
     LAST("11 10 00 03 00 02 04 00 00 22 22 +");
 }
 
-TEST(begin_transmission_empties_the_queue_and_keeps_the_words)
+SIM_TEST(begin_transmission_empties_the_queue_and_keeps_the_words)
 {
-    NODE;
-
     mbm_node_beginTransmission(n, 1);
     mbm_node_send(n, 0x1111);
     mbm_node_send(n, 0x2222);
@@ -245,10 +214,8 @@ TEST(begin_transmission_empties_the_queue_and_keeps_the_words)
     LAST("11 10 00 09 00 02 04 33 33 22 22 +");
 }
 
-TEST(send_queues_words)
+SIM_TEST(send_queues_words)
 {
-    NODE;
-
     mbm_node_beginTransmission(n, 0x100);
     OK(mbm_node_send(n, 0x1234));
     OK(mbm_node_send(n, 0xAB));
@@ -257,25 +224,21 @@ TEST(send_queues_words)
     LAST("11 10 01 00 00 02 04 12 34 00 AB +");
 }
 
-TEST(send_bit_queues_bits_lowest_first)
+SIM_TEST(send_bit_queues_bits_lowest_first)
 {
     static const uint8_t bits[] = {1, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 1, 9};
-    size_t i;
-    NODE;
 
     memset(s->transmit, 0xFF, sizeof s->transmit);
     mbm_node_beginTransmission(n, 5);
-    for (i = 0; i < COUNT(bits); i++)
+    for (size_t i = 0; i < COUNT(bits); i++)
         OK(mbm_node_sendBit(n, bits[i]));
     sim_answer(s, 1, 100, "11 0F 00 05 00 12 +");
     OK(mbm_node_writeQueuedCoils(n));
     LAST("11 0F 00 05 00 12 03 8D 80 03 +");
 }
 
-TEST(a_word_after_bits_starts_a_new_word)
+SIM_TEST(a_word_after_bits_starts_a_new_word)
 {
-    NODE;
-
     mbm_node_beginTransmission(n, 5);
     mbm_node_sendBit(n, 1);
     mbm_node_sendBit(n, 1);
@@ -285,26 +248,20 @@ TEST(a_word_after_bits_starts_a_new_word)
     LAST("11 10 00 05 00 02 04 00 03 12 34 +");
 }
 
-TEST(queued_registers_are_complete_words_only)
+SIM_TEST(queued_registers_are_complete_words_only)
 {
-    unsigned i;
-    NODE;
-
     mbm_node_beginTransmission(n, 5);
-    for (i = 0; i < 17; i++)
+    for (unsigned i = 0; i < 17; i++)
         mbm_node_sendBit(n, 1);
     sim_answer(s, 1, 100, "11 10 00 05 00 01 +");
     OK(mbm_node_writeQueuedRegisters(n));
     LAST("11 10 00 05 00 01 02 FF FF +");
 }
 
-TEST(words_beyond_the_transmit_buffer_are_not_queued)
+SIM_TEST(words_beyond_the_transmit_buffer_are_not_queued)
 {
-    unsigned i;
-    NODE;
-
     mbm_node_beginTransmission(n, 0);
-    for (i = 0; i < 123; i++)
+    for (unsigned i = 0; i < 123; i++)
         OK(mbm_node_send(n, 1));
     assert_int_equal(mbm_node_send(n, 3), MBM_BUFFER_TOO_SMALL);
     assert_int_equal(s->transmit[122], 1);
@@ -314,10 +271,8 @@ TEST(words_beyond_the_transmit_buffer_are_not_queued)
     assert_int_equal(s->frames[0].length, 9 + 2 * 123);
 }
 
-TEST(any_transaction_empties_the_queue_but_keeps_the_words)
+SIM_TEST(any_transaction_empties_the_queue_but_keeps_the_words)
 {
-    NODE;
-
     mbm_node_beginTransmission(n, 5);
     mbm_node_send(n, 0x1234);
     sim_answer(s, 1, 100, "11 03 02 00 01 +");
@@ -330,10 +285,8 @@ TEST(any_transaction_empties_the_queue_but_keeps_the_words)
     assert_int_equal(s->transmit[0], 0x1234);
 }
 
-TEST(a_failed_transaction_empties_the_queue_and_rewinds_receive)
+SIM_TEST(a_failed_transaction_empties_the_queue_and_rewinds_receive)
 {
-    NODE;
-
     sim_answer(s, 1, 100, "11 03 04 00 01 00 02 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 2));
     assert_int_equal(mbm_node_receive(n), 1);
@@ -345,10 +298,8 @@ TEST(a_failed_transaction_empties_the_queue_and_rewinds_receive)
     assert_int_equal(mbm_node_writeQueuedRegisters(n), MBM_ILLEGAL_DATA_VALUE);
 }
 
-TEST(the_write_address_is_shared_by_all_writing_functions)
+SIM_TEST(the_write_address_is_shared_by_all_writing_functions)
 {
-    NODE;
-
     sim_answer(s, 1, 100, "11 06 00 55 00 09 +");
     OK(mbm_node_writeSingleRegister(n, 0x55, 9));
     mbm_node_send(n, 0x1234);
@@ -369,10 +320,8 @@ TEST(the_write_address_is_shared_by_all_writing_functions)
     LAST("11 17 00 03 00 01 00 77 00 01 02 AA AA +");
 }
 
-TEST(single_writes_overwrite_the_first_transmit_words)
+SIM_TEST(single_writes_overwrite_the_first_transmit_words)
 {
-    NODE;
-
     memset(s->transmit, 0xEE, sizeof s->transmit);
     sim_answer(s, 1, 100, "11 06 00 01 12 34 +");
     OK(mbm_node_writeSingleRegister(n, 1, 0x1234));
@@ -385,10 +334,8 @@ TEST(single_writes_overwrite_the_first_transmit_words)
     assert_int_equal(s->transmit[2], 0xEEEE);
 }
 
-TEST(a_read_makes_exactly_its_words_available_to_receive)
+SIM_TEST(a_read_makes_exactly_its_words_available_to_receive)
 {
-    NODE;
-
     sim_answer(s, 1, 100, "11 03 02 AB CD +");
     OK(mbm_node_readHoldingRegisters(n, 6, 1));
     LAST("11 03 00 06 00 01 +");
@@ -401,10 +348,8 @@ TEST(a_read_makes_exactly_its_words_available_to_receive)
     assert_int_equal(mbm_node_available(n), 0);
 }
 
-TEST(begin_is_cheap_and_switches_slaves)
+SIM_TEST(begin_is_cheap_and_switches_slaves)
 {
-    NODE;
-
     s->transmit[3] = 0x4711;
     mbm_node_setResponseTimeout(n, 50);
     sim_begin(s, 2);
@@ -422,10 +367,8 @@ TEST(begin_is_cheap_and_switches_slaves)
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
 }
 
-TEST(set_slave_id_counts_from_the_next_request_on)
+SIM_TEST(set_slave_id_counts_from_the_next_request_on)
 {
-    NODE;
-
     sim_answer(s, 1, 100, "F7 03 02 00 07 +");
     OK(mbm_node_setSlaveID(n, 247));
     assert_int_equal(mbm_node_getSlaveID(n), 247);

@@ -5,12 +5,8 @@
 
 #include <string.h>
 
-fixture each_test = {sim_setup, sim_teardown};
-
-TEST(steps_come_in_order)
+SIM_TEST(steps_come_in_order)
 {
-    SIM;
-
     sim_deliver_text(s, s->now, "DE AD BE EF");
     sim_reads(s, 5000);
     /* Old bytes dropped, driver on, write, flush, driver off, idle, reply. */
@@ -20,10 +16,8 @@ TEST(steps_come_in_order)
     sim_assert_sent(s, 0, "11 03 00 00 00 01 +");
 }
 
-TEST(steps_come_in_order_when_the_port_takes_bytes_one_by_one)
+SIM_TEST(steps_come_in_order_when_the_port_takes_bytes_one_by_one)
 {
-    SIM;
-
     s->write_piece = 1;
     s->write_busy = 3;
     sim_reads(s, 5000);
@@ -32,16 +26,13 @@ TEST(steps_come_in_order_when_the_port_takes_bytes_one_by_one)
 }
 
 /* A port that takes a byte at every other call. */
-TEST(bytes_are_counted_as_they_are_sent)
+SIM_TEST(bytes_are_counted_as_they_are_sent)
 {
-    unsigned again;
-    NODE;
-
     OK(mbm_node_setBlocking(n, 0));
     s->write_piece = 1;
     s->write_busy = 1;
     s->character = 1000;
-    for (again = 0; again < 2; again++) {
+    for (unsigned again = 0; again < 2; again++) {
         const unsigned before = again * 8;
 
         assert_int_equal(sim_read_one(s), MBM_PENDING);
@@ -65,10 +56,8 @@ TEST(bytes_are_counted_as_they_are_sent)
     }
 }
 
-TEST(a_request_of_which_the_port_takes_no_byte_is_counted)
+SIM_TEST(a_request_of_which_the_port_takes_no_byte_is_counted)
 {
-    NODE;
-
     OK(mbm_node_setResponseTimeout(n, 100));
     s->write_never = 1;
     assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
@@ -76,16 +65,14 @@ TEST(a_request_of_which_the_port_takes_no_byte_is_counted)
     assert_int_equal(s->counters.bytesSent, 0);
 }
 
-TEST(a_client_counts_bytes_as_they_are_sent)
+SIM_TEST(a_client_counts_bytes_as_they_are_sent)
 {
     static mbm_client client;
     static uint8_t frame[MBM_MAX_ASCII_FRAME];
     mbm_counters counters = {0};
-    unsigned ascii;
-    SIM;
 
     s->write_piece = 1;
-    for (ascii = 0; ascii <= 1; ascii++) {
+    for (unsigned ascii = 0; ascii <= 1; ascii++) {
         const uint32_t length = ascii ? 17 : 8;
         mbm_clientRequest request = {.unit = 17};
 
@@ -112,27 +99,21 @@ TEST(a_client_counts_bytes_as_they_are_sent)
     }
 }
 
-TEST(bytes_that_wait_in_the_receiver_are_no_part_of_the_reply)
+SIM_TEST(bytes_that_wait_in_the_receiver_are_no_part_of_the_reply)
 {
-    SIM;
-
     sim_deliver_text(s, s->now, "11 03 02 66 66 +");
     sim_reads(s, 500);
 }
 
-TEST(the_driver_is_switched_off_only_after_the_last_bit)
+SIM_TEST(the_driver_is_switched_off_only_after_the_last_bit)
 {
-    SIM;
-
     s->character = 1146;
     sim_reads(s, 500);
     sim_assert_time(sim_time_of(s, 'O'), s->frames[0].end);
 }
 
-TEST(the_driver_is_held_on_after_an_early_flush)
+SIM_TEST(the_driver_is_held_on_after_an_early_flush)
 {
-    SIM;
-
     s->character = 1146;
     s->flush_lies = 1;
     OK(mbm_line_setBaudRate(&s->line, 9600));
@@ -143,20 +124,16 @@ TEST(the_driver_is_held_on_after_an_early_flush)
     assert_int_equal(s->idle_while_driving, 0);
 }
 
-TEST(without_a_baud_rate_the_hold_is_that_of_9600_baud)
+SIM_TEST(without_a_baud_rate_the_hold_is_that_of_9600_baud)
 {
-    SIM;
-
     s->flush_lies = 1;
     OK(mbm_line_setPostFlushHold(&s->line, 2));
     sim_reads(s, 500);
     sim_assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 2 * 1146);
 }
 
-TEST(all_hooks_except_three_may_be_missing)
+SIM_TEST(all_hooks_except_three_may_be_missing)
 {
-    SIM;
-
     s->port.flush = NULL;
     s->port.preTransmission = NULL;
     s->port.postTransmission = NULL;
@@ -166,10 +143,8 @@ TEST(all_hooks_except_three_may_be_missing)
     sim_assert_order(s, "PFOI", "");
 }
 
-TEST(the_first_request_waits_for_the_gap_after_begin)
+SIM_TEST(the_first_request_waits_for_the_gap_after_begin)
 {
-    SIM;
-
     sim_reads(s, 500);
     sim_assert_time(s->frames[0].silence, 4000);
 }
@@ -181,20 +156,16 @@ static void gap_after_reply(sim *s, uint32_t wanted)
     sim_assert_time(s->frames[s->sent - 1].silence, wanted);
 }
 
-TEST(the_gap_is_4_ms_while_no_baud_rate_is_set)
+SIM_TEST(the_gap_is_4_ms_while_no_baud_rate_is_set)
 {
-    SIM;
-
     gap_after_reply(s, 4000);
     mbm_line_setBaudRate(&s->line, 115200);
     mbm_line_setBaudRate(&s->line, 0);
     gap_after_reply(s, 4000);
 }
 
-TEST(the_gap_is_three_and_a_half_characters_up_to_19200_baud)
+SIM_TEST(the_gap_is_three_and_a_half_characters_up_to_19200_baud)
 {
-    SIM;
-
     OK(mbm_line_setBaudRate(&s->line, 9600));
     gap_after_reply(s, 4011);
     OK(mbm_line_setBaudRate(&s->line, 1200));
@@ -203,20 +174,16 @@ TEST(the_gap_is_three_and_a_half_characters_up_to_19200_baud)
     gap_after_reply(s, 2006);
 }
 
-TEST(the_gap_is_1750_us_above_19200_baud)
+SIM_TEST(the_gap_is_1750_us_above_19200_baud)
 {
-    SIM;
-
     OK(mbm_line_setBaudRate(&s->line, 19201));
     gap_after_reply(s, 1750);
     OK(mbm_line_setBaudRate(&s->line, 1000000));
     gap_after_reply(s, 1750);
 }
 
-TEST(a_set_gap_holds_until_a_baud_rate_is_set)
+SIM_TEST(a_set_gap_holds_until_a_baud_rate_is_set)
 {
-    SIM;
-
     OK(mbm_line_setGap(&s->line, 20000));
     gap_after_reply(s, 20000);
     OK(mbm_line_setGap(&s->line, 0));
@@ -225,10 +192,8 @@ TEST(a_set_gap_holds_until_a_baud_rate_is_set)
     gap_after_reply(s, 1750);
 }
 
-TEST(the_gap_counts_from_the_last_foreign_byte)
+SIM_TEST(the_gap_counts_from_the_last_foreign_byte)
 {
-    SIM;
-
     sim_reads(s, 500);
     sim_deliver_text(s, s->now + 3000, "05 03 02 00 01 +");
     sim_deliver_text(s, s->now + 6000, "99");
@@ -237,10 +202,8 @@ TEST(the_gap_counts_from_the_last_foreign_byte)
     sim_assert_order(s, "PR", "PRPR");
 }
 
-TEST(the_gap_counts_from_the_last_byte_sent)
+SIM_TEST(the_gap_counts_from_the_last_byte_sent)
 {
-    NODE;
-
     mbm_line_setTurnaroundDelay(&s->line, 0);
     mbm_node_setSlaveID(n, 0);
     OK(mbm_node_writeSingleCoil(n, 1, 1));
@@ -248,10 +211,9 @@ TEST(the_gap_counts_from_the_last_byte_sent)
     sim_assert_time(s->frames[1].begin - s->frames[0].end, 4000);
 }
 
-TEST(a_gap_that_has_passed_already_is_not_waited_for)
+SIM_TEST(a_gap_that_has_passed_already_is_not_waited_for)
 {
     uint64_t asked;
-    SIM;
 
     sim_reads(s, 500);
     s->now += 10000;
@@ -260,10 +222,9 @@ TEST(a_gap_that_has_passed_already_is_not_waited_for)
     sim_assert_time(s->frames[1].begin - asked, 0);
 }
 
-TEST(line_used_makes_the_gap_count_from_now)
+SIM_TEST(line_used_makes_the_gap_count_from_now)
 {
     uint64_t asked;
-    SIM;
 
     sim_reads(s, 500);
     s->now += 10000;
@@ -273,20 +234,17 @@ TEST(line_used_makes_the_gap_count_from_now)
     sim_assert_time(s->frames[1].begin - asked, 4000);
 }
 
-TEST(idle_is_not_called_while_bytes_wait)
+SIM_TEST(idle_is_not_called_while_bytes_wait)
 {
-    SIM;
-
     s->character = 0;
     s->read_piece = 1;
     sim_reads(s, 500);
     sim_assert_order(s, "IRO", "IOIR");
 }
 
-TEST(no_gap_is_waited_for_after_begin_on_a_silent_line)
+SIM_TEST(no_gap_is_waited_for_after_begin_on_a_silent_line)
 {
     uint64_t asked;
-    SIM;
 
     s->now += 10000;
     sim_begin(s, 17);
@@ -299,10 +257,8 @@ TEST(no_gap_is_waited_for_after_begin_on_a_silent_line)
     sim_assert_time(s->frames[1].silence, 4000);
 }
 
-TEST(bytes_that_arrive_after_begin_start_the_gap)
+SIM_TEST(bytes_that_arrive_after_begin_start_the_gap)
 {
-    SIM;
-
     s->now += 10000;
     sim_begin(s, 17);
     sim_deliver_text(s, s->now - 100, "05 03 02");
@@ -310,10 +266,9 @@ TEST(bytes_that_arrive_after_begin_start_the_gap)
     sim_assert_time(s->frames[0].silence, 4000);
 }
 
-TEST(the_gap_counts_from_the_reported_use_of_the_line)
+SIM_TEST(the_gap_counts_from_the_reported_use_of_the_line)
 {
     uint64_t asked;
-    SIM;
 
     sim_reads(s, 500);
     s->now += 10000;
@@ -327,10 +282,9 @@ TEST(the_gap_counts_from_the_reported_use_of_the_line)
     sim_assert_time(s->frames[2].silence, 4000);
 }
 
-TEST(a_reported_use_counts_also_after_40_minutes_without_one)
+SIM_TEST(a_reported_use_counts_also_after_40_minutes_without_one)
 {
     uint64_t asked;
-    SIM;
 
     sim_reads(s, 500);
     s->now += 40ull * 60 * 1000000;
@@ -342,13 +296,12 @@ TEST(a_reported_use_counts_also_after_40_minutes_without_one)
 }
 
 /* Two objects that know nothing of each other, each with a line. */
-TEST(several_lines_share_a_stream)
+SIM_TEST(several_lines_share_a_stream)
 {
     mbm_line line = MBM_INIT;
     mbm_node other = MBM_INIT;
     uint16_t words[4];
     uint8_t frame[MBM_FRAME_BYTES(4)];
-    SIM;
 
     OK(mbm_line_beginRtu(&line, &s->port, frame, sizeof frame));
     OK(mbm_node_begin(&other, &line, 3, words, 4, NULL, 0));

@@ -6,8 +6,6 @@
 
 #include <string.h>
 
-fixture each_test = {sim_setup, sim_teardown};
-
 static void gap_after_reply(sim *s, uint32_t wanted)
 {
     sim_reads(s, 500);
@@ -15,10 +13,8 @@ static void gap_after_reply(sim *s, uint32_t wanted)
     sim_assert_time(s->frames[s->sent - 1].silence, wanted);
 }
 
-TEST(a_reply_may_take_2000_ms)
+SIM_TEST(a_reply_may_take_2000_ms)
 {
-    NODE;
-
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
     sim_assert_time(s->now - sim_time_of(s, 'O'), 2000000);
     assert_true(s->idles > 1000);
@@ -26,10 +22,8 @@ TEST(a_reply_may_take_2000_ms)
     sim_reads(s, 1990000);
 }
 
-TEST(the_response_timeout_can_be_set)
+SIM_TEST(the_response_timeout_can_be_set)
 {
-    NODE;
-
     OK(mbm_node_setResponseTimeout(n, 7));
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     sim_assert_time(s->now - sim_time_of(s, 'O'), 7000);
@@ -44,29 +38,24 @@ static void pass_3_seconds(sim *s)
         s->now += 3000000;
 }
 
-TEST(a_reply_that_is_complete_as_the_deadline_passes_is_a_success)
+SIM_TEST(a_reply_that_is_complete_as_the_deadline_passes_is_a_success)
 {
-    SIM;
-
     s->on_idle = pass_3_seconds;
     sim_reads(s, 1500000);
 }
 
 /* Ports such as Arduino's return one byte for each read. The result must be the same. */
-TEST(a_reply_read_byte_by_byte_after_the_deadline_is_a_success)
+SIM_TEST(a_reply_read_byte_by_byte_after_the_deadline_is_a_success)
 {
-    SIM;
-
     s->on_idle = pass_3_seconds;
     s->read_piece = 1;
     sim_reads(s, 1500000);
 }
 
 /* The request must end, however many bytes arrive after the deadline. */
-TEST(endless_bytes_do_not_keep_a_request_from_ending)
+SIM_TEST(endless_bytes_do_not_keep_a_request_from_ending)
 {
     static const uint8_t noise[8000] = {0};
-    NODE;
 
     mbm_node_setResponseTimeout(n, 50);
     s->step = 100;
@@ -78,20 +67,17 @@ TEST(endless_bytes_do_not_keep_a_request_from_ending)
     assert_in_range(s->now - s->frames[0].end, 50000, 300000);
 }
 
-TEST(a_long_idle_while_a_reply_arrives_is_tolerated)
+SIM_TEST(a_long_idle_while_a_reply_arrives_is_tolerated)
 {
-    NODE;
-
     mbm_node_setResponseTimeout(n, 10000);
     s->on_idle = pass_3_seconds;
     sim_reads(s, 100);
     assert_true(s->idles < 1000);
 }
 
-TEST(the_quiet_time_is_kept_after_a_timeout)
+SIM_TEST(the_quiet_time_is_kept_after_a_timeout)
 {
     uint64_t failed;
-    SIM;
 
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     failed = s->now;
@@ -110,10 +96,9 @@ TEST(the_quiet_time_is_kept_after_a_timeout)
 }
 
 /* It is the reply that the quiet time waits for. */
-TEST(a_reply_in_the_quiet_time_is_dropped_and_ends_it)
+SIM_TEST(a_reply_in_the_quiet_time_is_dropped_and_ends_it)
 {
     uint64_t failed;
-    SIM;
 
     sim_answer(s, 1, 2050000, "11 03 02 66 66 +");
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
@@ -124,20 +109,16 @@ TEST(a_reply_in_the_quiet_time_is_dropped_and_ends_it)
 }
 
 /* One frame followed by silence does not mean that the line never falls silent. */
-TEST(a_reply_late_in_the_quiet_time_does_not_make_the_line_busy)
+SIM_TEST(a_reply_late_in_the_quiet_time_does_not_make_the_line_busy)
 {
-    NODE;
-
     mbm_node_setResponseTimeout(n, 50);
     sim_answer(s, 1, 130000, "11 03 02 66 66 +");
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     sim_reads(s, 500);
 }
 
-TEST(a_foreign_frame_in_the_quiet_time_does_not_lengthen_it)
+SIM_TEST(a_foreign_frame_in_the_quiet_time_does_not_lengthen_it)
 {
-    NODE;
-
     mbm_node_setResponseTimeout(n, 50);
     /* Within the frame is what seems to be a damaged exception. */
     sim_answer(s, 1, 60000, "05 03 06 11 83 00 00 00 00 +");
@@ -146,10 +127,8 @@ TEST(a_foreign_frame_in_the_quiet_time_does_not_lengthen_it)
     sim_assert_time(s->frames[1].silence, 100000);
 }
 
-TEST(a_request_without_a_reply_is_repeated_as_often_as_set)
+SIM_TEST(a_request_without_a_reply_is_repeated_as_often_as_set)
 {
-    SIM;
-
     OK(mbm_line_setRetries(&s->line, 2));
     sim_answer(s, 3, 500, "11 03 02 00 2A +");
     OK(sim_read_one(s));
@@ -162,10 +141,8 @@ TEST(a_request_without_a_reply_is_repeated_as_often_as_set)
     assert_int_equal(s->sent, 6);
 }
 
-TEST(damaged_and_malformed_replies_are_retried_exceptions_are_not)
+SIM_TEST(damaged_and_malformed_replies_are_retried_exceptions_are_not)
 {
-    SIM;
-
     OK(mbm_line_setRetries(&s->line, 1));
     sim_answer(s, 1, 500, "11 03 02 00 2A 00 00");
     sim_answer(s, 2, 500, "11 03 02 00 2A +");
@@ -179,10 +156,8 @@ TEST(damaged_and_malformed_replies_are_retried_exceptions_are_not)
     assert_int_equal(s->sent, 5);
 }
 
-TEST(a_broadcast_succeeds_after_the_turnaround_delay)
+SIM_TEST(a_broadcast_succeeds_after_the_turnaround_delay)
 {
-    NODE;
-
     OK(mbm_node_setSlaveID(n, 0));
     OK(mbm_node_writeSingleRegister(n, 1, 2));
     sim_assert_sent(s, 0, "00 06 00 01 00 02 +");
@@ -197,10 +172,8 @@ TEST(a_broadcast_succeeds_after_the_turnaround_delay)
     assert_int_equal(s->idle_while_driving, 0);
 }
 
-TEST(a_read_is_not_broadcast)
+SIM_TEST(a_read_is_not_broadcast)
 {
-    NODE;
-
     mbm_node_setSlaveID(n, 0);
     assert_int_equal(mbm_node_readCoils(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
     assert_int_equal(mbm_node_readDiscreteInputs(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
@@ -210,25 +183,22 @@ TEST(a_read_is_not_broadcast)
     assert_int_equal(s->sent, 0);
 }
 
-TEST(a_line_that_never_falls_silent_is_busy)
+SIM_TEST(a_line_that_never_falls_silent_is_busy)
 {
     static const uint8_t noise[300] = {0};
-    unsigned i;
-    NODE;
 
     OK(mbm_node_setResponseTimeout(n, 100));
     s->limit = 1000000;
-    for (i = 0; i < 10; i++)
+    for (unsigned i = 0; i < 10; i++)
         sim_deliver(s, 30000u * i, noise, sizeof noise);
     assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
     assert_int_equal(s->sent, 0);
     assert_in_range(s->now, 100000, 110000);
 }
 
-TEST(a_flood_is_bounded_even_if_every_read_returns_bytes)
+SIM_TEST(a_flood_is_bounded_even_if_every_read_returns_bytes)
 {
     static const uint8_t noise[8000] = {0};
-    NODE;
 
     OK(mbm_node_setResponseTimeout(n, 1));
     s->character = 0;
@@ -240,10 +210,8 @@ TEST(a_flood_is_bounded_even_if_every_read_returns_bytes)
 }
 
 /* On a slow line the port still accepts bytes, so it is not stuck. */
-TEST(a_request_that_takes_longer_than_the_response_timeout_is_sent)
+SIM_TEST(a_request_that_takes_longer_than_the_response_timeout_is_sent)
 {
-    NODE;
-
     s->character = 1146;
     OK(mbm_line_setBaudRate(&s->line, 9600));
     OK(mbm_node_setResponseTimeout(n, 100));
@@ -251,10 +219,8 @@ TEST(a_request_that_takes_longer_than_the_response_timeout_is_sent)
     OK(mbm_node_writeMultipleRegisters(n, 0, 100));
 }
 
-TEST(a_port_that_accepts_a_byte_now_and_then_is_not_busy)
+SIM_TEST(a_port_that_accepts_a_byte_now_and_then_is_not_busy)
 {
-    NODE;
-
     s->character = 1146;
     s->write_piece = 1;
     s->write_busy = 500; /* one byte in 1 ms */
@@ -263,10 +229,8 @@ TEST(a_port_that_accepts_a_byte_now_and_then_is_not_busy)
     OK(mbm_node_writeMultipleRegisters(n, 0, 100));
 }
 
-TEST(a_gap_longer_than_the_timeout_is_waited_for)
+SIM_TEST(a_gap_longer_than_the_timeout_is_waited_for)
 {
-    NODE;
-
     OK(mbm_node_setResponseTimeout(n, 3));
     gap_after_reply(s, 4000);
 }
@@ -287,15 +251,13 @@ static uint8_t poll_as_rarely_as_allowed(sim *s)
 
 /* A poll does not take all of 407 bytes. Those that are left need no wait, also if the deadline
  * has passed. */
-TEST(a_reply_behind_400_bytes_is_found_by_polls_without_a_wait)
+SIM_TEST(a_reply_behind_400_bytes_is_found_by_polls_without_a_wait)
 {
     static const uint32_t pauses[] = {1000000, 3000000};
-    unsigned i;
-    NODE;
 
     OK(mbm_node_setBlocking(n, 0));
     s->character = 100;
-    for (i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         const unsigned sent = s->sent;
         uint64_t at;
 
@@ -315,10 +277,9 @@ TEST(a_reply_behind_400_bytes_is_found_by_polls_without_a_wait)
     }
 }
 
-TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout)
+SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout)
 {
     uint64_t begin;
-    NODE;
 
     OK(mbm_node_setBlocking(n, 0));
     OK(mbm_node_setResponseTimeout(n, 500));
@@ -335,10 +296,8 @@ TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout)
     assert_in_range(s->now - begin, 1800000, 1800000 + 40 * s->character);
 }
 
-TEST(sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay)
+SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay)
 {
-    NODE;
-
     OK(mbm_node_setBlocking(n, 0));
     OK(mbm_node_setSlaveID(n, 0));
     OK(mbm_line_setTurnaroundDelay(&s->line, 200));
@@ -347,10 +306,8 @@ TEST(sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay)
     sim_assert_time(s->now - s->frames[0].end, 200000);
 }
 
-TEST(sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply)
+SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply)
 {
-    NODE;
-
     OK(mbm_node_setBlocking(n, 0));
     OK(mbm_node_setResponseTimeout(n, 500));
     assert_int_equal(sim_read_one(s), MBM_PENDING);
@@ -408,17 +365,15 @@ static const struct leaving {
     {9600, 1042, 200}, {9600, 1042, 128}, /* a port that takes the frame in two parts */
 };
 
-TEST(a_program_sleeps_while_a_frame_leaves)
+SIM_TEST(a_program_sleeps_while_a_frame_leaves)
 {
     static const uint16_t quantities[] = {1, 2, 10, 60, LONGEST_WRITE};
-    unsigned i, k;
-    NODE;
 
     OK(mbm_node_setBlocking(n, 0));
     /* The unit is not left alone after a request that was cancelled. */
     OK(mbm_line_setQuietTime(&s->line, 0));
-    for (i = 0; i < COUNT(leavings); i++)
-        for (k = 0; k < COUNT(quantities); k++) {
+    for (unsigned i = 0; i < COUNT(leavings); i++)
+        for (unsigned k = 0; k < COUNT(quantities); k++) {
             const uint32_t length = 9u + 2u * quantities[k];
             uint64_t end, off;
             unsigned polls;
@@ -442,10 +397,8 @@ TEST(a_program_sleeps_while_a_frame_leaves)
 }
 
 /* Without a baud rate, the frame may leave at any time. */
-TEST(a_program_polls_while_a_frame_leaves_at_an_unknown_rate)
+SIM_TEST(a_program_polls_while_a_frame_leaves_at_an_unknown_rate)
 {
-    NODE;
-
     OK(mbm_node_setBlocking(n, 0));
     assert_int_equal(mbm_node_writeMultipleRegisters(n, 0, LONGEST_WRITE), MBM_PENDING);
     (void)poll_while_the_frame_leaves(s, poll_node, node_delay);
@@ -453,10 +406,9 @@ TEST(a_program_polls_while_a_frame_leaves_at_an_unknown_rate)
     OK(mbm_node_cancel(n));
 }
 
-TEST(a_program_sleeps_while_the_driver_stays_on)
+SIM_TEST(a_program_sleeps_while_the_driver_stays_on)
 {
     unsigned polls;
-    NODE;
 
     OK(mbm_node_setBlocking(n, 0));
     OK(mbm_line_setBaudRate(&s->line, 9600));
@@ -485,15 +437,13 @@ static uint32_t client_delay(sim *s)
     return mbm_client_pollDelay(&a_client);
 }
 
-TEST(a_program_with_a_client_sleeps_while_a_frame_leaves)
+SIM_TEST(a_program_with_a_client_sleeps_while_a_frame_leaves)
 {
     static const uint16_t words[LONGEST_WRITE] = {0};
     static uint8_t frame[MBM_MAX_ASCII_FRAME];
-    unsigned i, ascii;
-    SIM;
 
-    for (ascii = 0; ascii <= 1; ascii++)
-        for (i = 0; i < COUNT(leavings); i++) {
+    for (unsigned ascii = 0; ascii <= 1; ascii++)
+        for (unsigned i = 0; i < COUNT(leavings); i++) {
             mbm_clientRequest request = {0};
             unsigned polls;
 
@@ -523,15 +473,13 @@ TEST(a_program_with_a_client_sleeps_while_a_frame_leaves)
 }
 
 /* A longer gap could not be measured with the clock, so it would not be kept at all. */
-TEST(the_longest_gap_is_2_to_the_31_microseconds)
+SIM_TEST(the_longest_gap_is_2_to_the_31_microseconds)
 {
     static const uint32_t gaps[] = {0x80000000, 0x80000001, 0xFFFF0000, 0xFFFFFFFE, 0xFFFFFFFF};
-    unsigned i;
-    NODE;
 
     s->limit = UINT64_MAX;
     OK(mbm_node_setBlocking(n, 0));
-    for (i = 0; i < COUNT(gaps); i++) {
+    for (unsigned i = 0; i < COUNT(gaps); i++) {
         uint64_t begin = s->now;
 
         OK(mbm_line_setGap(&s->line, gaps[i]));
@@ -551,11 +499,10 @@ TEST(the_longest_gap_is_2_to_the_31_microseconds)
     }
 }
 
-TEST(the_longest_gap_of_a_client_is_2_to_the_31_microseconds)
+SIM_TEST(the_longest_gap_of_a_client_is_2_to_the_31_microseconds)
 {
     static mbm_client client;
     mbm_clientRequest request = {0};
-    SIM;
 
     s->limit = UINT64_MAX;
     memset(&client, 0, sizeof client);

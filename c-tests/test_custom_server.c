@@ -90,9 +90,8 @@ TEST(wrong_lengths_return_03_and_change_nothing)
 {
     static const char *const wrong[] = {"42 00 00 00 01 03 00 01 02", "42 00 00 00 02 02 00 01",
                                         "42 00 00 00 01 02 00", "42 00 00 00 00 00"};
-    size_t i;
 
-    for (i = 0; i < sizeof wrong / sizeof *wrong; i++)
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
         assert_string_equal(exchange(wrong[i]), "C2 03");
     assert_string_equal(exchange("41 00 00 00"), "C1 03");
     assert_string_equal(exchange("41"), "C1 03");

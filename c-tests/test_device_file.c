@@ -141,7 +141,6 @@ TEST(what_a_file_leaves_out_has_the_documented_value)
 TEST(fields_that_can_only_be_written_come_last)
 {
     static const char *const names[] = {"b", "d", "a", "c"};
-    unsigned i;
 
     read_text("fields:\n"
               "- {name: a, table: holding, address: 0, type: uint16, access: write}\n"
@@ -150,7 +149,7 @@ TEST(fields_that_can_only_be_written_come_last)
               "- {name: d, table: holding, address: 3, type: uint16, access: read-write}\n");
     assert_int_equal(meter.count, 4);
     assert_int_equal(meter.readable, 2);
-    for (i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++) {
         assert_string_equal(meter.fields[i].name, names[i]);
         assert_int_equal(meter.planned[i].address, names[i][0] - 'a');
     }
@@ -159,12 +158,10 @@ TEST(fields_that_can_only_be_written_come_last)
 
 static void expect_words(const char *text, unsigned count, const uint16_t *words)
 {
-    unsigned i;
-
     read_text(text);
     assert_non_null(meter.fields->words);
     assert_int_equal(device_size(meter.planned), count);
-    for (i = 0; i < count; i++)
+    for (unsigned i = 0; i < count; i++)
         assert_int_equal(meter.fields->words[i], words[i]);
     device_free(&meter);
 }
@@ -252,9 +249,8 @@ TEST(a_wrong_word_is_refused_with_its_line)
         {UINT16("    scale: 0,1\n"),
          "6: scale: \"0,1\" is not a decimal number of up to 18 digits other than 0"},
     };
-    unsigned i;
 
-    for (i = 0; i < COUNT(rows); i++)
+    for (unsigned i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
 }
 
@@ -298,9 +294,8 @@ TEST(a_wrong_key_is_refused_with_its_line)
         {"device: \"\"\n" UINT16(""), "1: device is empty"},
         {UINT16("---\n") UINT16(""), "7: a second document begins: the file has one"},
     };
-    unsigned i;
 
-    for (i = 0; i < COUNT(rows); i++)
+    for (unsigned i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
 }
 
@@ -352,9 +347,8 @@ TEST(keys_that_do_not_go_together_are_refused)
              "    value: 12\n") "  - {name: b, table: holding, address: 7, type: bit, bit: 2, value: off}\n",
          "7: b shares an address with level of line 2, and has another value"},
     };
-    unsigned i;
 
-    for (i = 0; i < COUNT(rows); i++)
+    for (unsigned i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
     read_text(UINT16(
         "    value: 12\n") "  - {name: b, table: holding, address: 7, type: bit, bit: 2, count: 2, value: 3}\n"
@@ -397,9 +391,8 @@ TEST(a_value_that_the_registers_cannot_hold_is_refused)
         {FIELD("    type: text\n    count: 9\n    value: [a]\n"),
          "7: value is a list: it must be one word"},
     };
-    unsigned i;
 
-    for (i = 0; i < COUNT(rows); i++)
+    for (unsigned i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
 }
 
@@ -472,9 +465,8 @@ TEST(a_wrong_enumeration_is_refused_with_its_line)
         {UINT16("    enumeration: {1: off}\n    enumeration: {2: on}\n"),
          "7: enumeration is there twice, first in line 6"},
     };
-    unsigned i;
 
-    for (i = 0; i < COUNT(rows); i++)
+    for (unsigned i = 0; i < COUNT(rows); i++)
         expect_refused(rows[i].text, rows[i].reason);
 }
 
@@ -514,11 +506,10 @@ TEST(a_file_has_at_most_as_many_fields_as_a_plan)
     const size_t size = 80 * ((size_t)MBM_PLAN_MAX_FIELDS + 1);
     char *text = malloc(size), reason[100];
     size_t length;
-    int i;
 
     assert_non_null(text);
     length = (size_t)snprintf(text, size, "fields:\n");
-    for (i = 0; i <= MBM_PLAN_MAX_FIELDS; i++)
+    for (int i = 0; i <= MBM_PLAN_MAX_FIELDS; i++)
         length += (size_t)snprintf(text + length, size - length,
                                    "- {name: n%d, table: coils, address: %d}\n", i, i);
     snprintf(reason, sizeof reason, "2: fields has %d items: %d are allowed",

@@ -46,9 +46,7 @@ static uint8_t got[600];
 
 static void begin(void)
 {
-    unsigned i;
-
-    for (i = 0; i < sizeof bytes; i++)
+    for (unsigned i = 0; i < sizeof bytes; i++)
         bytes[i] = (uint8_t)i;
     at = end = 0;
     now = 1000;

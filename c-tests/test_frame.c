@@ -71,10 +71,9 @@ TEST(every_function_is_built_and_parsed_in_every_framing)
     uint8_t pdu[MBM_MAX_PDU], wanted[MBM_MAX_ASCII_FRAME], built[MBM_MAX_ASCII_FRAME];
     mbm_packet packet, found;
     uint16_t length, size;
-    size_t i, f;
 
-    for (f = 0; f < COUNT(framings); f++) {
-        for (i = 0; i < example_count; i++) {
+    for (size_t f = 0; f < COUNT(framings); f++) {
+        for (size_t i = 0; i < example_count; i++) {
             length = framed(i, &framings[f], pdu, &packet, wanted);
             memset(built, 0xEE, sizeof built);
             OK(mbm_frame_build(&framings[f], &packet, built, length, &size));
@@ -126,9 +125,8 @@ TEST(frames_of_other_implementations_are_parsed_and_built)
     uint8_t frame[64], built[64];
     mbm_packet packet;
     uint16_t length, size;
-    size_t i;
 
-    for (i = 0; i < COUNT(frames); i++) {
+    for (size_t i = 0; i < COUNT(frames); i++) {
         const mbm_framing *f = &framings[frames[i].framing];
 
         length = hex_bytes(frame, frames[i].hex);
@@ -144,15 +142,14 @@ TEST(the_first_bytes_of_a_frame_determine_its_length)
     uint8_t pdu[MBM_MAX_PDU], frame[MBM_MAX_ASCII_FRAME];
     mbm_packet packet;
     mbm_length expected;
-    uint16_t length, have;
-    size_t i, f;
+    uint16_t length;
 
-    for (f = 0; f < COUNT(framings); f++) {
-        for (i = 0; i < example_count; i++) {
+    for (size_t f = 0; f < COUNT(framings); f++) {
+        for (size_t i = 0; i < example_count; i++) {
             uint8_t side = example_side(&examples[i]), last = MBM_LENGTH_UNKNOWN;
 
             length = framed(i, &framings[f], pdu, &packet, frame);
-            for (have = 0; have <= length; have++) {
+            for (uint16_t have = 0; have <= length; have++) {
                 OK(mbm_frame_expectedLength(&framings[f], side, frame, have, &expected));
                 last = expected.kind;
                 if (last == MBM_LENGTH_EXACT)
@@ -174,9 +171,8 @@ TEST(a_request_determines_the_length_of_its_reply_frame)
     static const uint16_t lengths[] = {11, 23, 15, 11};
     mbm_packet packet = {.unit = 1, .function = 0x03, .quantity = 3};
     mbm_length expected;
-    size_t f;
 
-    for (f = 0; f < COUNT(framings); f++) {
+    for (size_t f = 0; f < COUNT(framings); f++) {
         OK(mbm_frame_replyLength(&framings[f], &packet, &expected));
         assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
         assert_int_equal(expected.bytes, lengths[f]);
@@ -192,9 +188,7 @@ TEST(a_request_determines_the_length_of_its_reply_frame)
 /* True for a function that has an example, and for a user-defined one. */
 static int has_example(uint8_t function)
 {
-    size_t i;
-
-    for (i = 0; i < example_count; i++)
+    for (size_t i = 0; i < example_count; i++)
         if (examples[i].packet.function == function)
             return 1;
     return (function >= 65 && function <= 72) || (function >= 100 && function <= 110);
@@ -204,7 +198,6 @@ TEST(bytes_look_like_tcp_with_or_without_unknown_functions)
 {
     uint8_t frame[] = {0x81, 0x80, 0, 0, 0, 6, 0x10, 1, 0, 0x6B, 0, 3};
     uint16_t length = 0, have;
-    unsigned function;
 
     for (have = 0; have < 8; have++)
         IS(MBM_INCOMPLETE_FRAME, mbm_frame_looksLikeTcp(frame, have, 0, &length));
@@ -212,7 +205,7 @@ TEST(bytes_look_like_tcp_with_or_without_unknown_functions)
         OK(mbm_frame_looksLikeTcp(frame, have, 0, &length));
         assert_int_equal(length, 12);
     }
-    for (function = 0; function < 256; function++) {
+    for (unsigned function = 0; function < 256; function++) {
         uint8_t fits = 0, any = 0;
 
         frame[7] = (uint8_t)function;
@@ -319,10 +312,9 @@ TEST(a_refused_request_is_answered_with_its_exception)
     uint8_t pdu[16], frame[64], reply[32], wanted[32];
     mbm_packet packet, answer;
     uint16_t length, size;
-    size_t i, f;
 
-    for (f = 0; f < COUNT(framings); f++) {
-        for (i = 0; i < COUNT(refused); i++) {
+    for (size_t f = 0; f < COUNT(framings); f++) {
+        for (size_t i = 0; i < COUNT(refused); i++) {
             uint8_t exception[2];
             mbm_packet head = {.unit = 0x0A, .transaction = f == 2 ? 0xDA87 : 0};
 
@@ -393,9 +385,8 @@ TEST(a_declared_function_is_built_and_parsed_in_every_framing)
     mbm_length expected;
     uint8_t frame[32], built[32];
     uint16_t length, size;
-    size_t f;
 
-    for (f = 0; f < COUNT(framings); f++) {
+    for (size_t f = 0; f < COUNT(framings); f++) {
         mbm_framing with = framings[f];
 
         with.functions = &own;

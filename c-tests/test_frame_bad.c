@@ -29,7 +29,7 @@ static uint8_t parsed(const mbm_framing *f, uint8_t side, const uint8_t *frame, 
 {
     uint8_t *copy = malloc(length ? length : 1), again[MBM_MAX_ASCII_FRAME];
     mbm_packet packet;
-    uint16_t size, i;
+    uint16_t size;
     uint8_t status;
 
     assert_non_null(copy);
@@ -38,7 +38,7 @@ static uint8_t parsed(const mbm_framing *f, uint8_t side, const uint8_t *frame, 
     if (status == MBM_OK) {
         OK(mbm_frame_build(f, &packet, again, sizeof again, &size));
         assert_int_equal(size, length);
-        for (i = 0; i < length; i++)
+        for (uint16_t i = 0; i < length; i++)
             if (f->kind == MBM_FRAMING_ASCII && frame[i] >= 'a' && frame[i] <= 'f')
                 assert_int_equal(again[i], frame[i] - 'a' + 'A');
             else
@@ -55,18 +55,16 @@ static uint8_t parsed(const mbm_framing *f, uint8_t side, const uint8_t *frame, 
 TEST(an_rtu_frame_that_is_cut_or_changed_is_refused)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
-    uint16_t length, at;
-    unsigned flip;
-    size_t i;
+    uint16_t length;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         uint8_t side = example_side(&examples[i]);
 
         length = framed(i, &rtu, frame);
-        for (at = 0; at < length; at++)
+        for (uint16_t at = 0; at < length; at++)
             IS(at < 4 ? MBM_INCOMPLETE_FRAME : MBM_INVALID_CRC, parsed(&rtu, side, frame, at));
-        for (at = 0; at < length; at++) {
-            for (flip = 1; flip < 256; flip++) {
+        for (uint16_t at = 0; at < length; at++) {
+            for (unsigned flip = 1; flip < 256; flip++) {
                 frame[at] ^= (uint8_t)flip;
                 IS(MBM_INVALID_CRC, parsed(&rtu, side, frame, length));
                 frame[at] ^= (uint8_t)flip;
@@ -80,18 +78,16 @@ TEST(an_rtu_frame_that_is_cut_or_changed_is_refused)
 TEST(a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
-    uint16_t length, at;
-    unsigned flip;
-    size_t i;
+    uint16_t length;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         uint8_t side = example_side(&examples[i]);
 
         length = framed(i, &tcp, frame);
-        for (at = 0; at < length; at++)
+        for (uint16_t at = 0; at < length; at++)
             IS(MBM_INCOMPLETE_FRAME, parsed(&tcp, side, frame, at));
-        for (at = 0; at < length; at++) {
-            for (flip = 1; flip < 256; flip++) {
+        for (uint16_t at = 0; at < length; at++) {
+            for (unsigned flip = 1; flip < 256; flip++) {
                 uint8_t status;
 
                 frame[at] ^= (uint8_t)flip;
@@ -109,20 +105,19 @@ TEST(a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused)
 TEST(an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
-    uint16_t length, at;
-    unsigned value, right;
-    size_t i;
+    uint16_t length;
+    unsigned right;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         uint8_t side = example_side(&examples[i]);
 
         length = framed(i, &ascii, frame);
-        for (at = 0; at < length; at++)
+        for (uint16_t at = 0; at < length; at++)
             IS(MBM_INCOMPLETE_FRAME, parsed(&ascii, side, frame, at));
-        for (at = 0; at < length; at++) {
+        for (uint16_t at = 0; at < length; at++) {
             uint8_t was = frame[at];
 
-            for (value = right = 0; value < 256; value++) {
+            for (unsigned value = right = 0; value < 256; value++) {
                 frame[at] = (uint8_t)value;
                 right += parsed(&ascii, side, frame, length) == MBM_OK;
             }
@@ -140,10 +135,9 @@ TEST(a_packet_with_a_unit_above_255_is_refused)
     mbm_packet packet = {.kind = MBM_PACKET_REQUEST, .function = 3, .quantity = 1};
     mbm_length expected;
     uint16_t length;
-    size_t i;
 
     memset(frame, 0, sizeof frame);
-    for (i = 0; i < COUNT(kinds); i++) {
+    for (size_t i = 0; i < COUNT(kinds); i++) {
         packet.unit = 300; /* not 44 */
         IS(MBM_INVALID_ARGUMENT, mbm_frame_build(kinds[i], &packet, frame, sizeof frame, &length));
         assert_int_equal(length, 0);
@@ -165,9 +159,8 @@ TEST(impossible_mbap_lengths_are_malformed)
     uint8_t frame[600] = {0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 1};
     mbm_length expected;
     uint16_t total;
-    size_t i;
 
-    for (i = 0; i < COUNT(lengths); i++) {
+    for (size_t i = 0; i < COUNT(lengths); i++) {
         frame[4] = (uint8_t)(lengths[i] >> 8);
         frame[5] = (uint8_t)lengths[i];
         IS(MBM_MALFORMED_FRAME, parsed(&tcp, MBM_PACKET_REQUEST, frame, 12));
@@ -211,9 +204,8 @@ TEST(ascii_digits_may_be_lower_case_and_must_come_in_pairs)
     mbm_packet packet;
     uint8_t text[600];
     uint16_t length;
-    size_t i;
 
-    for (i = 0; i < COUNT(frames); i++) {
+    for (size_t i = 0; i < COUNT(frames); i++) {
         length = (uint16_t)strlen(frames[i].text);
         memcpy(text, frames[i].text, length);
         IS(frames[i].status, mbm_frame_parse(&ascii, MBM_PACKET_REQUEST, text, length, &packet));

@@ -92,11 +92,10 @@ static void sends_what_we_build(modbus_t *client, int fd, const mbm_framing *f)
     uint8_t frame[MBM_MAX_TCP_FRAME], built[MBM_MAX_TCP_FRAME];
     mbm_packet found, wanted;
     uint16_t length, size;
-    unsigned number;
 
     assert_int_equal(modbus_set_slave(client, 17), 0);
     assert_int_equal(modbus_set_response_timeout(client, 0, 1000), 0);
-    for (number = 0; number < CALLS; number++) {
+    for (unsigned number = 0; number < CALLS; number++) {
         call(client, number);
         length = receive(fd, f, MBM_PACKET_REQUEST, frame);
         wanted = sent[number];
@@ -174,9 +173,8 @@ static void answers_what_we_parse(int fd, const mbm_framing *f, const modbus_map
 {
     uint8_t frame[MBM_MAX_TCP_FRAME];
     mbm_packet reply;
-    unsigned i;
 
-    for (i = 0; i < CALLS; i++) {
+    for (unsigned i = 0; i < CALLS; i++) {
         const mbm_packet *request = &sent[i];
         unsigned at;
 

@@ -26,13 +26,11 @@ fixture each_test = {start, stop};
 TEST(reads_holding_registers)
 {
     static const uint16_t quantities[] = {1, 2, 64, 65, 125};
-    size_t q;
-    unsigned i;
 
-    for (q = 0; q < COUNT(quantities); q++) {
+    for (size_t q = 0; q < COUNT(quantities); q++) {
         assert_int_equal(mbm_node_readHoldingRegisters(&n.node, 3, quantities[q]), MBM_OK);
         assert_int_equal(mbm_node_available(&n.node), quantities[q]);
-        for (i = 0; i < quantities[q]; i++)
+        for (unsigned i = 0; i < quantities[q]; i++)
             assert_int_equal(n.response[i], server_pattern(3 + i));
     }
 }
@@ -40,12 +38,10 @@ TEST(reads_holding_registers)
 TEST(reads_input_registers)
 {
     static const uint16_t quantities[] = {1, 2, 64, 65, 125};
-    size_t q;
-    unsigned i;
 
-    for (q = 0; q < COUNT(quantities); q++) {
+    for (size_t q = 0; q < COUNT(quantities); q++) {
         assert_int_equal(mbm_node_readInputRegisters(&n.node, 9, quantities[q]), MBM_OK);
-        for (i = 0; i < quantities[q]; i++)
+        for (unsigned i = 0; i < quantities[q]; i++)
             assert_int_equal(n.response[i], (uint16_t)~server_pattern(9 + i));
     }
 }
@@ -54,10 +50,9 @@ static const uint16_t bit_quantities[] = {1, 8, 16, 17, 1968, 2000};
 
 TEST(reads_coils)
 {
-    size_t q;
     unsigned i;
 
-    for (q = 0; q < COUNT(bit_quantities); q++) {
+    for (size_t q = 0; q < COUNT(bit_quantities); q++) {
         assert_int_equal(mbm_node_readCoils(&n.node, 5, bit_quantities[q]), MBM_OK);
         for (i = 0; i < bit_quantities[q]; i++)
             assert_int_equal(node_bit(&n, i), server_bit_pattern(5 + i));
@@ -68,10 +63,9 @@ TEST(reads_coils)
 
 TEST(reads_discrete_inputs)
 {
-    size_t q;
     unsigned i;
 
-    for (q = 0; q < COUNT(bit_quantities); q++) {
+    for (size_t q = 0; q < COUNT(bit_quantities); q++) {
         assert_int_equal(mbm_node_readDiscreteInputs(&n.node, 7, bit_quantities[q]), MBM_OK);
         for (i = 0; i < bit_quantities[q]; i++)
             assert_int_equal(node_bit(&n, i), !server_bit_pattern(7 + i));
@@ -102,19 +96,17 @@ TEST(writes_a_single_register)
 TEST(writes_multiple_coils)
 {
     static const uint16_t quantities[] = {1, 8, 16, 17, 1968};
-    size_t q;
-    unsigned i;
 
-    for (q = 0; q < COUNT(quantities); q++) {
+    for (size_t q = 0; q < COUNT(quantities); q++) {
         uint16_t quantity = quantities[q];
 
         memset(peer.mapping->tab_bits, 0, SERVER_BITS);
         peer.mapping->tab_bits[11 + quantity] = 1;
-        for (i = 0; i < 1968; i++)
+        for (unsigned i = 0; i < 1968; i++)
             node_set_bit(&n, i, i % 3 == 0 || i + 1 == quantity);
         assert_int_equal(mbm_node_writeMultipleCoils(&n.node, 11, quantity), MBM_OK);
         assert_int_equal(peer.mapping->tab_bits[10], 0);
-        for (i = 0; i < quantity; i++)
+        for (unsigned i = 0; i < quantity; i++)
             assert_int_equal(peer.mapping->tab_bits[11 + i], i % 3 == 0 || i + 1 == quantity);
         assert_int_equal(peer.mapping->tab_bits[11 + quantity], 1);
     }
@@ -123,17 +115,15 @@ TEST(writes_multiple_coils)
 TEST(writes_multiple_registers)
 {
     static const uint16_t quantities[] = {1, 2, 64, 65, 123};
-    size_t q;
-    unsigned i;
 
-    for (q = 0; q < COUNT(quantities); q++) {
+    for (size_t q = 0; q < COUNT(quantities); q++) {
         uint16_t quantity = quantities[q];
 
         memset(peer.mapping->tab_registers, 0, 2 * SERVER_REGISTERS);
-        for (i = 0; i < 123; i++)
+        for (unsigned i = 0; i < 123; i++)
             n.transmit[i] = (uint16_t)(i * 257 + quantity);
         assert_int_equal(mbm_node_writeMultipleRegisters(&n.node, 21, quantity), MBM_OK);
-        for (i = 0; i < quantity; i++)
+        for (unsigned i = 0; i < quantity; i++)
             assert_int_equal(peer.mapping->tab_registers[21 + i], (uint16_t)(i * 257 + quantity));
         assert_int_equal(peer.mapping->tab_registers[21 + quantity], 0);
     }
@@ -152,11 +142,9 @@ TEST(reads_and_writes_multiple_registers)
     static const struct {
         uint16_t read, write;
     } quantities[] = {{1, 1}, {2, 64}, {64, 2}, {125, 121}};
-    size_t q;
-    unsigned i;
 
-    for (q = 0; q < COUNT(quantities); q++) {
-        for (i = 0; i < quantities[q].write; i++)
+    for (size_t q = 0; q < COUNT(quantities); q++) {
+        for (unsigned i = 0; i < quantities[q].write; i++)
             n.transmit[i] = (uint16_t)(0x4000 + i * 3);
         peer.mapping->tab_registers[300 + quantities[q].write] = 0x7777;
         assert_int_equal(mbm_node_readWriteMultipleRegisters(&n.node, 300, quantities[q].read, 300,
@@ -164,7 +152,7 @@ TEST(reads_and_writes_multiple_registers)
                          MBM_OK);
         assert_int_equal(peer.mapping->tab_registers[300 + quantities[q].write], 0x7777);
         /* The server writes before it reads. */
-        for (i = 0; i < quantities[q].read; i++) {
+        for (unsigned i = 0; i < quantities[q].read; i++) {
             uint16_t value = peer.mapping->tab_registers[300 + i];
 
             if (i < quantities[q].write)

@@ -82,7 +82,6 @@ static void start(void)
     char paths[3][128], text[64];
     const char *arguments[] = {"gateway", "--timeout", "3s",     "tcp://:0", paths[0], "1-10",
                                paths[1],  "11-30",     paths[2], "40-41",    NULL};
-    unsigned i;
 
     pty_open(&line);
     peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
@@ -91,9 +90,9 @@ static void start(void)
                 !modbus_set_socket(peer, line.ours) &&
                 !modbus_set_response_timeout(peer, 0, 20000));
     run_peer();
-    for (i = 0; i < SERVER_REGISTERS; i++)
+    for (unsigned i = 0; i < SERVER_REGISTERS; i++)
         mapping->tab_registers[i] = server_pattern(i);
-    for (i = 0; i < SERVER_BITS; i++)
+    for (unsigned i = 0; i < SERVER_BITS; i++)
         mapping->tab_bits[i] = server_bit_pattern(i);
     served_prepare(&ours);
     served_on_line(&ours, MBM_FRAMING_RTU);
@@ -141,13 +140,12 @@ TEST(libmodbus_reads_and_writes_through_the_gateway)
 {
     uint16_t words[125], values[] = {1, 0xFFFE, 0x1234};
     uint8_t cells[2000];
-    int i;
 
     modbus_set_slave(client, PEER_UNIT);
     assert_int_equal(modbus_read_registers(client, 3, 125, words), 125);
     assert_memory_equal(words, mapping->tab_registers + 3, sizeof words);
     assert_int_equal(modbus_read_bits(client, 1, 2000, cells), 2000);
-    for (i = 0; i < 2000; i++)
+    for (int i = 0; i < 2000; i++)
         assert_int_equal(cells[i], mapping->tab_bits[1 + i]);
     assert_int_equal(modbus_write_register(client, 7, 0xABCD), 1);
     assert_int_equal(mapping->tab_registers[7], 0xABCD);
@@ -190,9 +188,8 @@ enum { ATTEMPTS = 5 };
 TEST(a_request_to_an_absent_device_gets_0b_after_the_timeout)
 {
     double took = TIMEOUT_MS;
-    unsigned i;
 
-    for (i = 0; i < ATTEMPTS && took > TIMEOUT_MS * 2e-3; i++) {
+    for (unsigned i = 0; i < ATTEMPTS && took > TIMEOUT_MS * 2e-3; i++) {
         double before = seconds();
 
         expect_exception(0x0B, ABSENT);
@@ -206,9 +203,8 @@ TEST(a_request_to_an_absent_device_gets_0b_after_the_timeout)
 TEST(a_request_to_a_unit_without_a_line_gets_0a)
 {
     double took = TIMEOUT_MS;
-    unsigned i;
 
-    for (i = 0; i < ATTEMPTS && took > TIMEOUT_MS * 0.9e-3; i++) {
+    for (unsigned i = 0; i < ATTEMPTS && took > TIMEOUT_MS * 0.9e-3; i++) {
         double before = seconds();
 
         expect_exception(0x0A, NO_LINE);
@@ -224,19 +220,18 @@ TEST(requests_of_many_connections_wait_for_their_turn)
 {
     enum { MANY = 12 };
     int fds[MANY];
-    unsigned i, round;
 
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         fds[i] = tcp_connect((uint16_t)port);
-    for (round = 0; round < 5; round++) {
-        for (i = 0; i < MANY; i++) {
+    for (unsigned round = 0; round < 5; round++) {
+        for (unsigned i = 0; i < MANY; i++) {
             uint8_t request[] = {
                 (uint8_t)round,     (uint8_t)i, 0, 0, 0, 6, i % 2 ? PEER_UNIT : SERVED_UNIT, 3, 0,
                 (uint8_t)(160 + i), 0,          1};
 
             assert_int_equal(write(fds[i], request, sizeof request), sizeof request);
         }
-        for (i = 0; i < MANY; i++) {
+        for (unsigned i = 0; i < MANY; i++) {
             uint8_t answer[600];
             uint16_t word = i % 2 ? mapping->tab_registers[160 + i] : ours.words[60 + i];
             const uint8_t expected[] = {(uint8_t)round,
@@ -256,7 +251,7 @@ TEST(requests_of_many_connections_wait_for_their_turn)
             assert_memory_equal(answer, expected, sizeof expected);
         }
     }
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         close(fds[i]);
 }
 
@@ -287,9 +282,8 @@ TEST(a_line_that_waits_does_not_delay_another)
 TEST(a_connection_that_breaks_gives_up_its_request)
 {
     const struct linger hard = {1, 0};
-    unsigned i;
 
-    for (i = 0; i < 40; i++) {
+    for (unsigned i = 0; i < 40; i++) {
         static const uint8_t request[] = {0, 1, 0, 0, 0, 6, PEER_UNIT, 3, 0, 0, 0, 1};
         int fd = tcp_connect((uint16_t)port);
 
@@ -306,15 +300,14 @@ TEST(a_connection_that_breaks_gives_up_its_request)
 TEST(connections_beyond_the_places_are_closed)
 {
     int fds[40];
-    unsigned i;
 
-    for (i = 0; i < COUNT(fds); i++)
+    for (unsigned i = 0; i < COUNT(fds); i++)
         fds[i] = tcp_connect((uint16_t)port);
     /* One of the places is the client's. */
-    for (i = 0; i < COUNT(fds); i++)
+    for (unsigned i = 0; i < COUNT(fds); i++)
         assert_int_equal(asked_is_served(fds[i], NO_LINE, 0x0A), i < PLACES - 1);
     libmodbus_reads_and_writes_through_the_gateway();
-    for (i = 0; i < COUNT(fds); i++)
+    for (unsigned i = 0; i < COUNT(fds); i++)
         close(fds[i]);
 }
 
@@ -432,9 +425,8 @@ TEST(bad_arguments_end_the_program)
         {"gateway", "--in-flight", "17", "tcp://:0", "rtu:/dev/null", "1-9"},
     };
     char text[64];
-    unsigned i;
 
-    for (i = 0; i < COUNT(bad); i++) {
+    for (unsigned i = 0; i < COUNT(bad); i++) {
         program one;
 
         program_start(&one, "mbm", bad[i]);

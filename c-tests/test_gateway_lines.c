@@ -84,10 +84,8 @@ static mbm_clientRequest own[16];
 
 static void fill_the_queue(void)
 {
-    unsigned i;
-
     memset(own, 0, sizeof own);
-    for (i = 0; i < COUNT(own); i++) {
+    for (unsigned i = 0; i < COUNT(own); i++) {
         own[i].unit = 9;
         IS(MBM_PENDING, mbm_client_readExceptionStatus(&b.clients[0], &own[i]));
     }
@@ -172,15 +170,14 @@ TEST(a_line_may_be_a_tcp_connection)
     static uint8_t outgoing[MBM_MAX_TCP_FRAME];
     const mbm_port port = memory_port_of(&b.wires[0]);
     uint8_t reply[] = {0, 0, 0, 0, 0, 5, 2, 3, 2, 0x12, 0x34};
-    unsigned i;
 
     OK(mbm_client_beginTcp(&b.clients[0], &port, b.frames[0], MBM_MAX_TCP_FRAME, outgoing,
                            sizeof outgoing));
     OK(mbm_client_setInFlight(&b.clients[0], 3));
     b.lines[0].inFlight = 3;
-    for (i = 0; i < 4; i++)
+    for (unsigned i = 0; i < 4; i++)
         ASK(0, 100 + i, 2, READ);
-    for (i = 0; i < 4; i++)
+    for (unsigned i = 0; i < 4; i++)
         OK(mbm_gateway_poll(&b.gateway));
     assert_int_equal(b.wires[0].sent_count, 3 * 12);
     memcpy(reply, b.wires[0].sent + 24, 2); /* the last one is answered first */

@@ -1,10 +1,9 @@
 /* A gateway that is begun wrongly, begun again, and called from within hooks. */
+#include "refused.h"
 #include "gateway_bench.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 static gateway_bench b;
 
@@ -50,7 +49,6 @@ TEST(a_gateway_goes_on_after_a_refused_begin)
     static mbm_client none;
     mbm_gatewayLine line = {0};
     mbm_gatewayConfig config;
-    unsigned i;
 
     ASK(0, 1, 2, READ);
     ON_LINE(0, 2, READ);
@@ -70,7 +68,7 @@ TEST(a_gateway_goes_on_after_a_refused_begin)
     REFUSES(MBM_INVALID_ARGUMENT, requestCount, 65535);
     REFUSES(MBM_INVALID_ARGUMENT, lineCount, 254);
     REFUSES(MBM_INVALID_ARGUMENT, lineCount, 1); /* a route leads to line 1 */
-    for (i = 0; i < COUNT(bad); i++) {
+    for (unsigned i = 0; i < COUNT(bad); i++) {
         config = b.config;
         config.routeCount = 1;
         REFUSES(MBM_INVALID_ARGUMENT, routes, &bad[i]);

@@ -163,9 +163,8 @@ TEST(a_late_reply_to_one_client_does_not_reach_another)
      * same time. */
     gateway gateways[COUNT(cases)];
     int first[COUNT(cases)], second;
-    unsigned i;
 
-    for (i = 0; i < COUNT(cases); i++) {
+    for (unsigned i = 0; i < COUNT(cases); i++) {
         const late *c = &cases[i];
 
         start(&gateways[i], TIMEOUT, NULL);
@@ -173,7 +172,7 @@ TEST(a_late_reply_to_one_client_does_not_reach_another)
         send_request(first[i], (const uint8_t *)c->request, c->lengths[0]);
         expect_request(&gateways[i], (const uint8_t *)c->request, c->lengths[0]);
     }
-    for (i = 0; i < COUNT(cases); i++) {
+    for (unsigned i = 0; i < COUNT(cases); i++) {
         const late *c = &cases[i];
         const uint8_t no_response[] = {(uint8_t)(c->request[0] | 0x80), 0x0B};
 
@@ -202,12 +201,11 @@ TEST(a_reply_that_does_not_answer_the_request_becomes_0b)
     };
     static const uint8_t lengths[][2] = {{5, 4}, {5, 8}, {5, 3}, {5, 5}, {5, 5}};
     gateway g;
-    unsigned i;
     int fd;
 
     start(&g, "500ms", NULL);
     fd = tcp_connect(g.port);
-    for (i = 0; i < COUNT(no_answers); i++) {
+    for (unsigned i = 0; i < COUNT(no_answers); i++) {
         const uint8_t *request = (const uint8_t *)no_answers[i][0];
         const uint8_t no_response[] = {request[0] | 0x80, 0x0B};
 
@@ -326,7 +324,6 @@ TEST(the_quiet_time_is_an_option)
     };
     double before;
     gateway g;
-    unsigned i;
     int fd;
 
     start(&g, "200ms", options);
@@ -340,7 +337,7 @@ TEST(the_quiet_time_is_an_option)
     assert_true(seconds() - before >= 1.2);
     close(fd);
     stop(&g);
-    for (i = 0; i < COUNT(bad); i++) {
+    for (unsigned i = 0; i < COUNT(bad); i++) {
         char text[64];
 
         program_start(&g.program, "mbm", bad[i]);

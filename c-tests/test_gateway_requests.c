@@ -33,9 +33,8 @@ TEST(a_request_goes_to_the_line_and_unit_of_its_route)
     static const struct {
         uint8_t unit, line, there;
     } cases[] = {{1, 0, 1}, {31, 0, 31}, {101, 1, 1}, {131, 1, 31}, {255, 0, 5}, {0, 1, 6}};
-    unsigned i;
 
-    for (i = 0; i < COUNT(cases); i++) {
+    for (unsigned i = 0; i < COUNT(cases); i++) {
         ASK(0, 0x1200 + i, cases[i].unit, READ);
         ON_LINE(cases[i].line, cases[i].there, READ);
         REPLY(cases[i].line, cases[i].there, VALUE);
@@ -144,9 +143,7 @@ TEST(unknown_functions_pass)
 
 TEST(a_reply_without_data_passes)
 {
-    unsigned function;
-
-    for (function = 0x41; function <= 0x48; function++) {
+    for (unsigned function = 0x41; function <= 0x48; function++) {
         const char pdu[] = {(char)function};
 
         gateway_bench_ask(&b, 0, function, 2, pdu, 1);
@@ -206,11 +203,10 @@ TEST(a_retry_sends_the_same_request)
 TEST(the_longest_request_and_reply_pass)
 {
     char request[253] = {0x10, 0, 1, 0, 123, (char)246}, reply[252] = {0x03, (char)250};
-    unsigned i;
 
-    for (i = 6; i < 252; i++)
+    for (unsigned i = 6; i < 252; i++)
         request[i] = (char)i;
-    for (i = 2; i < 252; i++)
+    for (unsigned i = 2; i < 252; i++)
         reply[i] = (char)(i * 3);
     gateway_bench_ask(&b, 0, 1, 2, request, 252);
     gateway_bench_on_line(&b, 0, 2, request, 252);

@@ -28,9 +28,7 @@ static int fds[MANY];
 
 static void begin(void)
 {
-    unsigned i;
-
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         fds[i] = -1;
     alarm(6 * PATIENCE_MS / 1000);
     pty_open(&line);
@@ -41,9 +39,7 @@ static void begin(void)
 
 static void end(void)
 {
-    unsigned i;
-
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         if (fds[i] >= 0)
             close(fds[i]);
     unlink(name);
@@ -95,15 +91,14 @@ static void close_from_to(unsigned first, unsigned last)
 TEST(with_few_descriptors_the_gateway_serves_sleeps_and_ends)
 {
     static const unsigned limits[] = {OWN + 1, OWN + 3, OWN + 15, OWN + 16, OWN + 17};
-    unsigned i, k;
 
     SKIP_WITHOUT_LIMITS();
-    for (i = 0; i < COUNT(limits); i++) {
+    for (unsigned i = 0; i < COUNT(limits); i++) {
         const unsigned most = limits[i] - OWN < PLACES ? limits[i] - OWN : PLACES;
 
         start(limits[i], "60s");
         connect_to(0, most);
-        for (k = 0; k < most; k++)
+        for (unsigned k = 0; k < most; k++)
             assert_int_equal(is_served(fds[k]), 1);
         AWAIT(program_sleeps(&gateway));
         stop();
@@ -148,24 +143,21 @@ TEST(a_new_client_gets_the_place_of_an_idle_one)
 TEST(a_new_client_gets_the_descriptor_of_an_idle_one)
 {
     enum { SERVED = 4 };
-    unsigned i;
 
     SKIP_WITHOUT_LIMITS();
     start(OWN + SERVED, "1s");
     connect_to(0, SERVED);
-    for (i = SERVED; i < SERVED + 2; i++)
+    for (unsigned i = SERVED; i < SERVED + 2; i++)
         AWAIT((fds[i] = tcp_connect(port), is_served(fds[i])) || (close(fds[i]), 0));
     stop();
 }
 
 TEST(an_idle_time_of_0_closes_none)
 {
-    unsigned i;
-
     start(0, "0s");
     connect_to(0, PLACES + 1);
     assert_int_equal(is_served(fds[PLACES]), 0);
-    for (i = 0; i < PLACES; i++)
+    for (unsigned i = 0; i < PLACES; i++)
         assert_int_equal(is_served(fds[i]), 1);
     stop();
 }
@@ -192,12 +184,11 @@ TEST(a_lost_line_keeps_its_descriptor)
     enum { SERVED = 4 };
     static const uint8_t request[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
     struct pollfd input;
-    unsigned i;
 
     SKIP_WITHOUT_LIMITS();
     start(OWN + SERVED, "60s");
     connect_to(0, SERVED + 2);
-    for (i = 0; i < SERVED; i++)
+    for (unsigned i = 0; i < SERVED; i++)
         assert_int_equal(is_served(fds[i]), 1);
     /* Another program may get a terminal of the same name. */
     assert_int_equal(unlink(name), 0);

@@ -151,7 +151,6 @@ TEST(libmodbus_reaches_a_libmodbus_server_over_tcp)
     uint16_t words[125], values[] = {1, 0xFFFE, 0x1234};
     tcp_server far;
     modbus_t *peer;
-    int i;
 
     memset(&far, 0, sizeof far);
     tcp_server_start(&far);
@@ -160,7 +159,7 @@ TEST(libmodbus_reaches_a_libmodbus_server_over_tcp)
     assert_non_null(peer);
     assert_int_equal(modbus_connect(peer), 0);
     modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
-    for (i = 1; i <= 100; i += 99) {
+    for (int i = 1; i <= 100; i += 99) {
         modbus_set_slave(peer, i);
         assert_int_equal(modbus_read_registers(peer, 3, 125, words), 125);
         assert_memory_equal(words, far.mapping->tab_registers + 3, sizeof words);
@@ -198,12 +197,11 @@ TEST(a_line_of_rtu_over_tcp_has_frames_of_rtu)
 
 TEST(a_device_that_closes_an_idle_connection_costs_no_request)
 {
-    uint8_t round;
     int device;
 
     listener = tcp_listen(&device_port);
     start("tcp://127.0.0.1", device_port, NULL);
-    for (round = 1; round < 6; round++) {
+    for (uint8_t round = 1; round < 6; round++) {
         device = accept_gateway();
         ask(round);
         reply(device, take(device, round), round);
@@ -266,10 +264,8 @@ TEST(requests_to_a_device_that_does_not_listen_get_0a_until_it_does)
 
 TEST(requests_to_a_host_that_is_not_found_get_0a)
 {
-    uint8_t i;
-
     start("tcp://no-such-host.invalid", 502, NULL);
-    for (i = 0; i < 3; i++) {
+    for (uint8_t i = 0; i < 3; i++) {
         ask(i);
         expect_exception(i, 0x0A);
     }
@@ -282,24 +278,24 @@ TEST(a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says)
     static const char *const options[] = {"--in-flight", "4", NULL};
     uint16_t transactions[4];
     uint8_t byte;
-    int device, i;
+    int device;
 
     listener = tcp_listen(&device_port);
     start("tcp://127.0.0.1", device_port, options);
     device = accept_gateway();
-    for (i = 0; i < 6; i++)
+    for (int i = 0; i < 6; i++)
         ask((uint8_t)(10 + i));
-    for (i = 0; i < 4; i++)
+    for (int i = 0; i < 4; i++)
         transactions[i] = take(device, (uint8_t)(10 + i));
     assert_int_equal(recv(device, &byte, 1, MSG_DONTWAIT), -1);
     /* The device replies to the last one first. */
-    for (i = 3; i >= 0; i--) {
+    for (int i = 3; i >= 0; i--) {
         reply(device, transactions[i], (uint8_t)(50 + i));
         expect_register((uint8_t)(10 + i), (uint8_t)(50 + i));
     }
-    for (i = 4; i < 6; i++)
+    for (int i = 4; i < 6; i++)
         reply(device, take(device, (uint8_t)(10 + i)), (uint8_t)i);
-    for (i = 4; i < 6; i++)
+    for (int i = 4; i < 6; i++)
         expect_register((uint8_t)(10 + i), (uint8_t)i);
     close(device);
     stop();
@@ -310,15 +306,14 @@ TEST(a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says)
 static void expect_places(const char *const *options, unsigned places)
 {
     int fds[MANY];
-    unsigned i;
 
     listener = tcp_listen(&device_port);
     start_without_client("tcp://127.0.0.1", device_port, options);
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         fds[i] = tcp_connect(port);
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         assert_int_equal(asked_is_served(fds[i], NO_LINE, 0x0A), i < places);
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         close(fds[i]);
     stop();
     close(listener);

@@ -45,11 +45,9 @@ TEST(replies_go_back_as_they_arrive_with_their_transaction_id)
 
 TEST(requests_of_one_connection_reach_their_line_in_order)
 {
-    unsigned i;
-
-    for (i = 0; i < 5; i++)
+    for (unsigned i = 0; i < 5; i++)
         ASK(0, i, (uint8_t)(2 + i), READ);
-    for (i = 0; i < 5; i++) {
+    for (unsigned i = 0; i < 5; i++) {
         ON_LINE(0, (uint8_t)(2 + i), READ);
         REPLY(0, (uint8_t)(2 + i), VALUE);
         EXPECT(0, i, (uint8_t)(2 + i), VALUE);
@@ -104,9 +102,7 @@ static void next_is(uint8_t unit)
 
 TEST(the_connections_take_turns_on_a_line)
 {
-    unsigned i;
-
-    for (i = 0; i < 5; i++)
+    for (unsigned i = 0; i < 5; i++)
         ASK(0, i, 2, READ);
     ON_LINE(0, 2, READ); /* the flood has begun before the others come */
     ASK(1, 0, 3, READ);
@@ -155,9 +151,7 @@ TEST(a_flood_of_one_client_does_not_starve_another)
 
 TEST(a_client_that_floods_leaves_a_place_for_each_other)
 {
-    unsigned i;
-
-    for (i = 0; i < 20; i++)
+    for (unsigned i = 0; i < 20; i++)
         ASK(0, i, 2, READ);
     ON_LINE(0, 2, READ);
     assert_int_equal(pending(0), BENCH_REQUESTS - (BENCH_CONNECTIONS - 1));
@@ -268,9 +262,8 @@ TEST(half_a_request_dies_with_its_connection)
 TEST(bytes_that_are_not_modbus_end_their_connection_only)
 {
     static const char *const bad[] = {"\0\1\0\1\0\6\2\3", "\0\1\0\0\0\0\2\3", "\0\1\0\0\1\0\2\3"};
-    unsigned i;
 
-    for (i = 0; i < COUNT(bad); i++) {
+    for (unsigned i = 0; i < COUNT(bad); i++) {
         ASK(0, 1, 2, READ);
         ON_LINE(0, 2, READ);
         ASK(1, 1, 3, READ);

@@ -5,8 +5,6 @@
 
 #include <string.h>
 
-fixture each_test = {sim_setup, sim_teardown};
-
 static void call_back(sim *s)
 {
     mbm_node *n = &s->node;
@@ -36,10 +34,8 @@ static void call_back(sim *s)
     assert_int_equal(s->sent, sent);
 }
 
-TEST(requests_in_an_idle_hook_return_busy_and_change_nothing)
+SIM_TEST(requests_in_an_idle_hook_return_busy_and_change_nothing)
 {
-    NODE;
-
     s->transmit[0] = 0x1111;
     mbm_node_beginTransmission(n, 0x55);
     s->on_idle = call_back;
@@ -57,10 +53,8 @@ static void poll_from_idle(sim *s)
     mbm_node_poll(&s->node);
 }
 
-TEST(an_idle_hook_that_polls_does_no_harm)
+SIM_TEST(an_idle_hook_that_polls_does_no_harm)
 {
-    SIM;
-
     s->on_idle = poll_from_idle;
     sim_reads(s, 500);
 }
@@ -71,10 +65,8 @@ static void cancel_after_20_idles(sim *s)
         OK(mbm_node_cancel(&s->node));
 }
 
-TEST(an_idle_hook_may_cancel_before_a_byte_is_sent)
+SIM_TEST(an_idle_hook_may_cancel_before_a_byte_is_sent)
 {
-    NODE;
-
     s->on_idle = cancel_after_20_idles;
     IS(MBM_CANCELLED, sim_read_one(s));
     IS(MBM_CANCELLED, mbm_node_status(n));
@@ -89,10 +81,8 @@ static void cancel_in_the_reply(sim *s)
         OK(mbm_node_cancel(&s->node));
 }
 
-TEST(an_idle_hook_may_cancel_while_the_reply_is_waited_for)
+SIM_TEST(an_idle_hook_may_cancel_while_the_reply_is_waited_for)
 {
-    SIM;
-
     mbm_line_setRetries(&s->line, 3);
     s->on_idle = cancel_in_the_reply;
     IS(MBM_CANCELLED, sim_read_one(s));
@@ -101,10 +91,8 @@ TEST(an_idle_hook_may_cancel_while_the_reply_is_waited_for)
     sim_reads(s, 500);
 }
 
-TEST(idle_is_not_called_again_once_it_has_cancelled)
+SIM_TEST(idle_is_not_called_again_once_it_has_cancelled)
 {
-    SIM;
-
     s->on_idle = cancel_after_20_idles;
     IS(MBM_CANCELLED, sim_read_one(s));
     assert_int_equal(s->idles, 20);
@@ -116,10 +104,8 @@ static void poll_until(sim *s, unsigned bytes)
         IS(MBM_PENDING, mbm_node_poll(&s->node));
 }
 
-TEST(a_non_blocking_request_is_ended_by_poll)
+SIM_TEST(a_non_blocking_request_is_ended_by_poll)
 {
-    NODE;
-
     OK(mbm_node_poll(n));
     OK(mbm_node_status(n));
     OK(mbm_node_setBlocking(n, 0));
@@ -139,11 +125,10 @@ TEST(a_non_blocking_request_is_ended_by_poll)
     sim_reads(s, 500);
 }
 
-TEST(buffers_of_a_pending_request_do_not_change)
+SIM_TEST(buffers_of_a_pending_request_do_not_change)
 {
     uint16_t words[1];
     uint8_t frame[8];
-    NODE;
 
     mbm_node_setBlocking(n, 0);
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
@@ -162,10 +147,8 @@ TEST(buffers_of_a_pending_request_do_not_change)
     assert_int_equal(words[0], 42);
 }
 
-TEST(a_cancel_mid_send_switches_the_driver_off)
+SIM_TEST(a_cancel_mid_send_switches_the_driver_off)
 {
-    NODE;
-
     mbm_node_setBlocking(n, 0);
     s->write_piece = 1;
     s->cut_allowed = 1;
@@ -181,10 +164,8 @@ TEST(a_cancel_mid_send_switches_the_driver_off)
     sim_reads(s, 500);
 }
 
-TEST(the_gap_is_kept_after_a_cancel_mid_send)
+SIM_TEST(the_gap_is_kept_after_a_cancel_mid_send)
 {
-    NODE;
-
     mbm_node_setBlocking(n, 0);
     s->write_piece = 1;
     s->character = 0; /* bytes are on the wire as soon as they are handed over */
@@ -197,10 +178,8 @@ TEST(the_gap_is_kept_after_a_cancel_mid_send)
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
-TEST(a_cancel_while_the_port_drains_switches_the_driver_off)
+SIM_TEST(a_cancel_while_the_port_drains_switches_the_driver_off)
 {
-    NODE;
-
     mbm_node_setBlocking(n, 0);
     IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 8);
@@ -211,10 +190,8 @@ TEST(a_cancel_while_the_port_drains_switches_the_driver_off)
     sim_reads(s, 500);
 }
 
-TEST(a_cancel_in_the_hold_switches_the_driver_off)
+SIM_TEST(a_cancel_in_the_hold_switches_the_driver_off)
 {
-    NODE;
-
     mbm_node_setBlocking(n, 0);
     mbm_line_setPostFlushHold(&s->line, 100);
     IS(MBM_PENDING, sim_read_one(s));
@@ -226,10 +203,9 @@ TEST(a_cancel_in_the_hold_switches_the_driver_off)
     sim_assert_order(s, "PO", "PO");
 }
 
-TEST(begin_mid_send_is_refused_until_the_request_is_given_up)
+SIM_TEST(begin_mid_send_is_refused_until_the_request_is_given_up)
 {
     mbm_port other;
-    NODE;
 
     mbm_node_setBlocking(n, 0);
     s->write_piece = 1;
@@ -253,10 +229,9 @@ TEST(begin_mid_send_is_refused_until_the_request_is_given_up)
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
-TEST(a_refused_begin_leaves_the_pending_request)
+SIM_TEST(a_refused_begin_leaves_the_pending_request)
 {
     mbm_port empty;
-    NODE;
 
     memset(&empty, 0, sizeof empty);
     mbm_node_setBlocking(n, 0);

@@ -59,10 +59,9 @@ static void answer(sim *s, const sim_frame *request)
     uint8_t frame[300], asked[8];
     uint64_t at;
     size_t length;
-    unsigned i;
     device *d = NULL;
 
-    for (i = 0; i < b->count; i++)
+    for (unsigned i = 0; i < b->count; i++)
         if (b->devices[i].unit == request->bytes[0])
             d = &b->devices[i];
     if (!d || d->unit == 0)
@@ -278,15 +277,14 @@ static unsigned time_to_the_first_value(sim *s, reader_kind kind, uint32_t limit
 
 static void one_row(sim *s, FILE *table, uint32_t timeout, uint32_t limit, unsigned lost)
 {
-    unsigned pause, kind;
     char text[16] = "none";
 
     if (limit > 0)
         (void)snprintf(text, sizeof text, "%u", (unsigned)limit);
     if (table)
         fprintf(table, "| %u | %s | %u |", (unsigned)timeout, text, lost);
-    for (pause = 0; pause < COUNT(pauses); pause++)
-        for (kind = NODE_READS; kind <= CLIENT_READS; kind++) {
+    for (unsigned pause = 0; pause < COUNT(pauses); pause++)
+        for (unsigned kind = NODE_READS; kind <= CLIENT_READS; kind++) {
             unsigned ms =
                 time_to_the_first_value(s, (reader_kind)kind, limit ? limit * MS : (uint32_t)NEVER,
                                         timeout * MS, pauses[pause] * MS, lost);
@@ -298,20 +296,18 @@ static void one_row(sim *s, FILE *table, uint32_t timeout, uint32_t limit, unsig
         fprintf(table, "\n");
 }
 
-TEST(a_device_is_heard_again_whatever_limit_and_pause_a_program_has)
+SIM_TEST(a_device_is_heard_again_whatever_limit_and_pause_a_program_has)
 {
     const char *path = getenv("MBM_FAULT_TABLE");
     FILE *table = path ? fopen(path, "w") : NULL;
-    unsigned i, j, k;
-    SIM;
 
     if (table)
         fprintf(table,
                 "| response timeout, ms | limit, ms | lost replies | no pause | pauses of 200 ms | "
                 "pauses of 1 s | pauses of 1 min |\n|---|---|---|---|---|---|---|\n");
-    for (i = 0; i < COUNT(timeouts); i++)
-        for (j = 0; j < COUNT(limits); j++)
-            for (k = 0; k < COUNT(losses); k++)
+    for (unsigned i = 0; i < COUNT(timeouts); i++)
+        for (unsigned j = 0; j < COUNT(limits); j++)
+            for (unsigned k = 0; k < COUNT(losses); k++)
                 one_row(s, table, timeouts[i], limits[j], losses[k]);
     if (table)
         (void)fclose(table);
@@ -439,11 +435,10 @@ static void begin_second(sim *s, uint8_t unit)
 TEST(a_request_of_a_node_that_waits_gives_way_to_that_of_another_node)
 {
     uint64_t sent, began;
-    int blocks;
     BENCH;
 
     kind = NODE_READS;
-    for (blocks = 0; blocks < 2; blocks++) {
+    for (int blocks = 0; blocks < 2; blocks++) {
         BEGIN;
         begin_second(s, OTHER);
         OK(mbm_node_setBlocking(&second, (uint8_t)blocks));
@@ -562,19 +557,17 @@ static const uint8_t alike[] = {33, 65, 97, 129, 225, 255};
 /* The reply of unit 1 comes 700 ms after its timeout, and the other unit is read in between. */
 TEST(units_with_the_same_last_five_bits_share_no_memory)
 {
-    unsigned i;
-    uint16_t n;
     BENCH;
 
     for (kind = 0; kind < READERS; kind++)
-        for (i = 0; i < COUNT(alike); i++) {
+        for (unsigned i = 0; i < COUNT(alike); i++) {
             const uint8_t unit = alike[i] == 255 ? 31 : 1;
             device *d;
 
             BEGIN;
             d = add(&b, unit, 100 * MS);
             add(&b, alike[i], 5 * MS);
-            for (n = 0; n < 100; n++) {
+            for (uint16_t n = 0; n < 100; n++) {
                 const uint8_t status = reads(&b, unit, n, NEVER);
 
                 if (n == 1)
@@ -589,16 +582,14 @@ TEST(units_with_the_same_last_five_bits_share_no_memory)
 
 TEST(a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits)
 {
-    unsigned i, n;
-    int is_cancelled;
     BENCH;
 
     for (kind = 0; kind < READERS; kind++)
-        for (i = 0; i < COUNT(alike); i++)
-            for (is_cancelled = 0; is_cancelled < 2; is_cancelled++) {
+        for (unsigned i = 0; i < COUNT(alike); i++)
+            for (int is_cancelled = 0; is_cancelled < 2; is_cancelled++) {
                 BEGIN;
                 add(&b, alike[i], 5 * MS);
-                for (n = 0; n < 10; n++) {
+                for (unsigned n = 0; n < 10; n++) {
                     if (is_cancelled)
                         IS(MBM_CANCELLED, reads(&b, 1, 0, 50 * MS));
                     else
@@ -613,11 +604,10 @@ TEST(a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits)
 TEST(two_nodes_of_one_unit_know_of_each_others_late_replies)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
-    unsigned i, n;
     BENCH;
 
     kind = NODE_READS;
-    for (i = 0; i < COUNT(with); i++) {
+    for (unsigned i = 0; i < COUNT(with); i++) {
         device *d;
 
         BEGIN;
@@ -625,7 +615,7 @@ TEST(two_nodes_of_one_unit_know_of_each_others_late_replies)
         d = add(&b, UNIT, PROMPT);
         be_late(d, TIMEOUT + 300 * MS);
         assert_int_not_equal(reads(&b, UNIT, 1, with[i]), MBM_OK);
-        for (n = 2; n < 50; n++) {
+        for (unsigned n = 2; n < 50; n++) {
             OK(mbm_node_readHoldingRegisters(&second, (uint16_t)(500 + n), 1));
             assert_int_equal(second_word, fault_value(500 + n));
             OK(reads(&b, UNIT, (uint16_t)n, EXCHANGE));
@@ -636,12 +626,11 @@ TEST(two_nodes_of_one_unit_know_of_each_others_late_replies)
 TEST(a_node_that_has_changed_its_unit_does_not_forget_the_late_reply)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
-    unsigned i, begins;
     BENCH;
 
     kind = NODE_READS;
-    for (i = 0; i < COUNT(with); i++)
-        for (begins = 0; begins < 2; begins++) {
+    for (unsigned i = 0; i < COUNT(with); i++)
+        for (unsigned begins = 0; begins < 2; begins++) {
             device *d;
 
             BEGIN;
@@ -691,14 +680,13 @@ static void broadcast(bench *b)
 /* Even if more units owe replies than are remembered one by one. */
 TEST(a_broadcast_does_not_wait_after_a_cancelled_request)
 {
-    uint8_t unit;
     BENCH;
 
     for (kind = 0; kind < READERS; kind++) {
         BEGIN;
         (void)loses_one(&b, add(&b, UNIT, PROMPT));
         broadcast(&b);
-        for (unit = ABSENT; unit < ABSENT + 20; unit++)
+        for (uint8_t unit = ABSENT; unit < ABSENT + 20; unit++)
             (void)reads(&b, unit, 0, QUIET + 40 * MS);
         broadcast(&b);
         /* And it lets no reply be late. */
@@ -713,14 +701,13 @@ TEST(a_broadcast_does_not_wait_after_a_cancelled_request)
 TEST(a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones)
 {
     uint64_t last;
-    uint8_t unit;
     BENCH;
 
     for (kind = 0; kind < READERS; kind++) {
         BEGIN;
         add(&b, UNIT, PROMPT);
         reads_well(&b, UNIT, 3);
-        for (unit = ABSENT; unit < ABSENT + 20; unit++)
+        for (uint8_t unit = ABSENT; unit < ABSENT + 20; unit++)
             (void)reads(&b, unit, 0, QUIET + 40 * MS);
         last = s->frames[s->sent - 1].begin;
         while (reads(&b, UNIT, 1, QUIET + EXCHANGE) != MBM_OK)
@@ -750,12 +737,11 @@ TEST(a_device_whose_replies_always_deviate_is_heard_again)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
     static const int8_t by[] = {1, -1, 20};
-    unsigned i, j, n;
     BENCH;
 
     kind = NODE_READS;
-    for (i = 0; i < COUNT(with); i++)
-        for (j = 0; j < COUNT(by); j++) {
+    for (unsigned i = 0; i < COUNT(with); i++)
+        for (unsigned j = 0; j < COUNT(by); j++) {
             device *d;
             uint64_t began;
 
@@ -763,7 +749,7 @@ TEST(a_device_whose_replies_always_deviate_is_heard_again)
             OK(mbm_node_setLenient(&s->node, 1));
             d = add(&b, UNIT, PROMPT);
             d->deviates = by[j];
-            for (n = 0; n < 20; n++) {
+            for (unsigned n = 0; n < 20; n++) {
                 const uint16_t address = (uint16_t)(40 * n);
 
                 if (n == 5)
@@ -785,11 +771,10 @@ TEST(a_device_whose_replies_always_deviate_is_heard_again)
 TEST(a_device_that_always_repeats_another_value_is_heard_again)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
-    unsigned i, n;
     BENCH;
 
     kind = NODE_READS;
-    for (i = 0; i < COUNT(with); i++) {
+    for (unsigned i = 0; i < COUNT(with); i++) {
         device *d;
 
         BEGIN;
@@ -797,7 +782,7 @@ TEST(a_device_that_always_repeats_another_value_is_heard_again)
         d = add(&b, UNIT, PROMPT);
         d->repeats_wrong = 1;
         s->response[0] = fault_value(0);
-        for (n = 0; n < 20; n++) {
+        for (unsigned n = 0; n < 20; n++) {
             if (n == 5)
                 lose(d, 1);
             IS(MBM_PENDING, mbm_node_writeSingleRegister(&s->node, 1, (uint16_t)n));
@@ -816,12 +801,11 @@ TEST(a_device_that_always_repeats_another_value_is_heard_again)
 TEST(no_late_reply_that_deviates_is_taken_for_the_next_one)
 {
     static const uint32_t with[] = {50 * MS, NEVER};
-    unsigned i, n, first;
     BENCH;
 
     kind = NODE_READS;
-    for (i = 0; i < COUNT(with); i++)
-        for (first = 0; first < 2; first++) {
+    for (unsigned i = 0; i < COUNT(with); i++)
+        for (unsigned first = 0; first < 2; first++) {
             device *d;
 
             BEGIN;
@@ -829,7 +813,7 @@ TEST(no_late_reply_that_deviates_is_taken_for_the_next_one)
             d = add(&b, UNIT, PROMPT);
             d->deviates = 1;
             be_late(d, TIMEOUT + 300 * MS);
-            for (n = 0; n < 20; n++) {
+            for (unsigned n = 0; n < 20; n++) {
                 const uint16_t address = (uint16_t)(40 * n), quantity = (n + first) % 2 ? 1 : 9;
 
                 IS(MBM_PENDING, mbm_node_readHoldingRegisters(&s->node, address, quantity));
@@ -859,14 +843,13 @@ TEST(a_new_connection_of_rtu_over_tcp_owes_nothing)
     mbm_link link = MBM_INIT;
     mbm_linkHooks hooks = {0};
     uint64_t sent;
-    int is_tcp;
     BENCH;
 
     hooks.context = s;
     hooks.connect = connect_again;
     hooks.disconnect = disconnect;
     kind = CLIENT_READS;
-    for (is_tcp = 0; is_tcp < 2; is_tcp++) {
+    for (int is_tcp = 0; is_tcp < 2; is_tcp++) {
         BEGIN;
         memset(&b.client, 0, sizeof b.client);
         if (is_tcp)

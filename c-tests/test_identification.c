@@ -223,11 +223,10 @@ TEST(no_object_although_more_follow_is_no_progress)
 TEST(a_device_that_names_every_object_is_asked_256_times)
 {
     char object[] = "?\x01x";
-    unsigned next;
 
     begin();
     read_all(MBM_DEVICE_ID_EXTENDED);
-    for (next = 0; next < 256; next++) {
+    for (unsigned next = 0; next < 256; next++) {
         object[0] = (char)next;
         ANSWER(0xFF, (uint8_t)(next + 1), 1, object);
     }
@@ -293,9 +292,7 @@ static mbm_clientRequest others[MBM_CLIENT_DEPTH];
 
 static void fill_the_queue(void)
 {
-    unsigned i;
-
-    for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+    for (unsigned i = 0; i < MBM_CLIENT_DEPTH; i++) {
         others[i].unit = UNIT;
         (void)mbm_client_writeSingleCoil(&client, &others[i], 0, 1);
     }

@@ -75,7 +75,6 @@ TEST(a_client_on_a_serial_line_works_with_large_buffers)
     static mbm_client client;
     mbm_clientRequest request = {0};
     uint16_t words[2] = {0};
-    unsigned i;
 
     memset(&wire, 0, sizeof wire);
     OK(mbm_client_beginRtu(&client, &port, incoming, LARGE));
@@ -83,11 +82,11 @@ TEST(a_client_on_a_serial_line_works_with_large_buffers)
     request.reply = words;
     request.replyBytes = sizeof words;
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 2));
-    for (i = 0; i < 10; i++)
+    for (unsigned i = 0; i < 10; i++)
         IS(MBM_PENDING, mbm_client_poll(&client));
     (void)seal(response, 7);
     put_arriving(response, sizeof response);
-    for (i = 0; i < 10; i++)
+    for (unsigned i = 0; i < 10; i++)
         (void)mbm_client_poll(&client);
     assert_int_equal(request.status, MBM_OK);
     assert_int_equal(words[1], 2);
@@ -101,7 +100,6 @@ static void assert_served(uint8_t (*begin)(mbm_server *, const mbm_port *, mbm_u
     static uint16_t words[2];
     mbm_unit unit = {0};
     mbm_registerTable table = {0};
-    unsigned i;
 
     memset(&server, 0, sizeof server);
     memset(&wire, 0, sizeof wire);
@@ -111,7 +109,7 @@ static void assert_served(uint8_t (*begin)(mbm_server *, const mbm_port *, mbm_u
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(begin(&server, &port, &unit, 1, incoming, LARGE));
     put_arriving(request, length);
-    for (i = 0; i < 10; i++)
+    for (unsigned i = 0; i < 10; i++)
         OK(mbm_server_poll(&server));
     assert_int_equal(wire.length, answered);
 }

@@ -72,10 +72,8 @@ static void answer_in_order(sim *s, const sim_frame *request)
 
 static void assert_reads(sim *s, uint16_t address, uint16_t quantity)
 {
-    uint16_t i;
-
     OK(mbm_node_readHoldingRegisters(&s->node, address, quantity));
-    for (i = 0; i < quantity; i++)
+    for (uint16_t i = 0; i < quantity; i++)
         assert_int_equal(s->response[i], fault_value(address + i));
 }
 
@@ -86,44 +84,40 @@ static uint8_t read_at(sim *s, uint16_t address)
 
 TEST(one_late_reply_does_not_shift_the_answers_of_later_requests)
 {
-    uint16_t i;
     DEVICE;
 
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
-    for (i = 1; i < 100; i++)
+    for (uint16_t i = 1; i < 100; i++)
         assert_reads(s, i, 1);
     assert_int_equal(s->counters.foreignFrames, 1);
 }
 
 TEST(a_late_reply_does_not_shift_the_answers_after_a_retry)
 {
-    uint16_t i;
     DEVICE;
 
     device.takes[1] = 50000; /* longer than the gap before the next request */
     OK(mbm_line_setRetries(&s->line, 1));
-    for (i = 0; i < 100; i++)
+    for (uint16_t i = 0; i < 100; i++)
         assert_reads(s, i, 1);
 }
 
 /* The frame buffer has space for one reply of this length, not for two. */
 TEST(a_late_reply_of_the_longest_length_does_not_shift_later_answers)
 {
-    uint16_t i;
     DEVICE;
 
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
-    for (i = 1; i < 10; i++)
+    for (uint16_t i = 1; i < 10; i++)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
 
 TEST(a_late_reply_to_a_write_of_the_same_value_costs_one_request)
 {
-    unsigned i;
     DEVICE;
 
     assert_int_equal(mbm_node_writeSingleRegister(n, 1, 5), MBM_RESPONSE_TIMED_OUT);
-    for (i = 0; i < 10; i++)
+    for (unsigned i = 0; i < 10; i++)
         OK(mbm_node_writeSingleRegister(n, 1, 5));
     assert_reads(s, 9, 1);
 }
@@ -144,22 +138,20 @@ TEST(several_late_replies_in_a_row_are_all_skipped)
 /* The reply is held beyond the response timeout. */
 TEST(a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer)
 {
-    uint16_t i;
     DEVICE;
 
     device.takes[0] = 1000 * (TIMEOUT_MS + TIMEOUT_MS) + QUIET - 1000;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
-    for (i = 1; i < 50; i++)
+    for (uint16_t i = 1; i < 50; i++)
         assert_reads(s, i, 1);
 }
 
 TEST(a_late_exception_is_not_the_answer_to_a_later_request)
 {
     static const uint8_t codes[] = {2, 5, 6, 0x0B};
-    unsigned i;
     DEVICE;
 
-    for (i = 0; i < COUNT(codes); i++) {
+    for (unsigned i = 0; i < COUNT(codes); i++) {
         memset(&device, 0, sizeof device);
         device.takes[0] = LATE;
         device.exception = codes[i];
@@ -210,16 +202,15 @@ TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
 /* As when an RS-485 driver releases the line. */
 TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
 {
-    uint16_t i;
     DEVICE;
 
     device.trailing = 1;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
-    for (i = 1; i < 10; i++)
+    for (uint16_t i = 1; i < 10; i++)
         assert_reads(s, i, 1);
     device.requests = 0;
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
-    for (i = 1; i < 10; i++)
+    for (uint16_t i = 1; i < 10; i++)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
 
@@ -365,25 +356,23 @@ static void begin_client(sim *s, mbm_client *client)
 TEST(one_late_reply_does_not_shift_the_clients_answers)
 {
     mbm_client client;
-    uint16_t i;
     DEVICE;
 
     begin_client(s, &client);
     client_reads(s, &client, 0, MBM_RESPONSE_TIMED_OUT);
-    for (i = 1; i < 100; i++)
+    for (uint16_t i = 1; i < 100; i++)
         client_reads(s, &client, i, MBM_OK);
 }
 
 TEST(a_late_reply_does_not_shift_the_clients_answers_after_a_retry)
 {
     mbm_client client;
-    uint16_t i;
     DEVICE;
 
     begin_client(s, &client);
     OK(mbm_client_setRetries(&client, 1));
     device.takes[1] = 50000;
-    for (i = 0; i < 100; i++)
+    for (uint16_t i = 0; i < 100; i++)
         client_reads(s, &client, i, MBM_OK);
 }
 
@@ -423,12 +412,11 @@ TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_ending)
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
     size_t length = fault_right_reply(frame, request);
     uint64_t at;
-    unsigned i;
     DEVICE;
 
     /* The device owes more replies than are counted, so each one is held. */
     device.takes[0] = 0xFFFFFFFF;
-    for (i = 0; i < 40; i++)
+    for (unsigned i = 0; i < 40; i++)
         assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     s->device = NULL;
     /* One reply every 80 ms, from the end of the next request on. */
@@ -442,12 +430,11 @@ TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_ending)
 /* The late reply, then the one to the request. The unit owes no other, so it is not held. */
 TEST(the_last_reply_that_the_unit_owes_is_delivered_at_once)
 {
-    uint16_t i;
     DEVICE;
 
     device.takes[0] = LATE;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
-    for (i = 1; i < 4; i++) {
+    for (uint16_t i = 1; i < 4; i++) {
         OK(read_at(s, i));
         assert_int_equal(s->response[0], fault_value(i));
         assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);

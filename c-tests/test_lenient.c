@@ -23,10 +23,9 @@ enum { TIMEOUT_MS = 200, TIMEOUT = 200000 };
 TEST(a_write_whose_reply_repeats_other_content_is_accepted)
 {
     static const char *const values[] = {"11 06 00 01 00 08 +", "11 06 00 02 00 07 +"};
-    unsigned i;
     LENIENT;
 
-    for (i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         sim_answer(s, 1, 500, values[i]);
         OK(mbm_node_writeSingleRegister(n, 1, 7));
         assert_true(s->now - s->frames[s->sent - 1].end >= TIMEOUT);
@@ -82,10 +81,9 @@ TEST(a_read_takes_the_registers_that_come)
 
 TEST(the_bytes_may_come_one_at_a_time_or_all_at_once)
 {
-    uint16_t piece;
     LENIENT;
 
-    for (piece = 1; piece < 20; piece++) {
+    for (uint16_t piece = 1; piece < 20; piece++) {
         s->read_piece = piece;
         sim_answer(s, 1, 500, "11 03 06 00 01 11 03 11 83 +"); /* data like the head of a reply */
         OK(mbm_node_readHoldingRegisters(n, 0, 1));
@@ -172,11 +170,10 @@ TEST(what_is_no_reply_to_the_request_is_not_accepted)
         {"11 83 00 +", MBM_MALFORMED_REPLY},
         {"11 03 00 00 00 01 +", MBM_MALFORMED_REPLY}, /* the request itself */
     };
-    unsigned i;
     LENIENT;
 
     mbm_line_setQuietTime(&s->line, 0);
-    for (i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         uint8_t status;
         sim_answer(s, 1, 500, rows[i].bytes);
         status = mbm_node_readHoldingRegisters(n, 0, 1);
@@ -197,9 +194,8 @@ TEST(what_is_no_reply_to_the_request_is_not_accepted)
 static size_t largest_reply(uint8_t *frame)
 {
     char text[3 * 250 + 16] = "11 03 FA";
-    unsigned i;
 
-    for (i = 0; i < 125; i++)
+    for (unsigned i = 0; i < 125; i++)
         sprintf(text + strlen(text), " 00 %02X", i);
     strcat(text, " +");
     return sim_bytes(frame, text);
@@ -219,18 +215,17 @@ static void answer_largest(sim *s, const sim_frame *frame)
 TEST(a_read_of_more_words_than_the_buffer_fills_it)
 {
     static const uint16_t frames[] = {MBM_FRAME_BYTES(64), 255};
-    unsigned i, word;
     LENIENT;
 
     s->device = answer_largest;
     OK(mbm_line_setQuietTime(&s->line, 0));
-    for (i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         OK(mbm_node_begin(n, &s->line, 17, s->response, 64, s->transmit, 64));
         OK(mbm_line_setFrame(&s->line, s->buffer, frames[i]));
         memset(s->response, 0xFF, sizeof s->response);
         OK(mbm_node_readHoldingRegisters(n, 0, 125));
         assert_int_equal(mbm_node_available(n), 64);
-        for (word = 0; word < 64; word++)
+        for (unsigned word = 0; word < 64; word++)
             assert_int_equal(s->response[word], word);
         assert_int_equal(s->response[64], 0xFFFF);
         assert_true(s->now - s->frames[s->sent - 1].end < 255 * s->character + 20000);
@@ -254,11 +249,10 @@ TEST(what_the_buffer_does_not_hold_is_checked_too)
 
 TEST(a_small_frame_buffer_is_not_left)
 {
-    uint16_t size;
     LENIENT;
 
     s->device = answer_largest;
-    for (size = 8; size < 255; size++) {
+    for (uint16_t size = 8; size < 255; size++) {
         uint8_t *frame = malloc(size); /* the sanitizer looks at its ends */
         uint8_t status;
 

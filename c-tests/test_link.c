@@ -3,9 +3,7 @@
 
 TEST(a_link_is_opened_in_the_first_poll)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         assert_int_equal(mbm_link_state(&kept), 0);
         assert_int_equal(connects, 0);
@@ -45,9 +43,7 @@ TEST(a_link_that_is_open_already_is_used_as_it_is)
 
 TEST(the_loss_of_the_link_is_noticed_while_the_client_is_idle)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         assert_int_equal(mbm_client_pollDelay(&client), 1000 * MS);
         run(10000);
@@ -73,9 +69,8 @@ TEST(the_loss_of_the_link_is_noticed_while_the_client_is_idle)
 TEST(bytes_that_arrive_while_the_client_is_idle_are_dropped)
 {
     static const uint8_t late[] = {0, 9, 0, 0, 0, 5, UNIT, 3, 2, 0xAA, 0xAA, 0, 9, 0, 0};
-    unsigned i;
 
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         mbm_counters counted = {0};
 
         begin_up(framings[i]);
@@ -143,12 +138,10 @@ TEST(the_wait_grows_from_attempt_to_attempt)
 
 TEST(a_peer_that_closes_each_connection_at_once_is_asked_less_and_less)
 {
-    unsigned i;
-
     begin_up(MBM_FRAMING_TCP);
     OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_EXPONENTIAL, 100, 30000));
     run(2000);
-    for (i = 0; i < 5; i++) {
+    for (unsigned i = 0; i < 5; i++) {
         m.is_lost = 1;
         OK(mbm_client_poll(&client));
         assert_int_equal(next_attempt(), 100u << i);
@@ -173,9 +166,7 @@ TEST(jitter_shortens_the_wait)
 
 TEST(requests_fail_while_the_link_is_down)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         connects_with = MBM_LINK_LOST;
         queue_read(&request);
@@ -196,9 +187,7 @@ TEST(requests_fail_while_the_link_is_down)
 
 TEST(requests_that_were_not_sent_wait_for_the_link)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         OK(mbm_link_setRequestsWait(&kept, 1));
         OK(mbm_client_setInFlight(&client, 1));
@@ -231,9 +220,7 @@ TEST(requests_that_were_not_sent_wait_for_the_link)
 
 TEST(requests_wait_while_the_first_connection_is_being_made)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         connects_with = MBM_PENDING;
         queue_read(&request);

@@ -29,9 +29,9 @@ static void is_answered(int framing, mbm_clientRequest *which)
 
 TEST(a_request_that_finds_the_link_closed_opens_it_at_once)
 {
-    unsigned i, noticed;
+    unsigned noticed;
 
-    for (i = 0; i < 2 * COUNT(framings); i++) {
+    for (unsigned i = 0; i < 2 * COUNT(framings); i++) {
         const int framing = framings[i / 2];
         uint32_t before;
 
@@ -64,11 +64,9 @@ TEST(a_request_that_finds_the_link_closed_opens_it_at_once)
 /* A device that serves one request with each connection. */
 TEST(a_peer_that_closes_the_link_after_each_reply_answers_each_request)
 {
-    unsigned i, round;
-
-    for (i = 0; i < COUNT(streams); i++) {
+    for (unsigned i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
-        for (round = 0; round < 20; round++) {
+        for (unsigned round = 0; round < 20; round++) {
             m.is_lost = 1;
             queue_read(&request);
             m.sent_count = 0;
@@ -82,9 +80,7 @@ TEST(a_peer_that_closes_the_link_after_each_reply_answers_each_request)
 
 TEST(a_request_waits_for_the_opening_as_long_as_its_response_timeout)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_good(framings[i]);
         m.is_lost = 1;
         connects_with = status_is = MBM_PENDING;
@@ -127,9 +123,7 @@ TEST(requests_that_wait_for_the_link_wait_longer)
 
 TEST(only_a_failed_opening_backs_off)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_good(framings[i]);
         m.is_lost = 1;
         connects_with = MBM_LINK_LOST;
@@ -149,11 +143,9 @@ TEST(only_a_failed_opening_backs_off)
 
 TEST(a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_request)
 {
-    unsigned i;
-
     begin_good(MBM_FRAMING_TCP);
     m.is_lost = 1;
-    for (i = 0; i < 1000; i++) {
+    for (unsigned i = 0; i < 1000; i++) {
         queue_read(&request);
         run(5);
         m.is_lost = 1;
@@ -166,9 +158,7 @@ TEST(a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_request)
 
 TEST(a_request_that_was_sent_is_not_sent_again_over_the_new_link)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_good(framings[i]);
         OK(mbm_client_setRetries(&client, 3));
         IS(MBM_PENDING, mbm_client_writeSingleRegister(&client, &request, 1, 2));
@@ -189,9 +179,7 @@ TEST(a_request_that_was_sent_is_not_sent_again_over_the_new_link)
 
 TEST(a_link_that_its_peer_closes_twice_while_idle_waits_for_a_request)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_good(framings[i]);
         OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 1000, 1000));
         m.is_lost = 1;
@@ -230,11 +218,9 @@ static void is_unanswered(mbm_clientRequest *which)
 
 TEST(a_silent_connection_is_replaced_after_two_requests)
 {
-    unsigned i, round;
-
-    for (i = 0; i < COUNT(streams); i++) {
+    for (unsigned i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
-        for (round = 1; round < 5; round++) {
+        for (unsigned round = 1; round < 5; round++) {
             events[0] = '\0';
             is_unanswered(&request);
             assert_int_equal(connects, round - 1);
@@ -253,14 +239,12 @@ TEST(a_silent_connection_is_replaced_after_two_requests)
 /* A unit behind a gateway is absent, and the gateway says nothing. Another one is there. */
 TEST(a_silent_unit_costs_the_others_no_request)
 {
-    unsigned i, round;
-
-    for (i = 0; i < COUNT(streams); i++) {
+    for (unsigned i = 0; i < COUNT(streams); i++) {
         begin_up(streams[i]);
         connects = 0;
         OK(mbm_client_setResponseTimeout(&client, 20));
         /* After 2, 4, 8 and 16 requests. */
-        for (round = 0; round < 30; round++)
+        for (unsigned round = 0; round < 30; round++)
             is_unanswered(&request);
         assert_int_equal(counters.lost, 4);
         m.sent_count = 0;
@@ -273,9 +257,7 @@ TEST(a_silent_unit_costs_the_others_no_request)
 
 TEST(a_repetition_goes_over_the_new_connection)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(streams); i++) {
+    for (unsigned i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
         OK(mbm_client_setRetries(&client, 2));
         queue_read(&request);
@@ -291,11 +273,10 @@ TEST(a_repetition_goes_over_the_new_connection)
 TEST(any_byte_begins_the_count_anew)
 {
     static const uint8_t noise = 0xA5;
-    unsigned i, round;
 
-    for (i = 0; i < COUNT(streams); i++) {
+    for (unsigned i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
-        for (round = 0; round < 20; round++) {
+        for (unsigned round = 0; round < 20; round++) {
             queue_read(&request);
             memory_port_send(&m, &client);
             if (round % 2)
@@ -309,12 +290,10 @@ TEST(any_byte_begins_the_count_anew)
 
 TEST(requests_of_a_program_with_limits_of_its_own_count_too)
 {
-    unsigned i, round;
-
-    for (i = 0; i < COUNT(streams); i++) {
+    for (unsigned i = 0; i < COUNT(streams); i++) {
         begin_good(streams[i]);
         /* Each is cancelled after 20 ms. The response timeout is 300 ms. */
-        for (round = 0; round < 15; round++) {
+        for (unsigned round = 0; round < 15; round++) {
             assert_int_equal(connects, 0);
             queue_read(&request);
             run(20);
@@ -329,10 +308,8 @@ TEST(requests_of_a_program_with_limits_of_its_own_count_too)
 
 TEST(cancelled_requests_alone_do_not_close_a_connection)
 {
-    unsigned round;
-
     begin_good(MBM_FRAMING_TCP);
-    for (round = 0; round < 100; round++) {
+    for (unsigned round = 0; round < 100; round++) {
         unsigned cancelled;
 
         for (cancelled = 0; cancelled < 5; cancelled++) {
@@ -349,19 +326,17 @@ TEST(cancelled_requests_alone_do_not_close_a_connection)
 
 TEST(the_limit_is_a_setting)
 {
-    unsigned i, round;
-
     IS(MBM_INVALID_ARGUMENT, mbm_link_setReplaceAfter(NULL, 1));
     begin(MBM_FRAMING_TCP);
     IS(MBM_INVALID_ARGUMENT, mbm_link_setReplaceAfter(&kept, 101));
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         const int is_stream =
             framings[i] == MBM_FRAMING_TCP || framings[i] == MBM_FRAMING_RTU_OVER_TCP;
 
         begin_good(framings[i]);
         if (is_stream)
             OK(mbm_link_setReplaceAfter(&kept, 0));
-        for (round = 0; round < 200; round++)
+        for (unsigned round = 0; round < 200; round++)
             is_unanswered(&request);
         OK(mbm_client_poll(&client));
         assert_int_equal(connects, 0);
@@ -397,15 +372,14 @@ TEST(requests_in_flight_have_their_time_before_a_connection_is_replaced)
 {
     static mbm_clientRequest late[3];
     uint8_t reply[11] = {0, 0, 0, 0, 0, 5, UNIT, 3, 2, 0x12, 0x34};
-    unsigned i, answered;
 
-    for (answered = 0; answered < 2; answered++) {
+    for (unsigned answered = 0; answered < 2; answered++) {
         begin_good(MBM_FRAMING_TCP);
         queue_read(&request);
         queue_read(&other);
         run(100);
         m.sent_count = 0;
-        for (i = 0; i < COUNT(late); i++) {
+        for (unsigned i = 0; i < COUNT(late); i++) {
             late[i] = (mbm_clientRequest){.unit = UNIT, .reply = words, .replyBytes = 2};
             queue_read(&late[i]);
         }

@@ -72,9 +72,8 @@ TEST(the_callback_may_use_link_and_client)
 {
     static const uint8_t after[] = {MBM_OK, MBM_OK, MBM_OK, MBM_NOT_INITIALISED,
                                     MBM_OK, MBM_OK, MBM_OK, MBM_OK};
-    unsigned i;
 
-    for (i = 0; i < COUNT(framings); i++)
+    for (unsigned i = 0; i < COUNT(framings); i++)
         for (what = 0; what < 8; what++) {
             begin_up(framings[i]);
             OK(mbm_link_setCallback(&kept, act, NULL));
@@ -96,9 +95,7 @@ TEST(the_callback_may_use_link_and_client)
 
 TEST(a_client_without_its_link_works_as_before)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         OK(mbm_link_end(&kept));
         IS(MBM_NOT_INITIALISED, mbm_link_end(&kept));
@@ -207,9 +204,7 @@ TEST(a_suspended_client_leaves_its_link_alone)
 
 TEST(a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_up(framings[i]);
         queue_read(&request);
         memory_port_send(&m, &client);
@@ -258,9 +253,7 @@ TEST(a_reconnection_on_demand_closes_the_link_and_opens_it_at_once)
 
 TEST(queued_requests_wait_for_a_reconnection_on_demand)
 {
-    unsigned is_down;
-
-    for (is_down = 0; is_down < 2; is_down++) {
+    for (unsigned is_down = 0; is_down < 2; is_down++) {
         mbm_clientRequest queued = {.unit = 17};
 
         begin_up(MBM_FRAMING_RTU);
@@ -296,9 +289,7 @@ static void queue_again(void *context, mbm_clientRequest *ended)
 
 TEST(a_request_of_done_fails_or_waits_as_all_do)
 {
-    unsigned i;
-
-    for (i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         begin_up(MBM_FRAMING_TCP);
         OK(mbm_link_setRequestsWait(&kept, (uint8_t)i));
         connects_with = MBM_LINK_LOST;

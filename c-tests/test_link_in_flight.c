@@ -105,11 +105,9 @@ static const struct {
 
 static void requests_in_flight_end_when_the_link_was_closed(uint16_t accepted)
 {
-    unsigned i, j, waits;
-
-    for (i = 0; i < COUNT(framings); i++)
-        for (j = 0; j < COUNT(courses); j++)
-            for (waits = 0; waits < 2; waits++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned j = 0; j < COUNT(courses); j++)
+            for (unsigned waits = 0; waits < 2; waits++) {
                 begin_in_flight(framings[i], accepted);
                 m.is_lost = 1;
                 status_is = courses[j].status_is;
@@ -140,10 +138,8 @@ TEST(a_request_that_the_port_took_in_part_is_not_sent_on_over_the_new_link)
 
 TEST(a_request_that_ended_with_the_old_link_is_never_sent)
 {
-    unsigned i, j;
-
-    for (i = 0; i < COUNT(framings); i++)
-        for (j = 0; j < COUNT(courses); j++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned j = 0; j < COUNT(courses); j++) {
             begin_in_flight(framings[i], NOTHING);
             assert_int_equal(m.sent_count, 0);
             status_is = courses[j].status_is;
@@ -162,9 +158,8 @@ TEST(a_request_that_ended_with_the_old_link_is_never_sent)
 TEST(half_a_reply_of_the_old_peer_is_dropped)
 {
     static const uint8_t half_rtu[] = {UNIT, 3, 2}, half_tcp[] = {0, 0, 0, 0, 0, 5, UNIT, 6};
-    unsigned i;
 
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin_in_flight(framings[i], ALL);
         if (framings[i] == MBM_FRAMING_TCP)
             memory_port_bytes(&m, half_tcp, sizeof half_tcp);
@@ -186,10 +181,9 @@ TEST(a_request_in_flight_goes_on_if_the_link_is_found_open)
 {
     static const uint8_t reply[] = {UNIT, 6, 0, 7, 0xBE, 0xEF};
     uint8_t tcp[] = {0, 0, 0, 0, 0, 6, UNIT, 6, 0, 7, 0xBE, 0xEF};
-    unsigned i, waits;
 
-    for (i = 0; i < COUNT(framings); i++)
-        for (waits = 0; waits < 2; waits++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned waits = 0; waits < 2; waits++) {
             begin_in_flight(framings[i], ALL);
             status_is = waits ? MBM_PENDING : MBM_OK;
             begin_link();
@@ -212,9 +206,7 @@ TEST(a_request_in_flight_goes_on_if_the_link_is_found_open)
 
 TEST(a_link_that_the_program_closes_while_it_is_being_made_sends_nothing_old)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         mbm_clientRequest second = {.unit = UNIT};
 
         begin_in_flight(framings[i], NOTHING);
@@ -248,10 +240,8 @@ static void end_it(void *context, uint8_t event, uint8_t status)
 
 TEST(a_client_whose_link_ends_in_its_callback_sends_nothing_old)
 {
-    unsigned i, j;
-
-    for (i = 0; i < COUNT(framings); i++)
-        for (j = 1; j < COUNT(courses); j++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned j = 1; j < COUNT(courses); j++) {
             begin_in_flight(framings[i], NOTHING);
             status_is = courses[j].status_is;
             connects_with = courses[j].connects_with;

@@ -94,10 +94,8 @@ static void read_over_tcp(unsigned i)
 
 TEST(a_connection_that_the_server_closes_is_opened_again_while_idle)
 {
-    unsigned i;
-
     read_over_tcp(0);
-    for (i = 1; i < 4; i++) {
+    for (unsigned i = 1; i < 4; i++) {
         tcp_peer_hang_up(peer);
         UNTIL(counters.lost == i);
         UNTIL(counters.connected == i + 1);
@@ -110,11 +108,9 @@ TEST(a_connection_that_the_server_closes_is_opened_again_while_idle)
 
 TEST(a_request_after_the_server_has_hung_up_is_sent_once_over_a_new_connection)
 {
-    unsigned i;
-
     OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 1000000, 1000000));
     read_over_tcp(0);
-    for (i = 1; i < MANY; i++) {
+    for (unsigned i = 1; i < MANY; i++) {
         tcp_peer_hang_up(peer);
         /* With and without a poll between. */
         if (i % 2)
@@ -130,13 +126,11 @@ TEST(a_request_after_the_server_has_hung_up_is_sent_once_over_a_new_connection)
 
 TEST(a_server_that_answers_no_more_is_connected_to_anew)
 {
-    unsigned n;
-
     OK(mbm_client_setResponseTimeout(&a.client, 100));
     read_over_tcp(0);
     tcp_peer_fault(peer, 2, FAULT_DROP, 0);
     tcp_peer_fault(peer, 3, FAULT_DROP, 0);
-    for (n = 1; n <= 2; n++) {
+    for (unsigned n = 1; n <= 2; n++) {
         queue_read(n);
         UNTIL(requests[n].status != MBM_PENDING);
         IS(MBM_RESPONSE_TIMED_OUT, requests[n].status);
@@ -264,12 +258,11 @@ static void read_over_tty(void)
 TEST_WITH(a_terminal_that_is_unplugged_is_opened_again, NULL, NULL)
 {
     const mbm_linkHooks hooks = {NULL, close_tty, open_tty, status_of_tty};
-    unsigned i;
 
     come();
     asker_begin_rtu(&a, dup(far_end.line.ours));
     keep(&hooks);
-    for (i = 1; i < 3; i++) {
+    for (unsigned i = 1; i < 3; i++) {
         read_over_tty();
         assert_int_equal(counters.connected, i);
         go();

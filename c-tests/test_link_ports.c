@@ -41,7 +41,6 @@ int getaddrinfo(const char *host, const char *name, const struct addrinfo *hints
 {
     static struct sockaddr_in places[2];
     static struct addrinfo all[2];
-    unsigned i;
 
     (void)hints;
     assert_string_equal(host, "meter.plant.example");
@@ -49,7 +48,7 @@ int getaddrinfo(const char *host, const char *name, const struct addrinfo *hints
     lookups++;
     if (lookup_fails_with != 0)
         return lookup_fails_with;
-    for (i = 0; i < count_of_addresses; i++) {
+    for (unsigned i = 0; i < count_of_addresses; i++) {
         places[i].sin_family = AF_INET;
         /* TCP has no way to a group of hosts: this fails as without a network. */
         places[i].sin_addr.s_addr = htonl(has_network ? INADDR_LOOPBACK : INADDR_ALLHOSTS_GROUP);
@@ -275,7 +274,6 @@ TEST(a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_comes)
 {
     const mbm_tty_options options = {.baud = 115200, .parity = 'N', .stop = 1};
     mbm_linkHooks hooks;
-    unsigned i;
 
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/tty", folder);
@@ -290,7 +288,7 @@ TEST(a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_comes)
     assert_int_equal(mbm_tty_openLater(&a.tty, path, &options), 0);
     hooks = mbm_tty_link(&a.tty);
     keep(&hooks);
-    for (i = 1; i <= 3; i++) {
+    for (unsigned i = 1; i <= 3; i++) {
         /* While it is closed, the wait sleeps. */
         UNTIL(counters.failed >= 2 * i);
         assert_string_equal(reason, strerror(ENOENT));

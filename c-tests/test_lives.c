@@ -180,13 +180,12 @@ static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
 static int16_t write_bytes(void *context, const uint8_t *bytes, uint16_t length)
 {
     line *l = (line *)context;
-    uint16_t i;
 
     if (l->state != OPEN)
         return l->state == OPENING ? 0 : -1;
     if (length > l->takes)
         length = l->takes;
-    for (i = 0; i < length; i++)
+    for (uint16_t i = 0; i < length; i++)
         take(l, bytes[i]);
     return (int16_t)length;
 }
@@ -279,7 +278,6 @@ static void begin(line *l)
     const int framing = (int)below(4);
     const uint16_t bytes = (uint16_t)(below(2) ? 520 : 40), more = (uint16_t)(below(2) ? 300 : 20);
     uint8_t status;
-    int i;
 
     frame = (uint8_t *)malloc(bytes);
     outgoing = (uint8_t *)malloc(more);
@@ -309,7 +307,7 @@ static void begin(line *l)
     l->framing = framing;
     l->has_link = 0;
     renew(l, OPEN);
-    for (i = 0; i < JOBS; i++)
+    for (int i = 0; i < JOBS; i++)
         if (jobs[i].is_pending && &lines[jobs[i].at] == l) {
             HOLDS(jobs[i].request->status == MBM_CANCELLED);
             jobs[i].is_pending = 0;
@@ -584,17 +582,15 @@ static void all_end(line *l)
 
 static void live(void)
 {
-    int i;
-
     random_state = (uint32_t)life * 2654435761u + 1;
     now = below(2) ? 0 : 0u - below(3000000);
     next_id = 1;
     memset(asked_by, 0, sizeof asked_by);
-    for (i = 0; i < JOBS; i++) {
+    for (int i = 0; i < JOBS; i++) {
         memset(&jobs[i], 0, sizeof jobs[i]);
         jobs[i].request = (mbm_clientRequest *)calloc(1, sizeof *jobs[i].request);
     }
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         memset(&lines[i], 0, sizeof lines[i]);
         lines[i].client = (mbm_client *)calloc(1, sizeof *lines[i].client);
         lines[i].link = (mbm_link *)calloc(1, sizeof *lines[i].link);
@@ -607,25 +603,25 @@ static void live(void)
         OK(mbm_node_begin(nodes[i], borrowers[i], 1, node_words[i], 8, NULL, 0));
         OK(mbm_node_setBlocking(nodes[i], 0));
     }
-    for (i = 0; i < STEPS; i++)
+    for (int i = 0; i < STEPS; i++)
         step();
     inside = 2;
-    for (i = 0; i < 2; i++)
+    for (int i = 0; i < 2; i++)
         all_end(&lines[i]);
     inside = 0;
-    for (i = 0; i < JOBS; i++) {
+    for (int i = 0; i < JOBS; i++) {
         HOLDS(!jobs[i].is_pending);
         free(jobs[i].request);
         free(jobs[i].words);
     }
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         free(lines[i].client);
         free(lines[i].link);
         free(lines[i].frame);
         free(lines[i].outgoing);
     }
     /* Their lines are gone. */
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         IS(MBM_NOT_INITIALISED, mbm_node_readCoils(nodes[i], 0, 1));
         free(nodes[i]);
         free(borrowers[i]);

@@ -56,14 +56,12 @@ static void begin(void)
 
 static void end(void)
 {
-    unsigned i;
-
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
-    for (i = 0; i < CLIENTS; i++) {
+    for (unsigned i = 0; i < CLIENTS; i++) {
         mbm_loop_remove(&devices[i].entry);
         mbm_tcp_close(&devices[i].tcp);
     }
-    for (i = 0; i < PEERS; i++)
+    for (unsigned i = 0; i < PEERS; i++)
         if (peers[i])
             tcp_peer_stop(peers[i]);
     assert_int_equal(loop.count, 0);
@@ -75,9 +73,7 @@ static void end(void)
 
 static void start_peers(unsigned count)
 {
-    unsigned i;
-
-    for (i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++) {
         peers[i] = tcp_peer_new();
         ports[i] = tcp_peer_start(peers[i], 0);
     }
@@ -133,17 +129,13 @@ static void begin_device(device *d, uint16_t at, unsigned requests)
 
 static void begin_devices(unsigned count, unsigned requests)
 {
-    unsigned i;
-
-    for (i = 0; i < count; i++)
+    for (unsigned i = 0; i < count; i++)
         begin_device(&devices[i], ports[i / TCP_PEER_CONNECTIONS], requests);
 }
 
 static int all_are_right(unsigned count, unsigned requests)
 {
-    unsigned i;
-
-    for (i = 0; i < count; i++)
+    for (unsigned i = 0; i < count; i++)
         if (devices[i].right < requests)
             return 0;
     return 1;
@@ -154,12 +146,11 @@ static int all_are_right(unsigned count, unsigned requests)
 TEST_WITH(many_clients_are_served_by_one_wait, begin, end)
 {
     enum { REQUESTS = 50 };
-    unsigned i;
 
     start_peers(PEERS);
     begin_devices(CLIENTS, REQUESTS);
     UNTIL(&loop, all_are_right(CLIENTS, REQUESTS));
-    for (i = 0; i < CLIENTS; i++) {
+    for (unsigned i = 0; i < CLIENTS; i++) {
         assert_int_equal(devices[i].right, REQUESTS);
         assert_int_equal(devices[i].failed, 0);
         assert_int_equal(devices[i].counters.connected, 1);
@@ -188,12 +179,10 @@ TEST_WITH(a_client_that_gets_no_answer_ends_while_others_are_busy, begin, end)
 
 TEST_WITH(a_link_that_is_lost_is_opened_and_waited_for_again, begin, end)
 {
-    unsigned i, round;
-
     start_peers(1);
     begin_devices(4, 5);
     UNTIL(&loop, all_are_right(4, 5));
-    for (round = 2; round <= 4; round++) {
+    for (unsigned round = 2; round <= 4; round++) {
         if (round % 2 == 0) {
             tcp_peer_hang_up(peers[0]);
         } else {
@@ -201,9 +190,9 @@ TEST_WITH(a_link_that_is_lost_is_opened_and_waited_for_again, begin, end)
             UNTIL(&loop, devices[0].counters.failed > 2 && devices[3].counters.failed > 2);
             assert_int_equal(tcp_peer_start(peers[0], ports[0]), ports[0]);
         }
-        for (i = 0; i < 4; i++)
+        for (unsigned i = 0; i < 4; i++)
             UNTIL(&loop, devices[i].counters.connected >= round);
-        for (i = 0; i < 4; i++) {
+        for (unsigned i = 0; i < 4; i++) {
             devices[i].right = devices[i].failed = 0;
             devices[i].left = 5;
             ask(&devices[i]);
@@ -211,7 +200,7 @@ TEST_WITH(a_link_that_is_lost_is_opened_and_waited_for_again, begin, end)
         }
         UNTIL(&loop, all_are_right(4, 5));
     }
-    for (i = 0; i < 4; i++)
+    for (unsigned i = 0; i < 4; i++)
         assert_true(devices[i].counters.lost >= 3);
 }
 
@@ -231,7 +220,7 @@ TEST_WITH(a_request_that_is_queued_outside_needs_a_wake, begin, end)
 TEST_WITH(without_a_descriptor_links_wait_and_connect_later, begin, end)
 {
     struct rlimit limit;
-    int next, i;
+    int next;
 
     SKIP_WITHOUT_LIMITS();
     start_peers(1);
@@ -241,7 +230,7 @@ TEST_WITH(without_a_descriptor_links_wait_and_connect_later, begin, end)
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
     begin_devices(4, 5);
     /* Each end of a connection takes one. */
-    for (i = 0; i < 200; i++)
+    for (int i = 0; i < 200; i++)
         assert_true(mbm_loop_wait(&loop, 1000) >= 0);
     assert_true(devices[3].counters.failed > 0);
     assert_int_equal(devices[3].tcp.error, EMFILE);
@@ -280,19 +269,15 @@ static void add_inlet(inlet *one)
 
 static void begin_inlets(void)
 {
-    unsigned i;
-
     begin();
     memset(inlets, 0, sizeof inlets);
-    for (i = 0; i < PIPES; i++)
+    for (unsigned i = 0; i < PIPES; i++)
         assert_int_equal(pipe2(inlets[i].ends, O_CLOEXEC | O_NONBLOCK), 0);
 }
 
 static void end_inlets(void)
 {
-    unsigned i;
-
-    for (i = 0; i < PIPES; i++) {
+    for (unsigned i = 0; i < PIPES; i++) {
         mbm_loop_remove(&inlets[i].entry);
         close(inlets[i].ends[0]);
         close(inlets[i].ends[1]);
@@ -316,25 +301,21 @@ static void read_one(inlet *own)
 
 TEST(descriptors_that_are_always_ready_keep_no_other_waiting)
 {
-    unsigned i;
-
-    for (i = 0; i < PIPES; i++)
+    for (unsigned i = 0; i < PIPES; i++)
         add_inlet(&inlets[i]);
     assert_int_equal(mbm_loop_wait(&loop, 0), PIPES);
-    for (i = 0; i < PIPES; i++)
+    for (unsigned i = 0; i < PIPES; i++)
         make_ready(i);
-    for (i = 0; i < 20; i++)
+    for (unsigned i = 0; i < 20; i++)
         assert_int_equal(mbm_loop_wait(&loop, MBM_LOOP_FOREVER), MBM_LOOP_READY);
-    for (i = 0; i < PIPES; i++)
+    for (unsigned i = 0; i < PIPES; i++)
         assert_in_range(inlets[i].polls, 1 + 20 * MBM_LOOP_READY / PIPES - 1,
                         1 + 20 * MBM_LOOP_READY / PIPES + 1);
 }
 
 static void remove_all_others(inlet *own)
 {
-    unsigned i;
-
-    for (i = 0; i < 10; i++) {
+    for (unsigned i = 0; i < 10; i++) {
         if (&inlets[i] == own)
             continue;
         mbm_loop_remove(&inlets[i].entry);
@@ -347,9 +328,7 @@ static void remove_all_others(inlet *own)
 /* Adds all but one, and has each remove the others when it is polled. */
 static void add_inlets_but(const inlet *that)
 {
-    unsigned i;
-
-    for (i = 0; i < 10; i++)
+    for (unsigned i = 0; i < 10; i++)
         if (&inlets[i] != that) {
             memset(&inlets[i].entry, 0, sizeof inlets[i].entry);
             add_inlet(&inlets[i]);
@@ -358,10 +337,8 @@ static void add_inlets_but(const inlet *that)
 
 TEST(an_entry_that_was_removed_in_the_poll_of_another_is_not_polled)
 {
-    unsigned i;
-
     add_inlets_but(NULL);
-    for (i = 0; i < 10; i++) {
+    for (unsigned i = 0; i < 10; i++) {
         make_ready(i);
         inlets[i].within = remove_all_others;
     }
@@ -369,7 +346,7 @@ TEST(an_entry_that_was_removed_in_the_poll_of_another_is_not_polled)
     assert_int_equal(mbm_loop_wait(&loop, 0), 2);
     assert_int_equal(inlets[0].polls, 2);
     assert_int_equal(loop.count, 1);
-    for (i = 1; i < 10; i++) {
+    for (unsigned i = 1; i < 10; i++) {
         assert_int_equal(inlets[i].polls, 0);
         inlets[i].within = NULL;
     }
@@ -380,7 +357,7 @@ TEST(an_entry_that_was_removed_in_the_poll_of_another_is_not_polled)
     assert_in_range(mbm_loop_wait(&loop, 0), 1, 10);
     assert_int_equal(loop.count, 1);
     assert_int_equal(mbm_loop_wait(&loop, 0), 1);
-    for (i = 0; i < 10; i++)
+    for (unsigned i = 0; i < 10; i++)
         if (i != 4)
             memset(&inlets[i].entry, 0, sizeof inlets[i].entry);
 }

@@ -155,7 +155,6 @@ TEST(a_serial_line_takes_part_beside_tcp)
     tcp_peer *peer = tcp_peer_new();
     const mbm_port port = mbm_tty_port(&tty);
     server s;
-    unsigned i;
 
     server_start(&s, UNIT);
     assert_int_equal(mbm_tty_attach(&tty, s.line.ours), 0);
@@ -165,7 +164,7 @@ TEST(a_serial_line_takes_part_beside_tcp)
     assert_int_equal(mbm_loop_addTty(&loop, &by_line.entry, &tty), 0);
     begin_tcp(tcp_peer_start(peer, 0), 100);
     UNTIL(&loop, by_line.right == 20 && by_tcp.right == 100);
-    for (i = 0; i < WORDS; i++) {
+    for (unsigned i = 0; i < WORDS; i++) {
         assert_int_equal(by_line.words[i], server_pattern(i));
         assert_int_equal(by_tcp.words[i], tcp_peer_word(i));
     }
@@ -275,8 +274,6 @@ static uint8_t frames[PLACES][MBM_MAX_TCP_FRAME], lone_frame[MBM_MAX_TCP_FRAME];
 
 static void begin_unit(void)
 {
-    unsigned i;
-
     memset(&unit, 0, sizeof unit);
     memset(places, 0, sizeof places);
     memset(served, 0, sizeof served);
@@ -284,7 +281,7 @@ static void begin_unit(void)
     memset(&accepting, 0, sizeof accepting);
     memset(&lone_entry, 0, sizeof lone_entry);
     unit.id = UNIT;
-    for (i = 0; i < WORDS; i++)
+    for (unsigned i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(0x1200 + i);
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
 }
@@ -315,9 +312,7 @@ static void begin_to_listen(void)
 
 static void end_listening(void)
 {
-    unsigned i;
-
-    for (i = 0; i < PLACES; i++) {
+    for (unsigned i = 0; i < PLACES; i++) {
         mbm_loop_remove(&served[i]);
         mbm_tcp_close(&places[i]);
     }
@@ -433,14 +428,13 @@ TEST(a_server_on_a_serial_line_takes_part)
 TEST(a_terminal_that_comes_back_is_waited_for_again)
 {
     char folder[] = "/tmp/mbm-loop-XXXXXX", path[64];
-    unsigned round;
     int taken[3];
 
     begin_unit();
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/tty", folder);
     begin_line(path, 0);
-    for (round = 1; round <= 3; round++) {
+    for (unsigned round = 1; round <= 3; round++) {
         UNTIL(&loop, by_line.counters.failed >= 2 * round);
         begin_far_end();
         assert_int_equal(symlink(line.path, path), 0);
@@ -456,7 +450,7 @@ TEST(a_terminal_that_comes_back_is_waited_for_again)
         UNTIL(&loop, by_line.counters.lost == round);
         taken[round - 1] = dup(0);
     }
-    for (round = 0; round < 3; round++)
+    for (unsigned round = 0; round < 3; round++)
         close(taken[round]);
     rmdir(folder);
 }

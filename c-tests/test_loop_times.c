@@ -140,9 +140,7 @@ static void begin_client(device *d)
 
 static void begin_clients(unsigned count)
 {
-    unsigned i;
-
-    for (i = 0; i < count; i++)
+    for (unsigned i = 0; i < count; i++)
         begin_client(&devices[i]);
     assert_int_equal(mbm_loop_wait(&loop, 0), count);
     assert_int_equal(mbm_loop_pollDelay(&loop), MBM_LOOP_FOREVER);
@@ -168,16 +166,14 @@ static void answer(device *d)
 
 TEST(each_of_ten_thousand_timeouts_ends_at_its_time)
 {
-    unsigned i;
-
     begin_clients(MANY);
-    for (i = 0; i < MANY; i++) {
+    for (unsigned i = 0; i < MANY; i++) {
         ask(&devices[i], 1 + chance(3000));
         devices[i].polls = 0;
     }
     while (step())
         ;
-    for (i = 0; i < MANY; i++) {
+    for (unsigned i = 0; i < MANY; i++) {
         IS(MBM_RESPONSE_TIMED_OUT, devices[i].request.status);
         assert_int_equal(devices[i].ended, devices[i].due);
         /* Once to send the request, once when its time was over. */
@@ -221,27 +217,23 @@ TEST(a_timeout_ends_at_its_time_though_others_are_busy)
 
 TEST(a_client_without_requests_is_not_polled)
 {
-    unsigned i;
-
     begin_clients(SOME);
     ask(&devices[5], 100);
     while (step())
         ;
-    for (i = 0; i < SOME; i++)
+    for (unsigned i = 0; i < SOME; i++)
         assert_int_equal(devices[i].polls, i == 5 ? 3 : 1);
 }
 
 TEST(after_a_jump_of_the_clock_no_timeout_is_missing)
 {
-    unsigned i;
-
     begin_clients(SOME);
-    for (i = 0; i < SOME; i++)
+    for (unsigned i = 0; i < SOME; i++)
         ask(&devices[i], 1000 + i);
     assert_int_equal(mbm_loop_wait(&loop, 0), SOME);
     now += 30LL * 60 * 1000000;
     assert_int_equal(mbm_loop_wait(&loop, 0), SOME);
-    for (i = 0; i < SOME; i++)
+    for (unsigned i = 0; i < SOME; i++)
         IS(MBM_RESPONSE_TIMED_OUT, devices[i].request.status);
     assert_int_equal(mbm_loop_pollDelay(&loop), MBM_LOOP_FOREVER);
 }
@@ -332,11 +324,10 @@ static uint32_t poll_chore(mbm_loop_entry *entry)
 TEST(entries_are_polled_when_they_are_due_and_never_else)
 {
     const unsigned rounds = RUNNING_ON_VALGRIND ? 3000 : 30000;
-    unsigned i;
 
     memset(chores, 0, sizeof chores);
     polls = changes = round_now = 0;
-    for (i = 0; i < SOME; i++) {
+    for (unsigned i = 0; i < SOME; i++) {
         chores[i].entry.poll = poll_chore;
         if (i % 3)
             add_chore(&chores[i]);
@@ -347,7 +338,7 @@ TEST(entries_are_polled_when_they_are_due_and_never_else)
             wake_chore(&chores[chance(SOME)]);
         round_now++;
         assert_true(mbm_loop_wait(&loop, 0) >= 0);
-        for (i = 0; i < SOME; i++) {
+        for (unsigned i = 0; i < SOME; i++) {
             const chore *one = &chores[i];
 
             /* Only one that was woken in this wait may be left. */
@@ -358,7 +349,7 @@ TEST(entries_are_polled_when_they_are_due_and_never_else)
         }
     }
     assert_true(polls > rounds && changes > rounds / 50);
-    for (i = 0; i < SOME; i++)
+    for (unsigned i = 0; i < SOME; i++)
         mbm_loop_remove(&chores[i].entry);
     assert_int_equal(mbm_loop_pollDelay(&loop), MBM_LOOP_FOREVER);
 }
@@ -382,14 +373,13 @@ static uint32_t poll_calm(mbm_loop_entry *entry)
 TEST(an_entry_that_always_has_something_to_do_is_polled_once_in_a_wait)
 {
     static mbm_loop_entry eager, calm;
-    unsigned i;
 
     eager.poll = poll_eager;
     calm.poll = poll_calm;
     assert_int_equal(mbm_loop_addFd(&loop, &eager, -1), 0);
     assert_int_equal(mbm_loop_addFd(&loop, &calm, -1), 0);
     assert_int_equal(mbm_loop_wait(&loop, MBM_LOOP_FOREVER), 2);
-    for (i = 0; i < 100; i++) {
+    for (unsigned i = 0; i < 100; i++) {
         now += MS;
         assert_in_range(mbm_loop_wait(&loop, MBM_LOOP_FOREVER), 1, 2);
     }
@@ -457,14 +447,13 @@ TEST(a_plan_reads_at_its_intervals)
     static mbm_plan plan;
     mbm_loop_planned planned = {&devices[0].client, &plan};
     const int64_t from = now;
-    unsigned i;
     double value;
 
     begin_client(&devices[0]);
     OK(mbm_plan_begin(&plan, &devices[0].client, &setup, NULL));
     devices[0].entry.poll = mbm_loop_pollPlan;
     devices[0].entry.context = &planned;
-    for (i = 1; i <= 20; i++) {
+    for (unsigned i = 1; i <= 20; i++) {
         while (devices[0].sent < i)
             assert_true(step());
         assert_in_range(now, from + (i - 1) * 1000LL * MS, from + (i - 1) * 1000LL * MS + 2 * MS);

@@ -72,19 +72,17 @@ static void assert_printed(const char *text)
 
 TEST(mbpoll_reads_every_table)
 {
-    unsigned where, i;
-
-    for (where = 0; where < 2; where++) {
+    for (unsigned where = 0; where < 2; where++) {
         assert_int_equal(mbpoll(place[where], "-a 17 -r 103 -c 125", ""), 0);
-        for (i = 103; i < 103 + 125; i++)
+        for (unsigned i = 103; i < 103 + 125; i++)
             assert_int_equal(value(i, 10), served_pattern(i));
         assert_int_equal(mbpoll(place[where], "-a 17 -r 399 -c 1 -t 3:hex", ""), 0);
         assert_int_equal(value(399, 16), (uint16_t)~served_pattern(399));
         assert_int_equal(mbpoll(place[where], "-a 17 -r 111 -c 19 -t 0", ""), 0);
-        for (i = 111; i < 111 + 19; i++)
+        for (unsigned i = 111; i < 111 + 19; i++)
             assert_int_equal(value(i, 10), served_bit_pattern(i));
         assert_int_equal(mbpoll(place[where], "-a 17 -r 101 -c 9 -t 1", ""), 0);
-        for (i = 101; i < 101 + 9; i++)
+        for (unsigned i = 101; i < 101 + 9; i++)
             assert_int_equal(value(i, 10), !served_bit_pattern(i));
     }
 }
@@ -92,9 +90,8 @@ TEST(mbpoll_reads_every_table)
 TEST(mbpoll_writes_one_and_several_values)
 {
     served *servers[] = {&tcp, &rtu};
-    unsigned where;
 
-    for (where = 0; where < 2; where++) {
+    for (unsigned where = 0; where < 2; where++) {
         const uint16_t words[] = {7, 65535, 4711};
         uint8_t before = servers[where]->bits[2];
 
@@ -111,9 +108,7 @@ TEST(mbpoll_writes_one_and_several_values)
 
 TEST(mbpoll_receives_exceptions)
 {
-    unsigned where;
-
-    for (where = 0; where < 2; where++) {
+    for (unsigned where = 0; where < 2; where++) {
         assert_int_equal(mbpoll(place[where], "-a 17 -r 99", ""), 1);
         assert_printed("Illegal data address");
         assert_int_equal(mbpoll(place[where], "-a 17 -r 260", "48879"), 1);

@@ -40,10 +40,9 @@ TEST(a_poll_of_an_ascii_server_ends_while_a_peer_floods)
     static mbm_unit unit;
     static uint8_t frame[MBM_MAX_ASCII_FRAME];
     static const uint8_t floods[] = {'x', ':', '0', '\r', '\n'};
-    size_t i;
 
     OK(mbm_server_beginAscii(&server, &flooded, &unit, 1, frame, sizeof frame));
-    for (i = 0; i < sizeof floods; i++) {
+    for (size_t i = 0; i < sizeof floods; i++) {
         flood = floods[i];
         reads = 0;
         OK(mbm_server_poll(&server));

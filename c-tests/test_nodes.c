@@ -4,8 +4,6 @@
 
 #include <string.h>
 
-fixture each_test = {sim_setup, sim_teardown};
-
 typedef struct other {
     mbm_node node;
     uint16_t words[4];
@@ -25,11 +23,10 @@ static void other_reads(sim *s, other *o)
     assert_int_equal(o->words[0], 7);
 }
 
-TEST(the_gap_counts_from_the_last_use_by_any_node)
+SIM_TEST(the_gap_counts_from_the_last_use_by_any_node)
 {
     uint64_t asked;
     other o;
-    SIM;
 
     begin_other(s, &o);
     sim_reads(s, 500);
@@ -43,10 +40,9 @@ TEST(the_gap_counts_from_the_last_use_by_any_node)
     sim_assert_time(s->frames[3].begin - asked, 0);
 }
 
-TEST(each_node_keeps_its_result)
+SIM_TEST(each_node_keeps_its_result)
 {
     other o;
-    NODE;
 
     begin_other(s, &o);
     OK(mbm_node_setResponseTimeout(&o.node, 50));
@@ -61,10 +57,9 @@ TEST(each_node_keeps_its_result)
     assert_int_equal(mbm_node_available(&o.node), 0);
 }
 
-TEST(a_request_is_refused_while_another_node_has_one_pending)
+SIM_TEST(a_request_is_refused_while_another_node_has_one_pending)
 {
     other o;
-    NODE;
 
     begin_other(s, &o);
     OK(mbm_node_setBlocking(n, 0));
@@ -98,10 +93,8 @@ static void try_the_other_node(void *context)
     tried++;
 }
 
-TEST(a_hook_may_use_another_node_but_not_for_a_request)
+SIM_TEST(a_hook_may_use_another_node_but_not_for_a_request)
 {
-    NODE;
-
     tried = 0;
     begin_other(s, &within);
     other_reads(s, &within);
@@ -113,10 +106,9 @@ TEST(a_hook_may_use_another_node_but_not_for_a_request)
     assert_int_equal(mbm_node_getSlaveID(&within.node), 4);
 }
 
-TEST(the_idle_hook_is_given_the_node_that_waits)
+SIM_TEST(the_idle_hook_is_given_the_node_that_waits)
 {
     other o;
-    NODE;
 
     begin_other(s, &o);
     sim_reads(s, 500);
@@ -125,10 +117,9 @@ TEST(the_idle_hook_is_given_the_node_that_waits)
     assert_ptr_equal(s->waits, &o.node);
 }
 
-TEST(a_request_that_the_line_has_given_up_is_cancelled)
+SIM_TEST(a_request_that_the_line_has_given_up_is_cancelled)
 {
     other o;
-    NODE;
 
     begin_other(s, &o);
     OK(mbm_node_setBlocking(n, 0));
@@ -141,10 +132,9 @@ TEST(a_request_that_the_line_has_given_up_is_cancelled)
     OK(mbm_line_cancel(&s->line));
 }
 
-TEST(a_lost_node_blocks_its_line_until_that_is_cancelled)
+SIM_TEST(a_lost_node_blocks_its_line_until_that_is_cancelled)
 {
     other o;
-    SIM;
 
     begin_other(s, &o);
     OK(mbm_node_setBlocking(&o.node, 0));
@@ -156,10 +146,9 @@ TEST(a_lost_node_blocks_its_line_until_that_is_cancelled)
     sim_reads(s, 500);
 }
 
-TEST(the_request_of_a_node_is_not_that_of_its_copy)
+SIM_TEST(the_request_of_a_node_is_not_that_of_its_copy)
 {
     mbm_node copy;
-    NODE;
 
     OK(mbm_node_setBlocking(n, 0));
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
@@ -174,13 +163,12 @@ TEST(the_request_of_a_node_is_not_that_of_its_copy)
     assert_int_equal(s->response[0], 42);
 }
 
-TEST(a_node_may_move_to_another_line)
+SIM_TEST(a_node_may_move_to_another_line)
 {
     mbm_line line = MBM_INIT;
     uint8_t frame[MBM_FRAME_BYTES(4)];
     sim second;
     other o;
-    SIM;
 
     memcpy(&second, s, sizeof second);
     second.port.context = &second;
@@ -196,10 +184,9 @@ TEST(a_node_may_move_to_another_line)
     sim_assert_sent(&second, 0, "03 04 00 00 00 01 +");
 }
 
-TEST(a_failure_of_one_node_delays_the_next_request_of_another)
+SIM_TEST(a_failure_of_one_node_delays_the_next_request_of_another)
 {
     other o;
-    NODE;
 
     begin_other(s, &o);
     OK(mbm_node_setResponseTimeout(n, 50));
@@ -209,10 +196,9 @@ TEST(a_failure_of_one_node_delays_the_next_request_of_another)
     assert_in_range(s->frames[1].begin - s->frames[0].end, 150000, 151000);
 }
 
-TEST(one_node_may_be_lenient_beside_a_strict_one)
+SIM_TEST(one_node_may_be_lenient_beside_a_strict_one)
 {
     other o;
-    NODE;
 
     begin_other(s, &o);
     OK(mbm_node_setLenient(&o.node, 1));

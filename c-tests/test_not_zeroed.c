@@ -65,7 +65,6 @@ static uint8_t use_node(void *object)
 static uint8_t use_client(mbm_client *client, uint8_t begun, int is_rtu)
 {
     mbm_clientRequest request = MBM_INIT;
-    unsigned i;
 
     if (begun != MBM_OK)
         return begun;
@@ -73,12 +72,12 @@ static uint8_t use_client(mbm_client *client, uint8_t begun, int is_rtu)
     request.reply = words;
     request.replyBytes = sizeof words;
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(client, &request, 0, 1));
-    for (i = 0; i < 1000 && wire.length == 0; i++)
+    for (unsigned i = 0; i < 1000 && wire.length == 0; i++)
         IS(MBM_PENDING, mbm_client_poll(client));
     assert_true(wire.length > 0);
     if (is_rtu) {
         hooked_port_arrive_rtu(&wire, 17, "\x03\x02\x12\x34", 4);
-        for (i = 0; i < 1000 && request.status == MBM_PENDING; i++)
+        for (unsigned i = 0; i < 1000 && request.status == MBM_PENDING; i++)
             mbm_client_poll(client);
         OK(request.status);
         assert_int_equal(words[0], 0x1234);
@@ -119,7 +118,6 @@ static uint8_t use_server(mbm_server *server, begin_server *begin, const char *r
     mbm_unit unit = MBM_INIT;
     mbm_registerTable table = MBM_INIT;
     uint8_t begun;
-    unsigned i;
 
     unit.id = 17;
     table.words = words;
@@ -132,7 +130,7 @@ static uint8_t use_server(mbm_server *server, begin_server *begin, const char *r
         hooked_port_arrive_rtu(&wire, 17, request, length);
     else
         hooked_port_arrive(&wire, request, length);
-    for (i = 0; i < 100; i++)
+    for (unsigned i = 0; i < 100; i++)
         OK(mbm_server_poll(server));
     assert_int_equal(wire.length, expected);
     return MBM_OK;
@@ -189,7 +187,6 @@ static uint8_t use_plan(void *object)
     uint32_t ageMs;
     uint16_t field;
     uint8_t begun;
-    unsigned i;
 
     memset(&device, 0, sizeof device);
     plan_device_begin(&device, 0);
@@ -199,7 +196,7 @@ static uint8_t use_plan(void *object)
     if (begun != MBM_OK)
         return begun;
     IS(MBM_PENDING, mbm_plan_getStatus(object, 0, &ageMs));
-    for (i = 0; i < 10; i++)
+    for (unsigned i = 0; i < 10; i++)
         OK(mbm_plan_poll(object));
     assert_int_equal(mbm_client_pending(&device.client), 1);
     OK(mbm_plan_end(object));
@@ -305,10 +302,9 @@ static uint8_t (*const uses[])(void *object) = {
 static void use_all(void)
 {
     unsigned char before[sizeof memory];
-    size_t i;
 
     memcpy(before, &memory, sizeof before);
-    for (i = 0; i < COUNT(uses); i++) {
+    for (size_t i = 0; i < COUNT(uses); i++) {
         uint8_t begun;
 
         reset();
@@ -321,9 +317,7 @@ static void use_all(void)
 
 TEST(a_begin_function_works_in_memory_filled_with_any_byte)
 {
-    int byte;
-
-    for (byte = 0; byte < 256; byte++) {
+    for (int byte = 0; byte < 256; byte++) {
         memset(&memory, byte, sizeof memory);
         if (byte != MARK)
             use_all();
@@ -334,10 +328,9 @@ TEST(a_begin_function_works_in_memory_with_random_bytes)
 {
     unsigned char bytes[sizeof memory];
     uint32_t random = 1;
-    size_t fill, i;
 
-    for (fill = 0; fill < RANDOM_FILLS; fill++) {
-        for (i = 0; i < sizeof bytes; i++) {
+    for (size_t fill = 0; fill < RANDOM_FILLS; fill++) {
+        for (size_t i = 0; i < sizeof bytes; i++) {
             random = random * 1664525 + 1013904223;
             bytes[i] = (unsigned char)(random >> 24);
             if (bytes[i] == MARK)

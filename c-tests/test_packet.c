@@ -12,9 +12,8 @@ TEST(every_example_is_parsed_to_its_fields)
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet wanted, found;
     uint16_t length;
-    size_t i;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &wanted);
         OK(mbm_frame_parse(PDU(NULL, 0), example_side(&examples[i]), pdu, length, &found));
         assert_same_packet(&found, &wanted);
@@ -28,9 +27,8 @@ TEST(every_example_is_built_byte_for_byte)
     uint8_t pdu[MBM_MAX_PDU], built[MBM_MAX_PDU];
     mbm_packet packet;
     uint16_t length, found;
-    size_t i;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &packet);
         memset(built, 0xEE, sizeof built);
         OK(mbm_frame_build(PDU(NULL, 0), &packet, built, length, &found));
@@ -101,13 +99,12 @@ TEST(a_pdu_cut_short_is_parsed_right_or_refused)
 {
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
-    uint16_t length, cut;
+    uint16_t length;
     unsigned right = 0;
-    size_t i;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &packet);
-        for (cut = 0; cut < length; cut++)
+        for (uint16_t cut = 0; cut < length; cut++)
             right += parsed_right(example_side(&examples[i]), pdu, cut);
     }
     /* The data of 08/00, 2B/0D and 41, and those of 11 after its byte count, may have any
@@ -119,13 +116,12 @@ TEST(a_pdu_with_one_byte_changed_is_parsed_right_or_refused)
 {
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
-    uint16_t length, at;
+    uint16_t length;
     unsigned value, right = 0, all = 0;
-    size_t i;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &packet);
-        for (at = 0; at < length; at++) {
+        for (uint16_t at = 0; at < length; at++) {
             uint8_t was = pdu[at];
 
             for (value = 0; value < 256; value++) {
@@ -144,9 +140,8 @@ TEST(an_extra_byte_is_refused_unless_the_data_may_have_any_length)
     uint8_t pdu[MBM_MAX_PDU + 1];
     mbm_packet packet;
     unsigned right = 0;
-    size_t i;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         uint16_t length = example_load(&examples[i], pdu, &packet);
 
         pdu[length] = 0;
@@ -206,9 +201,8 @@ TEST(an_impossible_packet_is_not_built)
     };
     uint8_t built[700];
     uint16_t length = 0x5555;
-    size_t i;
 
-    for (i = 0; i < COUNT(refused); i++) {
+    for (size_t i = 0; i < COUNT(refused); i++) {
         mbm_packet packet = refused[i].packet;
 
         packet.data = data;
@@ -223,15 +217,14 @@ TEST(the_first_bytes_of_a_pdu_determine_its_length)
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
     mbm_length expected;
-    uint16_t length, have;
-    size_t i;
+    uint16_t length;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         uint8_t side = example_side(&examples[i]), kind = MBM_LENGTH_UNKNOWN;
         uint8_t id_goes_on = examples[i].packet.byteCount;
 
         length = example_load(&examples[i], pdu, &packet);
-        for (have = 0; have <= length; have++) {
+        for (uint16_t have = 0; have <= length; have++) {
             OK(mbm_frame_expectedLength(PDU(NULL, 0), side, pdu, have, &expected));
             kind = expected.kind;
             if (kind == MBM_LENGTH_EXACT)
@@ -259,9 +252,8 @@ TEST(a_request_determines_the_length_of_its_response)
     uint8_t pdu[MBM_MAX_PDU], reply[MBM_MAX_PDU];
     mbm_packet request, response;
     mbm_length expected;
-    size_t i;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         uint16_t length;
 
         example_load(&examples[i], pdu, &request);
@@ -340,9 +332,8 @@ TEST(an_impossible_declaration_is_an_invalid_argument)
     static const uint8_t pdu[] = {0x41, 1, 2};
     mbm_packet packet;
     mbm_length expected;
-    size_t i;
 
-    for (i = 0; i < COUNT(wrong); i++) {
+    for (size_t i = 0; i < COUNT(wrong); i++) {
         IS(MBM_INVALID_ARGUMENT,
            mbm_frame_parse(PDU(&wrong[i], 1), MBM_PACKET_REQUEST, (uint8_t *)pdu, 3, &packet));
         IS(MBM_INVALID_ARGUMENT,

@@ -87,9 +87,8 @@ TEST(an_impossible_record_is_not_added)
         {MBM_INVALID_ARGUMENT, MBM_PACKET_EXCEPTION, 0x15, {data, 1, 1, 1}},
     };
     uint8_t storage[600];
-    size_t i;
 
-    for (i = 0; i < COUNT(refused); i++) {
+    for (size_t i = 0; i < COUNT(refused); i++) {
         mbm_packet packet = {0};
 
         packet.kind = refused[i].kind;
@@ -161,9 +160,8 @@ TEST(other_packets_have_neither_records_nor_objects)
     mbm_packet packet;
     mbm_record record;
     mbm_object object;
-    size_t i;
 
-    for (i = 0; i < example_count; i++) {
+    for (size_t i = 0; i < example_count; i++) {
         uint16_t cursor = 0, other = 0;
 
         example_load(&examples[i], pdu, &packet);

@@ -40,9 +40,8 @@ static uint16_t parse(uint8_t type, const char *scale, const char *payload)
 static uint64_t written(uint16_t count)
 {
     uint64_t value = 0;
-    uint16_t at;
 
-    for (at = 0; at < count; at++)
+    for (uint16_t at = 0; at < count; at++)
         value = value << 16 | words[at];
     return value;
 }
@@ -170,11 +169,8 @@ static const char *const NO_NUMBERS[] = {
 
 TEST(a_payload_that_is_no_number_as_a_whole_is_refused)
 {
-    unsigned i;
-    uint8_t type;
-
-    for (i = 0; i < COUNT(NO_NUMBERS); i++)
-        for (type = MBM_TYPE_BIT; type <= MBM_TYPE_DOUBLE; type++)
+    for (unsigned i = 0; i < COUNT(NO_NUMBERS); i++)
+        for (uint8_t type = MBM_TYPE_BIT; type <= MBM_TYPE_DOUBLE; type++)
             expect_refused(type, NULL, NO_NUMBERS[i], "no number");
 }
 
@@ -195,9 +191,8 @@ TEST(bytes_after_a_zero_byte_are_not_overlooked)
         {"{\"a\":\"\\\0\",\"value\":9}", 20},
         {"{\"a\":\"\\u000\0\",\"value\":9}", 24},
     };
-    unsigned i;
 
-    for (i = 0; i < COUNT(rows); i++) {
+    for (unsigned i = 0; i < COUNT(rows); i++) {
         assert_int_equal(parse_bytes(MBM_TYPE_UINT16, NULL, rows[i].payload, rows[i].length), 0);
         assert_int_equal(parse_bytes(MBM_TYPE_BIT, NULL, rows[i].payload, rows[i].length), 0);
     }
@@ -231,9 +226,8 @@ TEST(json_may_have_space_and_other_members)
         "9.000000000000000000000000000000000000",
         "0.00000000000000000000000000000009e32",
     };
-    unsigned i;
 
-    for (i = 0; i < COUNT(rows); i++)
+    for (unsigned i = 0; i < COUNT(rows); i++)
         expect(MBM_TYPE_UINT16, NULL, rows[i], 9);
 }
 
@@ -253,10 +247,9 @@ TEST(integers_of_64_bits_are_exact)
         {MBM_TYPE_INT64, "-9223372036854775808", (uint64_t)INT64_MAX + 1},
     };
     char payload[64];
-    unsigned i, form;
 
-    for (i = 0; i < COUNT(rows); i++)
-        for (form = 0; form < COUNT(forms); form++) {
+    for (unsigned i = 0; i < COUNT(rows); i++)
+        for (unsigned form = 0; form < COUNT(forms); form++) {
             snprintf(payload, sizeof payload, forms[form], rows[i].text);
             expect(rows[i].type, NULL, payload, rows[i].value);
         }
@@ -330,11 +323,9 @@ TEST(a_fraction_for_an_integer_is_refused_and_not_rounded)
         "65535.5",
         "18446744073709551615.5",
     };
-    unsigned i;
-    uint8_t type;
 
-    for (i = 0; i < COUNT(rows); i++)
-        for (type = MBM_TYPE_BIT; type <= MBM_TYPE_INT64; type++)
+    for (unsigned i = 0; i < COUNT(rows); i++)
+        for (uint8_t type = MBM_TYPE_BIT; type <= MBM_TYPE_INT64; type++)
             expect_refused(type, NULL, rows[i], "not a whole number");
 }
 
@@ -373,10 +364,9 @@ TEST(what_a_scaled_integer_is_published_as_can_be_written_back)
     static const char *const scales[] = {"0.1",  "0.01", "0.001", "1e-4", "0.5",     "0.25",
                                          "-0.1", "7",    "10",    "1000", "0.333333"};
     char payload[64];
-    unsigned i, raw;
 
-    for (i = 0; i < COUNT(scales); i++)
-        for (raw = 0; raw <= UINT16_MAX; raw += 1 + raw % 7) {
+    for (unsigned i = 0; i < COUNT(scales); i++)
+        for (unsigned raw = 0; raw <= UINT16_MAX; raw += 1 + raw % 7) {
             /* As a scaled value is published. */
             snprintf(payload, sizeof payload, "%.15g", (double)raw * strtod(scales[i], NULL));
             expect(MBM_TYPE_UINT16, scales[i], payload, raw);
@@ -406,9 +396,8 @@ TEST(a_scale_is_a_decimal_number)
         "0.1234567890123456789",
     };
     value_scale scale;
-    unsigned i;
 
-    for (i = 0; i < COUNT(bad); i++)
+    for (unsigned i = 0; i < COUNT(bad); i++)
         if (value_scale_read(bad[i], &scale))
             fail_msg("%s is taken", bad[i]);
     assert_int_equal(value_scale_read("-12.50", &scale), 1);
@@ -472,14 +461,12 @@ TEST(only_a_bit_takes_a_truth_value)
                                      " ON\n", "{\"value\":1}"};
     static const char *const off[] = {
         "false", "off", "OFF", "0", "-0", "{\"value\":false}", "{\"value\":0.0}"};
-    unsigned i;
-    uint8_t type;
 
-    for (i = 0; i < COUNT(on); i++)
+    for (unsigned i = 0; i < COUNT(on); i++)
         expect(MBM_TYPE_BIT, NULL, on[i], 1);
-    for (i = 0; i < COUNT(off); i++)
+    for (unsigned i = 0; i < COUNT(off); i++)
         expect(MBM_TYPE_BIT, NULL, off[i], 0);
-    for (type = MBM_TYPE_UINT16; type <= MBM_TYPE_DOUBLE; type++) {
+    for (uint8_t type = MBM_TYPE_UINT16; type <= MBM_TYPE_DOUBLE; type++) {
         expect_refused(type, NULL, "true", "no number");
         expect_refused(type, NULL, "ON", "no number");
         expect_refused(type, NULL, "{\"value\":false}", "no number");
@@ -525,11 +512,10 @@ static uint16_t parse_all(uint8_t type, uint16_t count, const char *payload, siz
 static void expect_text(const char *payload, const char *latin)
 {
     char found[9] = "";
-    int i;
 
     if (parse_all(MBM_TYPE_TEXT, 8, payload, strlen(payload)) != 4)
         fail_msg("%s: %s", payload, wrong);
-    for (i = 0; i < 8; i++)
+    for (int i = 0; i < 8; i++)
         found[i] = (char)(all[i / 2] >> (i % 2 ? 0 : 8));
     assert_string_equal(found, latin);
     assert_int_equal(all[4], 0xEEEE);
@@ -583,16 +569,15 @@ TEST(several_values_are_all_written)
                                         "{\"value\":[1,2,3]}"};
     static const char *const bits[] = {"1,0,1", "[true,false,true]", "ON,OFF,ON",
                                        "{\"value\":[1,false,1]}"};
-    unsigned i;
 
-    for (i = 0; i < COUNT(right); i++) {
+    for (unsigned i = 0; i < COUNT(right); i++) {
         if (parse_all(MBM_TYPE_UINT16, 3, right[i], strlen(right[i])) != 3)
             fail_msg("%s: %s", right[i], wrong);
         assert_int_equal(all[0] * 100 + all[1] * 10 + all[2], 123);
         assert_int_equal(parse_all(MBM_TYPE_UINT32, 3, right[i], strlen(right[i])), 6);
         assert_int_equal(all[1] * 100 + all[3] * 10 + all[5], 123);
     }
-    for (i = 0; i < COUNT(bits); i++) {
+    for (unsigned i = 0; i < COUNT(bits); i++) {
         if (parse_all(MBM_TYPE_BIT, 3, bits[i], strlen(bits[i])) != 3)
             fail_msg("%s: %s", bits[i], wrong);
         assert_int_equal(all[0] * 100 + all[1] * 10 + all[2], 101);
@@ -619,9 +604,8 @@ TEST(a_list_with_one_wrong_value_is_refused)
                                          "[]",
                                          "{\"other\":[1,2,3]}",
                                          "[{\"value\":1},2,3]"};
-    unsigned i;
 
-    for (i = 0; i < COUNT(wrongs); i++)
+    for (unsigned i = 0; i < COUNT(wrongs); i++)
         if (parse_all(MBM_TYPE_UINT16, 3, wrongs[i], strlen(wrongs[i])) != 0)
             fail_msg("%s is taken", wrongs[i]);
     expect_wrong(MBM_TYPE_UINT16, 3, "1,65536,3", "value 2: the number is out of range");
@@ -642,9 +626,8 @@ static uint64_t next_random(void)
 TEST(random_integers_are_written_exactly)
 {
     char payload[80];
-    unsigned i;
 
-    for (i = 0; i < 20000; i++) {
+    for (unsigned i = 0; i < 20000; i++) {
         const uint64_t value = next_random() >> next_random() % 64;
         const unsigned decimals = (unsigned)(next_random() % 6);
         char digits[32], scale[16];

@@ -8,17 +8,15 @@ fixture each_test = {rtu, NULL};
 
 TEST(every_table_is_read_with_its_function)
 {
-    unsigned i;
-
-    for (i = 1; i <= 4; i++)
+    for (unsigned i = 1; i <= 4; i++)
         (void)plan_device_add(&d, 1, (uint8_t)i, i <= 2 ? MBM_TYPE_BIT : MBM_TYPE_UINT16,
                               (uint16_t)(10 * i), SECOND);
     plan_device_start(&d);
     plan_device_run(&d, 900);
     assert_true(d.requested >= 4);
-    for (i = 0; i < 4; i++)
+    for (unsigned i = 0; i < 4; i++)
         assert_int_equal(d.log[i].address, 10 * d.log[i].function);
-    for (i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++) {
         uint16_t cell = d.registers[10 * (i + 1)];
 
         OK(status((uint16_t)i));
@@ -100,28 +98,24 @@ TEST(each_read_keeps_its_interval)
 
 TEST(reads_of_one_interval_are_spread_over_it)
 {
-    unsigned i;
-
-    for (i = 0; i < 5; i++)
+    for (unsigned i = 0; i < 5; i++)
         add(1, (uint16_t)(10 * i), SECOND);
     plan_device_start(&d);
     plan_device_run(&d, 5 * SECOND);
     /* The first round is at once. */
     assert_true(d.log[4].ms < 100);
-    for (i = 5; i + 1 < d.requested; i++)
+    for (unsigned i = 5; i + 1 < d.requested; i++)
         assert_in_range(d.log[i + 1].ms - d.log[i].ms, 180, 220);
     assert_in_range(d.requested, 25, 30);
 }
 
 TEST(a_value_is_never_older_than_its_interval_while_its_unit_answers)
 {
-    unsigned i;
-
-    for (i = 0; i < 8; i++)
+    for (unsigned i = 0; i < 8; i++)
         add(1, (uint16_t)(10 * i), i % 2 ? SECOND : 700);
     plan_device_start(&d);
     plan_device_run(&d, 300);
-    for (i = 0; i < 1000; i++) {
+    for (unsigned i = 0; i < 1000; i++) {
         plan_device_run(&d, 13);
         assert_true(age((uint16_t)(i % 8)) <= (i % 2 ? SECOND : 700) + 60u);
     }
@@ -147,11 +141,10 @@ TEST(a_value_has_no_age_before_it_was_read)
 TEST(a_full_queue_delays_the_plan_and_no_more)
 {
     static mbm_clientRequest own[16];
-    unsigned i;
 
     add(2, 10, 500);
     d.answers[1] = SILENT;
-    for (i = 0; i < COUNT(own); i++) {
+    for (unsigned i = 0; i < COUNT(own); i++) {
         memset(&own[i], 0, sizeof own[i]);
         own[i].unit = 1;
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&d.client, &own[i], 0, 1));
@@ -161,7 +154,7 @@ TEST(a_full_queue_delays_the_plan_and_no_more)
     assert_int_equal(mbm_plan_pollDelay(&d.plan), UINT32_MAX);
     plan_device_run(&d, 5 * SECOND);
     OK(status(0));
-    for (i = 0; i < COUNT(own); i++)
+    for (unsigned i = 0; i < COUNT(own); i++)
         IS(MBM_RESPONSE_TIMED_OUT, own[i].status);
 }
 
@@ -185,17 +178,15 @@ TEST(the_programs_own_requests_go_beside_the_plan)
 
 TEST_WITH(many_requests_are_in_flight_on_tcp, NULL, NULL)
 {
-    unsigned i;
-
     plan_device_begin(&d, 1);
-    for (i = 0; i < 6; i++)
+    for (unsigned i = 0; i < 6; i++)
         add(1, (uint16_t)(10 * i), SECOND);
     d.setup.requestCount = 4;
     plan_device_start(&d);
     OK(mbm_plan_poll(&d.plan));
     assert_int_equal(mbm_client_pending(&d.client), 4);
     plan_device_run(&d, 200);
-    for (i = 0; i < 6; i++) {
+    for (unsigned i = 0; i < 6; i++) {
         OK(status((uint16_t)i));
         assert_int_equal(plan_device_integer(&d, (uint16_t)i, 0), d.registers[10 * i]);
     }

@@ -42,9 +42,7 @@ TEST(the_plan_backs_off_from_a_silent_unit_and_goes_on_with_the_rest)
 
 TEST(a_silent_unit_with_many_reads_is_tried_with_one_at_a_time)
 {
-    unsigned i;
-
-    for (i = 0; i < 6; i++)
+    for (unsigned i = 0; i < 6; i++)
         add(1, (uint16_t)(10 * i), 500);
     d.answers[1] = SILENT;
     d.setup.backoffMs = 1000;
@@ -52,14 +50,14 @@ TEST(a_silent_unit_with_many_reads_is_tried_with_one_at_a_time)
     plan_device_start(&d);
     plan_device_run(&d, 40 * SECOND);
     assert_in_range(d.requested, 9, 14);
-    for (i = 0; i < 6; i++) {
+    for (unsigned i = 0; i < 6; i++) {
         IS(MBM_RESPONSE_TIMED_OUT, status((uint16_t)i));
         assert_true(plan_device_updates(&d, (uint16_t)i) > 0);
     }
     /* Once it answers, all its reads are made at once. */
     d.answers[1] = ANSWERS;
     plan_device_run(&d, 5 * SECOND);
-    for (i = 0; i < 6; i++)
+    for (unsigned i = 0; i < 6; i++)
         OK(status((uint16_t)i));
 }
 
@@ -129,10 +127,8 @@ TEST(a_lost_link_is_the_status_and_the_plan_goes_on_once_it_is_back)
 
 TEST_WITH(many_timeouts_at_once_count_as_one, NULL, NULL)
 {
-    unsigned i;
-
     plan_device_begin(&d, 1);
-    for (i = 0; i < 6; i++)
+    for (unsigned i = 0; i < 6; i++)
         add(1, (uint16_t)(10 * i), 100);
     d.setup.requestCount = 6;
     d.answers[1] = SILENT;
@@ -142,7 +138,7 @@ TEST_WITH(many_timeouts_at_once_count_as_one, NULL, NULL)
     d.answers[1] = ANSWERS;
     /* Six doublings would be a minute. */
     plan_device_run(&d, 2 * SECOND);
-    for (i = 0; i < 6; i++)
+    for (unsigned i = 0; i < 6; i++)
         OK(status((uint16_t)i));
 }
 
@@ -174,12 +170,10 @@ TEST(a_request_that_cannot_be_sent_is_a_status)
 
 TEST(the_clock_may_wrap)
 {
-    unsigned i;
-
     d.memory.now = UINT32_MAX - 2500000;
     add(1, 10, 500);
     plan_device_start(&d);
-    for (i = 0; i < 100; i++) {
+    for (unsigned i = 0; i < 100; i++) {
         plan_device_run(&d, 100);
         assert_true(age(0) <= 550);
     }

@@ -45,7 +45,7 @@ static mbm_planField field_of(uint32_t shape, uint32_t characters, int is_bits)
 static uint16_t make_table(uint32_t number, mbm_planField *fields, mbm_planSetup *setup)
 {
     static const uint16_t counts[] = {5, 10, 20, 50, 100, 200, 500, 1000};
-    uint32_t count, spread, i;
+    uint32_t count, spread;
     uint16_t made = 0;
     int is_bits;
 
@@ -55,7 +55,7 @@ static uint16_t make_table(uint32_t number, mbm_planField *fields, mbm_planSetup
     setup->registersPerRead = setup->bitsPerRead = (uint16_t)(20 + below(106));
     setup->excludedCount = below(3) == 0;
     is_bits = below(4) == 0;
-    for (i = 0; i < count; i++) {
+    for (uint32_t i = 0; i < count; i++) {
         const uint32_t shape = below(8);
         const uint16_t unit = (uint16_t)(1 + below(3));
         const uint16_t address = (uint16_t)below(count * spread);
@@ -80,9 +80,8 @@ TEST(a_plan_needs_no_request_more_than_go_modbus_client)
         {.first = FIRST_EXCLUDED, .last = LAST_EXCLUDED, .table = MBM_TABLE_COILS},
         {.first = FIRST_EXCLUDED, .last = LAST_EXCLUDED, .table = MBM_TABLE_HOLDING_REGISTERS}};
     unsigned theirs = 0, ours = 0;
-    uint32_t number;
 
-    for (number = 0; number < COUNT(expected); number++) {
+    for (uint32_t number = 0; number < COUNT(expected); number++) {
         mbm_planSetup setup = {.fields = fields,
                                .positions = positions,
                                .reads = reads,

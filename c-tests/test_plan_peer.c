@@ -94,13 +94,11 @@ static uint64_t number(unsigned address, unsigned registers)
 
 static void check_values(const modbus_mapping_t *memory)
 {
-    uint16_t field, i;
-
-    for (field = 0; field < FIELDS; field++) {
+    for (uint16_t field = 0; field < FIELDS; field++) {
         const mbm_planField *f = &fields[field];
         unsigned size = f->type == MBM_TYPE_UINT64 ? 4 : f->type == MBM_TYPE_UINT32 ? 2 : 1;
 
-        for (i = 0; i < f->count; i++) {
+        for (uint16_t i = 0; i < f->count; i++) {
             int64_t value = -1;
             uint64_t wanted = number(f->address + size * i, size);
 

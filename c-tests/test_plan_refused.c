@@ -1,11 +1,10 @@
 /* What a plan refuses, and that it changes nothing then. */
+#include "refused.h"
 #include "plan_device.h"
 #include "test.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#include "refused.h"
 
 enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS };
 
@@ -83,10 +82,9 @@ TEST(a_wrong_field_is_named)
 TEST(a_setup_that_is_not_complete_is_refused)
 {
     const mbm_planSetup whole = d.setup;
-    unsigned i;
 
     add(MBM_TYPE_UINT16, 0);
-    for (i = 0; i < 12; i++) {
+    for (unsigned i = 0; i < 12; i++) {
         uint16_t count = d.setup.fieldCount;
 
         d.setup = whole;
@@ -145,9 +143,8 @@ TEST(what_was_never_begun_is_refused)
     double wide = 7;
     uint32_t age = 7;
     char text[4] = "abc";
-    unsigned i;
 
-    for (i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         mbm_plan *object = i ? &plan : NULL;
         uint8_t status = i ? MBM_NOT_INITIALISED : MBM_INVALID_ARGUMENT;
 

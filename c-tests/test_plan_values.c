@@ -31,9 +31,7 @@ static void read_all(void)
 /* Registers of a number, the most significant first, as a device with `order` has them. */
 static void put(uint16_t address, uint64_t number, unsigned registers, uint8_t order)
 {
-    unsigned i;
-
-    for (i = 0; i < registers; i++) {
+    for (unsigned i = 0; i < registers; i++) {
         unsigned at = order == MBM_ORDER_CDAB || order == MBM_ORDER_DCBA ? i : registers - 1 - i;
         uint16_t word = (uint16_t)(number >> (16 * i));
 
@@ -59,21 +57,19 @@ TEST_WITH(integers_have_their_sign_in_every_order, NULL, NULL)
         {MBM_TYPE_INT64, 4, 0xFFFFFFFFFFFFFFFE, -2},
         {MBM_TYPE_INT64, 4, 0x8000000000000000, INT64_MIN},
     };
-    uint8_t order;
-    unsigned i;
 
-    for (order = MBM_ORDER_DEFAULT; order <= MBM_ORDER_DCBA; order++) {
+    for (uint8_t order = MBM_ORDER_DEFAULT; order <= MBM_ORDER_DCBA; order++) {
         plan_device_begin(&d, 0);
-        for (i = 0; i < COUNT(numbers); i++) {
+        for (unsigned i = 0; i < COUNT(numbers); i++) {
             add(numbers[i].type, (uint16_t)(10 * i))->order = order;
             put((uint16_t)(10 * i), numbers[i].bits, numbers[i].registers, order);
         }
         d.setup.registerGap = 10;
         read_all();
         assert_int_equal(d.requested, 1);
-        for (i = 0; i < COUNT(numbers); i++)
+        for (unsigned i = 0; i < COUNT(numbers); i++)
             assert_true(plan_device_integer(&d, (uint16_t)i, 0) == numbers[i].value);
-        for (i = 1; i < COUNT(numbers); i++) {
+        for (unsigned i = 1; i < COUNT(numbers); i++) {
             int32_t value;
             uint8_t fits = numbers[i].value <= INT32_MAX && numbers[i].registers < 4;
 
@@ -90,11 +86,10 @@ TEST_WITH(floats_and_doubles_are_numbers_too, NULL, NULL)
     const double e = 2.718281828459045;
     uint32_t pi_bits;
     uint64_t e_bits;
-    uint8_t order;
 
     memcpy(&pi_bits, &pi, sizeof pi);
     memcpy(&e_bits, &e, sizeof e);
-    for (order = MBM_ORDER_ABCD; order <= MBM_ORDER_DCBA; order++) {
+    for (uint8_t order = MBM_ORDER_ABCD; order <= MBM_ORDER_DCBA; order++) {
         float single = 0;
         double wide = 0;
         int64_t none = 77;
@@ -137,9 +132,8 @@ TEST(a_number_is_scaled_and_rounded_to_the_nearest)
         {1000, 0, 3, 333},    {1000, 100000, 0, 100000000},
         {5, 1, INT32_MAX, 0}, {30000, INT32_MIN, 1, -64424509440000},
     };
-    unsigned i;
 
-    for (i = 0; i < COUNT(scales); i++) {
+    for (unsigned i = 0; i < COUNT(scales); i++) {
         mbm_planField *field = add(MBM_TYPE_INT16, (uint16_t)i);
 
         field->multiplier = scales[i].multiplier;
@@ -147,7 +141,7 @@ TEST(a_number_is_scaled_and_rounded_to_the_nearest)
         put((uint16_t)i, scales[i].bits, 1, MBM_ORDER_ABCD);
     }
     read_all();
-    for (i = 0; i < COUNT(scales); i++) {
+    for (unsigned i = 0; i < COUNT(scales); i++) {
         int64_t product = (int64_t)(int16_t)scales[i].bits * scales[i].multiplier;
         int32_t value = 77;
 
@@ -167,13 +161,11 @@ TEST(bits_of_a_register_are_one_number_in_every_order)
         uint16_t count, value;
     } parts[] = {{0, 0, 1},   {0, 1, 1},    {15, 1, 1},      {4, 1, 0},      {0, 4, 0x5},
                  {4, 4, 0xC}, {8, 8, 0xA3}, {3, 13, 0x1478}, {0, 16, 0xA3C5}};
-    uint8_t order;
-    unsigned i;
 
-    for (order = MBM_ORDER_ABCD; order <= MBM_ORDER_DCBA; order++) {
+    for (uint8_t order = MBM_ORDER_ABCD; order <= MBM_ORDER_DCBA; order++) {
         plan_device_begin(&d, 0);
         put(7, 0xA3C5, 1, order);
-        for (i = 0; i < COUNT(parts); i++) {
+        for (unsigned i = 0; i < COUNT(parts); i++) {
             mbm_planField *field = plan_device_add(&d, 1, HOLDING, MBM_TYPE_BIT, 7, 1000);
 
             field->order = order;
@@ -184,7 +176,7 @@ TEST(bits_of_a_register_are_one_number_in_every_order)
         read_all();
         assert_int_equal(d.requested, 1);
         assert_int_equal(d.log[0].quantity, 1);
-        for (i = 0; i < COUNT(parts); i++) {
+        for (unsigned i = 0; i < COUNT(parts); i++) {
             int64_t value = i + 1 < COUNT(parts) ? parts[i].value : -2 * parts[i].value;
             int32_t small;
             double number;
@@ -244,9 +236,8 @@ TEST(a_number_beyond_32_bits_is_too_large_for_int32)
         {MBM_TYPE_UINT64, 1, 0, 0, MBM_INVALID_ARGUMENT, 0},
         {MBM_TYPE_FLOAT, 1, 0, 0, MBM_INVALID_ARGUMENT, 0},
     };
-    unsigned i;
 
-    for (i = 0; i < COUNT(numbers); i++) {
+    for (unsigned i = 0; i < COUNT(numbers); i++) {
         mbm_planField *field = add(numbers[i].type, (uint16_t)(4 * i));
         uint8_t type = numbers[i].type;
 
@@ -259,7 +250,7 @@ TEST(a_number_beyond_32_bits_is_too_large_for_int32)
             MBM_ORDER_ABCD);
     }
     read_all();
-    for (i = 0; i < COUNT(numbers); i++) {
+    for (unsigned i = 0; i < COUNT(numbers); i++) {
         int32_t value = 77;
 
         IS(numbers[i].status, mbm_plan_getInt32(&d.plan, (uint16_t)i, 0, &value));
@@ -367,17 +358,16 @@ TEST(the_least_integer_is_an_integer)
 
 TEST(a_field_may_have_many_values)
 {
-    unsigned i;
     int64_t value = 77;
 
     add(MBM_TYPE_UINT32, 0)->count = 5;
     add(MBM_TYPE_BIT, 3)->count = 30;
-    for (i = 0; i < 5; i++)
+    for (unsigned i = 0; i < 5; i++)
         put((uint16_t)(2 * i), 100000u * i, 2, MBM_ORDER_ABCD);
     read_all();
-    for (i = 0; i < 5; i++)
+    for (unsigned i = 0; i < 5; i++)
         assert_int_equal(plan_device_integer(&d, 0, (uint16_t)i), 100000 * i);
-    for (i = 0; i < 30; i++)
+    for (unsigned i = 0; i < 30; i++)
         assert_int_equal(plan_device_integer(&d, 1, (uint16_t)i), d.registers[3 + i] & 1);
     IS(MBM_INVALID_ARGUMENT, mbm_plan_getInteger(&d.plan, 0, 5, &value));
     IS(MBM_INVALID_ARGUMENT, mbm_plan_getInteger(&d.plan, 1, 30, &value));

@@ -1,13 +1,12 @@
 /* Each function of the client and of its link is held to its comment in mbm.h: results, limits,
  * defaults, NULL. */
+#include "refused.h"
 #include "crc.h"
 #include "hooked_port.h"
 #include "mbm.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 static hooked_port wire;
 static mbm_port port;
@@ -112,9 +111,7 @@ static const struct {
 
 TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
 {
-    unsigned i, nth;
-
-    for (i = 0; i < COUNT(calls); i++) {
+    for (unsigned i = 0; i < COUNT(calls); i++) {
         uint16_t most = calls[i].most;
         const struct {
             uint16_t address, quantity;
@@ -129,7 +126,7 @@ TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
                     {65535, 2, MBM_ILLEGAL_DATA_ADDRESS},
                     {(uint16_t)(65537 - most), most, MBM_ILLEGAL_DATA_ADDRESS}};
 
-        for (nth = 0; nth < (most != 0 ? COUNT(rows) : 2u); nth++) {
+        for (unsigned nth = 0; nth < (most != 0 ? COUNT(rows) : 2u); nth++) {
             setup();
             r.exception = 7;
             IS(rows[nth].status, calls[i].call(&c, &r, rows[nth].address, rows[nth].quantity));
@@ -142,9 +139,7 @@ TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
 
 TEST(a_request_is_refused_before_it_is_queued)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(calls); i++) {
+    for (unsigned i = 0; i < COUNT(calls); i++) {
         setup();
         IS(MBM_INVALID_ARGUMENT, calls[i].call(NULL, &r, 0, 1));
         IS(MBM_INVALID_ARGUMENT, calls[i].call(&c, NULL, 0, 1));
@@ -170,11 +165,10 @@ TEST(a_request_is_refused_before_it_is_queued)
 TEST(a_queue_holds_sixteen_requests)
 {
     static mbm_clientRequest many[MBM_CLIENT_DEPTH + 1];
-    unsigned i;
 
     memset(many, 0, sizeof many);
     OK(mbm_client_beginTcp(&c, &port, frame, 260, outgoing, sizeof outgoing));
-    for (i = 0; i <= MBM_CLIENT_DEPTH; i++) {
+    for (unsigned i = 0; i <= MBM_CLIENT_DEPTH; i++) {
         many[i].unit = 1;
         many[i].transaction = (uint16_t)(i == 1 ? 100 : 100 + i);
         if (i == 1) {
@@ -188,7 +182,7 @@ TEST(a_queue_holds_sixteen_requests)
     assert_int_equal(mbm_client_pending(&c), MBM_CLIENT_DEPTH);
     OK(mbm_client_beginTcp(&c, &port, frame, 260, outgoing, sizeof outgoing));
     assert_int_equal(mbm_client_pending(&c), 0);
-    for (i = 0; i < MBM_CLIENT_DEPTH; i++)
+    for (unsigned i = 0; i < MBM_CLIENT_DEPTH; i++)
         IS(MBM_CANCELLED, many[i].status);
 }
 
@@ -203,7 +197,6 @@ TEST(functions_with_bodies_check_them)
 {
     static const uint8_t bytes[256];
     static const mbm_rule silence = {.kind = MBM_RULE_SILENCE};
-    uint8_t code;
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
 
@@ -227,7 +220,7 @@ TEST(functions_with_bodies_check_them)
     WITHIN(0, mbm_client_diagnostics(&c, &r, 0, 126));
     WITHIN(1, mbm_client_diagnostics(&c, &r, 10, 1));
     WITHIN(0, mbm_client_diagnostics(&c, &r, 10, 2));
-    for (code = 0; code < 6; code++)
+    for (uint8_t code = 0; code < 6; code++)
         WITHIN(code >= MBM_DEVICE_ID_BASIC && code <= MBM_DEVICE_ID_INDIVIDUAL,
                mbm_client_readDeviceIdentification(&c, &r, code, 255));
     WITHIN(1, mbm_client_readFileRecord(&c, &r, 1, 0, 1));
@@ -283,9 +276,8 @@ TEST(a_begin_is_refused_without_a_change)
 {
     static const uint16_t least[] = {8, 17, 8, 9};
     mbm_port lacking;
-    unsigned i;
 
-    for (i = 0; i < COUNT(least); i++) {
+    for (unsigned i = 0; i < COUNT(least); i++) {
         setup();
         OK(begin(i, &c, &port, frame, least[i]));
         IS(MBM_INVALID_ARGUMENT, begin(i, NULL, &port, frame, 300));
@@ -370,10 +362,9 @@ static unsigned frames(uint32_t *us)
 
 TEST(a_begin_restores_the_defaults_of_the_header)
 {
-    unsigned again;
     uint32_t us;
 
-    for (again = 0; again < 2; again++) {
+    for (unsigned again = 0; again < 2; again++) {
         assert_int_equal(frames(&us), 1); /* no retries */
         assert_in_range(us, 2000000, 2004100);
         assert_int_equal(frames(&us), 1);
@@ -397,7 +388,6 @@ TEST(a_begin_restores_the_defaults_of_the_header)
 TEST(settings_have_the_ranges_of_the_header)
 {
     static mbm_clientUnit units[2];
-    unsigned i;
 
     OK(mbm_client_setResponseTimeout(&c, 1000000));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setResponseTimeout(&c, 1000001));
@@ -424,7 +414,7 @@ TEST(settings_have_the_ranges_of_the_header)
     OK(mbm_client_setUnits(&c, NULL, 2));
     OK(mbm_client_setUnits(&c, NULL, 0));
     OK(mbm_client_setCounters(&c, NULL));
-    for (i = 0; i < 256; i++) {
+    for (unsigned i = 0; i < 256; i++) {
         if (i == 1)
             OK(mbm_client_setInFlight(&c, 1));
         else
@@ -436,7 +426,7 @@ TEST(settings_have_the_ranges_of_the_header)
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setInFlight(&c, 17));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setInFlight(&c, 0));
     OK(mbm_client_beginAscii(&c, &port, frame, 513));
-    for (i = 0; i < 256; i++) {
+    for (unsigned i = 0; i < 256; i++) {
         int is_digit = (i >= '0' && i <= '9') || (i >= 'A' && i <= 'F') || (i >= 'a' && i <= 'f');
 
         IS(i == 0 || i > 127 || i == '\r' || i == ':' || is_digit ? MBM_INVALID_ARGUMENT : MBM_OK,
@@ -470,9 +460,8 @@ TEST(a_client_that_was_never_begun_has_no_settings)
 {
     static const mbm_rule silence = {.kind = MBM_RULE_SILENCE};
     mbm_client *const clients[] = {NULL, &never};
-    unsigned i;
 
-    for (i = 0; i < COUNT(clients); i++) {
+    for (unsigned i = 0; i < COUNT(clients); i++) {
         mbm_client *n = clients[i];
         uint8_t status = n == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
 
@@ -523,7 +512,6 @@ TEST(a_link_has_the_limits_of_the_header)
     static mbm_link link, other, none;
     mbm_linkHooks hooks = {.connect = connect_at_once};
     mbm_link *const links[] = {NULL, &none};
-    unsigned i;
 
     memset(&link, 0, sizeof link);
     memset(&other, 0, sizeof other);
@@ -557,7 +545,7 @@ TEST(a_link_has_the_limits_of_the_header)
     assert_int_equal(mbm_link_state(&link), MBM_LINK_IS_UP);
     OK(mbm_link_reconnect(&link));
     OK(mbm_link_end(&link));
-    for (i = 0; i < COUNT(links); i++) {
+    for (unsigned i = 0; i < COUNT(links); i++) {
         mbm_link *n = links[i];
         uint8_t status = n == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
 

@@ -1,12 +1,11 @@
 /* Each function for frames and packets is held to its comment in mbm.h: results, limits, NULL. */
+#include "refused.h"
 #include "crc.h"
 #include "examples.h"
 #include "hooked_port.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 enum { TEXT_SUFFICES = 2295 };
 
@@ -59,11 +58,10 @@ TEST(a_request_that_was_refused_here_is_no_exception_of_the_device)
     static uint16_t words[1];
     static hooked_port wire;
     const mbm_port port = hooked_port_of(&wire);
-    unsigned status, code;
     uint8_t refused;
 
-    for (status = 0; status < 256; status++) {
-        for (code = 0; code < 256; code++) {
+    for (unsigned status = 0; status < 256; status++) {
+        for (unsigned code = 0; code < 256; code++) {
             const char *text = mbm_status_textOf((uint8_t)status, (uint8_t)code);
             int is_refused = code == 0 && status >= 1 && status <= 3;
 
@@ -104,9 +102,8 @@ TEST(the_longest_frames_fit_into_the_buffers_that_are_named)
 {
     uint8_t data[MBM_MAX_PDU] = {0}, frame[MBM_MAX_ASCII_FRAME];
     uint16_t length;
-    unsigned i;
 
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         /* 08, return query data, may have any number of data bytes. */
         mbm_packet packet = {
             .function = MBM_FC_DIAGNOSTICS, .unit = 1, .data = data, .dataLength = MBM_MAX_PDU - 3};
@@ -140,10 +137,9 @@ TEST(a_frame_is_never_built_malformed)
     mbm_packet packet = read_of(0);
     mbm_length expected;
     uint16_t length;
-    unsigned i, f;
 
-    for (f = 0; f < COUNT(framings); f++) {
-        for (i = 0; i < COUNT(rows); i++) {
+    for (unsigned f = 0; f < COUNT(framings); f++) {
+        for (unsigned i = 0; i < COUNT(rows); i++) {
             packet.address = rows[i].address;
             packet.quantity = rows[i].quantity;
             IS(rows[i].status, mbm_frame_build(framings[f], &packet, frame, sizeof frame, &length));
@@ -212,10 +208,9 @@ TEST(an_exception_has_the_length_and_the_codes_that_are_named)
     uint8_t frame[11];
     mbm_length expected;
     uint16_t length;
-    unsigned code, f;
 
-    for (f = 0; f < COUNT(framings); f++) {
-        for (code = 0; code < 256; code++) {
+    for (unsigned f = 0; f < COUNT(framings); f++) {
+        for (unsigned code = 0; code < 256; code++) {
             uint8_t status =
                 mbm_frame_exception(framings[f], &request, (uint8_t)code, frame, 11, &length);
 
@@ -256,9 +251,8 @@ TEST(a_listen_only_request_has_no_reply)
                           .data = zero,
                           .dataLength = 2};
     mbm_length expected;
-    unsigned f;
 
-    for (f = 0; f < COUNT(framings); f++) {
+    for (unsigned f = 0; f < COUNT(framings); f++) {
         OK(mbm_frame_replyLength(framings[f], &request, &expected));
         assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
         assert_int_equal(expected.bytes, 0);
@@ -293,9 +287,9 @@ TEST(a_frame_that_does_not_hold_fills_in_what_is_known)
 TEST(bytes_look_like_tcp_from_the_eighth_on)
 {
     uint8_t bytes[12] = {0x12, 0x34, 0, 0, 0, 6, 17, 3, 0, 107, 0, 3};
-    uint16_t length, have;
+    uint16_t length;
 
-    for (have = 0; have < 8; have++) {
+    for (uint16_t have = 0; have < 8; have++) {
         IS(MBM_INCOMPLETE_FRAME, mbm_frame_looksLikeTcp(bytes, have, 0, &length));
         assert_int_equal(length, 0);
     }
@@ -316,9 +310,8 @@ TEST(the_first_bytes_may_be_none)
 {
     mbm_length expected;
     uint16_t length = 9;
-    unsigned f;
 
-    for (f = 0; f < COUNT(framings); f++) {
+    for (unsigned f = 0; f < COUNT(framings); f++) {
         OK(mbm_frame_expectedLength(framings[f], MBM_PACKET_REQUEST, NULL, 0, &expected));
         assert_int_equal(expected.kind, MBM_LENGTH_AT_LEAST);
     }
@@ -406,12 +399,10 @@ TEST(no_text_of_a_frame_is_longer_than_its_comment_says)
     static char text[8192];
     uint8_t frame[MBM_MAX_FRAME];
     size_t most = 0;
-    unsigned function, shape;
     uint16_t length;
-    uint8_t side;
 
-    for (function = 0; function < 129; function++) {
-        for (shape = 0; shape < SHAPES; shape++) {
+    for (unsigned function = 0; function < 129; function++) {
+        for (unsigned shape = 0; shape < SHAPES; shape++) {
             for (length = MBM_MAX_PDU - 16; length <= MBM_MAX_PDU; length++) {
                 uint16_t size;
 
@@ -419,7 +410,7 @@ TEST(no_text_of_a_frame_is_longer_than_its_comment_says)
                 frame[1] = (uint8_t)function;
                 shape_pdu(frame + 1, length, shape);
                 size = (uint16_t)seal(frame, length + 1u);
-                for (side = MBM_PACKET_REQUEST; side <= MBM_PACKET_RESPONSE; side++) {
+                for (uint8_t side = MBM_PACKET_REQUEST; side <= MBM_PACKET_RESPONSE; side++) {
                     OK(mbm_frame_text(&rtu, side, frame, size, text, sizeof text));
                     if (strlen(text) > most)
                         most = strlen(text);

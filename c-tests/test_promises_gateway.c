@@ -1,11 +1,10 @@
 /* Each function of the gateway is held to its comment in mbm.h: results, limits, defaults, NULL.
  * test_gateway_misuse has every config that is refused, and the calls from within hooks. */
+#include "refused.h"
 #include "gateway_bench.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 enum { FREE = 2 };
 
@@ -92,10 +91,9 @@ TEST(what_was_never_begun_is_refused)
     static mbm_gateway none;
     mbm_gateway *const both[] = {NULL, &none};
     const mbm_port port = memory_port_of(&b.sockets[0]);
-    unsigned i;
 
     IS(MBM_INVALID_ARGUMENT, mbm_gateway_begin(NULL, &b.config));
-    for (i = 0; i < COUNT(both); i++) {
+    for (unsigned i = 0; i < COUNT(both); i++) {
         uint8_t status = both[i] == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
 
         IS(status, mbm_gateway_poll(both[i]));

@@ -1,13 +1,12 @@
 /* Each function of a line and of a node is held to its comment in mbm.h: results, limits, defaults.
  * test_bad_input calls each with NULL and with an object that was never begun. */
+#include "refused.h"
 #include "crc.h"
 #include "hooked_port.h"
 #include "mbm.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 enum { RESPONSE = 125, TRANSMIT = 123 };
 
@@ -122,9 +121,7 @@ static const struct {
 
 TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
 {
-    unsigned i, nth;
-
-    for (i = 0; i < COUNT(requests); i++) {
+    for (unsigned i = 0; i < COUNT(requests); i++) {
         uint16_t most = requests[i].most;
         const struct {
             uint16_t address, quantity;
@@ -139,7 +136,7 @@ TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
                     {65535, 2, MBM_ILLEGAL_DATA_ADDRESS},
                     {(uint16_t)(65537 - most), most, MBM_ILLEGAL_DATA_ADDRESS}};
 
-        for (nth = 0; nth < COUNT(rows); nth++) {
+        for (unsigned nth = 0; nth < COUNT(rows); nth++) {
             setup();
             IS(rows[nth].status, requests[i].call(rows[nth].address, rows[nth].quantity));
             if (rows[nth].status == MBM_PENDING) {
@@ -188,11 +185,9 @@ TEST(requests_that_read_are_not_broadcast)
 
 TEST(words_end_where_their_buffers_end)
 {
-    unsigned i;
-
     assert_int_equal(mbm_node_available(&m), 0);
     assert_int_equal(mbm_node_receive(&m), 0xFFFF);
-    for (i = 0; i < TRANSMIT; i++)
+    for (unsigned i = 0; i < TRANSMIT; i++)
         OK(mbm_node_send(&m, (uint16_t)i));
     IS(MBM_BUFFER_TOO_SMALL, mbm_node_send(&m, 1));
     assert_int_equal(transmit[TRANSMIT - 1], TRANSMIT - 1);
@@ -299,9 +294,8 @@ TEST(an_ended_request_leaves_its_frame_alone)
 {
     static const uint8_t right[] = {3, 2, 0, 7}, wrong[] = {4, 2, 0, 7}, late[] = {3, 2, 0, 8};
     static uint8_t one_frame[MBM_FRAME_BYTES(2)], untouched[sizeof one_frame];
-    unsigned nth;
 
-    for (nth = 0; nth < 4; nth++) {
+    for (unsigned nth = 0; nth < 4; nth++) {
         OK(mbm_line_setFrame(&line, one_frame, sizeof one_frame));
         IS(MBM_PENDING, read_holding(0, 1));
         if (nth < 2)

@@ -1,11 +1,10 @@
 /* Each function of the plan is held to its comment in mbm.h: results, limits, NULL.
  * test_plan_refused has every table that is refused. */
+#include "refused.h"
 #include "plan_device.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 enum { TYPES = MBM_TYPE_TEXT, UINT16_FIELD = MBM_TYPE_UINT16 - 1 };
 
@@ -16,10 +15,8 @@ static mbm_plan none;
  * that of the type in `types`. */
 static void start(void)
 {
-    uint8_t type;
-
     plan_device_begin(&d, 0);
-    for (type = MBM_TYPE_BIT; type <= MBM_TYPE_TEXT; type++) {
+    for (uint8_t type = MBM_TYPE_BIT; type <= MBM_TYPE_TEXT; type++) {
         uint8_t table = type == MBM_TYPE_BIT ? MBM_TABLE_COILS : MBM_TABLE_HOLDING_REGISTERS;
 
         plan_device_add(&d, 1, table, type, (uint16_t)(10 * type), 1000)->count =
@@ -62,11 +59,9 @@ static union {
 
 TEST(each_type_has_its_getters)
 {
-    unsigned i;
-
     assert_int_equal(COUNT(types), TYPES);
     plan_device_run(&d, 500);
-    for (i = 0; i < COUNT(types); i++) {
+    for (unsigned i = 0; i < COUNT(types); i++) {
         uint16_t field = (uint16_t)i, index;
 
         OK(mbm_plan_getStatus(&d.plan, field, NULL));

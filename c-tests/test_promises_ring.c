@@ -1,10 +1,9 @@
 /* Each function of the ring is held to its comment in mbm.h: results, limits, NULL. */
+#include "refused.h"
 #include "mbm.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 static mbm_ring ring;
 static uint8_t storage[65535];
@@ -20,9 +19,8 @@ TEST(a_ring_that_was_never_begun_is_empty_and_takes_nothing)
 {
     uint8_t bytes[4] = {1, 2, 3, 4};
     mbm_ring *rings[] = {&ring, NULL};
-    unsigned i;
 
-    for (i = 0; i < COUNT(rings); i++) {
+    for (unsigned i = 0; i < COUNT(rings); i++) {
         assert_int_equal(mbm_ring_put(rings[i], 1), 0);
         assert_int_equal(mbm_ring_write(rings[i], bytes, 4), 0);
         assert_int_equal(mbm_ring_read(rings[i], bytes, 4), 0);
@@ -47,11 +45,10 @@ TEST(a_ring_holds_one_byte_less_than_its_storage)
 {
     static const uint16_t sizes[] = {2, 3, 255, 256, 257, 65535};
     static uint8_t bytes[65535], back[65535];
-    unsigned i, at;
 
-    for (at = 0; at < sizeof bytes; at++)
+    for (unsigned at = 0; at < sizeof bytes; at++)
         bytes[at] = (uint8_t)(7 * at);
-    for (i = 0; i < COUNT(sizes); i++) {
+    for (unsigned i = 0; i < COUNT(sizes); i++) {
         uint16_t holds = (uint16_t)(sizes[i] - 1);
 
         OK(mbm_ring_begin(&ring, storage, sizes[i]));
@@ -100,11 +97,9 @@ TEST(a_ring_that_was_read_empty_goes_on_counting)
 
 TEST(the_count_of_lost_bytes_wraps_at_65536)
 {
-    unsigned i;
-
     OK(mbm_ring_begin(&ring, storage, 2));
     mbm_ring_put(&ring, 1);
-    for (i = 0; i < 65535; i++)
+    for (unsigned i = 0; i < 65535; i++)
         assert_int_equal(mbm_ring_put(&ring, 2), 0);
     assert_int_equal(mbm_ring_lost(&ring), 65535);
     mbm_ring_put(&ring, 2);

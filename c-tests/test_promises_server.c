@@ -1,12 +1,11 @@
 /* Each function of servers and units is held to its comment in mbm.h: results, limits, NULL. */
+#include "refused.h"
 #include "crc.h"
 #include "hooked_port.h"
 #include "mbm.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 static hooked_port wire;
 static mbm_port port;
@@ -53,9 +52,7 @@ static const struct {
 
 TEST(a_begin_is_refused_without_a_change)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(begins); i++) {
+    for (unsigned i = 0; i < COUNT(begins); i++) {
         begins_server begin = begins[i].begin;
         uint16_t least = begins[i].least;
         mbm_port lacking;
@@ -91,10 +88,8 @@ static uint32_t silence(void)
 
 TEST(a_begin_restores_the_defaults_of_its_framing)
 {
-    unsigned i, first;
-
-    for (first = 0; first < COUNT(begins); first++) {
-        for (i = 0; i < COUNT(begins); i++) {
+    for (unsigned first = 0; first < COUNT(begins); first++) {
+        for (unsigned i = 0; i < COUNT(begins); i++) {
             setup();
             OK(begins[first].begin(&server, &port, &unit, 1, frame, 300));
             OK(mbm_server_setSilence(&server, 77));
@@ -126,9 +121,7 @@ TEST(a_server_that_was_never_begun_does_nothing)
 
 TEST(settings_of_rtu_are_refused_in_other_framings)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(begins); i++) {
+    for (unsigned i = 0; i < COUNT(begins); i++) {
         setup();
         OK(begins[i].begin(&server, &port, &unit, 1, frame, 300));
         if (begins[i].is_rtu) {
@@ -189,7 +182,6 @@ TEST(records_are_refused_without_a_change)
     static mbm_serverId id;
     static mbm_serverIdentification identification;
     static mbm_registerTable other_table;
-    unsigned code;
 
 #define NULLS(function, record)                                                                    \
     do {                                                                                           \
@@ -214,7 +206,7 @@ TEST(records_are_refused_without_a_change)
     /* Without `serve`. */
     custom.code = 0x41;
     REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCustom(&unit, &custom));
-    for (code = 0; code < 256; code++) {
+    for (unsigned code = 0; code < 256; code++) {
         if (code >= 1 && code <= 127)
             continue;
         REFUSED(MBM_INVALID_ARGUMENT, unit,
@@ -264,10 +256,9 @@ static mbm_fifos spare[MBM_MAX_SERVICES + 1];
 TEST(a_unit_has_as_many_records_as_the_header_says)
 {
     static mbm_functionMask mask;
-    unsigned i;
 
     /* One of them is the table of `setup`. */
-    for (i = 1; i < MBM_MAX_SERVICES; i++)
+    for (unsigned i = 1; i < MBM_MAX_SERVICES; i++)
         OK(mbm_unit_serveFifos(&unit, &spare[i]));
     REFUSED(MBM_BUFFER_TOO_SMALL, unit, mbm_unit_serveFifos(&unit, &spare[0]));
     REFUSED(MBM_BUFFER_TOO_SMALL, unit, mbm_unit_serveCoils(&unit, &bit_table));
@@ -279,10 +270,9 @@ TEST(a_function_that_is_off_is_illegal)
     static mbm_functionMask mask;
     uint8_t request[260] = {17, 3, 0, 0, 0, 1};
     uint16_t response;
-    unsigned round;
 
     memset(&mask, 0, sizeof mask);
-    for (round = 0; round < 3; round++) {
+    for (unsigned round = 0; round < 3; round++) {
         memcpy(request, "\x11\x03\0\0\0\1", 6);
         seal(request, 6);
         OK(mbm_unit_respond(&unit, 1, NULL, FRAMING(MBM_FRAMING_RTU), request, 8, 260, &response));
@@ -301,9 +291,8 @@ TEST(a_response_has_no_bytes_where_no_device_answers)
     } rows[] = {{17, 1}, {18, 0}, {0, 0}};
     uint8_t request[260];
     uint16_t response;
-    unsigned i;
 
-    for (i = 0; i < COUNT(rows); i++) {
+    for (unsigned i = 0; i < COUNT(rows); i++) {
         memcpy(request, "\x11\x03\0\0\0\1", 6);
         request[0] = rows[i].unit;
         seal(request, 6);

@@ -1,12 +1,11 @@
 /* Each function of the sniffer and of the trace is held to its comment in mbm.h: results, limits,
  * defaults, NULL. test_promises_frame has mbm_event_text. */
+#include "refused.h"
 #include "hooked_port.h"
 #include "mbm.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 static mbm_sniffer s, never;
 static mbm_trace t, no_trace;
@@ -47,7 +46,6 @@ static uint32_t event_after(uint8_t framing, uint16_t most, uint8_t kind, uint8_
     mbm_packet packet = {.unit = 17, .function = MBM_FC_READ_COILS, .quantity = 1};
     uint8_t bytes[32];
     uint16_t length;
-    uint32_t ms;
     mbm_event event;
 
     OK(mbm_frame_build(&as, &packet, bytes, sizeof bytes, &length));
@@ -55,7 +53,7 @@ static uint32_t event_after(uint8_t framing, uint16_t most, uint8_t kind, uint8_
         length = most;
     now += 100000000;
     assert_int_equal(mbm_sniffer_feed(&s, MBM_DIRECTION_BOTH, bytes, length, now), length);
-    for (ms = 0; ms < 70000; ms++, now += 1000)
+    for (uint32_t ms = 0; ms < 70000; ms++, now += 1000)
         while (mbm_sniffer_next(&s, now, &event))
             if (event.kind == kind || event.kind == other)
                 return ms;
@@ -75,9 +73,7 @@ static uint32_t frame_timeout(uint8_t framing)
 
 TEST(a_sniffer_begins_in_every_framing_or_changes_nothing)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(sniffers); i++) {
+    for (unsigned i = 0; i < COUNT(sniffers); i++) {
         setup();
         OK(mbm_sniffer_begin(&s, sniffers[i].kind, buffer, MBM_MIN_SNIFFER_BUFFER));
         IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(NULL, sniffers[i].kind, buffer, 300));
@@ -103,10 +99,9 @@ TEST(times_and_declarations_of_a_sniffer_have_limits)
 {
     static const mbm_function wrong = {.code = 200};
     mbm_function right[MBM_MAX_SNIFFER_FUNCTIONS + 1];
-    unsigned i;
 
     memset(right, 0, sizeof right);
-    for (i = 0; i < COUNT(right); i++)
+    for (unsigned i = 0; i < COUNT(right); i++)
         right[i].code = (uint8_t)(65 + i);
     OK(mbm_sniffer_begin(&s, MBM_FRAMING_RTU, buffer, 300));
     REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setResponseTimeout(&s, 0));
@@ -126,7 +121,7 @@ TEST(times_and_declarations_of_a_sniffer_have_limits)
     REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setFunctions(&s, NULL, 1));
     REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setFunctions(&s, &wrong, 1));
     REFUSED(MBM_INVALID_ARGUMENT, s, mbm_sniffer_setDelimiter(&s, ':'));
-    for (i = 0; i < 256; i++) {
+    for (unsigned i = 0; i < 256; i++) {
         int is_digit = (i >= '0' && i <= '9') || (i >= 'A' && i <= 'F') || (i >= 'a' && i <= 'f');
 
         OK(mbm_sniffer_begin(&s, MBM_FRAMING_ASCII, buffer, 300));
@@ -139,9 +134,8 @@ TEST(a_sniffer_that_was_never_begun_reports_nothing)
 {
     mbm_sniffer *const both[] = {NULL, &never};
     mbm_event event;
-    unsigned i;
 
-    for (i = 0; i < COUNT(both); i++) {
+    for (unsigned i = 0; i < COUNT(both); i++) {
         uint8_t status = both[i] == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
 
         IS(status, mbm_sniffer_setResponseTimeout(both[i], 1));
@@ -190,9 +184,8 @@ TEST(a_trace_begins_or_changes_nothing)
     static const uint8_t kinds[] = {MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
     static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = MBM_FRAMING_NONE};
     mbm_port lacking;
-    unsigned i;
 
-    for (i = 0; i < COUNT(kinds); i++) {
+    for (unsigned i = 0; i < COUNT(kinds); i++) {
         const uint8_t kind = kinds[i];
 
         setup();
@@ -236,9 +229,8 @@ TEST(a_trace_that_was_never_begun_has_no_port)
     mbm_trace *const both[] = {NULL, &no_trace};
     mbm_traceRecord record;
     mbm_event event;
-    unsigned i;
 
-    for (i = 0; i < COUNT(both); i++) {
+    for (unsigned i = 0; i < COUNT(both); i++) {
         uint8_t status = both[i] == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
 
         assert_null(mbm_trace_port(both[i]));

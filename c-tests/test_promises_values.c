@@ -1,10 +1,9 @@
 /* Each function for registers and bits is held to its comment in mbm.h: results, limits, NULL. */
+#include "refused.h"
 #include "mbm.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 enum { FIRST = 65530, WORDS = 6, VALUE = 0x5A };
 
@@ -24,9 +23,7 @@ static union {
 
 static void setup(void)
 {
-    unsigned i;
-
-    for (i = 0; i < WORDS; i++)
+    for (unsigned i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(0x4142 + 0x0202 * i);
     memset(&value, VALUE, sizeof value);
     OK(mbm_registers_intoWords(&r, words, WORDS, FIRST));
@@ -98,9 +95,7 @@ static const accessor accessors[] = {
 
 TEST(values_end_where_the_registers_end)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(accessors); i++) {
+    for (unsigned i = 0; i < COUNT(accessors); i++) {
         const accessor *a = &accessors[i];
         uint16_t last = (uint16_t)(FIRST + WORDS - a->registers);
 
@@ -117,9 +112,7 @@ TEST(values_end_where_the_registers_end)
 
 TEST(null_and_views_without_data_are_refused)
 {
-    unsigned i;
-
-    for (i = 0; i < COUNT(accessors); i++) {
+    for (unsigned i = 0; i < COUNT(accessors); i++) {
         const accessor *a = &accessors[i];
 
         setup();
@@ -132,12 +125,10 @@ TEST(null_and_views_without_data_are_refused)
 
 TEST(only_the_orders_and_kinds_of_the_header_are_accepted)
 {
-    unsigned i, order, kind;
-
-    for (i = 0; i < COUNT(accessors); i++) {
+    for (unsigned i = 0; i < COUNT(accessors); i++) {
         const accessor *a = &accessors[i];
 
-        for (order = 0; order < 256; order++) {
+        for (unsigned order = 0; order < 256; order++) {
             setup();
             if (order <= MBM_ORDER_DCBA)
                 OK(a->call(&r, FIRST, (uint8_t)order));
@@ -150,7 +141,7 @@ TEST(only_the_orders_and_kinds_of_the_header_are_accepted)
             else
                 NOTHING(MBM_INVALID_ARGUMENT, a->call(&r, FIRST, 0));
         }
-        for (kind = 0; kind < 256; kind++) {
+        for (unsigned kind = 0; kind < 256; kind++) {
             setup();
             r.kind = (uint8_t)kind;
             if (kind == MBM_REGISTERS_INTO_WORDS || kind == MBM_REGISTERS_INTO_BYTES ||
@@ -164,10 +155,9 @@ TEST(only_the_orders_and_kinds_of_the_header_are_accepted)
 
 TEST(a_register_has_sixteen_bits_and_two_bytes)
 {
-    unsigned bit;
     uint8_t on;
 
-    for (bit = 0; bit < 256; bit++) {
+    for (unsigned bit = 0; bit < 256; bit++) {
         if (bit < 16) {
             words[1] = (uint16_t) ~(1u << bit);
             OK(mbm_registers_setBit(&r, FIRST + 1, (uint8_t)bit, 200));

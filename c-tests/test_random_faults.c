@@ -223,7 +223,6 @@ static int agrees_with(const sim *s, const run *r, uint8_t status, const frame *
 {
     const uint8_t *b = f->bytes;
     int bits = r->asked.function <= 2;
-    unsigned i;
 
     if (b[0] != r->asked.unit || (b[1] & 0x7F) != r->asked.function)
         return 0;
@@ -236,7 +235,7 @@ static int agrees_with(const sim *s, const run *r, uint8_t status, const frame *
          * another request. */
         return be16(b + 2) == r->asked.address && be16(b + 4) == r->asked.value &&
                (r->asked.function != 0x16 || be16(b + 6) == r->asked.or_mask);
-    for (i = 0; i < b[2]; i += 2) {
+    for (unsigned i = 0; i < b[2]; i += 2) {
         unsigned first = b[3 + i], second = i + 1 < b[2] ? b[4 + i] : 0;
         unsigned word = bits ? second << 8 | first : first << 8 | second;
 
@@ -250,9 +249,7 @@ static int agrees_with(const sim *s, const run *r, uint8_t status, const frame *
 
 static int was_received(const run *r, const frame *f)
 {
-    size_t at;
-
-    for (at = 0; at + f->length <= r->received_length; at++)
+    for (size_t at = 0; at + f->length <= r->received_length; at++)
         if (memcmp(r->received + at, f->bytes, f->length) == 0)
             return 1;
     return 0;
@@ -261,9 +258,7 @@ static int was_received(const run *r, const frame *f)
 /* Returns whether the call took the reply to an earlier request. */
 static int is_late(const sim *s, const run *r, uint8_t status)
 {
-    unsigned i;
-
-    for (i = 0; i < LEDGER && i < r->written; i++)
+    for (unsigned i = 0; i < LEDGER && i < r->written; i++)
         if (agrees_with(s, r, status, &r->ledger[i]) && was_received(r, &r->ledger[i]))
             return 1;
     return 0;
@@ -273,11 +268,10 @@ static int is_late(const sim *s, const run *r, uint8_t status)
  * data. */
 static int is_blind(const sim *s, const run *r, uint8_t status)
 {
-    size_t at, length;
     frame f;
 
-    for (at = 0; at < r->received_length; at++)
-        for (length = 5; length <= 256 && at + length <= r->received_length; length++)
+    for (size_t at = 0; at < r->received_length; at++)
+        for (size_t length = 5; length <= 256 && at + length <= r->received_length; length++)
             if (crc16(r->received + at, length) == 0) {
                 f.length = length;
                 memcpy(f.bytes, r->received + at, length);
@@ -291,7 +285,6 @@ static void transact(sim *s, run *r, unsigned retries)
 {
     uint64_t began = s->now;
     uint8_t status;
-    unsigned i;
 
     s->sent = 0;
     s->order_length = 0;
@@ -300,7 +293,7 @@ static void transact(sim *s, run *r, unsigned retries)
     status = make_request(s, r);
     if (status == MBM_PENDING)
         status = sim_poll(s);
-    for (i = 0; i < s->sent; i++)
+    for (unsigned i = 0; i < s->sent; i++)
         assert_true(s->frames[i].whole);
     if (s->now - began > r->longest)
         r->longest = s->now - began;

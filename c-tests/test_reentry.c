@@ -1,11 +1,10 @@
 /* Every function of a line, a node or a server, called from within each of its hooks. Where no call
  * is allowed, it returns MBM_BUSY and changes nothing. Where calls are allowed, they work. */
+#include "unchanged.h"
 #include "hooked_port.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "unchanged.h"
 
 static hooked_port wire;
 static mbm_port port;
@@ -121,13 +120,11 @@ static void begin_master(void)
 
 TEST(no_hook_of_a_masters_port_may_call_the_master)
 {
-    int i;
-
     begin_master();
     is_pending = 1;
     OK(mbm_node_readHoldingRegisters(&master, 0, 1));
     assert_int_equal(mbm_node_receive(&master), 0x1234);
-    for (i = 0; i < HOOKS; i++)
+    for (int i = 0; i < HOOKS; i++)
         assert_true(wire.called[i] > 0);
     /* The same outside of a request. */
     entered = 0;
@@ -329,11 +326,9 @@ static void serve_all(void)
 
 static size_t exchange(const char *pdu, size_t length)
 {
-    unsigned i;
-
     wire.length = 0;
     hooked_port_arrive_rtu(&wire, 17, pdu, length);
-    for (i = 0; i < 100; i++)
+    for (unsigned i = 0; i < 100; i++)
         OK(mbm_server_poll(&server));
     return wire.length;
 }
@@ -358,18 +353,17 @@ TEST(no_hook_of_a_server_may_call_the_server)
         {"\x14\x07\6\0\1\0\0\0\1", 9, 9, 1},
         {"\x15\x09\6\0\1\0\0\0\1\0\2", 11, 14, 2},
     };
-    unsigned i;
 
     serve_all();
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, small_frame, 256));
     wire.within = within_server;
-    for (i = 0; i < COUNT(requests); i++) {
+    for (unsigned i = 0; i < COUNT(requests); i++) {
         hooks_called = 0;
         assert_int_equal(exchange(requests[i].pdu, requests[i].length), requests[i].answer);
         assert_true(hooks_called >= requests[i].hooks);
     }
     assert_int_equal(ASK("\x04\0\0\0\1"), 7); /* the value of the hook that is registered first */
-    for (i = 0; i < HOOK_IDLE; i++)
+    for (unsigned i = 0; i < HOOK_IDLE; i++)
         assert_true(wire.called[i] > 0);
     /* After the time of an echo it sleeps. */
     wire.now += mbm_server_pollDelay(&server);

@@ -1,11 +1,10 @@
 /* Every function of a client, called from within each of its hooks. Where no call is
  * allowed, it returns MBM_BUSY and changes nothing. Calls from `done` work. */
+#include "unchanged.h"
 #include "hooked_port.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "unchanged.h"
 
 static hooked_port wire;
 static mbm_port port;
@@ -171,18 +170,14 @@ static void begin_client(int framing)
 
 static void poll_until_all_have_ended(void)
 {
-    unsigned i;
-
-    for (i = 0; i < 3000 && mbm_client_poll(&client) == MBM_PENDING; i++) {
+    for (unsigned i = 0; i < 3000 && mbm_client_poll(&client) == MBM_PENDING; i++) {
     }
     assert_int_equal(mbm_client_pending(&client), 0);
 }
 
 TEST(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client)
 {
-    int framing;
-
-    for (framing = 0; framing < 4; framing++) {
+    for (int framing = 0; framing < 4; framing++) {
         wire.within = framing == 2 ? NULL : within_client; /* the begin of TCP calls no hook */
         begin_client(framing);
         wire.within = within_client;
@@ -208,7 +203,7 @@ TEST(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client)
         IS(MBM_PENDING, mbm_client_poll(&client));
         OK(mbm_client_cancel(&client, &request));
     }
-    for (framing = 0; framing < HOOK_IDLE; framing++)
+    for (int framing = 0; framing < HOOK_IDLE; framing++)
         assert_true(wire.called[framing] > 0);
 }
 

@@ -1,11 +1,10 @@
 /* Every function of a plan, called from within each hook of its client's port, from `done` of
  * another request, and from `update`. */
+#include "unchanged.h"
 #include "hooked_port.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "unchanged.h"
 
 enum { WORDS = 4 };
 
@@ -133,11 +132,9 @@ fixture each_test = {begin, NULL};
 /* Polls until the plan's request has ended. */
 static void run(void)
 {
-    unsigned i;
-
     OK(mbm_plan_poll(&plan));
     wire.within = within_port;
-    for (i = 0; i < 3000 && mbm_client_poll(&client) == MBM_PENDING; i++) {
+    for (unsigned i = 0; i < 3000 && mbm_client_poll(&client) == MBM_PENDING; i++) {
         if (wire.length > 0 && wire.last == 0)
             hooked_port_arrive_rtu(&wire, 17, reply, sizeof reply);
     }

@@ -1,13 +1,12 @@
 /* A call that is refused changes nothing: the object is compared byte for byte with its
  * state before the call, and pending requests go on. Buffers have exactly the size that
  * begin is given. */
+#include "refused.h"
+#include "refused_wire.h"
 #include "test.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#include "refused.h"
-#include "refused_wire.h"
 
 fixture each_test = {reset, NULL};
 
@@ -63,9 +62,7 @@ static void all_begins_are_refused(uint8_t *frame)
 
 static void poll_for_a_while(void)
 {
-    unsigned i;
-
-    for (i = 0; i < 200; i++)
+    for (unsigned i = 0; i < 200; i++)
         OK(mbm_server_poll(&server));
 }
 
@@ -178,7 +175,6 @@ TEST(a_master_goes_on_after_refused_calls)
     uint16_t *response = (uint16_t *)malloc(250), *transmit = (uint16_t *)malloc(4), one[1];
     uint8_t answer[252] = {3, 250};
     mbm_port mute = port;
-    unsigned i;
 
     memset(&line, 0, sizeof line);
     memset(&m, 0, sizeof m);
@@ -207,10 +203,10 @@ TEST(a_master_goes_on_after_refused_calls)
     assert_int_equal(transmit[0], 0x1234);
     assert_int_equal(transmit[1], 0x1234);
 
-    for (i = 0; i < 300 && wire.length == 0; i++)
+    for (unsigned i = 0; i < 300 && wire.length == 0; i++)
         IS(MBM_PENDING, mbm_node_poll(&m));
     hooked_port_arrive_rtu(&wire, 17, answer, sizeof answer);
-    for (i = 0; i < 300 && mbm_node_poll(&m) == MBM_PENDING; i++) {
+    for (unsigned i = 0; i < 300 && mbm_node_poll(&m) == MBM_PENDING; i++) {
     }
     OK(mbm_node_status(&m));
     /* The queue of words is full. */

@@ -1,12 +1,11 @@
 /* A call of a client that is refused changes nothing, and pending requests go on. Buffers
  * have exactly the size that begin is given. */
+#include "refused.h"
+#include "refused_wire.h"
 #include "test.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#include "refused.h"
-#include "refused_wire.h"
 
 fixture each_test = {reset, NULL};
 
@@ -79,10 +78,8 @@ TEST(a_client_goes_on_after_refused_calls)
     static const mbm_line zero;
     static uint16_t reply[125];
     mbm_clientRequest request, other;
-    uint32_t delay;
-    int framing;
 
-    for (framing = 0; framing < 4; framing++) {
+    for (int framing = 0; framing < 4; framing++) {
         memset(&client, 0, sizeof client);
         memset(&request, 0, sizeof request);
         memset(&other, 0, sizeof other);
@@ -96,7 +93,7 @@ TEST(a_client_goes_on_after_refused_calls)
         request.transaction = 7;
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 125));
         wire.length = 0;
-        for (delay = 0; delay < 1000 && wire.length == 0; delay++)
+        for (uint32_t delay = 0; delay < 1000 && wire.length == 0; delay++)
             IS(MBM_PENDING, mbm_client_poll(&client));
         assert_true(wire.length > 0);
 
@@ -138,7 +135,8 @@ TEST(a_client_goes_on_after_refused_calls)
             uint8_t answer[252] = {3, 250};
 
             hooked_port_arrive_rtu(&wire, 17, answer, sizeof answer);
-            for (delay = 0; delay < 1000 && mbm_client_poll(&client) == MBM_PENDING; delay++) {
+            for (uint32_t delay = 0; delay < 1000 && mbm_client_poll(&client) == MBM_PENDING;
+                 delay++) {
             }
             OK(request.status);
         } else {
@@ -193,10 +191,8 @@ TEST(a_full_queue_and_a_suspended_client_change_nothing)
 TEST(a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice)
 {
     mbm_clientRequest *request = (mbm_clientRequest *)malloc(sizeof *request);
-    unsigned i;
-    int framing;
 
-    for (framing = 0; framing < 4; framing++) {
+    for (int framing = 0; framing < 4; framing++) {
         memset(&client, 0, sizeof client);
         OK(begin_client(framing, 600, 600));
         OK(mbm_client_setResponseTimeout(&client, 10));
@@ -207,7 +203,7 @@ TEST(a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice)
         request->unit = 17;
         IS(MBM_BUSY, mbm_client_readCoils(&client, request, 0, 1)); /* it waits */
         wire.length = 0;
-        for (i = 0; i < 1000 && mbm_client_pending(&client) > 0; i++) {
+        for (unsigned i = 0; i < 1000 && mbm_client_pending(&client) > 0; i++) {
             mbm_client_poll(&client);
             if (mbm_client_pending(&client) > 0)
                 IS(MBM_BUSY, mbm_client_readCoils(&client, request, 0, 1)); /* in flight */
@@ -222,7 +218,7 @@ TEST(a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice)
         OK(mbm_client_cancel(&client, request));
     }
     free(request);
-    for (i = 0; i < 100; i++)
+    for (unsigned i = 0; i < 100; i++)
         OK(mbm_client_poll(&client));
     free(incoming);
     free(outgoing);

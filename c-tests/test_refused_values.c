@@ -1,12 +1,11 @@
 /* What a refused call leaves in the caller's variables: lengths become 0, all other
  * variables stay as they were. */
+#include "refused.h"
 #include "mbm.h"
 #include "test.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#include "refused.h"
 
 /* --- values --- */
 

@@ -39,10 +39,9 @@ TEST(a_double_word_is_read_in_four_orders)
     mbm_registers r;
     uint32_t value;
     int32_t negative;
-    unsigned i, over_words;
 
-    for (i = 0; i < 4; i++) {
-        for (over_words = 0; over_words < 2; over_words++) {
+    for (unsigned i = 0; i < 4; i++) {
+        for (unsigned over_words = 0; over_words < 2; over_words++) {
             to_words(words, double_words[i], 2);
             if (over_words)
                 OK(mbm_registers_ofWords(&r, words, 2, 30001));
@@ -83,11 +82,10 @@ TEST(floats_are_ieee_754)
     };
     uint16_t words[2];
     mbm_registers r;
-    unsigned i;
     float value;
 
     OK(mbm_registers_intoWords(&r, words, 2, 0));
-    for (i = 0; i < COUNT(cases); i++) {
+    for (unsigned i = 0; i < COUNT(cases); i++) {
         words[0] = cases[i].high;
         words[1] = cases[i].low;
         OK(mbm_registers_getFloat(&r, 0, MBM_ORDER_ABCD, &value));
@@ -112,9 +110,8 @@ TEST(values_of_four_registers_have_four_orders_too)
     int64_t negative;
     double value;
     uint8_t bytes[8];
-    unsigned i;
 
-    for (i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++) {
         OK(mbm_registers_ofBytes(&r, pi[i], 8, 100));
         OK(mbm_registers_getDouble(&r, 100, orders[i], &value));
         assert_true(value > 3.14159265358979 && value < 3.14159265358980);
@@ -143,11 +140,10 @@ TEST(a_double_word_is_written_in_four_orders)
     uint8_t bytes[4];
     uint16_t words[2], wanted[2];
     mbm_registers b, w;
-    unsigned i;
 
     OK(mbm_registers_intoBytes(&b, bytes, 4, 9));
     OK(mbm_registers_intoWords(&w, words, 2, 9));
-    for (i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++) {
         to_words(wanted, double_words[i], 2);
         OK(mbm_registers_setUint32(&b, 9, orders[i], 2923517522u));
         OK(mbm_registers_setUint32(&w, 9, orders[i], (uint32_t)-1371449774));
@@ -264,9 +260,8 @@ TEST(bytes_of_a_device_that_swaps_them_are_put_in_order)
     uint16_t words[] = {0x0102, 0x0304, 0x0506};
     uint8_t bytes[5], back[6];
     mbm_registers r;
-    size_t i;
 
-    for (i = 0; i < COUNT(orders); i++) {
+    for (size_t i = 0; i < COUNT(orders); i++) {
         const uint8_t *wanted = i < 2 ? straight : swapped;
 
         OK(mbm_registers_ofBytes(&r, data, 6, 40));
@@ -302,10 +297,9 @@ TEST(an_access_outside_of_a_view_changes_nothing)
     uint64_t wide = 5;
     uint32_t value = 5;
     float number = 5;
-    unsigned address;
 
     OK(mbm_registers_intoWords(&r, words, 4, 65532));
-    for (address = 0; address <= 65535; address++) {
+    for (unsigned address = 0; address <= 65535; address++) {
         uint16_t at = (uint16_t)address;
 
         if (address < 65532 || address == 65535) {

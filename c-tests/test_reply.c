@@ -45,9 +45,7 @@ static mbm_framing framing_of(uint8_t kind)
 /* The data of a packet as words in the machine's byte order. */
 static void use_words(const mbm_packet *packet)
 {
-    uint16_t i;
-
-    for (i = 0; i < packet->dataLength / 2; i++)
+    for (uint16_t i = 0; i < packet->dataLength / 2; i++)
         data[i] = (uint16_t)(packet->data[2 * i] << 8 | packet->data[2 * i + 1]);
 }
 

@@ -142,9 +142,8 @@ static void check_fields(void)
 static void with_each_framing(void (*check)(void))
 {
     static const uint8_t framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP};
-    size_t i;
 
-    for (i = 0; i < COUNT(framings); i++) {
+    for (size_t i = 0; i < COUNT(framings); i++) {
         framing = framings[i];
         served_prepare(&s);
         begin();
@@ -189,9 +188,8 @@ static void assert_read(uint8_t code, uint8_t object, unsigned count, unsigned a
 static void check_identification(void)
 {
     static mbm_object objects[OBJECTS];
-    unsigned i;
 
-    for (i = 0; i < OBJECTS; i++) {
+    for (unsigned i = 0; i < OBJECTS; i++) {
         memset(texts[i], 'a' + (int)i % 26, LENGTH);
         objects[i].data = (const uint8_t *)texts[i];
         objects[i].length = LENGTH;

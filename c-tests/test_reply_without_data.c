@@ -140,7 +140,6 @@ static void assert_seen(uint8_t framing, uint8_t function)
     mbm_packet packet, again;
     mbm_event event;
     uint16_t length;
-    unsigned i;
 
     mbm_trace_flush(&trace);
     assert_int_equal(records.requests, 1);
@@ -155,7 +154,7 @@ static void assert_seen(uint8_t framing, uint8_t function)
     assert_int_equal(again.function, function);
     assert_int_equal(again.dataLength, 0);
 
-    for (i = 0; i < COUNT(kinds); i++) {
+    for (unsigned i = 0; i < COUNT(kinds); i++) {
         assert_int_equal(mbm_sniffer_next(&sniffer, near_end.now + 1000000, &event), 1);
         assert_int_equal(event.kind, kinds[i]);
         assert_int_equal(event.unit, UNIT);
@@ -179,10 +178,9 @@ static int is_standard(uint8_t function)
 TEST(every_function_may_be_answered_without_data)
 {
     static const mbm_rule silence = MBM_INIT;
-    unsigned i, function;
 
-    for (i = 0; i < COUNT(framings); i++)
-        for (function = 1; function <= LAST; function++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned function = 1; function <= LAST; function++) {
             begin(framings[i], "", 0);
             IS(MBM_PENDING, mbm_client_custom(&client, &request, (uint8_t)function, 0, &silence));
             IS(MBM_OK, run());
@@ -198,10 +196,8 @@ TEST(every_function_may_be_answered_without_data)
 
 TEST(every_function_that_the_standard_leaves_open_is_forwarded_without_data)
 {
-    unsigned i, function;
-
-    for (i = 0; i < COUNT(framings); i++)
-        for (function = 1; function <= LAST; function++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned function = 1; function <= LAST; function++) {
             uint8_t queued;
 
             begin(framings[i], "", 0);
@@ -224,9 +220,8 @@ TEST(every_function_that_the_standard_leaves_open_is_forwarded_without_data)
 TEST(a_function_with_data_may_be_answered_without)
 {
     static const mbm_rule silence = MBM_INIT;
-    unsigned i;
 
-    for (i = 0; i < COUNT(framings); i++) {
+    for (unsigned i = 0; i < COUNT(framings); i++) {
         begin(framings[i], "", 0);
         request.data = "abcde";
         IS(MBM_PENDING, mbm_client_custom(&client, &request, 0x42, 5, &silence));
@@ -244,10 +239,9 @@ TEST(a_reply_that_lacks_what_it_must_repeat_is_not_accepted)
 {
     static const char *const bodies[] = {"\x0D\x01", "\x00\x15\x00\x00"};
     static const uint8_t functions[] = {0x2B, 0x08}, counts[] = {2, 4};
-    unsigned i, k;
 
-    for (i = 0; i < COUNT(framings); i++)
-        for (k = 0; k < COUNT(functions); k++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned k = 0; k < COUNT(functions); k++) {
             begin(framings[i], "", 0);
             IS(MBM_PENDING, mbm_client_forward(&client, &request, functions[k],
                                                (const uint8_t *)bodies[k], counts[k]));
@@ -270,11 +264,10 @@ TEST(the_rule_of_the_program_holds_for_every_function)
         {{MBM_RULE_FIXED, 6, 0}, "\xFF\x02\x03\x04\x05", 5},
         {{MBM_RULE_COUNTED, 2, 1}, "\xFF\x02\x03\x04\x05", 5},
     };
-    unsigned i, k, function;
 
-    for (i = 0; i < COUNT(framings); i++)
-        for (k = 0; k < COUNT(cases); k++)
-            for (function = 1; function <= LAST; function++) {
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (unsigned k = 0; k < COUNT(cases); k++)
+            for (unsigned function = 1; function <= LAST; function++) {
                 begin(framings[i], cases[k].bytes, cases[k].count);
                 IS(MBM_PENDING,
                    mbm_client_custom(&client, &request, (uint8_t)function, 0, &cases[k].rule));

@@ -45,11 +45,10 @@ TEST(a_ring_that_was_never_begun_accepts_and_returns_nothing)
     static mbm_ring zeroed;
     mbm_ring *rings[2];
     uint8_t byte = 0;
-    unsigned i;
 
     rings[0] = NULL;
     rings[1] = &zeroed;
-    for (i = 0; i < COUNT(rings); i++) {
+    for (unsigned i = 0; i < COUNT(rings); i++) {
         assert_int_equal(mbm_ring_put(rings[i], 1), 0);
         assert_int_equal(mbm_ring_write(rings[i], &byte, 1), 0);
         assert_int_equal(mbm_ring_read(rings[i], &byte, 1), 0);
@@ -75,9 +74,8 @@ TEST(begin_refuses_bad_arguments)
 static void *put_all(void *context)
 {
     mbm_ring *ring = context;
-    uint32_t number;
 
-    for (number = 0; number < BYTES; number++)
+    for (uint32_t number = 0; number < BYTES; number++)
         while (!mbm_ring_put(ring, (uint8_t)(number * 7)))
             sched_yield();
     return NULL;

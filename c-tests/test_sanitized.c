@@ -27,10 +27,9 @@ static void fill_ring(uint16_t bytes)
 {
     uint8_t *storage = malloc(BYTES), taken;
     mbm_ring ring;
-    unsigned i;
 
     mbm_ring_begin(&ring, storage, bytes);
-    for (i = 0; i < bytes; i++) {
+    for (unsigned i = 0; i < bytes; i++) {
         mbm_ring_put(&ring, 1);
         mbm_ring_read(&ring, &taken, 1);
     }

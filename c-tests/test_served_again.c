@@ -122,22 +122,18 @@ static unsigned function(int family)
 
 static void all_are_answered(mbm_unit *unit)
 {
-    int i;
-
-    for (i = 0; i < FAMILIES; i++)
+    for (int i = 0; i < FAMILIES; i++)
         assert_int_equal(answered(unit, i), function(i));
 }
 
 static void reset(void)
 {
-    int i;
-
     memset(&first, 0, sizeof first);
     memset(units, 0, sizeof units);
     units[0].id = 17;
     units[1].id = 18;
     words[0] = 0x1234;
-    for (i = 0; i < FAMILIES; i++)
+    for (int i = 0; i < FAMILIES; i++)
         OK(serve(&units[0], &first, i));
     all_are_answered(&units[0]);
 }
@@ -146,9 +142,7 @@ fixture each_test = {reset, NULL};
 
 TEST(a_record_that_is_served_again_leaves_the_others_served)
 {
-    int i;
-
-    for (i = 0; i < FAMILIES; i++) {
+    for (int i = 0; i < FAMILIES; i++) {
         OK(serve(&units[0], &first, i));
         all_are_answered(&units[0]);
     }
@@ -156,9 +150,7 @@ TEST(a_record_that_is_served_again_leaves_the_others_served)
 
 TEST(a_record_that_is_zeroed_and_served_again_leaves_the_others_served)
 {
-    int i;
-
-    for (i = 0; i < FAMILIES; i++) {
+    for (int i = 0; i < FAMILIES; i++) {
         zero(&first, i);
         OK(serve(&units[0], &first, i));
         all_are_answered(&units[0]);
@@ -167,11 +159,9 @@ TEST(a_record_that_is_zeroed_and_served_again_leaves_the_others_served)
 
 TEST(a_record_that_is_zeroed_serves_nothing_and_the_others_go_on)
 {
-    int i, other;
-
-    for (i = 0; i < FAMILIES; i++) {
+    for (int i = 0; i < FAMILIES; i++) {
         zero(&first, i);
-        for (other = 0; other < FAMILIES; other++)
+        for (int other = 0; other < FAMILIES; other++)
             assert_int_equal(answered(&units[0], other),
                              other == i ? function(i) | 0x80 : function(other));
         OK(serve(&units[0], &first, i));
@@ -180,13 +170,11 @@ TEST(a_record_that_is_zeroed_serves_nothing_and_the_others_go_on)
 
 TEST(all_records_may_be_zeroed_and_served_again)
 {
-    int i;
-
-    for (i = 0; i < FAMILIES; i++)
+    for (int i = 0; i < FAMILIES; i++)
         zero(&first, i);
-    for (i = 0; i < FAMILIES; i++)
+    for (int i = 0; i < FAMILIES; i++)
         assert_int_equal(answered(&units[0], i), function(i) | 0x80);
-    for (i = FAMILIES; i-- > 0;)
+    for (int i = FAMILIES; i-- > 0;)
         OK(serve(&units[0], &first, i));
     all_are_answered(&units[0]);
 }
@@ -194,12 +182,11 @@ TEST(all_records_may_be_zeroed_and_served_again)
 TEST(one_record_serves_two_units)
 {
     static records own;
-    int i;
 
     memset(&own, 0, sizeof own);
     /* The second unit has a record of its own first, then the records of the first unit. */
     OK(serve(&units[1], &own, 10));
-    for (i = 0; i < FAMILIES - 1; i++) {
+    for (int i = 0; i < FAMILIES - 1; i++) {
         OK(serve(&units[1], &first, i));
         all_are_answered(&units[0]);
         assert_int_equal(answered(&units[1], i), function(i));
@@ -251,9 +238,8 @@ TEST(a_second_record_of_a_kind_that_a_unit_has_once_is_refused)
     static records second;
     static const int once[] = {4, 5, 6, 9};
     mbm_unit before = units[0];
-    size_t i;
 
-    for (i = 0; i < COUNT(once); i++) {
+    for (size_t i = 0; i < COUNT(once); i++) {
         memset(&second, 0, sizeof second);
         IS(MBM_BUSY, serve(&units[0], &second, once[i]));
         assert_int_equal(second.status.service.kind | second.diagnostics.service.kind |
@@ -324,13 +310,12 @@ TEST(a_function_that_declines_may_fill_the_last_place)
 {
     static mbm_custom all[MBM_MAX_SERVICES - 1];
     static mbm_unit full;
-    int i;
 
     memset(all, 0, sizeof all);
     memset(&full, 0, sizeof full);
     memset(&late, 0, sizeof late);
     full.id = 17;
-    for (i = 0; i < MBM_MAX_SERVICES - 1; i++) {
+    for (int i = 0; i < MBM_MAX_SERVICES - 1; i++) {
         all[i].serve = echo;
         all[i].code = (uint8_t)(66 + i);
         OK(mbm_unit_serveCustom(&full, &all[i]));
@@ -345,17 +330,16 @@ TEST(a_unit_with_all_places_taken_refuses_other_functions)
 {
     static mbm_custom all[MBM_MAX_SERVICES];
     static mbm_unit full;
-    int i;
 
     memset(all, 0, sizeof all);
     memset(&full, 0, sizeof full);
     memset(&late, 0, sizeof late);
     full.id = 17;
-    for (i = 0; i < MBM_MAX_SERVICES; i++) {
+    for (int i = 0; i < MBM_MAX_SERVICES; i++) {
         all[i].serve = echo;
         all[i].code = (uint8_t)(66 + i);
     }
-    for (i = 0; i < MBM_MAX_SERVICES - 1; i++)
+    for (int i = 0; i < MBM_MAX_SERVICES - 1; i++)
         OK(mbm_unit_serveCustom(&full, &all[i]));
     /* A hook registers the diagnostics, which count every frame, in the last place. */
     all[0].serve = give_diagnostics;
@@ -365,7 +349,7 @@ TEST(a_unit_with_all_places_taken_refuses_other_functions)
     /* All places taken, without diagnostics. */
     memset(&full, 0, sizeof full);
     full.id = 17;
-    for (i = 0; i < MBM_MAX_SERVICES; i++)
+    for (int i = 0; i < MBM_MAX_SERVICES; i++)
         OK(mbm_unit_serveCustom(&full, &all[i]));
     assert_int_equal(answer(&full, 17, "\x51", 1), 0x51);
     assert_int_equal(answer(&full, 17, "\x03\0\0\0\1", 5), 0x83);

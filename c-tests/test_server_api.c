@@ -86,13 +86,11 @@ fixture each_test = {reset, NULL};
 /* Lets the frame of a PDU arrive and polls. Returns the length of what was sent. */
 static size_t exchange(uint8_t to, const char *pdu, size_t length)
 {
-    unsigned i;
-
     wire.arriving[0] = to;
     memcpy(wire.arriving + 1, pdu, length);
     wire.first = wire.length = 0;
     wire.last = seal(wire.arriving, length + 1);
-    for (i = 0; i < 100; i++)
+    for (unsigned i = 0; i < 100; i++)
         OK(mbm_server_poll(&server));
     return wire.length;
 }
@@ -183,9 +181,8 @@ TEST(a_unit_without_services_does_not_answer)
 static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     const char *request = (const char *)context;
-    uint16_t i;
 
-    for (i = 0; i < capacity; i++)
+    for (uint16_t i = 0; i < capacity; i++)
         bytes[i] = (uint8_t)request[wire.first++ % 12];
     assert_true(wire.first < 12 * 1000);
     return (int16_t)capacity;
@@ -393,7 +390,6 @@ TEST(the_length_rule_of_a_custom_function_frames_rtu_over_tcp)
     mbm_rule rules[] = {{MBM_RULE_FIXED, 4, 0}, {MBM_RULE_COUNTED, 1, 1}, {MBM_RULE_SILENCE, 0, 0}};
     const char *pdus[] = {"\144abc", "\144\1x!", "\14412345"};
     const size_t lengths[] = {4, 4, 6};
-    unsigned i;
 
     custom.serve = own;
     custom.context = &custom_result;
@@ -401,7 +397,7 @@ TEST(the_length_rule_of_a_custom_function_frames_rtu_over_tcp)
     custom.length = (mbm_rule){MBM_RULE_FIXED, 0, 0};
     IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCustom(&unit, &custom));
     custom_result = 1;
-    for (i = 0; i < COUNT(rules); i++) {
+    for (unsigned i = 0; i < COUNT(rules); i++) {
         unsigned k;
 
         custom.length = rules[i];

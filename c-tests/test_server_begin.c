@@ -36,10 +36,8 @@ fixture each_test = {reset, NULL};
 /* Polls until a request that has arrived is answered. Returns the length of what was sent. */
 static size_t answer(void)
 {
-    unsigned i;
-
     wire.length = 0;
-    for (i = 0; i < 100; i++)
+    for (unsigned i = 0; i < 100; i++)
         OK(mbm_server_poll(&server));
     return wire.length;
 }
@@ -63,12 +61,11 @@ TEST(a_begin_while_a_response_is_sent_switches_the_driver_off)
     static const begin begins[] = {mbm_server_beginRtu, mbm_server_beginAscii, mbm_server_beginTcp,
                                    mbm_server_beginRtuOverTcp};
     mbm_port stuck = port, other = port;
-    unsigned i;
 
     stuck.flush = never_drained;
     other.postTransmission = NULL;
     wire.within = calls_within_the_driver_hook;
-    for (i = 0; i < COUNT(begins); i++) {
+    for (unsigned i = 0; i < COUNT(begins); i++) {
         memset(wire.called, 0, sizeof wire.called);
         OK(mbm_server_beginRtu(&server, &stuck, &unit, 1, frame, sizeof frame));
         hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\1", 5);
@@ -90,7 +87,6 @@ TEST(a_begin_while_a_response_is_sent_switches_the_driver_off)
 TEST(a_baud_rate_is_refused_except_on_an_rtu_line)
 {
     static const char request[] = ":110300000001EB\r\n", response[] = ":1103020000EA\r\n";
-    unsigned i;
 
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_setBaudRate(&server, 115200));
@@ -103,7 +99,7 @@ TEST(a_baud_rate_is_refused_except_on_an_rtu_line)
     OK(mbm_server_beginAscii(&server, &port, &unit, 1, frame, sizeof frame));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 115200));
     /* A pause of half a second between two characters does not end an ASCII frame. */
-    for (i = 0; request[i] != '\0'; i++) {
+    for (unsigned i = 0; request[i] != '\0'; i++) {
         hooked_port_arrive(&wire, request + i, 1);
         OK(mbm_server_poll(&server));
         wire.now += 500000;
@@ -130,12 +126,11 @@ TEST(a_poll_reads_at_most_1200_bytes_of_noise)
     static const begin begins[] = {mbm_server_beginRtu, mbm_server_beginAscii,
                                    mbm_server_beginRtuOverTcp};
     mbm_port noisy = port;
-    unsigned i, polls;
 
     noisy.read = noisy_read;
-    for (i = 0; i < COUNT(begins); i++) {
+    for (unsigned i = 0; i < COUNT(begins); i++) {
         OK(begins[i](&server, &noisy, &unit, 1, frame, 64));
-        for (polls = 0; polls < 10; polls++) {
+        for (unsigned polls = 0; polls < 10; polls++) {
             wire.first = 0;
             OK(mbm_server_poll(&server));
             assert_in_range(wire.first, 1, 1200);
@@ -146,10 +141,9 @@ TEST(a_poll_reads_at_most_1200_bytes_of_noise)
 TEST(a_frame_that_fills_the_buffer_after_noise_is_answered)
 {
     uint8_t bytes[120] = {0};
-    unsigned noise;
 
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, 16));
-    for (noise = 0; noise < 100; noise++) {
+    for (unsigned noise = 0; noise < 100; noise++) {
         memset(bytes, 0x5A, noise);
         memcpy(bytes + noise, "\x11\x10\0\0\0\2\4\1\2\3\4", 11);
         hooked_port_arrive(&wire, bytes, noise + seal(bytes + noise, 11));

@@ -102,17 +102,16 @@ static int is_answered(const uart *from, uint32_t baud, unsigned quantity)
     const uint32_t character = BITS * 1000000u / baud + 1;
     const uint8_t head[7] = {UNIT, 0x10, 0, 0, 0, (uint8_t)quantity, (uint8_t)(2 * quantity)};
     uint64_t end;
-    unsigned i;
 
     begin(baud);
     memset(&line, 0, sizeof line);
     line.now = 1000000;
     memset(words, 0, sizeof words);
     memcpy(line.bytes, head, sizeof head);
-    for (i = 0; i < 2 * quantity; i++)
+    for (unsigned i = 0; i < 2 * quantity; i++)
         line.bytes[sizeof head + i] = (uint8_t)(i * 7 + quantity);
     line.count = (unsigned)seal(line.bytes, sizeof head + 2 * quantity);
-    for (i = 0; i < line.count; i++) {
+    for (unsigned i = 0; i < line.count; i++) {
         const uint64_t start = line.now;
 
         if (from->block) {
@@ -129,7 +128,7 @@ static int is_answered(const uart *from, uint32_t baud, unsigned quantity)
     end = line.at[line.count - 1] + 200000;
     for (; line.now < end; line.now += 50)
         OK(mbm_server_poll(&server));
-    for (i = 0; i < quantity && line.answers == 1; i++)
+    for (unsigned i = 0; i < quantity && line.answers == 1; i++)
         assert_int_equal(words[i], (uint16_t)((i * 14 + quantity) << 8 & 0xFF00) |
                                        (uint8_t)((2 * i + 1) * 7 + quantity));
     return line.answers == 1 && line.other == 0;
@@ -139,18 +138,17 @@ TEST(requests_of_every_length_in_blocks_are_answered)
 {
     const char *path = getenv("MBM_FAULT_TABLE");
     FILE *table = path ? fopen(path, "w") : NULL;
-    unsigned i, r, quantity;
 
     if (table)
         fprintf(table, "| the UART hands over | delay | 1200 baud | 9600 | 19200 | 115200 |\n"
                        "|---|---|---|---|---|---|\n");
-    for (i = 0; i < sizeof uarts / sizeof uarts[0]; i++) {
+    for (unsigned i = 0; i < sizeof uarts / sizeof uarts[0]; i++) {
         if (table)
             fprintf(table, "| %s | %s |", uarts[i].name, uarts[i].delay);
-        for (r = 0; r < sizeof rates / sizeof rates[0]; r++) {
+        for (unsigned r = 0; r < sizeof rates / sizeof rates[0]; r++) {
             unsigned answered = 0;
 
-            for (quantity = 1; quantity <= MOST; quantity++)
+            for (unsigned quantity = 1; quantity <= MOST; quantity++)
                 answered += (unsigned)is_answered(&uarts[i], rates[r], quantity);
             assert_int_equal(answered, MOST);
             if (table)
@@ -178,10 +176,9 @@ TEST(a_ring_that_a_dma_callback_fills_gives_every_request)
 {
     const mbm_port port = {.read = receive_from_ring, .write = transmit, .micros = micros};
     const uint32_t baud = 9600, character = BITS * 1000000u / baud;
-    unsigned half, quantity;
 
-    for (half = 8; half <= 128; half *= 2)
-        for (quantity = 1; quantity <= MOST; quantity++) {
+    for (unsigned half = 8; half <= 128; half *= 2)
+        for (unsigned quantity = 1; quantity <= MOST; quantity++) {
             uint8_t request[300] = {
                 UNIT, 0x10, 0, 0, 0, (uint8_t)quantity, (uint8_t)(2 * quantity)};
             const size_t length = seal(request, 7 + 2 * quantity);
@@ -235,7 +232,6 @@ static int answers_through_adapter(int fd, void (*poll_ours)(void))
     uint8_t request[300] = {UNIT, 0x10, 0, 0, 0, 20, 40}, answer[8];
     const size_t length = seal(request, 47), block = 14;
     size_t sent, got = 0;
-    unsigned tries;
 
     for (sent = 0; sent < length; sent += block) {
         const size_t count = length - sent < block ? length - sent : block;
@@ -245,7 +241,7 @@ static int answers_through_adapter(int fd, void (*poll_ours)(void))
         if (poll_ours)
             poll_ours();
     }
-    for (tries = 0; tries < 1000 && got < sizeof answer; tries++) {
+    for (unsigned tries = 0; tries < 1000 && got < sizeof answer; tries++) {
         struct pollfd readable = {fd, POLLIN, 0};
 
         if (poll_ours)
@@ -258,9 +254,7 @@ static int answers_through_adapter(int fd, void (*poll_ours)(void))
 
 static void poll_server(void)
 {
-    unsigned i;
-
-    for (i = 0; i < 5; i++)
+    for (unsigned i = 0; i < 5; i++)
         OK(mbm_server_poll(&server));
 }
 
@@ -303,9 +297,8 @@ TEST(a_server_that_waits_tells_a_program_how_long)
     const uint32_t silence = 38500000 / 9600 + 1;
     const uint32_t missing = (247 + 10) * (BITS * 1000000u / 9600 + 1);
     static const int32_t latencies[] = {-1, 0, 20, 65535}; /* in ms; -1 is the default */
-    size_t i;
 
-    for (i = 0; i < sizeof latencies / sizeof *latencies; i++) {
+    for (size_t i = 0; i < sizeof latencies / sizeof *latencies; i++) {
         const uint32_t latency = 1000 * (uint32_t)(latencies[i] < 0 ? 50 : latencies[i]);
         const uint32_t wait = silence + missing + latency;
 

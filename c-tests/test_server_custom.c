@@ -99,20 +99,20 @@ static int answers(uint8_t function)
 
 TEST(a_custom_function_is_found_at_any_place)
 {
-    unsigned count, at, i;
+    unsigned at;
 
-    for (count = 0; count <= MBM_MAX_SERVICES; count++) {
+    for (unsigned count = 0; count <= MBM_MAX_SERVICES; count++) {
         /* The table stands at each place among them, or is not registered. */
         for (at = 0; at <= MBM_MAX_SERVICES; at++) {
             if (count == MBM_MAX_SERVICES && at < MBM_MAX_SERVICES)
                 continue;
             reset();
-            for (i = 0; i < count; i++) {
+            for (unsigned i = 0; i < count; i++) {
                 if (i == at)
                     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
                 add(i, (uint8_t)(FIRST_CODE + i));
             }
-            for (i = 0; i < count; i++)
+            for (unsigned i = 0; i < count; i++)
                 assert_int_equal(answers((uint8_t)(FIRST_CODE + i)), (int)i);
             if (count > 0) {
                 assert_int_equal(answers((uint8_t)(FIRST_CODE + count)), -2);
@@ -124,13 +124,11 @@ TEST(a_custom_function_is_found_at_any_place)
 
 TEST(a_custom_function_of_code_0_is_called_in_its_order)
 {
-    unsigned zero, i;
-
-    for (zero = 0; zero < MBM_MAX_SERVICES; zero++) {
+    for (unsigned zero = 0; zero < MBM_MAX_SERVICES; zero++) {
         reset();
-        for (i = 0; i < MBM_MAX_SERVICES; i++)
+        for (unsigned i = 0; i < MBM_MAX_SERVICES; i++)
             add(i, i == zero ? 0 : (uint8_t)(FIRST_CODE + i));
-        for (i = 0; i < MBM_MAX_SERVICES; i++)
+        for (unsigned i = 0; i < MBM_MAX_SERVICES; i++)
             assert_int_equal(answers((uint8_t)(FIRST_CODE + i)), (int)(i < zero ? i : zero));
         assert_int_equal(answers(3), (int)zero);
     }
@@ -138,9 +136,7 @@ TEST(a_custom_function_of_code_0_is_called_in_its_order)
 
 TEST(a_code_that_is_changed_counts_from_then_on)
 {
-    unsigned i;
-
-    for (i = 0; i < MBM_MAX_SERVICES; i++)
+    for (unsigned i = 0; i < MBM_MAX_SERVICES; i++)
         add(i, (uint8_t)(FIRST_CODE + i));
     ours[13].code = 100;
     assert_int_equal(answers(100), 13);
@@ -149,9 +145,7 @@ TEST(a_code_that_is_changed_counts_from_then_on)
 
 TEST(a_record_that_was_zeroed_serves_nothing)
 {
-    unsigned i;
-
-    for (i = 0; i < MBM_MAX_SERVICES; i++)
+    for (unsigned i = 0; i < MBM_MAX_SERVICES; i++)
         add(i, (uint8_t)(FIRST_CODE + i));
     memset(&ours[6], 0, sizeof ours[6]);
     assert_int_equal(answers(FIRST_CODE + 6), -2);
@@ -191,11 +185,9 @@ static void add_declining(unsigned which, uint8_t code)
 
 TEST(a_function_that_declines_leaves_the_request_to_the_built_in_one)
 {
-    unsigned before, i;
-
-    for (before = 0; before < MBM_MAX_SERVICES - 1; before++) {
+    for (unsigned before = 0; before < MBM_MAX_SERVICES - 1; before++) {
         reset();
-        for (i = 0; i < before; i++)
+        for (unsigned i = 0; i < before; i++)
             add(i, (uint8_t)(FIRST_CODE + i));
         add_declining(before, 3);
         OK(mbm_unit_serveHoldingRegisters(&unit, &table));
@@ -231,9 +223,7 @@ TEST(a_function_that_declines_leaves_the_request_to_the_next_of_its_code)
 
 TEST(a_request_that_all_decline_is_answered_with_exception_01)
 {
-    unsigned i;
-
-    for (i = 0; i < MBM_MAX_SERVICES; i++)
+    for (unsigned i = 0; i < MBM_MAX_SERVICES; i++)
         add_declining(i, i % 2 ? FIRST_CODE : 0);
     assert_int_equal(answers(FIRST_CODE), -2);
     assert_int_equal(declining.calls, MBM_MAX_SERVICES);

@@ -83,9 +83,8 @@ static void reads_are_refused_by(modbus_t *client, uint8_t code)
 TEST(a_read_is_refused_with_every_exception)
 {
     uint16_t word;
-    uint8_t code;
 
-    for (code = 1; code <= 11; code++) {
+    for (uint8_t code = 1; code <= 11; code++) {
         watching.refuse_read = code;
         reads_are_refused_by(line, code);
         reads_are_refused_by(first, code);
@@ -114,12 +113,10 @@ static unsigned refreshed;
 
 static void refresh(char hook, const mbm_access *access)
 {
-    unsigned i;
-
     if (hook != 'r')
         return;
     refreshed++;
-    for (i = access->address - SERVED_BASE;
+    for (unsigned i = access->address - SERVED_BASE;
          i < access->address - SERVED_BASE + 0u + access->quantity; i++)
         if (access->function == 3)
             rtu.words[i] = (uint16_t)(1000 * refreshed + i);
@@ -320,9 +317,8 @@ TEST(a_wrong_request_calls_no_hook)
         size_t length;
         uint8_t code;
     } of[] = {{5, 3}, {5, 2}, {5, 2}, {5, 2}, {5, 3}, {7, 3}, {7, 2}, {12, 2}, {12, 2}};
-    unsigned i;
 
-    for (i = 0; i < COUNT(wrong); i++) {
+    for (unsigned i = 0; i < COUNT(wrong); i++) {
         const uint8_t response[] = {(uint8_t)(wrong[i][0] | 0x80), of[i].code};
 
         asked_frames(modbus_get_socket(first), MBM_FRAMING_TCP, SERVED_UNIT,

@@ -86,13 +86,12 @@ TEST(foreign_frames_around_requests_are_ignored)
 {
     static const uint8_t ours[] = {SERVED_UNIT, 3, 0, SERVED_BASE, 0, 1, 0, 0};
     uint8_t bytes[600], answer[600];
-    unsigned round, i;
 
-    for (round = 0; round < 20; round++) {
+    for (unsigned round = 0; round < 20; round++) {
         size_t n = 0;
 
         /* A request and the response of another unit, with no silence between any frames. */
-        for (i = 0; i < round % 4; i++) {
+        for (unsigned i = 0; i < round % 4; i++) {
             memcpy(bytes + n, "\x30\x03\x00\x00\x00\x10", 6);
             seal(bytes + n, 6);
             n += 8;
@@ -111,10 +110,9 @@ TEST(foreign_frames_around_requests_are_ignored)
 TEST(damaged_and_cut_frames_are_not_answered)
 {
     uint8_t bytes[8] = {SERVED_UNIT, 3, 0, SERVED_BASE, 0, 1}, answer[600];
-    size_t length;
 
     seal(bytes, 6);
-    for (length = 1; length < 8; length++)
+    for (size_t length = 1; length < 8; length++)
         assert_int_equal(asked_bytes(modbus_get_socket(client), bytes, length, answer, 0), 0);
     bytes[4] ^= 0x40;
     assert_int_equal(asked_bytes(modbus_get_socket(client), bytes, 8, answer, 0), 0);

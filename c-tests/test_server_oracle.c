@@ -55,11 +55,9 @@ static int is_in_one_piece(unsigned first, unsigned quantity)
 
 static int exists(unsigned address, unsigned quantity)
 {
-    unsigned i;
-
     if (address < BASE || address + quantity > BASE + CELLS)
         return 0;
-    for (i = address - BASE; i < address - BASE + quantity; i++)
+    for (unsigned i = address - BASE; i < address - BASE + quantity; i++)
         if (i == 20 || i == 33)
             return 0;
     return !is_split || quantity == 0 || is_in_one_piece(address - BASE, quantity);
@@ -89,11 +87,9 @@ static size_t refuse(uint8_t *out, uint8_t function, uint8_t code)
 
 static size_t words_of(uint8_t *out, uint8_t function, const uint16_t *cells, unsigned quantity)
 {
-    unsigned i;
-
     out[0] = function;
     out[1] = (uint8_t)(2 * quantity);
-    for (i = 0; i < quantity; i++) {
+    for (unsigned i = 0; i < quantity; i++) {
         out[2 + 2 * i] = (uint8_t)(cells[i] >> 8);
         out[3 + 2 * i] = (uint8_t)cells[i];
     }
@@ -106,7 +102,7 @@ static size_t expected_response(const uint8_t *pdu, size_t length, uint8_t *out)
 {
     uint8_t function = pdu[0];
     unsigned address = length >= 3 ? word(pdu + 1) : 0, quantity = length >= 5 ? word(pdu + 3) : 0;
-    unsigned i, bytes, written, to;
+    unsigned bytes, written, to;
 
     memcpy(out, pdu, length < 7 ? length : 7);
     switch (function) {
@@ -119,7 +115,7 @@ static size_t expected_response(const uint8_t *pdu, size_t length, uint8_t *out)
         bytes = (quantity + 7) / 8;
         memset(out + 1, 0, 1 + bytes);
         out[1] = (uint8_t)bytes;
-        for (i = 0; i < quantity; i++)
+        for (unsigned i = 0; i < quantity; i++)
             out[2 + i / 8] |= (uint8_t)(model.bits[function - 1][address - BASE + i] << i % 8);
         return 2 + bytes;
     case 3:
@@ -148,7 +144,7 @@ static size_t expected_response(const uint8_t *pdu, size_t length, uint8_t *out)
             return refuse(out, function, 3);
         if (!exists(address, quantity))
             return refuse(out, function, 2);
-        for (i = 0; i < quantity; i++)
+        for (unsigned i = 0; i < quantity; i++)
             if (function == 0x0F)
                 model.bits[0][address - BASE + i] = pdu[6 + i / 8] >> i % 8 & 1;
             else
@@ -170,7 +166,7 @@ static size_t expected_response(const uint8_t *pdu, size_t length, uint8_t *out)
             return refuse(out, function, 3);
         if (!exist(address, quantity, to, written))
             return refuse(out, function, 2);
-        for (i = 0; i < written; i++)
+        for (unsigned i = 0; i < written; i++)
             model.words[0][to - BASE + i] = (uint16_t)word(pdu + 10 + 2 * i);
         return words_of(out, function, &model.words[0][address - BASE], quantity);
     default: return refuse(out, function, 1);
@@ -243,15 +239,13 @@ static size_t some_request(uint8_t *pdu)
 
 static void prepare(void)
 {
-    unsigned i;
-
     memset(&memory, 0xA5, sizeof memory);
     memset(memory.coils, 0, sizeof memory.coils);
     memset(memory.discrete, 0, sizeof memory.discrete);
     memset(valid, 0xFF, sizeof valid);
     valid[20 / 8] &= (uint8_t) ~(1u << 20 % 8);
     valid[33 / 8] &= (uint8_t) ~(1u << 33 % 8);
-    for (i = 0; i < CELLS; i++) {
+    for (unsigned i = 0; i < CELLS; i++) {
         model.words[0][i] = memory.holding[i] = (uint16_t)below(0x10000);
         model.words[1][i] = memory.inputs[i] = (uint16_t)below(0x10000);
         model.bits[0][i] = (uint8_t)below(2);
@@ -346,9 +340,8 @@ static uint8_t serve_piece(unsigned i)
 {
     const unsigned first = first_of[i];
     uint8_t status = MBM_OK;
-    unsigned kind;
 
-    for (kind = 0; kind < 2; kind++) {
+    for (unsigned kind = 0; kind < 2; kind++) {
         mbm_registerTable *words = &word_pieces[kind][i];
         mbm_bitTable *bits = &bit_pieces[kind][i];
 
@@ -405,7 +398,6 @@ static void compare_with_model(mbm_unit *asked)
     const char *fewer = getenv("MBM_TRANSACTIONS");
     long rounds = fewer ? atol(fewer) : 1000000, round;
     uint8_t packed[2][CELLS / 8];
-    unsigned i;
 
     for (round = 0; round < rounds; round++) {
         uint8_t pdu[300], expected[300], frame[256];
@@ -430,7 +422,7 @@ static void compare_with_model(mbm_unit *asked)
             assert_int_equal(crc16(frame, answered), 0);
         }
         memset(packed, 0, sizeof packed);
-        for (i = 0; i < CELLS; i++) {
+        for (unsigned i = 0; i < CELLS; i++) {
             packed[0][i / 8] |= (uint8_t)(model.bits[0][i] << i % 8);
             packed[1][i / 8] |= (uint8_t)(model.bits[1][i] << i % 8);
         }

@@ -229,10 +229,8 @@ static void close_tcp(int in_set)
 
 TEST(over_tcp_the_server_goes_on_after_the_reply)
 {
-    int in_set, has_header;
-
-    for (in_set = 0; in_set < 2; in_set++)
-        for (has_header = 0; has_header < 2; has_header++) {
+    for (int in_set = 0; in_set < 2; in_set++)
+        for (int has_header = 0; has_header < 2; has_header++) {
             open_tcp(in_set, has_header);
             goes_on_after_each_reply();
             close_tcp(in_set);

@@ -89,10 +89,9 @@ static uint16_t fill(void *context, const mbm_request *request, uint8_t *respons
                      uint16_t capacity)
 {
     uint8_t sum = 0;
-    uint16_t i;
 
     (void)context;
-    for (i = 0; i < request->length; i++)
+    for (uint16_t i = 0; i < request->length; i++)
         sum = (uint8_t)(sum + request->data[i]);
     check_place(response, capacity);
     memset(response, sum, capacity);
@@ -126,14 +125,12 @@ static void put(const uint8_t *bytes, unsigned count)
 /* Polls until all bytes were read, then until the silence of any framing is over. */
 static void run(void)
 {
-    unsigned turn;
-
-    for (turn = 0; turn < 5000 && (line.next < line.length || turn % 8); turn++) {
+    for (unsigned turn = 0; turn < 5000 && (line.next < line.length || turn % 8); turn++) {
         (void)mbm_server_poll(&server);
         line.now += 10;
     }
     assert_int_equal(line.next, line.length);
-    for (turn = 0; turn < 40; turn++) {
+    for (unsigned turn = 0; turn < 40; turn++) {
         line.now += 2000000;
         (void)mbm_server_poll(&server);
     }
@@ -188,10 +185,9 @@ static void exchange(begin_function *how, const uint8_t *pdu, unsigned length)
 static void ask_everything(begin_function *how, unsigned pieces)
 {
     uint8_t pdu[260] = {0x10, 0, 0};
-    unsigned n;
 
     line.at_once = pieces;
-    for (n = 1; n <= 123; n += n < 8 || n > 118 ? 1 : 9) {
+    for (unsigned n = 1; n <= 123; n += n < 8 || n > 118 ? 1 : 9) {
         pdu[0] = 0x10;
         memset(pdu + 1, 0, 3);
         pdu[4] = (uint8_t)n;
@@ -199,7 +195,7 @@ static void ask_everything(begin_function *how, unsigned pieces)
         memset(pdu + 6, (int)n, 2 * n);
         exchange(how, pdu, 6 + 2 * n);
     }
-    for (n = 1; n <= 125; n++) {
+    for (unsigned n = 1; n <= 125; n++) {
         const uint8_t read[] = {3, 0, 0, 0, (uint8_t)n};
         const uint8_t read_coils[] = {1, 0, 3, (uint8_t)(16 * n >> 8), (uint8_t)(16 * n - 3)};
 
@@ -211,16 +207,14 @@ static void ask_everything(begin_function *how, unsigned pieces)
         assert_int_not_equal(line.sent, 0);
     }
     pdu[0] = ECHO_CODE;
-    for (n = 1; n <= 253; n += n < 20 || n > 245 ? 1 : 7)
+    for (unsigned n = 1; n <= 253; n += n < 20 || n > 245 ? 1 : 7)
         exchange(how, pdu, n);
 }
 
 /* Appends bytes that are no frame. */
 static void noise(unsigned count, unsigned seed)
 {
-    unsigned i;
-
-    for (i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++) {
         seed = seed * 1103515245 + 12345;
         line.bytes[line.length++] = (uint8_t)(seed >> 16);
     }
@@ -233,10 +227,11 @@ static void flood(begin_function *how, unsigned size)
                                size - 3, size - 2, size - 1, size,        size + 1, size + 3,
                                size + 4, size + 5, 2 * size, 2 * size + 3};
     uint8_t frame[2 * MOST];
-    unsigned i, pieces;
 
-    for (pieces = 1; pieces <= MOST; pieces = pieces == 1 ? 3 : pieces == 3 ? MOST : MOST + 1) {
-        for (i = 0; i < sizeof counts / sizeof counts[0]; i++) {
+    for (unsigned pieces = 1; pieces <= MOST; pieces = pieces == 1   ? 3
+                                                       : pieces == 3 ? MOST
+                                                                     : MOST + 1) {
+        for (unsigned i = 0; i < sizeof counts / sizeof counts[0]; i++) {
             assert_true(begin(how, size));
             line.at_once = pieces;
             noise(counts[i], i);
@@ -256,10 +251,10 @@ TEST(a_frame_of_each_framing_is_kept_inside_a_buffer_of_any_size)
     static begin_function *const all[] = {mbm_server_beginRtu, mbm_server_beginAscii,
                                           mbm_server_beginTcp, mbm_server_beginRtuOverTcp};
     static const unsigned least[] = {16, 32, 260, 16};
-    unsigned how, size;
 
-    for (how = 0; how < 4; how++) {
-        for (size = least[how] - 1; size <= MOST; size += size < least[how] + 12 ? 1 : 61) {
+    for (unsigned how = 0; how < 4; how++) {
+        for (unsigned size = least[how] - 1; size <= MOST;
+             size += size < least[how] + 12 ? 1 : 61) {
             if (!begin(all[how], size)) {
                 assert_int_equal(size, least[how] - 1);
                 continue;
@@ -272,9 +267,7 @@ TEST(a_frame_of_each_framing_is_kept_inside_a_buffer_of_any_size)
 
 TEST(noise_of_any_length_is_kept_inside_the_buffer)
 {
-    unsigned size;
-
-    for (size = 16; size <= 300; size += size < 24 ? 1 : 92)
+    for (unsigned size = 16; size <= 300; size += size < 24 ? 1 : 92)
         flood(mbm_server_beginRtu, size);
     flood(mbm_server_beginRtuOverTcp, 16);
     flood(mbm_server_beginRtuOverTcp, 41);
@@ -283,7 +276,7 @@ TEST(noise_of_any_length_is_kept_inside_the_buffer)
     /* Noise ends a TCP stream. */
     assert_true(begin(mbm_server_beginTcp, 260));
     noise(600, 1);
-    for (size = 0; size < 100; size++)
+    for (unsigned size = 0; size < 100; size++)
         (void)mbm_server_poll(&server);
 }
 
@@ -291,9 +284,8 @@ TEST(a_port_that_lies_is_kept_inside_the_buffer)
 {
     static const uint8_t read[] = {3, 0, 0, 0, 2};
     uint8_t frame[2 * MOST];
-    unsigned size, turn;
 
-    for (size = 16; size < 40; size++) {
+    for (unsigned size = 16; size < 40; size++) {
         assert_true(begin(mbm_server_beginRtu, size));
         line.lies = 1;
         noise(3 * size, size);
@@ -301,7 +293,7 @@ TEST(a_port_that_lies_is_kept_inside_the_buffer)
         line.lies = 0;
         assert_true(begin(mbm_server_beginRtu, size));
         put(frame, framed(frame, mbm_server_beginRtu, read, sizeof read));
-        for (turn = 0; turn < 40 && line.next < line.length; turn++)
+        for (unsigned turn = 0; turn < 40 && line.next < line.length; turn++)
             (void)mbm_server_poll(&server);
         line.lies = 1;
         run();
@@ -313,12 +305,12 @@ TEST(an_echo_of_any_length_is_kept_inside_the_buffer)
 {
     static const uint8_t read[] = {3, 0, 0, 0, 2};
     uint8_t frame[2 * MOST];
-    unsigned size, length, pieces, more;
+    unsigned length;
 
     length = framed(frame, mbm_server_beginRtu, read, sizeof read);
-    for (size = 16; size < 24; size++) {
-        for (pieces = 1; pieces < 12; pieces++) {
-            for (more = 0; more < 3 * size; more += 5) {
+    for (unsigned size = 16; size < 24; size++) {
+        for (unsigned pieces = 1; pieces < 12; pieces++) {
+            for (unsigned more = 0; more < 3 * size; more += 5) {
                 assert_true(begin(mbm_server_beginRtu, size));
                 assert_int_equal(mbm_server_setEchoDiscard(&server, 1), MBM_OK);
                 put(frame, length);

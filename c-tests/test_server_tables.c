@@ -19,10 +19,8 @@ static uint8_t response[MBM_MAX_FRAME];
 
 static void fill(mbm_registerTable *table, uint16_t *words, uint16_t base)
 {
-    unsigned i;
-
     memset(table, 0, sizeof *table);
-    for (i = 0; i < 4; i++)
+    for (unsigned i = 0; i < 4; i++)
         words[i] = (uint16_t)(base + i);
     table->words = words;
     table->base = base;
@@ -190,10 +188,9 @@ TEST(bits_of_several_tables_are_read_and_written)
 {
     static uint8_t bits[2];
     static mbm_bitTable coils[2];
-    unsigned i;
 
     memset(coils, 0, sizeof coils);
-    for (i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         bits[i] = 0;
         coils[i].bits = &bits[i];
         coils[i].base = (uint16_t)(100 * i);
@@ -288,10 +285,9 @@ TEST(files_of_several_records_are_read_and_written)
 {
     static const mbm_file files[2] = {{low, 4, 1}, {high, 4, 2}};
     static mbm_files records[2];
-    unsigned i;
 
     memset(records, 0, sizeof records);
-    for (i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         records[i].files = &files[i];
         records[i].count = 1;
         OK(mbm_unit_serveFiles(&unit, &records[i]));
@@ -306,10 +302,9 @@ TEST(queues_of_several_records_are_read)
 {
     static const mbm_fifo fifos[2] = {{low, 50, 1}, {high, 60, 2}};
     static mbm_fifos records[2];
-    unsigned i;
 
     memset(records, 0, sizeof records);
-    for (i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         records[i].fifos = &fifos[i];
         records[i].count = 1;
         OK(mbm_unit_serveFifos(&unit, &records[i]));

@@ -44,9 +44,8 @@ fixture each_test = {start, stop};
 static void go_round(void)
 {
     uint16_t word;
-    unsigned i;
 
-    for (i = 0; i < 3; i++)
+    for (unsigned i = 0; i < 3; i++)
         assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
 }
 
@@ -103,14 +102,13 @@ TEST(requests_in_one_segment_are_answered_in_turn)
     static const uint8_t one[] = {0, 1, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 1};
     uint8_t bytes[20 * sizeof one], answer[600];
     int fd = tcp_connect((uint16_t)tcp.port);
-    unsigned i;
 
-    for (i = 0; i < 20; i++) {
+    for (unsigned i = 0; i < 20; i++) {
         memcpy(bytes + i * sizeof one, one, sizeof one);
         bytes[i * sizeof one + 1] = (uint8_t)i;
     }
     assert_int_equal(asked_bytes(fd, bytes, sizeof bytes, answer, 20 * 11), 20 * 11);
-    for (i = 0; i < 20; i++)
+    for (unsigned i = 0; i < 20; i++)
         assert_int_equal(answer[i * 11 + 1], i);
     close(fd);
 }
@@ -122,12 +120,12 @@ TEST(slow_and_half_open_connections_do_not_stall_others)
     int slow = tcp_connect((uint16_t)tcp.port), silent = tcp_connect((uint16_t)tcp.port);
     uint8_t answer[600];
     uint16_t word;
-    unsigned i, k;
+    unsigned i;
 
     assert_int_equal(write(silent, one, 5), 5);
     for (i = 0; i < sizeof one - 1; i++) {
         assert_int_equal(asked_bytes(slow, &one[i], 1, answer, 0), 0);
-        for (k = 0; k < 20; k++)
+        for (unsigned k = 0; k < 20; k++)
             assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
     }
     usleep(1100000);
@@ -141,10 +139,9 @@ static int far_end(int fd)
 {
     struct sockaddr_in ours, theirs;
     socklen_t size = sizeof ours;
-    unsigned i;
 
     assert_int_equal(getsockname(fd, (struct sockaddr *)&ours, &size), 0);
-    for (i = 0; i < SERVED_CONNECTIONS; i++) {
+    for (unsigned i = 0; i < SERVED_CONNECTIONS; i++) {
         size = sizeof theirs;
         if (tcp.fds[i] >= 0 && getpeername(tcp.fds[i], (struct sockaddr *)&theirs, &size) == 0 &&
             theirs.sin_port == ours.sin_port)
@@ -210,15 +207,14 @@ TEST(a_client_that_reads_nothing_does_not_stall_others)
 TEST(further_connections_are_closed_and_the_others_served)
 {
     int fds[SERVED_CONNECTIONS + 8];
-    unsigned i;
 
-    for (i = 0; i < COUNT(fds); i++) {
+    for (unsigned i = 0; i < COUNT(fds); i++) {
         fds[i] = tcp_connect((uint16_t)tcp.port);
         go_round();
     }
-    for (i = 0; i < COUNT(fds); i++)
+    for (unsigned i = 0; i < COUNT(fds); i++)
         assert_int_equal(asked_is_served(fds[i], SERVED_UNIT, 0x6D), i < FREE);
-    for (i = 0; i < COUNT(fds); i++)
+    for (unsigned i = 0; i < COUNT(fds); i++)
         close(fds[i]);
     all_places_are_free();
 }
@@ -238,9 +234,8 @@ TEST(a_stream_that_is_not_modbus_is_closed)
 TEST(a_connection_that_breaks_frees_its_place)
 {
     const struct linger hard = {1, 0};
-    unsigned i;
 
-    for (i = 0; i < 50; i++) {
+    for (unsigned i = 0; i < 50; i++) {
         int fd = tcp_connect((uint16_t)tcp.port);
 
         assert_int_equal(write(fd, "\0\1\0\0\0\6", i % 7), i % 7);

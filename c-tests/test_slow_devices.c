@@ -105,7 +105,6 @@ static void answer(world *w)
     uint16_t value = value_of((uint16_t)(w->sent[2] << 8 | w->sent[3]));
     uint8_t frame[7] = {0, 3, 2, (uint8_t)(value >> 8), (uint8_t)value};
     uint64_t at;
-    size_t i;
 
     frame[0] = w->sent[0];
     (void)seal(frame, 5);
@@ -125,16 +124,15 @@ static void answer(world *w)
         }
         w->free = at + sizeof frame * CHARACTER;
     }
-    for (i = 0; i < sizeof frame; i++)
+    for (size_t i = 0; i < sizeof frame; i++)
         deliver(w, at + i * CHARACTER, frame[i]);
 }
 
 static int16_t write_bytes(void *context, const uint8_t *bytes, uint16_t count)
 {
     world *w = (world *)context;
-    uint16_t i;
 
-    for (i = 0; i < count; i++) {
+    for (uint16_t i = 0; i < count; i++) {
         w->sent[w->sent_count++] = bytes[i];
         if (w->sent_count == 8) {
             w->now += 8 * CHARACTER;
@@ -237,7 +235,6 @@ static void add_reads(outcome *sum, int has_client, lateness kind, uint32_t late
 {
     user *u = (user *)calloc(1, sizeof *u);
     uint8_t before = MBM_OK;
-    uint16_t i;
 
     assert_non_null(u);
     u->w.latency = latency;
@@ -245,7 +242,7 @@ static void add_reads(outcome *sum, int has_client, lateness kind, uint32_t late
     u->w.late = late;
     u->w.kind = kind;
     begin(u, has_client, timeout);
-    for (i = 0; i < READS; i++) {
+    for (uint16_t i = 0; i < READS; i++) {
         uint16_t value = 0;
         uint64_t began = u->w.now;
         uint8_t status = reads(u, UNIT, i, &value);
@@ -279,12 +276,10 @@ static const uint32_t late_by[] = {1, 20, 90, 250, 1000, 2600, 7000};
 static outcome outcome_of(uint32_t latency, uint32_t timeout, uint32_t pause, int mixed)
 {
     outcome sum = {0};
-    unsigned kind, late;
-    int has_client;
 
-    for (kind = 0; kind < LATENESSES; kind++)
-        for (late = 0; late < COUNT(late_by); late++)
-            for (has_client = 0; has_client < 2 && (pause < timeout || late_by[late] < timeout);
+    for (unsigned kind = 0; kind < LATENESSES; kind++)
+        for (unsigned late = 0; late < COUNT(late_by); late++)
+            for (int has_client = 0; has_client < 2 && (pause < timeout || late_by[late] < timeout);
                  has_client++)
                 add_reads(&sum, has_client, (lateness)kind, latency * MS, timeout * MS,
                           late_by[late] * MS, pause * MS, mixed);
@@ -293,15 +288,13 @@ static outcome outcome_of(uint32_t latency, uint32_t timeout, uint32_t pause, in
 
 static void assert_never_wrong(int mixed, FILE *table)
 {
-    unsigned i, j, k;
-
-    for (i = 0; i < COUNT(latencies); i++)
-        for (j = 0; j < COUNT(timeouts); j++) {
+    for (unsigned i = 0; i < COUNT(latencies); i++)
+        for (unsigned j = 0; j < COUNT(timeouts); j++) {
             if (latencies[i] >= timeouts[j])
                 continue;
             if (table)
                 fprintf(table, "| %u | %u |", (unsigned)latencies[i], (unsigned)timeouts[j]);
-            for (k = 0; k < COUNT(pauses); k++) {
+            for (unsigned k = 0; k < COUNT(pauses); k++) {
                 outcome o = outcome_of(latencies[i], timeouts[j], pauses[k], mixed);
 
                 if (table)
@@ -340,9 +333,7 @@ TEST(reads_of_a_fast_device_in_between_do_not_shift_those_of_a_slow_one)
 /* The second unit that does not answer must not make the master forget the first. */
 TEST(a_late_reply_is_expected_though_another_unit_is_silent)
 {
-    int has_client;
-
-    for (has_client = 0; has_client < 2; has_client++) {
+    for (int has_client = 0; has_client < 2; has_client++) {
         user *u = (user *)calloc(1, sizeof *u);
         uint16_t i, value;
 

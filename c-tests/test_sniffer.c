@@ -103,11 +103,10 @@ TEST(every_example_is_found_as_a_frame)
     mbm_packet packet;
     mbm_event event;
     uint16_t length, size;
-    size_t i;
 
     for (kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_TCP; kind++) {
         framing.kind = kind;
-        for (i = 0; i < example_count; i++) {
+        for (size_t i = 0; i < example_count; i++) {
             uint8_t side = example_side(&examples[i]);
 
             begin(kind);
@@ -197,7 +196,6 @@ TEST(user_defined_functions_are_reported)
     mbm_packet packet = {0};
     uint8_t frame[MBM_MAX_FRAME];
     uint16_t size;
-    size_t i;
 
     framing.functions = own;
     framing.functionCount = 1;
@@ -211,7 +209,7 @@ TEST(user_defined_functions_are_reported)
     now = 0;
     feed(frame, size);
     assert_next("unit 17  request    55 unknown function: 01 02");
-    for (i = 0; i < COUNT(many); i++)
+    for (size_t i = 0; i < COUNT(many); i++)
         many[i] = own[0];
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFunctions(&sniffer, many, COUNT(many)));
     many[0].code = 0;

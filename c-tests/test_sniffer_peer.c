@@ -147,9 +147,8 @@ static void assert_all_reported(const modbus_mapping_t *mapping)
 {
     const reported *t = line.events;
     uint32_t took = micros() - line.begun;
-    unsigned i;
 
-    for (i = 0; i < line.count; i++) {
+    for (unsigned i = 0; i < line.count; i++) {
         uint8_t kind = i % 2 == 0           ? MBM_EVENT_REQUEST
                        : i == 2 * CALLS - 1 ? MBM_EVENT_EXCEPTION
                                             : MBM_EVENT_REPLY;
@@ -159,11 +158,11 @@ static void assert_all_reported(const modbus_mapping_t *mapping)
         assert_true(t[i].event.kind == MBM_EVENT_REQUEST || t[i].event.responseTimeUs < took);
     }
     assert_int_equal(line.count, 2 * CALLS);
-    for (i = 0; i < 19; i++)
+    for (unsigned i = 0; i < 19; i++)
         assert_int_equal(t[1].pdu[2 + i / 8] >> i % 8 & 1, server_bit_pattern(3 + i));
     assert_int_equal(t[1].event.address, 3);
     assert_int_equal(t[1].event.quantity, 19);
-    for (i = 0; i < 125; i++)
+    for (unsigned i = 0; i < 125; i++)
         assert_int_equal(t[5].pdu[2 + 2 * i] << 8 | t[5].pdu[3 + 2 * i], server_pattern(7 + i));
     assert_int_equal(t[5].event.address, 7);
     assert_int_equal(t[7].pdu[2] << 8 | t[7].pdu[3], mapping->tab_input_registers[9]);

@@ -51,9 +51,8 @@ static int64_t now_ms(void)
 static void send_requests(unsigned id, unsigned count)
 {
     uint8_t requests[12 * 8];
-    unsigned i;
 
-    for (i = 0; i < count; i++, id++) {
+    for (unsigned i = 0; i < count; i++, id++) {
         const uint8_t request[12] = {(uint8_t)(id >> 8), (uint8_t)id, 0, 0, 0, 6, 7, 3,
                                      (uint8_t)(id >> 8), (uint8_t)id, 0, 1};
 
@@ -153,12 +152,11 @@ TEST(requests_in_one_send_and_in_pieces_are_found)
 {
     const uint8_t two[24] = {0, 1, 0, 0, 0, 6, 7, 3, 0, 1, 0, 1,
                              0, 2, 0, 0, 0, 6, 7, 3, 0, 2, 0, 1};
-    size_t i;
 
     assert_int_equal(send(s, two, sizeof two, 0), sizeof two);
     expect(1);
     expect(2);
-    for (i = 0; i < sizeof two; i++) {
+    for (size_t i = 0; i < sizeof two; i++) {
         assert_int_equal(send(s, two + i, 1, 0), 1);
         usleep(500);
     }
@@ -296,15 +294,14 @@ TEST(an_exception_leaves_the_memory_alone)
 TEST(garbage_comes_before_the_reply_and_is_no_header)
 {
     uint8_t got[7 + REPLY];
-    size_t i;
 
     tcp_peer_fault(peer, 1, FAULT_GARBAGE, 7);
     send_request(0x100);
     receive_all(got, 7);
-    for (i = 0; i < 7; i++)
+    for (size_t i = 0; i < 7; i++)
         assert_int_equal(got[i], 0xA5);
     receive_all(got + 7, REPLY - 2);
-    for (i = 0; i < 7; i++) {
+    for (size_t i = 0; i < 7; i++) {
         unsigned protocol = (unsigned)got[i + 2] << 8 | got[i + 3];
         unsigned length = (unsigned)got[i + 4] << 8 | got[i + 5];
 
@@ -358,11 +355,10 @@ TEST(a_connection_beyond_the_limit_is_refused)
 {
     int others[TCP_PEER_CONNECTIONS], first = s;
     uint8_t byte;
-    unsigned i;
 
     send_request(1);
     expect(1);
-    for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
+    for (unsigned i = 0; i < TCP_PEER_CONNECTIONS; i++)
         others[i] = tcp_connect(port);
     s = others[TCP_PEER_CONNECTIONS - 1];
     assert_true(receive(&byte, 1, PATIENCE_MS) <= 0);
@@ -370,7 +366,7 @@ TEST(a_connection_beyond_the_limit_is_refused)
     send_request(2);
     expect(2);
     assert_int_equal(tcp_peer_count(peer).refused, 1);
-    for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
+    for (unsigned i = 0; i < TCP_PEER_CONNECTIONS; i++)
         close(others[i]);
     s = first;
 }
@@ -396,11 +392,10 @@ static tcp_peer_counts run_chaos(uint32_t seed)
 {
     static const tcp_fault kinds[] = {FAULT_DROP, FAULT_TWICE, FAULT_OTHER_ID, FAULT_GARBAGE};
     tcp_peer_counts counts;
-    unsigned i;
     uint8_t got[512];
 
     tcp_peer_chaos(peer, seed, 40, kinds, COUNT(kinds), 0);
-    for (i = 0; i < 200; i++)
+    for (unsigned i = 0; i < 200; i++)
         send_request(i);
     do
         usleep(1000);

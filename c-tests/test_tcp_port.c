@@ -403,7 +403,6 @@ TEST(a_master_reads_rtu_through_a_stream)
     static model memory;
     mbm_tcp_listener listener = {0};
     pthread_t thread;
-    unsigned i;
 
     model_start(&memory);
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
@@ -415,7 +414,7 @@ TEST(a_master_reads_rtu_through_a_stream)
     OK(mbm_node_begin(&node, &line, MODEL_FIRST_UNIT, response, 100, NULL, 0));
     OK(mbm_line_setGap(&line, 0));
     OK(mbm_node_setResponseTimeout(&node, PATIENCE_MS));
-    for (i = 1; i <= 100; i++) {
+    for (unsigned i = 1; i <= 100; i++) {
         OK(mbm_node_readHoldingRegisters(&node, (uint16_t)i, (uint16_t)i));
         assert_memory_equal(response, &memory.holding[0][i], 2 * i);
     }

@@ -63,12 +63,10 @@ static void begin(void)
 
 static void end(void)
 {
-    unsigned i;
-
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         mbm_tcp_close(&tcps[i]);
-    for (i = 0; i < peer_count; i++)
+    for (unsigned i = 0; i < peer_count; i++)
         close(peers[i]);
     mbm_tcp_closeListener(&listener);
     if (taken >= 0)
@@ -222,11 +220,10 @@ TEST(a_full_socket_is_ready_once_it_accepts_bytes_again)
 
 TEST(a_closed_socket_is_not_reported)
 {
-    unsigned i;
     int other;
 
     fill(4);
-    for (i = 0; i < 4; i++)
+    for (unsigned i = 0; i < 4; i++)
         peer_sends(i, "x");
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
     mbm_tcp_close(&tcps[1]);
@@ -249,12 +246,11 @@ TEST(a_connection_is_reported_when_it_is_made_and_made_anew)
     tcp_peer *peer = tcp_peer_new();
     mbm_tcp_addresses addresses;
     char service[8];
-    unsigned round;
 
     snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
     assert_int_equal(mbm_tcp_open(&tcps[0], &addresses, "127.0.0.1", service), 0);
     assert_int_equal(mbm_tcp_add(&set, &tcps[0]), 0);
-    for (round = 0; round < 2; round++) {
+    for (unsigned round = 0; round < 2; round++) {
         const uint8_t read_one[12] = {0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1};
         const mbm_port port = mbm_tcp_port(&tcps[0]);
 
@@ -318,11 +314,10 @@ TEST(a_socket_that_has_left_its_set_is_waited_for_alone)
 TEST(the_idle_time_counts_from_the_last_byte)
 {
     const mbm_port port = mbm_tcp_port(&tcps[0]);
-    unsigned i;
 
     fill(1);
     mbm_tcp_remove(&tcps[0]);
-    for (i = 0; i < 300; i++) {
+    for (unsigned i = 0; i < 300; i++) {
         peer_sends(0, "x");
         (void)port.micros(port.context);
         assert_int_equal(read_some(0, 1), 1);
@@ -363,11 +358,9 @@ static void wait_for_connection(void)
 
 static void take_all_places(void)
 {
-    int i;
-
     connect_some(PLACES);
     wait_for_connection();
-    for (i = 0; i < PLACES; i++)
+    for (int i = 0; i < PLACES; i++)
         assert_int_equal(accept_one(), i);
     FAILS(EAGAIN, accept_one());
 }

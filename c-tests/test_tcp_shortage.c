@@ -67,12 +67,10 @@ static void begin(void)
 
 static void end(void)
 {
-    unsigned i;
-
     limit_descriptors(found.rlim_cur);
-    for (i = 0; i < client_count; i++)
+    for (unsigned i = 0; i < client_count; i++)
         close(clients[i]);
-    for (i = 0; i < PLACES; i++)
+    for (unsigned i = 0; i < PLACES; i++)
         mbm_tcp_close(&places[i]);
     mbm_tcp_closeListener(&listener);
     alarm(0);
@@ -99,10 +97,8 @@ static void expect_none(int error)
 
 static void fill(void)
 {
-    int i;
-
     connect_some(PLACES);
-    for (i = 0; i < PLACES; i++)
+    for (int i = 0; i < PLACES; i++)
         assert_int_equal(accept_one(), i);
 }
 
@@ -166,7 +162,6 @@ static void accept_one_and_let_two_wait(void)
 
 TEST(a_connection_without_a_descriptor_is_closed_at_once)
 {
-    unsigned i;
     char byte;
 
     SKIP_WITHOUT_LIMITS();
@@ -176,7 +171,7 @@ TEST(a_connection_without_a_descriptor_is_closed_at_once)
     leave_no_descriptor();
     expect_none(EAGAIN);
     assert_int_equal(listener.refused, 2);
-    for (i = 1; i < 3; i++)
+    for (unsigned i = 1; i < 3; i++)
         assert_int_equal(read(clients[i], &byte, 1), 0);
     assert_int_equal(wait_for(1000), 0);
     exchange_byte(0);
@@ -308,13 +303,11 @@ TEST(the_oldest_idle_connection_gives_its_place_to_a_new_one)
 
 TEST(an_idle_connection_stays_while_no_other_needs_its_place)
 {
-    unsigned i;
-
     listener.idleTimeMs = MINUTE_MS;
     fill();
     ahead = 3600;
     expect_none(EAGAIN);
-    for (i = 0; i < PLACES; i++)
+    for (unsigned i = 0; i < PLACES; i++)
         assert_int_equal(is_lost(i), 0);
 }
 
@@ -322,27 +315,24 @@ TEST(an_idle_connection_stays_while_no_other_needs_its_place)
 static void expect_turned_away(uint32_t refused)
 {
     char byte;
-    unsigned i;
 
     connect_some(1);
     expect_none(EAGAIN);
     assert_int_equal(listener.refused, refused);
     assert_int_equal(listener.idle, 0);
     assert_int_equal(read(clients[client_count - 1], &byte, 1), 0);
-    for (i = 0; i < PLACES; i++)
+    for (unsigned i = 0; i < PLACES; i++)
         assert_int_equal(is_lost(i), 0);
 }
 
 TEST(connections_that_are_not_idle_keep_their_places)
 {
-    unsigned i;
-
     fill();
     ahead = 3600;
     /* No idle time is set. */
     expect_turned_away(1);
     listener.idleTimeMs = MINUTE_MS;
-    for (i = 0; i < PLACES; i++) {
+    for (unsigned i = 0; i < PLACES; i++) {
         places[i].isBusy = i != 0;
         if (i == 0)
             exchange_byte(i);

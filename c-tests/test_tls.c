@@ -21,12 +21,10 @@ static const uint8_t secret[] = "Modbus in the clear";
 
 static void begin(void)
 {
-    unsigned i;
-
     tls_pair_begin(&pair, "operator", "server");
     memset(&unit, 0, sizeof unit);
     holding = (mbm_registerTable){.words = words, .base = FIRST, .size = WORDS};
-    for (i = 0; i < WORDS; i++)
+    for (unsigned i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(0xA55A ^ i);
     unit.id = 17;
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
@@ -111,9 +109,7 @@ TEST(the_handshake_and_requests_pass_in_pieces_of_one_byte)
 /* The wire holds few bytes, so each message waits for space in its middle. */
 TEST(a_wire_that_is_often_full_delays_everything_and_breaks_nothing)
 {
-    unsigned i;
-
-    for (i = 1; i < 60; i += (unsigned)tls_step(19, 40)) {
+    for (unsigned i = 1; i < 60; i += (unsigned)tls_step(19, 40)) {
         pair.to_server.capacity = pair.to_client.capacity = i;
         tls_pair_open(&pair, NULL);
         OK(mbm_client_reconnect(&client, NULL));
@@ -143,9 +139,8 @@ TEST(a_long_write_is_accepted_in_parts_while_the_wire_is_full)
     static uint8_t sent[3000], received[3000];
     size_t accepted = 0, have = 0;
     int16_t count;
-    unsigned i;
 
-    for (i = 0; i < sizeof sent; i++)
+    for (unsigned i = 0; i < sizeof sent; i++)
         sent[i] = (uint8_t)(i * 7);
     tls_pair_run(&pair);
     pair.to_server.capacity = 100;
@@ -190,10 +185,9 @@ TEST(requests_in_one_record_are_answered_in_turn)
 {
     static const uint8_t one[] = {0, 1, 0, 0, 0, 6, 17, 3, 0, FIRST, 0, 1};
     uint8_t all[20 * sizeof one], reply[11];
-    unsigned i;
 
     tls_pair_run(&pair);
-    for (i = 0; i < 20; i++) {
+    for (unsigned i = 0; i < 20; i++) {
         memcpy(all + i * sizeof one, one, sizeof one);
         all[i * sizeof one + 1] = (uint8_t)i;
     }
@@ -201,7 +195,7 @@ TEST(requests_in_one_record_are_answered_in_turn)
     OK(mbm_server_poll(&server));
     while (mbm_tls_pollDelay(&pair.server.tls) == 0)
         OK(mbm_server_poll(&server));
-    for (i = 0; i < 20; i++) {
+    for (unsigned i = 0; i < 20; i++) {
         assert_int_equal(read_at(&pair.client, reply, sizeof reply), sizeof reply);
         assert_int_equal(reply[1], i);
         assert_int_equal(reply[9] << 8 | reply[10], words[0]);
@@ -241,13 +235,13 @@ TEST(a_peer_that_is_silent_in_the_handshake_is_given_up_in_time)
 /* The client is gone after each number of bytes that it sends in a handshake. */
 TEST(a_peer_that_is_gone_in_the_handshake_is_a_lost_link)
 {
-    size_t whole, cut;
+    size_t whole;
     unsigned polls;
 
     tls_pair_run(&pair);
     whole = pair.to_server.moved;
     assert_true(whole > 500);
-    for (cut = 0; cut < whole - 100; cut += tls_step(151, 500)) {
+    for (size_t cut = 0; cut < whole - 100; cut += tls_step(151, 500)) {
         tls_pair_open(&pair, NULL);
         for (polls = 0; polls < 100 && !pair.to_server.is_cut; polls++) {
             (void)mbm_tls_poll(&pair.client.tls);
@@ -396,13 +390,12 @@ TEST(a_client_connects_anew_with_a_new_handshake)
     const mbm_linkHooks below = {.disconnect = cut, .connect = join};
     const mbm_linkHooks link = {
         .context = &pair.client.tls, .disconnect = mbm_tls_disconnect, .connect = mbm_tls_connect};
-    unsigned i;
 
     connects = 0;
     connect_status = MBM_PENDING;
     mbm_tls_close(&pair.client.tls);
     pair.client.tls.link = below;
-    for (i = 0; i < 3; i++) {
+    for (unsigned i = 0; i < 3; i++) {
         mbm_port own = {.context = &pair.client,
                         .micros = pair.client.tls.below.micros,
                         .read = pair.client.tls.below.read,
@@ -462,9 +455,7 @@ TEST(calls_out_of_order_are_refused_and_change_nothing)
 
 TEST(every_status_has_a_text)
 {
-    unsigned i;
-
-    for (i = 0; i <= MBM_TLS_AUTHORITY_NOT_YET_VALID; i++)
+    for (unsigned i = 0; i <= MBM_TLS_AUTHORITY_NOT_YET_VALID; i++)
         assert_string_not_equal(mbm_tls_text((uint8_t)i), "unknown status");
     assert_string_equal(mbm_tls_text(MBM_TLS_AUTHORITY_NOT_YET_VALID + 1), "unknown status");
     assert_string_equal(mbm_tls_alertText(48), "unknown ca");

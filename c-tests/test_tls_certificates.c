@@ -31,7 +31,6 @@ static const char *client_knows = "authority", *server_knows = "authority";
 static void meet(const char *client, const char *server, const char *name)
 {
     static const uint8_t secret[] = "the words of a register";
-    unsigned rounds;
 
     mbm_tls_close(&pair.client.tls);
     mbm_tls_close(&pair.server.tls);
@@ -40,7 +39,7 @@ static void meet(const char *client, const char *server, const char *name)
     tls_identify(&pair.client_identity, client, client_knows, 0);
     tls_identify(&pair.server_identity, server, server_knows, 1);
     tls_pair_open(&pair, name);
-    for (rounds = 0; rounds < 20; rounds++) {
+    for (unsigned rounds = 0; rounds < 20; rounds++) {
         (void)pair.client.port.write(&pair.client.tls, secret, sizeof secret);
         (void)pair.server.port.write(&pair.server.tls, secret, sizeof secret);
     }
@@ -146,9 +145,8 @@ TEST(an_authority_of_this_side_whose_time_is_over_or_not_come_is_named)
         uint8_t reason;
     } dates[] = {{"expired-authority", MBM_TLS_AUTHORITY_EXPIRED},
                  {"future-authority", MBM_TLS_AUTHORITY_NOT_YET_VALID}};
-    unsigned i;
 
-    for (i = 0; i < COUNT(dates); i++) {
+    for (unsigned i = 0; i < COUNT(dates); i++) {
         server_knows = dates[i].authority;
         server_refuses("operator", dates[i].reason);
         server_knows = "authority";

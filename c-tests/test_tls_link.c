@@ -40,9 +40,7 @@ static void leave(unsigned place)
 
 static void end(void)
 {
-    unsigned i;
-
-    for (i = 0; i < PLACES; i++)
+    for (unsigned i = 0; i < PLACES; i++)
         leave(i);
     mbm_tcp_closeListener(&listener);
     mbm_tls_end(&identity);
@@ -54,14 +52,13 @@ fixture each_test = {begin, end};
 static void go_round(void)
 {
     const int place = mbm_tls_accept(&listener, &identity, tlss, tcps, PLACES);
-    unsigned i;
 
     if (place >= 0) {
         const mbm_port port = mbm_tls_port(&tlss[place]);
 
         OK(mbm_server_beginTcp(&servers[place], &port, &unit, 1, frames[place], MBM_MAX_TCP_FRAME));
     }
-    for (i = 0; i < PLACES; i++) {
+    for (unsigned i = 0; i < PLACES; i++) {
         if (!mbm_tcp_isInUse(&tcps[i]))
             continue;
         if (mbm_server_poll(&servers[i]) != MBM_OK)
@@ -159,7 +156,6 @@ TEST(a_link_opens_a_session_anew_when_it_was_lost)
     uint16_t at;
     const int reserved = tcp_reserve(&at);
     char service[8];
-    unsigned i, k;
 
     snprintf(service, sizeof service, "%u", at);
     tls_identify(&who, "operator", "authority", 0);
@@ -168,11 +164,11 @@ TEST(a_link_opens_a_session_anew_when_it_was_lost)
     UNTIL(&l, l.counters.failed == 2);
     assert_int_equal(l.tls_status, MBM_TLS_LINK_LOST);
     assert_int_equal(mbm_tls_listen(&listener, "127.0.0.1", service), 0);
-    for (i = 1; i <= 3; i++) {
+    for (unsigned i = 1; i <= 3; i++) {
         read_by_link(&l);
         assert_int_equal(l.counters.connected, i);
         assert_string_equal(role, "Operator");
-        for (k = 0; k < PLACES; k++)
+        for (unsigned k = 0; k < PLACES; k++)
             leave(k);
         UNTIL(&l, l.counters.lost == i);
         assert_int_equal(l.tls_status, MBM_TLS_PEER_CLOSED);
@@ -187,17 +183,16 @@ TEST(a_request_finds_the_session_closed_and_is_answered_in_a_new_one)
 {
     static linked l;
     mbm_tls_identity who = {0};
-    unsigned i, k;
 
     tls_identify(&who, "operator", "authority", 0);
     assert_int_equal(mbm_tls_listen(&listener, "127.0.0.1", "0"), 0);
     keep(&l, &who, listener.port);
     OK(mbm_link_setRequestsWait(&l.kept, 0));
     OK(mbm_link_setBackoff(&l.kept, MBM_BACKOFF_FIXED, 1000000, 1000000));
-    for (i = 1; i <= 4; i++) {
+    for (unsigned i = 1; i <= 4; i++) {
         read_by_link(&l);
         assert_int_equal(l.counters.connected, i);
-        for (k = 0; k < PLACES; k++)
+        for (unsigned k = 0; k < PLACES; k++)
             leave(k);
     }
     assert_int_equal(l.counters.failed, 0);
@@ -291,7 +286,6 @@ TEST(a_loop_polls_client_and_server_and_a_lost_session_comes_back)
 {
     static linked l;
     mbm_tls_identity own = {0};
-    unsigned round, i;
 
     assert_int_equal(mbm_tls_listen(&listener, "127.0.0.1", "0"), 0);
     tls_identify(&own, "operator", "authority", 0);
@@ -303,7 +297,7 @@ TEST(a_loop_polls_client_and_server_and_a_lost_session_comes_back)
     asking.poll = poll_secure_client;
     asking.context = &l.a;
     assert_int_equal(mbm_loop_addTcp(&loop, &asking, &l.a.tcp), 0);
-    for (round = 1; round <= 3; round++) {
+    for (unsigned round = 1; round <= 3; round++) {
         UNTIL_IN_LOOP(l.counters.connected == round);
         l.a.request =
             (mbm_clientRequest){.unit = 17, .reply = l.a.words, .replyBytes = sizeof l.a.words};
@@ -312,13 +306,13 @@ TEST(a_loop_polls_client_and_server_and_a_lost_session_comes_back)
         UNTIL_IN_LOOP(l.a.request.status != MBM_PENDING);
         IS(MBM_OK, l.a.request.status);
         assert_memory_equal(l.a.words, words, sizeof words);
-        for (i = 0; i < PLACES; i++) {
+        for (unsigned i = 0; i < PLACES; i++) {
             mbm_loop_remove(&served[i]);
             leave(i);
         }
         UNTIL_IN_LOOP(l.counters.lost == round);
     }
-    for (i = 0; i < PLACES; i++)
+    for (unsigned i = 0; i < PLACES; i++)
         mbm_loop_remove(&served[i]);
     mbm_loop_remove(&asking);
     mbm_loop_remove(&accepting);

@@ -26,14 +26,12 @@ static void serve(void)
 
 static void begin(void)
 {
-    unsigned i;
-
     tls_pair_begin(&pair, "operator", "server");
     pair.idle = serve;
     memset(&unit, 0, sizeof unit);
     unit.id = UNIT;
     holding = (mbm_registerTable){.words = words, .base = FIRST, .size = WORDS};
-    for (i = 0; i < WORDS; i++)
+    for (unsigned i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(0xC000 + i);
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
     OK(mbm_server_beginRtuOverTcp(&server, &pair.server.port, &unit, 1, frame, sizeof frame));
@@ -50,11 +48,9 @@ fixture each_test = {begin, end};
 
 TEST(a_master_reads_while_its_idle_hook_lets_the_port_below_sleep)
 {
-    unsigned i;
-
     tls_pair_run(&pair);
     idles = 0;
-    for (i = 0; i < 3; i++) {
+    for (unsigned i = 0; i < 3; i++) {
         memset(response, 0, sizeof response);
         OK(mbm_node_readHoldingRegisters(&master, FIRST, WORDS));
         assert_memory_equal(response, words, sizeof words);

@@ -47,11 +47,9 @@ static const uint8_t reply[] = {0x12, 0x34, 0, 0, 0, 9, 17, 3, 6, 0xA0, 0, 0xA0,
 
 static void begin(void)
 {
-    unsigned i;
-
     memset(&unit, 0, sizeof unit);
     unit.id = 17;
-    for (i = 0; i < COUNT_OF_WORDS; i++)
+    for (unsigned i = 0; i < COUNT_OF_WORDS; i++)
         words[i] = (uint16_t)(0xA000 + i);
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
     tls_identify(&identity, "server", "authority", 1);
@@ -70,9 +68,7 @@ static void leave(unsigned place)
 
 static void end(void)
 {
-    unsigned i;
-
-    for (i = 0; i < PLACES; i++)
+    for (unsigned i = 0; i < PLACES; i++)
         leave(i);
     mbm_tcp_closeListener(&listener);
     mbm_tls_end(&identity);
@@ -154,13 +150,12 @@ static size_t ask_once(const char *name, const char *const *more)
 {
     uint8_t received[64];
     size_t have = 0;
-    unsigned rounds;
     program p;
 
     start_client(&p, name, more);
     assert_int_equal(fcntl(p.output, F_SETFL, O_NONBLOCK), 0);
     assert_int_equal(write(p.input, ask, sizeof ask), sizeof ask);
-    for (rounds = 0; have < sizeof reply && endings == 0; rounds++) {
+    for (unsigned rounds = 0; have < sizeof reply && endings == 0; rounds++) {
         ssize_t count;
 
         if (rounds == PATIENCE_MS)
@@ -421,24 +416,24 @@ TEST(many_connections_keep_their_roles_apart)
     static mbm_tls_identity who[3];
     static asker askers[PLACES];
     char service[8];
-    unsigned i, pending;
+    unsigned pending;
 
     memset(askers, 0, sizeof askers);
     snprintf(service, sizeof service, "%u", listener.port);
-    for (i = 0; i < 3; i++)
+    for (unsigned i = 0; i < 3; i++)
         tls_identify(&who[i], names[i], "authority", 0);
-    for (i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++) {
         assert_int_equal(mbm_tcp_attach(&askers[i].tcp, tcp_connect(listener.port)), 0);
         start_asking(&askers[i], &who[i % 3], "localhost");
         go_round_after(-1, AT_ONCE);
     }
     do {
-        for (i = pending = 0; i < count; i++)
+        for (unsigned i = pending = 0; i < count; i++)
             pending += mbm_client_poll(&askers[i].client) == MBM_PENDING;
         go_round_after(-1, AT_ONCE);
     } while (pending > 0);
     /* Connections were accepted in the order in which they were made. */
-    for (i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++) {
         if (askers[i].request.status != MBM_OK)
             fail_msg("%u: %s, %s; %s", i, mbm_status_text(askers[i].request.status),
                      mbm_tls_text(askers[i].tls.status), mbm_tls_text(tlss[i].status));
@@ -446,11 +441,11 @@ TEST(many_connections_keep_their_roles_apart)
         keep_role(&tlss[i]);
         assert_string_equal(role, roles[i % 3]);
     }
-    for (i = 0; i < count; i++)
+    for (unsigned i = 0; i < count; i++)
         stop_asking(&askers[i]);
     while (endings < count)
         go_round(-1);
     assert_int_equal(ended, MBM_TLS_PEER_CLOSED);
-    for (i = 0; i < 3; i++)
+    for (unsigned i = 0; i < 3; i++)
         mbm_tls_end(&who[i]);
 }

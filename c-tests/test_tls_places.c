@@ -113,9 +113,7 @@ static void leave(int place)
 
 static void end(void)
 {
-    int i;
-
-    for (i = 0; i < PLACES; i++)
+    for (int i = 0; i < PLACES; i++)
         leave(i);
     mbm_tcp_closeListener(&listener);
     mbm_tls_end(&identity);
@@ -164,10 +162,9 @@ static int place_of(int fd)
 {
     struct sockaddr_in ours, theirs;
     socklen_t size = sizeof ours;
-    int i;
 
     assert_int_equal(getsockname(fd, (struct sockaddr *)&ours, &size), 0);
-    for (i = 0; i < PLACES; i++) {
+    for (int i = 0; i < PLACES; i++) {
         size = sizeof theirs;
         if (mbm_tcp_isInUse(&tcps[i]) &&
             getpeername(tcps[i].fd, (struct sockaddr *)&theirs, &size) == 0 &&
@@ -225,14 +222,14 @@ static int is_closed(int fd)
 TEST(the_oldest_unfinished_handshake_leaves_for_a_new_client)
 {
     int fds[2 * PLACES];
-    unsigned i, k;
+    unsigned i;
 
     for (i = 0; i < PLACES; i++)
         fds[i] = get_half_open("127.0.0.1");
     for (; i < 2 * PLACES; i++) {
         fds[i] = get_half_open("127.0.0.1");
         UNTIL(is_closed(fds[i - PLACES]));
-        for (k = i - PLACES + 1; k <= i; k++)
+        for (unsigned k = i - PLACES + 1; k <= i; k++)
             assert_true(place_of(fds[k]) >= 0);
     }
     assert_int_equal(listener.refused, 0);
@@ -243,19 +240,18 @@ TEST(the_oldest_unfinished_handshake_leaves_for_a_new_client)
 TEST(the_oldest_leaves_also_if_time_passes_while_handshakes_are_compared)
 {
     int fds[PLACES + 1];
-    unsigned i, jump;
 
-    for (jump = 1; jump <= PLACES; jump++) {
-        for (i = 0; i <= PLACES; i++) {
+    for (unsigned jump = 1; jump <= PLACES; jump++) {
+        for (unsigned i = 0; i <= PLACES; i++) {
             looks = i == PLACES ? jump : 0;
             fds[i] = get_half_open("127.0.0.1");
         }
         looks = 0;
         UNTIL(is_closed(fds[0]));
-        for (i = 1; i <= PLACES; i++)
+        for (unsigned i = 1; i <= PLACES; i++)
             assert_true(place_of(fds[i]) >= 0);
         close_all(fds, PLACES + 1);
-        for (i = 0; i < PLACES; i++)
+        for (unsigned i = 0; i < PLACES; i++)
             leave((int)i);
     }
 }
@@ -263,10 +259,9 @@ TEST(the_oldest_leaves_also_if_time_passes_while_handshakes_are_compared)
 TEST(a_client_whose_first_message_is_there_stays_longer_than_one_that_sent_half)
 {
     int fds[PLACES + 1];
-    unsigned i;
 
     fds[0] = get_place("127.0.0.1", hello, hello_bytes, MBM_TLS_GREETED);
-    for (i = 1; i <= PLACES; i++)
+    for (unsigned i = 1; i <= PLACES; i++)
         fds[i] = get_half_open("127.0.0.1");
     assert_true(place_of(fds[0]) >= 0);
     UNTIL(is_closed(fds[1]));
@@ -277,10 +272,9 @@ TEST(a_client_whose_first_message_is_there_stays_longer_than_one_that_sent_half)
 TEST(the_address_with_the_most_unfinished_handshakes_loses_one_first)
 {
     int fds[PLACES + 1];
-    unsigned i;
 
     fds[0] = get_half_open("127.0.0.2");
-    for (i = 1; i <= PLACES; i++)
+    for (unsigned i = 1; i <= PLACES; i++)
         fds[i] = get_place("127.0.0.1", hello, hello_bytes, MBM_TLS_GREETED);
     assert_true(place_of(fds[0]) >= 0);
     UNTIL(is_closed(fds[1]));
@@ -290,12 +284,11 @@ TEST(the_address_with_the_most_unfinished_handshakes_loses_one_first)
 TEST(clients_that_say_nothing_get_no_place)
 {
     int fds[MANY], other;
-    unsigned i;
 
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         fds[i] = come("127.0.0.1", NULL, 0);
     other = get_half_open("127.0.0.1");
-    for (i = 0; i < MANY; i++)
+    for (unsigned i = 0; i < MANY; i++)
         assert_int_equal(place_of(fds[i]), -1);
     assert_int_equal(listener.refused, 0);
     close(other);
@@ -385,12 +378,11 @@ TEST(openssl_gets_in_while_half_open_connections_fill_every_place_again)
 TEST(a_client_whose_handshake_is_over_keeps_its_place)
 {
     int fds[2 * PLACES];
-    unsigned i;
     program p;
 
     start_openssl(&p);
     UNTIL(is_answered(&p));
-    for (i = 0; i < 2 * PLACES; i++)
+    for (unsigned i = 0; i < 2 * PLACES; i++)
         fds[i] = get_half_open("127.0.0.1");
     assert_int_equal(write(p.input, ask, sizeof ask), sizeof ask);
     UNTIL(is_answered(&p));

@@ -94,15 +94,13 @@ TEST(damaged_extensions_are_read_within_their_bounds)
 {
     char role[MBM_TLS_ROLE_BYTES + 1];
     extensions e = {.length = 0}, changed;
-    size_t i, length;
-    unsigned value;
 
     add(&e, constraint, sizeof constraint);
     add(&e, role_critical, sizeof role_critical);
-    for (length = 1; length < e.length; length++)
+    for (size_t length = 1; length < e.length; length++)
         assert_int_equal(find(&e, length, role), MBM_TLS_WRONG_ROLE);
-    for (i = 0; i < e.length; i++)
-        for (value = 0; value < 256; value++) {
+    for (size_t i = 0; i < e.length; i++)
+        for (unsigned value = 0; value < 256; value++) {
             changed = e;
             changed.bytes[i] = (uint8_t)value;
             if (find(&changed, e.length, role) == MBM_TLS_ONE_ROLE)
@@ -160,13 +158,12 @@ static uint8_t before_write(void *context, const mbm_access *access)
 static void begin_unit(int guarded)
 {
     static const mbm_accessHooks hooks = {.beforeWrite = before_write};
-    unsigned i;
 
     memset(&unit, 0, sizeof unit);
     memset(&every_function, 0, sizeof every_function);
     every_function.serve = authorise;
     holding = (mbm_registerTable){.words = words, .base = FIRST, .size = WORDS};
-    for (i = 0; i < WORDS; i++)
+    for (unsigned i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(500 + i);
     unit.id = 17;
     seen = NULL;

@@ -1,11 +1,10 @@
 /* The trace before a port: its records, what it passes on, refused calls, and calls from within
  * its hook. How it cuts bytes into frames is tested in tests/trace. */
+#include "refused.h"
 #include "hooked_port.h"
 #include "test.h"
 
 #include <string.h>
-
-#include "refused.h"
 
 enum { MOST = 32 };
 
@@ -116,9 +115,8 @@ TEST(a_blocking_master_works_through_a_trace)
 TEST(optional_hooks_are_passed_on_only_where_the_port_has_them)
 {
     const mbm_port *traced;
-    int i;
 
-    for (i = 0; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         if (i == 1) {
             port.flush = NULL;
             port.preTransmission = port.postTransmission = NULL;
@@ -137,9 +135,7 @@ TEST(optional_hooks_are_passed_on_only_where_the_port_has_them)
 
 TEST(a_client_of_each_framing_works_through_a_trace)
 {
-    unsigned kind;
-
-    for (kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_RTU_OVER_TCP; kind++) {
+    for (unsigned kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_RTU_OVER_TCP; kind++) {
         const mbm_framing *const framing = FRAMING((uint8_t)kind);
         mbm_packet packet = {.kind = MBM_PACKET_RESPONSE, .unit = 17, .function = 3};
         uint8_t reply[MBM_MAX_ASCII_FRAME];
@@ -305,7 +301,6 @@ TEST(a_trace_goes_on_after_refused_calls)
     mbm_port incomplete = port;
     const mbm_port *traced;
     uint8_t bytes[16];
-    size_t i;
 
     incomplete.micros = NULL;
     IS(MBM_NOT_INITIALISED, mbm_trace_flush(&trace));
@@ -321,7 +316,7 @@ TEST(a_trace_goes_on_after_refused_calls)
     wire.last = 4;
     traced = mbm_trace_port(&trace);
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 4);
-    for (i = 0; i < COUNT(framings); i++)
+    for (size_t i = 0; i < COUNT(framings); i++)
         REFUSED(MBM_INVALID_ARGUMENT, trace,
                 mbm_trace_begin(&trace, MBM_PACKET_RESPONSE, &port, framings[i], buffer, 64, keep,
                                 NULL));
@@ -430,11 +425,10 @@ TEST(an_event_of_a_sniffer_becomes_a_record)
     mbm_traceRecord record;
     mbm_event event;
     uint32_t now = 1000;
-    unsigned piece;
 
     memset(&sniffer, 0, sizeof sniffer);
     OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, frame, sizeof frame));
-    for (piece = 0; piece < 5; piece++) {
+    for (unsigned piece = 0; piece < 5; piece++) {
         hooked_port_arrive_rtu(&wire, 17, piece == 1 ? REPLY + 1 : READ + 1, piece == 1 ? 6 : 5);
         memcpy(bytes, wire.arriving, wire.last);
         bytes[7] ^= piece == 2;

@@ -69,7 +69,6 @@ TEST(a_hook_finds_its_connection_behind_a_trace)
     static mbm_server server;
     const mbm_port port = {
         .context = &wire, .read = read_wire, .write = write_wire, .micros = micros};
-    int polls;
 
     OK(mbm_registerTable_setHooks(&table, &hooks));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
@@ -79,7 +78,7 @@ TEST(a_hook_finds_its_connection_behind_a_trace)
                            sizeof frame));
     memcpy(wire.request, request, sizeof request);
     wire.arrived = sizeof request;
-    for (polls = 0; polls < 100 && wire.sent == 0; polls++)
+    for (int polls = 0; polls < 100 && wire.sent == 0; polls++)
         OK(mbm_server_poll(&server));
     assert_int_equal(wire.sent, 7);
     assert_ptr_equal(accessed, &wire);

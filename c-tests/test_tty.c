@@ -112,10 +112,9 @@ TEST(every_rate_of_termios_can_be_set)
                 {57600, B57600},     {115200, B115200},  {230400, B230400},   {460800, B460800},
                 {500000, B500000},   {921600, B921600},  {1000000, B1000000}, {1500000, B1500000},
                 {3000000, B3000000}, {4000000, B4000000}};
-    size_t i;
 
     SKIP_IF_EMULATED();
-    for (i = 0; i < COUNT(rows); i++) {
+    for (size_t i = 0; i < COUNT(rows); i++) {
         struct termios settings;
         mbm_tty tty;
 
@@ -142,12 +141,11 @@ TEST(any_rate_is_set_if_the_options_allow_it)
     mbm_tty_options options = PLAIN;
     uint32_t rate;
     mbm_tty tty;
-    size_t i;
 
     SKIP_IF_EMULATED();
     rate = rate_of(line.theirs);
     options.anyRate = 1;
-    for (i = 0; i < COUNT(rates); i++) {
+    for (size_t i = 0; i < COUNT(rates); i++) {
         options.baud = rates[i];
         assert_int_equal(mbm_tty_openWith(&tty, line.path, &options), 0);
         assert_int_equal(rate_of(tty.fd), rates[i]);
@@ -176,10 +174,9 @@ TEST(a_pty_that_lacks_only_the_parity_is_opened)
                                       {.baud = 19200, .parity = 'O', .stop = 1},
                                       {.baud = 19200, .parity = 'E', .stop = 1, .data = 7}};
     mbm_tty left_open, tty;
-    size_t i;
 
     assert_int_equal(mbm_tty_open(&left_open, line.path, 19200, 'N', 1), 0);
-    for (i = 0; i < COUNT(frames); i++) {
+    for (size_t i = 0; i < COUNT(frames); i++) {
         assert_int_equal(mbm_tty_openWith(&tty, line.path, &frames[i]), 0);
         mbm_tty_close(&tty);
     }
@@ -201,9 +198,8 @@ TEST(options_that_no_terminal_has_are_refused_with_einval)
     };
     struct termios settings = settings_of(line.theirs);
     mbm_tty tty;
-    size_t i;
 
-    for (i = 0; i < COUNT(bad); i++) {
+    for (size_t i = 0; i < COUNT(bad); i++) {
         FAILS(EINVAL, mbm_tty_openWith(&tty, line.path, &bad[i]));
         assert_int_equal(tty.fd, -1);
         FAILS(EINVAL, mbm_tty_settings(&settings, &bad[i]));
@@ -360,10 +356,9 @@ TEST(received_bytes_are_handed_over_at_once_if_the_driver_can)
 {
     const int other = (int)ASYNC_SKIP_TEST, at_once = (int)ASYNC_LOW_LATENCY;
     mbm_tty tty;
-    int i;
 
     driver.serial.closing_wait = 77;
-    for (i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++) {
         const int before = i & 1 ? other | at_once : other;
 
         driver.has_latency = i < 2 ? 1 : 2;

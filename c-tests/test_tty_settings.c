@@ -17,9 +17,8 @@ TEST(parity_stop_and_data_bits_become_settings)
         {'E', 1, 7, CS7 | PARENB}, {'O', 2, 7, CS7 | PARENB | PARODD | CSTOPB},
     };
     const tcflag_t all = CSIZE | PARENB | PARODD | CSTOPB | CRTSCTS | HUPCL | CLOCAL | CREAD;
-    size_t i;
 
-    for (i = 0; i < COUNT(rows); i++) {
+    for (size_t i = 0; i < COUNT(rows); i++) {
         mbm_tty_options options = {.baud = 9600};
         struct termios settings;
 

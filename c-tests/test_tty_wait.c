@@ -106,7 +106,6 @@ TEST(a_server_with_a_pending_function_sleeps_between_polls)
     uint8_t frame[MBM_MAX_FRAME];
     mbm_port port;
     mbm_tty tty;
-    unsigned i;
 
     unit.id = 0x11;
     custom.code = 0x41;
@@ -119,7 +118,7 @@ TEST(a_server_with_a_pending_function_sleeps_between_polls)
     AWAIT((OK(mbm_server_poll(&server)), mbm_server_pollDelay(&server) == 1000));
     assert_int_equal(write(line.ours, request, sizeof request), sizeof request);
     assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
-    for (i = 0; i < 10; i++) {
+    for (unsigned i = 0; i < 10; i++) {
         OK(mbm_server_poll(&server));
         assert_int_equal(mbm_tty_wait(&tty, mbm_server_pollDelay(&server)), 0);
     }

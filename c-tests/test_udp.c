@@ -36,12 +36,11 @@ static void listen_again(void)
 static void begin(void)
 {
     const mbm_port port = mbm_udp_port(&sender);
-    unsigned i;
 
     memset(&unit, 0, sizeof unit);
     unit.id = UNIT;
     holding = (mbm_registerTable){.words = words, .base = FIRST, .size = WORDS};
-    for (i = 0; i < WORDS; i++)
+    for (unsigned i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(0xB000 + i);
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
     memset(&receiver, 0, sizeof receiver);
@@ -140,10 +139,9 @@ TEST(requests_of_one_write_are_a_datagram_each)
 {
     static mbm_clientRequest more[16];
     static uint16_t values[16];
-    unsigned i;
 
     memset(more, 0, sizeof more);
-    for (i = 0; i < COUNT(more); i++) {
+    for (unsigned i = 0; i < COUNT(more); i++) {
         more[i].unit = UNIT;
         more[i].reply = &values[i];
         more[i].replyBytes = sizeof values[i];
@@ -151,7 +149,7 @@ TEST(requests_of_one_write_are_a_datagram_each)
            mbm_client_readHoldingRegisters(&client, &more[i], (uint16_t)(FIRST + i), 1));
     }
     exchange();
-    for (i = 0; i < COUNT(more); i++) {
+    for (unsigned i = 0; i < COUNT(more); i++) {
         IS(MBM_OK, more[i].status);
         assert_int_equal(values[i], words[i]);
     }
@@ -160,19 +158,18 @@ TEST(requests_of_one_write_are_a_datagram_each)
 TEST(each_client_gets_the_responses_to_its_own_requests)
 {
     int fds[8];
-    unsigned i;
 
-    for (i = 0; i < COUNT(fds); i++)
+    for (unsigned i = 0; i < COUNT(fds); i++)
         fds[i] = plain_socket(receiver.port);
     /* All use the same number. */
-    for (i = 0; i < COUNT(fds); i++)
+    for (unsigned i = 0; i < COUNT(fds); i++)
         send_request(fds[i], 7, (uint8_t)(FIRST + i));
     send_request(fds[0], 8, FIRST + 20);
     serve();
-    for (i = 0; i < COUNT(fds); i++)
+    for (unsigned i = 0; i < COUNT(fds); i++)
         assert_reply(fds[i], 7, (uint8_t)(FIRST + i));
     assert_reply(fds[0], 8, FIRST + 20);
-    for (i = 0; i < COUNT(fds); i++) {
+    for (unsigned i = 0; i < COUNT(fds); i++) {
         assert_silent(fds[i]);
         close(fds[i]);
     }
@@ -320,14 +317,13 @@ TEST(a_frame_is_sent_when_its_last_byte_is_written)
     const mbm_port port = mbm_udp_port(&sender);
     const uint8_t bytes[FRAME] = {0, 1, 0, 0, 0, 6, UNIT, 3, 0, FIRST, 0, 1};
     uint8_t reply[REPLY];
-    unsigned i;
 
-    for (i = 0; i < FRAME; i++) {
+    for (unsigned i = 0; i < FRAME; i++) {
         assert_int_equal(mbm_udp_wait(&receiver, 1, -1, 0), 0);
         assert_int_equal(port.write(&sender, &bytes[i], 1), 1);
     }
     serve();
-    for (i = 0; i < REPLY; i++)
+    for (unsigned i = 0; i < REPLY; i++)
         assert_int_equal(port.read(&sender, &reply[i], 1), 1);
     assert_int_equal(port.read(&sender, reply, 1), 0);
     assert_int_equal(reply[9] << 8 | reply[10], words[0]);

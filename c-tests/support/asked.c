@@ -22,27 +22,25 @@ void asked_reads(modbus_t *client)
     static const int bits[] = {1, 7, 8, 9, 16, 17, 1999, 2000};
     uint16_t words[MODBUS_MAX_READ_REGISTERS];
     uint8_t cells[MODBUS_MAX_READ_BITS];
-    size_t q;
-    int i;
 
-    for (q = 0; q < COUNT(quantities); q++) {
+    for (size_t q = 0; q < COUNT(quantities); q++) {
         int n = quantities[q];
 
         assert_int_equal(modbus_read_registers(client, SERVED_BASE + 3, n, words), n);
-        for (i = 0; i < n; i++)
+        for (int i = 0; i < n; i++)
             assert_int_equal(words[i], served_pattern((unsigned)(SERVED_BASE + 3 + i)));
         assert_int_equal(modbus_read_input_registers(client, SERVED_BASE + 5, n, words), n);
-        for (i = 0; i < n; i++)
+        for (int i = 0; i < n; i++)
             assert_int_equal(words[i], (uint16_t)~served_pattern((unsigned)(SERVED_BASE + 5 + i)));
     }
-    for (q = 0; q < COUNT(bits); q++) {
+    for (size_t q = 0; q < COUNT(bits); q++) {
         int n = bits[q];
 
         assert_int_equal(modbus_read_bits(client, SERVED_BASE + 11, n, cells), n);
-        for (i = 0; i < n; i++)
+        for (int i = 0; i < n; i++)
             assert_int_equal(cells[i], served_bit_pattern((unsigned)(SERVED_BASE + 11 + i)));
         assert_int_equal(modbus_read_input_bits(client, SERVED_BASE + 1, n, cells), n);
-        for (i = 0; i < n; i++)
+        for (int i = 0; i < n; i++)
             assert_int_equal(cells[i], !served_bit_pattern((unsigned)(SERVED_BASE + 1 + i)));
     }
 }
@@ -230,7 +228,6 @@ void asked_functions(int fd, int framing, served *s)
 {
     static const uint8_t long_query[253] = {8};
     uint8_t group[] = {0x14, 7, 6, 0, 4, 0, 0, 0, 20}, records[4 + 40] = {0x14, 42, 41, 6};
-    unsigned i;
 
     ANSWERS("\x07", "\x07\x6D");
     ANSWERS("\x11", "\x11\x08mbm\xFFtest");
@@ -250,7 +247,7 @@ void asked_functions(int fd, int framing, served *s)
     ANSWERS("\x15\x0B\x06\x00\x04\x00\x07\x00\x02\x12\x34\x56\x78",
             "\x15\x0B\x06\x00\x04\x00\x07\x00\x02\x12\x34\x56\x78");
     assert_int_equal(s->records[7], 0x1234);
-    for (i = 0; i < 20; i++) {
+    for (unsigned i = 0; i < 20; i++) {
         records[4 + 2 * i] = (uint8_t)(s->records[i] >> 8);
         records[5 + 2 * i] = (uint8_t)s->records[i];
     }

@@ -24,10 +24,10 @@ static void put(bus_tap *tap, uint8_t byte)
     bus *b = tap->line;
     uint64_t begin = tap->free > b->now ? tap->free : b->now;
     uint64_t end = begin + BUS_CHARACTER;
-    unsigned place, i;
+    unsigned place;
     uint8_t garbled = 0;
 
-    for (i = b->count; i > 0 && b->bytes[i - 1].end > begin; i--) {
+    for (unsigned i = b->count; i > 0 && b->bytes[i - 1].end > begin; i--) {
         if (b->bytes[i - 1].from != tap && b->bytes[i - 1].end - BUS_CHARACTER < end) {
             b->collisions += !b->bytes[i - 1].garbled;
             b->bytes[i - 1].garbled = garbled = 1;
@@ -47,9 +47,7 @@ static void put(bus_tap *tap, uint8_t byte)
 
 static int16_t send(void *context, const uint8_t *bytes, uint16_t length)
 {
-    uint16_t i;
-
-    for (i = 0; i < length; i++)
+    for (uint16_t i = 0; i < length; i++)
         put((bus_tap *)context, bytes[i]);
     return (int16_t)length;
 }

@@ -20,13 +20,12 @@ size_t fault_right_reply(uint8_t *frame, const uint8_t *request)
 {
     unsigned address = (unsigned)request[2] << 8 | request[3];
     unsigned quantity = (unsigned)request[4] << 8 | request[5];
-    unsigned i;
 
     memcpy(frame, request, 6);
     if (request[1] == 6 || request[1] == 8)
         return seal(frame, 6);
     frame[2] = (uint8_t)(2 * quantity);
-    for (i = 0; i < quantity; i++) {
+    for (unsigned i = 0; i < quantity; i++) {
         frame[3 + 2 * i] = (uint8_t)(fault_value(address + i) >> 8);
         frame[4 + 2 * i] = (uint8_t)fault_value(address + i);
     }
@@ -110,9 +109,8 @@ static void a_byte_every_5_ms(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
     size_t length = fault_right_reply(frame, request);
-    size_t i;
 
-    for (i = 0; i < length; i++) {
+    for (size_t i = 0; i < length; i++) {
         responder_send(r, frame + i, 1);
         responder_pause(r, 5);
     }

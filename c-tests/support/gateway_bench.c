@@ -18,10 +18,8 @@ void gateway_bench_open(gateway_bench *b, unsigned connection)
 
 void gateway_bench_start(gateway_bench *b, const mbm_gatewayRoute *routes, unsigned count)
 {
-    unsigned i;
-
     memset(b, 0, sizeof *b);
-    for (i = 0; i < BENCH_LINES; i++) {
+    for (unsigned i = 0; i < BENCH_LINES; i++) {
         const mbm_port port = memory_port_of(&b->wires[i]);
 
         OK(mbm_client_beginRtu(&b->clients[i], &port, b->frames[i], MBM_MAX_FRAME));
@@ -37,27 +35,26 @@ void gateway_bench_start(gateway_bench *b, const mbm_gatewayRoute *routes, unsig
                                     .requests = b->requests,
                                     .requestCount = BENCH_REQUESTS};
     OK(mbm_gateway_begin(&b->gateway, &b->config));
-    for (i = 0; i < BENCH_CONNECTIONS; i++)
+    for (unsigned i = 0; i < BENCH_CONNECTIONS; i++)
         gateway_bench_open(b, i);
 }
 
 int gateway_bench_step(gateway_bench *b)
 {
     uint32_t delay = mbm_gateway_pollDelay(&b->gateway);
-    unsigned i;
 
     /* Bytes that have arrived end the sleep. */
-    for (i = 0; i < BENCH_LINES; i++)
+    for (unsigned i = 0; i < BENCH_LINES; i++)
         if (b->wires[i].arriving_count > 0 && mbm_client_pending(&b->clients[i]) > 0)
             delay = 0;
-    for (i = 0; i < BENCH_CONNECTIONS; i++)
+    for (unsigned i = 0; i < BENCH_CONNECTIONS; i++)
         if (b->sockets[i].arriving_count > 0 && mbm_gateway_isReading(&b->gateway, (uint8_t)i))
             delay = 0;
     /* Each poll takes a microsecond. */
     delay = delay == 0 || delay == UINT32_MAX ? 1 : delay;
-    for (i = 0; i < BENCH_LINES; i++)
+    for (unsigned i = 0; i < BENCH_LINES; i++)
         b->wires[i].now += delay;
-    for (i = 0; i < BENCH_CONNECTIONS; i++)
+    for (unsigned i = 0; i < BENCH_CONNECTIONS; i++)
         b->sockets[i].now += delay;
     OK(mbm_gateway_poll(&b->gateway));
     return mbm_gateway_pollDelay(&b->gateway) != UINT32_MAX;
@@ -65,9 +62,7 @@ int gateway_bench_step(gateway_bench *b)
 
 void gateway_bench_settle(gateway_bench *b)
 {
-    unsigned steps;
-
-    for (steps = 0; gateway_bench_step(b); steps++)
+    for (unsigned steps = 0; gateway_bench_step(b); steps++)
         assert_true(steps < STEPS);
 }
 
@@ -84,9 +79,7 @@ void gateway_bench_ask(gateway_bench *b, unsigned connection, unsigned transacti
 /* Polls until a port has sent a frame, which must be the expected one, and removes it. */
 static void expect(gateway_bench *b, memory_port *m, const uint8_t *frame, size_t length)
 {
-    unsigned steps;
-
-    for (steps = 0; m->sent_count < length && steps < STEPS; steps++)
+    for (unsigned steps = 0; m->sent_count < length && steps < STEPS; steps++)
         gateway_bench_step(b);
     assert_true(m->sent_count >= length);
     assert_memory_equal(m->sent, frame, length);

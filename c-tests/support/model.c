@@ -5,10 +5,8 @@
 
 void model_start(model *m)
 {
-    unsigned unit, i;
-
-    for (unit = 0; unit < MODEL_UNITS; unit++)
-        for (i = 0; i < MODEL_CELLS; i++) {
+    for (unsigned unit = 0; unit < MODEL_UNITS; unit++)
+        for (unsigned i = 0; i < MODEL_CELLS; i++) {
             uint32_t mixed = (unit * 7919u + i + 1u) * 2654435761u;
 
             m->holding[unit][i] = (uint16_t)(mixed >> 16);
@@ -31,10 +29,8 @@ static size_t pack(uint8_t *reply, const uint8_t *cells, unsigned quantity)
 
 static size_t copy(uint8_t *reply, const uint16_t *cells, unsigned quantity)
 {
-    unsigned i;
-
     reply[2] = (uint8_t)(2 * quantity);
-    for (i = 0; i < quantity; i++) {
+    for (unsigned i = 0; i < quantity; i++) {
         reply[3 + 2 * i] = (uint8_t)(cells[i] >> 8);
         reply[4 + 2 * i] = (uint8_t)cells[i];
     }
@@ -43,9 +39,7 @@ static size_t copy(uint8_t *reply, const uint16_t *cells, unsigned quantity)
 
 static void store(uint16_t *cells, const uint8_t *data, unsigned quantity)
 {
-    unsigned i;
-
-    for (i = 0; i < quantity; i++)
+    for (unsigned i = 0; i < quantity; i++)
         cells[i] = be16(data + 2 * i);
 }
 

@@ -17,7 +17,6 @@ static void log_update(void *context, mbm_plan *plan, uint16_t field)
 void plan_device_begin(plan_device *d, int is_tcp)
 {
     mbm_port port;
-    unsigned i;
 
     memset(d, 0, sizeof *d);
     d->is_tcp = is_tcp != 0;
@@ -28,7 +27,7 @@ void plan_device_begin(plan_device *d, int is_tcp)
     else
         OK(mbm_client_beginRtu(&d->client, &port, d->frame, sizeof d->frame));
     OK(mbm_client_setResponseTimeout(&d->client, 100));
-    for (i = 0; i < PLAN_REGISTERS; i++)
+    for (unsigned i = 0; i < PLAN_REGISTERS; i++)
         d->registers[i] = (uint16_t)(i * 40503u + 7u);
     d->setup.fields = d->fields;
     d->setup.positions = d->positions;

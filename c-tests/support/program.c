@@ -34,9 +34,8 @@ static void start(program *p, const char *path, const char *name, const char *co
     const struct rlimit limit = {descriptors, descriptors};
     const char *argv[32] = {name};
     int in[2], out[2];
-    size_t i;
 
-    for (i = 0; arguments[i]; i++) {
+    for (size_t i = 0; arguments[i]; i++) {
         must(i < 30, "too many arguments");
         argv[i + 1] = arguments[i];
     }
@@ -127,9 +126,7 @@ static int is_asleep(const program *p)
 
 int program_sleeps(const program *p)
 {
-    int looks;
-
-    for (looks = 0; looks < 50; looks++) {
+    for (int looks = 0; looks < 50; looks++) {
         if (!is_asleep(p))
             return 0;
         usleep(1000);

@@ -1,7 +1,10 @@
-/* Checks of calls that are refused. Include test.h and string.h first. */
+/* Checks of calls that are refused. */
 #ifndef REFUSED_H
 #define REFUSED_H
 
+#include "test.h"
+
+#include <string.h>
 #include <valgrind/memcheck.h>
 
 /* Asserts that a call returns a status and leaves an object as it was, byte for byte. The

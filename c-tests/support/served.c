@@ -27,10 +27,9 @@ uint8_t served_bit_pattern(unsigned address)
 static uint8_t before(void *context, const mbm_access *access)
 {
     const uint8_t *data = access->data;
-    unsigned i;
 
     (void)context;
-    for (i = 0; i < access->quantity; i++)
+    for (unsigned i = 0; i < access->quantity; i++)
         if (access->address + i == SERVED_REFUSED && data[2 * i] == 0xBE && data[2 * i + 1] == 0xEF)
             return MBM_ILLEGAL_DATA_VALUE;
     return 0;
@@ -240,11 +239,9 @@ static void start(served *s)
 
 void served_on_line(served *s, int framing)
 {
-    int i;
-
     s->framing = framing;
     s->listener = -1;
-    for (i = 0; i < SERVED_CONNECTIONS; i++)
+    for (int i = 0; i < SERVED_CONNECTIONS; i++)
         s->fds[i] = -1;
     pty_open(&s->line);
     fcntl(s->line.ours, F_SETFL, O_NONBLOCK);
@@ -257,10 +254,9 @@ void served_on_tcp(served *s, int framing)
 {
     struct sockaddr_in address = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
     socklen_t length = sizeof address;
-    int i;
 
     s->framing = framing;
-    for (i = 0; i < SERVED_CONNECTIONS; i++)
+    for (int i = 0; i < SERVED_CONNECTIONS; i++)
         s->fds[i] = -1;
     s->listener = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
     must(bind(s->listener, (struct sockaddr *)&address, sizeof address) == 0, "bind");
@@ -272,8 +268,6 @@ void served_on_tcp(served *s, int framing)
 
 void served_stop(served *s)
 {
-    int i;
-
     must(write(s->stop[1], "", 1) == 1, "stop");
     pthread_join(s->thread, NULL);
     close(s->stop[0]);
@@ -283,7 +277,7 @@ void served_stop(served *s)
         return;
     }
     close(s->listener);
-    for (i = 0; i < SERVED_CONNECTIONS; i++)
+    for (int i = 0; i < SERVED_CONNECTIONS; i++)
         if (s->fds[i] >= 0)
             close(s->fds[i]);
 }

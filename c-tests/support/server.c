@@ -20,15 +20,14 @@ modbus_mapping_t *server_memory(void)
 {
     modbus_mapping_t *memory =
         modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
-    unsigned i;
 
     if (!memory)
         abort();
-    for (i = 0; i < SERVER_REGISTERS; i++) {
+    for (unsigned i = 0; i < SERVER_REGISTERS; i++) {
         memory->tab_registers[i] = server_pattern(i);
         memory->tab_input_registers[i] = (uint16_t)~server_pattern(i);
     }
-    for (i = 0; i < SERVER_BITS; i++) {
+    for (unsigned i = 0; i < SERVER_BITS; i++) {
         memory->tab_bits[i] = server_bit_pattern(i);
         memory->tab_input_bits[i] = !server_bit_pattern(i);
     }

@@ -57,9 +57,7 @@ static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
 
 void sim_deliver(sim *s, uint64_t at, const uint8_t *bytes, size_t length)
 {
-    size_t i;
-
-    for (i = 0; i < length; i++) {
+    for (size_t i = 0; i < length; i++) {
         unsigned place;
 
         at += s->character;
@@ -92,9 +90,7 @@ void sim_deliver_ascii(sim *s, uint64_t at, const uint8_t *frame, size_t length)
 /* A complete request has left. From now on its answers have a time. */
 static void request_ended(sim *s, const sim_frame *frame)
 {
-    unsigned i;
-
-    for (i = 0; i < s->answered; i++)
+    for (unsigned i = 0; i < s->answered; i++)
         if (s->answers[i].request == s->sent)
             sim_deliver(s, frame->end + s->answers[i].delay, s->answers[i].bytes,
                         s->answers[i].length);

@@ -137,4 +137,15 @@ void sim_node(sim *s, uint8_t unit);
     SIM;                                                                                           \
     mbm_node *n = &s->node
 
+/* A test of a simulation and its node. */
+#define SIM_TEST(name)                                                                             \
+    static void with_##name(sim *s, mbm_node *n);                                                  \
+    TEST_WITH(name, sim_setup, sim_teardown)                                                       \
+    {                                                                                              \
+        sim *s = sim_of_test();                                                                    \
+                                                                                                   \
+        with_##name(s, &s->node);                                                                  \
+    }                                                                                              \
+    static void with_##name(__attribute__((unused)) sim *s, __attribute__((unused)) mbm_node *n)
+
 #endif

@@ -85,10 +85,9 @@ static unsigned fitting(tcp_peer *p, tcp_fault fault)
 static tcp_fault fault_of(tcp_peer *p, unsigned number, unsigned *argument)
 {
     tcp_fault fault = FAULT_NONE;
-    size_t i;
 
     *argument = 0;
-    for (i = 0; i < p->scripts; i++) {
+    for (size_t i = 0; i < p->scripts; i++) {
         if (p->script[i].number == number) {
             fault = p->script[i].fault;
             *argument = p->script[i].argument;
@@ -209,9 +208,7 @@ static void serve(tcp_peer *p, stream *c, const uint8_t *request, size_t length)
 
 static int64_t due_ms(const tcp_peer *p, int64_t latest)
 {
-    size_t i;
-
-    for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
+    for (size_t i = 0; i < TCP_PEER_CONNECTIONS; i++)
         latest = stream_due(&p->streams[i], latest);
     return latest;
 }
@@ -338,7 +335,6 @@ static void wake(tcp_peer *p, char what)
 tcp_peer *tcp_peer_new(void)
 {
     tcp_peer *p = (tcp_peer *)calloc(1, sizeof *p);
-    unsigned i;
 
     must(p != NULL, "calloc");
     p->replier = modbus_new_tcp("127.0.0.1", 502);
@@ -349,13 +345,13 @@ tcp_peer *tcp_peer_new(void)
     must(modbus_set_socket(p->replier, p->capture[0]) == 0, "modbus_set_socket");
     /* libmodbus sleeps for this time after a request that it does not accept. */
     must(modbus_set_response_timeout(p->replier, 0, 1) == 0, "modbus_set_response_timeout");
-    for (i = 0; i < TCP_PEER_CELLS; i++) {
+    for (unsigned i = 0; i < TCP_PEER_CELLS; i++) {
         p->memory->tab_registers[i] = tcp_peer_word(i);
         p->memory->tab_input_registers[i] = (uint16_t)~tcp_peer_word(i);
         p->memory->tab_bits[i] = tcp_peer_bit(i);
         p->memory->tab_input_bits[i] = !tcp_peer_bit(i);
     }
-    for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
+    for (unsigned i = 0; i < TCP_PEER_CONNECTIONS; i++)
         p->streams[i].fd = -1;
     p->listener = p->reserved = -1;
     held_clock_start(&p->own_clock);
@@ -437,13 +433,11 @@ modbus_mapping_t *tcp_peer_memory(tcp_peer *p)
 
 void tcp_peer_halt(tcp_peer *p)
 {
-    size_t i;
-
     if (!p->running)
         return;
     wake(p, 'q');
     pthread_join(p->thread, NULL);
-    for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
+    for (size_t i = 0; i < TCP_PEER_CONNECTIONS; i++)
         stream_let_go(&p->streams[i]);
     close(p->listener);
     p->listener = -1;

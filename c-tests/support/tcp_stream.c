@@ -114,10 +114,8 @@ void stream_hold(stream *c, const reply *r, int64_t due, unsigned replies_before
 
 void stream_split(stream *c, const reply *r, unsigned pause)
 {
-    size_t i;
-
     flush_joined(c);
-    for (i = 0; i < r->length && c->fd >= 0; i++) {
+    for (size_t i = 0; i < r->length && c->fd >= 0; i++) {
         put(c, r->bytes + i, 1);
         if (pause > 0)
             usleep(pause * 1000);
@@ -134,9 +132,7 @@ void stream_join(stream *c, const reply *r, int64_t due, unsigned more)
 
 int64_t stream_due(const stream *c, int64_t latest)
 {
-    size_t i;
-
-    for (i = 0; i < c->holds; i++)
+    for (size_t i = 0; i < c->holds; i++)
         latest = c->held[i].due < latest ? c->held[i].due : latest;
     if (c->join_more > 0 && c->join_due < latest)
         latest = c->join_due;

@@ -22,9 +22,8 @@ unsigned tcp_waiting(int listener)
 void tcp_connect_some(int *fds, unsigned count, int listener, uint16_t port)
 {
     const unsigned before = tcp_waiting(listener);
-    unsigned i;
 
-    for (i = 0; i < count; i++)
+    for (unsigned i = 0; i < count; i++)
         fds[i] = tcp_connect(port);
     AWAIT(tcp_waiting(listener) == before + count);
 }

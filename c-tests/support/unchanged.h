@@ -1,6 +1,10 @@
-/* For calls from within hooks that must change nothing. Include test.h and string.h first. */
+/* For calls from within hooks that must change nothing. */
 #ifndef UNCHANGED_H
 #define UNCHANGED_H
+
+#include "test.h"
+
+#include <string.h>
 
 /* How often a hook has made its calls. */
 static unsigned entered;
