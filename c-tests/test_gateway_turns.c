@@ -352,3 +352,238 @@ TEST(a_client_that_takes_no_responses_delays_no_other)
     most = 20;
     EXPECT(0, 1, 2, VALUE);
 }
+
+/* The lines of a gateway: not ready, lost, full, shared with the program, begun anew; ASCII and
+ * TCP; and the gateway's own units beside them. All in memory. */
+
+#define READ_OTHER "\x03\x00\x20\x00\x01"
+
+static uint8_t ready;
+
+static uint8_t is_ready(void *context)
+{
+    assert_ptr_equal(context, &b);
+    return ready;
+}
+
+TEST(a_line_that_is_not_ready_gets_0a)
+{
+    b.lines[0].isReady = is_ready;
+    b.lines[0].context = &b;
+    ready = 0;
+    ASK(0, 1, 2, READ);
+    EXPECT(0, 1, 2, NO_PATH);
+    SILENT(b.wires[0]);
+    ready = 1;
+    ASK(0, 2, 2, READ);
+    ON_LINE(0, 2, READ);
+}
+
+TEST(a_changed_route_holds_for_later_requests)
+{
+    static mbm_gatewayRoute map[2];
+
+    map[0] = (mbm_gatewayRoute){1, 9, 0, 0};
+    map[1] = (mbm_gatewayRoute){10, 19, 1, 0};
+    gateway_bench_start(&b, map, COUNT(map));
+    ASK(0, 1, 2, READ);
+    ON_LINE(0, 2, READ);
+    map[0] = (mbm_gatewayRoute){1, 9, 1, 101};
+    map[1] = (mbm_gatewayRoute){1, 0, 0, 0};
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 1, 2, VALUE);
+    ASK(0, 2, 2, READ);
+    ON_LINE(1, 102, READ);
+    REPLY(1, 102, VALUE);
+    EXPECT(0, 2, 2, VALUE);
+    ASK(0, 3, 12, READ);
+    EXPECT(0, 3, 12, NO_PATH);
+}
+
+TEST(a_line_that_is_lost_gets_0a)
+{
+    ASK(0, 1, 2, READ);
+    ASK(0, 2, 2, READ);
+    ON_LINE(0, 2, READ);
+    b.wires[0].is_lost = 1;
+    EXPECT(0, 1, 2, NO_PATH);
+    EXPECT(0, 2, 2, NO_PATH);
+    b.wires[0].is_lost = 0;
+    ASK(0, 3, 2, READ);
+    ON_LINE(0, 2, READ);
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 3, 2, VALUE);
+}
+
+static mbm_clientRequest own[16];
+
+static void fill_the_queue(void)
+{
+    memset(own, 0, sizeof own);
+    for (unsigned i = 0; i < COUNT(own); i++) {
+        own[i].unit = 9;
+        IS(MBM_PENDING, mbm_client_readExceptionStatus(&b.clients[0], &own[i]));
+    }
+}
+
+TEST(a_client_whose_queue_is_full_gets_0a)
+{
+    fill_the_queue();
+    ASK(0, 1, 2, READ);
+    EXPECT(0, 1, 2, NO_PATH);
+}
+
+TEST(the_program_shares_the_line)
+{
+    memset(own, 0, sizeof own);
+    own[0].unit = 9;
+    ASK(0, 1, 2, READ);
+    ON_LINE(0, 2, READ);
+    IS(MBM_PENDING, mbm_client_readExceptionStatus(&b.clients[0], &own[0]));
+    ASK(0, 2, 2, READ_OTHER);
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 1, 2, VALUE);
+    ON_LINE(0, 9, "\x07");
+    REPLY(0, 9, "\x07\x6D");
+    ON_LINE(0, 2, READ_OTHER);
+    OK(own[0].status);
+    REPLY(0, 2, OTHER_VALUE);
+    EXPECT(0, 2, 2, OTHER_VALUE);
+}
+
+TEST(a_line_that_is_begun_anew_gets_0a)
+{
+    const mbm_port port = memory_port_of(&b.wires[0]);
+
+    ASK(0, 1, 2, READ);
+    ON_LINE(0, 2, READ);
+    OK(mbm_client_beginRtu(&b.clients[0], &port, b.frames[0], MBM_MAX_FRAME));
+    EXPECT(0, 1, 2, NO_PATH);
+    ASK(0, 2, 2, READ);
+    ON_LINE(0, 2, READ);
+    /* Also if the program has zeroed the client. */
+    memset(&b.clients[0], 0, sizeof b.clients[0]);
+    EXPECT(0, 2, 2, NO_PATH);
+    ASK(0, 3, 2, READ);
+    EXPECT(0, 3, 2, NO_PATH);
+}
+
+TEST(a_suspended_line_goes_on_when_it_is_resumed)
+{
+    OK(mbm_client_suspend(&b.clients[0], NULL));
+    ASK(0, 1, 2, READ);
+    SILENT(b.wires[0]);
+    SILENT(b.sockets[0]);
+    OK(mbm_client_resume(&b.clients[0], NULL));
+    ON_LINE(0, 2, READ);
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 1, 2, VALUE);
+}
+
+TEST(an_ascii_line_works)
+{
+    const mbm_port port = memory_port_of(&b.wires[1]);
+    static const char sent[] = ":020300100001EA\r\n", reply[] = ":0203021234B3\r\n";
+
+    OK(mbm_client_beginAscii(&b.clients[1], &port, b.frames[1], MBM_MAX_ASCII_FRAME));
+    ASK(0, 1, 102, READ);
+    gateway_bench_settle(&b);
+    assert_int_equal(b.wires[1].sent_count, sizeof sent - 1);
+    assert_memory_equal(b.wires[1].sent, sent, sizeof sent - 1);
+    EXPECT(0, 1, 102, NO_RESPONSE);
+    b.wires[1].sent_count = 0;
+    ASK(0, 2, 102, READ);
+    while (b.wires[1].sent_count < sizeof sent - 1)
+        assert_true(gateway_bench_step(&b));
+    memory_port_bytes(&b.wires[1], (const uint8_t *)reply, sizeof reply - 1);
+    EXPECT(0, 2, 102, VALUE);
+}
+
+/* A line that is a TCP connection has as many requests in flight as `inFlight` says. */
+TEST(a_line_may_be_a_tcp_connection)
+{
+    static uint8_t outgoing[MBM_MAX_TCP_FRAME];
+    const mbm_port port = memory_port_of(&b.wires[0]);
+    uint8_t reply[] = {0, 0, 0, 0, 0, 5, 2, 3, 2, 0x12, 0x34};
+
+    OK(mbm_client_beginTcp(&b.clients[0], &port, b.frames[0], MBM_MAX_TCP_FRAME, outgoing,
+                           sizeof outgoing));
+    OK(mbm_client_setInFlight(&b.clients[0], 3));
+    b.lines[0].inFlight = 3;
+    for (unsigned i = 0; i < 4; i++)
+        ASK(0, 100 + i, 2, READ);
+    for (unsigned i = 0; i < 4; i++)
+        OK(mbm_gateway_poll(&b.gateway));
+    assert_int_equal(b.wires[0].sent_count, 3 * 12);
+    memcpy(reply, b.wires[0].sent + 24, 2); /* the last one is answered first */
+    memory_port_bytes(&b.wires[0], reply, sizeof reply);
+    EXPECT(0, 102, 2, VALUE);
+    OK(mbm_gateway_poll(&b.gateway));
+    OK(mbm_gateway_poll(&b.gateway));
+    assert_int_equal(b.wires[0].sent_count, 4 * 12);
+    memcpy(reply, b.wires[0].sent, 2);
+    memory_port_bytes(&b.wires[0], reply, sizeof reply);
+    EXPECT(0, 100, 2, VALUE);
+}
+
+/* --- the gateway's own units --- */
+
+static mbm_unit unit;
+static mbm_registerTable table;
+static mbm_custom custom;
+static uint16_t words[4] = {1, 2, 3, 4};
+static uint8_t units_seen[8];
+static unsigned calls, not_yet;
+
+static uint16_t serve(void *context, const mbm_request *request, uint8_t *response,
+                      uint16_t capacity)
+{
+    (void)context;
+    (void)capacity;
+    units_seen[calls++ % COUNT(units_seen)] = request->unit;
+    if (not_yet > 0) {
+        not_yet--;
+        return MBM_REPLY_PENDING;
+    }
+    response[0] = request->data[0];
+    return 1;
+}
+
+TEST(own_units_are_served_beside_the_lines)
+{
+    static const mbm_gatewayRoute local[] = {{1, 31, 0, 0}, {200, 201, MBM_GATEWAY_LOCAL, 7}};
+
+    gateway_bench_start(&b, local, COUNT(local));
+    memset(&unit, 0, sizeof unit);
+    memset(&table, 0, sizeof table);
+    memset(&custom, 0, sizeof custom);
+    unit.id = 7;
+    table.words = words;
+    table.size = COUNT(words);
+    custom.code = 0x41;
+    custom.serve = serve;
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveCustom(&unit, &custom));
+    /* Before the units are there, nothing responds. */
+    ASK(0, 1, 200, "\x03\x00\x00\x00\x02");
+    SILENT(b.sockets[0]);
+    OK(mbm_gateway_serveUnits(&b.gateway, &unit, 1));
+    ASK(0, 2, 200, "\x03\x00\x01\x00\x02");
+    EXPECT(0, 2, 200, "\x03\x04\x00\x02\x00\x03");
+    ASK(0, 3, 201, "\x03\x00\x01\x00\x02"); /* unit 8 */
+    SILENT(b.sockets[0]);
+    /* A function that is not finished delays no other request. */
+    calls = 0;
+    not_yet = 3;
+    ASK(0, 4, 200, "\x41x");
+    ASK(0, 5, 200, "\x03\x00\x00\x00\x01");
+    ASK(0, 6, 3, READ);
+    EXPECT(0, 5, 200, "\x03\x02\x00\x01");
+    assert_true(mbm_gateway_pollDelay(&b.gateway) <= 1000);
+    EXPECT(0, 4, 200, "\x41x");
+    assert_int_equal(calls, 4);
+    assert_int_equal(units_seen[0], 7);
+    assert_int_equal(units_seen[3], 7);
+    ON_LINE(0, 3, READ);
+    SILENT(b.wires[1]);
+}

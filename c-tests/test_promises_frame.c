@@ -1,4 +1,5 @@
 /* Each function for frames and packets is held to its comment in mbm.h: results, limits, NULL. */
+#include "mbm.h"
 #include "refused.h"
 #include "crc.h"
 #include "examples.h"
@@ -6,6 +7,7 @@
 #include "test.h"
 
 #include <string.h>
+#include <stdio.h>
 
 enum { TEXT_SUFFICES = 2295 };
 
@@ -545,4 +547,31 @@ TEST(objects_are_added_within_their_limits)
     assert_int_equal(packet.objectCount, 35);
     REFUSED(MBM_BUFFER_TOO_SMALL, packet,
             mbm_packet_addObject(&packet, storage, sizeof storage, &object));
+}
+
+/* --- The version: one number, in Cargo.toml --- */
+
+/* The version of a Cargo.toml. */
+static void read_version(const char *path, char *version)
+{
+    FILE *file = fopen(path, "r");
+    char line[200];
+
+    assert_non_null(file);
+    while (fgets(line, sizeof line, file))
+        if (sscanf(line, "version = \"%19[0-9.]\"", version) == 1)
+            break;
+    (void)fclose(file);
+}
+
+TEST(the_version_is_that_of_the_packages_in_header_and_archive)
+{
+    char numbers[20], package[20];
+
+    snprintf(numbers, sizeof numbers, "%d.%d.%d", MBM_VERSION_MAJOR, MBM_VERSION_MINOR,
+             MBM_VERSION_PATCH);
+    assert_string_equal(MBM_VERSION, numbers);
+    assert_string_equal(mbm_version(), numbers);
+    read_version("Cargo.toml", package);
+    assert_string_equal(package, numbers);
 }

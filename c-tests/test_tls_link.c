@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
+#include <stdlib.h>
 
 enum { PLACES = 4, FIRST = 100 };
 
@@ -320,4 +321,304 @@ TEST(a_loop_polls_client_and_server_and_a_lost_session_comes_back)
     mbm_tcp_close(&l.a.tcp);
     mbm_loop_close(&loop);
     mbm_tls_end(&own);
+}
+
+/* The role of a certificate: how it is found in the extensions, and what a server does with it. */
+
+/* --- extensions as in a certificate --- */
+
+/* A sequence of extensions: a basic constraint, and the roles that a test adds. */
+typedef struct extensions {
+    uint8_t bytes[512];
+    size_t length;
+} extensions;
+
+#define OID 0x06, 0x0B, 0x2B, 0x06, 0x01, 0x04, 0x01, 0x83, 0x89, 0x0C, 0x86, 0x22, 0x01
+
+static const uint8_t constraint[] = {0x30, 0x0C, 0x06, 0x03, 0x55, 0x1D, 0x13,
+                                     0x01, 0x01, 0xFF, 0x04, 0x02, 0x30, 0x00};
+static const uint8_t role_plain[] = {0x30, 0x13, OID, 0x04, 0x04, 0x0C, 0x02, 'A', 'B'};
+static const uint8_t role_critical[] = {0x30, 0x16, OID,  0x01, 0x01, 0xFF,
+                                        0x04, 0x04, 0x0C, 0x02, 'C',  'D'};
+/* Another OID that begins with the same bytes, and one that is longer. */
+static const uint8_t other_oid[] = {0x30, 0x13, 0x06, 0x0B, 0x2B, 0x06, 0x01,
+                                    0x04, 0x01, 0x83, 0x89, 0x0C, 0x86, 0x22,
+                                    0x02, 0x04, 0x04, 0x0C, 0x02, 'E',  'F'};
+
+static void add(extensions *e, const uint8_t *bytes, size_t length)
+{
+    if (e->length == 0) {
+        e->bytes[0] = 0x30;
+        e->bytes[1] = 0;
+        e->length = 2;
+    }
+    memcpy(e->bytes + e->length, bytes, length);
+    e->length += length;
+    e->bytes[1] = (uint8_t)(e->length - 2);
+}
+
+/* Looks for the found in a copy that ends where the extensions do, so that the address
+ * sanitizer and valgrind see a byte too many. */
+static int find(const extensions *e, size_t length, char *found)
+{
+    uint8_t *copy = (uint8_t *)malloc(length ? length : 1);
+    mbedtls_x509_buf buffer = {.len = length, .p = copy};
+    int result;
+
+    memcpy(copy, e->bytes, length);
+    memset(found, 'x', MBM_TLS_ROLE_BYTES + 1);
+    result = mbm_tls_findRole(&buffer, found);
+    free(copy);
+    if (result != MBM_TLS_ONE_ROLE)
+        assert_int_equal(found[0], 'x');
+    else
+        assert_non_null(memchr(found, 0, MBM_TLS_ROLE_BYTES + 1));
+    return result;
+}
+
+TEST_WITH(the_role_is_found_among_other_extensions, NULL, NULL)
+{
+    char found[MBM_TLS_ROLE_BYTES + 1];
+    extensions e = {.length = 0};
+
+    assert_int_equal(find(&e, 0, found), MBM_TLS_NO_ROLE);
+    add(&e, constraint, sizeof constraint);
+    add(&e, other_oid, sizeof other_oid);
+    assert_int_equal(find(&e, e.length, found), MBM_TLS_NO_ROLE);
+    add(&e, role_plain, sizeof role_plain);
+    assert_int_equal(find(&e, e.length, found), MBM_TLS_ONE_ROLE);
+    assert_string_equal(found, "AB");
+    add(&e, constraint, sizeof constraint);
+    assert_int_equal(find(&e, e.length, found), MBM_TLS_ONE_ROLE);
+    assert_string_equal(found, "AB");
+    e.length = 0;
+    add(&e, role_critical, sizeof role_critical);
+    assert_int_equal(find(&e, e.length, found), MBM_TLS_ONE_ROLE);
+    assert_string_equal(found, "CD");
+}
+
+TEST_WITH(two_roles_are_no_role, NULL, NULL)
+{
+    char found[MBM_TLS_ROLE_BYTES + 1];
+    extensions e = {.length = 0};
+
+    add(&e, role_plain, sizeof role_plain);
+    add(&e, role_critical, sizeof role_critical);
+    assert_int_equal(find(&e, e.length, found), MBM_TLS_WRONG_ROLE);
+}
+
+/* No length and no change of a byte makes the search leave the extensions, or find a found that
+ * is not two characters long. */
+TEST_WITH(damaged_extensions_are_read_within_their_bounds, NULL, NULL)
+{
+    char found[MBM_TLS_ROLE_BYTES + 1];
+    extensions e = {.length = 0}, changed;
+
+    add(&e, constraint, sizeof constraint);
+    add(&e, role_critical, sizeof role_critical);
+    for (size_t length = 1; length < e.length; length++)
+        assert_int_equal(find(&e, length, found), MBM_TLS_WRONG_ROLE);
+    for (size_t i = 0; i < e.length; i++)
+        for (unsigned value = 0; value < 256; value++) {
+            changed = e;
+            changed.bytes[i] = (uint8_t)value;
+            if (find(&changed, e.length, found) == MBM_TLS_ONE_ROLE)
+                assert_int_equal(strlen(found), 2);
+        }
+}
+
+/* --- a server that serves by found --- */
+
+enum { FIRST_WORD = 100, WORDS = 4 };
+
+static tls_pair pair;
+static mbm_server server;
+static mbm_client client;
+
+static mbm_registerTable held;
+static mbm_custom every_function;
+static uint16_t held_words[WORDS], read_words[WORDS], new_word;
+static uint8_t frame[MBM_MAX_TCP_FRAME], incoming[600], outgoing[600];
+static mbm_clientRequest request;
+static const mbm_tls *seen; /* the connection that the hook of the table got */
+
+static int may(const mbm_tls *connection, const char *found)
+{
+    const char *own = mbm_tls_role(connection);
+
+    return own && strcmp(own, found) == 0;
+}
+
+/* Refuses with exception 01 what the found does not allow, before any record is asked. */
+static uint16_t authorise(void *context, const mbm_request *asked, uint8_t *response,
+                          uint16_t capacity)
+{
+    const mbm_tls *connection = (const mbm_tls *)asked->connection;
+
+    (void)context;
+    (void)response;
+    (void)capacity;
+    if (may(connection, "Operator") ||
+        (may(connection, "Viewer") && asked->function == MBM_FC_READ_HOLDING_REGISTERS))
+        return MBM_REPLY_DECLINED;
+    return MBM_REPLY_EXCEPTION | MBM_ILLEGAL_FUNCTION;
+}
+
+/* Only the operator may write register 103. */
+static uint8_t before_write(void *context, const mbm_access *access)
+{
+    (void)context;
+    seen = (const mbm_tls *)access->connection;
+    if (access->address + access->quantity > FIRST_WORD + 3 && !may(seen, "Operator"))
+        return MBM_ILLEGAL_DATA_ADDRESS;
+    return 0;
+}
+
+static void begin_unit(int guarded)
+{
+    static const mbm_accessHooks hooks = {.beforeWrite = before_write};
+
+    memset(&unit, 0, sizeof unit);
+    memset(&every_function, 0, sizeof every_function);
+    every_function.serve = authorise;
+    held = (mbm_registerTable){.words = held_words, .base = FIRST_WORD, .size = WORDS};
+    for (unsigned i = 0; i < WORDS; i++)
+        held_words[i] = (uint16_t)(500 + i);
+    unit.id = 17;
+    seen = NULL;
+    if (guarded)
+        OK(mbm_unit_serveCustom(&unit, &every_function));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &held));
+    OK(mbm_registerTable_setHooks(&held, &hooks));
+}
+
+static void connect_as(const char *name)
+{
+    tls_pair_begin(&pair, name, "server");
+    memset(&request, 0, sizeof request);
+    request.unit = 17;
+    request.reply = read_words;
+    request.replyBytes = sizeof read_words;
+    request.data = &new_word;
+    OK(mbm_client_beginTcp(&client, &pair.client.port, incoming, sizeof incoming, outgoing,
+                           sizeof outgoing));
+    OK(mbm_server_beginTcp(&server, &pair.server.port, &unit, 1, frame, sizeof frame));
+}
+
+static uint8_t see_through(void)
+{
+    while (request.status == MBM_PENDING) {
+        (void)mbm_client_poll(&client);
+        (void)mbm_server_poll(&server);
+    }
+    return request.status;
+}
+
+static uint8_t read_all(void)
+{
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, FIRST_WORD, WORDS));
+    return see_through();
+}
+
+static uint8_t write_one(uint16_t address, uint16_t word)
+{
+    new_word = word;
+    IS(MBM_PENDING, mbm_client_writeMultipleRegisters(&client, &request, address, 1));
+    return see_through();
+}
+
+TEST_WITH(a_function_that_the_role_does_not_allow_is_exception_01, NULL, NULL)
+{
+    begin_unit(1);
+    connect_as("operator");
+    IS(MBM_OK, read_all());
+    IS(MBM_OK, write_one(FIRST_WORD, 9));
+    assert_int_equal(held_words[0], 9);
+    tls_pair_end(&pair);
+    connect_as("viewer");
+    IS(MBM_OK, read_all());
+    assert_int_equal(read_words[0], 9);
+    IS(MBM_ILLEGAL_FUNCTION, write_one(FIRST_WORD, 10));
+    assert_int_equal(request.exception, 1);
+    assert_int_equal(held_words[0], 9);
+    tls_pair_end(&pair);
+    connect_as("norole");
+    IS(MBM_ILLEGAL_FUNCTION, read_all());
+    IS(MBM_ILLEGAL_FUNCTION, write_one(FIRST_WORD, 10));
+    assert_int_equal(held_words[0], 9);
+    tls_pair_end(&pair);
+}
+
+TEST_WITH(a_hook_of_a_table_gets_the_connection_and_its_role, NULL, NULL)
+{
+    begin_unit(0);
+    connect_as("viewer");
+    IS(MBM_OK, write_one(FIRST_WORD + 2, 1));
+    assert_ptr_equal(seen, &pair.server.tls);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, write_one(FIRST_WORD + 3, 1));
+    tls_pair_end(&pair);
+    connect_as("operator");
+    IS(MBM_OK, write_one(FIRST_WORD + 3, 1));
+    assert_int_equal(held_words[3], 1);
+    tls_pair_end(&pair);
+}
+
+/* --- A blocking master inside TLS: RTU frames, as some gateways take them --- */
+
+enum { UNIT = 17, MASTER_FIRST = 100, MASTER_WORDS = 20, TICK_US = 1000 };
+
+static mbm_line line;
+static mbm_node master;
+
+static mbm_registerTable master_holding;
+static uint16_t master_words[MASTER_WORDS], response[MASTER_WORDS];
+static uint8_t server_frame[MBM_MAX_FRAME], own_frame[MBM_MAX_FRAME];
+static unsigned idles;
+
+/* The port below sleeps here. Meanwhile time passes, and the server serves. */
+static void serve(void)
+{
+    idles++;
+    pair.now += TICK_US;
+    (void)mbm_server_poll(&server);
+}
+
+static void begin_pair(void)
+{
+    tls_pair_begin(&pair, "operator", "server");
+    pair.idle = serve;
+    memset(&unit, 0, sizeof unit);
+    unit.id = UNIT;
+    master_holding =
+        (mbm_registerTable){.words = master_words, .base = MASTER_FIRST, .size = MASTER_WORDS};
+    for (unsigned i = 0; i < MASTER_WORDS; i++)
+        master_words[i] = (uint16_t)(0xC000 + i);
+    OK(mbm_unit_serveHoldingRegisters(&unit, &master_holding));
+    OK(mbm_server_beginRtuOverTcp(&server, &pair.server.port, &unit, 1, server_frame,
+                                  sizeof server_frame));
+    OK(mbm_line_beginRtu(&line, &pair.client.port, own_frame, sizeof own_frame));
+    OK(mbm_node_begin(&master, &line, UNIT, response, MASTER_WORDS, NULL, 0));
+}
+
+static void end_pair(void)
+{
+    tls_pair_end(&pair);
+}
+
+TEST_WITH(a_master_reads_while_its_idle_hook_lets_the_port_below_sleep, begin_pair, end_pair)
+{
+    tls_pair_run(&pair);
+    idles = 0;
+    for (unsigned i = 0; i < 3; i++) {
+        memset(response, 0, sizeof response);
+        OK(mbm_node_readHoldingRegisters(&master, MASTER_FIRST, MASTER_WORDS));
+        assert_memory_equal(response, master_words, sizeof master_words);
+    }
+    assert_true(idles > 0);
+}
+
+TEST_WITH(a_master_without_a_session_reports_a_lost_link, begin_pair, end_pair)
+{
+    mbm_tls_close(&pair.client.tls);
+    IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&master, MASTER_FIRST, MASTER_WORDS));
 }
