@@ -100,7 +100,10 @@ public:
     uint8_t setTurnaroundDelay(uint32_t ms) { return mbm_client_setTurnaroundDelay(&client, ms); }
     /** Milliseconds after a failed request before the next one is sent; 100 at first. */
     uint8_t setQuietTime(uint32_t ms) { return mbm_client_setQuietTime(&client, ms); }
-    /** Discards the local echo, if the receiver receives what the driver sends; off at first. */
+    /**
+     * Discards the local echo, if the receiver receives the bytes that the driver sends; off at
+     * first.
+     */
     uint8_t setEchoDiscard(bool on) { return mbm_client_setEchoDiscard(&client, on); }
     /** Character times that the driver stays on after flush, for cores whose flush returns early; 0 at first. */
     uint8_t setPostFlushHold(uint8_t characters)
@@ -167,9 +170,9 @@ private:
 };
 
 /**
- * A client of one TCP connection of an Ethernet or WiFi library. Up to 16 requests are
- * pending at once. The device at the other end of the connection is unit 255; other units
- * are behind a gateway.
+ * A client of one TCP connection of an Ethernet or WiFi library. Up to 16 requests are pending
+ * at once. The device at the other end of the connection is unit 255; requests to other units
+ * pass through a gateway.
  */
 class ModbusTcpClient : public ModbusClient {
 public:

@@ -339,7 +339,10 @@ public:
     void setQuietTime(uint32_t ms) { mbm_line_setQuietTime(line(), ms); }
     /** How often a request is repeated if its reply is missing, damaged or malformed; 0 at first. */
     void setRetries(uint8_t retries) { mbm_line_setRetries(line(), retries); }
-    /** Discards the local echo, if the receiver receives what the driver sends; off at first. */
+    /**
+     * Discards the local echo, if the receiver receives the bytes that the driver sends; off at
+     * first.
+     */
     void setEchoDiscard(bool on) { mbm_line_setEchoDiscard(line(), on); }
     /**
      * Accepts replies that deviate from the standard if no correct one arrives in time:
@@ -415,7 +418,8 @@ private:
         uint16_t response[responseWords];
         uint16_t transmit[transmitWords];
 #if defined(MODBUSMASTER_SHARE_LINE)
-        // Several ports may share the line, so that of one object says nothing of its rate.
+        // Several ports may share the line, so the rate of one object's port says nothing about
+        // the line's.
         static void keepRate() { Line::wire.keepsGap = true; }
         static void forgetRate() {}
         static bool keepsGap() { return Line::wire.keepsGap; }
@@ -494,7 +498,7 @@ private:
         attach(getSlaveID());
     }
 
-    // Has the line make requests of an object.
+    // Makes the line work for an object.
     static void takeLine(State &user)
     {
         Line::wire.user = &user;

@@ -40,7 +40,7 @@ public:
         uint8_t frame[Bytes];
     };
 
-    // Has all later requests use the buffer.
+    // Makes all later requests use the buffer.
     static void keep()
     {
         static Kept all = {mbm_node_cancel, {}};
@@ -117,8 +117,8 @@ public:
     mbm_port port;
     uint8_t frame[Bytes];
     bool isRateKept;
-    // mbm_line_setBaudRate once a port has told its rate, else nullptr. A program whose ports tell
-    // none does not contain that function.
+    // mbm_line_setBaudRate once the rate of a port is known, else nullptr. A program with ports
+    // whose rate is not known does not contain that function.
     uint8_t (*forget)(mbm_line *, uint32_t);
 
     static uint8_t bytesOfRead(uint16_t) { return Bytes; }
@@ -134,7 +134,7 @@ public:
         forget = nullptr;
     }
 
-    // Takes over the bit rate that the open port tells; 0 if it is closed.
+    // Takes over the bit rate that the open port reports; 0 if it is closed.
     template <typename Port> void takeRate(Port &serial)
     {
         if (!isRateKept && mbm_line_setBaudRate(&wire.line, uint32_t(serial.baudRate())) == MBM_OK)

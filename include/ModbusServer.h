@@ -261,8 +261,8 @@ public:
     }
 
     /**
-     * Says whether the receiver receives what the driver sends (RTU only; call it after begin).
-     * Without this call the server finds out. See mbm_server_setEchoDiscard.
+     * Says whether the receiver receives the bytes that the driver sends (RTU only; call it
+     * after begin). Without this call the server finds out. See mbm_server_setEchoDiscard.
      */
     void setEchoDiscard(bool on) { mbm_server_setEchoDiscard(&state.server, on); }
 

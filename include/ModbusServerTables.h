@@ -17,9 +17,9 @@
  * Functions of yours that are called around the requests to a table: pass the object to
  * setHooks of each table. It must outlive the tables.
  *
- * A hook gets the request: its unit and function, the address on the wire of the first
- * cell, the number of cells and, of a write, the new values: registers with the high
- * byte first, bits with the lowest bit first. A cell is a register or a bit.
+ * A hook gets the request: its unit and function, the address on the wire of the first cell,
+ * the number of cells and, for a write, the new values: registers with the high byte first,
+ * bits with the lowest bit first. A cell is a register or a bit.
  */
 class ModbusHooks {
 public:
@@ -81,9 +81,9 @@ public:
     ModbusTable(const ModbusTable &) = delete;
     ModbusTable &operator=(const ModbusTable &) = delete;
 
-    /** Has these hooks called around requests to the table; other tables may have them too. */
+    /** Sets the hooks around requests to the table; other tables may have them too. */
     void setHooks(const ModbusHooks &hooks) { set(&table, &hooks.hooks); }
-    /** Has no hooks called any more. */
+    /** Takes the hooks away. */
     void removeHooks() { set(&table, nullptr); }
     /**
      * Says which cells exist: one bit for each, lowest bit of the first byte first.

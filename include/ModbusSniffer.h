@@ -47,8 +47,8 @@
  * needs about 700 bytes of RAM in addition to its buffer, and about 40 KB of flash: a Mega has
  * them, an Uno does not.
  *
- * Call poll in loop, more often than the Stream's buffer fills: 64 bytes take 33 ms at
- * 19200 baud. Printing takes time too: open the port that prints at a higher rate than that of the line.
+ * Call poll in loop, more often than the Stream's buffer fills: 64 bytes take 33 ms at 19200
+ * baud. Printing takes time too: open the port that prints at a higher rate than the line has.
  */
 class ModbusSniffer {
 public:

@@ -82,11 +82,11 @@ statuses! {
 errors {
     /// Exception 01 of the remote device.
     ILLEGAL_FUNCTION = 0x01, "exception 01: illegal function";
-    /// Exception 02 of the remote device. Also returned without sending for addresses
-    /// beyond 65535, to which every device would answer this exception.
+    /// Exception 02 of the remote device. Also returned, with nothing sent, for addresses
+    /// beyond 65535: every device would answer with this exception.
     ILLEGAL_DATA_ADDRESS = 0x02, "exception 02: illegal data address";
-    /// Exception 03 of the remote device. Also returned without sending for a quantity that
-    /// the standard does not allow, to which every device would answer this exception.
+    /// Exception 03 of the remote device. Also returned, with nothing sent, for a quantity that
+    /// the standard does not allow: every device would answer with this exception.
     ILLEGAL_DATA_VALUE = 0x03, "exception 03: illegal data value";
     /// Exception 04 of the remote device.
     SERVER_DEVICE_FAILURE = 0x04, "exception 04: server device failure";

@@ -106,7 +106,7 @@ pub const fn character(baud: u32) -> u16 {
     }
 }
 
-/// The time so many characters after `start`. (A 32-bit multiplication costs 84 bytes of flash on
+/// The time `count` characters after `start`. (A 32-bit multiplication costs 84 bytes of flash on
 /// an AVR. The fence keeps the compiler from using one.)
 #[inline(always)]
 pub fn after_characters(start: u32, count: usize, character: &u16) -> u32 {

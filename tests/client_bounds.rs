@@ -70,7 +70,7 @@ proptest! {
         echo: bool,
     ) {
         let (build, data, request, response, received) = case;
-        // Two of the three sizes are exactly what the request or the reply needs.
+        // Two of the three sizes are exactly those that the request or the reply needs.
         let needs = [request, response].map(|pdu| encoded(framing, 17, pdu).len());
         for space in [space, needs[0], needs[0].max(needs[1])] {
             let end = End::default();

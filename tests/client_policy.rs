@@ -1,4 +1,4 @@
-//! When a client sends a request, when it retries, and what it records about each unit.
+//! When a client sends a request, when it retries, and how it records each unit.
 
 #[path = "common/wire.rs"]
 mod wire;

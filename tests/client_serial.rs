@@ -106,7 +106,7 @@ fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
     }
 }
 
-/// The data of a user-defined 08 do not tell its replies apart, as those of Return Query Data do.
+/// The data of a user-defined 08 do not distinguish its replies, as those of Return Query Data do.
 #[test]
 fn a_late_reply_to_a_function_08_of_the_program_is_not_taken() {
     let (end, mut client) = rtu_client();

@@ -450,7 +450,7 @@ fn a_reconnect_discards_a_half_received_response() {
     assert_right(&poll(&end, &mut client)[0]);
 }
 
-/// A device may keep a connection open on which it answers no more.
+/// A device may keep a connection open and answer no more on it.
 #[test]
 fn a_program_sees_how_many_requests_in_a_row_were_unanswered() {
     let (end, mut client) = client();

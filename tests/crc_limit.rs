@@ -200,8 +200,9 @@ fn read(registers: usize, frame: &[u8]) -> Option<Vec<u16>> {
     panic!("the request does not end");
 }
 
-/// Damages a reply of ten registers `times` times: one to eight bits anywhere in it, or as many bytes.
-/// Counts those that a bare check accepts, and compares with what the master does, frame by frame.
+/// Damages a reply of ten registers `times` times: one to eight bits anywhere in it, or as many
+/// bytes. Counts the frames that a bare check accepts, and compares each with the verdict of
+/// the master.
 fn count_accepted(times: u64) -> u64 {
     const REGISTERS: usize = 10;
     let right = reply(REGISTERS);

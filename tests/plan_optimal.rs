@@ -139,7 +139,7 @@ proptest! {
             .into_iter()
             .collect();
         let limits = Limits { bits, registers, bit_gap, register_gap, units: &units, excluded: &excluded };
-        // Only what the plan accepts, one field after the other.
+        // Takes only fields that the plan accepts, one after the other.
         let mut accepted: Vec<Field> = Vec::new();
         for field in fields {
             accepted.push(field);

@@ -1,5 +1,5 @@
-//! The order in which a plan reads, held against a scan of all reads: random plans, of which units
-//! do not answer, over a clock that wraps.
+//! The order in which a plan reads, held against a scan of all reads: random plans with units
+//! that do not answer, over a clock that wraps.
 
 #[path = "common/plan.rs"]
 mod plan;
@@ -276,8 +276,8 @@ proptest! {
     }
 }
 
-/// Runs a plan, of which some units do not answer for some time, and sleeps as it says. Returns how
-/// many reads of each unit were sent.
+/// Runs a plan some of whose units do not answer for some time, and sleeps as the plan says.
+/// Returns how many reads of each unit were sent.
 fn run(
     pair: &mut Pair,
     in_flight: usize,

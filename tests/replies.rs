@@ -1,5 +1,5 @@
-//! Responses restored from what a client stores of them, and identifications in several
-//! replies.
+//! Responses restored from the data that a client stores of them, and identifications in
+//! several replies.
 
 #[path = "common/exchanges.rs"]
 mod exchanges;

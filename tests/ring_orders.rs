@@ -73,7 +73,7 @@ struct Shared {
 }
 
 impl Shared {
-    /// An empty ring with `storage` bytes, of which it can hold one fewer. `at` bytes have been
+    /// An empty ring with `storage` bytes; it can hold one byte fewer. `at` bytes have been
     /// written and read before, so both sides are at position `at`.
     fn new(storage: usize, at: usize) -> Self {
         let bytes = (0..storage).map(|_| atomic::AtomicU8::new(0xEE)).collect();

@@ -55,7 +55,7 @@ fn a_request_of_any_length_in_blocks_of_any_length_is_answered() {
 
 #[test]
 fn a_request_through_an_adapter_with_a_latency_timer_is_answered() {
-    // Every 16 ms the adapter hands over what has arrived since.
+    // The adapter hands over the received bytes every 16 ms.
     let mut line = Line::new(Framing::Rtu);
     for count in [11, 20, 57, 123] {
         {
@@ -146,7 +146,7 @@ fn a_request_inside_a_longer_one_in_blocks_is_not_carried_out() {
         let mut line = Line::new(Framing::Rtu);
         arrive_in_blocks(&line, 0, &sealed(&content), 45, 0);
         let sent = answers(&mut line);
-        // One that ends where a block ends cannot be told from a new request.
+        // One that ends where a block ends looks like a new request.
         if !(7 + 2 * before + inner.len()).is_multiple_of(45) {
             assert_eq!(sent, [refused()], "{before}");
             assert_ne!(line.device.holding[0], 0xDEAD);
@@ -223,7 +223,7 @@ fn the_server_waits_at_any_baud_rate_and_when_it_is_unknown() {
     }
 }
 
-/// Units that do not tell which ids they have.
+/// Units that do not say which ids they have.
 struct AnyUnit(Vec<u8>);
 
 impl Units for AnyUnit {

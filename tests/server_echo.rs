@@ -1,5 +1,5 @@
 //! One request on the line leads to at most one response, and to nothing else: with a receiver
-//! that gets what the driver sends, and with two servers of one id.
+//! that gets the bytes of its own driver, and with two servers of one id.
 
 mod common;
 
@@ -62,7 +62,7 @@ fn line(framing: Framing) -> Line {
     line
 }
 
-/// The receiver gets what the driver sends, `late` microseconds later and after `glitch`.
+/// The receiver gets the bytes of its own driver, `late` microseconds later and after `glitch`.
 fn line_with_echo(framing: Framing, late: u32, glitch: &[u8]) -> Line {
     let line = line(framing);
     let mut wire = line.wire.borrow_mut();
@@ -264,8 +264,8 @@ fn a_function_code_of_an_exception_is_never_answered_on_a_serial_line() {
     }
 }
 
-/// Lets two servers of one id get a request, and each what the other sends. Returns how many frames
-/// each sends.
+/// Lets two servers of one id get a request, and the bytes that the other one sends. Returns
+/// how many frames each sends.
 fn twins(framing: Framing, request: &[u8]) -> [usize; 2] {
     let mut lines = [line(framing), line(framing)];
     // So that each is beyond its first requests.
@@ -298,7 +298,7 @@ fn two_servers_of_one_id_do_not_answer_each_other() {
         // The responses of these have the form of a request.
         if !equals_its_request(request) {
             assert_eq!(twins(Framing::Rtu, request), [1, 1], "{request:02X?}");
-            // In ASCII each refuses what the other sends, once.
+            // In ASCII each refuses the frame of the other, once.
             let most = twins(Framing::Ascii, request);
             assert!(most.into_iter().all(|sent| sent <= 2), "{request:02X?}");
         }

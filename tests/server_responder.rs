@@ -371,7 +371,7 @@ fn identification_of_a_category_has_all_its_objects() {
     ]
     .concat();
     assert_eq!(ask(&mut device, &[0x2B, 0x0E, 1, 0]), basic);
-    // For a category without objects, the response has those of the lower categories.
+    // The response for a category without objects has the objects of the lower categories.
     let extended = ask(&mut device, &[0x2B, 0x0E, 3, 0]);
     assert_eq!(extended[3..], basic[3..]);
     device.objects.push((0x80, b"x".to_vec()));

@@ -153,7 +153,7 @@ proptest! {
         lenient: bool,
         at_end: bool,
     ) {
-        // Two of the three sizes are exactly what the request or the reply needs.
+        // Two of the three sizes are exactly those that the request or the reply needs.
         let query = call.query().unwrap();
         let longest = query.length().max(query.response_length());
         for space in [space, usize::from(query.length()) + 3, usize::from(longest) + 3] {

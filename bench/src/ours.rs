@@ -173,7 +173,7 @@ pub fn answer(
     emit(framing, buffer, |pdu| response.emit(pdu))
 }
 
-/// Parses a response of which nothing is taken out: bits stay where they are.
+/// Parses a response and takes nothing out: bits stay where they are.
 #[inline(always)]
 pub fn receive_bits(framing: Framing, frame: &[u8]) {
     let adu = open(framing, frame).expect("a frame");

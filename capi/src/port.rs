@@ -85,8 +85,8 @@ pub(super) unsafe fn now(port: *const mbm_port) -> u32 {
     micros.unwrap_unchecked()(context)
 }
 
-/// The number of bytes of a buffer that is used: at most as many as the `i16` that a port's
-/// hooks return can count.
+/// The number of bytes of a buffer that are used: at most as many as the hooks of a port can
+/// count in their `i16`.
 pub(super) const fn countable(bytes: u16) -> u16 {
     if bytes > i16::MAX as u16 {
         i16::MAX as u16

@@ -128,7 +128,7 @@ statuses! {
 }
 
 /// Explains a status in a few words of English. For 1 to 3 these are the words of the device's
-/// exception; mbm_status_textOf tells a request that was refused before it was sent apart.
+/// exception; mbm_status_textOf has its own text for a request that was refused before it was sent.
 ///
 /// On an AVR, constants are in RAM, and a program that calls this function has about 1100
 /// bytes of RAM less. There, show the number; or in a sketch call modbusStatusText of

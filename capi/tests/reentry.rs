@@ -279,7 +279,7 @@ fn hooks_use_a_node_whose_reply_arrives() {
         assert_eq!(mbm_line_setGap(line.line, 0), MBM_OK);
         assert_eq!(mbm_node_setBlocking(line.node, 0), MBM_OK);
         assert_eq!(mbm_node_readHoldingRegisters(line.node, 0, 2), MBM_PENDING);
-        // The poll that sends the request discards what has arrived.
+        // The poll that sends the request discards the bytes that have arrived.
         assert_eq!(mbm_node_poll(line.node), MBM_PENDING);
         (*state).received = reply();
         for _ in 0..8 {

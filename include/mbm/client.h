@@ -415,10 +415,10 @@ uint16_t mbm_client_wireTransaction(const mbm_clientRequest *request);
 uint8_t mbm_client_setRetries(mbm_client *client, uint8_t retries);
 
 /**
- * Sets that the client repeats a request that a busy device refuses: one that the device
- * answers with exception 06 (SERVER DEVICE BUSY), and one that only reads and that the device
- * answers with exception 05 (ACKNOWLEDGE) (V1.1b3, 7). Without this setting both are the
- * result of the request, as every exception is.
+ * Makes the client repeat a request that a busy device refuses (V1.1b3, 7): any request that
+ * the device answers with exception 06 (SERVER DEVICE BUSY), and a request that only reads
+ * that it answers with exception 05 (ACKNOWLEDGE). Without this setting both are the result of
+ * the request, as every exception is.
  *
  * After exception 06 the device has not carried out the request, so the client repeats any
  * request. After exception 05 the device is carrying out the request, so a repetition would
@@ -802,9 +802,9 @@ uint8_t mbm_client_setTurnaroundDelay(mbm_client *client, uint32_t delayMs);
 uint8_t mbm_client_setQuietTime(mbm_client *client, uint32_t quietMs);
 
 /**
- * Switches echo discarding on or off. Switch it on if the receiver also receives what the
- * driver sends: then the client discards the copy of each request that arrives before the
- * reply. It has no effect on TCP.
+ * Switches echo discarding on or off. Switch it on if the receiver also receives the bytes
+ * that the driver sends: then the client discards the copy of each request that arrives before
+ * the reply. It has no effect on TCP.
  *
  * @param on  0 (the default) or 1
  */

@@ -189,9 +189,9 @@ uint8_t mbm_line_setQuietTime(mbm_line *line, uint32_t quietMs);
 uint8_t mbm_line_setRetries(mbm_line *line, uint8_t retries);
 
 /**
- * Switches echo discarding on or off. Switch it on if the receiver also receives what the
- * driver sends: then the master discards the copy of each request that arrives before the
- * reply.
+ * Switches echo discarding on or off. Switch it on if the receiver also receives the bytes
+ * that the driver sends: then the master discards the copy of each request that arrives before
+ * the reply.
  *
  * @param on  0 (the default) or 1
  */

@@ -345,7 +345,7 @@ uint8_t mbm_plan_getText(const mbm_plan *plan, uint16_t field, char *text, uint1
 
 /**
  * The registers of a field as they were read, for mbm_registers_get... functions, in the order
- * of the field. It copies nothing: the next reply changes what it sees.
+ * of the field. It copies nothing: the next reply changes the words that it shows.
  *
  * @param field      the index of the field, of registers
  * @param registers  the view to fill in
@@ -366,7 +366,7 @@ uint8_t mbm_plan_refresh(mbm_plan *plan, uint16_t field);
  *
  * @param index  0 for the first read
  * @param read   gets the read
- * @return a status; MBM_INVALID_ARGUMENT behind the last read
+ * @return a status; MBM_INVALID_ARGUMENT after the last read
  */
 uint8_t mbm_plan_getRead(const mbm_plan *plan, uint16_t index, mbm_planReadInfo *read);
 

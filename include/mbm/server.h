@@ -90,11 +90,11 @@ typedef struct mbm_diagnostics {
  * zeroed and refilled it; it keeps its place. A zeroed record serves nothing until you
  * pass it again. Any number of units may share one record.
  *
- * A unit may have several tables of one kind, for example holding registers 0 to 9 and
- * 40000 to 40099; the same holds for callbacks, files and FIFO queues. The unit asks them
- * in the order in which they were registered. The first one that has all cells of a request
- * answers it. If none has all of them, the unit answers with exception 02, also where
- * several have them together.
+ * A unit may have several tables of one kind, for example holding registers 0 to 9 and 40000
+ * to 40099; the same holds for callbacks, files and FIFO queues. The unit asks them in the
+ * order of their registration. The first one that has all cells of a request answers it. If
+ * none has all of them, the unit answers with exception 02, also where several have them
+ * together.
  */
 typedef struct mbm_unit {
     /** Private: the records in the order in which the unit calls them. NULL follows the
@@ -220,7 +220,7 @@ typedef struct mbm_request {
  * A function of yours. Initialise the struct with MBM_INIT, set the fields that you need, and
  * pass it to mbm_unit_serveCustom.
  *
- * A unit asks its records in the order in which they were registered. So a function that is
+ * A unit asks its records in the order of their registration. So a function that is
  * registered before the record that serves the same code is asked first. It answers the
  * request itself, for example with an exception, or it returns MBM_REPLY_DECLINED: then the
  * record after it answers. A function that is registered after tables with its code is asked
@@ -726,11 +726,12 @@ uint8_t mbm_server_setBaudRate(mbm_server *server, uint32_t baud);
 uint8_t mbm_server_setReceiveLatency(mbm_server *server, uint16_t latencyMs);
 
 /**
- * Says whether the receiver of an RTU line gets what the driver sends (a local echo). Without
- * this call the server finds out: it drops a frame that is byte for byte its last response,
- * until another frame, or none in time, has followed a response. A client whose very first
- * requests are the same write again and again, each less than 80 ms after the response, then
- * loses some of them: say that there is no echo. mbm_server_beginRtu takes the answer back.
+ * Says whether the receiver of an RTU line gets the bytes that the driver sends (a local
+ * echo). Without this call the server finds out: it drops a frame that is byte for byte its
+ * last response, until another frame, or none in time, has followed a response. A client whose
+ * very first requests are the same write again and again, each less than 80 ms after the
+ * response, then loses some of them: say that there is no echo. mbm_server_beginRtu takes the
+ * answer back.
  *
  * @param on  0: there is none, so no request is taken for it; anything else: there is one, even if
  *            a response came without it

@@ -71,12 +71,12 @@ typedef struct mbm_traceRecord {
  * mbm_trace_port.
  *
  * The hook is called from within the functions of the node, client or server, when the last
- * byte of a frame was sent or read. Bytes that are not followed by the rest of a frame are
- * handed out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a
- * serial line when the next frame is sent, when the link is lost, or by mbm_trace_flush.
- * `record` and its bytes are valid until the hook returns. The hook must not use this trace or
- * the object that uses its port: such a call returns MBM_BUSY and changes nothing. On a serial
- * line it should not take longer than a character.
+ * byte of a frame was sent or read. Bytes of an incomplete frame are handed out at the first
+ * read after the frame timeout (see mbm_trace_setFrameTimeout), on a serial line when the next
+ * frame is sent, when the link is lost, or by mbm_trace_flush. `record` and its bytes are
+ * valid until the hook returns. The hook must not use this trace or the object that uses its
+ * port: such a call returns MBM_BUSY and changes nothing. On a serial line it should not take
+ * longer than a character.
  *
  * You may call this function again at any time, but not from within the hook. The trace then
  * drops the bytes that it has not handed out, and its frame timeout is the default.

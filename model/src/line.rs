@@ -44,7 +44,7 @@ const LONGEST: u32 = 100;
 
 /// The fault of a request that continues after its end.
 pub const TWICE: &str = "a request ended twice";
-/// The fault of a rule that keeps a device from being heard.
+/// The fault of a rule that keeps the master from receiving a device's replies.
 pub const NOT_HEARD: &str = "a device that answers is not heard";
 
 /// A fault that is planted to see that the model finds it.
@@ -151,8 +151,9 @@ struct Device {
     since: u32,
     /// How long the line must be silent before a reply after a failure is accepted, in ticks.
     hold: u32,
-    /// It owes a reply that no master can tell from the right one: it was silent for longer than
-    /// promised, or its reply came, or was lost, after a late one had been held long enough.
+    /// It owes a reply that no master can distinguish from the right one: it was silent for
+    /// longer than promised, or its reply came, or was lost, after a late one had been held
+    /// long enough.
     beyond_bound: bool,
 }
 
@@ -309,7 +310,7 @@ impl State {
                 events.push(Event::Start(0));
             }
             if slow.late > 0 && slow.may_be_late {
-                // A reply that is later by more than a response timeout is beyond what is promised.
+                // The promise does not cover a reply that is later by more than a response timeout.
                 events.extend([1, 5, 9].map(Event::Late));
                 events.push(Event::Lost(0));
             }

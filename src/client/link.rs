@@ -92,8 +92,8 @@ pub struct Link {
     /// without any byte between: only a request opens it.
     was_idle: bool,
     rests: bool,
-    /// After so many requests in a row without any byte the link is closed and opened anew, 1 to
-    /// [`MOST_REPLACE_AFTER`]; 0 for never.
+    /// The number of requests in a row without any byte after which the link is closed and
+    /// opened anew: 1 to [`MOST_REPLACE_AFTER`]; 0 for never.
     pub replace_after: u8,
     /// Requests since the last byte that the program cancelled.
     pub cancelled: u8,

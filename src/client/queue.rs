@@ -1,4 +1,4 @@
-//! The queue of a client, and what follows when a request ends. Serial lines and TCP
+//! The queue of a client, and the steps after the end of a request. Serial lines and TCP
 //! streams use the same queue, so a program contains its code once.
 
 use super::policy::{Policy, NO_RETRIES};
@@ -348,8 +348,8 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         self.mark_lost(|_| true);
     }
 
-    /// Puts a placeholder into the empty queue, which is never due. While it is there, the
-    /// client reads and drops what arrives.
+    /// Puts a placeholder, which is never due, into the empty queue. While the queue has it,
+    /// the client reads and drops all bytes that arrive.
     pub fn begin_idle(&mut self, mut placeholder: J, now: u32) {
         placeholder.state_mut().enter(Stage::Queued, now, LONGEST);
         self.set_next_due(now, LONGEST);

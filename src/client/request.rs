@@ -104,7 +104,7 @@ impl RequestState {
     }
 
     /// True if a device answers such a request: its function has a response, and it is no
-    /// broadcast, for which it takes a write to unit 0 in TCP frames, too.
+    /// broadcast. A write to unit 0 counts as a broadcast in TCP frames, too.
     pub const fn has_reply(&self) -> bool {
         let may_be_broadcast = self.unit() == BROADCAST && self.header.may_be_broadcast();
         !may_be_broadcast && self.header.is_answered()

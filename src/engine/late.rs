@@ -93,7 +93,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Writes into the record of the unit what it owes, and when it is clean at the latest.
+    /// Writes into the record of the unit how many replies it owes, and when it is clean at the
+    /// latest.
     #[inline(always)]
     fn write_record(&mut self) {
         let place = self.place_of_record();

@@ -26,8 +26,8 @@ pub struct LateUnit {
     pub(super) unit: u8,
     /// How many replies it owes, and flags; 0: the record is free.
     pub(super) owed: u8,
-    /// No more than so many times 2^16 microseconds are left until the unit is clean. More on the
-    /// clock mean that it has been clean for long.
+    /// The most time that can be left until the unit is clean, in units of 2^16 microseconds.
+    /// If the clock shows more, the unit has been clean for long.
     pub(super) most: u16,
     /// When the unit is clean: it has been silent for long enough since its last request.
     pub(super) clean: Micros,
@@ -86,7 +86,8 @@ impl LateUnits {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn record(&mut self, unit: u8) -> Option<&mut LateUnit> {
         let records = self.records.iter_mut();
-        // The records that were ever used come first. A host has so many that this saves time.
+        // The records that were ever used come first. Looking at these alone saves time on a
+        // host, which has more records.
         let mut used = records.take_while(|record| LATE_UNITS <= 4 || record.most > 0);
         used.find(|record| record.is_of(unit))
     }

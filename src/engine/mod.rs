@@ -147,7 +147,8 @@ pub struct Engine<P, S: Storage, Q> {
     pub(crate) extras: Option<Extension<P, S, Q>>,
 }
 
-/// A function that does something at a moment of a request. `true` if that replaces what follows.
+/// A function that does something at a moment of a request. `true` if that replaces the
+/// engine's next step.
 pub type Extension<P, S, Q> = fn(&mut Engine<P, S, Q>, Moment) -> bool;
 
 /// When an [`Extension`] is called.

@@ -101,9 +101,9 @@ impl<S: GatewayStorage> Gateway<S> {
     /// as many as it may have. The connections take turns, and the oldest request of a
     /// connection is the first. Answers requests that have waited too long.
     ///
-    /// A request whose unit is left alone for a while is not counted, so that the line is free for
-    /// other units. The line takes such requests too, as many as it has places left, because it
-    /// reads what arrives only while it has requests.
+    /// A request whose unit is left alone for a while is not counted, so that the line is free
+    /// for other units. The line takes such requests too, as long as it has places left,
+    /// because it reads received bytes only while it has requests.
     fn next(&mut self, line: u8) -> Option<u16> {
         let last = self.storage.line(line).last;
         let mut left = self.storage.line_depth(line);

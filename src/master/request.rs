@@ -210,8 +210,8 @@ impl MasterRequest {
         }
     }
 
-    /// True if the response carries data behind a byte count, false if it
-    /// repeats the request's head.
+    /// True if the response carries data after a byte count, false if it repeats the request's
+    /// head.
     pub const fn is_read(&self) -> bool {
         self.reads > 0
     }

@@ -56,7 +56,7 @@ pub(super) fn check_head(code: u8, more: bool, count: u8) -> Result<(), Error> {
     })
 }
 
-/// Parses what follows the code of a response to Read Device Identification.
+/// Parses the bytes that follow the code of a response to Read Device Identification.
 fn read_reply<'a>(code: u8, reader: &mut Reader<'a>) -> Result<IdentificationReply<'a>, Error> {
     let conformity = byte(reader)?;
     let (more, next_object, count) = (byte(reader)?, byte(reader)?, byte(reader)?);

@@ -279,7 +279,7 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Passes the MEI type of a request of 2B, and what follows it.
+    /// Passes the MEI type of a request of 2B, and the fields that follow it.
     fn pass_encapsulated<F: Fields<'a>>(&mut self, fields: &mut F) {
         let mut mei_type = match *self {
             Request::EncapsulatedInterface { mei_type, .. } => mei_type,

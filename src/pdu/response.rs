@@ -288,7 +288,7 @@ impl<'a> Response<'a> {
         }
     }
 
-    /// Passes the MEI type of a response of 2B, and what follows it.
+    /// Passes the MEI type of a response of 2B, and the fields that follow it.
     fn pass_encapsulated<F: Fields<'a>>(&mut self, fields: &mut F) {
         let mut mei_type = match *self {
             Response::EncapsulatedInterface { mei_type, .. } => mei_type,

@@ -1,4 +1,5 @@
-//! Division for processors without: a Cortex-M0+ lacks it, and so does the client.
+//! Division for processors that have no such instruction, as a Cortex-M0+. The client has no
+//! division either.
 
 /// Divides by at most 2^31: the quotient, rounded down, and the rest.
 pub fn divide(mut dividend: u32, divisor: u32) -> (u32, u32) {

@@ -157,8 +157,8 @@ impl Field {
         }
     }
 
-    /// The first bit or register on a line on which every table of every unit has its place.
-    /// There are more than 65535 places between two tables.
+    /// The position of the first bit or register, if the tables of all units stand one after
+    /// the other. There are more than 65535 places between two tables.
     pub(super) const fn place(&self) -> u32 {
         place(self.unit as u8, self.table, self.address)
     }

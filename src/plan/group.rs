@@ -307,7 +307,7 @@ impl<'a, L: ReadLimits> Table<'a, L> {
             offset = read
                 .set_up(first, quantity as u16, offset, words)
                 .ok_or(start)?;
-            // Every read has a field, so that what this replaces is known by now.
+            // Every read has a field, so the position that this replaces is not needed any more.
             if let Some(own) = self.positions.get_mut(count) {
                 own.first_or_last = start as u16;
             }

@@ -93,7 +93,8 @@ impl Words<'_> {
         raw
     }
 
-    /// The bits of a float of 32 bits; of 64 bits, those of the nearest of 32.
+    /// The bits of a float of 32 bits. For a float of 64 bits they are those of the nearest one
+    /// of 32.
     ///
     /// # Errors
     /// [`Error::INVALID_ARGUMENT`] for other types.
@@ -106,7 +107,8 @@ impl Words<'_> {
         }
     }
 
-    /// The bits of a float of 64 bits; of 32 bits, those of the same number in 64.
+    /// The bits of a float of 64 bits. For a float of 32 bits they are those of the same number
+    /// in 64.
     ///
     /// # Errors
     /// As [`Words::float`].

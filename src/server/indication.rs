@@ -11,15 +11,15 @@ use crate::pdu::EXCEPTION;
 pub struct Indication {
     /// The unit id in the frame.
     pub to: u8,
-    /// A second id that addresses the server itself: 255 in a stream. On a serial line 0,
-    /// which is the broadcast address there.
+    /// A second id that addresses the server itself: 255 in a stream; 0, the broadcast address,
+    /// on a serial line.
     pub own: u8,
     /// The frame was longer than the buffer, so its first bytes are missing.
     pub overrun: bool,
     /// Index of the PDU in the buffer.
     pub head: u8,
     /// The frame was served before, and the service returned that it is not finished. After the
-    /// response: bytes may have arrived meanwhile, which the server has not read.
+    /// response it means that bytes may have arrived that the server has not read.
     pub again: bool,
     /// The exception code if no service of the unit answers: 01, or 02 as soon as a service has
     /// returned [`Reply::ABSENT`](super::Reply::ABSENT).

@@ -351,7 +351,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.now.wrapping_sub(self.deadline) as i32 >= 0
     }
 
-    /// Waits for so many bytes, for as long as they may take from `start` on.
+    /// Waits for `count` bytes, for as long as they may take from `start` on.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn wait_for(&mut self, count: usize, start: u32) {
         self.is_waiting = true;
@@ -368,13 +368,14 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         }
     }
 
-    /// Microseconds from `now` for which poll has nothing to do unless the port has bytes to read.
-    /// It is 1000 while a service is not finished, or while a stream accepts no bytes of the
-    /// response: poll earlier if that changes. It is 0 after that, until poll has read the port:
-    /// bytes that arrived meanwhile may have ended a wait already. While a response leaves on an RTU
-    /// line whose rate is known, it is a time for which characters are sure to leave, and 0 for the
-    /// last ones: the driver must go off in time. After that it is the time in which an echo may
-    /// arrive, so that a program that sleeps until bytes arrive does not take them for it later.
+    /// Microseconds from `now` for which poll has nothing to do unless the port has bytes to
+    /// read. It is 1000 while a service is not finished, or while a stream accepts no bytes of
+    /// the response: poll earlier if that changes. It is 0 after that, until poll has read the
+    /// port: bytes that arrived meanwhile may have ended a wait already. While a response
+    /// leaves on an RTU line whose rate is known, it is a time for which characters are sure to
+    /// leave, and 0 for the last ones: the driver must go off in time. After that it is the
+    /// time in which an echo may arrive: a program that slept until the next bytes would take
+    /// these for the echo.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.phase {
             ServerPhase::Listen if self.request.again => 0,

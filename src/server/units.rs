@@ -93,8 +93,9 @@ pub fn dispatch(units: &mut impl Dispatch, mut all: Addressing) -> Reply {
 }
 
 /// Lets `services` serve a request one after the other, until one of them answers it.
-/// [`Reply::ILLEGAL_FUNCTION`] if none serves the function, [`Reply::ABSENT`] if none has the cells
-/// of the request. Once a service lacks them, those for which `is_custom` is true are not asked.
+/// [`Reply::ILLEGAL_FUNCTION`] if none serves the function, [`Reply::ABSENT`] if none has the
+/// cells of the request. Once a service lacks the cells, the services for which `is_custom` is
+/// true are not asked.
 #[inline(always)]
 pub fn first_reply<S>(
     services: impl IntoIterator<Item = S>,

@@ -40,7 +40,7 @@ pub struct Event<'a> {
     /// damaged frame; [`Status::BUFFER_TOO_SMALL`] of noise that may have been a frame longer
     /// than the buffer.
     pub status: Status,
-    /// Time of the last byte, in microseconds; of a timeout, the time at which it expired.
+    /// Time of the last byte, in microseconds; for a timeout, the time at which it expired.
     pub time: Micros,
     /// Microseconds from the last byte of the request to the last byte of its reply, or to the
     /// timeout; otherwise 0.

@@ -109,7 +109,7 @@ impl Call {
         })
     }
 
-    /// Starts the request, which sends `words`, as many as it says. Words that are missing are 0.
+    /// Starts the request. It sends as many of `words` as it needs. Words that are missing are 0.
     pub fn start<P: Port, S: Words>(
         &self,
         master: &mut Master<P, S>,

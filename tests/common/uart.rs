@@ -48,7 +48,7 @@ impl Wire {
         self.to_device.is_empty()
     }
 
-    /// Fills `bytes` with what has arrived at the master, and returns how many.
+    /// Fills `bytes` with the bytes that have arrived at the master, and returns how many.
     pub fn receive(&mut self, bytes: &mut [u8]) -> usize {
         let mut count = 0;
         for place in bytes {
@@ -137,7 +137,7 @@ impl Bench {
         }
     }
 
-    /// Lets 50 microseconds pass, in which the device receives and answers.
+    /// Lets 50 microseconds pass. The device receives and answers in that time.
     pub fn pass(&mut self) {
         let now = {
             let wire = &mut *self.wire.borrow_mut();

@@ -96,7 +96,7 @@ fn read(address: u8, quantity: u8) -> (Vec<u8>, Vec<u8>) {
 
 #[test]
 fn a_late_reply_is_paired_although_its_unit_was_asked_again() {
-    // Another quantity tells the late reply from the reply to the next request.
+    // Another quantity distinguishes the late reply from the reply to the next request.
     let ((first, late), (second, reply)) = (read(10, 2), read(20, 3));
     for is_first in [true, false] {
         let mut bench = Bench::new(Framing::Rtu);

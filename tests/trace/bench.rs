@@ -102,7 +102,7 @@ impl Observer for Keeper {
     }
 }
 
-/// A trace, its wire, and what it has handed out.
+/// A trace, its wire, and the records that it has handed out.
 pub struct Bench {
     pub wire: Shared,
     pub records: Rc<RefCell<Vec<Kept>>>,
@@ -134,7 +134,7 @@ impl Bench {
         while matches!(self.trace.read(&mut place), Ok(1..)) {}
     }
 
-    /// Writes a frame as a master does: what is left of it, until all is accepted.
+    /// Writes a frame as a master does: the rest of it again and again, until all is accepted.
     pub fn send(&mut self, frame: &[u8]) {
         let mut left = frame;
         self.trace.pre_transmission();

@@ -31,7 +31,8 @@ fn framing() -> impl Strategy<Value = Framing> {
 }
 
 proptest! {
-    /// However bytes are split, nothing is lost or invented, and what is called a frame is one.
+    /// However bytes are split, nothing is lost or invented, and every record that is called a
+    /// frame is one.
     #[test]
     fn every_byte_is_in_exactly_one_record(
         (framing, pieces) in framing().prop_flat_map(|framing| (Just(framing), pieces(framing))),

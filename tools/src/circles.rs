@@ -17,7 +17,7 @@ struct File {
     public: BTreeSet<String>,
     /// The names that a `use` imports, and their resolved paths.
     imports: BTreeMap<String, Names>,
-    /// The modules of which a `use` imports everything.
+    /// The modules from which a `use` imports everything.
     globs: Vec<Names>,
     /// The resolved paths that the file uses itself, with their lines.
     needs: Vec<(usize, Names)>,
@@ -278,7 +278,7 @@ impl Crate {
         None
     }
 
-    /// The pairs of files of which the first uses the second, with the first line that does.
+    /// The pairs of files in which the first file uses the second, with the first line that does.
     fn uses(&self) -> BTreeMap<(usize, usize), usize> {
         let mut found = BTreeMap::new();
         for (index, file) in self.files.iter().enumerate() {

@@ -2,8 +2,9 @@
 //!
 //! A linker takes whole members. In one object, a plain link would take all of mbm, and only
 //! `--gc-sections` would drop what the program does not call. So each function of the header
-//! becomes a member, and so does code or a constant that several members use. What only one
-//! member refers to belongs to that member, and what no function of the header needs is left out.
+//! becomes a member, and so does code or a constant that several members use. Code that only
+//! one member refers to belongs to that member, and code that no function of the header needs
+//! is left out.
 //!
 //! A symbol that another member refers to becomes global. It is hidden, so a shared library does
 //! not export it, and its name ends in `.mbm`, so that it cannot clash with the same function of

@@ -68,10 +68,10 @@ fn again_after_failure(
     again(policy, state, limit, status, || storage.random())
 }
 
-/// Sets that the client repeats a request that a busy device refuses: one that the device
-/// answers with exception 06 (SERVER DEVICE BUSY), and one that only reads and that the device
-/// answers with exception 05 (ACKNOWLEDGE) (V1.1b3, 7). Without this setting both are the
-/// result of the request, as every exception is.
+/// Makes the client repeat a request that a busy device refuses (V1.1b3, 7): any request that
+/// the device answers with exception 06 (SERVER DEVICE BUSY), and a request that only reads
+/// that it answers with exception 05 (ACKNOWLEDGE). Without this setting both are the result of
+/// the request, as every exception is.
 ///
 /// After exception 06 the device has not carried out the request, so the client repeats any
 /// request. After exception 05 the device is carrying out the request, so a repetition would

@@ -126,9 +126,9 @@ pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietM
     })
 }
 
-/// Switches echo discarding on or off. Switch it on if the receiver also receives what the
-/// driver sends: then the client discards the copy of each request that arrives before the
-/// reply. It has no effect on TCP.
+/// Switches echo discarding on or off. Switch it on if the receiver also receives the bytes
+/// that the driver sends: then the client discards the copy of each request that arrives before
+/// the reply. It has no effect on TCP.
 ///
 /// @param on  0 (the default) or 1
 #[no_mangle]

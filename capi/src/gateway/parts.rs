@@ -56,9 +56,9 @@ pub struct mbm_gatewayLine {
     /// on the gateway (MBM_BUSY).
     pub isReady: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
     /// The most requests that the gateway queues in the client at a time, 1 to 16; 0 means 1.
-    /// With 1, the clients on TCP take turns with every request. A line that is a TCP connection to
-    /// a device that takes several at once can have more in flight, as many as
-    /// mbm_client_setInFlight allows its client.
+    /// With 1, the clients on TCP take turns with every request. If the line is a TCP
+    /// connection to a device that takes several requests at once, it can have more in flight:
+    /// as many as mbm_client_setInFlight allows its client.
     pub inFlight: u8,
     /// Private.
     last: u8,

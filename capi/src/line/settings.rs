@@ -89,9 +89,9 @@ pub unsafe extern "C" fn mbm_line_setRetries(line: *mut mbm_line, retries: u8) -
     })
 }
 
-/// Switches echo discarding on or off. Switch it on if the receiver also receives what the
-/// driver sends: then the master discards the copy of each request that arrives before the
-/// reply.
+/// Switches echo discarding on or off. Switch it on if the receiver also receives the bytes
+/// that the driver sends: then the master discards the copy of each request that arrives before
+/// the reply.
 ///
 /// @param on  0 (the default) or 1
 #[no_mangle]

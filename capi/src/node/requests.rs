@@ -1,4 +1,4 @@
-//! The ten functions, and those of them that use the queue of words to send.
+//! The ten functions, and their forms that use the queue of words to send.
 
 use super::{call, mbm_node, request};
 use mbm::pdu::functions::FunctionSpec;

@@ -262,7 +262,7 @@ pub unsafe extern "C" fn mbm_plan_getText(
 }
 
 /// The registers of a field as they were read, for mbm_registers_get... functions, in the order
-/// of the field. It copies nothing: the next reply changes what it sees.
+/// of the field. It copies nothing: the next reply changes the words that it shows.
 ///
 /// @param field      the index of the field, of registers
 /// @param registers  the view to fill in
@@ -312,7 +312,7 @@ pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8
 ///
 /// @param index  0 for the first read
 /// @param read   gets the read
-/// @return a status; MBM_INVALID_ARGUMENT behind the last read
+/// @return a status; MBM_INVALID_ARGUMENT after the last read
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getRead(
     plan: *const mbm_plan,

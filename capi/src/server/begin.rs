@@ -215,11 +215,12 @@ pub unsafe extern "C" fn mbm_server_setReceiveLatency(
     status.code()
 }
 
-/// Says whether the receiver of an RTU line gets what the driver sends (a local echo). Without
-/// this call the server finds out: it drops a frame that is byte for byte its last response,
-/// until another frame, or none in time, has followed a response. A client whose very first
-/// requests are the same write again and again, each less than 80 ms after the response, then
-/// loses some of them: say that there is no echo. mbm_server_beginRtu takes the answer back.
+/// Says whether the receiver of an RTU line gets the bytes that the driver sends (a local
+/// echo). Without this call the server finds out: it drops a frame that is byte for byte its
+/// last response, until another frame, or none in time, has followed a response. A client whose
+/// very first requests are the same write again and again, each less than 80 ms after the
+/// response, then loses some of them: say that there is no echo. mbm_server_beginRtu takes the
+/// answer back.
 ///
 /// @param on  0: there is none, so no request is taken for it; anything else: there is one, even if
 ///            a response came without it

@@ -45,7 +45,7 @@ pub struct mbm_request {
 /// A function of yours. Initialise the struct with MBM_INIT, set the fields that you need, and
 /// pass it to mbm_unit_serveCustom.
 ///
-/// A unit asks its records in the order in which they were registered. So a function that is
+/// A unit asks its records in the order of their registration. So a function that is
 /// registered before the record that serves the same code is asked first. It answers the
 /// request itself, for example with an exception, or it returns MBM_REPLY_DECLINED: then the
 /// record after it answers. A function that is registered after tables with its code is asked

@@ -18,7 +18,7 @@ struct RespondUnits(*mut mbm_unit, u8, *mut c_void);
 impl Units for RespondUnits {
     fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply {
         // SAFETY: mbm_unit_respond requires `self.1` units. In place of a server, they get
-        // storage in which the fields are set that services use.
+        // storage in which only the fields that services use are set.
         let reply = unsafe {
             let mut server = MaybeUninit::<Core>::uninit();
             let server = server.as_mut_ptr();

@@ -20,11 +20,11 @@ pub const MBM_MAX_SERVICES: u8 = 16;
 /// zeroed and refilled it; it keeps its place. A zeroed record serves nothing until you
 /// pass it again. Any number of units may share one record.
 ///
-/// A unit may have several tables of one kind, for example holding registers 0 to 9 and
-/// 40000 to 40099; the same holds for callbacks, files and FIFO queues. The unit asks them
-/// in the order in which they were registered. The first one that has all cells of a request
-/// answers it. If none has all of them, the unit answers with exception 02, also where
-/// several have them together.
+/// A unit may have several tables of one kind, for example holding registers 0 to 9 and 40000
+/// to 40099; the same holds for callbacks, files and FIFO queues. The unit asks them in the
+/// order of their registration. The first one that has all cells of a request answers it. If
+/// none has all of them, the unit answers with exception 02, also where several have them
+/// together.
 #[repr(C)]
 pub struct mbm_unit {
     /// Private: the records in the order in which the unit calls them. NULL follows the

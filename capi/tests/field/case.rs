@@ -194,7 +194,7 @@ pub enum Token {
     Seal,
     /// Another frame begins.
     Next,
-    /// Nothing is sent for this time.
+    /// The device sends nothing for this time.
     Pause(u64),
     /// The transaction number of the request.
     Transaction,
@@ -530,7 +530,7 @@ impl Case {
         Ok(true)
     }
 
-    /// Reads the cases of a file, each of which begins with `case NAME`.
+    /// Reads the cases of a file. Each begins with `case NAME`.
     pub fn read(path: &Path) -> Result<Vec<Case>, String> {
         let at = |line: usize, why: String| format!("{}:{line}: {why}", path.display());
         let text = std::fs::read_to_string(path).map_err(|why| at(0, why.to_string()))?;

@@ -34,18 +34,18 @@ struct Manner {
     most: Option<u16>,
     /// It knows function 10 (hex), not 06.
     many_only: bool,
-    /// It closes a connection on which it has received nothing for so long.
+    /// It closes a connection if it has received nothing for this time.
     idle: Option<u64>,
-    /// It closes the connection after so many replies.
+    /// It closes the connection after this number of replies.
     closes: Option<u32>,
-    /// It does not answer after so many replies on one connection.
+    /// It does not answer after this number of replies on one connection.
     deaf: Option<u32>,
     /// It does not answer before so long after the connection was opened.
     slow_start: u64,
     is_dead: bool,
     /// It does not receive a request without so long a silence before it.
     gap: u64,
-    /// It sends its replies in pieces of so many bytes, with a pause between them.
+    /// It sends its replies in pieces of this number of bytes, with a pause between them.
     pieces: Option<(usize, u64)>,
 }
 
@@ -145,7 +145,7 @@ impl Device {
         self.is_open = true;
     }
 
-    /// True once, when it closes a connection on which nothing has arrived for too long.
+    /// True once, when it closes a connection because no byte has arrived for too long.
     pub fn hangs_up(&mut self, now: u64) -> bool {
         let is_due = self.closes_at().is_some_and(|at| now >= at);
         self.is_open &= !is_due;

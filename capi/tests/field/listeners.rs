@@ -166,7 +166,7 @@ impl Sniffer {
         })
     }
 
-    /// Feeds what has arrived, and returns the events.
+    /// Feeds the received bytes, and returns the events.
     pub fn poll(&mut self) -> Vec<Event> {
         let bytes = self.wire.borrow_mut().take(self.end);
         let now = clock(self.wire.borrow().now);
@@ -174,7 +174,7 @@ impl Sniffer {
         let mut rest = &bytes[..];
         let sniffer = &raw mut self.own.0;
         loop {
-            // SAFETY: the sniffer was begun; what an event points to is not used.
+            // SAFETY: the sniffer was begun; the memory that an event points to is not used.
             unsafe {
                 if !rest.is_empty() {
                     let (first, count) = (rest.as_ptr(), rest.len() as u16);

@@ -61,7 +61,7 @@ struct Node {
     node: mbm_node,
     response: [u16; 125],
     transmit: [u16; 123],
-    /// Of the last request, and the status with which it ended.
+    /// The last request, and the status with which it ended.
     function: u8,
     quantity: u16,
     is_pending: bool,

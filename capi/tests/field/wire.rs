@@ -38,7 +38,7 @@ struct End {
     frame: Vec<u8>,
     /// When the last bit of `frame` leaves.
     frame_end: u64,
-    /// The end hears what it sends, but this many bytes of each frame.
+    /// The end receives its own frames, but for this many bytes of each.
     echo: Option<usize>,
     /// The peer has closed the stream.
     is_closed: bool,
@@ -104,8 +104,8 @@ impl Wire {
         }
     }
 
-    /// The silence on the line before a frame of so many bytes that has ended at `end`; of the first
-    /// one it is without limit.
+    /// The silence on the line before a frame of `bytes` bytes that has ended at `end`; before
+    /// the first frame it has no limit.
     pub fn silence(&self, bytes: usize, end: u64) -> u64 {
         if self.taken[0] == 0 {
             return u64::MAX;
@@ -114,7 +114,7 @@ impl Wire {
         begin.saturating_sub(self.taken[0])
     }
 
-    /// When a medium is free of what devices and scripted peers send.
+    /// The time at which no device and no scripted peer sends on a medium any more.
     pub fn free(&self, medium: usize) -> u64 {
         self.taken[medium].max(self.now)
     }

@@ -360,7 +360,7 @@ impl<'a> World<'a> {
             Want::Ok => *status == MBM_OK,
             Want::Data(wanted) => *status == MBM_OK && data == wanted,
             Want::Failed => *status != MBM_OK,
-            // A gateway tells its client no more.
+            // A gateway reports no more than this to its client.
             Want::Status(wanted) if is_gateway && *wanted >= 0xE0 && *status < 0xE0 => {
                 *status == MBM_GATEWAY_TARGET_FAILED_TO_RESPOND
             }
@@ -404,7 +404,8 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Lets time pass until what was heard has arrived, and then until `is_over`, at most `time`.
+    /// Lets time pass until the bytes on the line have arrived, and then until `is_over`, at
+    /// most `time`.
     fn pass_until(&mut self, time: u64, is_over: impl Fn(&World) -> bool) {
         let end = self.wire.borrow().free(0) + time;
         while !is_over(self) && self.now() < end {

@@ -24,7 +24,7 @@ unsafe extern "C" fn changed(_: *mut c_void, event: u8, status: u8) {
     World::current().hook(Grant::All, 3);
 }
 
-/// A client and its link: some of those of the run, or new ones.
+/// A client and its link: those of the run, or new ones.
 fn pick(w: &World) -> (*mut mbm_client, *mut mbm_link) {
     let choice = usize::from(w.byte());
     let count = w.linked.borrow().len();

@@ -143,7 +143,7 @@ pub fn begin(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
     }
 }
 
-/// A value gets what a call gives, and stays as it is if that refuses.
+/// A value gets the result of a call, and stays as it is if the call is refused.
 fn get<T>(w: &World, name: &str, call: impl FnOnce(*mut T) -> u8) {
     let value = if w.rarely(32) {
         null_mut()

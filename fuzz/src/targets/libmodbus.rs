@@ -117,7 +117,7 @@ pub fn run(data: &[u8]) {
         naive::with_crc(&[&[UNIT], pdu].concat())
     };
     if how & 2 == 2 && !over_tcp {
-        // One byte is damaged. Not the unit: libmodbus checks it before the CRC.
+        // One byte is damaged. The unit is left out: libmodbus checks it before the CRC.
         let at = 1 + usize::from(how >> 2) % (frame.len() - 1);
         frame[at] ^= 0x10;
     }

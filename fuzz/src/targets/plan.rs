@@ -1,6 +1,6 @@
-//! Tables of a plan, of any content: what is accepted keeps every limit and is as good as the
-//! best way to group it; what is refused names a field that is there. Then reads end in any way,
-//! at any time, and values come out of any words.
+//! Tables of a plan, of any content: a table that is accepted keeps every limit and is as good
+//! as the best way to group it; a refusal names a field of the table. Then reads end in any
+//! way, at any time, and values come out of any words.
 
 use crate::Input;
 use mbm::error::Status;

@@ -11,7 +11,7 @@ use mbm::trace::{Direction, Record, Trace, MIN_BUFFER};
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// What the port has moved in each direction, and what was handed out.
+/// The bytes that the port has moved in each direction, and the records that were handed out.
 #[derive(Default)]
 struct Wire {
     now: u32,

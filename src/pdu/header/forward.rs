@@ -27,9 +27,10 @@ impl RequestHeader {
         self.forward_counted(function, body, 0)
     }
 
-    /// As [`RequestHeader::forward`], but the `body` of 14 and 15 (hex) may also be the groups alone:
-    /// it lacks the byte count before them then, which is sent too. No byte count is as small as
-    /// the reference type with which a group begins.
+    /// As [`RequestHeader::forward`], but the `body` of 14 and 15 (hex) may also be the groups
+    /// alone. Then it lacks the byte count before them, which is added. The first byte tells
+    /// both apart, because no byte count is as small as the reference type at the beginning of
+    /// a group.
     pub fn forward_groups(&mut self, function: u8, body: &[u8]) -> Status {
         let has_groups = matches!(
             function,

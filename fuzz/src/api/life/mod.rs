@@ -4,8 +4,8 @@
 //!
 //! - A request that has ended is never sent. Each request has an address of its own, so the device
 //!   knows which request it receives.
-//! - Every request ends, once, within a time that the settings give. The clock moves on by what
-//!   the pollDelay functions return.
+//! - Every request ends, once, within a time that the settings give. The clock moves on by the
+//!   results of the pollDelay functions.
 
 mod bound;
 mod client;

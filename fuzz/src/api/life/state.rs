@@ -1,4 +1,5 @@
-//! The state of one life: its lines, requests, masters, plan and gateway, and what is pending.
+//! The state of one life: its lines, requests, masters, plan and gateway, and what they have
+//! pending.
 
 use super::bound::Limits;
 use crate::api::check::call;
@@ -22,7 +23,7 @@ pub const PLACES: u64 = 6;
 
 pub const FIELDS: usize = 5;
 pub const REQUESTS: usize = 2;
-/// A client on a line, with what belongs to it.
+/// A client on a line, with its storage.
 pub struct Line {
     pub client: Cell<*mut mbm_client>,
     pub link: Cell<*mut mbm_link>,

@@ -1,4 +1,4 @@
-//! The simulated lines: a port with a device behind it. The device finds each frame that was
+//! The simulated lines: a port with a device on its line. The device finds each frame that was
 //! written, and checks that the request in it had not ended when its first byte was written.
 
 use super::state::{Life, Wire, FIRST_ID};
