@@ -11,6 +11,7 @@ mod request_pdu;
 mod response_pdu;
 mod server;
 mod sniffer;
+mod tables;
 mod trace;
 
 /// The name of a target, what it does with an input, and how many inputs `make test` tries.
@@ -31,4 +32,5 @@ pub const TARGETS: &[Target] = &[
     ("trace", trace::run, 50_000),
     ("replies", replies::run, 200_000),
     ("server", server::run, 10_000),
+    ("tables", tables::run, 20_000),
 ];
