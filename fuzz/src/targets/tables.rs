@@ -8,6 +8,7 @@ use mbm::server::storage::{
 };
 use mbm::server::{Indication, Service, Unit, Units};
 use mbm_c::*;
+use std::any::Any;
 use std::ffi::c_void;
 use std::mem::zeroed;
 
@@ -290,7 +291,7 @@ impl Memory {
             ..Indication::NONE
         };
         let unit = Unit {
-            id: UNIT.into(),
+            id: UNIT,
             services: &mut services,
             diagnostics: None,
         };
@@ -377,9 +378,7 @@ impl Called {
 /// A unit of C with its records, which are at fixed places.
 struct Records {
     unit: Box<mbm_unit>,
-    words: Vec<Box<mbm_registerTable>>,
-    bits: Vec<Box<mbm_bitTable>>,
-    callbacks: Vec<(Box<mbm_dataCallbacks>, Box<Called>)>,
+    records: Vec<Box<dyn Any>>,
 }
 
 impl Records {
@@ -389,9 +388,7 @@ impl Records {
         unit.id = UNIT.into();
         Records {
             unit,
-            words: Vec::new(),
-            bits: Vec::new(),
-            callbacks: Vec::new(),
+            records: Vec::new(),
         }
     }
 
@@ -425,8 +422,7 @@ impl Records {
                 }
             };
             assert_eq!(statuses, [MBM_OK; 3]);
-            self.words.push(words);
-            self.bits.push(bits);
+            self.records.extend([words as Box<dyn Any>, bits]);
         }
     }
 
@@ -448,7 +444,7 @@ impl Records {
             // SAFETY: the unit and the record live as long as `self`.
             let status = unsafe { mbm_unit_serveCallbacks(unit, &raw mut *record, kind) };
             assert_eq!(status, MBM_OK);
-            self.callbacks.push((record, called));
+            self.records.extend([record as Box<dyn Any>, called]);
         }
     }
 
