@@ -168,10 +168,13 @@ impl<L: Transport<Task>> Requester<L> {
     }
 
     fn identification(&mut self) {
-        let basic = self.request(&[], |o| o.read_device_identification(1, 0));
-        let objects = b"\x00\x06Vendor\x01\x02PC\x02\x05V2.11";
-        assert_eq!(basic.received().get(1..4), Some(&[0, 0, 3][..]));
-        assert_eq!(basic.received().get(4..), Some(&objects[..]));
+        // The regular category is the basic one and four more objects. The server has one of them.
+        let objects = b"\x00\x06Vendor\x01\x02PC\x02\x05V2.11\x03\x0Bexample.org";
+        for (code, count, length) in [(1, 3, 19), (2, 4, 32), (3, 4, 32)] {
+            let all = self.request(&[], |o| o.read_device_identification(code, 0));
+            assert_eq!(all.received().get(1..4), Some(&[0, 0, count][..]));
+            assert_eq!(all.received().get(4..), Some(&objects[..length]));
+        }
         let one = self.request(&[], |o| o.read_device_identification(4, 2));
         assert_eq!(one.received().get(3..), Some(&b"\x01\x02\x05V2.11"[..]));
         let missing = |o: &mut RequestHeader| o.read_device_identification(4, 9);
