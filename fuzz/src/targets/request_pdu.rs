@@ -3,18 +3,21 @@
 
 use crate::{lengths, Input};
 use mbm::error::Error;
-use mbm::pdu::custom::is_user_defined;
+use mbm::pdu::custom::Function;
 use mbm::pdu::files::{Reads, Writes};
 use mbm::pdu::length;
 use mbm::pdu::request::Request;
 
 pub fn run(data: &[u8]) {
-    check_received(data);
+    for functions in [&[][..], &lengths::USERS] {
+        check_received(data, functions);
+        lengths::stays(data, |front| length::request(front, functions));
+    }
     check_constructed(Input(data));
 }
 
-fn check_received(pdu: &[u8]) {
-    match Request::parse(pdu) {
+fn check_received(pdu: &[u8], functions: &[Function]) {
+    match Request::parse_with(pdu, functions) {
         Ok(request) => {
             assert_eq!(request.function(), pdu[0]);
             let mut buffer = [0; 253];
@@ -22,8 +25,8 @@ fn check_received(pdu: &[u8]) {
             assert_eq!(&buffer[..pdu.len()], pdu);
             let short = request.emit(&mut buffer[..pdu.len() - 1]);
             assert_eq!(short, Err(Error::BUFFER_TOO_SMALL));
-            lengths::agree(pdu, |front| length::request(front, &[]));
-            request.response_length(&[]);
+            lengths::agree(pdu, |front| length::request(front, functions));
+            request.response_length(functions);
         }
         // The status is the exception of a server: 01, 02 or 03.
         Err(status) => assert!((1..=3).contains(&status.code())),
@@ -36,6 +39,11 @@ fn check_constructed(mut input: Input) {
     let (a, b, c, d) = (input.u16(), input.u16(), input.u16(), input.u16());
     let (function, code) = (a as u8, b as u8);
     let data = input.0;
+    // Most data have the length that belongs to the quantity.
+    let quantity_of = |quantity: u16, bits: usize| match function & 3 {
+        0 => quantity,
+        _ => (8 * data.len() / bits) as u16,
+    };
     let request = match kind {
         0 => Request::ReadBits {
             function: 1 + code % 2,
@@ -64,12 +72,12 @@ fn check_constructed(mut input: Input) {
         7 => Request::GetCommEventLog,
         8 => Request::WriteMultipleCoils {
             address: a,
-            quantity: b,
+            quantity: quantity_of(b, 1).saturating_sub(d % 8),
             data,
         },
         9 => Request::WriteMultipleRegisters {
             address: a,
-            quantity: b,
+            quantity: quantity_of(b, 16),
             data,
         },
         10 => Request::ReportServerId,
@@ -90,7 +98,7 @@ fn check_constructed(mut input: Input) {
             read_address: a,
             read_quantity: b,
             write_address: c,
-            write_quantity: d,
+            write_quantity: quantity_of(d, 16),
             data,
         },
         15 => Request::ReadFifoQueue { address: a },
@@ -107,12 +115,7 @@ fn check_constructed(mut input: Input) {
     let mut buffer = [0; 300];
     if let Ok(length) = request.emit(&mut buffer) {
         assert!(length <= 253);
-        let own =
-            !matches!(request, Request::Custom { function, .. } if !is_user_defined(function));
-        if own {
-            assert_eq!(Request::parse(&buffer[..length]), Ok(request));
-        } else {
-            assert_eq!(buffer[..length], [&[function], data].concat());
-        }
+        let again = Request::parse_with(&buffer[..length], &lengths::any_function());
+        assert_eq!(again, Ok(request));
     }
 }

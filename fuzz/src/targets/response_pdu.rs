@@ -3,19 +3,22 @@
 
 use crate::{lengths, Input};
 use mbm::error::Error;
-use mbm::pdu::custom::is_user_defined;
+use mbm::pdu::custom::Function;
 use mbm::pdu::files::{Records, Writes};
 use mbm::pdu::identification::ObjectList;
 use mbm::pdu::length;
 use mbm::pdu::response::Response;
 
 pub fn run(data: &[u8]) {
-    check_received(data);
+    for functions in [&[][..], &lengths::USERS] {
+        check_received(data, functions);
+        lengths::stays(data, |front| length::response(front, functions));
+    }
     check_constructed(Input(data));
 }
 
-fn check_received(pdu: &[u8]) {
-    match Response::parse(pdu) {
+fn check_received(pdu: &[u8], functions: &[Function]) {
+    match Response::parse_with(pdu, functions) {
         Ok(response) => {
             assert_eq!(response.function(), pdu[0] & 0x7F);
             let mut buffer = [0; 253];
@@ -27,7 +30,7 @@ fn check_received(pdu: &[u8]) {
                 // Some devices send more than their byte count says. Only the framing shows the
                 // length of such a response.
                 Response::ServerId { count, data } if usize::from(count) != data.len() => {}
-                _ => lengths::agree(pdu, |front| length::response(front, &[])),
+                _ => lengths::agree(pdu, |front| length::response(front, functions)),
             }
         }
         Err(status) => assert!(matches!(
@@ -114,12 +117,7 @@ fn check_constructed(mut input: Input) {
     let mut buffer = [0; 600];
     if let Ok(length) = response.emit(&mut buffer) {
         assert!(length <= 253);
-        let own =
-            !matches!(response, Response::Custom { function, .. } if !is_user_defined(function));
-        if own {
-            assert_eq!(Response::parse(&buffer[..length]), Ok(response));
-        } else {
-            assert_eq!(buffer[..length], [&[function], data].concat());
-        }
+        let again = Response::parse_with(&buffer[..length], &lengths::any_function());
+        assert_eq!(again, Ok(response));
     }
 }
