@@ -113,7 +113,6 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@$(MAKE) --no-print-directory check-comments
 	@scripts/check/functions
 	@scripts/check/packages
-	@scripts/build/pictures --check
 	@scripts/build/project.py --check
 	@CARGO="$(CARGO)" scripts/check/dependencies
 	@$(MAKE) --no-print-directory spell
@@ -156,11 +155,10 @@ run-c-tests: $(PROGRAMS)
 	tail -n 1 $(BUILD)/tests/c.txt >$(BUILD)/tests/c.total; exit $$code
 
 .PHONY: coverage
-coverage: need-test ## Measure the lines that the tests run, Rust and C; writes docs/reports/coverage.md
+coverage: need-test ## Measure the lines that the tests run, Rust and C; writes build/coverage.md
 	@scripts/need llvm-22
 	@$(MAKE) --no-print-directory venv $(BUILD)/plain/serve
 	@CARGO="$(CARGO)" JOBS="$(JOBS)" scripts/bench/coverage
-	@scripts/build/pictures
 .PHONY: coverage-tests
 coverage-tests: $(TESTS:%=$(BUILD)/coverage/%)
 	@scripts/check/run-c-tests $^
@@ -329,7 +327,7 @@ $(BENCH_PLAN): $(BUILD)/bench/bench_plan.o $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
-bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone of nanoMODBUS, MBUSD=mbusd; writes docs/reports/*speed.md
+bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone of nanoMODBUS, MBUSD=mbusd; writes docs/reports/speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind strace
 	@rm -rf $(BUILD)/bench/bench_client.o $(NANO_SOURCE)
 	@$(MAKE) --no-print-directory $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_LOOP) $(BENCH_SNIFFER) $(BENCH_PLAN) $(BENCH_GATEWAY) $(INSTALLED_TOOL)
