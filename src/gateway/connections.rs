@@ -144,7 +144,6 @@ impl<S: GatewayStorage> Gateway<S> {
     /// Sends the responses of a connection, until there are no more or the connection takes
     /// no more bytes.
     pub(super) fn send(&mut self, connection: u8) {
-        self.storage.connection_mut(connection).is_blocked = false;
         while let Some(request) = self.next_response(connection) {
             self.storage.connection_mut(connection).sending = request;
             let state = self.storage.request(request);
@@ -156,7 +155,6 @@ impl<S: GatewayStorage> Gateway<S> {
             let sent = sent.saturating_add(count as u16);
             self.storage.request(request).sent = sent;
             if sent < length {
-                self.storage.connection_mut(connection).is_blocked = true;
                 return;
             }
             self.storage.connection_mut(connection).sending = NONE;
