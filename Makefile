@@ -263,11 +263,11 @@ $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(pa
 	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
-$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value cursor)
+$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
-$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device device_file device_value yaml_file value cursor numbers report)
+$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device device_file yaml_file value numbers report)
 $(BUILD)/$(1)/test_place: $(patsubst %,$(BUILD)/$(1)/cli/%.o,place numbers)
-$(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,ahead_port found_port clock)
+$(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over clock)
 $(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@

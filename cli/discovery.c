@@ -1,3 +1,6 @@
+/* Writes the topics and the JSON of Home Assistant's MQTT discovery.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "discovery.h"
 
@@ -8,8 +11,6 @@
 #include <string.h>
 
 enum { LONGEST_STATE = 255, TOPIC_BYTES = 512, ID_BYTES = 300 };
-
-const char *discovery_prefix = "homeassistant";
 
 /* --- names --- */
 
@@ -98,7 +99,7 @@ void discovery_topic(const discovery_line *line, const device *of, uint16_t fiel
 
     line_id(line, node);
     write_id(of->fields[field].name, object);
-    snprintf(topic, DISCOVERY_TOPIC_BYTES, "%s/%s/%s/%s/config", discovery_prefix,
+    snprintf(topic, DISCOVERY_TOPIC_BYTES, "%s/%s/%s/%s/config", line->prefix,
              component_of(of, field), node, object);
 }
 

@@ -1,7 +1,7 @@
-/* Options that several commands share, as children of their argp parsers.
+/* The commands, and the options that several of them share, as children of their argp parsers.
  *
  *     static const struct argp_child children[] = {
- *         {&options_unit, 0, NULL, 0}, {&options_client, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+ *         {.argp = &options_unit}, {.argp = &options_client}, {0}};
  *
  * Licence: MIT OR Apache-2.0. */
 #ifndef OPTIONS_H
@@ -76,5 +76,21 @@ void options_check_unit(const struct argp_state *state, const struct place *wher
 /* Reads the LINE of a client, or of a server. */
 void options_place(const struct argp_state *state, struct place *where, const char *text,
                    int is_server);
+
+/* --- the commands, each in a file of its own --- */
+
+/* A command gets its own arguments, the first of which is "mbm" and its name, and returns an exit
+ * code: one of CODE_ of report.h. */
+int read_command(int argc, char **argv);
+int write_command(int argc, char **argv);
+int call_command(int argc, char **argv);
+int scan_command(int argc, char **argv);
+int identify_command(int argc, char **argv);
+int poll_command(int argc, char **argv);
+int serve_command(int argc, char **argv);
+int sniff_command(int argc, char **argv);
+int gateway_command(int argc, char **argv);
+int header_command(int argc, char **argv);
+int bridge_command(int argc, char **argv);
 
 #endif

@@ -1,7 +1,10 @@
+/* Parses the payloads of writes: numbers, truth values, texts, and JSON with these.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "payload.h"
 
-#include "cursor.h"
+#include "numbers.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,3 +1,6 @@
+/* Writes the blocks of a pcapng file, with the headers that Wireshark needs.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #include "pcap_file.h"
 
 #include <string.h>

@@ -89,10 +89,6 @@ void report_catch_signals(void);
  * end the program exits with CODE_SYSTEM if its output could not be written. */
 void report_begin(void);
 
-/* Writes a time in UTC, such as 2026-01-31T12:00:00.123Z. */
-struct timespec;
-void report_time(const struct timespec *when, char text[40]);
-
 /* Writes what was printed so far to stdout, and keeps the reason if that fails. */
 void report_flush(void);
 
