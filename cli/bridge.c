@@ -464,7 +464,7 @@ static const struct argp parser = {
         "  mbm bridge bridge.yaml --metrics 127.0.0.1:9100\n\n" SERVICE_HELP PLACE_HELP,
     .children = children};
 
-/* Opens all lines. Of the command line, each terminal must be there. Returns an exit code. */
+/* Opens all lines. Each terminal of the command line must be there. Returns an exit code. */
 static int begin_lines(bridge *b)
 {
     static next_line next[BRIDGE_LINES];

@@ -298,7 +298,7 @@ static int is_discovered(const bridge_line *l, const device *next, const char *n
     return strcmp(topic, other) == 0;
 }
 
-/* Removes what is retained of the table, except what `next` has too. */
+/* Removes the retained messages of the table, except those that `next` has too. */
 static void remove_retained(bridge_line *l, const bridge_table *next)
 {
     const device *fields = &l->table->fields, *others = next ? &next->fields : NULL;
@@ -364,7 +364,7 @@ static uint8_t write_part(bridge_line *l, bridge_write *write, const mbm_planFie
                                         device_part(planned, bits[0]));
 }
 
-/* Packs coils, of which each has a word, eight to a byte. */
+/* Packs coils, one word each, eight to a byte. */
 static void pack_coils(const uint16_t *bits, uint16_t count, void *bytes)
 {
     uint8_t *to = (uint8_t *)bytes;

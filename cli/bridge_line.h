@@ -84,10 +84,11 @@ bridge_line *bridge_line_make(bridge_settings *bridge, const char *text, const c
  * not owned if it is not CODE_DONE. */
 int bridge_line_begin(bridge_line *l, bridge_table *table, int is_patient);
 
-/* Reads another table from now on, and removes what is retained of fields that it does not have. */
+/* Reads another table from now on, and removes the retained messages of fields that it does not
+ * have. */
 void bridge_line_replace(bridge_line *l, bridge_table *next);
 
-/* Removes all that is retained of the line: it is gone from the bridge. */
+/* Removes all retained messages of the line, which is gone from the bridge. */
 void bridge_line_clear(bridge_line *l);
 
 /* Closes the line and frees it. */

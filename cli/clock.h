@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include <time.h>
 
-/* The time of a clock in microseconds; of CLOCK_REALTIME since 1970. */
+/* The time of a clock in microseconds; CLOCK_REALTIME counts from 1970. */
 uint64_t clock_micros(clockid_t clock);
 
 /* The time of the monotonic clock in milliseconds. */

@@ -42,11 +42,12 @@ static const char *const FIELD_NAMES[] = {
 
 #define NEEDED_OF_FIELD (1u << NAME | 1u << TABLE | 1u << ADDRESS)
 
-/* Words whose numbers are their places: of access from 1 on, as of the words of value.h. */
+/* Words whose numbers are their places; those of access count from 1, like the words of value.h. */
 static const char *const ACCESS_NAMES[] = {"", "read", "write", "read-write", NULL};
 static const char *const ANSWERS[] = {"no", "yes", NULL};
 
-/* Reads a word as its number, from 1 on. Of no node the number stays. Returns 0 after a refusal. */
+/* Reads a word as its number, from 1 on. Without a node the number stays. Returns 0 after a
+ * refusal. */
 static int read_word(yaml_file *file, const char *key, const yaml_node_t *node,
                      const char *const *names, uint8_t *number)
 {

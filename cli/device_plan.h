@@ -12,9 +12,9 @@
 int device_plan_make(mbm_planSetup *setup, const device *of, uint16_t gap, uint8_t requests);
 void device_plan_free(mbm_planSetup *setup);
 
-/* Begins a plan on a client that has no line: what the library makes of the fields. Returns the
- * status of mbm_plan_begin, which sets `wrong`. The caller ends the plan; another trial may begin
- * then. */
+/* Begins a plan on a client that has no line, to see what the library makes of the fields. Returns
+ * the status of mbm_plan_begin, which sets `wrong`. The caller ends the plan; another trial may
+ * begin then. */
 uint8_t device_plan_try(mbm_plan *plan, const mbm_planSetup *setup, uint16_t *wrong);
 
 /* Returns why the plan of the device file at `path` was refused: a sentence without its full stop,

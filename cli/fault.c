@@ -173,7 +173,7 @@ static uint8_t digit(uint8_t character)
     return (uint8_t)(character <= '9' ? character - '0' : character - 'A' + 10);
 }
 
-/* Takes a frame apart, which the server has built. */
+/* Takes apart a frame that the server has built. */
 static void take_apart(uint8_t framing, const uint8_t *frame, uint16_t length, parts *of)
 {
     const uint8_t *body = frame;
@@ -239,7 +239,7 @@ static void damage(uint8_t framing, uint8_t *frame, uint16_t length)
         frame[length - 1] ^= 0xFF;
 }
 
-/* Makes the length wrong that the frame has of itself. */
+/* Makes the length or the byte count in the frame wrong. */
 static void lengthen(uint8_t framing, parts *of)
 {
     static const uint8_t COUNTED[] = {1, 2, 3, 4, 12, 17, 20, 21, 23};

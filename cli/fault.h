@@ -78,7 +78,7 @@ typedef struct fault_port {
     mbm_port below;
     uint8_t framing, is_datagrams, is_lost, is_closing;
     fault_choice chosen; /* the faults of the request that is answered; all 0: none */
-    /* What is to be sent: pieces, each after a pause. */
+    /* The answer that is still to be sent: pieces, each after a pause. */
     uint8_t bytes[FAULT_PORT_BYTES];
     uint16_t ends[FAULT_PORT_PIECES];
     uint32_t pauses[FAULT_PORT_PIECES]; /* microseconds */
@@ -92,8 +92,8 @@ typedef struct fault_port {
 mbm_port fault_port_begin(fault_port *port, const mbm_port *below, uint8_t framing,
                           int is_datagrams);
 
-/* How long nothing is due, in microseconds: 0 if the link is lost, UINT32_MAX if nothing is to be
- * sent. */
+/* Returns the microseconds until something is due: 0 if the link is lost, UINT32_MAX if nothing is
+ * to be sent. */
 uint32_t fault_port_delay(fault_port *port);
 
 #endif

@@ -325,7 +325,7 @@ static void wait_for_work(gateway *g)
         /* The system refuses to poll: it has no memory, or the limit of descriptors was
          * lowered. */
         (void)poll(NULL, 0, NAP_MICROS / 1000);
-    /* Without a wait it is not known what has come, so all are tried. */
+    /* If the wait failed, it is unknown what has come, so all are tried. */
     for (n = 0; n < g->waits.clients && found < 0; n++)
         g->aheads[g->waits.slots[n]].is_ready = 1;
     g->is_client_waiting = 1;

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The gateway reports a line after this number of requests in a row without a right reply. */
+/* The gateway reports a line after SILENT_AFTER requests in a row without a right reply. */
 enum { SILENT_AFTER = 5 };
 
 void gateway_line_set(gateway_line *l, const gateway_pace *pace)

@@ -255,7 +255,7 @@ static int choose_names(header *h, const char *name)
 
 /* --- scales --- */
 
-/* Divides both numbers by what divides both. */
+/* Divides both numbers by their greatest common divisor. */
 static void reduce(uint64_t *one, uint64_t *other)
 {
     uint64_t a = *one, b = *other;
@@ -325,8 +325,8 @@ static int covers(const mbm_planReadInfo *read, const mbm_planField *field)
            (uint32_t)read->address + read->quantity >= field->address + device_size(field);
 }
 
-/* Puts the fields that a read covers, of those that no read had before, behind the others of
- * `order`, sorted by address. Returns the new number of fields there. */
+/* Appends to `order` the fields that a read covers and no read before it had, sorted by address.
+ * Returns the new number of fields there. */
 static uint16_t take_fields(const header *h, const mbm_planReadInfo *read, uint16_t taken,
                             uint8_t *is_taken)
 {
@@ -398,7 +398,7 @@ static void scale_fields(const header *h, mbm_planField *fields)
 
     for (i = 0; i < h->of->readable; i++) {
         fields[i] = h->of->planned[i];
-        if (h->of->fields[i].form.scale.digits) {
+        if (h->scales && h->of->fields[i].form.scale.digits) {
             fields[i].multiplier = h->scales[i].multiplier;
             fields[i].divisor = h->scales[i].divisor;
         }

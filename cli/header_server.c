@@ -11,8 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* TABLES is how many tables of a kind a unit has at most: of its MBM_MAX_SERVICES records, some are
- * left for others. From the size HOLE or BIT_HOLE on, in registers or bits, a hole takes more
+/* TABLES is the most tables of a kind that a unit has: they leave some of its MBM_MAX_SERVICES
+ * records for others. From the size HOLE or BIT_HOLE on, in registers or bits, a hole takes more
  * memory than a second table. A name has the name of the device, the unit, the table and an
  * address. */
 enum { CELLS = 65536, TABLES = 3, HOLE = 32, BIT_HOLE = 512, NAME_BYTES = HEADER_NAME_BYTES + 40 };
@@ -515,7 +515,7 @@ static void write_swap(const header *h)
 
 /* --- the part --- */
 
-/* Writes the assignments that give the cells of a table the values of the file. */
+/* Writes the assignments of the file's values to the cells of a table. */
 static int write_values(const header *h, const cells *of)
 {
     const uint32_t step = is_bits(of->table) ? 8 : 1;

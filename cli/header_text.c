@@ -92,7 +92,7 @@ static int has_small_numbers(const device_field *field)
     for (i = 0; i < field->label_count; i++) {
         const char *number = field->labels[i].number;
 
-        /* The numbers of uint64 that are too large become INT64_MAX. */
+        /* strtoll makes INT64_MAX of numbers of uint64 that are too large. */
         if (strtoll(number, NULL, 10) > 32767 || strtoll(number, NULL, 10) < -32767)
             return 0;
     }

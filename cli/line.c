@@ -172,8 +172,8 @@ static int open_tls(line *l)
     return code;
 }
 
-/* Whether a loss harms nobody, unless the line cannot be opened again: a device has closed a
- * connection over which it has answered, or which was idle. */
+/* Whether a loss is harmless, unless the line cannot be opened again: a device has closed a
+ * connection that was idle, or over which it has answered. */
 static int is_harmless(const line *l, uint8_t event)
 {
     const mbm_counters *opened = &l->opened, *now = &l->counters;
@@ -183,8 +183,8 @@ static int is_harmless(const line *l, uint8_t event)
            (now->replies != opened->replies || now->requests == opened->requests);
 }
 
-/* A device is connected to anew, since no byte came. That is reported if it has answered over this
- * connection: of one that never answered, the program reports that. */
+/* The connection to a device is made anew, since no byte came. This is reported if the device has
+ * answered over this connection; the program reports a device that never answered. */
 static void take_silence(line *l)
 {
     if (l->counters.replies == l->opened.replies)

@@ -49,7 +49,7 @@ int line_open(line *l, const place *where);
 /* The same for a service: a terminal that is not there yet is opened by line_poll later. */
 int line_open_later(line *l, const place *where);
 
-/* The same, but line_poll opens any line later: of a gateway. */
+/* The same for a gateway: line_poll opens any line later. */
 int line_begin(line *l, const place *where);
 void line_close(line *l);
 
@@ -79,13 +79,13 @@ void line_rest(line *l, uint32_t milliseconds);
  * in microseconds or a second. */
 void line_wait(line *l, int fd, uint32_t micros);
 
-/* For how many microseconds the line has nothing to do unless bytes arrive. */
+/* Returns for how many microseconds the line has nothing to do unless bytes arrive. */
 uint32_t line_delay(line *l);
 
-/* What to poll for the line, with other descriptors. Returns 0 if it has no descriptor. */
+/* Sets what to poll for the line, with other descriptors. Returns 0 if it has no descriptor. */
 int line_polls(const line *l, struct pollfd *wait);
 
-/* What was found then, in this round. */
+/* Notes what the wait of this round has found for the line. */
 void line_polled(line *l, const found_round *round, const struct pollfd *wait);
 
 /* Waits for a request that was queued. Returns its status, MBM_CANCELLED after Ctrl-C. */
@@ -102,8 +102,7 @@ const char *line_why(const line *l, uint8_t status);
  * after line_read and line_call it has been called. */
 void line_note(line *l, uint8_t status);
 
-/* Reports how a request failed that was made from `about`, one of ADVICE_. Returns the exit code.
- */
+/* Reports how a request failed. It was made from `about`, one of ADVICE_. Returns the exit code. */
 int line_failure(line *l, const mbm_clientRequest *request, int about);
 
 /* The same of `who` in place of the unit. */

@@ -45,8 +45,8 @@ extern const struct argp options_unit;
  * that of the table: a bit, or a uint16 if none is given. */
 extern const struct argp options_values;
 
-/* Of a text on the command line, where `what` names it, for example "COUNT". They end the program
- * with CODE_WRONG, after saying what is allowed, if the text is not right. */
+/* Read a text of the command line; `what` names it, for example "COUNT". If the text is not right,
+ * they say what is allowed and end the program with CODE_WRONG. */
 int64_t options_number(const struct argp_state *state, const char *what, const char *text,
                        int64_t least, int64_t most);
 uint32_t options_time(const struct argp_state *state, const char *what, const char *text,
@@ -70,7 +70,7 @@ void options_wrong(const struct argp_state *state, const char *format, ...)
 /* Refuses a word after the last one that a command takes. */
 void options_too_many(const struct argp_state *state, const char *text) __attribute__((noreturn));
 
-/* Refuses unit 0, to which a client only writes, and only on a serial line. */
+/* Refuses unit 0, unless a client writes on a serial line. */
 void options_check_unit(const struct argp_state *state, const struct place *where, int is_write);
 
 /* Reads the LINE of a client, or of a server. */

@@ -151,7 +151,7 @@ static void show_plan(polling *p)
 
 /* --- showing --- */
 
-/* The status of a field in words; of a lost link with the reason. */
+/* The status of a field in words; a lost link has the reason too. */
 static const char *print_status(polling *p, uint8_t status, char text[256])
 {
     const char *reason = status == MBM_LINK_LOST ? line_reason(&p->at) : NULL;
@@ -188,8 +188,8 @@ static void print_column(const char *text, int width)
     printf("  %s%*s", text, width > width_of(text) ? width - width_of(text) : 0, "");
 }
 
-/* Appends the names of an enumeration, as far as they fit: " (off)", of several values " (off,on)",
- * with "-" for a value without a name. Nothing if no value has one. */
+/* Appends the names of an enumeration, as far as they fit: " (off)", or " (off,on)" if there are
+ * several values; "-" stands for a value without a name. Appends nothing if no value has a name. */
 static void add_names(polling *p, uint16_t field, char *text, size_t capacity)
 {
     const uint16_t count = device_plan_count(&p->meter.planned[field]);
@@ -242,7 +242,7 @@ static void print_rows(polling *p, uint32_t round, const char *time)
         print_row(p, i, name_width);
 }
 
-/* The names of an enumeration for JSON: a text or null, of several values an array of them. */
+/* The names of an enumeration for JSON: a text or null, or an array of these for several values. */
 static cJSON *json_names(polling *p, uint16_t field)
 {
     const uint16_t count = device_plan_count(&p->meter.planned[field]);

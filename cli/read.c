@@ -158,7 +158,7 @@ static int take(reading *r, part *p)
     return code != CODE_LINE && code != CODE_NO_REPLY;
 }
 
-/* Ends the parts from `ended` on, of which `queued` are pending or ended, with one status. */
+/* Ends the parts from `ended` on with one status; those before `queued` are pending or ended. */
 static void end_others(reading *r, unsigned ended, unsigned queued, uint8_t status)
 {
     for (; ended < r->part_count; ended++) {
@@ -170,7 +170,7 @@ static void end_others(reading *r, unsigned ended, unsigned queued, uint8_t stat
     }
 }
 
-/* Reads all parts. The parts after one that failed as all others would get its status. Returns 0
+/* Reads all parts. If a part failed in a way that all others would, they get its status. Returns 0
  * after Ctrl-C; then the parts that were not read have the status MBM_CANCELLED. */
 static int read_parts(reading *r)
 {

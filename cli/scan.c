@@ -77,7 +77,7 @@ static void check_arguments(scanning *s, const struct argp_state *state)
         s->parities[s->parity_count++] = s->where.tty.parity;
     if (!options.has_timeout && place_is_serial(&s->where))
         options.timeoutMs = 200;
-    /* That units are silent is what a scan expects. */
+    /* A scan expects that units are silent. */
     if (!options.has_replace_after)
         options.replace_after = 0;
 }

@@ -74,8 +74,8 @@ static int open_tty(serve_line *l, char *name)
     return terminal_open(&l->tty, &l->at) == 0 ? CODE_DONE : line_cannot_open(&l->at, 0);
 }
 
-/* Whether a link leads to what a pseudo terminal was: a name of one that is gone, or that the
- * system has given to this program again. */
+/* Whether a link is left over: it leads to a pseudo terminal that is gone, or that the system has
+ * given to this program again. */
 static int is_left_over(const char *leads_to, const char *target)
 {
     const size_t folder = sizeof PSEUDO_TERMINALS - 1;
@@ -259,7 +259,7 @@ static uint8_t before_request(void *context, const mbm_request *request)
     fault_port *port = (fault_port *)request->connection;
 
     memset(&port->chosen, 0, sizeof port->chosen);
-    /* Nobody answers a broadcast. */
+    /* A broadcast has no answer. */
     if (request->unit == 0 && place_is_serial(&l->at))
         return 0;
     fault_choose(&l->faults, &port->chosen);
@@ -341,7 +341,7 @@ static void rest(serve_line *l)
         terminal_free(l->far_end);
 }
 
-/* Accepts the connections that wait; of TLS one in each round. */
+/* Accepts the connections that wait; with TLS one in each round. */
 static void accept_all(serve_line *l, served_units *units)
 {
     mbm_port port;
@@ -361,8 +361,8 @@ static void accept_all(serve_line *l, served_units *units)
     }
 }
 
-/* Finds the servers to poll: of a set those whose connection is ready, or that have something due
- * without it. */
+/* Finds the servers to poll: with a set those that have something due, or whose connection is
+ * ready. */
 static void find_due(serve_line *l, uint8_t is_due[PLACES])
 {
     const mbm_tcp *tcp;

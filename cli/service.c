@@ -58,7 +58,7 @@ static void catch_signals(void)
     sigaddset(&all, SIGTERM);
     sigaddset(&all, SIGHUP);
     sigaddset(&all, SIGUSR1);
-    /* pthread_sigmask, since the thread of libmosquitto must not take them either. */
+    /* pthread_sigmask, because the thread of libmosquitto must not take them either. */
     pthread_sigmask(SIG_BLOCK, &all, &awake);
     had_terminal = isatty(0);
 }

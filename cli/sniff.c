@@ -171,8 +171,8 @@ static void print_text(const mbm_event *event, int64_t time)
 
 static void print_event(sniff *s, const mbm_event *event)
 {
-    /* Of several frames that arrive in the first piece, the first ones ended before it began to be
-     * counted. A recording has no time before 1970. */
+    /* If several frames arrive in the first piece, the first ones ended before `first`. A recording
+     * has no time before 1970. */
     const int64_t time = (int64_t)(s->now - s->first) - (int64_t)((uint32_t)s->now - event->timeUs),
                   since_1970 = (int64_t)s->epoch + time;
 

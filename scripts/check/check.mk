@@ -46,7 +46,7 @@ tidy: compile-commands ## Run clang-tidy over C, C++ and sketches, with the chec
 		xargs -P "$$(nproc)" -n 1 clang-tidy --quiet 2>/dev/null || { echo "tidy: clang-tidy has findings (above)" >&2; exit 1; }
 	@echo "tidy: clang-tidy finds nothing in $$(grep -c '"file"' compile_commands.json) files and their headers"
 
-# In mbm.h and its parts, to which the other headers refer, parameters and returned values need comments too.
+# The other headers refer to mbm.h and its parts, so there parameters and returned values need comments too.
 .PHONY: check-comments
 check-comments:
 	@mkdir -p $(BUILD)/docs
