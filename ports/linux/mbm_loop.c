@@ -290,8 +290,8 @@ static void poll_entry(mbm_loop *loop, mbm_loop_entry *entry)
     }
 }
 
-/* Returns whether to poll an entry whose descriptor is ready. */
-static int is_ready(mbm_loop_entry *entry, uint32_t events)
+/* Notes that the descriptor of an entry is ready. Returns whether to poll the entry. */
+static int note_ready(mbm_loop_entry *entry, uint32_t events)
 {
     switch (entry->kind) {
     case OF_TCP: {
@@ -342,7 +342,7 @@ static void poll_ready(mbm_loop *loop)
         mbm_loop_entry *entry = (mbm_loop_entry *)loop->ready[i].data.ptr;
 
         /* mbm_loop_remove sets the entries that it removes to NULL. */
-        if (entry && is_ready(entry, loop->ready[i].events))
+        if (entry && note_ready(entry, loop->ready[i].events))
             poll_entry(loop, entry);
     }
 }
