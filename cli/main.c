@@ -2,7 +2,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
-#include "options.h"
+#include "commands.h"
 #include "mbm.h"
 #include "report.h"
 

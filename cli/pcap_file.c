@@ -1,6 +1,3 @@
-/* Writes the blocks of a pcapng file, with the headers that Wireshark needs.
- *
- * Licence: MIT OR Apache-2.0. */
 #include "pcap_file.h"
 
 #include <string.h>
@@ -304,7 +301,7 @@ int pcap_write(FILE *file, pcap_link *link, const mbm_traceRecord *record, uint6
         const char *const comment = pcap_fault(record->status);
 
         put_option(&b, OPTION_COMMENT, comment, strlen(comment));
-        /* The next record does not continue these bytes. */
+        /* What follows does not continue these bytes. */
         pcap_reconnect(link);
     }
     packet = record->direction == MBM_TRACE_SENT ? OUTBOUND : INBOUND;

@@ -125,7 +125,7 @@ impl Sniffer {
         let overdue = if is_unchanged {
             None
         } else {
-            self.find_overdue(time)
+            self.overdue(time)
         };
         if let Some(overdue) = overdue {
             return self.expire(overdue, time);

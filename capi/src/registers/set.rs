@@ -106,12 +106,12 @@ pub unsafe extern "C" fn mbm_registers_setDouble(
     #[cfg(target_arch = "avr")]
     {
         match pointers::get(value.cast::<ShortDouble>()) {
-            Ok(double) => {
+            Some(double) => {
                 let mut bytes = double.to_bytes();
                 bytes.reverse();
                 set(registers, address, order, bytes.as_ptr(), 8)
             }
-            Err(refused) => refused.code(),
+            None => Error::INVALID_ARGUMENT.code(),
         }
     }
 }
