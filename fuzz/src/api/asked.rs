@@ -1,12 +1,11 @@
 //! Requests of the client. The buffers for data and reply have exactly the size needed.
 
-use super::check::{call, is_status, refused_changes_nothing, span, PENDING};
+use super::check::{is_status, refused_changes_nothing, span, PENDING};
 use super::records::rule;
 use super::world::{Grant, World};
 use super::{identification, traffic};
 use mbm_c::*;
 use std::ffi::c_void;
-use std::ptr::{null, null_mut};
 
 unsafe extern "C" fn done(_: *mut c_void, request: *mut mbm_clientRequest) {
     let w = World::current();
@@ -38,16 +37,8 @@ fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
     // SAFETY: the request is not pending, so the client does not use it.
     unsafe {
         (*request).done = (w.byte() & 3 != 0).then_some(done);
-        (*request).data = if w.rarely(64) {
-            null()
-        } else {
-            w.noise(bytes).cast()
-        };
-        (*request).reply = if w.rarely(8) {
-            null_mut()
-        } else {
-            w.noise(space.into()).cast()
-        };
+        (*request).data = w.null_or(64, || w.noise(bytes).cast());
+        (*request).reply = w.null_or(8, || w.noise(space.into()).cast());
         (*request).replyBytes = space;
         (*request).transaction = if w.rarely(8) { w.word() } else { 0 };
         (*request).unit = w.unit_id().into();
@@ -71,14 +62,10 @@ pub fn request(w: &World, client: *mut mbm_client) {
         23 => b.into(),
         _ => 0,
     };
-    let rule: *const mbm_rule = if w.rarely(16) { null() } else { w.put(rule(w)) };
+    let rule: *const mbm_rule = w.null_or(16, || w.put(rule(w))).cast_const();
     let pdu = traffic::pdu(w);
     let (function, length) = (pdu[0], pdu.len() as u16 - 1);
-    let body = if w.rarely(32) {
-        null_mut()
-    } else {
-        w.array(&pdu[1..])
-    };
+    let body = w.null_or(32, || w.array(&pdu[1..]));
     // A pending request belongs to the client.
     // SAFETY: the pointer is not NULL.
     let free = !request.is_null() && unsafe { (*request).status } != PENDING;
@@ -92,102 +79,41 @@ pub fn request(w: &World, client: *mut mbm_client) {
         &[span(client), span(request)]
     };
     let status = refused_changes_nothing(w, spans, "a request", || match choice {
-        0 => call!(w, client, mbm_client_readCoils(client, request, a, b)),
-        1 => call!(w, client, mbm_client_readCoils(client, request, a, 1)),
-        2 => call!(
+        0 => call!(w, mbm_client_readCoils(client, request, a, b)),
+        1 => call!(w, mbm_client_readCoils(client, request, a, 1)),
+        2 => call!(w, mbm_client_readDiscreteInputs(client, request, a, b)),
+        3 => call!(w, mbm_client_readDiscreteInputs(client, request, a, 1)),
+        4 => call!(w, mbm_client_readHoldingRegisters(client, request, a, b)),
+        5 => call!(w, mbm_client_readHoldingRegisters(client, request, a, 1)),
+        6 => call!(w, mbm_client_readInputRegisters(client, request, a, b)),
+        7 => call!(w, mbm_client_readInputRegisters(client, request, a, 1)),
+        8 => call!(w, mbm_client_writeSingleCoil(client, request, a, byte)),
+        9 => call!(w, mbm_client_writeSingleRegister(client, request, a, b)),
+        10 => call!(w, mbm_client_writeMultipleCoils(client, request, a, b)),
+        11 => call!(w, mbm_client_writeMultipleRegisters(client, request, a, b)),
+        12 => call!(w, mbm_client_maskWriteRegister(client, request, a, b, c)),
+        13 => call!(
             w,
-            client,
-            mbm_client_readDiscreteInputs(client, request, a, b)
+            mbm_client_readWriteMultipleRegisters(client, request, a, b, c, d)
         ),
-        3 => call!(
-            w,
-            client,
-            mbm_client_readDiscreteInputs(client, request, a, 1)
-        ),
-        4 => call!(
-            w,
-            client,
-            mbm_client_readHoldingRegisters(client, request, a, b)
-        ),
-        5 => call!(
-            w,
-            client,
-            mbm_client_readHoldingRegisters(client, request, a, 1)
-        ),
-        6 => call!(
-            w,
-            client,
-            mbm_client_readInputRegisters(client, request, a, b)
-        ),
-        7 => call!(
-            w,
-            client,
-            mbm_client_readInputRegisters(client, request, a, 1)
-        ),
-        8 => call!(
-            w,
-            client,
-            mbm_client_writeSingleCoil(client, request, a, byte)
-        ),
-        9 => call!(
-            w,
-            client,
-            mbm_client_writeSingleRegister(client, request, a, b)
-        ),
-        10 => call!(
-            w,
-            client,
-            mbm_client_writeMultipleCoils(client, request, a, b)
-        ),
-        11 => call!(
-            w,
-            client,
-            mbm_client_writeMultipleRegisters(client, request, a, b)
-        ),
-        12 => call!(
-            w,
-            client,
-            mbm_client_maskWriteRegister(client, request, a, b, c)
-        ),
-        13 => {
-            call!(
-                w,
-                client,
-                mbm_client_readWriteMultipleRegisters(client, request, a, b, c, d)
-            )
-        }
-        14 => call!(w, client, mbm_client_readExceptionStatus(client, request)),
-        15 => call!(
-            w,
-            client,
-            mbm_client_diagnostics(client, request, a % 24, b)
-        ),
-        16 => call!(w, client, mbm_client_getCommEventCounter(client, request)),
-        17 => call!(w, client, mbm_client_getCommEventLog(client, request)),
-        18 => call!(w, client, mbm_client_reportServerId(client, request)),
-        19 => call!(w, client, mbm_client_readFifoQueue(client, request, a)),
-        20 => call!(
-            w,
-            client,
-            mbm_client_readFileRecord(client, request, a, b, c)
-        ),
-        21 => call!(
-            w,
-            client,
-            mbm_client_writeFileRecord(client, request, a, b, c)
-        ),
+        14 => call!(w, mbm_client_readExceptionStatus(client, request)),
+        15 => call!(w, mbm_client_diagnostics(client, request, a % 24, b)),
+        16 => call!(w, mbm_client_getCommEventCounter(client, request)),
+        17 => call!(w, mbm_client_getCommEventLog(client, request)),
+        18 => call!(w, mbm_client_reportServerId(client, request)),
+        19 => call!(w, mbm_client_readFifoQueue(client, request, a)),
+        20 => call!(w, mbm_client_readFileRecord(client, request, a, b, c)),
+        21 => call!(w, mbm_client_writeFileRecord(client, request, a, b, c)),
         22 => {
             let (code, object) = (byte % 8, d as u8);
             call!(
                 w,
-                client,
                 mbm_client_readDeviceIdentification(client, request, code, object)
             )
         }
-        23 => call!(w, client, mbm_client_custom(client, request, byte, b, rule)),
+        23 => call!(w, mbm_client_custom(client, request, byte, b, rule)),
         _ => call!(
             w,
-            client,
             mbm_client_forward(client, request, function, body, length)
         ),
     });

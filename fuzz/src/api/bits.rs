@@ -1,17 +1,13 @@
 //! Packed and unpacked bits.
 
-use super::check::{call, refused_changes_nothing, span};
+use super::check::{refused_changes_nothing, span};
 use super::world::World;
 use std::ptr::null_mut;
 
 /// Makes one call with bits.
 pub fn step(w: &World) {
     let (quantity, length, first, at) = (w.word(), w.word(), w.word(), w.word());
-    let coils = if w.rarely(32) {
-        null_mut()
-    } else {
-        w.unset_bytes(quantity.into())
-    };
+    let coils = w.null_or(32, || w.unset_bytes(quantity.into()));
     let null = w.rarely(32);
     let bytes = if null {
         null_mut()
@@ -29,11 +25,7 @@ pub fn step(w: &World) {
     } else {
         w.unset_bytes(2 * usize::from(quantity).div_ceil(16)).cast()
     };
-    let on = if w.rarely(32) {
-        null_mut()
-    } else {
-        w.unset::<u8>()
-    };
+    let on = w.null_or(32, || w.unset::<u8>());
     let choice = w.byte() % 6;
     let size = |null: bool, size: usize| if null { 0 } else { size };
     let spans = [
@@ -43,15 +35,11 @@ pub fn step(w: &World) {
         span(on),
     ];
     refused_changes_nothing(w, &spans, "bits", || match choice {
-        0 => call!(w, bytes, mbm_bits_pack(coils, quantity, bytes, length)),
-        1 => call!(w, bytes, mbm_bits_unpack(bytes, length, coils, quantity)),
-        2 => call!(w, bits, mbm_bits_isSet(bits, first, quantity, at, on)),
-        3 => call!(w, bits, mbm_bits_set(bits, first, quantity, at, 1)),
-        4 => call!(
-            w,
-            more,
-            mbm_bits_isSetInWords(more, first, quantity, at, on)
-        ),
-        _ => call!(w, more, mbm_bits_setInWords(more, first, quantity, at, 0)),
+        0 => call!(w, mbm_bits_pack(coils, quantity, bytes, length)),
+        1 => call!(w, mbm_bits_unpack(bytes, length, coils, quantity)),
+        2 => call!(w, mbm_bits_isSet(bits, first, quantity, at, on)),
+        3 => call!(w, mbm_bits_set(bits, first, quantity, at, 1)),
+        4 => call!(w, mbm_bits_isSetInWords(more, first, quantity, at, on)),
+        _ => call!(w, mbm_bits_setInWords(more, first, quantity, at, 0)),
     });
 }

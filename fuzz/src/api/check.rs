@@ -8,8 +8,12 @@ pub const PENDING: u8 = 235;
 /// The greatest status.
 const LAST: u8 = MBM_CONNECT_TIMED_OUT;
 
-/// Calls a function of the C API. `$object` is marked as in use during the call.
+/// Calls a function of the C API. Its first argument, or `$object`, is marked as in use during the
+/// call.
 macro_rules! call {
+    ($w:expr, $name:ident($first:expr $(, $more:expr)* $(,)?)) => {
+        call!($w, $first, $name($first $(, $more)*))
+    };
     ($w:expr, $object:expr, $name:ident($($argument:expr),* $(,)?)) => {{
         let w: &$crate::api::world::World = $w;
         w.note(|| {
@@ -25,7 +29,34 @@ macro_rules! call {
         returned
     }};
 }
-pub(super) use call;
+
+/// A call by `checked_call`.
+macro_rules! checked {
+    ($w:expr, $name:ident($first:expr $(, $more:expr)* $(,)?)) => {
+        $crate::api::check::checked_call(
+            $w,
+            $crate::api::check::span($first),
+            stringify!($name),
+            || call!($w, $name($first $(, $more)*)),
+        )
+    };
+}
+
+/// A call by `refused_changes_nothing`, with the memory ranges `$spans` or the first argument.
+macro_rules! refused {
+    ($w:expr, $name:ident($first:expr $(, $more:expr)* $(,)?)) => {
+        refused!(
+            $w,
+            &[$crate::api::check::span($first)],
+            $name($first $(, $more)*)
+        )
+    };
+    ($w:expr, $spans:expr, $name:ident($($argument:expr),* $(,)?)) => {
+        $crate::api::check::refused_changes_nothing($w, $spans, stringify!($name), || {
+            call!($w, $name($($argument),*))
+        })
+    };
+}
 
 /// A memory range: its start and its length in bytes.
 pub type Span = (*const u8, usize);

@@ -1,6 +1,6 @@
 //! The client.
 
-use super::check::{call, checked_call, refused_changes_nothing, span, PENDING};
+use super::check::{refused_changes_nothing, span, PENDING};
 use super::world::{Grant, World};
 use super::{asked, identification, ports};
 use mbm_c::*;
@@ -19,20 +19,13 @@ pub fn begin(w: &World, client: *mut mbm_client) {
     let (bytes, more) = (size(w), size(w));
     let (frame, outgoing) = (w.buffer(bytes.into()), w.buffer(more.into()));
     refused_changes_nothing(w, &[span(client)], "mbm_client_begin", || match framing {
-        MBM_FRAMING_RTU => call!(w, client, mbm_client_beginRtu(client, port, frame, bytes)),
-        MBM_FRAMING_ASCII => call!(w, client, mbm_client_beginAscii(client, port, frame, bytes)),
-        MBM_FRAMING_TCP => {
-            call!(
-                w,
-                client,
-                mbm_client_beginTcp(client, port, frame, bytes, outgoing, more)
-            )
-        }
-        _ => call!(
+        MBM_FRAMING_RTU => call!(w, mbm_client_beginRtu(client, port, frame, bytes)),
+        MBM_FRAMING_ASCII => call!(w, mbm_client_beginAscii(client, port, frame, bytes)),
+        MBM_FRAMING_TCP => call!(
             w,
-            client,
-            mbm_client_beginRtuOverTcp(client, port, frame, bytes)
+            mbm_client_beginTcp(client, port, frame, bytes, outgoing, more)
         ),
+        _ => call!(w, mbm_client_beginRtuOverTcp(client, port, frame, bytes)),
     });
 }
 
@@ -67,56 +60,37 @@ fn set(w: &World, client: *mut mbm_client) {
         (record.retryLimit, record.timeoutMs) = (limit, if w.rarely(2) { word.into() } else { 0 });
     }
     let none: *mut mbm_clientUnit = null_mut();
-    let units = if w.rarely(8) { null_mut() } else { units };
+    let units = w.null_or(8, || units);
     refused_changes_nothing(w, &[span(client)], "mbm_client_set", || match choice {
-        0 => call!(w, client, mbm_client_setDelimiter(client, byte)),
-        1 => call!(w, client, mbm_client_setInFlight(client, byte % 20)),
-        2 => call!(
-            w,
-            client,
-            mbm_client_setResponseTimeout(client, u32::from(word))
-        ),
-        3 => call!(w, client, mbm_client_setBaudRate(client, long)),
-        4 => call!(w, client, mbm_client_setGap(client, long)),
-        5 => call!(
-            w,
-            client,
-            mbm_client_setTurnaroundDelay(client, u32::from(word))
-        ),
-        6 => call!(w, client, mbm_client_setQuietTime(client, u32::from(word))),
-        7 => call!(w, client, mbm_client_setEchoDiscard(client, byte & 3)),
-        8 => call!(w, client, mbm_client_setPostFlushHold(client, byte)),
-        9 => call!(w, client, mbm_client_setRetries(client, byte)),
+        0 => call!(w, mbm_client_setDelimiter(client, byte)),
+        1 => call!(w, mbm_client_setInFlight(client, byte % 20)),
+        2 => call!(w, mbm_client_setResponseTimeout(client, u32::from(word))),
+        3 => call!(w, mbm_client_setBaudRate(client, long)),
+        4 => call!(w, mbm_client_setGap(client, long)),
+        5 => call!(w, mbm_client_setTurnaroundDelay(client, u32::from(word))),
+        6 => call!(w, mbm_client_setQuietTime(client, u32::from(word))),
+        7 => call!(w, mbm_client_setEchoDiscard(client, byte & 3)),
+        8 => call!(w, mbm_client_setPostFlushHold(client, byte)),
+        9 => call!(w, mbm_client_setRetries(client, byte)),
         10 => call!(
             w,
-            client,
             mbm_client_setBackoff(client, byte % 6, u32::from(word), u32::from(more))
         ),
-        11 => call!(
-            w,
-            client,
-            mbm_client_setJitter(client, byte % 128, chance, context)
-        ),
-        12 => call!(w, client, mbm_client_setCounters(client, counters)),
-        13 => call!(w, client, mbm_client_setUnits(client, units, byte % 8)),
-        14 => call!(
-            w,
-            client,
-            mbm_client_setBusyRetries(client, byte, u32::from(word))
-        ),
-        _ => call!(w, client, mbm_client_setUnits(client, none, byte)),
+        11 => call!(w, mbm_client_setJitter(client, byte % 128, chance, context)),
+        12 => call!(w, mbm_client_setCounters(client, counters)),
+        13 => call!(w, mbm_client_setUnits(client, units, byte % 8)),
+        14 => call!(w, mbm_client_setBusyRetries(client, byte, u32::from(word))),
+        _ => call!(w, mbm_client_setUnits(client, none, byte)),
     });
 }
 
 fn poll(w: &World, client: *mut mbm_client) {
     for _ in 0..1 + w.byte() % 12 {
-        let status = checked_call(w, span(client), "mbm_client_poll", || {
-            call!(w, client, mbm_client_poll(client))
-        });
+        let status = checked!(w, mbm_client_poll(client));
         if status != PENDING {
             break;
         }
-        let count = call!(w, client, mbm_client_pending(client));
+        let count = call!(w, mbm_client_pending(client));
         assert!(count <= MBM_CLIENT_DEPTH, "{count} requests");
         if w.byte() < 0x40 {
             w.clock
@@ -150,10 +124,10 @@ fn line(w: &World, client: *mut mbm_client) {
                     status: None,
                 })
             };
-            call!(w, client, mbm_client_reconnect(client, link));
+            call!(w, mbm_client_reconnect(client, link));
         }
         1 => {
-            let connected = call!(w, client, mbm_client_isConnected(client));
+            let connected = call!(w, mbm_client_isConnected(client));
             assert!(connected <= 1);
         }
         choice => {
@@ -162,9 +136,9 @@ fn line(w: &World, client: *mut mbm_client) {
             refused_changes_nothing(w, &spans, "suspend or resume", || match choice {
                 2 => {
                     w.lenders.borrow_mut().push(client);
-                    call!(w, client, mbm_client_suspend(client, line))
+                    call!(w, mbm_client_suspend(client, line))
                 }
-                _ => call!(w, client, mbm_client_resume(client, line)),
+                _ => call!(w, mbm_client_resume(client, line)),
             });
         }
     }
@@ -183,8 +157,8 @@ pub fn step_with(w: &World, client: *mut mbm_client) {
         4..=8 => asked::request(w, client),
         9..=11 => poll(w, client),
         12 => {
-            call!(w, client, mbm_client_pollDelay(client));
-            call!(w, client, mbm_client_getResponseTimeout(client, w.byte()));
+            call!(w, mbm_client_pollDelay(client));
+            call!(w, mbm_client_getResponseTimeout(client, w.byte()));
             match w.byte() % 4 {
                 0 => {}
                 1 => identification::reply(w),
@@ -193,11 +167,9 @@ pub fn step_with(w: &World, client: *mut mbm_client) {
         }
         13 => {
             let request = w.requests.pick(w);
-            call!(w, request, mbm_client_wireTransaction(request));
+            call!(w, mbm_client_wireTransaction(request));
             let spans = [span(client), span(request)];
-            refused_changes_nothing(w, &spans, "mbm_client_cancel", || {
-                call!(w, client, mbm_client_cancel(client, request))
-            });
+            refused!(w, &spans, mbm_client_cancel(client, request));
         }
         14 => line(w, client),
         _ => {

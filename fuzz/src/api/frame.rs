@@ -1,11 +1,11 @@
 //! Functions for frames, `mbm_frame_*`.
 
-use super::check::{call, is_length, is_status, OK};
+use super::check::{is_length, is_status, OK};
 use super::packet::{any_or_null, functions, is_expected, is_packet, kind};
 use super::traffic;
 use super::world::World;
 use mbm_c::*;
-use std::ptr::{null, null_mut};
+use std::ptr::null;
 
 /// A framing record, most often with one of the four framings.
 pub fn framing(w: &World) -> *const mbm_framing {
@@ -30,69 +30,37 @@ fn frame(w: &World) -> (*mut u8, u16) {
         asked
     };
     let place = w.array(&frame);
-    (
-        if w.rarely(64) { null_mut() } else { place },
-        frame.len() as u16,
-    )
+    (w.null_or(64, || place), frame.len() as u16)
 }
 
 fn parse(w: &World) {
     let (framing, kind) = (framing(w), kind(w));
     let (bytes, length) = frame(w);
     let size = w.word();
-    let text = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset_bytes(size.into())
-    };
+    let text = w.null_or(64, || w.unset_bytes(size.into()));
     let line: *mut std::ffi::c_char = text.cast();
-    let status = call!(
-        w,
-        text,
-        mbm_frame_text(framing, kind, bytes, length, line, size)
-    );
+    let status = call!(w, mbm_frame_text(framing, kind, bytes, length, line, size));
     super::text::check_text(w, "mbm_frame_text", status, text, size);
 
     let have = length / (1 + w.word() % 3);
-    let expected = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset::<mbm_length>()
-    };
+    let expected = w.null_or(64, || w.unset::<mbm_length>());
     let status = call!(
         w,
-        expected,
         mbm_frame_expectedLength(framing, kind, bytes, have, expected)
     );
     is_expected("mbm_frame_expectedLength", status, expected);
 
-    let looks = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset::<u16>()
-    };
+    let looks = w.null_or(64, || w.unset::<u16>());
     let unknown = w.byte() & 1;
-    let status = call!(
-        w,
-        looks,
-        mbm_frame_looksLikeTcp(bytes, have, unknown, looks)
-    );
+    let status = call!(w, mbm_frame_looksLikeTcp(bytes, have, unknown, looks));
     if is_status("mbm_frame_looksLikeTcp", status) == OK {
         is_length("mbm_frame_looksLikeTcp", looks, MBM_MAX_TCP_FRAME.into());
     }
-    call!(w, bytes, mbm_frame_crc16(bytes, length));
-    call!(w, bytes, mbm_frame_lrc(bytes, length));
+    call!(w, mbm_frame_crc16(bytes, length));
+    call!(w, mbm_frame_lrc(bytes, length));
 
-    let packet = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset::<mbm_packet>()
-    };
-    let status = call!(
-        w,
-        packet,
-        mbm_frame_parse(framing, kind, bytes, length, packet)
-    );
+    let packet = w.null_or(64, || w.unset::<mbm_packet>());
+    let status = call!(w, mbm_frame_parse(framing, kind, bytes, length, packet));
     is_status("mbm_frame_parse", status);
     if status == OK {
         is_packet(packet);
@@ -107,30 +75,17 @@ fn build(w: &World) {
     } else {
         MBM_MAX_ASCII_FRAME
     };
-    let place = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.noise(capacity.into())
-    };
-    let length = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset::<u16>()
-    };
+    let place = w.null_or(64, || w.noise(capacity.into()));
+    let length = w.null_or(64, || w.unset::<u16>());
     let exception = w.rarely(3);
     let code = w.byte();
     let status = if exception {
         call!(
             w,
-            packet,
             mbm_frame_exception(framing, packet, code, place, capacity, length)
         )
     } else {
-        call!(
-            w,
-            packet,
-            mbm_frame_build(framing, packet, place, capacity, length)
-        )
+        call!(w, mbm_frame_build(framing, packet, place, capacity, length))
     };
     if is_status("mbm_frame_build or mbm_frame_exception", status) == OK {
         is_length(
@@ -139,12 +94,8 @@ fn build(w: &World) {
             capacity.into(),
         );
     }
-    let expected = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset::<mbm_length>()
-    };
-    let status = call!(w, packet, mbm_frame_replyLength(framing, packet, expected));
+    let expected = w.null_or(64, || w.unset::<mbm_length>());
+    let status = call!(w, mbm_frame_replyLength(framing, packet, expected));
     is_expected("mbm_frame_replyLength", status, expected);
 }
 

@@ -1,6 +1,6 @@
 //! Gateways.
 
-use super::check::{call, checked_call, refused_changes_nothing, span, OK};
+use super::check::{refused_changes_nothing, span, OK};
 use super::world::{Grant, World};
 use super::{ports, records, traffic};
 use mbm_c::*;
@@ -84,14 +84,12 @@ fn config(w: &World) -> mbm_gatewayConfig {
 /// Begins a gateway, most often with connections that are open.
 pub fn begin(w: &World, gateway: *mut mbm_gateway) {
     let config = w.put(config(w));
-    let config = if w.rarely(64) { null_mut() } else { config };
-    let status = refused_changes_nothing(w, &[span(gateway)], "mbm_gateway_begin", || {
-        call!(w, gateway, mbm_gateway_begin(gateway, config))
-    });
+    let config = w.null_or(64, || config);
+    let status = refused!(w, mbm_gateway_begin(gateway, config));
     if status == OK {
         for connection in 0..w.byte() % 4 {
             let port = ports::good(w, connection.into(), MBM_FRAMING_TCP);
-            call!(w, gateway, mbm_gateway_open(gateway, connection, port));
+            call!(w, mbm_gateway_open(gateway, connection, port));
         }
     }
 }
@@ -99,10 +97,8 @@ pub fn begin(w: &World, gateway: *mut mbm_gateway) {
 /// Polls a gateway a few times while time passes and requests arrive.
 fn poll(w: &World, gateway: *mut mbm_gateway) {
     for _ in 0..1 + w.byte() % 12 {
-        checked_call(w, span(gateway), "mbm_gateway_poll", || {
-            call!(w, gateway, mbm_gateway_poll(gateway))
-        });
-        call!(w, gateway, mbm_gateway_pollDelay(gateway));
+        checked!(w, mbm_gateway_poll(gateway));
+        call!(w, mbm_gateway_pollDelay(gateway));
         if w.byte() < 0x40 {
             let time = 1 << (w.byte() % 22);
             w.clock.set(w.clock.get().wrapping_add(time));
@@ -140,18 +136,10 @@ fn set(w: &World, gateway: *mut mbm_gateway) {
     };
     refused_changes_nothing(w, &[span(gateway)], "mbm_gateway_set", || {
         match byte >> 2 & 3 {
-            0 => call!(w, gateway, mbm_gateway_setMaxPending(gateway, word % 8)),
-            1 => call!(
-                w,
-                gateway,
-                mbm_gateway_setQueueTime(gateway, u32::from(word))
-            ),
-            2 => call!(w, gateway, mbm_gateway_serveUnits(gateway, units, count)),
-            _ => call!(
-                w,
-                gateway,
-                mbm_gateway_setFunctions(gateway, functions, many)
-            ),
+            0 => call!(w, mbm_gateway_setMaxPending(gateway, word % 8)),
+            1 => call!(w, mbm_gateway_setQueueTime(gateway, u32::from(word))),
+            2 => call!(w, mbm_gateway_serveUnits(gateway, units, count)),
+            _ => call!(w, mbm_gateway_setFunctions(gateway, functions, many)),
         }
     });
 }
@@ -162,19 +150,15 @@ fn connection(w: &World, gateway: *mut mbm_gateway) {
     match w.byte() % 8 {
         0..=2 => {
             let port = ports::port(w, MBM_FRAMING_TCP);
-            refused_changes_nothing(w, &[span(gateway)], "mbm_gateway_open", || {
-                call!(w, gateway, mbm_gateway_open(gateway, number, port))
-            });
+            refused!(w, mbm_gateway_open(gateway, number, port));
         }
         3 => {
-            refused_changes_nothing(w, &[span(gateway)], "mbm_gateway_close", || {
-                call!(w, gateway, mbm_gateway_close(gateway, number))
-            });
+            refused!(w, mbm_gateway_close(gateway, number));
         }
-        4 => drop(call!(w, gateway, mbm_gateway_status(gateway, number))),
-        5 => drop(call!(w, gateway, mbm_gateway_pending(gateway, number))),
+        4 => drop(call!(w, mbm_gateway_status(gateway, number))),
+        5 => drop(call!(w, mbm_gateway_pending(gateway, number))),
         _ => {
-            let reads = call!(w, gateway, mbm_gateway_isReading(gateway, number));
+            let reads = call!(w, mbm_gateway_isReading(gateway, number));
             assert!(reads <= 1);
         }
     }

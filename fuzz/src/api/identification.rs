@@ -1,6 +1,6 @@
 //! Replies as packets, and identifications.
 
-use super::check::{bytes, call, is_status, refused_changes_nothing, span, OK, PENDING};
+use super::check::{bytes, is_status, refused_changes_nothing, span, OK, PENDING};
 use super::world::{Grant, World};
 use mbm_c::*;
 use std::ffi::c_void;
@@ -15,9 +15,9 @@ pub fn reply(w: &World) {
 pub fn reply_of(w: &World, request: *mut mbm_clientRequest) {
     let capacity = if w.rarely(4) { w.word() } else { MBM_MAX_PDU };
     let pdu = w.buffer(capacity.into());
-    let packet: *mut mbm_packet = if w.rarely(32) { null_mut() } else { w.zeroed() };
+    let packet: *mut mbm_packet = w.null_or(32, || w.zeroed());
     let before = bytes(span(packet));
-    let status = call!(w, request, mbm_client_reply(request, pdu, capacity, packet));
+    let status = call!(w, mbm_client_reply(request, pdu, capacity, packet));
     is_status("mbm_client_reply", status);
     if status != OK {
         assert!(bytes(span(packet)) == before, "a refused reply was written");
@@ -62,18 +62,14 @@ pub fn identify(w: &World, client: *mut mbm_client) {
     let request = unsafe { identification.as_mut() }.map(|it| &raw mut it.request);
     let request = request.unwrap_or(null_mut());
     if !request.is_null() && w.rarely(8) {
-        call!(w, client, mbm_client_cancel(client, request));
+        call!(w, mbm_client_cancel(client, request));
         return;
     }
     // A pending request belongs to the client.
     // SAFETY: the pointer is not NULL.
     if !request.is_null() && unsafe { (*request).status } != PENDING {
         let space = if w.rarely(4) { w.word() } else { 250 };
-        let reply = if w.rarely(16) {
-            null_mut()
-        } else {
-            w.noise(space.into()).cast()
-        };
+        let reply = w.null_or(16, || w.noise(space.into()).cast());
         // SAFETY: as above.
         unsafe {
             (*request).unit = w.unit_id().into();

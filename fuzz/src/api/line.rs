@@ -1,6 +1,6 @@
 //! Lines.
 
-use super::check::{call, refused_changes_nothing, span};
+use super::check::{refused_changes_nothing, span};
 use super::ports;
 use super::world::World;
 use mbm_c::*;
@@ -30,16 +30,12 @@ pub fn begin(w: &World, line: *mut mbm_line) {
         0xE0..0xF8 => (null_mut(), 0),
         _ => (null_mut(), 256),
     };
-    refused_changes_nothing(w, &[span(line)], "mbm_line_beginRtu", || {
-        call!(w, line, mbm_line_beginRtu(line, port, frame, bytes))
-    });
+    refused!(w, mbm_line_beginRtu(line, port, frame, bytes));
 }
 
 fn set_frame(w: &World, line: *mut mbm_line) {
     let (frame, bytes) = frame(w);
-    refused_changes_nothing(w, &[span(line)], "mbm_line_setFrame", || {
-        call!(w, line, mbm_line_setFrame(line, frame, bytes))
-    });
+    refused!(w, mbm_line_setFrame(line, frame, bytes));
 }
 
 fn set(w: &World, line: *mut mbm_line) {
@@ -53,14 +49,14 @@ fn set(w: &World, line: *mut mbm_line) {
     // Sometimes too large a number.
     let time = if byte < 0xF0 { word.into() } else { long };
     refused_changes_nothing(w, &[span(line)], "mbm_line_set", || match choice {
-        0 => call!(w, line, mbm_line_setBaudRate(line, long)),
-        1 => call!(w, line, mbm_line_setGap(line, long)),
-        2 => call!(w, line, mbm_line_setTurnaroundDelay(line, time)),
-        3 => call!(w, line, mbm_line_setQuietTime(line, time)),
-        4 => call!(w, line, mbm_line_setRetries(line, byte)),
-        5 => call!(w, line, mbm_line_setEchoDiscard(line, byte & 3)),
-        6 => call!(w, line, mbm_line_setPostFlushHold(line, byte)),
-        _ => call!(w, line, mbm_line_setCounters(line, counters)),
+        0 => call!(w, mbm_line_setBaudRate(line, long)),
+        1 => call!(w, mbm_line_setGap(line, long)),
+        2 => call!(w, mbm_line_setTurnaroundDelay(line, time)),
+        3 => call!(w, mbm_line_setQuietTime(line, time)),
+        4 => call!(w, mbm_line_setRetries(line, byte)),
+        5 => call!(w, mbm_line_setEchoDiscard(line, byte & 3)),
+        6 => call!(w, mbm_line_setPostFlushHold(line, byte)),
+        _ => call!(w, mbm_line_setCounters(line, counters)),
     });
 }
 
@@ -68,8 +64,8 @@ fn set(w: &World, line: *mut mbm_line) {
 fn used(w: &World, line: *mut mbm_line) {
     let (byte, long) = (w.byte(), w.long());
     refused_changes_nothing(w, &[span(line)], "mbm_line_used", || match byte & 1 {
-        0 => call!(w, line, mbm_line_used(line)),
-        _ => call!(w, line, mbm_line_usedAt(line, long)),
+        0 => call!(w, mbm_line_used(line)),
+        _ => call!(w, mbm_line_usedAt(line, long)),
     });
 }
 
@@ -82,9 +78,7 @@ pub fn step(w: &World) {
         7..=10 => set(w, line),
         11 | 12 => used(w, line),
         13 | 14 => {
-            refused_changes_nothing(w, &[span(line)], "mbm_line_cancel", || {
-                call!(w, line, mbm_line_cancel(line))
-            });
+            refused!(w, mbm_line_cancel(line));
         }
         _ => {
             // The user may zero a line at any time, also in the hook `idle`.

@@ -1,7 +1,7 @@
 //! Links of clients. A client that has a link must stay where it is and must not be copied, so
 //! each link has a client of its own.
 
-use super::check::{call, refused_changes_nothing, span};
+use super::check::{refused_changes_nothing, span};
 use super::client;
 use super::world::{Grant, World};
 use mbm_c::*;
@@ -73,19 +73,14 @@ fn set(w: &World, link: *mut mbm_link) {
     refused_changes_nothing(w, &[span(link)], "mbm_link_set", || match choice {
         0 => call!(
             w,
-            link,
             mbm_link_setBackoff(link, byte % 6, u32::from(word % 50), u32::from(more))
         ),
-        1 => call!(
-            w,
-            link,
-            mbm_link_setJitter(link, byte % 128, chance, context)
-        ),
-        2 => call!(w, link, mbm_link_setConnectTimeout(link, u32::from(word))),
-        3 => call!(w, link, mbm_link_setRequestsWait(link, byte & 3)),
-        4 => call!(w, link, mbm_link_setCounters(link, counters)),
-        5 => call!(w, link, mbm_link_setReplaceAfter(link, byte % 128)),
-        _ => call!(w, link, mbm_link_setCallback(link, callback, context)),
+        1 => call!(w, mbm_link_setJitter(link, byte % 128, chance, context)),
+        2 => call!(w, mbm_link_setConnectTimeout(link, u32::from(word))),
+        3 => call!(w, mbm_link_setRequestsWait(link, byte & 3)),
+        4 => call!(w, mbm_link_setCounters(link, counters)),
+        5 => call!(w, mbm_link_setReplaceAfter(link, byte % 128)),
+        _ => call!(w, mbm_link_setCallback(link, callback, context)),
     });
 }
 
@@ -109,22 +104,18 @@ pub fn step(w: &World) {
         }
         2 if !lent => {
             let spans = [span(link), span(client)];
-            refused_changes_nothing(w, &spans, "mbm_link_end", || {
-                call!(w, link, mbm_link_end(link))
-            });
+            refused!(w, &spans, mbm_link_end(link));
         }
         3 | 4 => set(w, link),
         5 => {
-            refused_changes_nothing(w, &[span(link)], "mbm_link_reconnect", || {
-                call!(w, link, mbm_link_reconnect(link))
-            });
+            refused!(w, mbm_link_reconnect(link));
         }
         6 => {
-            let state = call!(w, link, mbm_link_state(link));
+            let state = call!(w, mbm_link_state(link));
             assert!(state <= MBM_LINK_IS_UP, "state {state}");
         }
         7 => {
-            let delay = call!(w, client, mbm_client_pollDelay(client));
+            let delay = call!(w, mbm_client_pollDelay(client));
             if w.byte() & 1 == 0 && delay < 0x0100_0000 {
                 w.clock.set(w.clock.get().wrapping_add(delay));
             }

@@ -82,6 +82,14 @@ impl Memory {
         self.below(times) == times - 1
     }
 
+    /// NULL with a probability of 1 in `times`, or what `make` makes.
+    pub fn null_or<T>(&self, times: usize, make: impl FnOnce() -> *mut T) -> *mut T {
+        match self.rarely(times) {
+            true => std::ptr::null_mut(),
+            false => make(),
+        }
+    }
+
     /// A number of 16 bits: most often small, or near a limit.
     pub fn word(&self) -> u16 {
         let byte = self.byte();

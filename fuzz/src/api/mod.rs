@@ -5,9 +5,11 @@
 //! address sanitizer detects an access to any byte beside it. All pointers passed are NULL or
 //! valid, and stay valid until the input has been run.
 
+#[macro_use]
+mod check;
+
 mod asked;
 mod bits;
-mod check;
 mod client;
 mod frame;
 mod gateway;

@@ -1,9 +1,6 @@
 //! Nodes.
 
-use super::check::{
-    bytes, call, checked_call, is_status, refused_changes_nothing, span, unchanged_if_refused,
-    Span, PENDING,
-};
+use super::check::{bytes, checked_call, is_status, span, unchanged_if_refused, Span, PENDING};
 use super::line;
 use super::ports;
 use super::world::World;
@@ -40,13 +37,11 @@ fn begin(w: &World, node: *mut mbm_node) {
     };
     let (responses, transmits) = (place(w, response), place(w, transmit));
     let spans = [span(node), span(line)];
-    let status = refused_changes_nothing(w, &spans, "mbm_node_begin", || {
-        call!(
-            w,
-            node,
-            mbm_node_begin(node, line, unit, responses, response, transmits, transmit)
-        )
-    });
+    let status = refused!(
+        w,
+        &spans,
+        mbm_node_begin(node, line, unit, responses, response, transmits, transmit)
+    );
     if status == MBM_OK {
         w.set_line_of(node, line);
     }
@@ -58,12 +53,12 @@ fn set(w: &World, node: *mut mbm_node) {
     let choice = w.byte() % 4;
     let time = if byte < 0xF0 { word.into() } else { long };
     unchanged_if_refused(w, &[span(node)], "mbm_node_set", || match choice {
-        0 => call!(w, node, mbm_node_setSlaveID(node, byte)),
-        1 => call!(w, node, mbm_node_setResponseTimeout(node, time)),
-        2 => call!(w, node, mbm_node_setBlocking(node, byte & 1)),
-        _ => call!(w, node, mbm_node_setLenient(node, byte & 1)),
+        0 => call!(w, mbm_node_setSlaveID(node, byte)),
+        1 => call!(w, mbm_node_setResponseTimeout(node, time)),
+        2 => call!(w, mbm_node_setBlocking(node, byte & 1)),
+        _ => call!(w, mbm_node_setLenient(node, byte & 1)),
     });
-    call!(w, node, mbm_node_getSlaveID(node));
+    call!(w, mbm_node_getSlaveID(node));
 }
 
 /// The object that a hook must not use if it must not make a request of the node: the line while
@@ -88,23 +83,19 @@ fn request(w: &World, node: *mut mbm_node) {
     let before = spans.map(bytes);
     let inner = w.inner_calls.get();
     let status = checked_call(w, lock(w, node), "a request", || match choice {
-        0 => call!(w, node, mbm_node_readCoils(node, a, b)),
-        1 => call!(w, node, mbm_node_readDiscreteInputs(node, a, b)),
-        2 => call!(w, node, mbm_node_readHoldingRegisters(node, a, b)),
-        3 => call!(w, node, mbm_node_readInputRegisters(node, a, b)),
-        4 => call!(w, node, mbm_node_writeSingleCoil(node, a, b as u8)),
-        5 => call!(w, node, mbm_node_writeSingleRegister(node, a, b)),
-        6 => call!(w, node, mbm_node_writeMultipleCoils(node, a, b)),
-        7 => call!(w, node, mbm_node_writeQueuedCoils(node)),
-        8 => call!(w, node, mbm_node_writeMultipleRegisters(node, a, b)),
-        9 => call!(w, node, mbm_node_writeQueuedRegisters(node)),
-        10 => call!(w, node, mbm_node_maskWriteRegister(node, a, b, c)),
-        11 => call!(
-            w,
-            node,
-            mbm_node_readWriteMultipleRegisters(node, a, b, c, d)
-        ),
-        _ => call!(w, node, mbm_node_readWriteQueuedRegisters(node, a, b)),
+        0 => call!(w, mbm_node_readCoils(node, a, b)),
+        1 => call!(w, mbm_node_readDiscreteInputs(node, a, b)),
+        2 => call!(w, mbm_node_readHoldingRegisters(node, a, b)),
+        3 => call!(w, mbm_node_readInputRegisters(node, a, b)),
+        4 => call!(w, mbm_node_writeSingleCoil(node, a, b as u8)),
+        5 => call!(w, mbm_node_writeSingleRegister(node, a, b)),
+        6 => call!(w, mbm_node_writeMultipleCoils(node, a, b)),
+        7 => call!(w, mbm_node_writeQueuedCoils(node)),
+        8 => call!(w, mbm_node_writeMultipleRegisters(node, a, b)),
+        9 => call!(w, mbm_node_writeQueuedRegisters(node)),
+        10 => call!(w, mbm_node_maskWriteRegister(node, a, b, c)),
+        11 => call!(w, mbm_node_readWriteMultipleRegisters(node, a, b, c, d)),
+        _ => call!(w, mbm_node_readWriteQueuedRegisters(node, a, b)),
     });
     if w.inner_calls.get() - inner != u32::from(w.is_inside()) {
         // A hook may have changed anything.
@@ -142,7 +133,7 @@ fn changes_are_refused(w: &World, node: *mut mbm_node) {
     if let Some(other) = w.nodes.all().into_iter().find(is_other) {
         let spans = [span(other), span(node), span(line)];
         let status = unchanged_if_refused(w, &spans, "a request", || {
-            call!(w, other, mbm_node_readCoils(other, 0, 1))
+            call!(w, mbm_node_readCoils(other, 0, 1))
         });
         assert_eq!(status, MBM_BUSY, "a second request on a line");
     }
@@ -155,9 +146,9 @@ fn changes_are_refused(w: &World, node: *mut mbm_node) {
     for choice in 0..3 {
         let none = null_mut();
         let status = unchanged_if_refused(w, &spans, "a begin", || match choice {
-            0 => call!(w, node, mbm_node_begin(node, new, 1, none, 0, none, 0)),
-            1 => call!(w, line, mbm_line_beginRtu(line, port, frame, 256)),
-            _ => call!(w, line, mbm_line_setFrame(line, frame, 256)),
+            0 => call!(w, mbm_node_begin(node, new, 1, none, 0, none, 0)),
+            1 => call!(w, mbm_line_beginRtu(line, port, frame, 256)),
+            _ => call!(w, mbm_line_setFrame(line, frame, 256)),
         });
         assert_eq!(status, MBM_BUSY, "a change while a request is pending");
     }
@@ -166,9 +157,7 @@ fn changes_are_refused(w: &World, node: *mut mbm_node) {
 /// Polls a few times, or until the request has ended.
 fn poll(w: &World, node: *mut mbm_node) {
     for _ in 0..1 + w.byte() % 16 {
-        let status = checked_call(w, span(node), "mbm_node_poll", || {
-            call!(w, node, mbm_node_poll(node))
-        });
+        let status = checked!(w, mbm_node_poll(node));
         if status != PENDING {
             return;
         }
@@ -178,28 +167,28 @@ fn poll(w: &World, node: *mut mbm_node) {
 fn words(w: &World, node: *mut mbm_node) {
     let (byte, word) = (w.byte(), w.word());
     match w.byte() % 7 {
-        0 => drop(call!(w, node, mbm_node_beginTransmission(node, word))),
+        0 => drop(call!(w, mbm_node_beginTransmission(node, word))),
         1 => {
             for _ in 0..byte % 130 {
-                call!(w, node, mbm_node_send(node, word));
+                call!(w, mbm_node_send(node, word));
             }
         }
-        2 => drop(call!(w, node, mbm_node_send(node, u16::from(byte)))),
+        2 => drop(call!(w, mbm_node_send(node, u16::from(byte)))),
         3 => {
             for _ in 0..byte {
-                call!(w, node, mbm_node_sendBit(node, byte & 1));
+                call!(w, mbm_node_sendBit(node, byte & 1));
             }
         }
         4 => {
-            let count = call!(w, node, mbm_node_available(node));
+            let count = call!(w, mbm_node_available(node));
             assert!(count <= 125, "{count} words to receive");
         }
         5 => {
             for _ in 0..byte % 8 {
-                call!(w, node, mbm_node_receive(node));
+                call!(w, mbm_node_receive(node));
             }
         }
-        _ => drop(call!(w, node, mbm_node_getExceptionCode(node))),
+        _ => drop(call!(w, mbm_node_getExceptionCode(node))),
     }
 }
 
@@ -212,18 +201,16 @@ pub fn step(w: &World) {
         3..=7 => request(w, node),
         8 | 9 => words(w, node),
         10 => {
-            let delay = call!(w, node, mbm_node_pollDelay(node));
+            let delay = call!(w, mbm_node_pollDelay(node));
             if w.byte() & 1 == 0 && delay < 0x0100_0000 {
                 w.clock.set(w.clock.get().wrapping_add(delay));
             }
         }
         11 => {
-            refused_changes_nothing(w, &[span(node)], "mbm_node_cancel", || {
-                call!(w, node, mbm_node_cancel(node))
-            });
+            refused!(w, mbm_node_cancel(node));
         }
         12 => {
-            let status = call!(w, node, mbm_node_status(node));
+            let status = call!(w, mbm_node_status(node));
             is_status("mbm_node_status", status);
             assert!(!w.is_locked(node.cast()) || status == MBM_BUSY);
         }

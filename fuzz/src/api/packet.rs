@@ -1,6 +1,6 @@
 //! Packets without a frame, `mbm_packet_*`.
 
-use super::check::{bytes, call, is_length, is_status, refused_changes_nothing, span, OK};
+use super::check::{bytes, is_length, is_status, span, OK};
 use super::records::rule;
 use super::traffic;
 use super::world::World;
@@ -36,11 +36,7 @@ pub fn kind(w: &World) -> u8 {
 /// A packet with any content, and its data in their own block of the heap.
 fn random_packet(w: &World) -> *mut mbm_packet {
     let count = w.word();
-    let data = if w.rarely(32) {
-        null_mut()
-    } else {
-        w.noise(count.into())
-    };
+    let data = w.null_or(32, || w.noise(count.into()));
     let function = traffic::pdu(w)[0];
     w.put(mbm_packet {
         data,
@@ -122,32 +118,19 @@ fn parse(w: &World) {
     let pdu = traffic::pdu(w);
     let framing = pdu_alone(w);
     let place = w.array(&pdu);
-    let place = if w.rarely(64) { null_mut() } else { place };
+    let place = w.null_or(64, || place);
     let (kind, length) = (kind(w), pdu.len() as u16);
-    let packet = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset::<mbm_packet>()
-    };
-    let status = call!(
-        w,
-        packet,
-        mbm_frame_parse(framing, kind, place, length, packet)
-    );
+    let packet = w.null_or(64, || w.unset::<mbm_packet>());
+    let status = call!(w, mbm_frame_parse(framing, kind, place, length, packet));
     is_status("mbm_frame_parse of a PDU", status);
     if status == OK {
         is_packet(packet);
         w.packets.keep(packet);
     }
-    let expected = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset::<mbm_length>()
-    };
+    let expected = w.null_or(64, || w.unset::<mbm_length>());
     let have = length / (1 + w.word() % 3);
     let status = call!(
         w,
-        expected,
         mbm_frame_expectedLength(framing, kind, place, have, expected)
     );
     is_expected("mbm_frame_expectedLength of a PDU", status, expected);
@@ -172,21 +155,9 @@ fn build(w: &World) {
     let packet = any_or_null(w);
     let framing = pdu_alone(w);
     let capacity = if w.rarely(4) { w.word() } else { MBM_MAX_PDU };
-    let pdu = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset_bytes(capacity.into())
-    };
-    let length = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset::<u16>()
-    };
-    let status = call!(
-        w,
-        packet,
-        mbm_frame_build(framing, packet, pdu, capacity, length)
-    );
+    let pdu = w.null_or(64, || w.unset_bytes(capacity.into()));
+    let length = w.null_or(64, || w.unset::<u16>());
+    let status = call!(w, mbm_frame_build(framing, packet, pdu, capacity, length));
     is_status("mbm_frame_build of a PDU", status);
     if status == OK {
         let used = is_length(
@@ -200,12 +171,8 @@ fn build(w: &World) {
             "bytes after the PDU have changed"
         );
     }
-    let expected = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.unset::<mbm_length>()
-    };
-    let status = call!(w, packet, mbm_frame_replyLength(framing, packet, expected));
+    let expected = w.null_or(64, || w.unset::<mbm_length>());
+    let status = call!(w, mbm_frame_replyLength(framing, packet, expected));
     is_expected("mbm_frame_replyLength of a PDU", status, expected);
 }
 
@@ -213,19 +180,19 @@ fn build(w: &World) {
 fn walk(w: &World) {
     let packet = any_or_null(w);
     let cursor = w.put(if w.rarely(16) { w.word() } else { 0 });
-    let cursor = if w.rarely(64) { null_mut() } else { cursor };
+    let cursor = w.null_or(64, || cursor);
     let objects = w.rarely(2);
     for turn in 0.. {
         assert!(turn <= 65_536, "the iteration does not end");
         let (found, data) = if objects {
             let object = w.unset::<mbm_object>();
-            let found = call!(w, packet, mbm_packet_nextObject(packet, cursor, object));
+            let found = call!(w, mbm_packet_nextObject(packet, cursor, object));
             // SAFETY: a block of this type.
             let object = unsafe { &*object };
             (found, (object.data, usize::from(object.length)))
         } else {
             let record = w.unset::<mbm_record>();
-            let found = call!(w, packet, mbm_packet_nextRecord(packet, cursor, record));
+            let found = call!(w, mbm_packet_nextRecord(packet, cursor, record));
             // SAFETY: a block of this type.
             let record = unsafe { &*record };
             (found, (record.data, 2 * usize::from(record.length)))
@@ -267,13 +234,11 @@ fn add(w: &World) {
                 length,
             };
             let record = w.put(record);
-            refused_changes_nothing(w, &spans[..1], "mbm_packet_addRecord", || {
-                call!(
-                    w,
-                    packet,
-                    mbm_packet_addRecord(packet, storage, capacity, record)
-                )
-            });
+            refused!(
+                w,
+                &spans[..1],
+                mbm_packet_addRecord(packet, storage, capacity, record)
+            );
         } else {
             let object = mbm_object {
                 data,
@@ -281,13 +246,11 @@ fn add(w: &World) {
                 id: w.byte(),
             };
             let object = w.put(object);
-            refused_changes_nothing(w, &spans[..1], "mbm_packet_addObject", || {
-                call!(
-                    w,
-                    packet,
-                    mbm_packet_addObject(packet, storage, capacity, object)
-                )
-            });
+            refused!(
+                w,
+                &spans[..1],
+                mbm_packet_addObject(packet, storage, capacity, object)
+            );
         }
     }
     w.packets.keep(packet);

@@ -1,6 +1,6 @@
 //! The plan.
 
-use super::check::{call, checked_call, is_status, refused_changes_nothing, span, OK, PENDING};
+use super::check::{checked_call, is_status, refused_changes_nothing, span, OK, PENDING};
 use super::world::{Grant, World};
 use mbm_c::*;
 use std::ffi::c_void;
@@ -100,12 +100,8 @@ pub fn begin(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
         unitCount: units.len() as u8,
         excludedCount: excluded.len() as u8,
     });
-    let setup = if w.rarely(64) { null_mut() } else { setup };
-    let wrong = if w.rarely(8) {
-        null_mut()
-    } else {
-        w.unset::<u16>()
-    };
+    let setup = w.null_or(64, || setup);
+    let wrong = w.null_or(8, || w.unset::<u16>());
     // How many fields each read has: one, and the last the rest.
     let mut counts = vec![1; reads.into()];
     if let Some(last) = counts.last_mut() {
@@ -118,13 +114,9 @@ pub fn begin(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
     let is_grouped = w.byte() & 1 == 0;
     let begin = || {
         if is_grouped {
-            call!(
-                w,
-                plan,
-                mbm_plan_beginGrouped(plan, client, setup, counts, wrong)
-            )
+            call!(w, mbm_plan_beginGrouped(plan, client, setup, counts, wrong))
         } else {
-            call!(w, plan, mbm_plan_begin(plan, client, setup, wrong))
+            call!(w, mbm_plan_begin(plan, client, setup, wrong))
         }
     };
     // A plan that runs ends before its new table is checked.
@@ -145,11 +137,7 @@ pub fn begin(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
 
 /// A value gets the result of a call, and stays as it is if the call is refused.
 fn get<T>(w: &World, name: &str, call: impl FnOnce(*mut T) -> u8) {
-    let value = if w.rarely(32) {
-        null_mut()
-    } else {
-        w.unset::<T>()
-    };
+    let value = w.null_or(32, || w.unset::<T>());
     let before = super::check::bytes(span(value));
     if is_status(name, call(value)) != OK {
         assert!(super::check::bytes(span(value)) == before, "{name} changed");
@@ -161,14 +149,14 @@ fn look(w: &World, plan: *mut mbm_plan) {
     macro_rules! get {
         ($name:ident($($argument:expr),*)) => {
             get(w, stringify!($name), |value| {
-                call!(w, plan, $name(plan, $($argument,)* value))
+                call!(w, $name(plan, $($argument,)* value))
             })
         };
     }
     match w.byte() % 8 {
         0 => {
-            let age = if w.rarely(4) { null_mut() } else { w.unset() };
-            let status = call!(w, plan, mbm_plan_getStatus(plan, field, age));
+            let age = w.null_or(4, || w.unset());
+            let status = call!(w, mbm_plan_getStatus(plan, field, age));
             is_status("mbm_plan_getStatus", status);
         }
         1 => get!(mbm_plan_getInteger(field, index)),
@@ -180,14 +168,10 @@ fn look(w: &World, plan: *mut mbm_plan) {
         _ => {
             let capacity = w.word();
             let place = w.unset_bytes(capacity.into());
-            let text = if w.rarely(32) {
-                null_mut()
-            } else {
-                place.cast()
-            };
+            let text = w.null_or(32, || place.cast());
             is_status(
                 "mbm_plan_getText",
-                call!(w, plan, mbm_plan_getText(plan, field, text, capacity)),
+                call!(w, mbm_plan_getText(plan, field, text, capacity)),
             );
         }
     }
@@ -196,14 +180,12 @@ fn look(w: &World, plan: *mut mbm_plan) {
 /// Polls a plan and its client in turns, while time passes.
 fn run(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
     for _ in 0..1 + w.byte() % 16 {
-        checked_call(w, span(plan), "mbm_plan_poll", || {
-            call!(w, plan, mbm_plan_poll(plan))
-        });
-        let status = call!(w, client, mbm_client_poll(client));
+        checked!(w, mbm_plan_poll(plan));
+        let status = call!(w, mbm_client_poll(client));
         if status != OK && status != PENDING {
             break;
         }
-        call!(w, plan, mbm_plan_pollDelay(plan));
+        call!(w, mbm_plan_pollDelay(plan));
         if w.byte() < 0x80 {
             w.clock
                 .set(w.clock.get().wrapping_add(1 << (w.byte() % 24)));
@@ -221,14 +203,10 @@ pub fn step(w: &World) {
         8..=12 => look(w, plan),
         13 => {
             let field = u16::from(w.byte() % 12);
-            checked_call(w, span(plan), "mbm_plan_refresh", || {
-                call!(w, plan, mbm_plan_refresh(plan, field))
-            });
+            checked!(w, mbm_plan_refresh(plan, field));
         }
         14 => {
-            refused_changes_nothing(w, &[span(plan)], "mbm_plan_end", || {
-                call!(w, plan, mbm_plan_end(plan))
-            });
+            refused!(w, mbm_plan_end(plan));
         }
         _ => {
             // The user may zero a plan outside of every call.

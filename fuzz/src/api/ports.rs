@@ -1,6 +1,5 @@
 //! Ports with every behaviour: bytes delivered, bytes accepted, and false return values.
 
-use super::check::call;
 use super::port::Port;
 use super::traffic;
 use super::world::{Grant, World};
@@ -41,7 +40,7 @@ pub fn port(w: &World, framing: u8) -> *const mbm_port {
     if w.rarely(8) {
         // NULL if the trace was not begun, or while its hook runs.
         let trace = w.traces.pick(w);
-        return call!(w, trace, mbm_trace_port(trace));
+        return call!(w, mbm_trace_port(trace));
     }
     plain(w, framing)
 }
@@ -175,6 +174,6 @@ unsafe extern "C" fn idle(context: *mut c_void, node: *mut mbm_node) {
     let (w, _) = enter(context, Grant::All, 16);
     assert!(w.nodes.all().contains(&node), "`idle` gets an unknown node");
     w.inside(Grant::All, || {
-        call!(w, node, mbm_node_pollDelay(node));
+        call!(w, mbm_node_pollDelay(node));
     });
 }

@@ -1,7 +1,6 @@
 //! Objects that are set up correctly before the first step. Without them, few inputs would get
 //! as far as a first reply.
 
-use super::check::call;
 use super::gateway;
 use super::plan;
 use super::ports;
@@ -33,7 +32,7 @@ pub fn prepare(w: &World) {
         let sniffer = w.sniffers.make(w);
         let buffer = w.buffer(300);
         let framing = what >> 4 & 3;
-        call!(w, sniffer, mbm_sniffer_begin(sniffer, framing, buffer, 300));
+        call!(w, mbm_sniffer_begin(sniffer, framing, buffer, 300));
     }
 }
 
@@ -43,12 +42,11 @@ fn line(w: &World, more: u8) {
     let port = ports::good(w, 0, MBM_FRAMING_RTU);
     let (response, transmit) = (w.noise(250).cast(), w.noise(246).cast());
     let frame = w.noise(256);
-    call!(w, line, mbm_line_beginRtu(line, port, frame, 256));
+    call!(w, mbm_line_beginRtu(line, port, frame, 256));
     for unit in 1..=1 + more {
         let node = w.nodes.make(w);
         call!(
             w,
-            node,
             mbm_node_begin(node, line, unit, response, 125, transmit, 123)
         );
         w.set_line_of(node, line);
@@ -60,20 +58,10 @@ fn client(w: &World, framing: u8) {
     let port = ports::good(w, 1, framing % 4);
     let (frame, more) = (w.noise(513), w.noise(600));
     match framing % 4 {
-        MBM_FRAMING_RTU => call!(w, client, mbm_client_beginRtu(client, port, frame, 513)),
-        MBM_FRAMING_ASCII => call!(w, client, mbm_client_beginAscii(client, port, frame, 513)),
-        MBM_FRAMING_TCP => {
-            call!(
-                w,
-                client,
-                mbm_client_beginTcp(client, port, frame, 513, more, 600)
-            )
-        }
-        _ => call!(
-            w,
-            client,
-            mbm_client_beginRtuOverTcp(client, port, frame, 513)
-        ),
+        MBM_FRAMING_RTU => call!(w, mbm_client_beginRtu(client, port, frame, 513)),
+        MBM_FRAMING_ASCII => call!(w, mbm_client_beginAscii(client, port, frame, 513)),
+        MBM_FRAMING_TCP => call!(w, mbm_client_beginTcp(client, port, frame, 513, more, 600)),
+        _ => call!(w, mbm_client_beginRtuOverTcp(client, port, frame, 513)),
     };
 }
 
@@ -86,33 +74,21 @@ fn server(w: &World, framing: u8) {
     let (units, count) = records::array(w);
     let frame = w.noise(513);
     match framing % 4 {
-        MBM_FRAMING_RTU => {
-            call!(
-                w,
-                server,
-                mbm_server_beginRtu(server, port, units, count, frame, 513)
-            )
-        }
-        MBM_FRAMING_ASCII => {
-            call!(
-                w,
-                server,
-                mbm_server_beginAscii(server, port, units, count, frame, 513)
-            )
-        }
-        MBM_FRAMING_TCP => {
-            call!(
-                w,
-                server,
-                mbm_server_beginTcp(server, port, units, count, frame, 513)
-            )
-        }
-        _ => {
-            call!(
-                w,
-                server,
-                mbm_server_beginRtuOverTcp(server, port, units, count, frame, 513)
-            )
-        }
+        MBM_FRAMING_RTU => call!(
+            w,
+            mbm_server_beginRtu(server, port, units, count, frame, 513)
+        ),
+        MBM_FRAMING_ASCII => call!(
+            w,
+            mbm_server_beginAscii(server, port, units, count, frame, 513)
+        ),
+        MBM_FRAMING_TCP => call!(
+            w,
+            mbm_server_beginTcp(server, port, units, count, frame, 513)
+        ),
+        _ => call!(
+            w,
+            mbm_server_beginRtuOverTcp(server, port, units, count, frame, 513)
+        ),
     };
 }

@@ -1,7 +1,7 @@
 //! Records of units. They are filled in and registered; later they may be zeroed, filled in anew
 //! and registered again, with the same unit or another.
 
-use super::check::{call, refused_changes_nothing, span, OK};
+use super::check::{refused_changes_nothing, span, OK};
 use super::pool::Pool;
 use super::serving as hooks;
 use super::world::World;
@@ -168,11 +168,7 @@ fn bit_table(w: &World) -> mbm_bitTable {
     let size = w.word();
     mbm_bitTable {
         service: SERVICE,
-        bits: if w.rarely(64) {
-            null_mut()
-        } else {
-            w.noise(usize::from(size).div_ceil(8))
-        },
+        bits: w.null_or(64, || w.noise(usize::from(size).div_ceil(8))),
         valid: bitmap(w, size),
         hooks: NO_HOOKS,
         base: w.word() & 0xFFFC,
@@ -228,11 +224,7 @@ fn files(w: &World) -> mbm_files {
         .collect();
     mbm_files {
         service: SERVICE,
-        files: if w.rarely(16) {
-            null()
-        } else {
-            w.array(&files)
-        },
+        files: w.null_or(16, || w.array(&files)),
         count: files.len() as u16,
         hooks: NO_HOOKS,
     }
@@ -251,11 +243,7 @@ fn fifos(w: &World) -> mbm_fifos {
         .collect();
     mbm_fifos {
         service: SERVICE,
-        fifos: if w.rarely(16) {
-            null()
-        } else {
-            w.array(&fifos)
-        },
+        fifos: w.null_or(16, || w.array(&fifos)),
         count: fifos.len() as u16,
     }
 }
@@ -326,7 +314,7 @@ pub fn set_hooks(w: &World) {
             let record = records.$pool.pick(w);
             let hooks = hooks::hooks(w);
             refused_changes_nothing(w, &[span(record)], stringify!($name), || {
-                call!(w, record, $name(record, hooks))
+                call!(w, $name(record, hooks))
             });
         }};
     }
@@ -350,7 +338,7 @@ pub fn serve(w: &World) {
                 || $value,
                 |record| {
                     register(w, stringify!($name), unit, record, || {
-                        call!(w, unit, $name(unit, record))
+                        call!(w, $name(unit, record))
                     })
                 },
             )
@@ -363,16 +351,14 @@ pub fn serve(w: &World) {
         4 => register!(registers, register_table(w), mbm_unit_serveInputRegisters),
         5 => {
             let table = records.registers.pick(w);
-            refused_changes_nothing(w, &[span(table)], "serveMaskAndReadWrite", || {
-                call!(w, table, mbm_registerTable_serveMaskAndReadWrite(table))
-            });
+            refused!(w, mbm_registerTable_serveMaskAndReadWrite(table));
         }
         6 | 7 => {
             let table = w.byte() % 6;
             let fill = || cells(w);
             renew(w, &records.cells, fill, |record| {
                 register(w, "mbm_unit_serveCallbacks", unit, record, || {
-                    call!(w, unit, mbm_unit_serveCallbacks(unit, record, table))
+                    call!(w, mbm_unit_serveCallbacks(unit, record, table))
                 })
             });
         }
@@ -385,15 +371,17 @@ pub fn serve(w: &World) {
             };
             renew(w, &records.switches, fill, |record| {
                 register(w, "mbm_unit_switchFunction", unit, record, || {
-                    call!(w, unit, mbm_unit_switchFunction(unit, record, code, on))
+                    call!(w, mbm_unit_switchFunction(unit, record, code, on))
                 })
             });
         }
         10 => {
             let (mask, code) = (records.switches.pick(w), w.byte());
-            refused_changes_nothing(w, &[span(mask)], "mbm_unit_switchFunction", || {
-                call!(w, unit, mbm_unit_switchFunction(unit, mask, code, 1))
-            });
+            refused!(
+                w,
+                &[span(mask)],
+                mbm_unit_switchFunction(unit, mask, code, 1)
+            );
         }
         11 => register!(diagnostics, diagnostics(w), mbm_unit_serveDiagnostics),
         12 => register!(files, files(w), mbm_unit_serveFiles),

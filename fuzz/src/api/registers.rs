@@ -1,6 +1,6 @@
 //! Views of registers, `mbm_registers_*`.
 
-use super::check::{call, refused_changes_nothing, span};
+use super::check::{refused_changes_nothing, span};
 use super::world::World;
 use mbm_c::*;
 use std::ptr::{null, null_mut};
@@ -10,31 +10,14 @@ fn fill(w: &World, view: *mut mbm_registers) {
     let (count, first) = (w.word(), w.word());
     let odd = w.rarely(16);
     let length = (count % 0x4000) * 2 + u16::from(odd);
-    let words: *mut u16 = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.noise(2 * usize::from(count)).cast()
-    };
+    let words: *mut u16 = w.null_or(64, || w.noise(2 * usize::from(count)).cast());
     let bytes = w.noise(length.into());
     match w.byte() % 5 {
-        0 => drop(call!(
-            w,
-            view,
-            mbm_registers_ofWords(view, words, count, first)
-        )),
-        1 => drop(call!(
-            w,
-            view,
-            mbm_registers_ofBytes(view, bytes, length, first)
-        )),
-        2 => drop(call!(
-            w,
-            view,
-            mbm_registers_intoWords(view, words, count, first)
-        )),
+        0 => drop(call!(w, mbm_registers_ofWords(view, words, count, first))),
+        1 => drop(call!(w, mbm_registers_ofBytes(view, bytes, length, first))),
+        2 => drop(call!(w, mbm_registers_intoWords(view, words, count, first))),
         3 => drop(call!(
             w,
-            view,
             mbm_registers_intoBytes(view, bytes, length, first)
         )),
         _ if view.is_null() => {}
@@ -58,11 +41,7 @@ fn fill(w: &World, view: *mut mbm_registers) {
 
 /// Reads a value. Checks that a refused call leaves it unchanged.
 fn get<T>(w: &World, name: &str, call: impl FnOnce(*mut T) -> u8) {
-    let value = if w.rarely(32) {
-        null_mut()
-    } else {
-        w.unset::<T>()
-    };
+    let value = w.null_or(32, || w.unset::<T>());
     refused_changes_nothing(w, &[span(value)], name, || call(value));
 }
 
@@ -71,7 +50,7 @@ fn read(w: &World, view: *const mbm_registers) {
     macro_rules! get {
         ($name:ident, $with:expr) => {
             get(w, stringify!($name), |value| {
-                call!(w, view, $name(view, at, $with, value))
+                call!(w, $name(view, at, $with, value))
             })
         };
     }
@@ -86,37 +65,24 @@ fn read(w: &World, view: *const mbm_registers) {
         11 => {
             let capacity = w.word();
             let place = w.unset_bytes(capacity.into());
-            let text = if w.rarely(32) {
-                null_mut()
-            } else {
-                place.cast()
-            };
+            let text = w.null_or(32, || place.cast());
             let spans = [(place.cast_const(), capacity.into())];
-            refused_changes_nothing(w, &spans, "mbm_registers_getString", || {
-                call!(
-                    w,
-                    view,
-                    mbm_registers_getString(view, at, length, order, text, capacity)
-                )
-            });
+            refused!(
+                w,
+                &spans,
+                mbm_registers_getString(view, at, length, order, text, capacity)
+            );
         }
         choice => {
             let place = w.unset_bytes(length.into());
-            let bytes = if w.rarely(32) { null_mut() } else { place };
+            let bytes = w.null_or(32, || place);
             let spans = [(place.cast_const(), length.into())];
             refused_changes_nothing(w, &spans, "mbm_registers_getBytes", || match choice {
                 12 => call!(
                     w,
-                    view,
                     mbm_registers_getBytes(view, at, MBM_ORDER_ABCD, bytes, length)
                 ),
-                _ => {
-                    call!(
-                        w,
-                        view,
-                        mbm_registers_getBytes(view, at, order, bytes, length)
-                    )
-                }
+                _ => call!(w, mbm_registers_getBytes(view, at, order, bytes, length)),
             });
         }
     }
@@ -159,38 +125,24 @@ fn write(w: &World, view: *const mbm_registers) {
     };
     let choice = w.byte() % 14;
     refused_changes_nothing(w, &[memory_of(view)], "a setter", || match choice {
-        0 => call!(w, view, mbm_registers_setBit(view, at, byte % 20, byte & 1)),
-        1..=3 => call!(w, view, mbm_registers_setUint16(view, at, order, word)),
-        4 => call!(w, view, mbm_registers_setUint16(view, at, order, word)),
-        5 => call!(w, view, mbm_registers_setUint32(view, at, order, long)),
-        6 => call!(w, view, mbm_registers_setUint32(view, at, order, long)),
-        7 => call!(
-            w,
-            view,
-            mbm_registers_setUint64(view, at, order, value!(wide))
-        ),
-        8 => call!(
-            w,
-            view,
-            mbm_registers_setUint64(view, at, order, value!(wide))
-        ),
+        0 => call!(w, mbm_registers_setBit(view, at, byte % 20, byte & 1)),
+        1..=3 => call!(w, mbm_registers_setUint16(view, at, order, word)),
+        4 => call!(w, mbm_registers_setUint16(view, at, order, word)),
+        5 => call!(w, mbm_registers_setUint32(view, at, order, long)),
+        6 => call!(w, mbm_registers_setUint32(view, at, order, long)),
+        7 => call!(w, mbm_registers_setUint64(view, at, order, value!(wide))),
+        8 => call!(w, mbm_registers_setUint64(view, at, order, value!(wide))),
         9 => call!(
             w,
-            view,
             mbm_registers_setFloat(view, at, order, value!(long as f32))
         ),
         10 => call!(
             w,
-            view,
             mbm_registers_setDouble(view, at, order, value!(wide as f64))
         ),
         11 => {
             let text = text(w.word()).cast_const().cast();
-            call!(
-                w,
-                view,
-                mbm_registers_setString(view, at, length, order, text)
-            )
+            call!(w, mbm_registers_setString(view, at, length, order, text))
         }
         choice => {
             let bytes = if null {
@@ -202,15 +154,10 @@ fn write(w: &World, view: *const mbm_registers) {
             if choice == 12 {
                 call!(
                     w,
-                    view,
                     mbm_registers_setBytes(view, at, MBM_ORDER_ABCD, bytes, length)
                 )
             } else {
-                call!(
-                    w,
-                    view,
-                    mbm_registers_setBytes(view, at, order, bytes, length)
-                )
+                call!(w, mbm_registers_setBytes(view, at, order, bytes, length))
             }
         }
     });

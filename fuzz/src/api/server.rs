@@ -1,6 +1,6 @@
 //! Servers, and `mbm_unit_respond`, which needs no server.
 
-use super::check::{call, checked_call, is_status, refused_changes_nothing, span, OK};
+use super::check::{is_status, refused_changes_nothing, span, OK};
 use super::world::World;
 use super::{ports, records, traffic};
 use mbm_c::*;
@@ -23,34 +23,22 @@ fn begin(w: &World) {
     let frame = w.buffer(size.into());
     let spans = [span(server)];
     refused_changes_nothing(w, &spans, "mbm_server_beginRtu", || match framing {
-        MBM_FRAMING_RTU => {
-            call!(
-                w,
-                server,
-                mbm_server_beginRtu(server, port, units, count, frame, size)
-            )
-        }
-        MBM_FRAMING_ASCII => {
-            call!(
-                w,
-                server,
-                mbm_server_beginAscii(server, port, units, count, frame, size)
-            )
-        }
-        MBM_FRAMING_TCP => {
-            call!(
-                w,
-                server,
-                mbm_server_beginTcp(server, port, units, count, frame, size)
-            )
-        }
-        _ => {
-            call!(
-                w,
-                server,
-                mbm_server_beginRtuOverTcp(server, port, units, count, frame, size)
-            )
-        }
+        MBM_FRAMING_RTU => call!(
+            w,
+            mbm_server_beginRtu(server, port, units, count, frame, size)
+        ),
+        MBM_FRAMING_ASCII => call!(
+            w,
+            mbm_server_beginAscii(server, port, units, count, frame, size)
+        ),
+        MBM_FRAMING_TCP => call!(
+            w,
+            mbm_server_beginTcp(server, port, units, count, frame, size)
+        ),
+        _ => call!(
+            w,
+            mbm_server_beginRtuOverTcp(server, port, units, count, frame, size)
+        ),
     });
 }
 
@@ -58,9 +46,7 @@ fn begin(w: &World) {
 fn poll(w: &World) {
     let server = w.servers.pick(w);
     for _ in 0..1 + w.byte() % 4 {
-        checked_call(w, span(server), "mbm_server_poll", || {
-            call!(w, server, mbm_server_poll(server))
-        });
+        checked!(w, mbm_server_poll(server));
         w.clock
             .set(w.clock.get().wrapping_add(1 << (w.byte() % 20)));
     }
@@ -72,19 +58,19 @@ fn set(w: &World) {
     refused_changes_nothing(w, &spans, "mbm_server_set", || match w.byte() % 4 {
         0 => {
             let time = w.long();
-            call!(w, server, mbm_server_setSilence(server, time))
+            call!(w, mbm_server_setSilence(server, time))
         }
         1 => {
             let baud = w.long();
-            call!(w, server, mbm_server_setBaudRate(server, baud))
+            call!(w, mbm_server_setBaudRate(server, baud))
         }
         2 => {
             let time = w.long() as u16;
-            call!(w, server, mbm_server_setReceiveLatency(server, time))
+            call!(w, mbm_server_setReceiveLatency(server, time))
         }
         _ => {
             let on = w.byte() & 3;
-            call!(w, server, mbm_server_setEchoDiscard(server, on))
+            call!(w, mbm_server_setEchoDiscard(server, on))
         }
     });
 }
@@ -112,16 +98,8 @@ fn respond(w: &World) {
         0xF0.. => w.word(),
         _ => length as u16,
     };
-    let frame = if w.rarely(64) {
-        std::ptr::null_mut()
-    } else {
-        frame
-    };
-    let response = if w.rarely(64) {
-        std::ptr::null_mut()
-    } else {
-        w.unset::<u16>()
-    };
+    let frame = w.null_or(64, || frame);
+    let response = w.null_or(64, || w.unset::<u16>());
     let status = call!(
         w,
         std::ptr::null::<mbm_unit>(),
@@ -174,7 +152,7 @@ pub fn step(w: &World) {
         2..=6 => poll(w),
         7 => {
             let server = w.servers.pick(w);
-            call!(w, server, mbm_server_pollDelay(server));
+            call!(w, mbm_server_pollDelay(server));
         }
         8 => set(w),
         9 | 10 => respond(w),

@@ -1,10 +1,9 @@
 //! Sniffers, their events, and the texts of events.
 
-use super::check::{call, is_status, refused_changes_nothing, span};
+use super::check::{is_status, refused_changes_nothing, span};
 use super::world::World;
 use super::{packet, traffic};
 use mbm_c::*;
-use std::ptr::null;
 
 fn begin(w: &World, sniffer: *mut mbm_sniffer) {
     let kind = w.byte();
@@ -15,13 +14,7 @@ fn begin(w: &World, sniffer: *mut mbm_sniffer) {
         _ => w.word(),
     };
     let buffer = w.buffer(size.into());
-    refused_changes_nothing(w, &[span(sniffer)], "a sniffer that begins", || {
-        call!(
-            w,
-            sniffer,
-            mbm_sniffer_begin(sniffer, framing, buffer, size)
-        )
-    });
+    refused!(w, mbm_sniffer_begin(sniffer, framing, buffer, size));
 }
 
 fn set(w: &World, sniffer: *mut mbm_sniffer) {
@@ -29,35 +22,19 @@ fn set(w: &World, sniffer: *mut mbm_sniffer) {
     let (functions, count) = packet::functions(w);
     let choice = w.byte() % 5;
     refused_changes_nothing(w, &[span(sniffer)], "mbm_sniffer_set", || match choice {
-        0 => call!(w, sniffer, mbm_sniffer_setBaudRate(sniffer, long)),
-        3 => call!(w, sniffer, mbm_sniffer_setDelimiter(sniffer, word as u8)),
-        4 => call!(
-            w,
-            sniffer,
-            mbm_sniffer_setFunctions(sniffer, functions, count)
-        ),
-        1 => call!(
-            w,
-            sniffer,
-            mbm_sniffer_setResponseTimeout(sniffer, u32::from(word))
-        ),
-        _ => call!(
-            w,
-            sniffer,
-            mbm_sniffer_setFrameTimeout(sniffer, u32::from(word))
-        ),
+        0 => call!(w, mbm_sniffer_setBaudRate(sniffer, long)),
+        3 => call!(w, mbm_sniffer_setDelimiter(sniffer, word as u8)),
+        4 => call!(w, mbm_sniffer_setFunctions(sniffer, functions, count)),
+        1 => call!(w, mbm_sniffer_setResponseTimeout(sniffer, u32::from(word))),
+        _ => call!(w, mbm_sniffer_setFrameTimeout(sniffer, u32::from(word))),
     });
 }
 
 fn next(w: &World, sniffer: *mut mbm_sniffer) {
     let now = w.clock.get();
     for _ in 0..8 {
-        let event = if w.rarely(64) {
-            std::ptr::null_mut()
-        } else {
-            w.unset::<mbm_event>()
-        };
-        let found = call!(w, sniffer, mbm_sniffer_next(sniffer, now, event));
+        let event = w.null_or(64, || w.unset::<mbm_event>());
+        let found = call!(w, mbm_sniffer_next(sniffer, now, event));
         assert!(found <= 1, "mbm_sniffer_next returned {found}");
         if found == 0 || event.is_null() {
             return;
@@ -83,30 +60,18 @@ fn feed(w: &World, sniffer: *mut mbm_sniffer) {
         received.extend(answer);
     }
     let bytes = w.array(&received);
-    let bytes = if w.rarely(64) {
-        null()
-    } else {
-        bytes.cast_const()
-    };
+    let bytes = w.null_or(64, || bytes);
     let (length, now) = (received.len() as u16, w.clock.get());
-    let taken = call!(
-        w,
-        sniffer,
-        mbm_sniffer_feed(sniffer, tap, bytes, length, now)
-    );
+    let taken = call!(w, mbm_sniffer_feed(sniffer, tap, bytes, length, now));
     assert!(taken <= length, "{taken} bytes of {length}");
 }
 
 /// Writes the text of an event into a buffer of any size.
 fn text(w: &World, event: *const mbm_event) {
     let size = w.word();
-    let place = if w.rarely(64) {
-        std::ptr::null_mut()
-    } else {
-        w.unset_bytes(size.into())
-    };
+    let place = w.null_or(64, || w.unset_bytes(size.into()));
     let line: *mut std::ffi::c_char = place.cast();
-    let status = call!(w, event, mbm_event_text(event, line, size));
+    let status = call!(w, mbm_event_text(event, line, size));
     super::text::check_text(w, "mbm_event_text", status, place, size);
 }
 

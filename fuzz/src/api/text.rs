@@ -1,6 +1,6 @@
 //! Texts for statuses, and a check of texts for frames and events.
 
-use super::check::{call, is_status};
+use super::check::is_status;
 use super::world::World;
 
 /// Checks that a text written by a call has a NUL within its size, or that the call has written

@@ -1,6 +1,6 @@
 //! Traces, `mbm_trace_*`: before any port, and used by any object.
 
-use super::check::{bytes, call, is_status, refused_changes_nothing, span};
+use super::check::{bytes, is_status, refused_changes_nothing, span};
 use super::world::{Grant, World};
 use super::{packet, ports};
 use mbm_c::*;
@@ -30,11 +30,7 @@ fn begin(w: &World, trace: *mut mbm_trace) {
         byte @ 0x80..0xC0 => u16::from(byte) % 64,
         _ => w.word(),
     };
-    let buffer = if w.rarely(64) {
-        null_mut()
-    } else {
-        w.buffer(size.into())
-    };
+    let buffer = w.null_or(64, || w.buffer(size.into()));
     let (functions, count) = packet::functions(w);
     let framing = w.put(mbm_framing {
         functions,
@@ -49,7 +45,6 @@ fn begin(w: &World, trace: *mut mbm_trace) {
         let context = null_mut();
         call!(
             w,
-            trace,
             mbm_trace_begin(trace, sends, port, framing, buffer, size, take, context)
         )
     });
@@ -62,23 +57,15 @@ pub fn step(w: &World) {
         0 | 1 => begin(w, trace),
         2 => {
             let timeout = w.word();
-            refused_changes_nothing(w, &[span(trace)], "mbm_trace_setFrameTimeout", || {
-                call!(
-                    w,
-                    trace,
-                    mbm_trace_setFrameTimeout(trace, u32::from(timeout))
-                )
-            });
+            refused!(w, mbm_trace_setFrameTimeout(trace, u32::from(timeout)));
         }
         _ => {
-            refused_changes_nothing(w, &[span(trace)], "mbm_trace_flush", || {
-                call!(w, trace, mbm_trace_flush(trace))
-            });
+            refused!(w, mbm_trace_flush(trace));
         }
     }
     let event = w.events.any();
     let record = w.unset::<mbm_traceRecord>();
-    let status = call!(w, event, mbm_trace_ofEvent(event, record));
+    let status = call!(w, mbm_trace_ofEvent(event, record));
     if is_status("mbm_trace_ofEvent", status) == MBM_OK {
         // SAFETY: the record of an event, whose memory is valid until the input has been run.
         let record = unsafe { *record };

@@ -2,7 +2,7 @@
 
 use super::state::{new, Job, Life, Master};
 use super::wire;
-use crate::api::check::{bytes, call, span, OK, PENDING};
+use crate::api::check::{bytes, span, OK, PENDING};
 use mbm_c::*;
 use std::ffi::c_void;
 use std::ptr::null_mut;
@@ -18,20 +18,10 @@ pub fn begin(life: &Life, at: usize) -> u8 {
     let size: u16 = if w.byte() & 7 == 0 { 40 } else { 600 };
     let more: u16 = if w.byte() & 3 == 0 { 20 } else { 300 };
     let status = match framing {
-        MBM_FRAMING_RTU => call!(w, client, mbm_client_beginRtu(client, port, frame, size)),
-        MBM_FRAMING_ASCII => call!(w, client, mbm_client_beginAscii(client, port, frame, size)),
-        MBM_FRAMING_TCP => {
-            call!(
-                w,
-                client,
-                mbm_client_beginTcp(client, port, frame, size, out, more)
-            )
-        }
-        _ => call!(
-            w,
-            client,
-            mbm_client_beginRtuOverTcp(client, port, frame, size)
-        ),
+        MBM_FRAMING_RTU => call!(w, mbm_client_beginRtu(client, port, frame, size)),
+        MBM_FRAMING_ASCII => call!(w, mbm_client_beginAscii(client, port, frame, size)),
+        MBM_FRAMING_TCP => call!(w, mbm_client_beginTcp(client, port, frame, size, out, more)),
+        _ => call!(w, mbm_client_beginRtuOverTcp(client, port, frame, size)),
     };
     if status == OK {
         line.has_link.set(false);
@@ -41,7 +31,7 @@ pub fn begin(life: &Life, at: usize) -> u8 {
         line.wire.is_open.set(true);
         line.wire.is_opening.set(false);
         // Most lives are quick: the default timeouts are long.
-        call!(w, client, mbm_client_setResponseTimeout(client, 300));
+        call!(w, mbm_client_setResponseTimeout(client, 300));
     }
     status
 }
@@ -81,7 +71,7 @@ pub fn replace(life: &Life, at: usize) {
         || life.inside.get() > 0
         || life.gateway.is_begun()
         || life.plan.has(client)
-        || call!(w, client, mbm_client_pending(client)) > 0;
+        || call!(w, mbm_client_pending(client)) > 0;
     if is_used {
         return;
     }
@@ -140,27 +130,17 @@ pub fn queue(life: &Life, at: usize) {
     }
     let count = 1 + u16::from(w.byte()) % 8;
     let status = match w.byte() % 4 {
-        _ if unit == 0 => call!(
-            w,
-            client,
-            mbm_client_writeSingleRegister(client, request, id, id)
-        ),
+        _ if unit == 0 => call!(w, mbm_client_writeSingleRegister(client, request, id, id)),
         0 => call!(
             w,
-            client,
             mbm_client_readHoldingRegisters(client, request, id, count)
         ),
         1 => call!(
             w,
-            client,
             mbm_client_writeMultipleRegisters(client, request, id, count)
         ),
-        2 => call!(w, client, mbm_client_readCoils(client, request, id, count)),
-        _ => call!(
-            w,
-            client,
-            mbm_client_writeSingleRegister(client, request, id, id)
-        ),
+        2 => call!(w, mbm_client_readCoils(client, request, id, count)),
+        _ => call!(w, mbm_client_writeSingleRegister(client, request, id, id)),
     };
     if status == PENDING {
         let mut limits = line.limits.get();
@@ -178,7 +158,7 @@ pub fn cancel(life: &Life) {
     let job = &life.jobs[usize::from(w.byte()) % life.jobs.len()];
     let client = life.lines[job.line.get()].client.get();
     let request = job.request;
-    let status = call!(w, client, mbm_client_cancel(client, request));
+    let status = call!(w, mbm_client_cancel(client, request));
     if job.since.get().is_some() {
         assert_eq!(status, OK, "cancel");
         job.since.set(None);
@@ -198,45 +178,36 @@ pub fn set(life: &Life, at: usize) {
     match w.byte() % 12 {
         0 => {
             limits.timeout = limits.timeout.max(us);
-            call!(
-                w,
-                client,
-                mbm_client_setResponseTimeout(client, u32::from(word))
-            );
+            call!(w, mbm_client_setResponseTimeout(client, u32::from(word)));
         }
         1 => {
             limits.quiet = limits.quiet.max(us);
-            call!(w, client, mbm_client_setQuietTime(client, u32::from(word)));
+            call!(w, mbm_client_setQuietTime(client, u32::from(word)));
         }
         2 => {
             limits.turnaround = limits.turnaround.max(us);
-            call!(
-                w,
-                client,
-                mbm_client_setTurnaroundDelay(client, u32::from(word))
-            );
+            call!(w, mbm_client_setTurnaroundDelay(client, u32::from(word)));
         }
         3 => {
             let gap = u32::from(word) * 100;
             limits.gap = limits.gap.max(gap.into());
-            call!(w, client, mbm_client_setGap(client, gap));
+            call!(w, mbm_client_setGap(client, gap));
         }
         4 => {
             let baud = [0, 1200, 9600, 115_200][usize::from(byte) % 4];
             limits.character = limits.character.max(10_000);
             limits.gap = limits.gap.max(40_000);
-            call!(w, client, mbm_client_setBaudRate(client, baud));
+            call!(w, mbm_client_setBaudRate(client, baud));
         }
         5 => {
             limits.retries = limits.retries.max(u64::from(byte % 3));
-            call!(w, client, mbm_client_setRetries(client, byte % 3));
+            call!(w, mbm_client_setRetries(client, byte % 3));
         }
         6 => {
             limits.busy_retries = limits.busy_retries.max(u64::from(byte % 3));
             limits.backoff = limits.backoff.max(us);
             call!(
                 w,
-                client,
                 mbm_client_setBusyRetries(client, byte % 3, u32::from(word))
             );
         }
@@ -244,7 +215,6 @@ pub fn set(life: &Life, at: usize) {
             limits.backoff = limits.backoff.max(2 * us);
             call!(
                 w,
-                client,
                 mbm_client_setBackoff(client, byte % 4, u32::from(word), 2 * u32::from(word))
             );
         }
@@ -261,16 +231,16 @@ pub fn set(life: &Life, at: usize) {
             limits.rest = limits.rest.max(us);
             limits.timeout = limits.timeout.max(u64::from(byte) * 1000);
             limits.retries = limits.retries.max(1);
-            call!(w, client, mbm_client_setUnits(client, units, 3));
+            call!(w, mbm_client_setUnits(client, units, 3));
         }
         9 => {
-            call!(w, client, mbm_client_setInFlight(client, 1 + byte % 16));
+            call!(w, mbm_client_setInFlight(client, 1 + byte % 16));
         }
         10 => {
-            call!(w, client, mbm_client_setEchoDiscard(client, byte & 1));
+            call!(w, mbm_client_setEchoDiscard(client, byte & 1));
         }
         _ => {
-            call!(w, client, mbm_client_setPostFlushHold(client, byte % 20));
+            call!(w, mbm_client_setPostFlushHold(client, byte % 20));
         }
     }
     line.limits.set(limits);
@@ -295,23 +265,19 @@ pub fn lend(life: &Life, at: usize) {
             return;
         }
         let (words, frame): (*mut u16, _) = (w.noise(64).cast(), w.noise(256));
-        let status = call!(w, own, mbm_line_setFrame(own, frame, 256));
+        let status = call!(w, mbm_line_setFrame(own, frame, 256));
         assert_eq!(status, OK, "a line without a request");
         for node in life.masters[index].nodes {
             let (read, write) = (words, words.wrapping_add(16));
             // Two nodes of one unit, or two units that are equal modulo 32.
             let unit = if w.byte() & 1 == 0 { 1 } else { 33 };
-            let begun = call!(
-                w,
-                node,
-                mbm_node_begin(node, own, unit, read, 16, write, 16)
-            );
+            let begun = call!(w, mbm_node_begin(node, own, unit, read, 16, write, 16));
             assert_eq!(begun, OK, "a node without a request");
-            call!(w, node, mbm_node_setBlocking(node, 0));
-            call!(w, node, mbm_node_setResponseTimeout(node, 200));
+            call!(w, mbm_node_setBlocking(node, 0));
+            call!(w, mbm_node_setResponseTimeout(node, 200));
         }
     }
-    if call!(w, client, mbm_client_suspend(client, own)) == OK {
+    if call!(w, mbm_client_suspend(client, own)) == OK {
         line.is_suspended.set(true);
         line.borrower.set(borrower);
         if let Some(index) = borrower {
@@ -331,7 +297,7 @@ pub fn take_back(life: &Life, at: usize) {
     if wrong != line.borrower.get() || !line.is_suspended.get() {
         let other = pointer(wrong);
         let before = bytes(span(client));
-        let status = call!(w, client, mbm_client_resume(client, other));
+        let status = call!(w, mbm_client_resume(client, other));
         assert_eq!(status, MBM_INVALID_ARGUMENT, "resume with another line");
         assert!(
             bytes(span(client)) == before,
@@ -346,7 +312,7 @@ pub fn take_back(life: &Life, at: usize) {
         .get()
         .is_some_and(|at| life.masters[at].pending.get().is_some());
     let own = pointer(line.borrower.get());
-    let status = call!(w, client, mbm_client_resume(client, own));
+    let status = call!(w, mbm_client_resume(client, own));
     assert_eq!(status, if is_pending { MBM_BUSY } else { OK }, "resume");
     if status == OK {
         line.is_suspended.set(false);
@@ -387,12 +353,12 @@ fn request_of(life: &Life, own: &Master, asker: usize, has_port: bool) {
     let node = own.nodes[asker];
     if let Some((before, _)) = own.pending.get() {
         let id = life.id();
-        let status = call!(w, node, mbm_node_readHoldingRegisters(node, id, 2));
+        let status = call!(w, mbm_node_readHoldingRegisters(node, id, 2));
         if status == PENDING {
             // The request of the other node has waited for its unit, and gives way.
             let other = own.nodes[own.asker.get()];
             assert!(other != node, "a second request of a node");
-            let status = call!(w, other, mbm_node_poll(other));
+            let status = call!(w, mbm_node_poll(other));
             assert_eq!(status, MBM_CANCELLED, "a request that has given way");
             life.ends(before);
             life.w.note(|| "a request has given way".to_string());
@@ -409,8 +375,8 @@ fn request_of(life: &Life, own: &Master, asker: usize, has_port: bool) {
     }
     let id = life.id();
     let status = match w.byte() & 1 {
-        0 => call!(w, node, mbm_node_readHoldingRegisters(node, id, 2)),
-        _ => call!(w, node, mbm_node_writeSingleRegister(node, id, id)),
+        0 => call!(w, mbm_node_readHoldingRegisters(node, id, 2)),
+        _ => call!(w, mbm_node_writeSingleRegister(node, id, id)),
     };
     assert_eq!(status == PENDING, has_port, "a master's request: {status}");
     if status == PENDING {
@@ -425,10 +391,10 @@ fn cancel_master(life: &Life, own: &Master) {
     let w = &life.w;
     let (line, node) = (own.line, own.nodes[own.asker.get()]);
     match w.byte() & 1 {
-        0 => call!(w, node, mbm_node_cancel(node)),
-        _ => call!(w, line, mbm_line_cancel(line)),
+        0 => call!(w, mbm_node_cancel(node)),
+        _ => call!(w, mbm_line_cancel(line)),
     };
-    let status = call!(w, node, mbm_node_poll(node));
+    let status = call!(w, mbm_node_poll(node));
     assert_eq!(status, MBM_CANCELLED, "a request that was cancelled");
     let (id, _) = own.pending.take().expect("a pending request");
     life.ends(id);
@@ -439,9 +405,9 @@ pub fn poll_master(life: &Life, own: &Master) {
         return;
     };
     let [asker, other] = [own.asker.get(), 1 - own.asker.get()].map(|index| own.nodes[index]);
-    let status = call!(&life.w, other, mbm_node_poll(other));
+    let status = call!(&life.w, mbm_node_poll(other));
     assert!(status != PENDING, "two nodes have a pending request");
-    if call!(&life.w, asker, mbm_node_poll(asker)) != PENDING {
+    if call!(&life.w, mbm_node_poll(asker)) != PENDING {
         own.pending.set(None);
         life.ends(id);
     }

@@ -2,7 +2,7 @@
 
 use super::state::{GatewaySide, Life, Socket, CONNECTIONS, LINES, PLACES};
 use super::wire;
-use crate::api::check::{call, OK};
+use crate::api::check::OK;
 use crate::api::traffic::framed;
 use mbm_c::*;
 use std::ffi::c_void;
@@ -64,13 +64,13 @@ impl Socket {
 impl GatewaySide {
     pub fn poll(&self, life: &Life) {
         if self.is_begun() {
-            call!(&life.w, self.gateway, mbm_gateway_poll(self.gateway));
+            call!(&life.w, mbm_gateway_poll(self.gateway));
         }
     }
 
     pub fn delay(&self, life: &Life) -> u64 {
         match self.is_begun() {
-            true => call!(&life.w, self.gateway, mbm_gateway_pollDelay(self.gateway)).into(),
+            true => call!(&life.w, mbm_gateway_pollDelay(self.gateway)).into(),
             false => u64::MAX,
         }
     }
@@ -152,7 +152,7 @@ fn begin(life: &Life) {
         }
     }
     let (gateway, config) = (side.gateway, side.config);
-    let status = call!(w, gateway, mbm_gateway_begin(gateway, config));
+    let status = call!(w, mbm_gateway_begin(gateway, config));
     assert_eq!(status, OK, "mbm_gateway_begin");
     side.is_begun.set(true);
     for connection in 0..CONNECTIONS {
@@ -173,12 +173,7 @@ fn open(life: &Life, connection: usize) {
         postTransmission: None,
         idle: None,
     });
-    if call!(
-        w,
-        gateway,
-        mbm_gateway_open(gateway, connection as u8, port)
-    ) == OK
-    {
+    if call!(w, mbm_gateway_open(gateway, connection as u8, port)) == OK {
         let socket = &life.gateway.sockets[connection];
         socket.forget(life);
         socket.is_lost.set(false);
@@ -192,8 +187,8 @@ pub fn ask(life: &Life) {
     let connection = usize::from(w.byte()) % CONNECTIONS;
     let gateway = life.gateway.gateway;
     let socket = &life.gateway.sockets[connection];
-    let is_open = life.gateway.is_begun()
-        && call!(w, gateway, mbm_gateway_status(gateway, connection as u8)) == OK;
+    let is_open =
+        life.gateway.is_begun() && call!(w, mbm_gateway_status(gateway, connection as u8)) == OK;
     if !is_open || socket.is_lost.get() || socket.asked.borrow().len() as u64 >= PLACES {
         return;
     }
@@ -226,21 +221,17 @@ pub fn act(life: &Life) {
         _ if !life.gateway.is_begun() => {}
         1 => {
             socket.forget(life);
-            call!(w, gateway, mbm_gateway_close(gateway, connection as u8));
+            call!(w, mbm_gateway_close(gateway, connection as u8));
         }
         2 => socket.is_lost.set(true),
         3 | 4 => open(life, connection),
         5 => {
             let time = u16::from(w.byte());
-            call!(
-                w,
-                gateway,
-                mbm_gateway_setQueueTime(gateway, u32::from(time))
-            );
+            call!(w, mbm_gateway_setQueueTime(gateway, u32::from(time)));
         }
         6 => {
             let most = 1 + u16::from(w.byte()) % 6;
-            call!(w, gateway, mbm_gateway_setMaxPending(gateway, most));
+            call!(w, mbm_gateway_setMaxPending(gateway, most));
         }
         7 => socket
             .takes

@@ -1,7 +1,7 @@
 //! The link of each line, and what happens to the line itself.
 
 use super::state::{new, Life};
-use crate::api::check::{call, OK, PENDING};
+use crate::api::check::{OK, PENDING};
 use mbm_c::*;
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
@@ -70,7 +70,7 @@ pub fn begin_or_end(life: &Life, at: usize) {
     let line = &life.lines[at];
     let link = line.link.get();
     if line.has_link.get() && w.byte() & 1 == 0 {
-        if call!(w, link, mbm_link_end(link)) == OK {
+        if call!(w, mbm_link_end(link)) == OK {
             line.has_link.set(false);
             if life.inside.get() == 0 {
                 // SAFETY: the link has ended, so nothing uses it.
@@ -95,12 +95,11 @@ pub fn begin_or_end(life: &Life, at: usize) {
     line.connects_for_ever.set(false);
     call!(
         w,
-        link,
         mbm_link_setRequestsWait(link, u8::from(line.keeps.get()))
     );
     let callback: Option<unsafe extern "C" fn(*mut c_void, u8, u8)> = Some(changed);
     let context = at as *mut c_void;
-    call!(w, link, mbm_link_setCallback(link, callback, context));
+    call!(w, mbm_link_setCallback(link, callback, context));
 }
 
 pub fn set(life: &Life, at: usize) {
@@ -115,28 +114,23 @@ pub fn set(life: &Life, at: usize) {
         0 => {
             call!(
                 w,
-                link,
                 mbm_link_setBackoff(link, byte >> 2 & 3, u32::from(word), 2 * u32::from(word))
             );
         }
         1 => {
-            if call!(w, link, mbm_link_setConnectTimeout(link, u32::from(word))) == OK {
+            if call!(w, mbm_link_setConnectTimeout(link, u32::from(word))) == OK {
                 line.connects_for_ever.set(word == 0);
             }
         }
         2 => {
-            if call!(w, link, mbm_link_setRequestsWait(link, byte >> 2 & 1)) == OK {
+            if call!(w, mbm_link_setRequestsWait(link, byte >> 2 & 1)) == OK {
                 line.keeps.set(byte >> 2 & 1 != 0);
             }
         }
         _ => {
             let chance: Option<unsafe extern "C" fn(*mut c_void) -> u32> = Some(number);
             let context: *mut c_void = null_mut();
-            call!(
-                w,
-                link,
-                mbm_link_setJitter(link, byte % 101, chance, context)
-            );
+            call!(w, mbm_link_setJitter(link, byte % 101, chance, context));
         }
     }
 }
@@ -150,13 +144,13 @@ pub fn reconnect(life: &Life, at: usize) {
     let line = &life.lines[at];
     if line.has_link.get() {
         let link = line.link.get();
-        call!(w, link, mbm_link_reconnect(link));
+        call!(w, mbm_link_reconnect(link));
         return;
     }
     // By hand: the program has opened the line again.
     let client = line.client.get();
     let hooks: *const mbm_linkHooks = null();
-    if call!(w, client, mbm_client_reconnect(client, hooks)) == OK {
+    if call!(w, mbm_client_reconnect(client, hooks)) == OK {
         line.wire.reset(life);
         line.wire.is_open.set(true);
         line.wire.is_opening.set(false);

@@ -15,7 +15,6 @@ mod plan;
 mod state;
 mod wire;
 
-use super::check::call;
 use state::{Life, LINES};
 
 /// Makes one call or a few that belong together.
@@ -54,13 +53,13 @@ fn pass(life: &Life) {
     let mut delay = u64::MAX;
     for line in &life.lines {
         let client = line.client.get();
-        delay = delay.min(call!(w, client, mbm_client_pollDelay(client)).into());
+        delay = delay.min(call!(w, mbm_client_pollDelay(client)).into());
         delay = delay.min(line.wire.delay(now));
     }
     for master in &life.masters {
         if master.pending.get().is_some() {
             let node = master.nodes[master.asker.get()];
-            let own = call!(w, node, mbm_node_pollDelay(node));
+            let own = call!(w, mbm_node_pollDelay(node));
             delay = delay.min(own.into());
         }
     }
@@ -97,7 +96,7 @@ fn poll(life: &Life) {
     life.plan.poll(life);
     for at in 0..LINES {
         let client = life.lines[at].client.get();
-        call!(&life.w, client, mbm_client_poll(client));
+        call!(&life.w, mbm_client_poll(client));
     }
     life.gateway.poll(life);
     for master in &life.masters {

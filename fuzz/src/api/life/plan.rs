@@ -1,7 +1,7 @@
 //! A plan over one of the clients.
 
 use super::state::{Life, PlanSide, FIELDS, REQUESTS};
-use crate::api::check::{call, OK};
+use crate::api::check::OK;
 use mbm_c::*;
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
@@ -19,14 +19,14 @@ unsafe extern "C" fn update(_: *mut c_void, _: *mut mbm_plan, field: u16) {
 impl PlanSide {
     pub fn poll(&self, life: &Life) {
         if self.is_begun.get() {
-            let status = call!(&life.w, self.plan, mbm_plan_poll(self.plan));
+            let status = call!(&life.w, mbm_plan_poll(self.plan));
             assert_eq!(status, OK, "mbm_plan_poll");
         }
     }
 
     pub fn delay(&self, life: &Life) -> u64 {
         match self.is_begun.get() {
-            true => call!(&life.w, self.plan, mbm_plan_pollDelay(self.plan)).into(),
+            true => call!(&life.w, mbm_plan_pollDelay(self.plan)).into(),
             false => u64::MAX,
         }
     }
@@ -52,12 +52,12 @@ pub fn act(life: &Life) {
     let side = &life.plan;
     let plan = side.plan;
     match w.byte() % 8 {
-        0 if side.is_begun.get() && call!(w, plan, mbm_plan_end(plan)) == OK => {
+        0 if side.is_begun.get() && call!(w, mbm_plan_end(plan)) == OK => {
             side.is_begun.set(false);
         }
         1 if side.is_begun.get() => {
             let field = u16::from(w.byte()) % FIELDS as u16;
-            call!(w, plan, mbm_plan_refresh(plan, field));
+            call!(w, mbm_plan_refresh(plan, field));
         }
         // Within a hook the plan may be about to end.
         2..=4 if !side.is_begun.get() && life.inside.get() == 0 => begin(life),
@@ -108,7 +108,7 @@ fn begin(life: &Life) {
     let at = life.line();
     let client = life.lines[at].client.get();
     let (plan, wrong): (_, *mut u16) = (side.plan, null_mut());
-    if call!(w, plan, mbm_plan_begin(plan, client, setup, wrong)) == OK {
+    if call!(w, mbm_plan_begin(plan, client, setup, wrong)) == OK {
         side.is_begun.set(true);
         side.line.set(at);
         for news in &side.news {

@@ -2,7 +2,6 @@
 //! pending.
 
 use super::bound::Limits;
-use crate::api::check::call;
 use crate::api::world::World;
 use mbm_c::*;
 use std::cell::{Cell, RefCell};
@@ -138,7 +137,7 @@ impl Life {
         let w = World::new(data, |_| {});
         let lines = (0..LINES).map(|_| {
             let (ring, bytes) = (w.zeroed(), w.noise(1024));
-            call!(&w, ring, mbm_ring_begin(ring, bytes, 1024));
+            call!(&w, mbm_ring_begin(ring, bytes, 1024));
             Line {
                 client: Cell::new(new()),
                 link: Cell::new(new()),
@@ -236,7 +235,7 @@ impl Life {
 
     /// True if the client of a line may use it: the time counts for its requests.
     pub fn is_awake(&self, line: &Line) -> bool {
-        let state = call!(&self.w, line.link.get(), mbm_link_state(line.link.get()));
+        let state = call!(&self.w, mbm_link_state(line.link.get()));
         let waits = match state {
             _ if !line.has_link.get() => false,
             MBM_LINK_IS_DOWN => line.keeps.get(),

@@ -2,7 +2,6 @@
 //! written, and checks that the request in it had not ended when its first byte was written.
 
 use super::state::{Life, Wire, FIRST_ID};
-use crate::api::check::call;
 use crate::api::traffic::framed;
 use mbm_c::*;
 use std::ffi::c_void;
@@ -16,9 +15,9 @@ impl Wire {
     pub fn reset(&self, life: &Life) {
         self.replies.borrow_mut().clear();
         self.partial.borrow_mut().clear();
-        let left = call!(&life.w, self.ring, mbm_ring_available(self.ring));
+        let left = call!(&life.w, mbm_ring_available(self.ring));
         let bytes = life.w.unset_bytes(left.into());
-        call!(&life.w, self.ring, mbm_ring_read(self.ring, bytes, left));
+        call!(&life.w, mbm_ring_read(self.ring, bytes, left));
     }
 
     /// Microseconds until the device sends something.
@@ -31,7 +30,7 @@ impl Wire {
     /// Lets bytes arrive.
     pub fn arrive(&self, life: &Life, bytes: &[u8]) {
         let (place, length) = (life.w.array(bytes), bytes.len() as u16);
-        call!(&life.w, self.ring, mbm_ring_write(self.ring, place, length));
+        call!(&life.w, mbm_ring_write(self.ring, place, length));
     }
 
     fn deliver(&self, life: &Life) {
@@ -173,11 +172,7 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
         return if wire.is_opening.get() { 0 } else { -1 };
     }
     wire.deliver(life);
-    call!(
-        &life.w,
-        wire.ring,
-        mbm_ring_read(wire.ring, bytes, capacity)
-    ) as i16
+    call!(&life.w, mbm_ring_read(wire.ring, bytes, capacity)) as i16
 }
 
 unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) -> i16 {
