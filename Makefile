@@ -113,7 +113,6 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@$(MAKE) --no-print-directory check-comments
 	@scripts/check/functions
 	@scripts/check/packages
-	@scripts/build/pictures --check
 	@scripts/build/project.py --check
 	@CARGO="$(CARGO)" scripts/check/dependencies
 	@$(MAKE) --no-print-directory spell
@@ -156,11 +155,10 @@ run-c-tests: $(PROGRAMS)
 	tail -n 1 $(BUILD)/tests/c.txt >$(BUILD)/tests/c.total; exit $$code
 
 .PHONY: coverage
-coverage: need-test ## Measure the lines that the tests run, Rust and C; writes docs/reports/coverage.md
+coverage: need-test ## Measure the lines that the tests run, Rust and C; writes build/coverage.md
 	@scripts/need llvm-22
 	@$(MAKE) --no-print-directory venv $(BUILD)/plain/serve
 	@CARGO="$(CARGO)" JOBS="$(JOBS)" scripts/bench/coverage
-	@scripts/build/pictures
 .PHONY: coverage-tests
 coverage-tests: $(TESTS:%=$(BUILD)/coverage/%)
 	@scripts/check/run-c-tests $^
@@ -265,11 +263,11 @@ $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(pa
 	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
-$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value cursor)
+$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
-$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device device_file device_value yaml_file value cursor numbers report)
+$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device device_file yaml_file value numbers report)
 $(BUILD)/$(1)/test_place: $(patsubst %,$(BUILD)/$(1)/cli/%.o,place numbers)
-$(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,ahead_port found_port clock)
+$(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over clock)
 $(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
@@ -329,7 +327,7 @@ $(BENCH_PLAN): $(BUILD)/bench/bench_plan.o $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
-bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone of nanoMODBUS, MBUSD=mbusd; writes docs/reports/*speed.md
+bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone of nanoMODBUS, MBUSD=mbusd; writes docs/reports/speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind strace
 	@rm -rf $(BUILD)/bench/bench_client.o $(NANO_SOURCE)
 	@$(MAKE) --no-print-directory $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_LOOP) $(BENCH_SNIFFER) $(BENCH_PLAN) $(BENCH_GATEWAY) $(INSTALLED_TOOL)
@@ -346,6 +344,13 @@ bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone 
 SECURE := $(BUILD)/plain/linux/secure_server
 $(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure_server mbm_tls mbm_tls_identity mbm_tls_linux mbm_tls_listener mbm_tls_text mbm_tcp mbm_tcp_listener) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections $(TLS_LIBS) -o $@
+UDP := $(BUILD)/plain/linux/udp
+
+.PHONY: secure
+secure: tool ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
+	@scripts/need python3 python3-venv gcc libc6-dev libmbedtls-dev openssl
+	@$(MAKE) --no-print-directory venv certificates $(SECURE)
+	@$(BUILD)/venv/bin/python scripts/check/examples secure $(BUILD)/plain $(BUILD)/certificates
 
 .PHONY: measure-secure
 measure-secure: ## Measure what handshakes cost other clients of that server, and who gets in under attack
@@ -353,9 +358,34 @@ measure-secure: ## Measure what handshakes cost other clients of that server, an
 	@$(MAKE) --no-print-directory certificates $(SECURE)
 	@python3 scripts/bench/secure $(SECURE) $(BUILD)/certificates
 
+.PHONY: udp
+udp: ## Build and check the example over UDP, build/plain/linux/udp
+	@scripts/need python3 python3-venv gcc libc6-dev
+	@$(MAKE) --no-print-directory venv $(UDP)
+	@$(BUILD)/venv/bin/python scripts/check/examples udp $(BUILD)/plain
+
+.PHONY: keep-link
+keep-link: ## Show a client whose connection opens itself again, while a libmodbus server goes and comes back
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
+	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/keep_link $(PEERS)
+	@scripts/check/examples keep_link $(BUILD)/plain
+
+.PHONY: sniff
+sniff: tool ## Check the command that watches a bus, `mbm sniff`
+	@scripts/need python3
+	@scripts/check/sniff $(BUILD)/plain
+
+DEVICES ?= 1000
+MANY_SECONDS ?= 20
 SERVE_MANY := $(BUILD)/plain/serve_many
 $(SERVE_MANY): $(patsubst %,$(BUILD)/plain/%.o,serve_many support/server support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) -lmodbus -lpthread -o $@
+
+.PHONY: many-devices
+many-devices: ## Poll DEVICES (1000) for MANY_SECONDS (20) in one process, while a third of their libmodbus servers goes and comes
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
+	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/many_devices $(SERVE_MANY)
+	@scripts/check/examples many_devices $(BUILD)/plain $(DEVICES) $(MANY_SECONDS)
 
 PEERS := $(BUILD)/plain/serve_libmodbus
 $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support/tcp_server support/pty) $(ARCHIVE)
@@ -390,26 +420,44 @@ man: tool ## Make the man pages of that tool, build/man
 	@scripts/need help2man
 	@cli/man $(BUILD)/plain/mbm $(BUILD)/man
 
-# ONLY is an expression of pytest's -k: words of names, with and, or and not. DEVICES (1000) and MANY_SECONDS (20) are those of
-# the test of many_devices.
-TOOL_PEERS := $(PEERS) $(SERVE_MANY) $(SECURE) $(addprefix $(BUILD)/plain/linux/,calls keep_link many_devices udp)
+# ONLY is an expression of pytest's -k: words of names, with and, or and not.
 .PHONY: test-tool
-test-tool: man ## Test that tool and programs of examples/linux on other clients, servers and brokers: ONLY="tls or udp"
+test-tool: man ## Test that tool, also with the sanitizers, on other clients, servers and brokers: ONLY="tls or udp"
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev gcc-avr avr-libc gcc-arm-none-eabi libnewlib-arm-none-eabi \
-		pkg-config libmodbus-dev libmbedtls-dev mbpoll mosquitto mosquitto-clients openssl strace tshark
-	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(TOOL_PEERS)
-	@DEVICES="$(DEVICES)" MANY_SECONDS="$(MANY_SECONDS)" \
-		$(BUILD)/venv/bin/python -B -m pytest -c tests/tool/pytest.ini --rootdir tests/tool tests/tool $(if $(ONLY),-k "$(ONLY)")
+		pkg-config libmodbus-dev mbpoll openssl strace
+	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(BUILD)/plain/linux/calls $(PEERS)
+	@$(BUILD)/venv/bin/python -B -m pytest -c tests/tool/pytest.ini --rootdir tests/tool tests/tool $(if $(ONLY),-k "$(ONLY)")
 
-.PHONY: demo plan
+.PHONY: trace
+trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
+	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
+	@$(MAKE) --no-print-directory venv tool $(PEERS)
+	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
+
+.PHONY: gateway
+gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients and devices of libmodbus and pymodbus
+	@scripts/need python3 python3-venv gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev strace
+	@$(MAKE) --no-print-directory venv tool $(BUILD)/sanitized/mbm $(PEERS)
+	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain $(BUILD)/sanitized/mbm
+
+.PHONY: demo
 demo: tool ## Show every function against a libmodbus server, frame by frame, and a plan at work
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(PEERS)
-	@scripts/demo
+	@scripts/check/examples demo $(BUILD)/plain
 	@$(MAKE) --no-print-directory plan
+
+.PHONY: plan
 plan: tool ## A plan of ten fields at work against a libmodbus server
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(PEERS)
-	@scripts/demo plan
+	@scripts/check/examples plan $(BUILD)/plain
+
+.PHONY: mqtt
+mqtt: ## Show and check the bridge to MQTT, `mbm bridge`, on a libmodbus server and a mosquitto broker
+	@scripts/need gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev python3 mosquitto mosquitto-clients openssl
+	@$(MAKE) --no-print-directory tool $(BUILD)/sanitized/mbm $(PEERS)
+	@scripts/check/mqtt $(BUILD)/plain $(BUILD)/sanitized/mbm
 
 # The tests in C as programs for AArch64, run by QEMU's user mode. The machine stays as it is: the
 # libraries for AArch64 are unpacked below build.

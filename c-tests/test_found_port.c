@@ -1,7 +1,6 @@
 /* The ports of the tool that read only what a wait has found: of lines, and of a gateway's
  * clients. */
-#include "ahead_port.h"
-#include "found_port.h"
+#include "port_over.h"
 #include "test.h"
 
 #include <string.h>
@@ -40,6 +39,7 @@ static uint32_t micros_below(void *context)
 static const mbm_port below = {.read = read_below, .write = write_below, .micros = micros_below};
 static const struct pollfd NOTHING = {0, POLLIN, 0}, FOUND = {0, POLLIN, POLLIN},
                            NOT_ASKED = {0, 0, 0};
+static found_round the_round;
 static found_port found;
 static mbm_port line;
 static uint8_t got[600];
@@ -51,7 +51,7 @@ static void begin(void)
     at = end = 0;
     now = 1000;
     reads = writes = 0;
-    found_port_end_round();
+    found_port_end_round(&the_round);
     line = found_port_begin(&found, &below);
 }
 
@@ -69,7 +69,7 @@ static uint32_t time_of(const mbm_port *from)
 
 TEST(without_a_round_every_call_passes)
 {
-    found_port_note(&found, &NOTHING);
+    found_port_note(&found, &the_round, &NOTHING);
     assert_int_equal(take(&line, 8), 0);
     assert_int_equal(take(&line, 8), 0);
     assert_int_equal(reads, 2);
@@ -82,8 +82,8 @@ TEST(a_line_without_bytes_is_not_read_and_its_time_stands_still)
 {
     uint32_t waited;
 
-    found_port_begin_round();
-    found_port_note(&found, &NOTHING);
+    found_port_begin_round(&the_round);
+    found_port_note(&found, &the_round, &NOTHING);
     waited = time_of(&line);
     /* They come after the wait: they must not be late for what ends meanwhile. */
     end = 5;
@@ -91,18 +91,18 @@ TEST(a_line_without_bytes_is_not_read_and_its_time_stands_still)
     assert_int_equal(take(&line, 8), 0);
     assert_int_equal(reads, 0);
     assert_int_equal(time_of(&line), waited);
-    found_port_end_round();
+    found_port_end_round(&the_round);
     assert_int_equal(time_of(&line), 900000);
-    found_port_begin_round();
-    found_port_note(&found, &FOUND);
+    found_port_begin_round(&the_round);
+    found_port_note(&found, &the_round, &FOUND);
     assert_int_equal(take(&line, 8), 5);
     assert_memory_equal(got, bytes, 5);
 }
 
 TEST(a_write_lets_the_time_go_on_and_the_line_be_read)
 {
-    found_port_begin_round();
-    found_port_note(&found, &NOTHING);
+    found_port_begin_round(&the_round);
+    found_port_note(&found, &the_round, &NOTHING);
     now = 2000;
     assert_int_equal(line.write(line.context, bytes, 3), 3);
     assert_int_equal(writes, 1);
@@ -113,8 +113,8 @@ TEST(a_write_lets_the_time_go_on_and_the_line_be_read)
 
 TEST(a_read_that_takes_all_bytes_is_the_last_one)
 {
-    found_port_begin_round();
-    found_port_note(&found, &FOUND);
+    found_port_begin_round(&the_round);
+    found_port_note(&found, &the_round, &FOUND);
     end = 12;
     assert_int_equal(take(&line, 8), 8);
     assert_int_equal(time_of(&line), 1000);
@@ -124,8 +124,8 @@ TEST(a_read_that_takes_all_bytes_is_the_last_one)
     assert_int_equal(take(&line, 8), 0);
     assert_int_equal(reads, 2);
     assert_int_equal(time_of(&line), 1500);
-    found_port_begin_round();
-    found_port_note(&found, &FOUND);
+    found_port_begin_round(&the_round);
+    found_port_note(&found, &the_round, &FOUND);
     assert_int_equal(time_of(&line), 9000);
     assert_int_equal(take(&line, 8), 0);
     assert_int_equal(reads, 3);
@@ -133,8 +133,8 @@ TEST(a_read_that_takes_all_bytes_is_the_last_one)
 
 TEST(a_line_that_the_wait_was_not_for_is_read)
 {
-    found_port_begin_round();
-    found_port_note(&found, &NOT_ASKED);
+    found_port_begin_round(&the_round);
+    found_port_note(&found, &the_round, &NOT_ASKED);
     end = 3;
     assert_int_equal(take(&line, 8), 3);
 }

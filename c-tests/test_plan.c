@@ -192,6 +192,15 @@ TEST_WITH(many_requests_are_in_flight_on_tcp, NULL, NULL)
     }
 }
 
+TEST(a_plan_is_polled_every_half_hour_although_no_read_is_due)
+{
+    add(1, 10, 3600 * SECOND);
+    plan_device_start(&d);
+    plan_device_run(&d, SECOND);
+    OK(status(0));
+    assert_int_equal(mbm_plan_pollDelay(&d.plan), 30 * 60 * 1000000);
+}
+
 TEST(a_refresh_reads_at_once)
 {
     add(1, 10, 3600 * SECOND);

@@ -1,3 +1,7 @@
+/* Chooses the advice after a failure: by the kind of line, the status, the exception, and the words
+ * of the command line.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "advice.h"
 

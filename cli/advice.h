@@ -30,11 +30,11 @@ const char *advice_damaged(const place *where);
 void advice_keep(int argc, char **argv, const char *address_text);
 
 /* Manuals write 40101 for the holding register with address 100, 30101 for such an input register
- * and 10101 for such a discrete input; with six digits 400101, 300101 and 100101. Returns the table
- * of such a number, or 0 if it is none for a field of `table`; sets the address. */
+ * and 10101 for such a discrete input; with six digits 400101, 300101 and 100101. Sets the address
+ * of such a number and returns its table, or 0 if it is none for a field of `table`. */
 uint8_t advice_manual(uint8_t table, uint32_t number, uint16_t *address);
 
-/* What is meant by an ADDRESS that is such a number, with the command to use; or an empty text. */
+/* Explains an ADDRESS that is such a number, with the command to use; or returns an empty text. */
 const char *advice_on_number(uint32_t number);
 
 #endif

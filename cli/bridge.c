@@ -4,7 +4,6 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "bridge_file.h"
-#include "commands.h"
 #include "discovery.h"
 #include "options.h"
 #include "report.h"
@@ -16,17 +15,21 @@
 
 enum { UNREACHED_MS = 5000 /* after so long without the broker it is reported */ };
 
-/* What the command line says, and what is in force. */
-static bridge_setup given, setup;
-static broker_options to;
-static const char *path; /* of the file; NULL: the command line has the lines */
-static bridge_line *lines[BRIDGE_LINES];
-static unsigned line_count;
-static unsigned long reloads, refused_reloads;
-static uint32_t alone_since; /* since when there is no broker */
-static int is_alone;         /* and that was reported */
-static int is_check;
-static int has_events = 1; /* of the broker, as far as is known */
+typedef struct bridge {
+    bridge_setup given, setup; /* what the command line says, and what is in force */
+    broker_options to;
+    const char *path;      /* of the file; NULL: the command line has the lines */
+    const char *last_line; /* of the command line, whose FILE follows; NULL: it was there */
+    bridge_settings settings;
+    bridge_line *lines[BRIDGE_LINES];
+    unsigned line_count;
+    unsigned long reloads, refused_reloads;
+    uint32_t alone_since; /* since when there is no broker */
+    int is_alone;         /* and that was reported */
+    int is_check;
+    found_round round;
+    int has_events; /* of the broker, as far as is known */
+} bridge;
 
 /* --- the files again --- */
 
@@ -37,18 +40,18 @@ typedef struct next_line {
     int is_new;
 } next_line;
 
-static bridge_line *find_line(const char *text, const char *topic)
+static bridge_line *find_line(bridge *b, const char *text, const char *topic)
 {
     unsigned i;
 
-    for (i = 0; i < line_count; i++)
-        if (strcmp(lines[i]->text, text) == 0 && strcmp(lines[i]->topic, topic) == 0)
-            return lines[i];
+    for (i = 0; i < b->line_count; i++)
+        if (strcmp(b->lines[i]->text, text) == 0 && strcmp(b->lines[i]->topic, topic) == 0)
+            return b->lines[i];
     return NULL;
 }
 
 /* Prepares a line of a setup. Returns an exit code, with the reason in `wrong`. */
-static int prepare(const bridge_setup *from, unsigned index, next_line *next,
+static int prepare(bridge *b, const bridge_setup *from, unsigned index, next_line *next,
                    char wrong[YAML_FILE_WRONG_BYTES])
 {
     const char *file = from->lines[index].path;
@@ -57,11 +60,11 @@ static int prepare(const bridge_setup *from, unsigned index, next_line *next,
     next->table = bridge_table_read(file, bridge_setup_gap(from), &code, wrong);
     if (!next->table)
         return code;
-    next->line = find_line(from->lines[index].text, from->lines[index].topic);
+    next->line = find_line(b, from->lines[index].text, from->lines[index].topic);
     next->is_new = !next->line;
     if (next->is_new)
-        next->line = bridge_line_make(from->lines[index].text, file, from->lines[index].topic,
-                                      &from->lines[index].place);
+        next->line = bridge_line_make(&b->settings, from->lines[index].text, file,
+                                      from->lines[index].topic, &from->lines[index].place);
     if (!next->line) {
         snprintf(wrong, YAML_FILE_WRONG_BYTES, "not enough memory");
         return CODE_SYSTEM;
@@ -87,7 +90,7 @@ static void forget(next_line *next, unsigned count)
 
 /* Prepares all lines of a setup. Returns an exit code, with the reason in `wrong`; nothing is left
  * then. */
-static int prepare_all(const bridge_setup *from, next_line next[BRIDGE_LINES],
+static int prepare_all(bridge *b, const bridge_setup *from, next_line next[BRIDGE_LINES],
                        char wrong[YAML_FILE_WRONG_BYTES])
 {
     unsigned i;
@@ -95,34 +98,34 @@ static int prepare_all(const bridge_setup *from, next_line next[BRIDGE_LINES],
 
     memset(next, 0, BRIDGE_LINES * sizeof *next);
     for (i = 0; i < from->line_count && code == CODE_DONE; i++)
-        code = prepare(from, i, &next[i], wrong);
+        code = prepare(b, from, i, &next[i], wrong);
     if (code != CODE_DONE)
         forget(next, from->line_count);
     return code;
 }
 
-static void remove_lines(const next_line *next, unsigned count, unsigned *removed)
+static void remove_lines(bridge *b, const next_line *next, unsigned count, unsigned *removed)
 {
     unsigned i, j;
 
-    for (i = 0; i < line_count; i++) {
-        for (j = 0; j < count && next[j].line != lines[i]; j++)
+    for (i = 0; i < b->line_count; i++) {
+        for (j = 0; j < count && next[j].line != b->lines[i]; j++)
             ;
         if (j < count)
             continue;
-        bridge_line_clear(lines[i]);
-        bridge_line_end(lines[i]);
+        bridge_line_clear(b->lines[i]);
+        bridge_line_end(b->lines[i]);
         (*removed)++;
     }
 }
 
 /* Puts a setup in force that was prepared. Lines that both have go on as they are. */
-static void apply(next_line next[BRIDGE_LINES], unsigned count)
+static void apply(bridge *b, next_line next[BRIDGE_LINES], unsigned count)
 {
     unsigned i, kept = 0, changed = 0, added = 0, removed = 0;
 
-    remove_lines(next, count, &removed);
-    line_count = 0;
+    remove_lines(b, next, count, &removed);
+    b->line_count = 0;
     for (i = 0; i < count; i++) {
         bridge_line *one = next[i].line;
 
@@ -135,7 +138,7 @@ static void apply(next_line next[BRIDGE_LINES], unsigned count)
             bridge_line_connected(one);
             added++;
         } else if (next[i].table) {
-            char *file = strdup(setup.lines[i].path);
+            char *file = strdup(b->setup.lines[i].path);
 
             bridge_line_replace(one, next[i].table);
             free(one->path);
@@ -144,7 +147,7 @@ static void apply(next_line next[BRIDGE_LINES], unsigned count)
         } else {
             kept++;
         }
-        lines[line_count++] = one;
+        b->lines[b->line_count++] = one;
     }
     report_log(REPORT_INFO,
                "the files are in force. Lines kept: %u, with a new device file: %u, removed: %u, "
@@ -153,12 +156,12 @@ static void apply(next_line next[BRIDGE_LINES], unsigned count)
 }
 
 /* The first setting that differs, or NULL. */
-static const char *changed_setting(const bridge_setup *next)
+static const char *changed_setting(bridge *b, const bridge_setup *next)
 {
     int i;
 
     for (i = 0; i < BRIDGE_SETTINGS; i++) {
-        const char *before = setup.values[i] ? setup.values[i] : "";
+        const char *before = b->setup.values[i] ? b->setup.values[i] : "";
         const char *after = next->values[i] ? next->values[i] : "";
 
         if (strcmp(before, after) != 0)
@@ -169,15 +172,15 @@ static const char *changed_setting(const bridge_setup *next)
 
 /* Reads the file of the bridge, or takes the lines of the command line. Returns an exit code, with
  * the reason in its `wrong`. */
-static int read_setup(bridge_setup *into)
+static int read_setup(bridge *b, bridge_setup *into)
 {
-    if (bridge_setup_copy(into, &given))
-        return path ? bridge_file_read(into, path) : CODE_DONE;
+    if (bridge_setup_copy(into, &b->given))
+        return b->path ? bridge_file_read(into, b->path) : CODE_DONE;
     snprintf(into->wrong, sizeof into->wrong, "not enough memory");
     return CODE_SYSTEM;
 }
 
-static void reload(void)
+static void reload(bridge *b)
 {
     static next_line next_lines[BRIDGE_LINES];
     static bridge_setup next;
@@ -185,20 +188,21 @@ static void reload(void)
     const char *differs;
 
     service_is_reloading();
-    if (read_setup(&next) != CODE_DONE) {
+    if (read_setup(b, &next) != CODE_DONE) {
         snprintf(wrong, sizeof wrong, "%s", next.wrong);
-    } else if ((differs = changed_setting(&next)) != NULL) {
-        snprintf(wrong, sizeof wrong, "%s: %s has changed, which needs a restart", path, differs);
-    } else if (prepare_all(&next, next_lines, wrong) == CODE_DONE) {
-        bridge_setup_free(&setup);
-        setup = next;
+    } else if ((differs = changed_setting(b, &next)) != NULL) {
+        snprintf(wrong, sizeof wrong, "%s: %s has changed, which needs a restart", b->path,
+                 differs);
+    } else if (prepare_all(b, &next, next_lines, wrong) == CODE_DONE) {
+        bridge_setup_free(&b->setup);
+        b->setup = next;
         memset(&next, 0, sizeof next);
-        apply(next_lines, setup.line_count);
-        reloads++;
+        apply(b, next_lines, b->setup.line_count);
+        b->reloads++;
     }
     if (*wrong) {
         report_log(REPORT_ERROR, "%s. The files before stay in force", wrong);
-        refused_reloads++;
+        b->refused_reloads++;
         bridge_setup_free(&next);
     }
     service_is_ready();
@@ -207,102 +211,102 @@ static void reload(void)
 /* --- the broker --- */
 
 /* The line whose topic begins this name, or NULL. */
-static bridge_line *line_of(const char *name)
+static bridge_line *line_of(bridge *b, const char *name)
 {
     unsigned i;
 
-    for (i = 0; i < line_count; i++)
-        if (strncmp(name, lines[i]->below, strlen(lines[i]->below)) == 0)
-            return lines[i];
+    for (i = 0; i < b->line_count; i++)
+        if (strncmp(name, b->lines[i]->below, strlen(b->lines[i]->below)) == 0)
+            return b->lines[i];
     return NULL;
 }
 
-static void take_events(void)
+static void take_events(bridge *b)
 {
     static broker_event event;
     unsigned i;
 
-    while (broker_next(&bridge.mqtt, &event)) {
+    while (broker_next(&b->settings.mqtt, &event)) {
         bridge_line *owner;
 
         if (event.kind == BROKER_CONNECTED) {
-            for (i = 0; i < line_count; i++)
-                bridge_line_connected(lines[i]);
-            broker_publish(&bridge.mqtt, "status", NULL, "online", 1);
+            for (i = 0; i < b->line_count; i++)
+                bridge_line_connected(b->lines[i]);
+            broker_publish(&b->settings.mqtt, "status", NULL, "online", 1);
             continue;
         }
-        owner = line_of(event.bytes);
+        owner = line_of(b, event.bytes);
         if (owner)
             bridge_line_write(owner, event.bytes + strlen(owner->below), &event);
         else
-            broker_publish(&bridge.mqtt, event.bytes, "result", "there is no such field", 0);
+            broker_publish(&b->settings.mqtt, event.bytes, "result", "there is no such field", 0);
     }
 }
 
 /* Reports once that there is no broker for some time. Returns how long to sleep at most. */
-static uint32_t watch_broker(void)
+static uint32_t watch_broker(bridge *b)
 {
-    if (atomic_load(&bridge.mqtt.is_connected)) {
-        alone_since = line_milliseconds();
-        is_alone = 0;
+    if (atomic_load(&b->settings.mqtt.is_connected)) {
+        b->alone_since = line_milliseconds();
+        b->is_alone = 0;
         return UINT32_MAX;
     }
-    if (!is_alone && line_milliseconds() - alone_since >= UNREACHED_MS) {
+    if (!b->is_alone && line_milliseconds() - b->alone_since >= UNREACHED_MS) {
         report_log(REPORT_WARNING,
                    "the broker %s cannot be reached. The bridge reads on, and tries it again",
-                   bridge.mqtt.address);
-        is_alone = 1;
+                   b->settings.mqtt.address);
+        b->is_alone = 1;
     }
-    return is_alone ? UINT32_MAX : 1000000;
+    return b->is_alone ? UINT32_MAX : 1000000;
 }
 
 /* --- work --- */
 
 /* Sleeps until there is something to do, and notes what it is. */
-static void rest(uint32_t micros)
+static void rest(bridge *b, uint32_t micros)
 {
     static struct pollfd polls[1 + BRIDGE_LINES + SERVICE_WAITS];
     line *polled[1 + BRIDGE_LINES] = {0};
     nfds_t count = 1, n;
     unsigned i;
 
-    polls[0] = (struct pollfd){bridge.mqtt.events[0], POLLIN, 0};
-    for (i = 0; i < line_count; i++) {
-        const uint32_t delay = bridge_line_delay(lines[i]);
+    polls[0] = (struct pollfd){b->settings.mqtt.events[0], POLLIN, 0};
+    for (i = 0; i < b->line_count; i++) {
+        const uint32_t delay = bridge_line_delay(b->lines[i]);
 
         if (delay < micros)
             micros = delay;
-        polled[count] = &lines[i]->at;
+        polled[count] = &b->lines[i]->at;
         count += (nfds_t)line_polls(polled[count], &polls[count]);
     }
-    has_events = 1;
+    b->has_events = 1;
     if (service_wait(polls, count, micros) < 0)
         return;
-    has_events = polls[0].revents != 0;
-    found_port_begin_round();
+    b->has_events = polls[0].revents != 0;
+    found_port_begin_round(&b->round);
     for (n = 1; n < count; n++)
-        line_polled(polled[n], &polls[n]);
+        line_polled(polled[n], &b->round, &polls[n]);
 }
 
-static void work(void)
+static void work(bridge *b)
 {
     unsigned i, polls;
 
     if (service_reload_is_wanted())
-        reload();
+        reload(b);
     service_work();
-    if (has_events)
-        take_events();
-    for (i = 0; i < line_count; i++) {
+    if (b->has_events)
+        take_events(b);
+    for (i = 0; i < b->line_count; i++) {
         polls = 0;
         /* A poll may leave work that waits for nothing: after a reply the next read is due. */
         do
-            bridge_line_poll(lines[i]);
-        while (++polls < SERVICE_POLLS && bridge_line_delay(lines[i]) == 0);
+            bridge_line_poll(b->lines[i]);
+        while (++polls < SERVICE_POLLS && bridge_line_delay(b->lines[i]) == 0);
     }
-    found_port_end_round();
+    found_port_end_round(&b->round);
     if (!report_stopped)
-        rest(watch_broker());
+        rest(b, watch_broker(b));
 }
 
 static const stats_kind KINDS[] = {
@@ -316,27 +320,28 @@ static const stats_kind KINDS[] = {
     {"reload_failures", "How often files were refused.", 1},
 };
 
-static void fill_stats(stats *numbers)
+static void fill_stats(void *context, stats *numbers)
 {
+    bridge *b = (bridge *)context;
     unsigned i;
 
     numbers->command = "bridge";
     numbers->kinds = KINDS;
     numbers->count = sizeof KINDS / sizeof KINDS[0];
-    numbers->values[0] = (uint64_t)atomic_load(&bridge.mqtt.is_connected);
-    numbers->values[1] = atomic_load(&bridge.mqtt.connects);
-    numbers->values[2] = atomic_load(&bridge.mqtt.published);
-    numbers->values[3] = bridge.written;
-    numbers->values[4] = bridge.refused;
-    numbers->values[5] = atomic_load(&bridge.mqtt.lost);
-    numbers->values[6] = reloads;
-    numbers->values[7] = refused_reloads;
-    for (i = 0; i < line_count; i++) {
-        const line *at = &lines[i]->at;
+    numbers->values[0] = (uint64_t)atomic_load(&b->settings.mqtt.is_connected);
+    numbers->values[1] = atomic_load(&b->settings.mqtt.connects);
+    numbers->values[2] = atomic_load(&b->settings.mqtt.published);
+    numbers->values[3] = b->settings.written;
+    numbers->values[4] = b->settings.refused;
+    numbers->values[5] = atomic_load(&b->settings.mqtt.lost);
+    numbers->values[6] = b->reloads;
+    numbers->values[7] = b->refused_reloads;
+    for (i = 0; i < b->line_count; i++) {
+        const line *at = &b->lines[i]->at;
         const int has_link = at->place.kind != PLACE_UDP;
 
         numbers->lines[numbers->line_count++] =
-            (stats_line){.name = *lines[i]->topic ? lines[i]->topic : lines[i]->text,
+            (stats_line){.name = *b->lines[i]->topic ? b->lines[i]->topic : b->lines[i]->text,
                          .counters = &at->counters,
                          .link = has_link ? &at->losses : NULL,
                          .is_up = !has_link || mbm_link_state(&at->kept) == MBM_LINK_IS_UP};
@@ -345,89 +350,71 @@ static void fill_stats(stats *numbers)
 
 /* --- the command line --- */
 
-enum {
-    ALL = 0x100,
-    CA,
-    CERT,
-    CHECK,
-    DISCOVERY,
-    DISCOVERY_PREFIX,
-    GAP,
-    ID,
-    KEEP_ALIVE,
-    KEY,
-    PLAIN,
-    USER
-};
+/* The key of an option that sets a setting is SETTING and the number of the setting. */
+enum { SETTING = 0x100, CHECK = 0x200 };
 
-static void take_value(const struct argp_state *state, int setting, const char *option,
-                       const char *text)
+/* Sets the setting of an option, whose name has - for the _ of the setting's. */
+static void take_value(bridge *b, const struct argp_state *state, int setting, const char *text)
 {
-    const char *wrong = bridge_setup_value(&given, setting, text);
+    const char *wrong = bridge_setup_value(&b->given, setting, text ? text : "yes");
+    char option[32], *at = option;
 
+    snprintf(option, sizeof option, "%s", bridge_names[setting]);
+    while ((at = strchr(at, '_')) != NULL)
+        *at = '-';
     if (wrong)
-        options_wrong(state, "%s %s", option, wrong);
+        options_wrong(state, "--%s %s", option, wrong);
 }
 
-static const char *last_line; /* whose FILE follows; NULL: it was there */
-
 /* Reads a word that is no option: FILE of a bridge, or LINE and FILE by turns. */
-static void read_word(const struct argp_state *state, char *text)
+static void read_word(bridge *b, const struct argp_state *state, char *text)
 {
     const size_t length = strlen(text);
     const char *wrong = NULL;
     place where;
 
     if (state->arg_num == 0 && length > 5 && strcmp(text + length - 5, ".yaml") == 0) {
-        path = text;
-    } else if (path) {
+        b->path = text;
+    } else if (b->path) {
         options_wrong(state, "\"%s\" is one word too many: the lines are in the file", text);
     } else if (state->arg_num % 2 == 0) {
         options_place(state, &where, text, 0);
-        last_line = text;
+        b->last_line = text;
     } else {
-        wrong = bridge_setup_line(&given, last_line, text, NULL);
-        last_line = NULL;
+        wrong = bridge_setup_line(&b->given, b->last_line, text, NULL);
+        b->last_line = NULL;
     }
     if (wrong)
         options_wrong(state, "%s", wrong);
 }
 
-static void check_options(const struct argp_state *state)
+static void check_options(bridge *b, const struct argp_state *state)
 {
-    const char *wrong = bridge_setup_check(&given, "--");
+    const char *wrong = bridge_setup_check(&b->given, "--");
 
-    if (!path && (given.line_count == 0 || last_line))
+    if (!b->path && (b->given.line_count == 0 || b->last_line))
         options_wrong(state, "a bridge needs LINE and FILE, or a FILE of a bridge");
-    if (wrong && !path)
+    if (wrong && !b->path)
         options_wrong(state, "%s", wrong);
     /* The topics of one line need no name that tells it from others. */
-    if (given.line_count == 1)
-        given.lines[0].topic[0] = '\0';
+    if (b->given.line_count == 1)
+        b->given.lines[0].topic[0] = '\0';
 }
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
-    switch (key) {
-    case 'b': take_value(state, BRIDGE_BROKER, "--broker", text); return 0;
-    case 't': take_value(state, BRIDGE_TOPIC, "--topic", text); return 0;
-    case ID: take_value(state, BRIDGE_ID, "--id", text); return 0;
-    case USER: take_value(state, BRIDGE_USER, "--user", text); return 0;
-    case CA: take_value(state, BRIDGE_CA, "--ca", text); return 0;
-    case CERT: take_value(state, BRIDGE_CERT, "--cert", text); return 0;
-    case KEY: take_value(state, BRIDGE_KEY, "--key", text); return 0;
-    case KEEP_ALIVE: take_value(state, BRIDGE_KEEP_ALIVE, "--keep-alive", text); return 0;
-    case DISCOVERY: take_value(state, BRIDGE_DISCOVERY, "--discovery", text); return 0;
-    case DISCOVERY_PREFIX:
-        take_value(state, BRIDGE_DISCOVERY_PREFIX, "--discovery-prefix", text);
+    bridge *b = (bridge *)state->input;
+    if (key >= SETTING && key < SETTING + BRIDGE_SETTINGS) {
+        take_value(b, state, key - SETTING, text);
         return 0;
-    case PLAIN: take_value(state, BRIDGE_PLAIN, "--plain", "yes"); return 0;
-    case ALL: take_value(state, BRIDGE_ALL, "--all", "yes"); return 0;
-    case GAP: take_value(state, BRIDGE_GAP, "--gap", text); return 0;
+    }
+    switch (key) {
+    case 'b': take_value(b, state, BRIDGE_BROKER, text); return 0;
+    case 't': take_value(b, state, BRIDGE_TOPIC, text); return 0;
     case 'q': options.is_quiet = 1; return 0;
-    case CHECK: is_check = 1; return 0;
-    case ARGP_KEY_ARG: read_word(state, text); return 0;
-    case ARGP_KEY_END: check_options(state); return 0;
+    case CHECK: b->is_check = 1; return 0;
+    case ARGP_KEY_ARG: read_word(b, state, text); return 0;
+    case ARGP_KEY_END: check_options(b, state); return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
@@ -435,115 +422,118 @@ static error_t parse(int key, char *text, struct argp_state *state)
 static const struct argp_option texts[] = {
     {"broker", 'b', "HOST[:PORT]", 0, "The broker (localhost; port 1883, with --ca 8883)", 1},
     {"topic", 't', "TOPIC", 0, "The beginning of all topics (modbus)", 1},
-    {"id", ID, "ID", 0, "The MQTT client identifier (random)", 1},
-    {"user", USER, "USER", 0, "The user; the password is in the environment variable MQTT_PASSWORD",
-     1},
-    {"ca", CA, "FILE", 0, "Connect with TLS; the certificates that sign the broker's", 1},
-    {"cert", CERT, "FILE", 0, "The bridge's certificate", 1},
-    {"key", KEY, "FILE", 0, "The bridge's key", 1},
-    {"keep-alive", KEEP_ALIVE, "TIME", 0,
+    {"id", SETTING + BRIDGE_ID, "ID", 0, "The MQTT client identifier (random)", 1},
+    {"user", SETTING + BRIDGE_USER, "USER", 0,
+     "The user; the password is in the environment variable MQTT_PASSWORD", 1},
+    {"ca", SETTING + BRIDGE_CA, "FILE", 0,
+     "Connect with TLS; the certificates that sign the broker's", 1},
+    {"cert", SETTING + BRIDGE_CERT, "FILE", 0, "The bridge's certificate", 1},
+    {"key", SETTING + BRIDGE_KEY, "FILE", 0, "The bridge's key", 1},
+    {"keep-alive", SETTING + BRIDGE_KEEP_ALIVE, "TIME", 0,
      "After this time without a sign of the broker it is taken for lost, 5s to 1h (15s)", 1},
-    {"plain", PLAIN, NULL, 0, "Publish plain text instead of JSON", 2},
-    {"all", ALL, NULL, 0, "Publish every reading, not only changes", 2},
-    {"discovery", DISCOVERY, "WHOSE", 0,
+    {"plain", SETTING + BRIDGE_PLAIN, NULL, 0, "Publish plain text instead of JSON", 2},
+    {"all", SETTING + BRIDGE_ALL, NULL, 0, "Publish every reading, not only changes", 2},
+    {"discovery", SETTING + BRIDGE_DISCOVERY, "WHOSE", 0,
      "Publish for each field how homeassistant finds it, by MQTT discovery", 2},
-    {"discovery-prefix", DISCOVERY_PREFIX, "PREFIX", 0,
+    {"discovery-prefix", SETTING + BRIDGE_DISCOVERY_PREFIX, "PREFIX", 0,
      "The beginning of the topics of discovery (homeassistant)", 2},
-    {"gap", GAP, "N", 0, "Registers between two fields that one request may read too, 0 to 123 (0)",
-     3},
+    {"gap", SETTING + BRIDGE_GAP, "N", 0,
+     "Registers between two fields that one request may read too, 0 to 123 (0)", 3},
     {"check", CHECK, NULL, 0, "Only check the command line and the files", 4},
     {"quiet", 'q', NULL, 0, "Print no summary to stderr", 4},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
-static const struct argp_child children[] = {{&options_request, 0, NULL, 3},
-                                             {&options_service, 0, NULL, 0},
-                                             {&options_trace, 0, NULL, 4},
-                                             {NULL, 0, NULL, 0}};
+static const struct argp_child children[] = {{.argp = &options_request, .group = 3},
+                                             {.argp = &options_service},
+                                             {.argp = &options_trace, .group = 4},
+                                             {0}};
 static const struct argp parser = {
-    texts,
-    parse,
-    "LINE FILE [LINE FILE]...\nBRIDGE.yaml",
-    "Publishes the values of devices to an MQTT broker, and writes what the broker sends.\v"
-    "FILE is a device file; its fields with access write or read-write can be written. Several "
-    "lines have topics below the name of their file. BRIDGE.yaml has the keys lines and broker, and "
-    "what the options say. docs/mqtt.md describes topics and files.\n\n"
-    "SIGHUP reads the files again: broker, and lines that stay the same, stay connected.\n\n"
-    "Examples:\n\n"
-    "  mbm bridge --broker broker.local tcp://192.168.0.7 meter.yaml\n"
-    "  mbm bridge rtu:/dev/ttyUSB0 meter.yaml tcp://192.168.0.7 pump.yaml\n"
-    "  mbm bridge --discovery homeassistant tcp://192.168.0.7 pump.yaml\n"
-    "  mbm bridge bridge.yaml --metrics 127.0.0.1:9100\n\n" SERVICE_HELP PLACE_HELP,
-    children,
-    NULL,
-    NULL};
+    .options = texts,
+    .parser = parse,
+    .args_doc = "LINE FILE [LINE FILE]...\nBRIDGE.yaml",
+    .doc =
+        "Publishes the values of devices to an MQTT broker, and writes what the broker sends.\v"
+        "FILE is a device file; its fields with access write or read-write can be written. Several "
+        "lines have topics below the name of their file. BRIDGE.yaml has the keys lines and broker, and "
+        "what the options say. docs/mqtt.md describes topics and files.\n\n"
+        "SIGHUP reads the files again: broker, and lines that stay the same, stay connected.\n\n"
+        "Examples:\n\n"
+        "  mbm bridge --broker broker.local tcp://192.168.0.7 meter.yaml\n"
+        "  mbm bridge rtu:/dev/ttyUSB0 meter.yaml tcp://192.168.0.7 pump.yaml\n"
+        "  mbm bridge --discovery homeassistant tcp://192.168.0.7 pump.yaml\n"
+        "  mbm bridge bridge.yaml --metrics 127.0.0.1:9100\n\n" SERVICE_HELP PLACE_HELP,
+    .children = children};
 
-/* Opens all lines. Of the command line, each terminal must be there. Returns an exit code. */
-static int begin_lines(void)
+/* Opens all lines. Each terminal of the command line must be there. Returns an exit code. */
+static int begin_lines(bridge *b)
 {
     static next_line next[BRIDGE_LINES];
     char wrong[YAML_FILE_WRONG_BYTES];
     unsigned i;
-    int code = prepare_all(&setup, next, wrong);
+    int code = prepare_all(b, &b->setup, next, wrong);
 
     if (code != CODE_DONE)
         return report(code, "%s", wrong);
-    if (is_check)
-        forget(next, setup.line_count);
-    for (i = 0; !is_check && i < setup.line_count; i++) {
-        code = bridge_line_begin(next[i].line, next[i].table, path != NULL);
+    if (b->is_check)
+        forget(next, b->setup.line_count);
+    for (i = 0; !b->is_check && i < b->setup.line_count; i++) {
+        code = bridge_line_begin(next[i].line, next[i].table, b->path != NULL);
         if (code != CODE_DONE) {
-            forget(next + i, setup.line_count - i);
+            forget(next + i, b->setup.line_count - i);
             return code;
         }
-        lines[line_count++] = next[i].line;
+        b->lines[b->line_count++] = next[i].line;
     }
     return CODE_DONE;
 }
 
 /* Begins all of it. Returns an exit code, after reporting the reason if it is not CODE_DONE. */
-static int begin(void)
+static int begin(bridge *b)
 {
-    int code = read_setup(&setup);
+    int code = read_setup(b, &b->setup);
 
     if (code != CODE_DONE)
-        return report(code, "%s", setup.wrong);
-    if (!bridge_setup_options(&setup, &to))
+        return report(code, "%s", b->setup.wrong);
+    if (!bridge_setup_options(&b->setup, &b->to))
         return report(CODE_SYSTEM, "not enough memory");
-    bridge.is_plain = (uint8_t)bridge_setup_is(&setup, BRIDGE_PLAIN);
-    bridge.is_every = (uint8_t)bridge_setup_is(&setup, BRIDGE_ALL);
-    bridge.has_discovery = (uint8_t)bridge_setup_is(&setup, BRIDGE_DISCOVERY);
-    if (setup.values[BRIDGE_DISCOVERY_PREFIX])
-        discovery_prefix = strdup(setup.values[BRIDGE_DISCOVERY_PREFIX]);
-    code = begin_lines();
-    if (is_check)
+    b->settings.is_plain = (uint8_t)bridge_setup_is(&b->setup, BRIDGE_PLAIN);
+    b->settings.is_every = (uint8_t)bridge_setup_is(&b->setup, BRIDGE_ALL);
+    b->settings.has_discovery = (uint8_t)bridge_setup_is(&b->setup, BRIDGE_DISCOVERY);
+    if (b->setup.values[BRIDGE_DISCOVERY_PREFIX])
+        b->settings.discovery_prefix = strdup(b->setup.values[BRIDGE_DISCOVERY_PREFIX]);
+    code = begin_lines(b);
+    if (b->is_check)
         return code;
     if (code == CODE_DONE)
-        code = service_begin(fill_stats);
+        code = service_begin(fill_stats, b);
     if (code == CODE_DONE)
-        code = broker_begin(&bridge.mqtt, &to);
-    alone_since = line_milliseconds();
+        code = broker_begin(&b->settings.mqtt, &b->to);
+    b->alone_since = line_milliseconds();
     return code;
 }
 
 int bridge_command(int argc, char **argv)
 {
+    static bridge data;
+    bridge *b = &data;
     int code;
 
-    argp_parse(&parser, argc, argv, 0, NULL, NULL);
-    code = begin();
-    if (code == CODE_DONE && !is_check) {
+    b->has_events = 1;
+    argp_parse(&parser, argc, argv, 0, NULL, b);
+    code = begin(b);
+    if (code == CODE_DONE && !b->is_check) {
         service_is_ready();
         while (!report_stopped)
-            work();
+            work(b);
         service_end();
-        broker_end(&bridge.mqtt);
+        broker_end(&b->settings.mqtt);
         if (!options.is_quiet)
             fprintf(stderr, "%s: messages published: %lu, writes lost: %lu.\n", report_name,
-                    atomic_load(&bridge.mqtt.published), atomic_load(&bridge.mqtt.lost));
+                    atomic_load(&b->settings.mqtt.published), atomic_load(&b->settings.mqtt.lost));
     }
-    while (line_count > 0)
-        bridge_line_end(lines[--line_count]);
-    bridge_setup_free(&setup);
-    bridge_setup_free(&given);
+    while (b->line_count > 0)
+        bridge_line_end(b->lines[--b->line_count]);
+    bridge_setup_free(&b->setup);
+    bridge_setup_free(&b->given);
     return code;
 }

@@ -1,16 +1,140 @@
+/* Reads a line's table, publishes its values and units, and carries out writes.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "bridge_line.h"
 
+#include "clock.h"
+#include "device_file.h"
+#include "device_plan.h"
 #include "discovery.h"
 #include "report.h"
-#include "value_text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
-bridge_settings bridge;
+/* --- the table of a line --- */
+
+/* Tells two contents of a file apart (FNV-1a, 64 bits). Returns 0 if it cannot be read. */
+static uint64_t digest_of(const char *path)
+{
+    uint64_t digest = 0xCBF29CE484222325u;
+    FILE *file = fopen(path, "rb");
+    int one;
+
+    if (!file)
+        return 0;
+    while ((one = getc(file)) != EOF)
+        digest = (digest ^ (uint64_t)one) * 0x100000001B3u;
+    (void)fclose(file);
+    return digest;
+}
+
+/* Returns NULL, or why the bridge cannot publish or write a field. */
+static const char *check_field(const device_field *field, const mbm_planField *planned)
+{
+    const char *wrong = broker_check_name(field->name);
+    const uint32_t size = device_size(planned);
+
+    if (wrong || !(field->access & DEVICE_WRITE))
+        return wrong;
+    if (planned->table == MBM_TABLE_COILS && size > MBM_MAX_WRITE_BITS)
+        return "one request writes at most 1968 coils";
+    if (planned->table != MBM_TABLE_COILS && size > MBM_MAX_WRITE_REGISTERS)
+        return "one request writes at most 123 registers";
+    return NULL;
+}
+
+/* Returns an exit code; with the reason in `wrong` if it is not CODE_DONE. */
+static int check_fields(const device *of, const char *path, char wrong[YAML_FILE_WRONG_BYTES])
+{
+    uint16_t field;
+
+    for (field = 0; field < of->count; field++) {
+        const char *why = check_field(&of->fields[field], &of->planned[field]);
+
+        if (!why)
+            continue;
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s:%d: %s: %s", path, of->fields[field].line,
+                 of->fields[field].name, why);
+        return CODE_WRONG;
+    }
+    if (of->readable > 0)
+        return CODE_DONE;
+    snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: no field can be read", path);
+    return CODE_WRONG;
+}
+
+/* Gives the plan its storage. Returns 0 without memory. */
+static int make_storage(bridge_table *table, uint8_t register_gap)
+{
+    const size_t count = table->fields.readable;
+    size_t field;
+
+    table->last = (published *)calloc(count, sizeof *table->last);
+    for (field = 0; field < count; field++)
+        table->units[table->fields.planned[field].unit].fields++;
+    if (!device_plan_make(&table->setup, &table->fields, register_gap, BRIDGE_REQUESTS))
+        return 0;
+    table->setup.bitGap = 0;
+    return table->last != NULL;
+}
+
+/* Tries the plan. Returns an exit code. */
+static int try_plan(const bridge_table *table, const char *path, char wrong[YAML_FILE_WRONG_BYTES])
+{
+    static mbm_plan plan = MBM_INIT;
+    uint16_t field;
+    const uint8_t status = device_plan_try(&plan, &table->setup, &field);
+
+    (void)mbm_plan_end(&plan);
+    if (status == MBM_OK)
+        return CODE_DONE;
+    snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s",
+             device_plan_wrong(&table->fields, path, status, field));
+    return CODE_WRONG;
+}
+
+bridge_table *bridge_table_read(const char *path, uint8_t register_gap, int *code,
+                                char wrong[YAML_FILE_WRONG_BYTES])
+{
+    bridge_table *table = (bridge_table *)calloc(1, sizeof *table);
+
+    if (!table) {
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: not enough memory", path);
+        *code = CODE_SYSTEM;
+        return NULL;
+    }
+    table->digest = digest_of(path);
+    *code = device_file_read(&table->fields, path, wrong);
+    if (*code == CODE_DONE)
+        *code = check_fields(&table->fields, path, wrong);
+    if (*code == CODE_DONE && !make_storage(table, register_gap)) {
+        *code = CODE_SYSTEM;
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: not enough memory", path);
+    }
+    if (*code == CODE_DONE)
+        *code = try_plan(table, path, wrong);
+    if (*code == CODE_DONE)
+        return table;
+    bridge_table_free(table);
+    return NULL;
+}
+
+void bridge_table_free(bridge_table *table)
+{
+    uint16_t field;
+
+    if (!table)
+        return;
+    for (field = 0; table->last && field < table->fields.readable; field++)
+        free(table->last[field].value);
+    free(table->last);
+    device_plan_free(&table->setup);
+    device_free(&table->fields);
+    free(table);
+}
 
 /* --- publishing --- */
 
@@ -20,7 +144,7 @@ static void publish(const bridge_line *l, const char *name, const char *last, co
     char full[BRIDGE_TOPIC_BYTES + BROKER_LONGEST_TOPIC];
 
     snprintf(full, sizeof full, "%s%s", l->below, name);
-    broker_publish(&bridge.mqtt, full, last, text, is_retained);
+    broker_publish(&l->bridge->mqtt, full, last, text, is_retained);
 }
 
 /* Whether a status came from the unit itself, and not from a line or gateway that lacks it. */
@@ -73,31 +197,23 @@ static void update_unit(bridge_line *l, uint16_t field, uint8_t status)
 /* Publishes the last value of a field, with its status and the time at which it was read. */
 static void publish_value(bridge_line *l, uint16_t field)
 {
-    static char json[VALUE_TEXT_LONGEST + 128];
+    static char json[DEVICE_TEXT_LONGEST + 128];
     const published *what = &l->table->last[field];
     const char *value = what->value ? what->value : "null";
     const char *name = l->table->fields.fields[field].name;
-    struct timespec now;
     uint32_t age = 0;
-    char when[40];
+    char when[CLOCK_TEXT_BYTES];
 
-    if (bridge.is_plain) {
+    if (l->bridge->is_plain) {
         /* Plain text has no place for a status: what failed is not published. */
         if (what->value && what->status == MBM_OK)
             publish(l, name, NULL, value, 1);
         return;
     }
     (void)mbm_plan_getStatus(&l->plan, field, &age);
-    clock_gettime(CLOCK_REALTIME, &now);
-    if (what->value) {
-        now.tv_sec -= age / 1000;
-        now.tv_nsec -= (long)(age % 1000) * 1000000;
-        if (now.tv_nsec < 0) {
-            now.tv_nsec += 1000000000;
-            now.tv_sec--;
-        }
-    }
-    report_time(&now, when);
+    if (!what->value)
+        age = 0;
+    (void)clock_text(clock_micros(CLOCK_REALTIME) - age * (uint64_t)1000, 3, when);
     snprintf(json, sizeof json, "{\"value\":%s,\"status\":\"%s\",\"time\":\"%s\"}", value,
              mbm_status_text(what->status), when);
     publish(l, name, NULL, json, 1);
@@ -106,13 +222,14 @@ static void publish_value(bridge_line *l, uint16_t field)
 /* Called by the plan for each field whose read has ended. */
 static void on_update(void *context, mbm_plan *ended, uint16_t field)
 {
-    static char text[VALUE_TEXT_LONGEST];
+    static char text[DEVICE_TEXT_LONGEST];
     bridge_line *l = (bridge_line *)context;
     published *was = &l->table->last[field];
     const uint8_t status = mbm_plan_getStatus(ended, field, NULL);
-    int is_new = bridge.is_every || status != was->status || !was->has_ended;
+    int is_new = l->bridge->is_every || status != was->status || !was->has_ended;
 
-    if (status == MBM_OK && value_text(ended, &l->table->fields, field, !bridge.is_plain, text) &&
+    if (status == MBM_OK &&
+        device_plan_text(ended, &l->table->fields, field, !l->bridge->is_plain, text) &&
         (!was->value || strcmp(text, was->value) != 0)) {
         free(was->value);
         was->value = strdup(text);
@@ -128,9 +245,10 @@ static const discovery_line *discovery_of(const bridge_line *l)
 {
     static discovery_line as;
 
-    as.topic = bridge.mqtt.topic;
+    as.prefix = l->bridge->discovery_prefix ? l->bridge->discovery_prefix : "homeassistant";
+    as.topic = l->bridge->mqtt.topic;
     as.below = l->below;
-    as.is_plain = bridge.is_plain;
+    as.is_plain = l->bridge->is_plain;
     return &as;
 }
 
@@ -144,7 +262,7 @@ static void discover(bridge_line *l)
         char *text = discovery_config(discovery_of(l), &l->table->fields, field, topic);
 
         if (text)
-            broker_publish_at(&bridge.mqtt, topic, text);
+            broker_publish_at(&l->bridge->mqtt, topic, text);
         free(text);
     }
 }
@@ -154,8 +272,8 @@ void bridge_line_connected(bridge_line *l)
     unsigned number;
     uint16_t field;
 
-    broker_subscribe(&bridge.mqtt, l->below);
-    if (bridge.has_discovery)
+    broker_subscribe(&l->bridge->mqtt, l->below);
+    if (l->bridge->has_discovery)
         discover(l);
     for (number = 1; number < 256; number++)
         if (l->table->units[number].state != UNIT_UNKNOWN)
@@ -180,7 +298,7 @@ static int is_discovered(const bridge_line *l, const device *next, const char *n
     return strcmp(topic, other) == 0;
 }
 
-/* Removes what is retained of the table, except what `next` has too. */
+/* Removes the retained messages of the table, except those that `next` has too. */
 static void remove_retained(bridge_line *l, const bridge_table *next)
 {
     const device *fields = &l->table->fields, *others = next ? &next->fields : NULL;
@@ -194,11 +312,11 @@ static void remove_retained(bridge_line *l, const bridge_table *next)
 
         if (field < fields->readable && (other < 0 || other >= others->readable))
             publish(l, name, NULL, "", 1);
-        if (!bridge.has_discovery)
+        if (!l->bridge->has_discovery)
             continue;
         discovery_topic(discovery_of(l), fields, field, topic);
         if (!is_discovered(l, others, name, topic))
-            broker_publish_at(&bridge.mqtt, topic, "");
+            broker_publish_at(&l->bridge->mqtt, topic, "");
     }
     for (number = 1; number < 256; number++)
         if (l->table->units[number].fields > 0 && (!next || next->units[number].fields == 0))
@@ -209,8 +327,8 @@ static void remove_retained(bridge_line *l, const bridge_table *next)
 
 static void publish_result(const bridge_line *l, const char *name, const char *result)
 {
-    bridge.refused += strcmp(result, "success") != 0;
-    bridge.written += strcmp(result, "success") == 0;
+    l->bridge->refused += strcmp(result, "success") != 0;
+    l->bridge->written += strcmp(result, "success") == 0;
     publish(l, name, "result", result, 0);
 }
 
@@ -246,7 +364,7 @@ static uint8_t write_part(bridge_line *l, bridge_write *write, const mbm_planFie
                                         device_part(planned, bits[0]));
 }
 
-/* Packs coils, of which each has a word, eight to a byte. */
+/* Packs coils, one word each, eight to a byte. */
 static void pack_coils(const uint16_t *bits, uint16_t count, void *bytes)
 {
     uint8_t *to = (uint8_t *)bytes;
@@ -342,13 +460,14 @@ void bridge_line_write(bridge_line *l, const char *name, const broker_event *eve
 
 /* --- a line --- */
 
-bridge_line *bridge_line_make(const char *text, const char *path, const char *topic,
-                              const place *where)
+bridge_line *bridge_line_make(bridge_settings *bridge, const char *text, const char *path,
+                              const char *topic, const place *where)
 {
     bridge_line *l = (bridge_line *)calloc(1, sizeof *l);
 
     if (!l)
         return NULL;
+    l->bridge = bridge;
     l->text = strdup(text);
     l->path = strdup(path);
     l->topic = strdup(topic);
@@ -390,7 +509,7 @@ void bridge_line_replace(bridge_line *l, bridge_table *next)
     (void)mbm_plan_end(&l->plan);
     begin_plan(l, next);
     bridge_table_free(before);
-    if (bridge.has_discovery)
+    if (l->bridge->has_discovery)
         discover(l);
 }
 
@@ -402,7 +521,7 @@ void bridge_line_clear(bridge_line *l)
         if (l->writes[i].is_used)
             publish_result(l, l->writes[i].name, "the line was removed from the bridge");
     remove_retained(l, NULL);
-    broker_unsubscribe(&bridge.mqtt, l->below);
+    broker_unsubscribe(&l->bridge->mqtt, l->below);
 }
 
 void bridge_line_end(bridge_line *l)

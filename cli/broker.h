@@ -1,6 +1,6 @@
 /* The connection of `mbm bridge` to its MQTT broker, by libmosquitto. A thread of libmosquitto
- * connects, and connects again after the broker was lost, after 1 s, then 2 s, up to 30 s. What
- * arrives is handed to the program through a pipe, so the program needs no locks.
+ * connects, and connects again after the broker was lost, after 1 s, then 2 s, up to 30 s. It hands
+ * what arrives to the program through a pipe, so the program needs no locks.
  *
  * Licence: MIT OR Apache-2.0. */
 #ifndef BROKER_H
@@ -13,8 +13,8 @@
 
 struct mosquitto;
 
-/* The most levels of a field's name, of which a/b/c has three; and the most bytes of the topic of a
- * bridge. */
+/* The most levels of a field's name (a/b/c has three), and the most bytes of the topic of a bridge.
+ */
 enum { BROKER_LEVELS = 8, BROKER_TOPIC_BYTES = 200 };
 
 typedef struct broker_options {
@@ -55,9 +55,9 @@ const char *broker_check_name(const char *name);
  * it is not CODE_DONE. */
 int broker_begin(broker *of, const broker_options *options);
 
-/* Subscribes to the writes of all names below a name of several levels, which ends with /; or of
- * all names, if it is empty: names of up to BROKER_LEVELS levels, so that writes to unknown fields
- * are answered. Or ends that. To be called after BROKER_CONNECTED. */
+/* Subscribe to the writes of all names below a name that ends with /, or of all names if it is
+ * empty; and end that. Names have up to BROKER_LEVELS levels, so that writes to unknown fields are
+ * answered. Call them after BROKER_CONNECTED. */
 void broker_subscribe(broker *of, const char *below);
 void broker_unsubscribe(broker *of, const char *below);
 

@@ -1,7 +1,6 @@
 /* mbm call: sends any request. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "advice.h"
-#include "commands.h"
 #include "line.h"
 #include "numbers.h"
 #include "options.h"
@@ -13,68 +12,70 @@
 
 enum { MBAP = 7 };
 
-static line at;
-static place where;
-/* Frames of Modbus TCP: the PDUs behind a header, for mbm_frame_text. */
-static uint8_t asked[MBAP + MBM_MAX_PDU], answered[MBAP + MBM_MAX_PDU];
-static size_t length;
+typedef struct call {
+    line at;
+    place where;
+    /* Frames of Modbus TCP: the PDUs after a header, for mbm_frame_text. */
+    uint8_t asked[MBAP + MBM_MAX_PDU], answered[MBAP + MBM_MAX_PDU];
+    size_t length;
+} call;
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
+    call *c = (call *)state->input;
     const char *wrong;
 
     switch (key) {
     case ARGP_KEY_ARG:
         if (state->arg_num == 0) {
-            options_place(state, &where, text, 0);
+            options_place(state, &c->where, text, 0);
             return 0;
         }
-        wrong = number_hex(text, asked + MBAP, MBM_MAX_PDU, &length);
+        wrong = number_hex(text, c->asked + MBAP, MBM_MAX_PDU, &c->length);
         if (wrong)
             options_wrong(state, "HEX %s", wrong);
         return 0;
     case ARGP_KEY_SUCCESS:
-        if (length == 0)
-            options_wrong(state, "%s is missing", where.text ? "HEX" : "LINE");
-        options_check_unit(state, &where, 1);
-        if (asked[MBAP] == 0 || asked[MBAP] > 127)
-            options_wrong(state, "HEX begins with %02X: a function code is 01 to 7F", asked[MBAP]);
+        if (c->length == 0)
+            options_wrong(state, "%s is missing", c->where.text ? "HEX" : "LINE");
+        options_check_unit(state, &c->where, 1);
+        if (c->asked[MBAP] == 0 || c->asked[MBAP] > 127)
+            options_wrong(state, "HEX begins with %02X: a function code is 01 to 7F",
+                          c->asked[MBAP]);
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
 
 static const struct argp_child children[] = {
-    {&options_unit, 0, NULL, 0}, {&options_client, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+    {.argp = &options_unit}, {.argp = &options_client}, {0}};
 
 static const struct argp arguments = {
-    NULL,
-    parse,
-    "LINE HEX...",
-    "Sends a request that is given as a PDU in hexadecimal bytes, function code first, without unit "
-    "and checksum. Prints the PDU of the response in hexadecimal, and in words.\v"
-    "Example: read two holding registers from address 100 (hexadecimal 64) on\n\n"
-    "  mbm call tcp://192.168.0.7 --unit 17 03 00 64 00 02\n\n" PLACE_HELP,
-    children,
-    NULL,
-    NULL};
+    .parser = parse,
+    .args_doc = "LINE HEX...",
+    .doc =
+        "Sends a request that is given as a PDU in hexadecimal bytes, function code first, without unit "
+        "and checksum. Prints the PDU of the response in hexadecimal, and in words.\v"
+        "Example: read two holding registers from address 100 (hexadecimal 64) on\n\n"
+        "  mbm call tcp://192.168.0.7 --unit 17 03 00 64 00 02\n\n" PLACE_HELP,
+    .children = children};
 
 /* Sends a request that mbm understands, or, if it breaks a rule of its function, as it is. */
-static uint8_t queue(mbm_clientRequest *request)
+static uint8_t queue(call *c, mbm_clientRequest *request)
 {
     static const mbm_rule any_length = {.kind = MBM_RULE_SILENCE};
-    const uint16_t bytes = (uint16_t)(length - 1);
-    const uint8_t *const pdu = asked + MBAP;
+    const uint16_t bytes = (uint16_t)(c->length - 1);
+    const uint8_t *const pdu = c->asked + MBAP;
     /* A count of 6 is too small for records: mbm_client_forward would add one. */
     const int lacks_count =
         bytes > 0 && pdu[1] == 6 &&
         (pdu[0] == MBM_FC_READ_FILE_RECORD || pdu[0] == MBM_FC_WRITE_FILE_RECORD);
 
     if (!lacks_count &&
-        mbm_client_forward(&at.client, request, pdu[0], pdu + 1, bytes) == MBM_PENDING)
+        mbm_client_forward(&c->at.client, request, pdu[0], pdu + 1, bytes) == MBM_PENDING)
         return MBM_PENDING;
-    request->data = asked + MBAP + 1;
-    return mbm_client_custom(&at.client, request, asked[MBAP], bytes, &any_length);
+    request->data = c->asked + MBAP + 1;
+    return mbm_client_custom(&c->at.client, request, c->asked[MBAP], bytes, &any_length);
 }
 
 /* The PDU in hexadecimal and in words. */
@@ -93,30 +94,31 @@ static void describe(uint8_t *frame, uint16_t bytes, uint8_t kind, char *hex, ch
 }
 
 /* True unless no device answers the request: a broadcast, or Force Listen Only Mode. */
-static int has_reply(void)
+static int has_reply(call *c)
 {
     static const uint8_t listen_only[] = {8, 0, MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY};
 
-    return !(options.unit == 0 && place_is_serial(&where)) &&
-           !(length > sizeof listen_only && !memcmp(asked + MBAP, listen_only, sizeof listen_only));
+    return !(options.unit == 0 && place_is_serial(&c->where)) &&
+           !(c->length > sizeof listen_only &&
+             !memcmp(c->asked + MBAP, listen_only, sizeof listen_only));
 }
 
-static void show(const mbm_clientRequest *request)
+static void show(call *c, const mbm_clientRequest *request)
 {
     char hex[3 * MBM_MAX_PDU + 1], words[2400], status[256];
     uint16_t bytes = 0;
     cJSON *all;
 
     if (request->exception != 0) {
-        answered[MBAP] = asked[MBAP] | 0x80;
-        answered[MBAP + 1] = request->exception;
+        c->answered[MBAP] = c->asked[MBAP] | 0x80;
+        c->answered[MBAP + 1] = request->exception;
         bytes = 2;
-    } else if (request->status == MBM_OK && has_reply()) {
-        answered[MBAP] = asked[MBAP];
+    } else if (request->status == MBM_OK && has_reply(c)) {
+        c->answered[MBAP] = c->asked[MBAP];
         bytes = (uint16_t)(1 + request->length);
     }
     if (!options.is_json) {
-        describe(answered, bytes, MBM_PACKET_RESPONSE, hex, words);
+        describe(c->answered, bytes, MBM_PACKET_RESPONSE, hex, words);
         if (bytes > 0)
             printf("%s\n%s\n", hex, words);
         else if (request->status == MBM_OK && !options.is_quiet)
@@ -125,28 +127,30 @@ static void show(const mbm_clientRequest *request)
     }
     all = cJSON_CreateObject();
     cJSON_AddNumberToObject(all, "unit", options.unit);
-    describe(asked, (uint16_t)length, MBM_PACKET_REQUEST, hex, words);
+    describe(c->asked, (uint16_t)c->length, MBM_PACKET_REQUEST, hex, words);
     cJSON_AddStringToObject(all, "request", hex);
-    describe(answered, bytes, MBM_PACKET_RESPONSE, hex, words);
+    describe(c->answered, bytes, MBM_PACKET_RESPONSE, hex, words);
     if (bytes > 0) {
         cJSON_AddStringToObject(all, "response", hex);
         cJSON_AddStringToObject(all, "words", words);
     }
-    report_json(all, request->status, request->exception, line_status(&at, request, status));
+    report_json(all, request->status, request->exception, line_status(&c->at, request, status));
 }
 
 int call_command(int argc, char **argv)
 {
-    mbm_clientRequest request = {.reply = answered + MBAP + 1, .replyBytes = MBM_MAX_PDU - 1};
+    static call data;
+    call *c = &data;
+    mbm_clientRequest request = {.reply = c->answered + MBAP + 1, .replyBytes = MBM_MAX_PDU - 1};
 
-    argp_parse(&arguments, argc, argv, 0, NULL, NULL);
+    argp_parse(&arguments, argc, argv, 0, NULL, c);
     request.unit = options.unit;
-    if (line_open(&at, &where) == CODE_DONE && line_connect(&at) == CODE_DONE) {
-        request.status = line_call(&at, &request, queue(&request));
+    if (line_open(&c->at, &c->where) == CODE_DONE && line_connect(&c->at) == CODE_DONE) {
+        request.status = line_call(&c->at, &request, queue(c, &request));
         if (request.status != MBM_OK)
-            (void)line_failure(&at, &request, ADVICE_CALL);
-        show(&request);
+            (void)line_failure(&c->at, &request, ADVICE_CALL);
+        show(c, &request);
     }
-    line_close(&at);
+    line_close(&c->at);
     return report_code;
 }

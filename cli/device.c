@@ -1,3 +1,6 @@
+/* Finds, measures and frees the fields of a device.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #include "device.h"
 
 #include <stdlib.h>

@@ -47,19 +47,19 @@ void device_free(device *into);
 /* Returns the index of the field with this name, or -1. */
 int device_find(const device *from, const char *name);
 
-/* Returns the name that an enumeration has for a value of a field: its words as in the registers,
- * of bits the number. NULL if there is none. */
+/* Returns the name that an enumeration has for a value of a field, or NULL. `words` are those of
+ * the registers; the value of bits is their number. */
 const char *device_label_of(const device *from, uint16_t field, const uint16_t *words);
 
 /* Returns how many registers or bits a field has. */
 uint32_t device_size(const mbm_planField *planned);
 
-/* Returns whether a field is bits of one register, and which bits of its words a field has: all but
- * of such a field. */
+/* Returns whether a field is bits of one register; and which bits of its words a field has: only
+ * such a field has not all. */
 int device_is_part(const mbm_planField *planned);
 uint16_t device_mask(const mbm_planField *planned);
 
-/* Returns the word of a register in which the bits of a field are this number. */
+/* Returns the word of a register that has this number in the bits of a field. */
 uint16_t device_part(const mbm_planField *planned, uint16_t bits);
 
 #endif

@@ -18,8 +18,8 @@
 #include "device.h"
 #include "yaml_file.h"
 
-/* Reads a file. Returns CODE_DONE, and then device_free frees the device; or CODE_SYSTEM or
- * CODE_WRONG with what is wrong, a sentence without its full stop: "meter.yaml:12: ...". */
+/* Reads a file. Returns CODE_DONE; device_free frees the device. Otherwise returns CODE_SYSTEM or
+ * CODE_WRONG, and sets `wrong` to a sentence without its full stop: "meter.yaml:12: ...". */
 int device_file_read(device *into, const char *path, char wrong[YAML_FILE_WRONG_BYTES]);
 
 #endif

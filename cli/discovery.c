@@ -1,3 +1,6 @@
+/* Writes the topics and the JSON of Home Assistant's MQTT discovery.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "discovery.h"
 
@@ -9,12 +12,10 @@
 
 enum { LONGEST_STATE = 255, TOPIC_BYTES = 512, ID_BYTES = 300 };
 
-const char *discovery_prefix = "homeassistant";
-
 /* --- names --- */
 
-/* Writes a text with the characters of an identifier, [a-zA-Z0-9_-], alone. A number at its end
- * keeps texts apart of which other characters were replaced. */
+/* Writes a text with only the characters of an identifier, [a-zA-Z0-9_-]. If other characters were
+ * replaced, a number at the end tells the text from others. */
 static void write_id(const char *text, char id[ID_BYTES])
 {
     uint32_t digest = 0x811C9DC5u;
@@ -34,7 +35,7 @@ static void write_id(const char *text, char id[ID_BYTES])
         snprintf(id + at, ID_BYTES - at, "_%08x", digest);
 }
 
-/* The identifier of a line, of which all its topics have the beginning. */
+/* Writes the identifier of a line: the beginning of all its topics. */
 static void line_id(const discovery_line *line, char id[ID_BYTES])
 {
     char text[TOPIC_BYTES];
@@ -79,7 +80,7 @@ static const char *component_of(const device *of, uint16_t field)
     const mbm_planField *planned = &of->planned[field];
     const int is_written = of->fields[field].access & DEVICE_WRITE;
 
-    /* What is written without a state is a text too: Home Assistant has no list of numbers. */
+    /* Several values are a text if they are written: Home Assistant has no list of numbers. */
     if (is_several(planned))
         return is_written ? "text" : "sensor";
     if (is_text(planned))
@@ -98,7 +99,7 @@ void discovery_topic(const discovery_line *line, const device *of, uint16_t fiel
 
     line_id(line, node);
     write_id(of->fields[field].name, object);
-    snprintf(topic, DISCOVERY_TOPIC_BYTES, "%s/%s/%s/%s/config", discovery_prefix,
+    snprintf(topic, DISCOVERY_TOPIC_BYTES, "%s/%s/%s/%s/config", line->prefix,
              component_of(of, field), node, object);
 }
 
@@ -168,7 +169,7 @@ static int is_read(const device *of, uint16_t unit)
     return 0;
 }
 
-/* What is online while the bridge is connected and the unit answers. */
+/* The entity is online while the bridge is connected and the unit answers. */
 static void add_availability(cJSON *to, const discovery_line *line, const device *of,
                              const mbm_planField *planned)
 {
@@ -229,10 +230,10 @@ static void write_literal(FILE *out, const char *text)
     cJSON_Delete(string);
 }
 
-/* Which of the two a template looks up: a number, as JSON or as a text, or a name. */
+/* A template looks up one of these: a number, as JSON or as a text, or a name. */
 typedef enum lookup { BY_NUMBER, BY_TEXT, BY_NAME } lookup;
 
-/* Adds a template that looks up the other one, from a table of both and the `end` that uses it. */
+/* Adds a template: a table of numbers and names, and the `end` that looks one up. */
 static void add_names(cJSON *to, const char *key, const device_field *one, lookup by,
                       const char *end)
 {

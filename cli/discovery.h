@@ -10,14 +10,12 @@
 
 enum { DISCOVERY_TOPIC_BYTES = 700 };
 
-/* Where the fields are published: at TOPIC/BELOWNAME. */
+/* Where the fields are published: at TOPIC/BELOWNAME. The topics of discovery begin with `prefix`.
+ */
 typedef struct discovery_line {
-    const char *topic, *below;
+    const char *prefix, *topic, *below;
     uint8_t is_plain;
 } discovery_line;
-
-/* The prefix of all topics of discovery: "homeassistant". */
-extern const char *discovery_prefix;
 
 /* Writes the topic of a field's message. */
 void discovery_topic(const discovery_line *line, const device *of, uint16_t field,

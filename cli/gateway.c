@@ -6,8 +6,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
-#include "ahead_port.h"
-#include "commands.h"
+#include "port_over.h"
 #include "gateway_line.h"
 #include "options.h"
 #include "report.h"
@@ -15,7 +14,6 @@
 #include "trace.h"
 
 #include <errno.h>
-#include <netdb.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,145 +26,148 @@ enum {
     ROUTES = UINT8_MAX
 };
 
-/* All storage is the program's own; mbm allocates nothing. */
-static gateway_line lines[GATEWAY_LINES];
-static mbm_gateway gateway = MBM_INIT;
-static mbm_gatewayLine gateway_lines[GATEWAY_LINES] = MBM_INIT;
-static mbm_gatewayRoute routes[ROUTES];
-static mbm_gatewayConnection connections[GATEWAY_CONNECTIONS] = MBM_INIT;
-static mbm_gatewayRequest requests[GATEWAY_CONNECTIONS + GATEWAY_REQUESTS] = MBM_INIT;
-static mbm_gatewayConfig config = {
-    .routes = routes,
-    .routeCount = ROUTES,
-    .lines = gateway_lines,
-    .connections = connections,
-    .requests = requests,
-};
-static mbm_tcp tcps[GATEWAY_CONNECTIONS] = MBM_INIT;
-static ahead_port aheads[GATEWAY_CONNECTIONS];
-static mbm_tcp_listener listener = MBM_INIT;
-static int is_client_waiting = 1; /* at the listener, as far as is known */
-static unsigned long connected, reloads, refused_reloads;
+/* The descriptors of one sleep. A descriptor that is not open is left out, since the system
+ * refuses a list that is longer than the limit of descriptors. */
+typedef struct sleep_waits {
+    struct pollfd polls[1 + GATEWAY_LINES + GATEWAY_CONNECTIONS + SERVICE_WAITS];
+    uint8_t slots[GATEWAY_LINES + GATEWAY_CONNECTIONS]; /* of clients, and then of lines */
+    nfds_t clients, count;
+} sleep_waits;
 
-/* What the command line says, and what is in force: the same, or with what the file says. */
-static gateway_setup given = {
-    .idleMs = 60000,
-    .connections = CONNECTIONS,
-    .requests = 8,
-    .pace = {.timeoutMs = 1000, .quietMs = 100, .in_flight = 1, .replace_after = 2}};
-static gateway_setup setup;
-static const char *path;                /* of the file; NULL: the command line has the lines */
-static uint8_t place_of[GATEWAY_LINES]; /* the index in `lines` of each line of the setup */
-static int is_quiet, is_check;
+/* All storage is the program's own; mbm allocates nothing. */
+typedef struct gateway {
+    gateway_line lines[GATEWAY_LINES];
+    mbm_gateway gateway;
+    mbm_gatewayLine gateway_lines[GATEWAY_LINES];
+    mbm_gatewayRoute routes[ROUTES];
+    mbm_gatewayConnection connections[GATEWAY_CONNECTIONS];
+    mbm_gatewayRequest requests[GATEWAY_CONNECTIONS + GATEWAY_REQUESTS];
+    mbm_gatewayConfig config;
+    mbm_tcp tcps[GATEWAY_CONNECTIONS];
+    ahead_port aheads[GATEWAY_CONNECTIONS];
+    mbm_tcp_listener listener;
+    int is_client_waiting; /* at the listener, as far as is known */
+    sleep_waits waits;
+    found_round round;
+    unsigned long connected, reloads, refused_reloads;
+
+    /* What the command line says, and what is in force: the same, or with what the file says. */
+    gateway_setup given, setup;
+    const char *path;                /* of the file; NULL: the command line has the lines */
+    uint8_t place_of[GATEWAY_LINES]; /* the index in `lines` of each line of the setup */
+    int is_quiet, is_check;
+} gateway;
 
 /* --- lines and routes --- */
 
 /* Fills the map of units with the routes of lines that are there. */
-static void map_units(void)
+static void map_units(gateway *g)
 {
     unsigned i, count = 0;
 
-    for (i = 0; i < setup.route_count; i++) {
-        mbm_gatewayRoute route = setup.routes[i];
+    for (i = 0; i < g->setup.route_count; i++) {
+        mbm_gatewayRoute route = g->setup.routes[i];
 
-        route.line = place_of[route.line];
-        if (lines[route.line].is_used)
-            routes[count++] = route;
+        route.line = g->place_of[route.line];
+        if (g->lines[route.line].is_used)
+            g->routes[count++] = route;
     }
     /* No unit is in a range whose last unit is below its first. */
     while (count < ROUTES)
-        routes[count++] = (mbm_gatewayRoute){1, 0, 0, 0};
+        g->routes[count++] = (mbm_gatewayRoute){1, 0, 0, 0};
 }
 
-static void set_line(unsigned index)
+static void set_line(gateway *g, unsigned index)
 {
-    const unsigned slot = place_of[index];
-    const int is_tcp = lines[slot].place.framing == MBM_FRAMING_TCP;
+    const unsigned slot = g->place_of[index];
+    const int is_tcp = g->lines[slot].at.place.framing == MBM_FRAMING_TCP;
 
-    gateway_line_set(&lines[slot], &setup.lines[index].pace);
-    gateway_lines[slot].inFlight = (uint8_t)(is_tcp ? setup.lines[index].pace.in_flight : 1);
+    gateway_line_set(&g->lines[slot], &g->setup.lines[index].pace);
+    g->gateway_lines[slot].inFlight = (uint8_t)(is_tcp ? g->setup.lines[index].pace.in_flight : 1);
 }
 
-static int begin_line(unsigned index)
+static int begin_line(gateway *g, unsigned index)
 {
-    const unsigned slot = place_of[index];
+    const unsigned slot = g->place_of[index];
 
-    if (!gateway_line_begin(&lines[slot], &setup.lines[index].place, &setup.lines[index].pace))
+    if (!gateway_line_begin(&g->lines[slot], &g->setup.lines[index].place,
+                            &g->setup.lines[index].pace))
         return report(CODE_SYSTEM, "not enough memory");
-    set_line(index);
+    set_line(g, index);
     return CODE_DONE;
 }
 
 /* Sets what a reload may change of the whole gateway. */
-static void set_gateway(void)
+static void set_gateway(gateway *g)
 {
-    (void)mbm_gateway_setMaxPending(&gateway, (uint16_t)setup.requests);
-    (void)mbm_gateway_setQueueTime(&gateway, setup.queueMs);
-    listener.idleTimeMs = setup.idleMs;
+    (void)mbm_gateway_setMaxPending(&g->gateway, (uint16_t)g->setup.requests);
+    (void)mbm_gateway_setQueueTime(&g->gateway, g->setup.queueMs);
+    g->listener.idleTimeMs = g->setup.idleMs;
 }
 
 /* Begins the gateway and its lines, with all settings. Returns an exit code. */
-static int begin(void)
+static int begin(gateway *g)
 {
-    unsigned i, places = setup.line_count;
+    unsigned i, places = g->setup.line_count;
 
-    if (path)
+    if (g->path)
         places = places + SPARE_LINES > GATEWAY_LINES ? GATEWAY_LINES : places + SPARE_LINES;
     for (i = 0; i < places; i++) {
-        gateway_line_leave(&lines[i]);
-        gateway_lines[i] = (mbm_gatewayLine){
-            .client = &lines[i].client, .context = &lines[i], .isReady = gateway_line_isReady};
+        gateway_line_leave(&g->lines[i]);
+        g->gateway_lines[i] = (mbm_gatewayLine){.client = &g->lines[i].at.client,
+                                                .context = &g->lines[i],
+                                                .isReady = gateway_line_isReady};
     }
-    for (i = 0; i < setup.line_count; i++) {
-        place_of[i] = (uint8_t)i;
-        if (begin_line(i) != CODE_DONE)
+    for (i = 0; i < g->setup.line_count; i++) {
+        g->place_of[i] = (uint8_t)i;
+        if (begin_line(g, i) != CODE_DONE)
             return CODE_SYSTEM;
     }
     /* The gateway checks the routes that it begins with: each must be one. */
     for (i = 0; i < ROUTES; i++)
-        routes[i] = setup.routes[i < setup.route_count ? i : 0];
-    config.lineCount = (uint8_t)places;
-    config.connectionCount = (uint8_t)setup.connections;
-    config.requestCount = (uint16_t)(setup.connections + GATEWAY_REQUESTS);
-    (void)mbm_gateway_begin(&gateway, &config);
-    map_units();
-    set_gateway();
+        g->routes[i] = g->setup.routes[i < g->setup.route_count ? i : 0];
+    g->config.lineCount = (uint8_t)places;
+    g->config.connectionCount = (uint8_t)g->setup.connections;
+    g->config.requestCount = (uint16_t)(g->setup.connections + GATEWAY_REQUESTS);
+    (void)mbm_gateway_begin(&g->gateway, &g->config);
+    map_units(g);
+    set_gateway(g);
     return CODE_DONE;
 }
 
 /* --- the file again --- */
 
 /* The place of a line that is in force already and is not taken, or -1. */
-static int find_place(const char *text, const uint8_t taken[GATEWAY_LINES])
+static int find_place(gateway *g, const char *text, const uint8_t taken[GATEWAY_LINES])
 {
     int slot;
 
-    for (slot = 0; slot < config.lineCount; slot++)
-        if (lines[slot].is_used && !taken[slot] && strcmp(lines[slot].text, text) == 0)
+    for (slot = 0; slot < g->config.lineCount; slot++)
+        if (g->lines[slot].is_used && !taken[slot] && strcmp(g->lines[slot].text, text) == 0)
             return slot;
     return -1;
 }
 
 /* Returns NULL, or why the gateway must begin anew for this file. */
-static const char *needs_restart(const gateway_setup *next)
+static const char *needs_restart(gateway *g, const gateway_setup *next)
 {
-    if (strcmp(next->listen_text, setup.listen_text) != 0)
+    if (strcmp(next->listen_text, g->setup.listen_text) != 0)
         return "listen has changed";
-    if (next->connections != setup.connections)
+    if (next->connections != g->setup.connections)
         return "connections has changed";
-    if (next->line_count > config.lineCount)
+    if (next->line_count > g->config.lineCount)
         return "it has more lines than there are places";
     return NULL;
 }
 
 /* Replaces the setup by one that is right. Lines that both have go on as they are. */
-static void apply(gateway_setup *next)
+static void apply(gateway *g, gateway_setup *next)
 {
     uint8_t taken[GATEWAY_LINES] = {0}, is_new[GATEWAY_LINES] = {0}, next_places[GATEWAY_LINES];
     unsigned i, slot, kept = 0, removed = 0;
 
     for (i = 0; i < next->line_count; i++) {
-        const int found = find_place(next->lines[i].text, taken);
+        const int found = find_place(g, next->lines[i].text, taken);
 
         is_new[i] = found < 0;
         if (found < 0)
@@ -175,9 +176,9 @@ static void apply(gateway_setup *next)
         taken[found] = 1;
         kept++;
     }
-    for (slot = 0; slot < config.lineCount; slot++)
-        if (lines[slot].is_used && !taken[slot]) {
-            gateway_line_close(&lines[slot]);
+    for (slot = 0; slot < g->config.lineCount; slot++)
+        if (g->lines[slot].is_used && !taken[slot]) {
+            gateway_line_close(&g->lines[slot]);
             removed++;
         }
     for (i = slot = 0; i < next->line_count; i++) {
@@ -188,188 +189,187 @@ static void apply(gateway_setup *next)
         next_places[i] = (uint8_t)slot;
         taken[slot] = 1;
     }
-    gateway_setup_free(&setup);
-    setup = *next;
-    memcpy(place_of, next_places, sizeof place_of);
+    gateway_setup_free(&g->setup);
+    g->setup = *next;
+    memcpy(g->place_of, next_places, sizeof g->place_of);
     /* The requests of removed lines are answered before their places have other lines. */
-    map_units();
-    (void)mbm_gateway_poll(&gateway);
-    for (i = 0; i < setup.line_count; i++) {
+    map_units(g);
+    (void)mbm_gateway_poll(&g->gateway);
+    for (i = 0; i < g->setup.line_count; i++) {
         if (!is_new[i])
-            set_line(i);
+            set_line(g, i);
         else
-            (void)begin_line(i);
+            (void)begin_line(g, i);
     }
-    map_units();
-    set_gateway();
-    report_log(REPORT_INFO, "%s is in force. Lines kept: %u, removed: %u, added: %u", path, kept,
-               removed, setup.line_count - kept);
+    map_units(g);
+    set_gateway(g);
+    report_log(REPORT_INFO, "%s is in force. Lines kept: %u, removed: %u, added: %u", g->path, kept,
+               removed, g->setup.line_count - kept);
 }
 
-static void reload(void)
+static void reload(gateway *g)
 {
     static gateway_setup next;
     const char *why;
 
-    if (!path) {
+    if (!g->path) {
         report_log(REPORT_WARNING,
                    "SIGHUP reads the file of the gateway, and this one was begun without a file");
         return;
     }
     service_is_reloading();
-    next = given;
-    if (gateway_file_read(&next, path) != CODE_DONE) {
+    next = g->given;
+    if (gateway_file_read(&next, g->path) != CODE_DONE) {
         report_log(REPORT_ERROR, "%s. The file before stays in force", next.wrong);
-    } else if ((why = needs_restart(&next)) != NULL) {
+    } else if ((why = needs_restart(g, &next)) != NULL) {
         report_log(REPORT_ERROR, "%s: %s, which needs a restart. The file before stays in force",
-                   path, why);
+                   g->path, why);
     } else {
-        apply(&next);
-        reloads++;
+        apply(g, &next);
+        g->reloads++;
         service_is_ready();
         return;
     }
-    refused_reloads++;
+    g->refused_reloads++;
     gateway_setup_free(&next);
     service_is_ready();
 }
 
 /* --- connections --- */
 
-static void take_connections(void)
+static void take_connections(gateway *g)
 {
     int slot;
 
-    while ((slot = mbm_tcp_accept(&listener, tcps, config.connectionCount)) >= 0) {
-        const mbm_port own = mbm_tcp_port(&tcps[slot]);
+    while ((slot = mbm_tcp_accept(&g->listener, g->tcps, g->config.connectionCount)) >= 0) {
+        const mbm_port own = mbm_tcp_port(&g->tcps[slot]);
         char name[24];
         mbm_port port;
 
-        connected++;
+        g->connected++;
         snprintf(name, sizeof name, "client %d", slot);
         report_log(REPORT_DEBUG, "%s is connected", name);
-        port = trace_server(ahead_port_begin(&aheads[slot], &own), MBM_FRAMING_TCP, name);
-        if (mbm_gateway_open(&gateway, (uint8_t)slot, &port) != MBM_OK)
-            mbm_tcp_close(&tcps[slot]);
+        port = trace_server(ahead_port_begin(&g->aheads[slot], &own), MBM_FRAMING_TCP, name);
+        if (mbm_gateway_open(&g->gateway, (uint8_t)slot, &port) != MBM_OK)
+            mbm_tcp_close(&g->tcps[slot]);
     }
     /* An idle connection may have been closed for them. No wait shows that. */
-    for (slot = 0; slot < config.connectionCount; slot++)
-        aheads[slot].is_ready |= mbm_tcp_isInUse(&tcps[slot]) && tcps[slot].fd < 0;
+    for (slot = 0; slot < g->config.connectionCount; slot++)
+        g->aheads[slot].is_ready |= mbm_tcp_isInUse(&g->tcps[slot]) && g->tcps[slot].fd < 0;
 }
 
 /* Gives the requests of a connection up, and closes it. */
-static void drop_connection(unsigned slot)
+static void drop_connection(gateway *g, unsigned slot)
 {
     report_log(REPORT_DEBUG, "client %u is disconnected", slot);
-    mbm_gateway_close(&gateway, (uint8_t)slot);
-    mbm_tcp_close(&tcps[slot]);
+    mbm_gateway_close(&g->gateway, (uint8_t)slot);
+    mbm_tcp_close(&g->tcps[slot]);
 }
 
 /* The events to poll a connection for. */
-static short events_of(unsigned slot)
+static short events_of(gateway *g, unsigned slot)
 {
-    const int reads = mbm_gateway_isReading(&gateway, (uint8_t)slot);
+    const int reads = mbm_gateway_isReading(&g->gateway, (uint8_t)slot);
 
-    return (short)((reads ? POLLIN : 0) | (tcps[slot].events & POLLOUT));
+    return (short)((reads ? POLLIN : 0) | (g->tcps[slot].events & POLLOUT));
 }
 
 /* --- all of it --- */
 
-/* The descriptors of one sleep. A descriptor that is not open is left out, since the system
- * refuses a list that is longer than the limit of descriptors. */
-static struct {
-    struct pollfd polls[1 + GATEWAY_LINES + GATEWAY_CONNECTIONS + SERVICE_WAITS];
-    uint8_t slots[GATEWAY_LINES + GATEWAY_CONNECTIONS]; /* of clients, and then of lines */
-    nfds_t clients, count;
-} waits;
-
 /* Lists the descriptors. Returns for how long to sleep at most. */
-static uint32_t list_waits(void)
+static uint32_t list_waits(gateway *g)
 {
-    uint32_t delay = mbm_gateway_pollDelay(&gateway);
+    uint32_t delay = mbm_gateway_pollDelay(&g->gateway);
     unsigned i;
 
-    waits.count = 0;
-    for (i = 0; i < config.connectionCount; i++) {
-        struct pollfd *one = &waits.polls[waits.count];
+    g->waits.count = 0;
+    for (i = 0; i < g->config.connectionCount; i++) {
+        struct pollfd *one = &g->waits.polls[g->waits.count];
 
-        if (!mbm_tcp_isInUse(&tcps[i]))
+        if (!mbm_tcp_isInUse(&g->tcps[i]))
             continue;
-        *one = (struct pollfd){tcps[i].fd, events_of(i), 0};
-        waits.slots[waits.count++] = (uint8_t)i;
-        if ((one->events & POLLIN) && ahead_port_has_bytes(&aheads[i]))
+        *one = (struct pollfd){g->tcps[i].fd, events_of(g, i), 0};
+        g->waits.slots[g->waits.count++] = (uint8_t)i;
+        if ((one->events & POLLIN) && ahead_port_has_bytes(&g->aheads[i]))
             delay = 0;
     }
-    waits.clients = waits.count;
-    for (i = 0; i < config.lineCount; i++) {
-        waits.slots[waits.count] = (uint8_t)i;
-        waits.count += (nfds_t)gateway_line_wait(&lines[i], &waits.polls[waits.count]);
+    g->waits.clients = g->waits.count;
+    for (i = 0; i < g->config.lineCount; i++) {
+        const line *at = &g->lines[i].at;
+        struct pollfd *one = &g->waits.polls[g->waits.count];
+
+        if (!g->lines[i].is_used || !line_polls(at, one))
+            continue;
+        /* The wait finds noise of an idle line too, or each poll of its client would read. */
+        if (place_is_serial(&at->place))
+            one->events = POLLIN;
+        g->waits.slots[g->waits.count++] = (uint8_t)i;
     }
-    if (listener.events)
-        waits.polls[waits.count] = (struct pollfd){listener.fd, POLLIN, 0};
+    if (g->listener.events)
+        g->waits.polls[g->waits.count] = (struct pollfd){g->listener.fd, POLLIN, 0};
     else if (delay > MBM_TCP_RETRY)
         delay = MBM_TCP_RETRY;
     return delay;
 }
 
 /* Sleeps until there is something to do, and notes what it is. */
-static void wait_for_work(void)
+static void wait_for_work(gateway *g)
 {
-    const uint32_t delay = list_waits();
-    const int is_listening = listener.events != 0;
-    const int found = service_wait(waits.polls, waits.count + (nfds_t)is_listening, delay);
-    const struct pollfd *one = waits.polls;
+    const uint32_t delay = list_waits(g);
+    const int is_listening = g->listener.events != 0;
+    const int found = service_wait(g->waits.polls, g->waits.count + (nfds_t)is_listening, delay);
+    const struct pollfd *one = g->waits.polls;
     nfds_t n;
 
     if (found < 0 && errno != EINTR)
         /* The system refuses to poll: it has no memory, or the limit of descriptors was
          * lowered. */
         (void)poll(NULL, 0, NAP_MICROS / 1000);
-    /* Without a wait it is not known what has come, so all are tried. */
-    for (n = 0; n < waits.clients && found < 0; n++)
-        aheads[waits.slots[n]].is_ready = 1;
-    is_client_waiting = 1;
+    /* If the wait failed, it is unknown what has come, so all are tried. */
+    for (n = 0; n < g->waits.clients && found < 0; n++)
+        g->aheads[g->waits.slots[n]].is_ready = 1;
+    g->is_client_waiting = 1;
     if (found < 0)
         return;
-    for (n = 0; n < waits.clients; n++, one++) {
+    for (n = 0; n < g->waits.clients; n++, one++) {
         if (one->revents & ~POLLOUT)
-            aheads[waits.slots[n]].is_ready = 1;
+            g->aheads[g->waits.slots[n]].is_ready = 1;
         if (!(one->events & POLLIN) && (one->revents & (POLLERR | POLLHUP | POLLNVAL)))
-            drop_connection(waits.slots[n]);
+            drop_connection(g, g->waits.slots[n]);
     }
-    found_port_begin_round();
-    for (; n < waits.count; n++, one++)
-        found_port_note(&lines[waits.slots[n]].found, one);
-    is_client_waiting = !is_listening || one->revents != 0;
+    found_port_begin_round(&g->round);
+    for (; n < g->waits.count; n++, one++)
+        line_polled(&g->lines[g->waits.slots[n]].at, &g->round, one);
+    g->is_client_waiting = !is_listening || one->revents != 0;
 }
 
 /* One round of the loop. */
-static void work(void)
+static void work(gateway *g)
 {
     unsigned slot, polls = 0;
 
     if (service_reload_is_wanted())
-        reload();
+        reload(g);
     service_work();
-    if (is_client_waiting)
-        take_connections();
+    if (g->is_client_waiting)
+        take_connections(g);
     /* A poll may leave work that waits for nothing: a line has got a request. */
     do
-        mbm_gateway_poll(&gateway);
-    while (++polls < SERVICE_POLLS && mbm_gateway_pollDelay(&gateway) == 0);
-    for (slot = 0; slot < config.lineCount; slot++)
-        if (lines[slot].is_used)
-            gateway_line_watch(&lines[slot]);
-    for (slot = 0; slot < config.connectionCount; slot++) {
-        if (!mbm_tcp_isInUse(&tcps[slot]))
+        mbm_gateway_poll(&g->gateway);
+    while (++polls < SERVICE_POLLS && mbm_gateway_pollDelay(&g->gateway) == 0);
+    for (slot = 0; slot < g->config.lineCount; slot++)
+        if (g->lines[slot].is_used)
+            gateway_line_watch(&g->lines[slot]);
+    for (slot = 0; slot < g->config.connectionCount; slot++) {
+        if (!mbm_tcp_isInUse(&g->tcps[slot]))
             continue;
         /* A connection is not idle while its device has not answered. */
-        tcps[slot].isBusy = mbm_gateway_pending(&gateway, (uint8_t)slot) != 0;
-        if (mbm_gateway_status(&gateway, (uint8_t)slot) != MBM_OK)
-            drop_connection(slot);
+        g->tcps[slot].isBusy = mbm_gateway_pending(&g->gateway, (uint8_t)slot) != 0;
+        if (mbm_gateway_status(&g->gateway, (uint8_t)slot) != MBM_OK)
+            drop_connection(g, slot);
     }
-    found_port_end_round();
-    wait_for_work();
+    found_port_end_round(&g->round);
+    wait_for_work(g);
 }
 
 static const stats_kind KINDS[] = {
@@ -381,44 +381,45 @@ static const stats_kind KINDS[] = {
     {"reload_failures", "How often a file was refused.", 1},
 };
 
-static void fill_stats(stats *numbers)
+static void fill_stats(void *context, stats *numbers)
 {
+    gateway *g = (gateway *)context;
     unsigned i;
 
     numbers->command = "gateway";
     numbers->kinds = KINDS;
     numbers->count = sizeof KINDS / sizeof KINDS[0];
-    for (i = 0; i < config.connectionCount; i++)
-        numbers->values[0] += (uint64_t)mbm_tcp_isInUse(&tcps[i]);
-    numbers->values[1] = connected;
-    numbers->values[2] = listener.refused;
-    numbers->values[3] = listener.idle;
-    numbers->values[4] = reloads;
-    numbers->values[5] = refused_reloads;
-    for (i = 0; i < setup.line_count; i++) {
-        const gateway_line *line = &lines[place_of[i]];
+    for (i = 0; i < g->config.connectionCount; i++)
+        numbers->values[0] += (uint64_t)mbm_tcp_isInUse(&g->tcps[i]);
+    numbers->values[1] = g->connected;
+    numbers->values[2] = g->listener.refused;
+    numbers->values[3] = g->listener.idle;
+    numbers->values[4] = g->reloads;
+    numbers->values[5] = g->refused_reloads;
+    for (i = 0; i < g->setup.line_count; i++) {
+        const gateway_line *of = &g->lines[g->place_of[i]];
 
         numbers->lines[numbers->line_count++] =
-            (stats_line){.name = line->text,
-                         .counters = &line->counters,
-                         .link = &line->losses,
-                         .is_up = mbm_link_state(&line->link) == MBM_LINK_IS_UP};
+            (stats_line){.name = of->text,
+                         .counters = &of->at.counters,
+                         .link = &of->at.losses,
+                         .is_up = mbm_link_state(&of->at.kept) == MBM_LINK_IS_UP};
     }
 }
 
-static void print_summary(void)
+static void print_summary(gateway *g)
 {
     unsigned i;
 
     fprintf(stderr, "%s: connections: %lu, refused: %u, closed as idle: %u.\n", report_name,
-            connected, listener.refused, listener.idle);
-    for (i = 0; i < setup.line_count; i++) {
-        const gateway_line *line = &lines[place_of[i]];
-        const mbm_counters *counts = &line->counters;
+            g->connected, g->listener.refused, g->listener.idle);
+    for (i = 0; i < g->setup.line_count; i++) {
+        const gateway_line *of = &g->lines[g->place_of[i]];
+        const mbm_counters *counts = &of->at.counters;
 
         fprintf(stderr,
                 "%s: %s: requests: %u, replies: %u, exceptions: %u, timeouts: %u, bad CRCs: %u.\n",
-                report_name, line->text, counts->requests, counts->replies, counts->exceptions,
+                report_name, of->text, counts->requests, counts->replies, counts->exceptions,
                 counts->timeouts, counts->badCrc);
     }
 }
@@ -428,60 +429,63 @@ static void print_summary(void)
 enum { CHECK = 0x100, IDLE, IN_FLIGHT, QUEUE_TIME, QUIET_TIME, REPLACE_AFTER, REQUESTS, TIMEOUT };
 
 /* Reads a word that is no option: FILE, or LISTEN and then LINE and UNITS by turns. */
-static void read_word(const struct argp_state *state, char *text)
+static void read_word(gateway *g, const struct argp_state *state, char *text)
 {
     const unsigned number = state->arg_num;
     const size_t length = strlen(text);
     const char *wrong = NULL;
 
     if (number == 0 && length > 5 && strcmp(text + length - 5, ".yaml") == 0)
-        path = text;
-    else if (path)
+        g->path = text;
+    else if (g->path)
         options_wrong(state, "\"%s\" is one word too many: the lines are in the file", text);
     else if (number == 0)
-        wrong = gateway_setup_listen(&given, text);
+        wrong = gateway_setup_listen(&g->given, text);
     else if (number % 2 == 1)
-        wrong = gateway_setup_line(&given, text);
+        wrong = gateway_setup_line(&g->given, text);
     else
-        wrong = gateway_setup_units(&given, text);
+        wrong = gateway_setup_units(&g->given, text);
     if (wrong)
         options_wrong(state, number > 0 && number % 2 == 0 ? "UNITS %s" : "%s", wrong);
 }
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
+    gateway *g = (gateway *)state->input;
     switch (key) {
     case 'c':
-        given.connections =
+        g->given.connections =
             (uint32_t)options_number(state, "--connections", text, 1, GATEWAY_CONNECTIONS);
         return 0;
-    case 'q': is_quiet = 1; return 0;
-    case CHECK: is_check = 1; return 0;
+    case 'q': g->is_quiet = 1; return 0;
+    case CHECK: g->is_check = 1; return 0;
     case REQUESTS:
-        given.requests = (uint32_t)options_number(state, "--requests", text, 1, GATEWAY_REQUESTS);
+        g->given.requests =
+            (uint32_t)options_number(state, "--requests", text, 1, GATEWAY_REQUESTS);
         return 0;
     case IN_FLIGHT:
-        given.pace.in_flight =
+        g->given.pace.in_flight =
             (uint32_t)options_number(state, "--in-flight", text, 1, MBM_CLIENT_DEPTH);
         return 0;
     case REPLACE_AFTER:
-        given.pace.replace_after = (uint32_t)options_number(state, "--replace-after", text, 0, 100);
+        g->given.pace.replace_after =
+            (uint32_t)options_number(state, "--replace-after", text, 0, 100);
         return 0;
-    case IDLE: given.idleMs = options_time(state, "--idle", text, 0, 1000000000); return 0;
+    case IDLE: g->given.idleMs = options_time(state, "--idle", text, 0, 1000000000); return 0;
     case TIMEOUT:
-        given.pace.timeoutMs = options_time(state, "--timeout", text, 1, UINT16_MAX);
+        g->given.pace.timeoutMs = options_time(state, "--timeout", text, 1, UINT16_MAX);
         return 0;
     case QUIET_TIME:
-        given.pace.quietMs = options_time(state, "--quiet-time", text, 0, UINT16_MAX);
+        g->given.pace.quietMs = options_time(state, "--quiet-time", text, 0, UINT16_MAX);
         return 0;
     case QUEUE_TIME:
-        given.queueMs = options_time(state, "--queue-time", text, 0, UINT16_MAX);
+        g->given.queueMs = options_time(state, "--queue-time", text, 0, UINT16_MAX);
         return 0;
-    case ARGP_KEY_ARG: read_word(state, text); return 0;
+    case ARGP_KEY_ARG: read_word(g, state, text); return 0;
     case ARGP_KEY_END:
         if (state->arg_num == 0)
             options_wrong(state, "a gateway needs FILE, or LISTEN, and for each LINE its UNITS");
-        if (state->arg_num == 1 && path)
+        if (state->arg_num == 1 && g->path)
             return 0;
         if (state->arg_num < 3)
             options_wrong(state, "a gateway needs LISTEN, and for each LINE its UNITS");
@@ -512,76 +516,77 @@ static const struct argp_option texts[] = {
      "How long a request may wait for its line; then it gets exception 0A (0s, for any time)", 2},
     {"check", CHECK, NULL, 0, "Only check the command line and the file", 3},
     {"quiet", 'q', NULL, 0, "Print no summary to stderr", 3},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
 static const struct argp_child children[] = {
-    {&options_service, 0, NULL, 0}, {&options_trace, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+    {.argp = &options_service}, {.argp = &options_trace}, {0}};
 static const struct argp parser = {
-    texts,
-    parse,
-    "FILE.yaml\nLISTEN LINE UNITS [LINE UNITS]...",
-    "Passes requests from Modbus TCP to the devices of serial lines and of TCP.\v"
-    "FILE has the keys listen and lines, and what the options say; docs/gateway.md describes it. "
-    "SIGHUP reads it again: lines that stay the same, and all clients, stay connected.\n\n"
-    "LISTEN is where clients connect: tcp://:502, or tcp://ADDRESS:PORT for one address of this "
-    "machine; with port 0 it is a free one. mbm prints \"ready PORT\" once it listens.\n\n"
-    "UNITS are the unit ids of the LINE before: FIRST-LAST, or FIRST-LAST=UNIT if the unit FIRST of "
-    "clients is UNIT on the line. Several ranges have commas between them. 0=0 passes broadcasts.\n\n"
-    "Examples:\n\n"
-    "  mbm gateway tcp://:502 rtu:/dev/ttyUSB0 1-31 tcp://192.168.0.7 101-131=1\n"
-    "  mbm gateway gateway.yaml --metrics 127.0.0.1:9100\n\n" SERVICE_HELP
-    "The lines of a gateway are rtu:, ascii:, tcp:// and rtu+tcp://.\n\n" PLACE_HELP,
-    children,
-    NULL,
-    NULL};
-
-static int cannot_listen(void)
-{
-    const char *advice =
-        listener.lookupError ? "Check the name of the host" : place_advice(&setup.listen, errno);
-
-    return report(CODE_LINE, "%s: %s%s%s", setup.listen.text,
-                  listener.lookupError ? gai_strerror(listener.lookupError) : strerror(errno),
-                  *advice ? ". " : "", advice);
-}
+    .options = texts,
+    .parser = parse,
+    .args_doc = "FILE.yaml\nLISTEN LINE UNITS [LINE UNITS]...",
+    .doc =
+        "Passes requests from Modbus TCP to the devices of serial lines and of TCP.\v"
+        "FILE has the keys listen and lines, and what the options say; docs/gateway.md describes it. "
+        "SIGHUP reads it again: lines that stay the same, and all clients, stay connected.\n\n"
+        "LISTEN is where clients connect: tcp://:502, or tcp://ADDRESS:PORT for one address of this "
+        "machine; with port 0 it is a free one. mbm prints \"ready PORT\" once it listens.\n\n"
+        "UNITS are the unit ids of the LINE before: FIRST-LAST, or FIRST-LAST=UNIT if the unit FIRST of "
+        "clients is UNIT on the line. Several ranges have commas between them. 0=0 passes broadcasts.\n\n"
+        "Examples:\n\n"
+        "  mbm gateway tcp://:502 rtu:/dev/ttyUSB0 1-31 tcp://192.168.0.7 101-131=1\n"
+        "  mbm gateway gateway.yaml --metrics 127.0.0.1:9100\n\n" SERVICE_HELP
+        "The lines of a gateway are rtu:, ascii:, tcp:// and rtu+tcp://.\n\n" PLACE_HELP,
+    .children = children};
 
 int gateway_command(int argc, char **argv)
 {
+    static gateway data;
+    gateway *g = &data;
     unsigned i;
     int code = CODE_DONE;
 
-    argp_parse(&parser, argc, argv, 0, NULL, NULL);
-    for (i = 0; i < given.line_count; i++)
-        given.lines[i].pace = given.pace;
-    setup = given;
-    if (path)
-        code = gateway_file_read(&setup, path);
+    g->is_client_waiting = 1;
+    g->given.idleMs = 60000;
+    g->given.connections = CONNECTIONS;
+    g->given.requests = 8;
+    g->given.pace = (gateway_pace){1000, 100, 1, 2};
+    g->config = (mbm_gatewayConfig){.routes = g->routes,
+                                    .routeCount = ROUTES,
+                                    .lines = g->gateway_lines,
+                                    .connections = g->connections,
+                                    .requests = g->requests};
+    argp_parse(&parser, argc, argv, 0, NULL, g);
+    for (i = 0; i < g->given.line_count; i++)
+        g->given.lines[i].pace = g->given.pace;
+    g->setup = g->given;
+    if (g->path)
+        code = gateway_file_read(&g->setup, g->path);
     if (code != CODE_DONE)
-        return report(code, "%s", setup.wrong);
-    if (is_check)
+        return report(code, "%s", g->setup.wrong);
+    if (g->is_check)
         return CODE_DONE;
-    if (begin() != CODE_DONE)
+    if (begin(g) != CODE_DONE)
         return CODE_SYSTEM;
-    if (mbm_tcp_listen(&listener, place_host(&setup.listen), setup.listen.service) != 0)
-        return cannot_listen();
-    code = service_begin(fill_stats);
+    if (mbm_tcp_listen(&g->listener, place_host(&g->setup.listen), g->setup.listen.service) != 0)
+        return line_cannot_open(&g->setup.listen, g->listener.lookupError);
+    code = service_begin(fill_stats, g);
     if (code != CODE_DONE)
         return code;
-    printf("ready %u\n", listener.port);
+    printf("ready %u\n", g->listener.port);
     report_flush();
     service_is_ready();
     while (!report_stopped)
-        work();
+        work(g);
     service_end();
-    for (i = 0; i < config.connectionCount; i++)
-        if (mbm_tcp_isInUse(&tcps[i]))
-            drop_connection(i);
-    if (!is_quiet)
-        print_summary();
-    for (i = 0; i < config.lineCount; i++)
-        if (lines[i].is_used)
-            gateway_line_close(&lines[i]);
-    gateway_setup_free(&setup);
-    mbm_tcp_closeListener(&listener);
+    for (i = 0; i < g->config.connectionCount; i++)
+        if (mbm_tcp_isInUse(&g->tcps[i]))
+            drop_connection(g, i);
+    if (!g->is_quiet)
+        print_summary(g);
+    for (i = 0; i < g->config.lineCount; i++)
+        if (g->lines[i].is_used)
+            gateway_line_close(&g->lines[i]);
+    gateway_setup_free(&g->setup);
+    mbm_tcp_closeListener(&g->listener);
     return CODE_DONE;
 }

@@ -4,23 +4,23 @@
 #define _GNU_SOURCE
 #include "header.h"
 
-#include "commands.h"
 #include "device_file.h"
+#include "device_plan.h"
 #include "options.h"
 #include "report.h"
-#include "trial.h"
 
+#include <ctype.h>
 #include <errno.h>
+#include <search.h>
 #include <stdlib.h>
 #include <string.h>
 
-static struct {
+/* What the command line says. */
+typedef struct job {
     const char *file, *output, *name;
     uint16_t gap;
     uint8_t is_page;
-} wanted;
-
-static device meter;
+} job;
 
 /* --- the command line --- */
 
@@ -28,18 +28,19 @@ enum { NAME = 0x2000, GAP, MARKDOWN };
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
+    job *j = (job *)state->input;
     switch (key) {
-    case 'o': wanted.output = text; return 0;
-    case NAME: wanted.name = text; return 0;
-    case GAP: wanted.gap = (uint16_t)options_number(state, "--gap", text, 0, 2000); return 0;
-    case MARKDOWN: wanted.is_page = 1; return 0;
+    case 'o': j->output = text; return 0;
+    case NAME: j->name = text; return 0;
+    case GAP: j->gap = (uint16_t)options_number(state, "--gap", text, 0, 2000); return 0;
+    case MARKDOWN: j->is_page = 1; return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0)
             options_too_many(state, text);
-        wanted.file = text;
+        j->file = text;
         return 0;
     case ARGP_KEY_END:
-        if (!wanted.file)
+        if (!j->file)
             options_wrong(state, "FILE is missing");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
@@ -54,23 +55,207 @@ static const struct argp_option texts[] = {
      "One request may read up to N addresses between two fields too, if the device has them (0)",
      1},
     {"markdown", MARKDOWN, NULL, 0, "Write a page with a table of the fields, not a header", 1},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
 static const struct argp arguments = {
-    texts,
-    parse,
-    "FILE",
-    "Writes a C header for firmware from a device file: constants, a table for a plan, and tables "
-    "and functions for a server.\v"
-    "docs/serve.md describes the device file and the header.\n\n"
-    "  mbm header meter.yaml -o meter.h\n",
-    NULL,
-    NULL,
-    NULL};
+    .options = texts,
+    .parser = parse,
+    .args_doc = "FILE",
+    .doc =
+        "Writes a C header for firmware from a device file: constants, a table for a plan, and tables "
+        "and functions for a server.\v"
+        "docs/serve.md describes the device file and the header.\n\n"
+        "  mbm header meter.yaml -o meter.h\n"};
+
+/* --- names in C --- */
+
+static int is_plain(char one)
+{
+    return (unsigned char)one < 0x80 && isalnum((unsigned char)one);
+}
+
+char *header_upper(const char *text)
+{
+    char *upper = (char *)malloc(strlen(text) + 1);
+    size_t length = 0;
+
+    if (!upper)
+        return NULL;
+    for (; *text; text++) {
+        if (is_plain(*text))
+            upper[length++] = (char)toupper((unsigned char)*text);
+        else if (length > 0 && upper[length - 1] != '_')
+            upper[length++] = '_';
+    }
+    if (length > 0 && upper[length - 1] == '_')
+        length--;
+    upper[length] = '\0';
+    return upper;
+}
+
+char *header_lower(const char *upper)
+{
+    char *lower = strdup(upper), *at;
+
+    for (at = lower; at && *at; at++)
+        *at = (char)tolower((unsigned char)*at);
+    return lower;
+}
+
+static int fail(void)
+{
+    (void)report(CODE_SYSTEM, "there is no memory");
+    return 0;
+}
+
+/* A name that the header defines, and the line of the file that it comes from; 0 for one that each
+ * header has. */
+typedef struct c_name {
+    char *text;
+    int line;
+} c_name;
+
+static int compare(const void *one, const void *other)
+{
+    return strcmp(((const c_name *)one)->text, ((const c_name *)other)->text);
+}
+
+static void free_name(void *name)
+{
+    free(((c_name *)name)->text);
+    free(name);
+}
+
+/* Stores a name. Returns 0 after reporting that it is there already. */
+static int store(header *h, char *text, int line)
+{
+    c_name *name = (c_name *)malloc(sizeof *name), *other;
+    void *place;
+
+    if (!name) {
+        free(text);
+        return fail();
+    }
+    name->text = text;
+    name->line = line;
+    place = tsearch(name, &h->names, compare);
+    other = place ? *(c_name **)place : NULL;
+    if (other == name)
+        return 1;
+    if (!other)
+        (void)fail();
+    else if (other->line == 0)
+        (void)report(CODE_WRONG, "%s:%d: the C name %s is one that each header has: choose another",
+                     h->path, line, text);
+    else
+        (void)report(
+            CODE_WRONG,
+            "%s:%d: the C name %s is that of line %d too: choose another. Case, spaces and "
+            "signs make no difference",
+            h->path, line > other->line ? line : other->line, text,
+            line > other->line ? other->line : line);
+    free_name(name);
+    return 0;
+}
+
+/* Frees what the names took. */
+static void free_names(header *h)
+{
+    uint16_t i;
+
+    tdestroy(h->names, free_name);
+    for (i = 0; h->fields && i < h->of->count; i++)
+        free(h->fields[i]);
+    free(h->fields);
+    free(h->upper);
+    free(h->lower);
+}
+
+int header_define(header *h, uint16_t field, const char *suffix, int line)
+{
+    char *text;
+
+    if (asprintf(&text, "%s_%s%s", h->upper, h->fields[field], suffix) < 0)
+        return fail();
+    return store(h, text, line);
+}
+
+/* Chooses the name of the device: the one that is given, else that of the file without its end. */
+static int choose_device(header *h, const char *name)
+{
+    char *base = NULL, *end;
+
+    if (!name && !h->of->name) {
+        base = strdup(h->file);
+        end = base ? strrchr(base, '.') : NULL;
+        if (!base)
+            return fail();
+        if (end && end > base)
+            *end = '\0';
+    }
+    name = name ? name : base ? base : h->of->name;
+    h->upper = header_upper(name);
+    h->lower = h->upper ? header_lower(h->upper) : NULL;
+    if (!h->lower) {
+        free(base);
+        return fail();
+    }
+    if (!isalpha((unsigned char)h->upper[0]) || strcmp(h->upper, "MBM") == 0 ||
+        strlen(h->upper) > HEADER_NAME_BYTES) {
+        (void)report(CODE_WRONG,
+                     "%s: \"%s\" cannot be the device's name in C, which begins with one of the "
+                     "letters A to Z, has at most 255 bytes and is not MBM: give one with --name",
+                     h->path, name);
+        free(base);
+        return 0;
+    }
+    free(base);
+    return 1;
+}
+
+/* Chooses the C names of the device and of its fields. `name` is that of the device, or NULL to
+ * take that of the file. Returns 0 after reporting a refusal. */
+static int choose_names(header *h, const char *name)
+{
+    static const char *const OWN[] = {"H",     "PLAN",       "SERVER", "FIELDS",
+                                      "READS", "DATA_WORDS", "UNIT"};
+    uint16_t i;
+
+    h->fields = (char **)calloc(h->of->count, sizeof *h->fields);
+    if (!h->fields)
+        return fail();
+    if (!choose_device(h, name))
+        return 0;
+    for (i = 0; i < sizeof OWN / sizeof OWN[0]; i++) {
+        char *text;
+
+        if (asprintf(&text, "%s_%s", h->upper, OWN[i]) < 0)
+            return fail();
+        if (!store(h, text, 0))
+            return 0;
+    }
+    for (i = 0; i < h->of->count; i++) {
+        const device_field *field = &h->of->fields[i];
+
+        h->fields[i] = header_upper(field->name);
+        if (!h->fields[i])
+            return fail();
+        if (h->fields[i][0] == '\0') {
+            (void)report(CODE_WRONG,
+                         "%s:%d: the name \"%s\" has none of the letters A to Z and digits, of "
+                         "which names in C are made",
+                         h->path, field->line, field->name);
+            return 0;
+        }
+        if (!header_define(h, i, "", field->line))
+            return 0;
+    }
+    return 1;
+}
 
 /* --- scales --- */
 
-/* Divides both numbers by what divides both. */
+/* Divides both numbers by their greatest common divisor. */
 static void reduce(uint64_t *one, uint64_t *other)
 {
     uint64_t a = *one, b = *other;
@@ -117,16 +302,16 @@ static int find_scales(header *h)
 {
     uint16_t i;
 
-    h->scales = (header_scale *)calloc(meter.count, sizeof *h->scales);
+    h->scales = (header_scale *)calloc(h->of->count, sizeof *h->scales);
     if (!h->scales)
         return report(CODE_SYSTEM, "there is no memory");
-    for (i = 0; i < meter.count; i++)
-        if (!find_scale(&meter.fields[i].form.scale, &h->scales[i]))
+    for (i = 0; i < h->of->count; i++)
+        if (!find_scale(&h->of->fields[i].form.scale, &h->scales[i]))
             return report(
                 CODE_WRONG,
                 "%s:%d: scale is not a fraction of two whole numbers up to 2147483647, as "
                 "a plan needs it",
-                h->path, meter.fields[i].scale_line);
+                h->path, h->of->fields[i].scale_line);
     return CODE_DONE;
 }
 
@@ -140,20 +325,21 @@ static int covers(const mbm_planReadInfo *read, const mbm_planField *field)
            (uint32_t)read->address + read->quantity >= field->address + device_size(field);
 }
 
-/* Puts the fields that a read covers, of those that no read had before, behind the others of
- * `order`, sorted by address. Returns the new number of fields there. */
-static uint16_t take_fields(const mbm_planReadInfo *read, uint16_t *order, uint16_t taken,
+/* Appends to `order` the fields that a read covers and no read before it had, sorted by address.
+ * Returns the new number of fields there. */
+static uint16_t take_fields(const header *h, const mbm_planReadInfo *read, uint16_t taken,
                             uint8_t *is_taken)
 {
+    uint16_t *order = h->order;
     const uint16_t first = taken;
     uint16_t i, place;
 
-    for (i = 0; i < meter.readable; i++) {
-        if (is_taken[i] || !covers(read, &meter.planned[i]))
+    for (i = 0; i < h->of->readable; i++) {
+        if (is_taken[i] || !covers(read, &h->of->planned[i]))
             continue;
         is_taken[i] = 1;
         for (place = taken++; place > first; place--) {
-            if (meter.planned[order[place - 1]].address <= meter.planned[i].address)
+            if (h->of->planned[order[place - 1]].address <= h->of->planned[i].address)
                 break;
             order[place] = order[place - 1];
         }
@@ -165,13 +351,13 @@ static uint16_t take_fields(const mbm_planReadInfo *read, uint16_t *order, uint1
 /* Notes the reads of a plan, with their fields. Returns 0 without memory. */
 static int note_reads(header *h, const mbm_plan *plan)
 {
-    uint8_t *is_taken = (uint8_t *)calloc(meter.readable, 1);
+    uint8_t *is_taken = (uint8_t *)calloc(h->of->readable, 1);
     mbm_planReadInfo read;
     uint16_t taken = 0;
     uint32_t words = 0;
 
-    h->order = (uint16_t *)calloc(meter.readable, sizeof *h->order);
-    h->counts = (uint16_t *)calloc(meter.readable, sizeof *h->counts);
+    h->order = (uint16_t *)calloc(h->of->readable, sizeof *h->order);
+    h->counts = (uint16_t *)calloc(h->of->readable, sizeof *h->counts);
     if (!is_taken || !h->order || !h->counts) {
         free(is_taken);
         return 0;
@@ -179,7 +365,7 @@ static int note_reads(header *h, const mbm_plan *plan)
     for (h->reads = 0; mbm_plan_getRead(plan, h->reads, &read) == MBM_OK; h->reads++) {
         const uint16_t before = taken;
 
-        taken = take_fields(&read, h->order, taken, is_taken);
+        taken = take_fields(h, &read, taken, is_taken);
         h->counts[h->reads] = (uint16_t)(taken - before);
         words +=
             read.table <= MBM_TABLE_DISCRETE_INPUTS ? (read.quantity + 15u) / 16 : read.quantity;
@@ -195,17 +381,11 @@ static int begin_plan(header *h, const mbm_planSetup *setup)
 {
     static mbm_plan plan;
     uint16_t wrong;
-    const uint8_t status = trial_begin(&plan, setup, &wrong);
+    const uint8_t status = device_plan_try(&plan, setup, &wrong);
     int is_noted;
 
-    if (status == MBM_BUFFER_TOO_SMALL && wrong < meter.readable)
-        return report(CODE_WRONG, "%s:%d: the fields up to here take more than 65535 words of data",
-                      h->path, meter.fields[wrong].line);
-    if (status != MBM_OK && wrong < meter.readable)
-        return report(CODE_WRONG, "%s:%d: %s", h->path, meter.fields[wrong].line,
-                      mbm_status_text(status));
     if (status != MBM_OK)
-        return report(CODE_WRONG, "%s: %s", h->path, mbm_status_text(status));
+        return report(CODE_WRONG, "%s", device_plan_wrong(h->of, h->path, status, wrong));
     is_noted = note_reads(h, &plan);
     (void)mbm_plan_end(&plan);
     return is_noted ? CODE_DONE : report(CODE_SYSTEM, "there is no memory");
@@ -216,9 +396,9 @@ static void scale_fields(const header *h, mbm_planField *fields)
 {
     uint16_t i;
 
-    for (i = 0; i < meter.readable; i++) {
-        fields[i] = meter.planned[i];
-        if (meter.fields[i].form.scale.digits) {
+    for (i = 0; i < h->of->readable; i++) {
+        fields[i] = h->of->planned[i];
+        if (h->scales && h->of->fields[i].form.scale.digits) {
             fields[i].multiplier = h->scales[i].multiplier;
             fields[i].divisor = h->scales[i].divisor;
         }
@@ -229,63 +409,51 @@ static void scale_fields(const header *h, mbm_planField *fields)
  * reason. */
 static int group_fields(header *h)
 {
-    static mbm_clientRequest request;
-    const uint16_t count = meter.readable;
+    const uint16_t count = h->of->readable;
     mbm_planField *fields;
-    mbm_planSetup setup = {.fieldCount = count,
-                           .readCount = count,
-                           .dataWords = UINT16_MAX,
-                           .bitGap = h->gap,
-                           .registerGap =
-                               h->gap < MBM_MAX_READ_REGISTERS ? h->gap : MBM_MAX_READ_REGISTERS,
-                           .requests = &request,
-                           .requestCount = 1};
+    mbm_planSetup setup = MBM_INIT;
     int code;
 
     if (count == 0)
         return CODE_DONE;
-    setup.fields = fields = (mbm_planField *)calloc(count, sizeof *fields);
-    setup.positions = (mbm_planPosition *)calloc(count, sizeof *setup.positions);
-    setup.reads = (mbm_planRead *)calloc(count, sizeof *setup.reads);
-    setup.data = (uint16_t *)calloc(setup.dataWords, sizeof *setup.data);
-    if (fields && setup.positions && setup.reads && setup.data) {
+    fields = (mbm_planField *)calloc(count, sizeof *fields);
+    if (device_plan_make(&setup, h->of, h->gap, 1) && fields) {
         scale_fields(h, fields);
+        setup.fields = fields;
         code = begin_plan(h, &setup);
     } else {
         code = report(CODE_SYSTEM, "there is no memory for %u fields", count);
     }
     free(fields);
-    free(setup.positions);
-    free(setup.reads);
-    free(setup.data);
+    device_plan_free(&setup);
     return code;
 }
 
 /* --- the header --- */
 
-static uint16_t find_unit(void)
+static uint16_t find_unit(const header *h)
 {
     uint16_t i;
 
-    for (i = 1; i < meter.count; i++)
-        if (meter.planned[i].unit != meter.planned[0].unit)
+    for (i = 1; i < h->of->count; i++)
+        if (h->of->planned[i].unit != h->of->planned[0].unit)
             return 0;
-    return meter.planned[0].unit;
+    return h->of->planned[0].unit;
 }
 
 /* Writes the header or the page. Returns 0 after reporting a refusal. */
-static int write_header(header *h)
+static int write_header(job *j, header *h)
 {
-    if (wanted.is_page) {
+    if (j->is_page) {
         header_write_page(h);
         return 1;
     }
     fprintf(h->out, "/* ");
-    header_comment(h->out, meter.name ? meter.name : h->upper);
+    header_comment(h->out, h->of->name ? h->of->name : h->upper);
     fprintf(h->out, ", written by mbm header from ");
     header_comment(h->out, h->file);
     fprintf(h->out, ": do not edit.\n *\n");
-    if (meter.readable > 0)
+    if (h->of->readable > 0)
         fprintf(h->out, " * Define %s_PLAN before you include it for the table of a plan.\n",
                 h->upper);
     fprintf(
@@ -300,25 +468,25 @@ static int write_header(header *h)
 }
 
 /* Writes the text to where it is wanted. Returns the exit code. */
-static int keep(const char *text, size_t length)
+static int keep(job *j, const char *text, size_t length)
 {
-    FILE *file = wanted.output ? fopen(wanted.output, "wb") : stdout;
+    FILE *file = j->output ? fopen(j->output, "wb") : stdout;
     int is_right;
 
     if (!file)
-        return report(CODE_SYSTEM, "%s: %s", wanted.output, strerror(errno));
+        return report(CODE_SYSTEM, "%s: %s", j->output, strerror(errno));
     is_right = fwrite(text, 1, length, file) == length;
-    if (!wanted.output) {
+    if (!j->output) {
         report_flush(); /* notes whether standard output took it */
         return CODE_DONE;
     }
     if (fclose(file) != 0 || !is_right)
-        return report(CODE_SYSTEM, "%s: %s", wanted.output, strerror(errno));
+        return report(CODE_SYSTEM, "%s: %s", j->output, strerror(errno));
     return CODE_DONE;
 }
 
 /* Makes the text in memory first, so that a file that is refused leaves nothing. */
-static int make(header *h)
+static int make(job *j, header *h)
 {
     size_t length = 0;
     char *text = NULL;
@@ -327,35 +495,37 @@ static int make(header *h)
     h->out = open_memstream(&text, &length);
     if (!h->out)
         return report(CODE_SYSTEM, "%s", strerror(errno));
-    code = write_header(h) ? CODE_DONE : report_code;
+    code = write_header(j, h) ? CODE_DONE : report_code;
     if (fclose(h->out) != 0 && code == CODE_DONE)
         code = report(CODE_SYSTEM, "%s", strerror(errno));
     if (code == CODE_DONE)
-        code = keep(text, length);
+        code = keep(j, text, length);
     free(text);
     return code;
 }
 
 int header_command(int argc, char **argv)
 {
+    job data = {0}, *j = &data;
+    device meter;
     header h = {.of = &meter};
     char wrong[YAML_FILE_WRONG_BYTES];
     int code;
 
-    argp_parse(&arguments, argc, argv, 0, NULL, NULL);
-    code = device_file_read(&meter, wanted.file, wrong);
+    argp_parse(&arguments, argc, argv, 0, NULL, j);
+    code = device_file_read(&meter, j->file, wrong);
     if (code != CODE_DONE)
         return report(code, "%s", wrong);
-    h.path = wanted.file;
-    h.file = strrchr(wanted.file, '/') ? strrchr(wanted.file, '/') + 1 : wanted.file;
-    h.gap = wanted.gap;
-    h.unit = find_unit();
-    code = header_choose_names(&h, wanted.name) ? find_scales(&h) : report_code;
+    h.path = j->file;
+    h.file = strrchr(j->file, '/') ? strrchr(j->file, '/') + 1 : j->file;
+    h.gap = j->gap;
+    h.unit = find_unit(&h);
+    code = choose_names(&h, j->name) ? find_scales(&h) : report_code;
     if (code == CODE_DONE)
         code = group_fields(&h);
     if (code == CODE_DONE)
-        code = make(&h);
-    header_free_names(&h);
+        code = make(j, &h);
+    free_names(&h);
     free(h.scales);
     free(h.order);
     free(h.counts);

@@ -10,6 +10,9 @@
 
 #include <stdio.h>
 
+/* Bytes of the longest C name of a device. */
+enum { HEADER_NAME_BYTES = 255 };
+
 /* The scale of a field: the number in the registers is multiplied, then divided. 1 and 1 without a
  * scale. */
 typedef struct header_scale {
@@ -30,13 +33,6 @@ typedef struct header {
     uint16_t *order, *counts;
     uint16_t gap, reads, words;
 } header;
-
-/* Chooses the C names of the device and of its fields. `name` is that of the device, or NULL to
- * take that of the file. Returns 0 after reporting a refusal. */
-int header_choose_names(header *h, const char *name);
-
-/* Frees what the names took. */
-void header_free_names(header *h);
 
 /* Notes a name that the header defines, a field's name and what follows it, such as "_ADDRESS".
  * Returns 0 after reporting that there is the same name already. */

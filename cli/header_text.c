@@ -1,5 +1,7 @@
-/* The parts of a device's header that every program may include: the constants of its fields, and
- * the table of its plan. Licence: MIT OR Apache-2.0. */
+/* The parts of a device's header that every program may include, which are the constants of its
+ * fields and the table of its plan; and the page of documentation, in Markdown.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "header.h"
 
@@ -90,7 +92,7 @@ static int has_small_numbers(const device_field *field)
     for (i = 0; i < field->label_count; i++) {
         const char *number = field->labels[i].number;
 
-        /* The numbers of uint64 that are too large become INT64_MAX. */
+        /* strtoll makes INT64_MAX of numbers of uint64 that are too large. */
         if (strtoll(number, NULL, 10) > 32767 || strtoll(number, NULL, 10) < -32767)
             return 0;
     }
@@ -293,4 +295,93 @@ int header_write_plan(header *h)
         fprintf(h->out, "%s%uu", i == 0 ? "" : i % 16 == 0 ? ",\n    " : ", ", h->counts[i]);
     fprintf(h->out, "};\n#endif\n");
     return 1;
+}
+
+/* --- the page --- */
+
+static const char *const PAGE_ACCESSES[] = {"", "read", "write", "read, write"};
+
+/* Writes a text of a table. */
+static void write_text(FILE *out, const char *text)
+{
+    for (; *text; text++) {
+        if (*text == '<')
+            fputs("&lt;", out);
+        else if (*text == '&')
+            fputs("&amp;", out);
+        else {
+            if (strchr("\\|`*_[]", *text))
+                fputc('\\', out);
+            fputc(*text, out);
+        }
+    }
+}
+
+static void write_meaning(const header *h, uint16_t at)
+{
+    const device_field *field = &h->of->fields[at];
+    uint16_t i;
+
+    if (field->description)
+        write_text(h->out, field->description);
+    for (i = 0; i < field->label_count; i++) {
+        fprintf(h->out, "%s%s ",
+                i > 0                ? ", "
+                : field->description ? ": "
+                                     : "",
+                field->labels[i].number);
+        write_text(h->out, field->labels[i].name);
+    }
+}
+
+static void write_page_row(const header *h, uint16_t at)
+{
+    const mbm_planField *planned = &h->of->planned[at];
+    const device_field *field = &h->of->fields[at];
+    const header_scale *scale = &h->scales[at];
+
+    fprintf(h->out, "| ");
+    write_text(h->out, field->name);
+    fprintf(h->out, " | ");
+    if (h->unit == 0)
+        fprintf(h->out, "%u | ", planned->unit);
+    header_place(h->out, planned);
+    fprintf(h->out, " | %s", value_type_names[planned->type]);
+    if (planned->type == MBM_TYPE_TEXT)
+        fprintf(h->out, ", %u characters", planned->count);
+    else if (planned->count > 1 && !device_is_part(planned))
+        fprintf(h->out, ", %u values", planned->count);
+    if (planned->order != MBM_ORDER_ABCD && planned->type != MBM_TYPE_BIT)
+        fprintf(h->out, ", %s", value_order_names[planned->order]);
+    fprintf(h->out, " | ");
+    if (field->form.scale.digits && scale->divisor != 1)
+        fprintf(h->out, "%" PRId32 "/%" PRId32, scale->multiplier, scale->divisor);
+    else if (field->form.scale.digits)
+        fprintf(h->out, "%" PRId32, scale->multiplier);
+    fprintf(h->out, " | ");
+    if (field->unit_of_measurement)
+        write_text(h->out, field->unit_of_measurement);
+    fprintf(h->out, " | %s | ", PAGE_ACCESSES[field->access]);
+    write_meaning(h, at);
+    fprintf(h->out, " |\n");
+}
+
+void header_write_page(header *h)
+{
+    uint16_t i;
+
+    fprintf(h->out, "# ");
+    write_text(h->out, h->of->name ? h->of->name : h->upper);
+    fprintf(h->out, "\n\nWritten by `mbm header` from ");
+    write_text(h->out, h->file);
+    fprintf(h->out, ". ");
+    if (h->unit != 0)
+        fprintf(h->out, "The unit id is %u. ", h->unit);
+    fprintf(
+        h->out,
+        "Addresses are those of the protocol and count from 0.\n\n| field | %splace | type | scale | in | access | meaning |\n"
+        "|---|%s---|---|---|---|---|---|\n",
+        h->unit == 0 ? "unit | " : "", h->unit == 0 ? "---|" : "");
+    for (i = 0; i < h->of->count; i++)
+        write_page_row(h, i);
 }

@@ -1,7 +1,6 @@
 /* mbm identify: shows what a device says about itself. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "advice.h"
-#include "commands.h"
 #include "line.h"
 #include "options.h"
 #include "report.h"
@@ -11,32 +10,34 @@
 #include <stdio.h>
 #include <string.h>
 
-static line at;
-static place where;
-static int category = MBM_DEVICE_ID_EXTENDED;
-static uint8_t reply[250], pdu[MBM_MAX_PDU];
-static mbm_identification identification = {
-    .request = {.reply = reply, .replyBytes = sizeof reply}};
-static mbm_clientRequest request = {.reply = reply, .replyBytes = sizeof reply};
-static cJSON *json, *objects, *refused;
-static mbm_clientRequest failed; /* the first that failed */
-static unsigned found;
+typedef struct identity {
+    line at;
+    place where;
+    int category;
+    uint8_t reply[250], pdu[MBM_MAX_PDU];
+    mbm_identification identification;
+    mbm_clientRequest request;
+    cJSON *json, *objects, *refused; /* NULL without --json */
+    mbm_clientRequest failed;        /* the first that failed */
+    unsigned found;
+} identity;
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
+    identity *d = (identity *)state->input;
     static const char *const categories[] = {"basic", "regular", "extended", NULL};
 
     switch (key) {
-    case 'c': category = 1 + options_word(state, "--category", text, categories); return 0;
+    case 'c': d->category = 1 + options_word(state, "--category", text, categories); return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0)
             options_too_many(state, text);
-        options_place(state, &where, text, 0);
+        options_place(state, &d->where, text, 0);
         return 0;
     case ARGP_KEY_SUCCESS:
-        if (!where.text)
+        if (!d->where.text)
             options_wrong(state, "LINE is missing");
-        options_check_unit(state, &where, 0);
+        options_check_unit(state, &d->where, 0);
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -44,25 +45,25 @@ static error_t parse(int key, char *text, struct argp_state *state)
 
 static const struct argp_option texts[] = {
     {"category", 'c', "WORD", 0, "Objects to read: basic, regular or extended, all (extended)", 1},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
 static const struct argp_child children[] = {
-    {&options_unit, 0, NULL, 0}, {&options_client, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+    {.argp = &options_unit}, {.argp = &options_client}, {0}};
 
 static const struct argp arguments = {
-    texts,
-    parse,
-    "LINE",
-    "Shows all objects of the device identification (function 2B/0E), the server id (11) and the "
-    "event counter (0B). What the device does not have is left out, with the reason on stderr.\v"
-    "Example:\n\n"
-    "  mbm identify tcp://192.168.0.7 --unit 17\n\n" PLACE_HELP,
-    children,
-    NULL,
-    NULL};
+    .options = texts,
+    .parser = parse,
+    .args_doc = "LINE",
+    .doc =
+        "Shows all objects of the device identification (function 2B/0E), the server id (11) and the "
+        "event counter (0B). What the device does not have is left out, with the reason on stderr.\v"
+        "Example:\n\n"
+        "  mbm identify tcp://192.168.0.7 --unit 17\n\n" PLACE_HELP,
+    .children = children};
 
 /* Shows bytes as text, and those that are none as \x and two digits. */
-static void show_text(cJSON *into, const char *name, const uint8_t *bytes, uint16_t length)
+static void show_text(identity *d, cJSON *into, const char *name, const uint8_t *bytes,
+                      uint16_t length)
 {
     char text[4 * 256 + 1] = "";
     size_t to = 0;
@@ -75,34 +76,34 @@ static void show_text(cJSON *into, const char *name, const uint8_t *bytes, uint1
         cJSON_AddStringToObject(into, name, text);
     else
         printf("%s: %s\n", name, text);
-    found++;
+    d->found++;
 }
 
 static void show_object(void *context, const mbm_object *object)
 {
+    identity *d = (identity *)context;
     static const char *const names[] = {"vendor name",  "product code", "revision",   "vendor URL",
                                         "product name", "model name",   "application"};
     char name[16];
 
-    (void)context;
     snprintf(name, sizeof name, "object %02X", object->id);
-    show_text(objects, object->id < sizeof names / sizeof names[0] ? names[object->id] : name,
+    show_text(d, d->objects, object->id < sizeof names / sizeof names[0] ? names[object->id] : name,
               object->data, object->length);
 }
 
 /* Waits for a request. Says why it failed, and keeps its exit code. */
-static int succeeds(const char *what, mbm_clientRequest *one, uint8_t queued)
+static int succeeds(identity *d, const char *what, mbm_clientRequest *one, uint8_t queued)
 {
     char status[256];
 
-    one->status = line_call(&at, one, queued);
+    one->status = line_call(&d->at, one, queued);
     if (one->status == MBM_OK)
         return 1;
-    if (failed.status == MBM_OK)
-        failed = *one;
-    (void)line_status(&at, one, status);
-    if (refused && !report_stopped)
-        cJSON_AddStringToObject(refused, what, status);
+    if (d->failed.status == MBM_OK)
+        d->failed = *one;
+    (void)line_status(&d->at, one, status);
+    if (d->refused && !report_stopped)
+        cJSON_AddStringToObject(d->refused, what, status);
     if (!options.is_quiet && !report_stopped) {
         report_flush(); /* what was found first is printed first */
         fprintf(stderr, "%s: %s: %s.\n", report_name, what, status);
@@ -110,51 +111,59 @@ static int succeeds(const char *what, mbm_clientRequest *one, uint8_t queued)
     return 0;
 }
 
-static int replied(const char *what, uint8_t queued, mbm_packet *packet)
+static int replied(identity *d, const char *what, uint8_t queued, mbm_packet *packet)
 {
-    return succeeds(what, &request, queued) &&
-           mbm_client_reply(&request, pdu, sizeof pdu, packet) == MBM_OK;
+    return succeeds(d, what, &d->request, queued) &&
+           mbm_client_reply(&d->request, d->pdu, sizeof d->pdu, packet) == MBM_OK;
 }
 
-static void identify(void)
+static void identify(identity *d)
 {
     mbm_packet packet;
 
-    identification.object = show_object;
-    (void)succeeds("identification", &identification.request,
-                   mbm_identification_read(&identification, &at.client, (uint8_t)category, 0));
+    (void)succeeds(
+        d, "identification", &d->identification.request,
+        mbm_identification_read(&d->identification, &d->at.client, (uint8_t)d->category, 0));
     if (!report_stopped &&
-        replied("server id", mbm_client_reportServerId(&at.client, &request), &packet))
-        show_text(json, "server id", packet.data, packet.dataLength);
+        replied(d, "server id", mbm_client_reportServerId(&d->at.client, &d->request), &packet))
+        show_text(d, d->json, "server id", packet.data, packet.dataLength);
     if (report_stopped ||
-        !replied("event counter", mbm_client_getCommEventCounter(&at.client, &request), &packet))
+        !replied(d, "event counter", mbm_client_getCommEventCounter(&d->at.client, &d->request),
+                 &packet))
         return;
-    found++;
-    if (!json) {
+    d->found++;
+    if (!d->json) {
         printf("events: %u%s\n", packet.eventCount, packet.commStatus ? ", busy" : "");
         return;
     }
-    cJSON_AddNumberToObject(json, "events", packet.eventCount);
-    cJSON_AddBoolToObject(json, "busy", packet.commStatus != 0);
+    cJSON_AddNumberToObject(d->json, "events", packet.eventCount);
+    cJSON_AddBoolToObject(d->json, "busy", packet.commStatus != 0);
 }
 
 int identify_command(int argc, char **argv)
 {
-    argp_parse(&arguments, argc, argv, 0, NULL, NULL);
-    identification.request.unit = request.unit = options.unit;
+    static identity data;
+    identity *d = &data;
+    d->category = MBM_DEVICE_ID_EXTENDED;
+    argp_parse(&arguments, argc, argv, 0, NULL, d);
+    d->identification.object = show_object;
+    d->identification.context = d;
+    d->identification.request.reply = d->request.reply = d->reply;
+    d->identification.request.replyBytes = d->request.replyBytes = sizeof d->reply;
+    d->identification.request.unit = d->request.unit = options.unit;
     if (options.is_json) {
-        json = cJSON_CreateObject();
-        cJSON_AddNumberToObject(json, "unit", options.unit);
-        objects = cJSON_AddObjectToObject(json, "objects");
-        refused = cJSON_AddObjectToObject(json, "refused");
+        d->json = cJSON_CreateObject();
+        cJSON_AddNumberToObject(d->json, "unit", options.unit);
+        d->objects = cJSON_AddObjectToObject(d->json, "objects");
+        d->refused = cJSON_AddObjectToObject(d->json, "refused");
     }
-    if (line_open(&at, &where) == CODE_DONE && line_connect(&at) == CODE_DONE) {
-        identify();
-        if (found == 0 && failed.status != MBM_OK)
-            (void)line_failure(&at, &failed, ADVICE_DEVICE);
-        if (json)
-            report_print_json(json);
+    if (line_open(&d->at, &d->where) == CODE_DONE && line_connect(&d->at) == CODE_DONE) {
+        identify(d);
+        if (d->found == 0 && d->failed.status != MBM_OK)
+            (void)line_failure(&d->at, &d->failed, ADVICE_DEVICE);
+        if (d->json)
+            report_print_json(d->json);
     }
-    line_close(&at);
+    line_close(&d->at);
     return report_code;
 }

@@ -1,3 +1,6 @@
+/* Opens the lines of clients, keeps them open, and says why a request got no reply.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "line.h"
 
@@ -10,51 +13,127 @@
 #include "trace.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <netdb.h>
 #include <poll.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
+
+/* A lookup of a host may block the program, so there is a longer pause between two of them. */
+enum { REOPEN_MS = 1000, LOOKUP_MS = 10000 };
+
+static uint32_t micros(void)
+{
+    return (uint32_t)clock_micros(CLOCK_MONOTONIC);
+}
 
 uint32_t line_milliseconds(void)
 {
     return (uint32_t)clock_milliseconds();
 }
 
+/* --- the hooks of the link: a terminal, which is opened for this program alone, or a socket --- */
+
+/* Keeps a descriptor for a line that is not open. Without it, a new connection could take the
+ * line's descriptor, and the line could not be opened again. */
+static void keep_reserve(line *l)
+{
+    const int fd = l->reserve ? 0 : open("/dev/null", O_RDONLY | O_CLOEXEC);
+
+    if (fd > 0)
+        l->reserve = fd;
+}
+
+static void free_reserve(line *l)
+{
+    if (l->reserve)
+        close(l->reserve);
+    l->reserve = 0;
+}
+
+static void close_device(void *context)
+{
+    line *l = (line *)context;
+
+    if (place_is_tcp(&l->place))
+        mbm_tcp_disconnect(&l->tcp);
+    else
+        mbm_tty_disconnect(&l->tty);
+    keep_reserve(l);
+}
+
+static uint8_t open_device(void *context)
+{
+    line *l = (line *)context;
+    uint8_t status;
+
+    l->tried = micros();
+    free_reserve(l);
+    if (!place_is_tcp(&l->place))
+        return terminal_connect(&l->tty, &l->place);
+    if (l->tcp.lookupError && micros() - l->looked_up < LOOKUP_MS * 1000u)
+        return MBM_LINK_LOST;
+    status = mbm_tcp_connect(&l->tcp);
+    if (l->tcp.lookupError)
+        l->looked_up = micros();
+    return status;
+}
+
+static uint8_t device_status(void *context)
+{
+    line *l = (line *)context;
+
+    return place_is_tcp(&l->place) ? mbm_tcp_status(&l->tcp) : mbm_tty_status(&l->tty);
+}
+
 /* --- opening --- */
 
-static int cannot_open(const line *l, const char *reason, const char *advice)
+static int cannot_open(const place *where, const char *reason, const char *advice)
 {
-    return report(CODE_LINE, "%s: %s%s%s", l->place.text, reason, *advice ? ". " : "", advice);
+    return report(CODE_LINE, "%s: %s%s%s", where->text, reason, *advice ? ". " : "", advice);
+}
+
+int line_cannot_open(const place *where, int lookup_error)
+{
+    const int error = errno;
+
+    if (lookup_error)
+        return cannot_open(where, gai_strerror(lookup_error), "Check the name of the host");
+    return cannot_open(where, terminal_error_text(where, error), place_advice(where, error));
 }
 
 static int open_tty(line *l)
 {
-    int error;
+    return terminal_open(&l->tty, &l->place) == 0 ? CODE_DONE : line_cannot_open(&l->place, 0);
+}
 
-    if (terminal_open(&l->tty, &l->place) == 0)
-        return CODE_DONE;
-    error = errno;
-    return cannot_open(l, terminal_error_text(&l->place, error), place_advice(&l->place, error));
+static int open_tcp_later(line *l)
+{
+    return mbm_tcp_openLater(&l->tcp, &l->addresses, l->place.host, l->place.service) == 0
+               ? CODE_DONE
+               : line_cannot_open(&l->place, 0);
 }
 
 static int open_tcp(line *l)
 {
-    if (mbm_tcp_openLater(&l->tcp, &l->addresses, l->place.host, l->place.service) != 0)
-        return cannot_open(l, strerror(errno), "");
+    const int code = open_tcp_later(l);
+
+    if (code != CODE_DONE)
+        return code;
     /* A name that does not exist is a mistake of the user. A network that is not there yet is not:
      * the link waits for it. */
     if (mbm_tcp_connect(&l->tcp) == MBM_LINK_LOST && l->tcp.error == ENXIO)
-        return cannot_open(l, mbm_tcp_text(&l->tcp), "Check the name of the host");
+        return cannot_open(&l->place, mbm_tcp_text(&l->tcp), "Check the name of the host");
     return CODE_DONE;
 }
 
 static int open_udp(line *l)
 {
-    if (mbm_udp_open(&l->udp, l->place.host, l->place.service) == 0)
-        return CODE_DONE;
-    return cannot_open(l, l->udp.lookupError ? gai_strerror(l->udp.lookupError) : strerror(errno),
-                       "Check the name of the host");
+    return mbm_udp_open(&l->udp, l->place.host, l->place.service) == 0
+               ? CODE_DONE
+               : line_cannot_open(&l->place, l->udp.lookupError);
 }
 
 const char *line_load_tls(const place *p, mbm_tls_files *files, mbm_tls_options *into)
@@ -71,7 +150,7 @@ const char *line_load_tls(const place *p, mbm_tls_files *files, mbm_tls_options 
 
 static int open_tls(line *l)
 {
-    const mbm_linkHooks hooks = mbm_tcp_link(&l->tcp);
+    const mbm_linkHooks hooks = {l, close_device, open_device, device_status};
     const mbm_port below = mbm_tcp_port(&l->tcp);
     mbm_tls_options tls = {0};
     const char *unreadable;
@@ -93,8 +172,8 @@ static int open_tls(line *l)
     return code;
 }
 
-/* Whether a loss harms nobody, unless the line cannot be opened again: a device has closed a
- * connection over which it has answered, or which was idle. */
+/* Whether a loss is harmless, unless the line cannot be opened again: a device has closed a
+ * connection that was idle, or over which it has answered. */
 static int is_harmless(const line *l, uint8_t event)
 {
     const mbm_counters *opened = &l->opened, *now = &l->counters;
@@ -104,8 +183,8 @@ static int is_harmless(const line *l, uint8_t event)
            (now->replies != opened->replies || now->requests == opened->requests);
 }
 
-/* A device is connected to anew, since no byte came. That is reported if it has answered over this
- * connection: of one that never answered, the program reports that. */
+/* The connection to a device is made anew, since no byte came. This is reported if the device has
+ * answered over this connection; the program reports a device that never answered. */
 static void take_silence(line *l)
 {
     if (l->counters.replies == l->opened.replies)
@@ -114,7 +193,7 @@ static void take_silence(line *l)
         report_log(REPORT_WARNING,
                    "%s: no byte came after %u requests in a row. The connection is made anew, now "
                    "and each time that this happens",
-                   l->place.text, options.replace_after);
+                   l->place.text, l->replace_after);
     l->is_replaced = 1;
 }
 
@@ -126,6 +205,9 @@ static void take_link(void *context, uint8_t event, uint8_t status)
     const int is_quiet = is_harmless(l, event);
     char before[sizeof l->reason];
 
+    /* The next request may open a line that was open until now. */
+    if (event == MBM_LINK_EVENT_LOST)
+        l->tried = micros() - REOPEN_MS * 1000u;
     if (event == MBM_LINK_EVENT_LOST && status == MBM_RESPONSE_TIMED_OUT) {
         take_silence(l);
         return;
@@ -159,38 +241,16 @@ static void take_link(void *context, uint8_t event, uint8_t status)
     l->is_told = l->is_logged;
 }
 
-/* --- the hooks of a terminal, which is opened for this program alone --- */
-
-static void close_tty(void *context)
-{
-    mbm_tty_disconnect(&((line *)context)->tty);
-}
-
-static uint8_t open_tty_again(void *context)
-{
-    line *l = (line *)context;
-
-    return terminal_connect(&l->tty, &l->place);
-}
-
-static uint8_t tty_status(void *context)
-{
-    return mbm_tty_status(&((line *)context)->tty);
-}
-
 static void keep_open(line *l)
 {
-    const mbm_linkHooks terminal = {l, close_tty, open_tty_again, tty_status};
-    const mbm_linkHooks hooks = l->place.kind == PLACE_TLS ? mbm_tls_link(&l->tls)
-                                : place_is_tcp(&l->place)  ? mbm_tcp_link(&l->tcp)
-                                                           : terminal;
+    const mbm_linkHooks device = {l, close_device, open_device, device_status};
+    const mbm_linkHooks hooks = l->place.kind == PLACE_TLS ? mbm_tls_link(&l->tls) : device;
 
     if (l->place.kind == PLACE_UDP)
         return;
+    l->tried = micros() - REOPEN_MS * 1000u;
     (void)mbm_link_begin(&l->kept, &l->client, &hooks);
-    (void)mbm_link_setBackoff(&l->kept, MBM_BACKOFF_FIXED, 1000, 1000);
-    if (!place_is_serial(&l->place))
-        (void)mbm_link_setReplaceAfter(&l->kept, options.replace_after);
+    (void)mbm_link_setBackoff(&l->kept, MBM_BACKOFF_FIXED, REOPEN_MS, REOPEN_MS);
     (void)mbm_link_setCallback(&l->kept, take_link, l);
     (void)mbm_link_setCounters(&l->kept, &l->losses);
 }
@@ -233,16 +293,22 @@ static void begin_client(line *l)
         if (l->place.has_gap)
             (void)mbm_client_setGap(&l->client, l->place.gapMs * 1000);
     }
-    if (l->place.framing == MBM_FRAMING_TCP) {
-        (void)mbm_client_setInFlight(&l->client, options.in_flight);
-        report_set_in_flight(options.in_flight);
-    }
-    (void)mbm_client_setResponseTimeout(&l->client, options.timeoutMs);
     (void)mbm_client_setRetries(&l->client, options.retries);
     (void)mbm_client_setCounters(&l->client, &l->counters);
 }
 
-static int open_place(line *l, const place *where, int (*open_serial)(line *l))
+void line_set(line *l, uint32_t timeoutMs, uint8_t in_flight, uint8_t replace_after)
+{
+    if (l->place.framing == MBM_FRAMING_TCP)
+        (void)mbm_client_setInFlight(&l->client, in_flight);
+    (void)mbm_client_setResponseTimeout(&l->client, timeoutMs);
+    l->replace_after = replace_after;
+    if (place_is_tcp(&l->place))
+        (void)mbm_link_setReplaceAfter(&l->kept, replace_after);
+}
+
+static int open_place(line *l, const place *where, int (*open_serial)(line *l),
+                      int (*open_stream)(line *l))
 {
     int code;
 
@@ -251,35 +317,60 @@ static int open_place(line *l, const place *where, int (*open_serial)(line *l))
     code = place_is_serial(where)     ? open_serial(l)
            : where->kind == PLACE_UDP ? open_udp(l)
            : where->kind == PLACE_TLS ? open_tls(l)
-                                      : open_tcp(l);
+                                      : open_stream(l);
     if (code != CODE_DONE) {
         line_close(l);
         return code;
     }
     begin_client(l);
     keep_open(l);
+    line_set(l, options.timeoutMs, options.in_flight, options.replace_after);
+    if (where->framing == MBM_FRAMING_TCP)
+        report_set_in_flight(options.in_flight);
     return CODE_DONE;
 }
 
 int line_open(line *l, const place *where)
 {
-    return open_place(l, where, open_tty);
+    return open_place(l, where, open_tty, open_tcp);
 }
 
 static int open_tty_later(line *l)
 {
-    if (mbm_tty_openLater(&l->tty, l->place.path, &l->place.tty) == 0)
-        return CODE_DONE;
-    return cannot_open(l, strerror(errno), "");
+    return mbm_tty_openLater(&l->tty, l->place.path, &l->place.tty) == 0
+               ? CODE_DONE
+               : line_cannot_open(&l->place, 0);
 }
 
 int line_open_later(line *l, const place *where)
 {
-    return open_place(l, where, open_tty_later);
+    return open_place(l, where, open_tty_later, open_tcp);
+}
+
+int line_begin(line *l, const place *where)
+{
+    const int code = open_place(l, where, open_tty_later, open_tcp_later);
+
+    keep_reserve(l);
+    return code;
+}
+
+int line_prepare(line *l)
+{
+    const uint8_t state = mbm_link_state(&l->kept);
+
+    if (state != MBM_LINK_IS_DOWN)
+        return 1;
+    if (micros() - l->tried < REOPEN_MS * 1000u)
+        return 0;
+    /* The request waits for this attempt, and ends if it fails. */
+    (void)mbm_link_reconnect(&l->kept);
+    return 1;
 }
 
 void line_close(line *l)
 {
+    free_reserve(l);
     mbm_tls_close(&l->tls);
     mbm_tls_end(&l->identity);
     mbm_tcp_close(&l->tcp);
@@ -303,7 +394,7 @@ int line_connect(line *l)
                 advice = "The server may refuse the certificate: see docs/security.md";
             else if (place_is_tcp(&l->place))
                 advice = "Check host and port, and that the device is on";
-            return cannot_open(l, line_reason(l), advice);
+            return cannot_open(&l->place, line_reason(l), advice);
         }
         line_rest(l, 1000);
     }
@@ -369,11 +460,11 @@ int line_polls(const line *l, struct pollfd *wait)
     return l->tty.isOpen;
 }
 
-void line_polled(line *l, const struct pollfd *wait)
+void line_polled(line *l, const found_round *round, const struct pollfd *wait)
 {
     /* TLS keeps bytes that the descriptor does not show. */
     if (l->place.kind != PLACE_TLS)
-        found_port_note(&l->found, wait);
+        found_port_note(&l->found, round, wait);
 }
 
 static int rest(void *context, uint32_t micros)

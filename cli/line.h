@@ -4,7 +4,7 @@
 #ifndef LINE_H
 #define LINE_H
 
-#include "found_port.h"
+#include "port_over.h"
 #include "mbm_call.h"
 #include "mbm_tls_linux.h"
 #include "mbm_udp.h"
@@ -30,6 +30,10 @@ typedef struct line {
     uint8_t is_logged;   /* set by the program after line_open: report losses as log lines */
     uint8_t is_told;     /* a loss was, and is not over */
     uint8_t is_replaced; /* that a silent device is connected to anew was reported */
+    uint32_t replace_after;
+    uint32_t tried;      /* when the last attempt to open it began, in microseconds */
+    uint32_t looked_up;  /* when the host was last looked up and not found */
+    int reserve;         /* a descriptor that is kept for the line while it is not open; 0: none */
     mbm_counters opened; /* `counters` when the line was opened the last time */
     char reason[160];    /* why it was the last time */
     found_port found;
@@ -44,7 +48,22 @@ int line_open(line *l, const place *where);
 
 /* The same for a service: a terminal that is not there yet is opened by line_poll later. */
 int line_open_later(line *l, const place *where);
+
+/* The same for a gateway: line_poll opens any line later. */
+int line_begin(line *l, const place *where);
 void line_close(line *l);
+
+/* Sets how long a reply may take, how many requests may be in flight on Modbus TCP, and after how
+ * many without any byte a connection is made anew. */
+void line_set(line *l, uint32_t timeoutMs, uint8_t in_flight, uint8_t replace_after);
+
+/* Whether a request may be queued: the line is open, or it is being opened. A line that is not open
+ * is opened for a request, but at most once a second. */
+int line_prepare(line *l);
+
+/* Reports why a place cannot be opened or listened at: an error of getaddrinfo or, if that is 0,
+ * errno. Returns CODE_LINE. */
+int line_cannot_open(const place *where, int lookup_error);
 
 /* Waits until there is a connection. Returns as line_open. */
 int line_connect(line *l);
@@ -60,14 +79,14 @@ void line_rest(line *l, uint32_t milliseconds);
  * in microseconds or a second. */
 void line_wait(line *l, int fd, uint32_t micros);
 
-/* For how many microseconds the line has nothing to do unless bytes arrive. */
+/* Returns for how many microseconds the line has nothing to do unless bytes arrive. */
 uint32_t line_delay(line *l);
 
-/* What to poll for the line, with other descriptors. Returns 0 if it has no descriptor. */
+/* Sets what to poll for the line, with other descriptors. Returns 0 if it has no descriptor. */
 int line_polls(const line *l, struct pollfd *wait);
 
-/* What was found then. A round of found_port.h has begun. */
-void line_polled(line *l, const struct pollfd *wait);
+/* Notes what the wait of this round has found for the line. */
+void line_polled(line *l, const found_round *round, const struct pollfd *wait);
 
 /* Waits for a request that was queued. Returns its status, MBM_CANCELLED after Ctrl-C. */
 uint8_t line_call(line *l, mbm_clientRequest *request, uint8_t queued);
@@ -83,8 +102,7 @@ const char *line_why(const line *l, uint8_t status);
  * after line_read and line_call it has been called. */
 void line_note(line *l, uint8_t status);
 
-/* Reports how a request failed that was made from `about`, one of ADVICE_. Returns the exit code.
- */
+/* Reports how a request failed. It was made from `about`, one of ADVICE_. Returns the exit code. */
 int line_failure(line *l, const mbm_clientRequest *request, int about);
 
 /* The same of `who` in place of the unit. */

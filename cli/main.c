@@ -2,7 +2,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
-#include "commands.h"
+#include "options.h"
 #include "mbm.h"
 #include "report.h"
 

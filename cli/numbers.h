@@ -29,4 +29,19 @@ const char *number_hex(const char *text, uint8_t *bytes, size_t capacity, size_t
 /* Writes a time as number_time reads it. Returns `text`. */
 const char *number_time_text(uint32_t milliseconds, char text[32]);
 
+/* --- bytes that are read one after the other: what numbers and JSON share --- */
+
+/* The bytes that have not been read yet. */
+typedef struct cursor {
+    const char *at, *end;
+} cursor;
+
+int cursor_is_digit(const cursor *in);
+
+/* Returns 0 if the next byte is another one. */
+int cursor_skip_char(cursor *in, char one);
+
+/* Skips a number as JSON has it (RFC 8259, 6). Returns 0 if there is none. */
+int cursor_skip_number(cursor *in);
+
 #endif

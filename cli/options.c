@@ -1,3 +1,6 @@
+/* Parses the options that several commands share.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "options.h"
 
@@ -171,9 +174,9 @@ static const struct argp_option trace_texts[] = {
     {"trace", TRACE, NULL, 0, "Print each frame in words and hexadecimal to stderr, times in UTC",
      9},
     {"pcap", PCAP, "FILE", 0, "Write each frame to a pcapng file, for Wireshark", 9},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
-const struct argp options_trace = {trace_texts, parse_trace, NULL, NULL, NULL, NULL, NULL};
+const struct argp options_trace = {.options = trace_texts, .parser = parse_trace};
 
 /* --- requests and output --- */
 
@@ -211,9 +214,9 @@ static const struct argp_option request_texts[] = {
      "Requests in a row without any byte after which a connection is made anew, 0 to 100 (2); 0 for "
      "never",
      2},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
-const struct argp options_request = {request_texts, parse_request, NULL, NULL, NULL, NULL, NULL};
+const struct argp options_request = {.options = request_texts, .parser = parse_request};
 
 static error_t parse_output(int key, char *text, struct argp_state *state)
 {
@@ -231,15 +234,13 @@ static error_t parse_output(int key, char *text, struct argp_state *state)
 static const struct argp_option output_texts[] = {
     {"json", JSON, NULL, 0, "Print JSON, one object a line", 3},
     {"quiet", 'q', NULL, 0, "Print no summary and no notes to stderr", 3},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
-const struct argp options_output = {output_texts, parse_output, NULL, NULL, NULL, NULL, NULL};
+const struct argp options_output = {.options = output_texts, .parser = parse_output};
 
-static const struct argp_child client_children[] = {{&options_request, 0, NULL, 0},
-                                                    {&options_output, 0, NULL, 0},
-                                                    {&options_trace, 0, NULL, 0},
-                                                    {NULL, 0, NULL, 0}};
-const struct argp options_client = {NULL, NULL, NULL, NULL, client_children, NULL, NULL};
+static const struct argp_child client_children[] = {
+    {.argp = &options_request}, {.argp = &options_output}, {.argp = &options_trace}, {0}};
+const struct argp options_client = {.children = client_children};
 
 /* --- the unit --- */
 
@@ -252,10 +253,9 @@ static error_t parse_unit(int key, char *text, struct argp_state *state)
 }
 
 static const struct argp_option unit_texts[] = {
-    {"unit", 'u', "N", 0, "The unit id of the device, 1 to 255; 0 writes to all (1)", 1},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {"unit", 'u', "N", 0, "The unit id of the device, 1 to 255; 0 writes to all (1)", 1}, {0}};
 
-const struct argp options_unit = {unit_texts, parse_unit, NULL, NULL, NULL, NULL, NULL};
+const struct argp options_unit = {.options = unit_texts, .parser = parse_unit};
 
 /* --- values --- */
 
@@ -316,6 +316,6 @@ static const struct argp_option value_texts[] = {
     {"scale", SCALE, "NUMBER", 0, "The value is the device's number times this, such as 0.1", 1},
     {"hex", HEX, NULL, 0, "Values of integer types are hexadecimal", 1},
     {"one-based", ONE_BASED, NULL, 0, "ADDRESS counts from 1, as in many manuals", 1},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
-const struct argp options_values = {value_texts, parse_values, NULL, NULL, NULL, NULL, NULL};
+const struct argp options_values = {.options = value_texts, .parser = parse_values};

@@ -1,7 +1,7 @@
-/* Options that several commands share, as children of their argp parsers.
+/* The commands, and the options that several of them share, as children of their argp parsers.
  *
  *     static const struct argp_child children[] = {
- *         {&options_unit, 0, NULL, 0}, {&options_client, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+ *         {.argp = &options_unit}, {.argp = &options_client}, {0}};
  *
  * Licence: MIT OR Apache-2.0. */
 #ifndef OPTIONS_H
@@ -45,8 +45,8 @@ extern const struct argp options_unit;
  * that of the table: a bit, or a uint16 if none is given. */
 extern const struct argp options_values;
 
-/* Of a text on the command line, where `what` names it, for example "COUNT". They end the program
- * with CODE_WRONG, after saying what is allowed, if the text is not right. */
+/* Read a text of the command line; `what` names it, for example "COUNT". If the text is not right,
+ * they say what is allowed and end the program with CODE_WRONG. */
 int64_t options_number(const struct argp_state *state, const char *what, const char *text,
                        int64_t least, int64_t most);
 uint32_t options_time(const struct argp_state *state, const char *what, const char *text,
@@ -70,11 +70,27 @@ void options_wrong(const struct argp_state *state, const char *format, ...)
 /* Refuses a word after the last one that a command takes. */
 void options_too_many(const struct argp_state *state, const char *text) __attribute__((noreturn));
 
-/* Refuses unit 0, to which a client only writes, and only on a serial line. */
+/* Refuses unit 0, unless a client writes on a serial line. */
 void options_check_unit(const struct argp_state *state, const struct place *where, int is_write);
 
 /* Reads the LINE of a client, or of a server. */
 void options_place(const struct argp_state *state, struct place *where, const char *text,
                    int is_server);
+
+/* --- the commands, each in a file of its own --- */
+
+/* A command gets its own arguments, the first of which is "mbm" and its name, and returns an exit
+ * code: one of CODE_ of report.h. */
+int read_command(int argc, char **argv);
+int write_command(int argc, char **argv);
+int call_command(int argc, char **argv);
+int scan_command(int argc, char **argv);
+int identify_command(int argc, char **argv);
+int poll_command(int argc, char **argv);
+int serve_command(int argc, char **argv);
+int sniff_command(int argc, char **argv);
+int gateway_command(int argc, char **argv);
+int header_command(int argc, char **argv);
+int bridge_command(int argc, char **argv);
 
 #endif

@@ -1,7 +1,10 @@
+/* Parses the payloads of writes: numbers, truth values, texts, and JSON with these.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "payload.h"
 
-#include "cursor.h"
+#include "numbers.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -215,7 +218,7 @@ static unsigned long read_utf8(cursor *in)
     return (unsigned long)(first & 3) << 6 | ((unsigned char)*in->at++ & 0x3F);
 }
 
-/* Writes a text, of which the bytes of a JSON string may be escapes. */
+/* Writes a text to words. A JSON string may have escapes. */
 static const char *write_text(const value_form *form, uint16_t count, cursor in, int is_string,
                               uint16_t *words)
 {

@@ -21,10 +21,9 @@ uint16_t payload_parse(const value_form *form, const char *payload, size_t lengt
                        uint16_t words[VALUE_WORDS], const char **wrong);
 
 /* As payload_parse, for a text of `count` characters, or for `count` values. The payload of a text
- * is the text itself, as UTF-8, a JSON string, or a JSON object with such a member "value"; what
- * follows the text in the registers is 0. Several values are numbers or truth values with commas
- * between them, without or with the brackets of a JSON array, or an object with such an array as
- * "value". */
+ * is the text itself, as UTF-8, a JSON string, or a JSON object with such a member "value"; the
+ * rest of the registers is 0. Several values are numbers or truth values with commas between them,
+ * without or with the brackets of a JSON array, or an object with such an array as "value". */
 uint16_t payload_parse_all(const value_form *form, uint16_t count, const char *payload,
                            size_t length, uint16_t words[PAYLOAD_WORDS], const char **wrong);
 

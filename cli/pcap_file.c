@@ -1,3 +1,6 @@
+/* Writes the blocks of a pcapng file, with the headers that Wireshark needs.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #include "pcap_file.h"
 
 #include <string.h>
@@ -301,7 +304,7 @@ int pcap_write(FILE *file, pcap_link *link, const mbm_traceRecord *record, uint6
         const char *const comment = pcap_fault(record->status);
 
         put_option(&b, OPTION_COMMENT, comment, strlen(comment));
-        /* What follows does not continue these bytes. */
+        /* The next record does not continue these bytes. */
         pcap_reconnect(link);
     }
     packet = record->direction == MBM_TRACE_SENT ? OUTBOUND : INBOUND;

@@ -2,9 +2,9 @@
  *
  * Each link is an interface of the file. Frames of Modbus TCP get IP and TCP headers with the
  * server's port 502. RTU frames are written as packets for Wireshark's dissector of Modbus RTU,
- * between TCP ports of which PCAP_RTU_PORT is the server's. An ASCII frame is written as the RTU
+ * between two TCP ports; that of the server is PCAP_RTU_PORT. An ASCII frame is written as the RTU
  * frame with the same content, because Wireshark does not know Modbus ASCII. Bytes that are no
- * frame are packets of raw data. Whatever is not a whole frame has a comment that says so.
+ * frame are packets of raw data. A packet that is not a whole frame has a comment that says so.
  *
  * Licence: MIT OR Apache-2.0. */
 #ifndef PCAP_FILE_H
@@ -14,8 +14,8 @@
 
 #include <stdio.h>
 
-/* The TCP port of servers in packets that carry RTU frames. Wireshark tells a request from a
- * response that looks the same by it, if it knows it: -o mbrtu.tcp.port:503. */
+/* The TCP port of servers in packets that carry RTU frames. By this port Wireshark tells a request
+ * from a response that looks the same, with -o mbrtu.tcp.port:503. */
 enum { PCAP_RTU_PORT = 503 };
 
 /* A link whose frames are written. */

@@ -1,43 +1,40 @@
 /* mbm poll: reads the fields of a device file again and again. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "advice.h"
-#include "commands.h"
+#include "clock.h"
 #include "device_file.h"
+#include "device_plan.h"
 #include "line.h"
 #include "numbers.h"
 #include "options.h"
 #include "report.h"
-#include "value_text.h"
 
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
-enum { MOST_WORDS = 65535, LONGEST_NAME = 40 };
+enum { LONGEST_NAME = 40 };
 
-static struct {
+typedef struct polling {
+    /* What the command line says. */
+    place where;
     const char *file;
     uint32_t rounds, forMs;
     uint16_t gap;
     uint8_t shows_plan;
-} wanted;
 
-static place where;
-static line at;
-static device meter;
-static mbm_plan plan;
-static mbm_planSetup setup;
-static mbm_clientRequest requests[MBM_CLIENT_DEPTH];
-
-/* The first failure, which is reported at the end. */
-static struct {
-    uint8_t status, exception;
-    uint16_t field;
-    char why[160];
-} first_failure;
+    line at;
+    device meter;
+    mbm_plan plan;
+    mbm_planSetup setup;
+    struct {
+        uint8_t status, exception;
+        uint16_t field;
+        char why[160];
+    } first_failure; /* which is reported at the end */
+} polling;
 
 /* --- the command line --- */
 
@@ -45,25 +42,26 @@ enum { ROUNDS = 0x2000, FOR, ONCE, GAP, SHOW_PLAN };
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
+    polling *p = (polling *)state->input;
     switch (key) {
     case ROUNDS:
-        wanted.rounds = (uint32_t)options_number(state, "--rounds", text, 1, 1000000000);
+        p->rounds = (uint32_t)options_number(state, "--rounds", text, 1, 1000000000);
         return 0;
-    case FOR: wanted.forMs = options_time(state, "--for", text, 1, 86400000); return 0;
-    case ONCE: wanted.rounds = 1; return 0;
-    case GAP: wanted.gap = (uint16_t)options_number(state, "--gap", text, 0, 2000); return 0;
-    case SHOW_PLAN: wanted.shows_plan = 1; return 0;
+    case FOR: p->forMs = options_time(state, "--for", text, 1, 86400000); return 0;
+    case ONCE: p->rounds = 1; return 0;
+    case GAP: p->gap = (uint16_t)options_number(state, "--gap", text, 0, 2000); return 0;
+    case SHOW_PLAN: p->shows_plan = 1; return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 1)
             options_too_many(state, text);
         if (state->arg_num == 0)
-            options_place(state, &where, text, 0);
+            options_place(state, &p->where, text, 0);
         else
-            wanted.file = text;
+            p->file = text;
         return 0;
     case ARGP_KEY_END:
-        if (!wanted.file)
-            options_wrong(state, "%s is missing", where.text ? "FILE" : "LINE");
+        if (!p->file)
+            options_wrong(state, "%s is missing", p->where.text ? "FILE" : "LINE");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -77,21 +75,20 @@ static const struct argp_option texts[] = {
      "One request may read up to N addresses between two fields too, if the device has them (0)",
      1},
     {"show-plan", SHOW_PLAN, NULL, 0, "First print the requests of the plan to stderr", 3},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
-static const struct argp_child children[] = {{&options_client, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+static const struct argp_child children[] = {{.argp = &options_client}, {0}};
 
 static const struct argp arguments = {
-    texts,
-    parse,
-    "LINE FILE",
-    "Reads the fields of a device file, each at its interval, in the fewest requests. A round is "
-    "the shortest interval; at its end the values are printed with their age and status.\v"
-    "docs/serve.md describes the device file.\n\n"
-    "  mbm poll rtu:/dev/ttyUSB0 meter.yaml --rounds 10\n\n" PLACE_HELP,
-    children,
-    NULL,
-    NULL};
+    .options = texts,
+    .parser = parse,
+    .args_doc = "LINE FILE",
+    .doc =
+        "Reads the fields of a device file, each at its interval, in the fewest requests. A round is "
+        "the shortest interval; at its end the values are printed with their age and status.\v"
+        "docs/serve.md describes the device file.\n\n"
+        "  mbm poll rtu:/dev/ttyUSB0 meter.yaml --rounds 10\n\n" PLACE_HELP,
+    .children = children};
 
 /* --- the plan --- */
 
@@ -103,80 +100,50 @@ static uint8_t exception_of(uint8_t status)
 /* Notes how a read of a field has ended. */
 static void take_field(void *context, mbm_plan *of, uint16_t field)
 {
+    polling *p = (polling *)context;
     const uint8_t status = mbm_plan_getStatus(of, field, NULL);
     const char *why;
 
-    line_note(&at, status);
-    why = line_why(&at, status);
-    (void)context;
+    line_note(&p->at, status);
+    why = line_why(&p->at, status);
     if (status == MBM_OK || status == MBM_CANCELLED || report_stopped)
         return;
-    if (first_failure.status == MBM_OK) {
-        first_failure.status = status;
-        first_failure.exception = exception_of(status);
-        first_failure.field = field;
-        snprintf(first_failure.why, sizeof first_failure.why, "%s", why ? why : "");
+    if (p->first_failure.status == MBM_OK) {
+        p->first_failure.status = status;
+        p->first_failure.exception = exception_of(status);
+        p->first_failure.field = field;
+        snprintf(p->first_failure.why, sizeof p->first_failure.why, "%s", why ? why : "");
     }
     (void)report_note(report_code_of(status, exception_of(status)));
 }
 
-/* How many words a plan may need, its gaps included. */
-static uint16_t words_needed(void)
-{
-    uint32_t words = 0;
-    uint16_t i;
-
-    for (i = 0; i < meter.readable && words < MOST_WORDS; i++)
-        words += device_size(&meter.planned[i]) + wanted.gap;
-    return (uint16_t)(words < MOST_WORDS ? words : MOST_WORDS);
-}
-
 /* Returns CODE_DONE, or another exit code after reporting the reason. */
-static int begin_plan(void)
+static int begin_plan(polling *p)
 {
-    const uint16_t count = meter.readable;
-    uint16_t wrong = 0xFFFF;
+    /* Only on Modbus TCP several requests may be in flight. */
+    const uint8_t requests = p->where.framing == MBM_FRAMING_TCP ? options.in_flight : 1;
+    uint16_t wrong = UINT16_MAX;
     uint8_t status;
 
-    if (count == 0)
-        return report(CODE_WRONG, "%s has no field that can be read", wanted.file);
-    setup.fields = meter.planned;
-    setup.positions = (mbm_planPosition *)calloc(count, sizeof *setup.positions);
-    setup.reads = (mbm_planRead *)calloc(count, sizeof *setup.reads);
-    setup.dataWords = words_needed();
-    setup.data = (uint16_t *)calloc(setup.dataWords, sizeof *setup.data);
-    if (!setup.positions || !setup.reads || !setup.data)
-        return report(CODE_SYSTEM, "there is no memory for %u fields", count);
-    setup.requests = requests;
-    setup.update = take_field;
-    setup.fieldCount = setup.readCount = count;
-    setup.bitGap = wanted.gap;
-    setup.registerGap = wanted.gap < MBM_MAX_READ_REGISTERS ? wanted.gap : MBM_MAX_READ_REGISTERS;
-    /* Only on Modbus TCP several requests may be in flight. */
-    setup.requestCount = where.framing == MBM_FRAMING_TCP ? options.in_flight : 1;
-    status = mbm_plan_begin(&plan, &at.client, &setup, &wrong);
-    if (status != MBM_OK && wrong < count)
-        return report(CODE_WRONG, "%s:%d: %s", wanted.file, meter.fields[wrong].line,
-                      mbm_status_text(status));
-    return status == MBM_OK ? CODE_DONE
-                            : report(CODE_WRONG, "%s: %s", wanted.file, mbm_status_text(status));
+    if (p->meter.readable == 0)
+        return report(CODE_WRONG, "%s has no field that can be read", p->file);
+    if (!device_plan_make(&p->setup, &p->meter, p->gap, requests))
+        return report(CODE_SYSTEM, "there is no memory for %u fields", p->meter.readable);
+    p->setup.update = take_field;
+    p->setup.context = p;
+    status = mbm_plan_begin(&p->plan, &p->at.client, &p->setup, &wrong);
+    return status == MBM_OK
+               ? CODE_DONE
+               : report(CODE_WRONG, "%s", device_plan_wrong(&p->meter, p->file, status, wrong));
 }
 
-static void free_plan(void)
-{
-    (void)mbm_plan_end(&plan);
-    free(setup.positions);
-    free(setup.reads);
-    free(setup.data);
-}
-
-static void show_plan(void)
+static void show_plan(polling *p)
 {
     mbm_planReadInfo read;
     char time[32];
     uint16_t i;
 
-    for (i = 0; mbm_plan_getRead(&plan, i, &read) == MBM_OK; i++)
+    for (i = 0; mbm_plan_getRead(&p->plan, i, &read) == MBM_OK; i++)
         fprintf(stderr, "request %u: unit %u, %s, %u from %u on, every %s\n", i + 1u, read.unit,
                 value_table_names[read.table], read.quantity, read.address,
                 number_time_text(read.intervalMs, time));
@@ -184,10 +151,10 @@ static void show_plan(void)
 
 /* --- showing --- */
 
-/* The status of a field in words; of a lost link with the reason. */
-static const char *print_status(uint8_t status, char text[256])
+/* The status of a field in words; a lost link has the reason too. */
+static const char *print_status(polling *p, uint8_t status, char text[256])
 {
-    const char *reason = status == MBM_LINK_LOST ? line_reason(&at) : NULL;
+    const char *reason = status == MBM_LINK_LOST ? line_reason(&p->at) : NULL;
 
     snprintf(text, 256, "%s%s%s", report_words(status, exception_of(status)), reason ? ": " : "",
              reason ? reason : "");
@@ -204,14 +171,14 @@ static int width_of(const char *text)
     return width;
 }
 
-static int longest_name(void)
+static int longest_name(polling *p)
 {
     int longest = 0;
     uint16_t i;
 
-    for (i = 0; i < meter.readable; i++)
-        if (width_of(meter.fields[i].name) > longest)
-            longest = width_of(meter.fields[i].name);
+    for (i = 0; i < p->meter.readable; i++)
+        if (width_of(p->meter.fields[i].name) > longest)
+            longest = width_of(p->meter.fields[i].name);
     return longest < LONGEST_NAME ? longest : LONGEST_NAME;
 }
 
@@ -221,69 +188,69 @@ static void print_column(const char *text, int width)
     printf("  %s%*s", text, width > width_of(text) ? width - width_of(text) : 0, "");
 }
 
-/* Appends the names of an enumeration, as far as they fit: " (off)", of several values " (off,on)",
- * with "-" for a value without a name. Nothing if no value has one. */
-static void add_names(uint16_t field, char *text, size_t capacity)
+/* Appends the names of an enumeration, as far as they fit: " (off)", or " (off,on)" if there are
+ * several values; "-" stands for a value without a name. Appends nothing if no value has a name. */
+static void add_names(polling *p, uint16_t field, char *text, size_t capacity)
 {
-    const uint16_t count = value_count(&meter.planned[field]);
+    const uint16_t count = device_plan_count(&p->meter.planned[field]);
     size_t length = strlen(text);
     uint16_t i, named = 0;
 
     for (i = 0; i < count; i++)
-        named = (uint16_t)(named + (value_name(&plan, &meter, field, i) != NULL));
+        named = (uint16_t)(named + (device_plan_name(&p->plan, &p->meter, field, i) != NULL));
     for (i = 0; named > 0 && i < count && length < capacity; i++) {
-        const char *name = value_name(&plan, &meter, field, i);
+        const char *name = device_plan_name(&p->plan, &p->meter, field, i);
 
         length += (size_t)snprintf(text + length, capacity - length, "%s%s%s", i == 0 ? " (" : ",",
                                    name ? name : "-", i + 1 == count ? ")" : "");
     }
 }
 
-static void print_row(uint16_t field, int name_width)
+static void print_row(polling *p, uint16_t field, int name_width)
 {
-    static char value[VALUE_TEXT_LONGEST + 3 * DEVICE_NAME_BYTES];
-    const char *measure = meter.fields[field].unit_of_measurement;
+    static char value[DEVICE_TEXT_LONGEST + 3 * DEVICE_NAME_BYTES];
+    const char *measure = p->meter.fields[field].unit_of_measurement;
     char status[256], age[32] = "";
     uint32_t ageMs;
 
-    const uint8_t code = mbm_plan_getStatus(&plan, field, &ageMs);
+    const uint8_t code = mbm_plan_getStatus(&p->plan, field, &ageMs);
 
-    if (!value_text(&plan, &meter, field, 0, value))
+    if (!device_plan_text(&p->plan, &p->meter, field, 0, value))
         strcpy(value, "-");
     else if (measure)
         snprintf(value + strlen(value), DEVICE_NAME_BYTES + 2, " %s", measure);
-    add_names(field, value, sizeof value);
+    add_names(p, field, value, sizeof value);
     if (ageMs != UINT32_MAX)
         snprintf(age, sizeof age, "%ums", (unsigned)ageMs);
-    print_column(meter.fields[field].name, name_width);
+    print_column(p->meter.fields[field].name, name_width);
     print_column(value, 16);
     print_column(age, 7);
-    printf("  %s\n", print_status(code, status));
+    printf("  %s\n", print_status(p, code, status));
 }
 
-static void print_rows(uint32_t round, const char *time)
+static void print_rows(polling *p, uint32_t round, const char *time)
 {
-    const int name_width = longest_name();
+    const int name_width = longest_name(p);
     uint16_t i, right = 0;
 
-    for (i = 0; i < meter.readable; i++)
-        right = (uint16_t)(right + (mbm_plan_getStatus(&plan, i, NULL) == MBM_OK));
+    for (i = 0; i < p->meter.readable; i++)
+        right = (uint16_t)(right + (mbm_plan_getStatus(&p->plan, i, NULL) == MBM_OK));
     if (isatty(STDOUT_FILENO))
         printf("\033[H\033[J");
-    printf("round %u, %s: %u of %u fields read\n", (unsigned)round, time, right, meter.readable);
-    for (i = 0; i < meter.readable; i++)
-        print_row(i, name_width);
+    printf("round %u, %s: %u of %u fields read\n", (unsigned)round, time, right, p->meter.readable);
+    for (i = 0; i < p->meter.readable; i++)
+        print_row(p, i, name_width);
 }
 
-/* The names of an enumeration for JSON: a text or null, of several values an array of them. */
-static cJSON *json_names(uint16_t field)
+/* The names of an enumeration for JSON: a text or null, or an array of these for several values. */
+static cJSON *json_names(polling *p, uint16_t field)
 {
-    const uint16_t count = value_count(&meter.planned[field]);
+    const uint16_t count = device_plan_count(&p->meter.planned[field]);
     cJSON *array = count > 1 ? cJSON_CreateArray() : NULL, *one = NULL;
     uint16_t i;
 
     for (i = 0; i < count; i++) {
-        const char *name = value_name(&plan, &meter, field, i);
+        const char *name = device_plan_name(&p->plan, &p->meter, field, i);
 
         one = name ? cJSON_CreateString(name) : cJSON_CreateNull();
         if (array)
@@ -292,57 +259,55 @@ static cJSON *json_names(uint16_t field)
     return array ? array : one;
 }
 
-static void print_json(uint16_t field, uint32_t round, const char *time)
+static void print_json(polling *p, uint16_t field, uint32_t round, const char *time)
 {
-    static char value[VALUE_TEXT_LONGEST];
-    const device_field *of = &meter.fields[field];
+    static char value[DEVICE_TEXT_LONGEST];
+    const device_field *of = &p->meter.fields[field];
     cJSON *object = cJSON_CreateObject();
     char status[256];
     uint32_t ageMs;
 
-    const uint8_t code = mbm_plan_getStatus(&plan, field, &ageMs);
+    const uint8_t code = mbm_plan_getStatus(&p->plan, field, &ageMs);
 
     cJSON_AddStringToObject(object, "time", time);
     cJSON_AddNumberToObject(object, "round", round);
-    cJSON_AddNumberToObject(object, "unit", meter.planned[field].unit);
+    cJSON_AddNumberToObject(object, "unit", p->meter.planned[field].unit);
     cJSON_AddStringToObject(object, "name", of->name);
-    if (value_text(&plan, &meter, field, 1, value))
+    if (device_plan_text(&p->plan, &p->meter, field, 1, value))
         cJSON_AddRawToObject(object, "value", value);
     else
         cJSON_AddNullToObject(object, "value");
     if (of->label_count > 0)
-        cJSON_AddItemToObject(object, "value_name", json_names(field));
+        cJSON_AddItemToObject(object, "value_name", json_names(p, field));
     if (of->unit_of_measurement)
         cJSON_AddStringToObject(object, "unit_of_measurement", of->unit_of_measurement);
     if (ageMs != UINT32_MAX)
         cJSON_AddNumberToObject(object, "age_ms", ageMs);
-    report_json(object, code, exception_of(code), print_status(code, status));
+    report_json(object, code, exception_of(code), print_status(p, code, status));
 }
 
-static void show_round(uint32_t round)
+static void show_round(polling *p, uint32_t round)
 {
-    struct timespec now;
-    char time[40];
+    char time[CLOCK_TEXT_BYTES];
     uint16_t i;
 
-    clock_gettime(CLOCK_REALTIME, &now);
-    report_time(&now, time);
+    (void)clock_now_text(time);
     if (!options.is_json)
-        print_rows(round, time);
-    for (i = 0; options.is_json && i < meter.readable; i++)
-        print_json(i, round, time);
+        print_rows(p, round, time);
+    for (i = 0; options.is_json && i < p->meter.readable; i++)
+        print_json(p, i, round, time);
     report_flush();
 }
 
 /* Says how the first failure came about, and what to look at. An exception is about a field, other
  * failures are about its unit. */
-static void report_first_failure(void)
+static void report_first_failure(polling *p)
 {
-    const uint8_t status = first_failure.status, exception = first_failure.exception;
-    const char *why = *first_failure.why ? first_failure.why : NULL;
-    const mbm_planField *planned = &meter.planned[first_failure.field];
-    const device_field *field = &meter.fields[first_failure.field];
-    const char *advice = advice_on(&at.place, ADVICE_FILE, status, exception, why);
+    const uint8_t status = p->first_failure.status, exception = p->first_failure.exception;
+    const char *why = *p->first_failure.why ? p->first_failure.why : NULL;
+    const mbm_planField *planned = &p->meter.planned[p->first_failure.field];
+    const device_field *field = &p->meter.fields[p->first_failure.field];
+    const char *advice = advice_on(&p->at.place, ADVICE_FILE, status, exception, why);
     char who[200];
     uint16_t address;
     uint8_t table;
@@ -355,18 +320,18 @@ static void report_first_failure(void)
     if (exception == MBM_ILLEGAL_DATA_ADDRESS && table != 0)
         advice = say("In a manual, %u is address %u: write \"table: %s\" and \"address: %u\"",
                      planned->address, address, value_table_names[table], address);
-    else if (exception == MBM_ILLEGAL_DATA_ADDRESS && wanted.gap > 0)
+    else if (exception == MBM_ILLEGAL_DATA_ADDRESS && p->gap > 0)
         advice = say("%s. Try without --gap", advice);
     (void)report_failure(who, status, exception, options.timeoutMs, why, advice);
 }
 
 /* Says how it went, and what to look at after the first failure. */
-static void show_end(uint32_t round)
+static void show_end(polling *p, uint32_t round)
 {
-    const mbm_counters *counters = &at.counters;
+    const mbm_counters *counters = &p->at.counters;
 
-    if (first_failure.status != MBM_OK)
-        report_first_failure();
+    if (p->first_failure.status != MBM_OK)
+        report_first_failure(p);
     if (!options.is_quiet)
         fprintf(stderr, "%s: rounds: %u, requests: %u, replies: %u, exceptions: %u.\n", report_name,
                 (unsigned)round, (unsigned)counters->requests, (unsigned)counters->replies,
@@ -375,86 +340,89 @@ static void show_end(uint32_t round)
 
 /* --- rounds --- */
 
-static int is_every_field_read(void)
+static int is_every_field_read(polling *p)
 {
     uint16_t i;
 
-    for (i = 0; i < meter.readable; i++)
-        if (mbm_plan_getStatus(&plan, i, NULL) == MBM_PENDING)
+    for (i = 0; i < p->meter.readable; i++)
+        if (mbm_plan_getStatus(&p->plan, i, NULL) == MBM_PENDING)
             return 0;
     return 1;
 }
 
-static uint32_t shortest_interval(void)
+static uint32_t shortest_interval(polling *p)
 {
     uint32_t shortest = MBM_PLAN_LONGEST_INTERVAL;
     uint16_t i;
 
-    for (i = 0; i < meter.readable; i++)
-        if (meter.planned[i].intervalMs < shortest)
-            shortest = meter.planned[i].intervalMs;
+    for (i = 0; i < p->meter.readable; i++)
+        if (p->meter.planned[i].intervalMs < shortest)
+            shortest = p->meter.planned[i].intervalMs;
     return shortest;
 }
 
 /* Sleeps until plan or client have something to do, at most `milliseconds`. */
-static void rest(uint32_t milliseconds)
+static void rest(polling *p, uint32_t milliseconds)
 {
-    const uint32_t delay = mbm_plan_pollDelay(&plan) / 1000;
+    const uint32_t delay = mbm_plan_pollDelay(&p->plan) / 1000;
 
-    line_rest(&at, delay < milliseconds ? delay : milliseconds);
+    line_rest(&p->at, delay < milliseconds ? delay : milliseconds);
 }
 
 /* The first round ends when every field was read or failed, each other one an interval later. */
-static void poll_rounds(void)
+static void poll_rounds(polling *p)
 {
-    const uint32_t interval = shortest_interval(), start = line_milliseconds();
+    const uint32_t interval = shortest_interval(p), start = line_milliseconds();
     uint32_t round = 0, due = start;
 
-    while (!report_stopped && !ferror(stdout) && (wanted.rounds == 0 || round < wanted.rounds)) {
+    while (!report_stopped && !ferror(stdout) && (p->rounds == 0 || round < p->rounds)) {
         const uint32_t now = line_milliseconds();
         uint32_t left = 1000;
 
-        if (wanted.forMs && now - start >= wanted.forMs)
+        if (p->forMs && now - start >= p->forMs)
             break;
-        (void)mbm_plan_poll(&plan);
-        line_poll(&at);
-        if (round == 0 ? is_every_field_read() : (int32_t)(now - due) >= 0) {
-            show_round(++round);
+        (void)mbm_plan_poll(&p->plan);
+        line_poll(&p->at);
+        if (round == 0 ? is_every_field_read(p) : (int32_t)(now - due) >= 0) {
+            show_round(p, ++round);
             due =
                 round == 1 || (int32_t)(now - due - interval) > 0 ? now + interval : due + interval;
             continue;
         }
         if (round > 0 && due - now < left)
             left = due - now;
-        if (wanted.forMs && wanted.forMs - (now - start) < left)
-            left = wanted.forMs - (now - start);
-        rest(left);
+        if (p->forMs && p->forMs - (now - start) < left)
+            left = p->forMs - (now - start);
+        rest(p, left);
     }
-    show_end(round);
+    show_end(p, round);
 }
 
 int poll_command(int argc, char **argv)
 {
+    static polling data;
+    polling *p = &data;
     char wrong[YAML_FILE_WRONG_BYTES];
     int code;
 
-    argp_parse(&arguments, argc, argv, 0, NULL, NULL);
-    code = device_file_read(&meter, wanted.file, wrong);
+    argp_parse(&arguments, argc, argv, 0, NULL, p);
+    code = device_file_read(&p->meter, p->file, wrong);
     if (code != CODE_DONE)
         return report(code, "%s", wrong);
-    code = line_open(&at, &where);
+    code = line_open(&p->at, &p->where);
     if (code == CODE_DONE) {
-        if (wanted.rounds == 1)
-            code = line_connect(&at);
+        if (p->rounds == 1)
+            code = line_connect(&p->at);
         if (code == CODE_DONE)
-            code = begin_plan();
-        if (code == CODE_DONE && wanted.shows_plan)
-            show_plan();
+            code = begin_plan(p);
+        if (code == CODE_DONE && p->shows_plan)
+            show_plan(p);
         if (code == CODE_DONE)
-            poll_rounds();
-        free_plan();
-        line_close(&at);
+            poll_rounds(p);
+        (void)mbm_plan_end(&p->plan);
+        device_plan_free(&p->setup);
+        line_close(&p->at);
     }
-    device_free(&meter);
+    device_free(&p->meter);
     return code != CODE_DONE ? code : report_code;
 }

@@ -1,7 +1,7 @@
 /* mbm read: reads values once, or again and again. Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "advice.h"
-#include "commands.h"
+#include "clock.h"
 #include "line.h"
 #include "options.h"
 #include "report.h"
@@ -10,7 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { ADDRESSES = 65536, PARTS = ADDRESSES / 124 + 1, BYTES_OF_BITS = MBM_MAX_READ_BITS / 8 };
@@ -28,79 +27,84 @@ typedef struct history {
     uint8_t has_part[PARTS];
 } history;
 
-static line at;
-static place where;
-static const char *address_text, *count_text;
-static uint32_t interval, rounds;
-static int is_csv;
+typedef struct reading {
+    line at;
+    place where;
+    const char *address_text, *count_text;
+    uint32_t interval, rounds;
+    int is_csv;
 
-/* The units, which are read one after another; `turn` is the index of the one at work. */
-static uint8_t units[OPTIONS_UNITS] = {1};
-static unsigned unit_count = 1, turn;
-static history *before; /* of each unit */
+    /* The units, which are read one after another; `turn` is the index of the one at work. */
+    uint8_t units[OPTIONS_UNITS];
+    unsigned unit_count, turn;
+    history *before; /* of each unit */
 
-static uint16_t address;
-static uint32_t count = 1, total; /* values; registers or bits */
-static uint16_t each;             /* registers or bits of a value */
-static part parts[PARTS];
-static unsigned part_count;
-static uint16_t words[ADDRESSES];
-static uint8_t bits[(ADDRESSES / MBM_MAX_READ_BITS + 1) * BYTES_OF_BITS];
+    uint16_t address, each; /* `each`: registers or bits of a value */
+    uint32_t count, total;  /* values; registers or bits */
+    part parts[PARTS];
+    unsigned part_count;
+    uint16_t words[ADDRESSES];
+    uint8_t bits[(ADDRESSES / MBM_MAX_READ_BITS + 1) * BYTES_OF_BITS];
+} reading;
 
 /* --- the command line --- */
 
 enum { EVERY = 1, TIMES, CSV };
 
-static void check_arguments(const struct argp_state *state)
+static void check_arguments(reading *r, const struct argp_state *state)
 {
     const int is_text = options.form.type == MBM_TYPE_TEXT;
     const int is_bits = options.form.type == MBM_TYPE_BIT;
     uint16_t most;
 
-    if (!address_text)
-        options_wrong(state, "%s is missing", where.text ? "ADDRESS" : "LINE");
-    address = options_address(state, address_text);
-    if (count_text)
-        count = (uint32_t)options_number(state, "COUNT", count_text, 1,
-                                         is_text ? VALUE_LONGEST_TEXT : ADDRESSES);
-    if (rounds > 0 && interval == 0)
+    if (!r->address_text)
+        options_wrong(state, "%s is missing", r->where.text ? "ADDRESS" : "LINE");
+    r->address = options_address(state, r->address_text);
+    if (r->count_text)
+        r->count = (uint32_t)options_number(state, "COUNT", r->count_text, 1,
+                                            is_text ? VALUE_LONGEST_TEXT : ADDRESSES);
+    if (r->rounds > 0 && r->interval == 0)
         options_wrong(state, "--times needs --every");
-    if (is_csv && options.is_json)
+    if (r->is_csv && options.is_json)
         options_wrong(state, "--csv and --json exclude each other");
-    each = value_registers(options.form.type, is_text ? (uint16_t)count : 1);
-    total = is_text ? each : count * each;
-    if (address + total > ADDRESSES)
+    r->each = value_registers(options.form.type, is_text ? (uint16_t)r->count : 1);
+    r->total = is_text ? r->each : r->count * r->each;
+    if (r->address + r->total > ADDRESSES)
         options_wrong(state, "%u addresses from %u on end beyond the last address, 65535",
-                      (unsigned)total, address);
+                      (unsigned)r->total, r->address);
     if (is_text)
-        count = 1;
-    most = is_bits ? MBM_MAX_READ_BITS : (uint16_t)(MBM_MAX_READ_REGISTERS / each * each);
-    for (; part_count * (uint32_t)most < total; part_count++) {
-        parts[part_count].first = part_count * (uint32_t)most;
-        parts[part_count].quantity =
-            (uint16_t)(total - parts[part_count].first < most ? total - parts[part_count].first
-                                                              : most);
+        r->count = 1;
+    most = is_bits ? MBM_MAX_READ_BITS : (uint16_t)(MBM_MAX_READ_REGISTERS / r->each * r->each);
+    for (; r->part_count * (uint32_t)most < r->total; r->part_count++) {
+        r->parts[r->part_count].first = r->part_count * (uint32_t)most;
+        r->parts[r->part_count].quantity =
+            (uint16_t)(r->total - r->parts[r->part_count].first < most
+                           ? r->total - r->parts[r->part_count].first
+                           : most);
     }
 }
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
+    reading *r = (reading *)state->input;
     switch (key) {
-    case 'u': unit_count = options_units(state, "--unit", text, units); return 0;
-    case EVERY: interval = options_time(state, "--every", text, 1, 86400000); return 0;
-    case TIMES: rounds = (uint32_t)options_number(state, "--times", text, 1, 1000000000); return 0;
-    case CSV: is_csv = 1; return 0;
+    case 'u': r->unit_count = options_units(state, "--unit", text, r->units); return 0;
+    case EVERY: r->interval = options_time(state, "--every", text, 1, 86400000); return 0;
+    case TIMES:
+        r->rounds = (uint32_t)options_number(state, "--times", text, 1, 1000000000);
+        return 0;
+    case CSV: r->is_csv = 1; return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num == 0)
-            options_place(state, &where, text, 0);
+            options_place(state, &r->where, text, 0);
         else if (state->arg_num == 1)
-            address_text = text;
+            r->address_text = text;
         else if (state->arg_num == 2)
-            count_text = text;
+            r->count_text = text;
         else
             options_too_many(state, text);
         return 0;
-    case ARGP_KEY_SUCCESS: check_arguments(state); return 0;
+    case ARGP_KEY_SUCCESS: check_arguments(r, state); return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
@@ -110,39 +114,39 @@ static const struct argp_option texts[] = {
     {"every", EVERY, "TIME", 0, "Read again and again, such as every 500ms or 2s, until Ctrl-C", 0},
     {"times", TIMES, "N", 0, "With --every: so many times", 0},
     {"csv", CSV, NULL, 0, "Print CSV, one line a round", 3},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
 static const struct argp_child children[] = {
-    {&options_values, 0, NULL, 0}, {&options_client, 0, NULL, 0}, {NULL, 0, NULL, 0}};
+    {.argp = &options_values}, {.argp = &options_client}, {0}};
 
 static const struct argp arguments = {
-    texts,
-    parse,
-    "LINE ADDRESS [COUNT]",
-    "Reads COUNT values (1) from ADDRESS on, 0 to 65535. Of a text COUNT is the number of its "
-    "characters.\v"
-    "Example: two floats of unit 17, every second\n\n"
-    "  mbm read rtu:/dev/ttyUSB0 --unit 17 --type float --every 1s 100 2\n\n" PLACE_HELP,
-    children,
-    NULL,
-    NULL};
+    .options = texts,
+    .parser = parse,
+    .args_doc = "LINE ADDRESS [COUNT]",
+    .doc =
+        "Reads COUNT values (1) from ADDRESS on, 0 to 65535. Of a text COUNT is the number of its "
+        "characters.\v"
+        "Example: two floats of unit 17, every second\n\n"
+        "  mbm read rtu:/dev/ttyUSB0 --unit 17 --type float --every 1s 100 2\n\n" PLACE_HELP,
+    .children = children};
 
 /* --- reading --- */
 
-static void queue(part *p)
+static void queue(reading *r, part *p)
 {
     const int is_bits = options.form.type == MBM_TYPE_BIT;
 
     memset(&p->request, 0, sizeof p->request);
     p->request.unit = options.unit;
-    p->request.reply = is_bits ? (void *)(bits + p->first / 8) : (void *)(words + p->first);
+    p->request.reply = is_bits ? (void *)(r->bits + p->first / 8) : (void *)(r->words + p->first);
     p->request.replyBytes =
-        (uint16_t)(is_bits ? BYTES_OF_BITS : p->quantity * (unsigned)sizeof words[0]);
-    (void)line_read(&at, &p->request, options.table, (uint16_t)(address + p->first), p->quantity);
+        (uint16_t)(is_bits ? BYTES_OF_BITS : p->quantity * (unsigned)sizeof r->words[0]);
+    (void)line_read(&r->at, &p->request, options.table, (uint16_t)(r->address + p->first),
+                    p->quantity);
 }
 
 /* Takes a request that has ended. Returns 0 if others would fail in the same way. */
-static int take(part *p)
+static int take(reading *r, part *p)
 {
     const int code = report_code_of(p->request.status, p->request.exception);
     uint32_t i;
@@ -150,129 +154,130 @@ static int take(part *p)
     (void)report_note(code);
     if (code == CODE_DONE && options.form.type == MBM_TYPE_BIT)
         for (i = p->first; i < p->first + p->quantity; i++)
-            words[i] = bits[i / 8] >> i % 8 & 1;
+            r->words[i] = r->bits[i / 8] >> i % 8 & 1;
     return code != CODE_LINE && code != CODE_NO_REPLY;
 }
 
-/* Ends the parts from `ended` on, of which `queued` are pending or ended, with one status. */
-static void end_others(unsigned ended, unsigned queued, uint8_t status)
+/* Ends the parts from `ended` on with one status; those before `queued` are pending or ended. */
+static void end_others(reading *r, unsigned ended, unsigned queued, uint8_t status)
 {
-    for (; ended < part_count; ended++) {
+    for (; ended < r->part_count; ended++) {
         if (ended < queued)
-            (void)mbm_client_cancel(&at.client, &parts[ended].request);
-        parts[ended].request.unit = options.unit;
-        parts[ended].request.status = status;
-        parts[ended].request.exception = 0;
+            (void)mbm_client_cancel(&r->at.client, &r->parts[ended].request);
+        r->parts[ended].request.unit = options.unit;
+        r->parts[ended].request.status = status;
+        r->parts[ended].request.exception = 0;
     }
 }
 
-/* Reads all parts. The parts after one that failed as all others would get its status. Returns 0
+/* Reads all parts. If a part failed in a way that all others would, they get its status. Returns 0
  * after Ctrl-C; then the parts that were not read have the status MBM_CANCELLED. */
-static int read_parts(void)
+static int read_parts(reading *r)
 {
     unsigned queued = 0, ended = 0;
 
     for (;;) {
-        while (queued < part_count && queued - ended < MBM_CLIENT_DEPTH)
-            queue(&parts[queued++]);
-        line_poll(&at);
-        for (; ended < queued && parts[ended].request.status != MBM_PENDING; ended++) {
-            if (take(&parts[ended]))
+        while (queued < r->part_count && queued - ended < MBM_CLIENT_DEPTH)
+            queue(r, &r->parts[queued++]);
+        line_poll(&r->at);
+        for (; ended < queued && r->parts[ended].request.status != MBM_PENDING; ended++) {
+            if (take(r, &r->parts[ended]))
                 continue;
-            end_others(ended + 1, queued, parts[ended].request.status);
+            end_others(r, ended + 1, queued, r->parts[ended].request.status);
             return 1;
         }
-        if (ended == part_count)
+        if (ended == r->part_count)
             return 1;
         if (report_stopped) {
-            end_others(ended, queued, MBM_CANCELLED);
+            end_others(r, ended, queued, MBM_CANCELLED);
             return 0;
         }
-        line_rest(&at, 1000);
+        line_rest(&r->at, 1000);
     }
 }
 
 /* The part that read a value. */
-static part *part_of(uint32_t value)
+static part *part_of(reading *r, uint32_t value)
 {
-    return &parts[value * each / parts[0].quantity];
+    return &r->parts[value * r->each / r->parts[0].quantity];
 }
 
-static int is_read(uint32_t value)
+static int is_read(reading *r, uint32_t value)
 {
-    return part_of(value)->request.status == MBM_OK;
+    return part_of(r, value)->request.status == MBM_OK;
 }
 
 /* The first part that failed, or NULL. */
-static part *first_failed(void)
+static part *first_failed(reading *r)
 {
     unsigned i;
 
-    for (i = 0; i < part_count; i++)
-        if (parts[i].request.status != MBM_OK)
-            return &parts[i];
+    for (i = 0; i < r->part_count; i++)
+        if (r->parts[i].request.status != MBM_OK)
+            return &r->parts[i];
     return NULL;
 }
 
 /* --- showing --- */
 
-static void print_value(uint32_t value, int is_json, char text[VALUE_TEXT_BYTES])
+static void print_value(reading *r, uint32_t value, int is_json, char text[VALUE_TEXT_BYTES])
 {
-    const uint16_t first = (uint16_t)(address + value * each);
+    const uint16_t first = (uint16_t)(r->address + value * r->each);
     mbm_registers registers;
 
-    (void)mbm_registers_ofWords(&registers, words + value * each, each, first);
-    value_print(&options.form, &registers, first, (uint16_t)(each * 2), is_json, text);
+    (void)mbm_registers_ofWords(&registers, r->words + value * r->each, r->each, first);
+    value_print(&options.form, &registers, first, (uint16_t)(r->each * 2), is_json, text);
 }
 
-static unsigned shown_address(uint32_t offset)
+static unsigned shown_address(reading *r, uint32_t offset)
 {
-    return address + (unsigned)offset + options.is_one_based;
+    return r->address + (unsigned)offset + options.is_one_based;
 }
 
 /* Prints a row for each value; if it is one table of several, also for a part that failed. */
-static void print_rows(int is_table)
+static void print_rows(reading *r, int is_table)
 {
-    const history *old = &before[turn];
+    const history *old = &r->before[r->turn];
     char text[VALUE_TEXT_BYTES], status[256];
     uint32_t value;
 
-    for (value = 0; value < count; value++) {
-        const part *p = part_of(value);
-        const uint32_t first = value * each;
+    for (value = 0; value < r->count; value++) {
+        const part *p = part_of(r, value);
+        const uint32_t first = value * r->each;
         int is_changed;
 
-        if (!is_read(value)) {
+        if (!is_read(r, value)) {
             if (is_table && p->first == first)
-                printf("  %5u  %s\n", shown_address(first), line_status(&at, &p->request, status));
+                printf("  %5u  %s\n", shown_address(r, first),
+                       line_status(&r->at, &p->request, status));
             continue;
         }
-        is_changed = old->has_part[p - parts] &&
-                     memcmp(words + first, old->words + first, each * sizeof words[0]) != 0;
-        print_value(value, 0, text);
+        is_changed = old->has_part[p - r->parts] && memcmp(r->words + first, old->words + first,
+                                                           r->each * sizeof r->words[0]) != 0;
+        print_value(r, value, 0, text);
         printf("%s%5u  %s\n",
                !is_table    ? ""
                : is_changed ? "* "
                             : "  ",
-               shown_address(first), text);
+               shown_address(r, first), text);
     }
 }
 
 /* Prints a table of one unit, in a round or, if that is 0, in the only one. */
-static void print_table(uint32_t round)
+static void print_table(reading *r, uint32_t round)
 {
     uint32_t value, right = 0;
     char which[32] = "";
 
-    for (value = 0; value < count; value++)
-        right += (uint32_t)is_read(value);
+    for (value = 0; value < r->count; value++)
+        right += (uint32_t)is_read(r, value);
     if (round > 0)
         snprintf(which, sizeof which, ", round %u", (unsigned)round);
-    if (round > 0 && turn == 0 && isatty(STDOUT_FILENO))
+    if (round > 0 && r->turn == 0 && isatty(STDOUT_FILENO))
         printf("\033[H\033[J");
     printf("unit %u, %s%s: %u of %u values read\n", options.unit, value_table_names[options.table],
-           which, (unsigned)right, (unsigned)count);
-    print_rows(1);
+           which, (unsigned)right, (unsigned)r->count);
+    print_rows(r, 1);
 }
 
 static void print_cell(const char *text)
@@ -290,37 +295,37 @@ static void print_cell(const char *text)
     putchar('"');
 }
 
-static void print_csv_head(void)
+static void print_csv_head(reading *r)
 {
     uint32_t value;
 
     printf("time,unit,status");
-    for (value = 0; value < count; value++)
-        printf(",%u", shown_address(value * each));
+    for (value = 0; value < r->count; value++)
+        printf(",%u", shown_address(r, value * r->each));
     putchar('\n');
 }
 
-static void print_csv(const char *time)
+static void print_csv(reading *r, const char *time)
 {
     char text[VALUE_TEXT_BYTES], status[256];
-    const part *failed = first_failed();
+    const part *failed = first_failed(r);
     uint32_t value;
 
     printf("%s,%u", time, options.unit);
-    print_cell(line_status(&at, failed ? &failed->request : &parts[0].request, status));
-    for (value = 0; value < count; value++) {
+    print_cell(line_status(&r->at, failed ? &failed->request : &r->parts[0].request, status));
+    for (value = 0; value < r->count; value++) {
         *text = '\0';
-        if (is_read(value))
-            print_value(value, 0, text);
+        if (is_read(r, value))
+            print_value(r, value, 0, text);
         print_cell(text);
     }
     putchar('\n');
 }
 
-static void print_json(const char *time)
+static void print_json(reading *r, const char *time)
 {
     char text[VALUE_TEXT_BYTES], status[256];
-    const part *failed = first_failed();
+    const part *failed = first_failed(r);
     cJSON *all = cJSON_CreateObject(), *values;
     uint32_t value;
 
@@ -332,50 +337,49 @@ static void print_json(const char *time)
         all, "code",
         failed ? report_code_of(failed->request.status, failed->request.exception) : 0);
     cJSON_AddStringToObject(
-        all, "status", line_status(&at, failed ? &failed->request : &parts[0].request, status));
+        all, "status",
+        line_status(&r->at, failed ? &failed->request : &r->parts[0].request, status));
     values = cJSON_AddArrayToObject(all, "values");
-    for (value = 0; value < count; value++) {
-        const part *p = part_of(value);
+    for (value = 0; value < r->count; value++) {
+        const part *p = part_of(r, value);
         cJSON *one;
 
-        if (!is_read(value) && p->first != value * each)
+        if (!is_read(r, value) && p->first != value * r->each)
             continue;
         one = cJSON_CreateObject();
         cJSON_AddItemToArray(values, one);
-        cJSON_AddNumberToObject(one, "address", shown_address(value * each));
-        if (is_read(value)) {
-            print_value(value, 1, text);
+        cJSON_AddNumberToObject(one, "address", shown_address(r, value * r->each));
+        if (is_read(r, value)) {
+            print_value(r, value, 1, text);
             cJSON_AddRawToObject(one, "value", text);
         } else {
-            cJSON_AddNumberToObject(one, "count", (double)p->quantity / each);
-            cJSON_AddStringToObject(one, "status", line_status(&at, &p->request, status));
+            cJSON_AddNumberToObject(one, "count", (double)p->quantity / r->each);
+            cJSON_AddStringToObject(one, "status", line_status(&r->at, &p->request, status));
         }
     }
     report_print_json(all);
 }
 
-static void show(uint32_t round)
+static void show(reading *r, uint32_t round)
 {
-    history *old = &before[turn];
-    struct timespec now;
-    char time[40];
+    history *old = &r->before[r->turn];
+    char time[CLOCK_TEXT_BYTES];
     unsigned i;
 
-    clock_gettime(CLOCK_REALTIME, &now);
-    report_time(&now, time);
+    (void)clock_now_text(time);
     if (options.is_json)
-        print_json(time);
-    else if (is_csv)
-        print_csv(time);
-    else if (interval > 0 || unit_count > 1)
-        print_table(round);
+        print_json(r, time);
+    else if (r->is_csv)
+        print_csv(r, time);
+    else if (r->interval > 0 || r->unit_count > 1)
+        print_table(r, round);
     else
-        print_rows(0);
-    for (i = 0; i < part_count; i++) {
-        if (parts[i].request.status != MBM_OK)
+        print_rows(r, 0);
+    for (i = 0; i < r->part_count; i++) {
+        if (r->parts[i].request.status != MBM_OK)
             continue;
-        memcpy(old->words + parts[i].first, words + parts[i].first,
-               parts[i].quantity * sizeof words[0]);
+        memcpy(old->words + r->parts[i].first, r->words + r->parts[i].first,
+               r->parts[i].quantity * sizeof r->words[0]);
         old->has_part[i] = 1;
     }
     report_flush();
@@ -383,67 +387,67 @@ static void show(uint32_t round)
 
 /* Says on stderr why parts of the only round failed: once for parts in a row with one reason, and
  * with their addresses if not all parts failed for it. */
-static void report_parts(void)
+static void report_parts(reading *r)
 {
     unsigned i, next;
     char who[64];
 
-    for (i = 0; i < part_count; i = next) {
-        const mbm_clientRequest *failed = &parts[i].request;
+    for (i = 0; i < r->part_count; i = next) {
+        const mbm_clientRequest *failed = &r->parts[i].request;
 
-        for (next = i + 1; next < part_count && parts[next].request.status == failed->status;
+        for (next = i + 1; next < r->part_count && r->parts[next].request.status == failed->status;
              next++)
             ;
         if (failed->status == MBM_OK)
             continue;
         snprintf(who, sizeof who, "unit %u", failed->unit);
-        if (next - i < part_count)
+        if (next - i < r->part_count)
             snprintf(who, sizeof who, "unit %u, addresses %u to %u", failed->unit,
-                     shown_address(parts[i].first),
-                     shown_address(parts[next - 1].first + parts[next - 1].quantity - 1));
-        (void)line_failure_of(&at, who, failed, ADVICE_READ);
+                     shown_address(r, r->parts[i].first),
+                     shown_address(r, r->parts[next - 1].first + r->parts[next - 1].quantity - 1));
+        (void)line_failure_of(&r->at, who, failed, ADVICE_READ);
     }
 }
 
 /* Reads the units in a round, or in the only one, which is 0. Returns 0 after Ctrl-C; `right` is
  * then meaningless. */
-static int read_units(uint32_t round, int *right)
+static int read_units(reading *r, uint32_t round, int *right)
 {
-    for (*right = 1, turn = 0; turn < unit_count; turn++) {
+    for (*right = 1, r->turn = 0; r->turn < r->unit_count; r->turn++) {
         int is_read;
 
-        options.unit = units[turn];
-        is_read = read_parts();
+        options.unit = r->units[r->turn];
+        is_read = read_parts(r);
         if (!is_read && round > 0)
             return 0;
-        *right &= first_failed() == NULL;
-        show(round);
+        *right &= first_failed(r) == NULL;
+        show(r, round);
         if (round == 0)
-            report_parts();
+            report_parts(r);
         if (!is_read)
             return 0;
     }
     return 1;
 }
 
-static void read_rounds(void)
+static void read_rounds(reading *r)
 {
     int right;
     uint32_t round = 0, failed = 0, due = line_milliseconds();
 
-    while (!report_stopped && !ferror(stdout) && (rounds == 0 || round < rounds)) {
-        if (!read_units(round + 1, &right))
+    while (!report_stopped && !ferror(stdout) && (r->rounds == 0 || round < r->rounds)) {
+        if (!read_units(r, round + 1, &right))
             break;
         round++;
         failed += !right;
         /* If a round took longer than the interval, the next one follows at once. */
-        due += interval;
+        due += r->interval;
         if ((int32_t)(due - line_milliseconds()) < 0)
             due = line_milliseconds();
-        while (!report_stopped && !ferror(stdout) && round != rounds &&
+        while (!report_stopped && !ferror(stdout) && round != r->rounds &&
                (int32_t)(due - line_milliseconds()) > 0) {
-            line_poll(&at);
-            line_rest(&at, due - line_milliseconds());
+            line_poll(&r->at);
+            line_rest(&r->at, due - line_milliseconds());
         }
     }
     if (!options.is_quiet)
@@ -453,26 +457,30 @@ static void read_rounds(void)
 
 int read_command(int argc, char **argv)
 {
+    static reading data;
+    reading *r = &data;
     int right;
 
-    argp_parse(&arguments, argc, argv, 0, NULL, NULL);
-    advice_keep(argc, argv, address_text);
-    before = (history *)calloc(unit_count, sizeof *before);
-    if (!before)
-        return report(CODE_SYSTEM, "there is no memory for %u units", unit_count);
-    if (line_open(&at, &where) != CODE_DONE)
+    r->units[0] = 1;
+    r->unit_count = r->count = 1;
+    argp_parse(&arguments, argc, argv, 0, NULL, r);
+    advice_keep(argc, argv, r->address_text);
+    r->before = (history *)calloc(r->unit_count, sizeof *r->before);
+    if (!r->before)
+        return report(CODE_SYSTEM, "there is no memory for %u units", r->unit_count);
+    if (line_open(&r->at, &r->where) != CODE_DONE)
         return report_code;
-    if (interval == 0 && line_connect(&at) != CODE_DONE) {
-        line_close(&at);
+    if (r->interval == 0 && line_connect(&r->at) != CODE_DONE) {
+        line_close(&r->at);
         return report_code;
     }
-    if (is_csv)
-        print_csv_head();
-    if (interval > 0) {
-        read_rounds();
+    if (r->is_csv)
+        print_csv_head(r);
+    if (r->interval > 0) {
+        read_rounds(r);
     } else {
-        (void)read_units(0, &right);
+        (void)read_units(r, 0, &right);
     }
-    line_close(&at);
+    line_close(&r->at);
     return report_code;
 }

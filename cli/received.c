@@ -1,6 +1,10 @@
+/* Notes the bytes that pass a port, and says in words what is wrong with them.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #include "received.h"
 
 #include "numbers.h"
+#include "port_over.h"
 
 #include <string.h>
 
@@ -66,30 +70,14 @@ static int16_t write_bytes(void *context, const uint8_t *bytes, uint16_t length)
     return count;
 }
 
-static uint32_t micros(void *context)
-{
-    const received *to = (const received *)context;
-
-    return to->below.micros(to->below.context);
-}
-
-static uint8_t flush(void *context)
-{
-    const received *to = (const received *)context;
-
-    return to->below.flush(to->below.context);
-}
-
 mbm_port received_begin(received *to, const mbm_port *below, uint8_t framing)
 {
-    const mbm_port above = {.context = to,
-                            .read = read_bytes,
-                            .write = write_bytes,
-                            .micros = micros,
-                            .flush = below->flush ? flush : NULL};
+    mbm_port above;
 
     memset(to, 0, sizeof *to);
-    to->below = *below;
+    above = port_over(&to->below, below);
+    above.read = read_bytes;
+    above.write = write_bytes;
     to->framing = framing;
     return above;
 }

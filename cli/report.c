@@ -1,3 +1,6 @@
+/* Prints sentences, log lines and JSON, and keeps the exit code.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "report.h"
 
@@ -13,7 +16,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 const char *report_name = "mbm";
@@ -68,16 +70,6 @@ void report_begin(void)
         if (fcntl(fd, F_GETFD) < 0)
             (void)open("/dev/null", O_RDWR); /* the lowest descriptor that is free: this one */
     (void)atexit(close_output);
-}
-
-void report_time(const struct timespec *when, char text[40])
-{
-    struct tm utc;
-    size_t length;
-
-    gmtime_r(&when->tv_sec, &utc);
-    length = strftime(text, 40, "%Y-%m-%dT%H:%M:%S", &utc);
-    snprintf(text + length, 40 - length, ".%03dZ", (int)(when->tv_nsec / 1000000));
 }
 
 int report_note(int code)

@@ -68,10 +68,10 @@ const char *report_in_flight(void);
 int report_failure(const char *who, uint8_t status, uint8_t exception, uint32_t timeoutMs,
                    const char *why, const char *advice);
 
-/* The status of a request in words, of an exception with its code. */
+/* The status of a request in words; an exception has its code too. */
 const char *report_words(uint8_t status, uint8_t exception);
 
-/* An error number in words. EPIPE, of which strerror speaks as of a pipe, is a line's end. */
+/* An error number in words. EPIPE is the end of a line here, not "Broken pipe" as strerror says. */
 const char *report_error_text(int error);
 
 /* Prints an object in one line to stdout, and frees it. report_json adds the status of a request
@@ -89,11 +89,7 @@ void report_catch_signals(void);
  * end the program exits with CODE_SYSTEM if its output could not be written. */
 void report_begin(void);
 
-/* Writes a time in UTC, such as 2026-01-31T12:00:00.123Z. */
-struct timespec;
-void report_time(const struct timespec *when, char text[40]);
-
-/* Writes what was printed so far to stdout, and keeps the reason if that fails. */
+/* Flushes stdout, and keeps the reason if that fails. */
 void report_flush(void);
 
 #endif

@@ -1,3 +1,6 @@
+/* Makes the units that mbm serve serves, and gets and sets their cells.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "served.h"
 
@@ -18,14 +21,12 @@ static void add(uint8_t *bitmap, uint16_t address)
 
 /* --- random values --- */
 
-static uint32_t random_state = 1;
-
-static uint32_t next_random(void)
+static uint32_t next_random(served_cells *cells)
 {
-    random_state ^= random_state << 13;
-    random_state ^= random_state >> 17;
-    random_state ^= random_state << 5;
-    return random_state;
+    cells->random ^= cells->random << 13;
+    cells->random ^= cells->random >> 17;
+    cells->random ^= cells->random << 5;
+    return cells->random;
 }
 
 /* The value that a random register has at first. */
@@ -39,10 +40,10 @@ static uint16_t first_value(const served_cells *cells, uint16_t address)
 static uint16_t vary(served_cells *cells, uint16_t address, int is_bit)
 {
     if (is_bit)
-        cells->values[address] ^= next_random() % FLIPS == 0;
+        cells->values[address] ^= next_random(cells) % FLIPS == 0;
     else
         cells->values[address] =
-            (uint16_t)(cells->values[address] + next_random() % (2 * STEP + 1) - STEP);
+            (uint16_t)(cells->values[address] + next_random(cells) % (2 * STEP + 1) - STEP);
     return (uint16_t)(cells->values[address] + first_value(cells, address));
 }
 
@@ -114,6 +115,7 @@ static int make_cells(served_units *units, uint8_t unit, uint8_t table, enum ser
 
     cells->kind = kind;
     cells->seed = (uint32_t)(units->units[unit].id * 4 + table) * 40503u;
+    cells->random = cells->seed | 1;
     cells->callbacks.context = cells->hooks.context = cells;
     cells->callbacks.get = kind != SERVED_RANDOM ? get
                            : is_bit              ? get_random_bit

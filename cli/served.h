@@ -14,10 +14,10 @@ typedef struct served_cells {
     mbm_dataCallbacks callbacks;
     mbm_accessHooks hooks;
     enum served_kind kind;
-    uint32_t seed;
+    uint32_t seed, random;
     uint16_t *values;
-    /* One bit for each address. Only cells of a device may be neither readable nor writable. Of
-     * random cells `written` are those that hold what was written. */
+    /* One bit for each address. Only cells of a device may be neither readable nor writable.
+     * `written` are the random cells that hold what was written. */
     uint8_t *readable, *writable, *written;
 } served_cells;
 

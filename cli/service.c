@@ -1,3 +1,6 @@
+/* Runs what services share: signals, systemd, statistics, and the wait for descriptors.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "service.h"
 
@@ -21,7 +24,8 @@
 static const char *stats_path, *metrics_place;
 static uint32_t every; /* milliseconds; 0: only at the end and when SIGUSR1 comes */
 static int64_t next_time;
-static void (*fill_numbers)(stats *numbers);
+static void (*fill_numbers)(void *context, stats *numbers);
+static void *fill_context;
 static sigset_t awake; /* the signal mask during a sleep */
 static int had_terminal, stats_failed;
 static volatile sig_atomic_t reload_wanted, stats_wanted;
@@ -54,7 +58,7 @@ static void catch_signals(void)
     sigaddset(&all, SIGTERM);
     sigaddset(&all, SIGHUP);
     sigaddset(&all, SIGUSR1);
-    /* pthread_sigmask, since the thread of libmosquitto must not take them either. */
+    /* pthread_sigmask, because the thread of libmosquitto must not take them either. */
     pthread_sigmask(SIG_BLOCK, &all, &awake);
     had_terminal = isatty(0);
 }
@@ -116,7 +120,7 @@ static char *take(char *(*as_text)(const stats *from))
     static stats numbers;
 
     memset(&numbers, 0, sizeof numbers);
-    fill_numbers(&numbers);
+    fill_numbers(fill_context, &numbers);
     return as_text(&numbers);
 }
 
@@ -186,9 +190,10 @@ static void write_stats(void)
 
 /* --- the life of a service --- */
 
-int service_begin(void (*fill)(stats *numbers))
+int service_begin(void (*fill)(void *context, stats *numbers), void *context)
 {
     fill_numbers = fill;
+    fill_context = context;
     catch_signals();
     if (metrics_place) {
         const int port = metrics_listen(metrics_place);
@@ -285,6 +290,6 @@ static const struct argp_option texts[] = {
      "Serve the statistics to Prometheus at an address of this machine, such as 127.0.0.1:9100", 7},
     {"log-level", LOG_LEVEL, "LEVEL", 0,
      "Print log lines up to this level: error, warning, info or debug (info)", 7},
-    {NULL, 0, NULL, 0, NULL, 0}};
+    {0}};
 
-const struct argp options_service = {texts, parse, NULL, NULL, NULL, NULL, NULL};
+const struct argp options_service = {.options = texts, .parser = parse};

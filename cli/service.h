@@ -22,11 +22,11 @@ extern const struct argp options_service;
     "SIGUSR1 writes the statistics. systemd learns when the service is ready, and when it reads its " \
     "files again (Type=notify).\n\n"
 
-/* Begins: `fill` is called for the numbers when they are wanted. The signals that end or wake the
- * program are blocked from now on, except in service_wait. Returns an exit code after reporting the
- * reason.
+/* Begins: `fill` is called with `context` for the numbers when they are wanted. The signals that
+ * end or wake the program are blocked from now on, except in service_wait. Returns an exit code
+ * after reporting the reason.
  */
-int service_begin(void (*fill)(stats *numbers));
+int service_begin(void (*fill)(void *context, stats *numbers), void *context);
 
 /* Sleeps until a descriptor is ready, at most for a time in microseconds, UINT32_MAX without a
  * limit. `polls` has room for SERVICE_WAITS more than `count`. Returns as ppoll does. */

@@ -1,14 +1,16 @@
+/* Writes statistics as JSON and in Prometheus' text format.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "stats.h"
 
-#include "report.h"
+#include "clock.h"
 
 #include <cjson/cJSON.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 /* The numbers of a line, in the order of line_values. */
 static const stats_kind OF_LINE[STATS_OF_LINE] = {
@@ -43,14 +45,11 @@ static void line_values(const stats_line *line, uint64_t values[STATS_OF_LINE])
 char *stats_json(const stats *from)
 {
     cJSON *root = cJSON_CreateObject(), *list;
-    struct timespec now;
-    char when[40];
+    char when[CLOCK_TEXT_BYTES];
     size_t at, line;
     char *text;
 
-    clock_gettime(CLOCK_REALTIME, &now);
-    report_time(&now, when);
-    cJSON_AddStringToObject(root, "time", when);
+    cJSON_AddStringToObject(root, "time", clock_now_text(when));
     cJSON_AddStringToObject(root, "command", from->command);
     for (at = 0; at < from->count; at++)
         cJSON_AddNumberToObject(root, from->kinds[at].name, (double)from->values[at]);

@@ -1,3 +1,6 @@
+/* Opens terminals, and finds in /proc which program has one open.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "terminal.h"
 
@@ -146,7 +149,7 @@ void terminal_free(int fd)
 
     if (ioctl(fd, TIOCGEXCL, &is_exclusive) != 0 || !is_exclusive)
         return;
-    /* Who has it exclusively has its lock too, from before until after. */
+    /* A program that has it exclusively takes its lock before, and frees it after. */
     if (flock(fd, LOCK_EX | LOCK_NB) != 0)
         return;
     (void)ioctl(fd, TIOCNXCL);

@@ -13,8 +13,8 @@
 int terminal_open(mbm_tty *tty, const place *where);
 uint8_t terminal_connect(mbm_tty *tty, const place *where);
 
-/* Closes a pseudo terminal to others no longer, if the program that had it for itself was killed.
- * `fd` is a descriptor of it, which keeps the mark of that program. */
+/* Opens a pseudo terminal to others again, if the program that had it for itself was killed. `fd`
+ * is a descriptor of it, which keeps the mark of that program. */
 void terminal_free(int fd);
 
 /* An error number of a place in words. EBUSY of a terminal names the program that has it. */

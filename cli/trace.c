@@ -1,3 +1,6 @@
+/* Takes the frames of traced ports and sniffers, prints them, and writes them to a file.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "trace.h"
 
@@ -42,14 +45,11 @@ static void checked(int result)
 static void print_record(const traced *link, const mbm_traceRecord *record, const char *words,
                          uint64_t time)
 {
-    const time_t seconds = (time_t)(time / 1000000u);
-    char clock[16];
-    struct tm utc;
+    char clock[CLOCK_TEXT_BYTES];
     uint16_t i;
 
-    gmtime_r(&seconds, &utc);
-    (void)strftime(clock, sizeof clock, "%H:%M:%S", &utc);
-    fprintf(stderr, "%s.%06u  %s  %-8s  %s [", clock, (unsigned)(time % 1000000u), link->name,
+    /* Without the date, which has 11 characters, and without the zone. */
+    fprintf(stderr, "%.15s  %s  %-8s  %s [", clock_text(time, 6, clock) + 11, link->name,
             record->direction == MBM_TRACE_SENT ? "sent" : "received", words);
     for (i = 0; i < record->length; i++)
         fprintf(stderr, i == 0 ? "%02X" : " %02X", record->bytes[i]);

@@ -1,7 +1,10 @@
+/* Reads numbers into registers, and writes registers as text, without rounding.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "value.h"
 
-#include "cursor.h"
+#include "numbers.h"
 
 #include <ctype.h>
 #include <float.h>
@@ -277,8 +280,8 @@ static void print_real(char *text, double value, int digits, int is_json)
         snprintf(text, NUMBER_BYTES, "%.*g", digits, value);
 }
 
-/* A control character could do anything to a terminal: those of ASCII, and those from 0x80 to 0x9F,
- * of which 0x9B begins a sequence like ESC [. */
+/* Writes a text without control characters, which could do anything to a terminal: those of ASCII,
+ * and those from 0x80 to 0x9F (0x9B begins a sequence like ESC [). */
 static void print_text(const mbm_registers *registers, uint16_t address, uint16_t count,
                        uint8_t order, int is_json, char *text)
 {

@@ -36,7 +36,7 @@ typedef struct value_form {
  * NULL ends them. */
 extern const char *const value_table_names[], *const value_type_names[], *const value_order_names[];
 
-/* The registers that a value of a type has; of a text with `count` characters. 1 for a bit. */
+/* How many registers a value of a type has, or a text with `count` characters. A bit has 1. */
 uint16_t value_registers(uint8_t type, uint16_t count);
 
 /* Reads a scale, written as in JSON, such as 0.1 or -12.5e-1. Returns 0 if the text is anything
@@ -49,9 +49,9 @@ int value_scale_read(const char *text, value_scale *scale);
 uint16_t value_read(const value_form *form, const char *text, size_t length,
                     uint16_t words[VALUE_WORDS], const char **wrong);
 
-/* Writes the value at an address. For JSON, a bit is true or false, what is no number is null, and
- * text and hexadecimal numbers have quotes. A text has `count` characters; bytes above 127 are
- * taken as Latin-1. */
+/* Writes the value at an address. In JSON a bit is true or false, infinity and not-a-number are
+ * null, and text and hexadecimal numbers have quotes. A text has `count` characters; bytes above
+ * 127 are taken as Latin-1. */
 void value_print(const value_form *form, const mbm_registers *registers, uint16_t address,
                  uint16_t count, int is_json, char text[VALUE_TEXT_BYTES]);
 

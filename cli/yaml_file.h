@@ -43,16 +43,16 @@ int yaml_file_keys(yaml_file *file, const char *what, const yaml_node_t *mapping
 
 /* --- one word --- */
 
-/* The text of a node of at most `most` bytes and without control characters. Returns NULL after a
- * refusal. */
+/* The text of a node, which has at most `most` bytes and no control characters. Returns NULL after
+ * a refusal. */
 const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *node, size_t most);
 
 /* The same of a number, which must not begin with 0. */
 const char *yaml_file_decimal(yaml_file *file, const char *key, const yaml_node_t *node);
 
 /* Read a copy of the text, for free(); the place of the word in a list that NULL ends, from 0 on;
- * the number; the time in milliseconds. Of a node that is NULL the value stays. They return 0 after
- * a refusal. */
+ * the number; the time in milliseconds. If the node is NULL, the value stays. They return 0 after a
+ * refusal. */
 int yaml_file_copy(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
                    char **copy);
 int yaml_file_word(yaml_file *file, const char *key, const yaml_node_t *node,

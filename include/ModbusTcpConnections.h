@@ -31,7 +31,7 @@
 
 /**
  * Up to `Connections` connections of a `Listener`, each with a `Content`. `Derived` serves them:
- * `opened` begins with the port of a connection, `isServed` continues, `closed` ends.
+ * `opened` begins with the port of a connection, `serve` continues, `closed` ends.
  */
 template <typename Derived, typename Listener, uint8_t Connections, typename Content>
 class ModbusTcpConnections {
@@ -75,7 +75,7 @@ protected:
         for (uint8_t i = 0; i < Connections; i++) {
             if (!places[i].taken)
                 continue;
-            if (!derived().isServed(i, places[i].content))
+            if (!derived().serve(i, places[i].content))
                 close(i);
         }
         acceptNext(0);

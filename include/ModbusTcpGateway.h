@@ -135,7 +135,7 @@ private:
         return mbm_gateway_open(&gateway, index, &port) == MBM_OK;
     }
     // A client whose device has not answered yet is not idle.
-    bool isServed(uint8_t index, ModbusTcpPassed &)
+    bool serve(uint8_t index, ModbusTcpPassed &)
     {
         if (mbm_gateway_pending(&gateway, index) != 0)
             this->markUsed(index);

@@ -122,7 +122,7 @@ private:
         return mbm_server_beginTcp(&place.server, &port, &first->unit, count, place.frame,
                                    MBM_MAX_TCP_FRAME) == MBM_OK;
     }
-    bool isServed(uint8_t, ModbusTcpServed &place)
+    bool serve(uint8_t, ModbusTcpServed &place)
     {
         const uint8_t status = mbm_server_poll(&place.server);
         return status != MBM_LINK_LOST && status != MBM_MALFORMED_FRAME;

@@ -8,7 +8,7 @@ MCU_BUILDS := $(patsubst %,build-archive-%,$(APART) $(filter-out $(APART),$(MCUS
 $(MCU_BUILDS): build-archive-%:
 	+@scripts/build/archive $*
 
-# What is missing is installed or named before the first build.
+# Missing packages are installed or named before the first build.
 .PHONY: need-packages
 need-packages:
 	@scripts/need gcc libc6-dev libmbedtls-dev gcc-aarch64-linux-gnu libc6-dev-arm64-cross dpkg-dev
@@ -23,7 +23,7 @@ dist-parts: need-packages $(ARCHIVE)
 dist: dist-parts ## Write all packages to dist/, with their SHA-256 sums; builds what they contain
 	@scripts/release/dist
 
-# What the package of each kind contains. The crates and the source have what is in the clone.
+# The contents of the package of each kind. The crates and the source have what is in the clone.
 PARTS_arduino := assembler
 PARTS_crates :=
 PARTS_debian := $(ARCHIVE) linux $(INSTALLED_TOOL) man
@@ -59,7 +59,7 @@ publish: ## Upload dist/ to the registries whose secrets are set, with MBM_PUBLI
 	@cd dist && sha256sum --quiet --check SHA256SUMS
 	@set -e; for publish in packaging/*/publish; do CARGO="$(CARGO)" $$publish dist; done
 
-# What a release builds and checks. RELEASE_TARGETS= leaves it out, for a rehearsal in seconds.
+# The targets that a release builds and checks. RELEASE_TARGETS= leaves it out, for a rehearsal in seconds.
 RELEASE_TARGETS ?= check test dist check-dist
 .PHONY: release check-release
 release: ## Prepare a release, VERSION=x.y.z: version, changelog, checks, packages, tag; REHEARSE=yes changes nothing

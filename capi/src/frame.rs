@@ -4,7 +4,7 @@ use super::framing::mbm_framing;
 use super::packet::{
     mbm_length, mbm_packet, own, put_expected, reply_length, side, MBM_PACKET_REQUEST,
 };
-use super::pointers::{array, array_or_empty, buffer, get, put, put_length};
+use super::pointers::{buffer, get, put, put_length, required, slice};
 use mbm::error::{Error, Status};
 use mbm::frame::checksum::{crc16, lrc, Crc16};
 use mbm::frame::{Adu, Framing};
@@ -38,7 +38,7 @@ unsafe fn format(
     framing: *const mbm_framing,
     code: impl FnOnce(Option<Framing>) -> Option<u8>,
 ) -> Result<FrameFormat, Error> {
-    let description = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
+    let description = get(framing)?;
     let framing = description.core()?;
     Ok(FrameFormat {
         framing,
@@ -73,11 +73,13 @@ pub unsafe extern "C" fn mbm_frame_build(
 ) -> u8 {
     // Data and buffer do not overlap.
     let build = || {
-        let packet = get(packet).filter(|packet| !packet.lies_in(frame, capacity));
-        let mut packet = packet.ok_or(Error::INVALID_ARGUMENT)?;
+        let mut packet = get(packet)?;
+        if packet.lies_in(frame, capacity) {
+            return Err(Error::INVALID_ARGUMENT);
+        }
         let format = format(framing, |_| Some(packet.function))?;
-        let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
-        let buffer = buffer.ok_or(Error::INVALID_ARGUMENT)?;
+        required(length)?;
+        let buffer = buffer(frame, capacity)?;
         let data = packet.data()?;
         let Head {
             transaction, unit, ..
@@ -122,8 +124,8 @@ pub unsafe extern "C" fn mbm_frame_parse(
     packet: *mut mbm_packet,
 ) -> u8 {
     let arguments = side(kind).and_then(|pdu_kind| {
-        let bytes = buffer(frame, frameLength).filter(|_| !packet.is_null());
-        let bytes = bytes.ok_or(Error::INVALID_ARGUMENT)?;
+        required(packet)?;
+        let bytes = buffer(frame, frameLength)?;
         let format = format(framing, |framing| function(framing, bytes))?;
         Ok((pdu_kind, bytes, format))
     });
@@ -178,11 +180,13 @@ pub unsafe extern "C" fn mbm_frame_exception(
     length: *mut u16,
 ) -> u8 {
     let build = || {
-        let request = get(request).filter(|packet| packet.kind == MBM_PACKET_REQUEST);
-        let request = request.ok_or(Error::INVALID_ARGUMENT)?;
+        let request = get(request)?;
+        if request.kind != MBM_PACKET_REQUEST {
+            return Err(Error::INVALID_ARGUMENT);
+        }
         let format = format(framing, |_| None)?;
-        let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
-        let buffer = buffer.ok_or(Error::INVALID_ARGUMENT)?;
+        required(length)?;
+        let buffer = buffer(frame, capacity)?;
         let code = Status::from_code(code);
         let framing = format.framing.ok_or(Error::INVALID_ARGUMENT)?;
         let exception = Exception::new(framing, request.head()?, code)?;
@@ -218,7 +222,7 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
 ) -> u8 {
     let measure = || {
         let pdu_kind = side(kind)?;
-        let bytes = array_or_empty(bytes, have.into()).ok_or(Error::INVALID_ARGUMENT)?;
+        let bytes = slice(bytes, have.into())?;
         let format = format(framing, |framing| function(framing, bytes))?;
         let own = format.own.as_slice();
         match format.framing {
@@ -258,7 +262,7 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
     expected: *mut mbm_length,
 ) -> u8 {
     let measure = || {
-        let mut packet = get(request).ok_or(Error::INVALID_ARGUMENT)?;
+        let mut packet = get(request)?;
         let format = format(framing, |_| Some(packet.function))?;
         let own = format.own.as_slice();
         let unit = packet.head()?.unit;
@@ -291,12 +295,12 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
     allowUnknown: u8,
     expected: *mut u16,
 ) -> u8 {
-    let bytes = array_or_empty(bytes, have.into()).filter(|_| !expected.is_null());
-    let length = match bytes {
-        Some(bytes) => length::looks_like_tcp(bytes, allowUnknown != 0, &[]),
-        None => Err(Error::INVALID_ARGUMENT),
+    let measure = || {
+        required(expected)?;
+        let bytes = slice(bytes, have.into())?;
+        length::looks_like_tcp(bytes, allowUnknown != 0, &[])
     };
-    put_length(expected, length)
+    put_length(expected, measure())
 }
 
 /// Computes the CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). A frame carries
@@ -309,8 +313,7 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
 /// @return the CRC; 0xFFFF if `bytes` is NULL or `length` is 0
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_crc16(bytes: *const u8, length: u16) -> u16 {
-    let bytes = array(bytes, length.into());
-    let crc = bytes.map_or(Crc16::START, crc16);
+    let crc = slice(bytes, length.into()).map_or(Crc16::START, crc16);
     u16::from_le_bytes(crc.to_bytes())
 }
 
@@ -323,5 +326,5 @@ pub unsafe extern "C" fn mbm_frame_crc16(bytes: *const u8, length: u16) -> u16 {
 /// @return the LRC; 0 if `bytes` is NULL or `length` is 0
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_lrc(bytes: *const u8, length: u16) -> u8 {
-    array(bytes, length.into()).map_or(0, lrc)
+    slice(bytes, length.into()).map_or(0, lrc)
 }

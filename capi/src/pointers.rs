@@ -4,41 +4,63 @@
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::{Error, Status};
 
-/// The array of `count` items at `first`. `None` if `first` is NULL, or if the array
-/// would be longer than any memory.
-///
-/// # Safety
-/// `first` is NULL or points to `count` items, which nothing changes while the slice
-/// lives.
-pub(crate) unsafe fn array<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
-    if first.is_null() || count > isize::MAX as usize / size_of::<T>() {
-        return None;
+/// Refuses a pointer that is NULL.
+pub(crate) fn required<T>(pointer: *const T) -> Result<(), Error> {
+    match pointer.is_null() {
+        true => Err(Error::INVALID_ARGUMENT),
+        false => Ok(()),
     }
-    Some(from_raw_parts(first, count))
 }
 
-/// As [`array`], but `first` may also be NULL if `count` is 0.
+/// The array of `count` items at `items`, which may be NULL only if `count` is 0. Refused if it would
+/// be longer than any memory.
 ///
 /// # Safety
-/// As for [`array`].
-pub(crate) unsafe fn array_or_empty<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
-    if count == 0 {
-        return Some(&[]);
+/// `items` is NULL or points to `count` items, which nothing writes while the slice lives.
+pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [T], Error> {
+    match count {
+        0 => Ok(&[]),
+        _ if is_array(items, count) => Ok(from_raw_parts(items, count)),
+        _ => Err(Error::INVALID_ARGUMENT),
     }
-    array(first, count)
 }
 
-/// The writable buffer of `capacity` bytes at `first`. `None` if `first` is NULL.
+/// The array of `count` items at `items`; an empty one if that is NULL.
 ///
 /// # Safety
-/// `first` is NULL or points to `capacity` bytes, which nothing else uses while the slice
-/// lives: see [`overlap`].
-pub(crate) unsafe fn buffer<'a>(first: *mut u8, capacity: u16) -> Option<&'a mut [u8]> {
-    let capacity = usize::from(capacity);
-    if first.is_null() || capacity > isize::MAX as usize {
-        return None;
+/// As for [`slice`].
+pub(crate) unsafe fn slice_or_empty<'a, T>(items: *const T, count: usize) -> &'a [T] {
+    match items.is_null() {
+        true => &[],
+        false => from_raw_parts(items, count),
     }
-    Some(from_raw_parts_mut(first, capacity))
+}
+
+/// As [`slice`], writable.
+///
+/// # Safety
+/// As for [`slice`]; nothing else reads the items either: see [`overlap`].
+pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a mut [T], Error> {
+    match count {
+        0 => Ok(&mut []),
+        _ if is_array(items, count) => Ok(from_raw_parts_mut(items, count)),
+        _ => Err(Error::INVALID_ARGUMENT),
+    }
+}
+
+/// True if `count` items may lie at `items`. (A count of C has 16 bits.)
+fn is_array<T>(items: *const T, count: usize) -> bool {
+    let is_short = size_of::<usize>() > 2 || count <= isize::MAX as usize / size_of::<T>();
+    is_short && !items.is_null()
+}
+
+/// As [`slice_mut`], for a buffer that must not be NULL.
+///
+/// # Safety
+/// As for [`slice_mut`].
+pub(crate) unsafe fn buffer<'a>(bytes: *mut u8, capacity: u16) -> Result<&'a mut [u8], Error> {
+    required(bytes)?;
+    slice_mut(bytes, capacity.into())
 }
 
 /// True if the `bytes` bytes at `one` and the `more` bytes at `other` have a byte in common.
@@ -47,12 +69,13 @@ pub(crate) fn overlap(one: *const u8, bytes: u16, other: *const u8, more: u16) -
     one < other.saturating_add(usize::from(more)) && other < one.saturating_add(usize::from(bytes))
 }
 
-/// A copy of the value at `place`. `None` if `place` is NULL.
+/// A copy of the value at `place`. Refused if `place` is NULL.
 ///
 /// # Safety
 /// `place` is NULL or points to a value.
-pub(crate) unsafe fn get<T: Copy>(place: *const T) -> Option<T> {
-    (!place.is_null()).then(|| place.read())
+pub(crate) unsafe fn get<T: Copy>(place: *const T) -> Result<T, Error> {
+    required(place)?;
+    Ok(place.read())
 }
 
 /// Writes a value to `place`. Returns the code of [`Status::OK`], or of
@@ -286,39 +309,9 @@ pub(crate) unsafe fn put_result<T>(
     place: *mut T,
     find: impl FnOnce() -> Result<T, Error>,
 ) -> Result<(), Error> {
-    if place.is_null() {
-        return Err(Error::INVALID_ARGUMENT);
-    }
-    let found = find()?;
-    // SAFETY: not NULL, so storage of a `T`.
-    unsafe { place.write(found) };
+    required(place)?;
+    place.write(find()?);
     Ok(())
-}
-
-/// The array of `count` items at `items`. `items` may be NULL only if `count` is 0.
-///
-/// # Safety
-/// `items` is NULL or points to `count` items, which nothing writes while the slice lives.
-pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [T], Error> {
-    match (items.is_null(), count) {
-        (_, 0) => Ok(&[]),
-        (true, _) => Err(Error::INVALID_ARGUMENT),
-        // SAFETY: not NULL, so an array.
-        (false, _) => Ok(unsafe { from_raw_parts(items, count) }),
-    }
-}
-
-/// As [`slice`], writable.
-///
-/// # Safety
-/// As for [`slice`]; nothing else reads the items either.
-pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a mut [T], Error> {
-    match (items.is_null(), count) {
-        (_, 0) => Ok(&mut []),
-        (true, _) => Err(Error::INVALID_ARGUMENT),
-        // SAFETY: not NULL, so an array.
-        (false, _) => Ok(unsafe { from_raw_parts_mut(items, count) }),
-    }
 }
 
 /// The characters of a C string, without the NUL that ends it.
@@ -328,15 +321,11 @@ pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a
 /// # Safety
 /// `text` is NULL or points to characters that a NUL ends.
 pub(crate) unsafe fn text<'a>(text: *const u8, most: usize) -> Result<&'a [u8], Error> {
-    if text.is_null() {
-        return Err(Error::INVALID_ARGUMENT);
-    }
+    required(text)?;
     let mut count = 0;
-    // SAFETY: no byte after the NUL is read.
-    unsafe {
-        while count <= most && *text.add(count) != 0 {
-            count += 1;
-        }
-        slice(text, count)
+    // No byte after the NUL is read.
+    while count <= most && *text.add(count) != 0 {
+        count += 1;
     }
+    slice(text, count)
 }

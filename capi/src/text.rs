@@ -2,7 +2,7 @@
 
 use super::framing::mbm_framing;
 use super::packet::side;
-use super::pointers::{array_or_empty, buffer, get};
+use super::pointers::{buffer, get, slice};
 use core::ffi::c_char;
 use mbm::error::{Error, Status};
 use mbm::text::{self, TextWriter};
@@ -14,7 +14,7 @@ use mbm::text::{self, TextWriter};
 /// `text` is NULL or points to `size` bytes, which nothing else uses meanwhile.
 pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<TextWriter<'a>, Error> {
     // A character is a byte.
-    let text = buffer(text.cast(), size).ok_or(Error::INVALID_ARGUMENT)?;
+    let text = buffer(text.cast(), size)?;
     match text.first_mut() {
         Some(first) => *first = 0,
         None => return Err(Error::BUFFER_TOO_SMALL),
@@ -54,10 +54,9 @@ pub unsafe extern "C" fn mbm_frame_text(
 ) -> u8 {
     let write = || {
         let mut line = line(text, size)?;
-        let description = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
+        let description = get(framing)?;
         let (framing, end) = (description.of_frames()?, description.end());
-        let frame = array_or_empty(frame, frameLength.into());
-        let frame = frame.ok_or(Error::INVALID_ARGUMENT)?;
+        let frame = slice(frame, frameLength.into())?;
         text::frame(&mut line, framing, side(kind)?, frame, end);
         Ok(line)
     };

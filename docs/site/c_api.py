@@ -17,7 +17,7 @@ GUIDES = {
 }
 PORT_GUIDES = {
     "mbm_tty": "docs/ports-linux.md", "mbm_tcp": "docs/ports-linux.md", "mbm_call": "docs/ports-linux.md",
-    "mbm_udp": "docs/ports-linux.md#over-udp", "mbm_loop": "docs/many-devices.md", "mbm_tls": "docs/security.md", "mbm_tls_linux": "docs/security.md",
+    "mbm_udp": "docs/ports-linux.md#over-udp", "mbm_loop": "docs/ports-linux.md#many-devices-in-one-process", "mbm_tls": "docs/security.md", "mbm_tls_linux": "docs/security.md",
 }
 
 

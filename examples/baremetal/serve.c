@@ -1,6 +1,6 @@
-/* A Modbus server on a board without an operating system: four arrays. What is written to
- * the holding registers and coils also changes the input registers and discrete inputs.
- * Licence: MIT OR Apache-2.0. */
+/* A Modbus server on a board without an operating system: four arrays. A write to the holding
+ * registers or coils also changes the input registers or discrete inputs. Licence: MIT OR
+ * Apache-2.0. */
 #include "serve.h"
 #include "board.h"
 #include "mbm.h"

@@ -29,12 +29,12 @@ int main(int argc, char **argv)
 {
     mbm_tty tty = MBM_INIT;
     mbm_port port;
-    const unsigned long slave = argc == 4 ? strtoul(argv[3], NULL, 10) : 0;
+    const unsigned long unit = argc == 4 ? strtoul(argv[3], NULL, 10) : 0;
     uint32_t baud;
     uint8_t i;
 
-    if (slave < 1 || slave > 247) {
-        fprintf(stderr, "usage: %s path baud slave\n", argv[0]);
+    if (unit < 1 || unit > 247) {
+        fprintf(stderr, "usage: %s path baud unit\n", argv[0]);
         return 2;
     }
     baud = (uint32_t)strtoul(argv[2], NULL, 10);
@@ -45,7 +45,7 @@ int main(int argc, char **argv)
     port = mbm_tty_port(&tty);
     mbm_line_beginRtu(&line, &port, frame, sizeof frame);
     mbm_line_setBaudRate(&line, baud);
-    mbm_node_begin(&node, &line, (uint8_t)slave, response, READ_WORDS, transmit, WRITE_WORDS);
+    mbm_node_begin(&node, &line, (uint8_t)unit, response, READ_WORDS, transmit, WRITE_WORDS);
 
     /* Two words to registers 0 and 1, then six words from register 2 on. */
     transmit[0] = 0x1234;

@@ -30,9 +30,9 @@ need-avr:
 .PHONY: check-sketches
 check-sketches: need-avr library ## Compile the sketches in the folder SKETCHES with the library in MODBUSMASTER and with mbm
 	@scripts/need gcc-xtensa-lx106 gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
-	@firmware-tests/avr/check-sketches "$(MODBUSMASTER)" "$(SKETCHES)" docs/reports/sketches.md
+	@firmware-tests/avr/check-sketches "$(MODBUSMASTER)" "$(SKETCHES)" $(BUILD)/sketches.md
 
-# Not part of `make test` either, because the cores are not in the repository. docs/boards.md says which were tried.
+# Not part of `make test` either, because the cores are not in the repository. docs/maintainers/boards.md says which were tried.
 .PHONY: check-core
 check-core: library ## Examples with a real Arduino core: CORE, its tree in FOLDER; LIBRARIES, PROPERTIES as NAME=VALUE
 	@scripts/need python3 arduino-builder arduino-ctags gcc-avr avr-libc gcc-arm-none-eabi libnewlib-arm-none-eabi \

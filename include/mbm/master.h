@@ -427,10 +427,10 @@ uint8_t mbm_node_readWriteQueuedRegisters(mbm_node *node, uint16_t readAddress,
 /**
  * Sets the unit to which the master sends later requests.
  *
- * @param slave  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
- *               255, which the standard reserves
+ * @param unit  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
+ *              255, which the standard reserves
  */
-uint8_t mbm_node_setSlaveID(mbm_node *node, uint8_t slave);
+uint8_t mbm_node_setSlaveID(mbm_node *node, uint8_t unit);
 
 /**
  * Returns the unit to which the master sends requests.

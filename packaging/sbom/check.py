@@ -38,7 +38,7 @@ def schema_error(text):
 
 
 def complaints(data, lock):
-    """What is wrong with the SBOM `data`, beside the lock file of the crate."""
+    """Returns the faults of the SBOM `data`, compared with the lock file of the crate."""
     crates = {(part["name"], part["version"]): part for part in data["components"] if part["purl"].startswith("pkg:cargo/")}
     for package in lock.values():
         if package["name"] in OURS:

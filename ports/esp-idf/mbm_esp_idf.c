@@ -10,12 +10,12 @@
  * buffer holds more than the longest frame, so that uart_write_bytes never waits. */
 enum { RX_BUFFER = 1024, TX_BUFFER = 1024 };
 
-/* After so many characters of silence the driver hands over what it has received. Its own value
+/* The driver hands over what it has received after this many characters of silence. Its own value
  * of 10 would delay each reply. */
 enum { RX_SILENCE = 2 };
 
-/* After so many bytes it hands them over too. Its own value of 120 would hide the silences between
- * frames, and delay them by up to 120 characters. */
+/* It hands them over after this many bytes too. Its own value of 120 would hide the silences
+ * between frames, and delay them by up to 120 characters. */
 enum { RX_THRESHOLD = 1 };
 
 /* The bits of a character: start, data, parity or a second stop bit, stop. */

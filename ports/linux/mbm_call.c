@@ -32,7 +32,7 @@ static uint8_t give_up(const mbm_caller *caller, uint8_t status)
     return status;
 }
 
-/* Gives the request up for the reason that the link has. */
+/* Ends the request with the reason of the link. */
 static uint8_t time_out(const mbm_caller *caller)
 {
     const uint8_t link = caller->status ? caller->status(caller->port) : MBM_OK;

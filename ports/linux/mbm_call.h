@@ -45,9 +45,9 @@ typedef struct mbm_caller {
      *  the time is over; it may return earlier. Returns -1 if it cannot sleep. */
     int (*wait)(void *port, uint32_t timeoutUs);
     void *port; /**< passed to `wait`; the port that the client uses */
-    /** Returns what the link does, as of mbm_linkHooks: MBM_OK, MBM_PENDING while the connection
-     *  is being made, or another status. Then the call can say why the request was not sent.
-     *  NULL if the link is always there. */
+    /** Returns the state of the link, like the hook of mbm_linkHooks: MBM_OK, MBM_PENDING while the
+     * connection is being made, or another status. Then the call can say why the request was not
+     * sent. NULL if the link is always there. */
     uint8_t (*status)(void *port);
     uint32_t timeoutMs; /**< the longest that a call takes, in milliseconds; 0:
                              MBM_CALL_TIMEOUT_MS */

@@ -87,7 +87,7 @@ static inline void put(mbm_loop *loop, uint32_t at, mbm_loop_place place)
     place.entry->place = at;
 }
 
-/* Puts a place, of which the one at `at` is free, at `at` or higher up. */
+/* Puts a place into the free one at `at`, or higher up. */
 static void rise(mbm_loop *loop, uint32_t at, mbm_loop_place place)
 {
     while (at > 1 && loop->places[at / 2 - 1].timeUs > place.timeUs) {
@@ -107,7 +107,7 @@ static inline uint32_t first_below(const mbm_loop *loop, uint32_t at)
     return loop->places[one].timeUs < loop->places[one - 1].timeUs ? one + 1 : one;
 }
 
-/* Puts a place, of which the one at `at` is free, at `at` or further down. */
+/* Puts a place into the free one at `at`, or further down. */
 static void sink(mbm_loop *loop, uint32_t at, mbm_loop_place place)
 {
     uint32_t next = first_below(loop, at);
@@ -252,7 +252,7 @@ __attribute__((noinline)) static uint32_t follow_port(mbm_loop_entry *entry, uin
     if (entry->kind == OF_LISTENER) {
         const mbm_tcp_listener *listener = (const mbm_tcp_listener *)entry->port;
 
-        /* Connections that must wait are not waited for. */
+        /* While connections must wait, the loop polls it again after MBM_TCP_RETRY. */
         return listener->events == 0 && delay > MBM_TCP_RETRY ? MBM_TCP_RETRY : delay;
     }
     if (entry->kind != OF_FD && set_events(entry, wanted_of(entry)) < 0 && delay > SOON)
@@ -290,8 +290,8 @@ static void poll_entry(mbm_loop *loop, mbm_loop_entry *entry)
     }
 }
 
-/* Returns whether to poll an entry whose descriptor is ready. */
-static int is_ready(mbm_loop_entry *entry, uint32_t events)
+/* Notes that the descriptor of an entry is ready. Returns whether to poll the entry. */
+static int note_ready(mbm_loop_entry *entry, uint32_t events)
 {
     switch (entry->kind) {
     case OF_TCP: {
@@ -341,13 +341,13 @@ static void poll_ready(mbm_loop *loop)
     for (i = 0; i < loop->readyCount; i++) {
         mbm_loop_entry *entry = (mbm_loop_entry *)loop->ready[i].data.ptr;
 
-        /* mbm_loop_remove sets those to NULL that it has removed. */
-        if (entry && is_ready(entry, loop->ready[i].events))
+        /* mbm_loop_remove sets the entries that it removes to NULL. */
+        if (entry && note_ready(entry, loop->ready[i].events))
             poll_entry(loop, entry);
     }
 }
 
-/* Polls the sockets of which more than new bytes was reported. */
+/* Polls the sockets for which the system reported more than new bytes. */
 static void poll_listed(mbm_loop *loop)
 {
     mbm_tcp *tcp;

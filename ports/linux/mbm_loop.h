@@ -65,9 +65,9 @@ typedef struct mbm_loop_link {
 /** What a loop polls: for example a client with its link and its plan. Initialise it with
  *  MBM_INIT, then set `poll` and `context`. It must stay where it is while it is in a loop. */
 typedef struct mbm_loop_entry {
-    /** Does what can be done without waiting, and returns for how many microseconds there is then
-     *  nothing to do: what the pollDelay functions return, of several the least. 0: poll again in
-     *  the next wait; MBM_LOOP_FOREVER. For example mbm_loop_pollClient. */
+    /** Does what can be done without waiting. Returns for how many microseconds there is nothing to
+     *  do then: the least of what the pollDelay functions return, 0 to poll again in the next
+     *  wait, or MBM_LOOP_FOREVER. For example mbm_loop_pollClient. */
     uint32_t (*poll)(struct mbm_loop_entry *entry);
     void *context;         /**< yours, for `poll` */
     mbm_loop_link awake;   /**< private */

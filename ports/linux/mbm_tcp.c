@@ -125,7 +125,7 @@ static inline void report_again(mbm_tcp *tcp)
 }
 
 /* Bytes were moved. An object reads the port's clock in each poll, and that time is accurate
- * enough; else in a set that of the last wait is. */
+ * enough. In a set without such a read the time of the last wait is. */
 static inline void note_activity(mbm_tcp *tcp)
 {
     if (tcp->clockUs != 0)

@@ -125,7 +125,7 @@ typedef struct mbm_tcp_set {
  * @param tcp        initialised with MBM_INIT, or closed before
  * @param addresses  filled here; must stay until `tcp` is closed, for one `tcp` only
  * @param host       a name or a numeric address; the lookup of a name may block. NULL is
- *                   this machine. Of several addresses the first that answers is used
+ *                   this machine. The first of several addresses that answers is used
  * @param service    a port number, for example MBM_TCP_SERVICE
  * @return 0, or -1 with errno set: EBUSY if `tcp` is in use, ENAMETOOLONG, ENXIO for an
  *         unknown name or service, EAGAIN if the lookup may succeed later, or an error of

@@ -61,9 +61,9 @@ static int receive_below(void *context, unsigned char *bytes, size_t capacity)
     return (int)count;
 }
 
-/* Looks whether the peer has refused the connection in the middle of this side's messages. Mbed
+/* Takes a refusal of the peer in the middle of this side's messages, and returns 1 then. Mbed
  * TLS reads only after it has sent all: too late if the peer has closed the stream meanwhile. */
-static int is_refused(mbm_tls *tls)
+static int take_refusal(mbm_tls *tls)
 {
     const int count =
         tls->hasAhead < sizeof tls->ahead
@@ -85,7 +85,7 @@ static int send_below(void *context, const unsigned char *bytes, size_t length)
     mbm_tls *tls = (mbm_tls *)context;
     int16_t count;
 
-    if (tls->status == MBM_TLS_HANDSHAKE && is_refused(tls))
+    if (tls->status == MBM_TLS_HANDSHAKE && take_refusal(tls))
         return MBEDTLS_ERR_SSL_FATAL_ALERT_MESSAGE;
     if (tls->isLost)
         return lose(tls);

@@ -14,7 +14,7 @@
  *
  * No function waits for the peer. The handshake goes on in the port's read and write, and in
  * mbm_tls_poll: each call takes it on by one message at most, so that other connections wait
- * for one computation and no more. That may take long on a microcontroller. Until the
+ * for one computation and no more. One computation may take long on a microcontroller. Until the
  * handshake has succeeded, and after any failure, the port neither reads nor sends a byte of
  * Modbus.
  * No function is re-entrant on one object, nor are two connections of one mbm_tls_identity

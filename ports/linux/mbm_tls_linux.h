@@ -75,10 +75,10 @@ int mbm_tls_listen(mbm_tcp_listener *listener, const char *host, const char *ser
  * it serves. In mbm_tls_listener.c.
  *
  * If a connection waits and every place is in use, one whose handshake is not finished is
- * closed for it. Of the address that has the most of them (of IPv6 the network of 64 bits), it
- * is the one that has come least far, and of these the oldest. A finished connection
- * is closed only as mbm_tcp_accept does it, after the listener's `idleTimeMs`. If there is
- * none of either, the new connection is closed.
+ * closed for it. It belongs to the address that has the most of them (with IPv6 to the network of
+ * 64 bits), and is the oldest of those that have come least far. A finished connection is closed
+ * only as mbm_tcp_accept does it, after the listener's `idleTimeMs`. If there is none of either,
+ * the new connection is closed.
  *
  * @param listener  where connections arrive
  * @param identity  a server's; must outlive the connections

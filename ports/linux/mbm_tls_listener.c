@@ -24,7 +24,7 @@ int mbm_tls_listen(mbm_tcp_listener *listener, const char *host, const char *ser
     const int result = mbm_tcp_listen(listener, host, service);
 
 #ifdef TCP_DEFER_ACCEPT
-    /* Who says nothing gets no place. A system that lacks the option works too. */
+    /* A peer that sends nothing gets no place. A system that lacks the option works too. */
     if (result == 0)
         (void)setsockopt(listener->fd, IPPROTO_TCP, TCP_DEFER_ACCEPT, &(int){DEFER_S}, sizeof(int));
 #endif
@@ -76,8 +76,8 @@ static size_t crowd_of(const mbm_tls *tlss, const mbm_tcp *tcps, size_t count, s
     return crowd;
 }
 
-/* Returns the unfinished handshake that goes first: of the peer with the most of them, the one
- * that came least far, of these the oldest. `count` if there is none. */
+/* Returns the unfinished handshake that goes first. It belongs to the peer with the most of them,
+ * and is the oldest of those that came least far. `count` if there is none. */
 static size_t first_to_go(const mbm_tls *tlss, const mbm_tcp *tcps, size_t count)
 {
     size_t i, found = count, most = 0;
@@ -141,7 +141,7 @@ int mbm_tls_accept(mbm_tcp_listener *listener, const mbm_tls_identity *identity,
         errno = ENOMEM;
         return -1;
     }
-    /* Its first message may be there. Who has sent it is not the first to go. */
+    /* Its first message may be there. A peer that has sent it is not the first to go. */
     (void)mbm_tls_poll(&tlss[place]);
     return place;
 }

@@ -229,7 +229,7 @@ static int send_frame(mbm_udp *udp)
         return 0;
     if (count < 0 && !is_passing(errno))
         return lose(udp, errno);
-    /* A datagram that is not sent is one that got lost. */
+    /* A datagram that is not sent counts as lost. */
     if (count < 0) {
         udp->error = errno;
         udp->unsent++;

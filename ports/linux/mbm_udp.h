@@ -99,8 +99,8 @@ void mbm_udp_close(mbm_udp *udp);
 /**
  * Returns the port for the begin functions. It may be made before the socket is open. Its
  * read returns bytes of one datagram at a time. Its write sends a frame when it has all of
- * it, and collects bytes until then. What is no frame loses the link. A server that is not
- * there does not: it is counted in `unsent`.
+ * it, and collects bytes until then. A datagram that is no frame loses the link. A server that is
+ * not there does not: it is counted in `unsent`.
  *
  * @param udp  must outlive the port
  * @return the port

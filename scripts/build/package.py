@@ -141,6 +141,33 @@ HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterHelpers.h",
            "ModbusSnifferText.h"]
 
 
+def kit(package: Package, dialects: tuple, example: str) -> list:
+    """Takes what the packages for ESP-IDF, RT-Thread and Zephyr share: the library as assembler source, the port,
+    the headers, the example as `example`, and the tests' line. Returns the names of the library's sources."""
+    port = f"mbm_{package.kind.replace('-', '_')}"
+    sources = package.copy_assembler("src", dialects)
+    package.copy(f"ports/{package.kind}/{port}.c", f"src/{port}.c")
+    package.copy(f"ports/{package.kind}/{port}.h", f"include/{port}.h")
+    package.copy("include/mbm.h", "include/mbm.h")
+    package.copy_folder("include/mbm", "include/mbm")
+    if example.endswith(".c"):
+        package.copy(f"examples/{package.kind}/{pathlib.PurePosixPath(example).name}", example)
+    else:
+        package.copy_folder(f"examples/{package.kind}/{pathlib.PurePosixPath(example).name}", example)
+    package.copy_folder("firmware-tests/line", "tests")
+    package.copy("CHANGELOG.md")
+    package.copy_licence()
+    package.fill(f"packaging/{package.kind}/README.md.in", "README.md")
+    return sources
+
+
+def pack_kit(package: Package, usage: str) -> None:
+    """Writes the package of a kit into the folder that the command line names."""
+    if len(sys.argv) != 2:
+        sys.exit(usage)
+    package.tar(pathlib.Path(sys.argv[1]) / f"mbm-{package.kind}-{version()}.tar.gz", "mbm")
+
+
 def write(path: pathlib.Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8", newline="\n")

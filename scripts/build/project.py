@@ -104,7 +104,7 @@ def architectures() -> list:
     return list(dict.fromkeys(name for family in families() for name in FAMILIES[family][1]))
 
 
-# --- the address of the project and whether it has releases, of which packaging/project.toml is the one setting
+# --- the address of the project and whether it has releases, both set in packaging/project.toml
 
 ADDRESS = [(re.compile(r"https?://[^\s()]+(?=/releases/latest\b)"), ["README.md", "docs/*.md"]),
            (re.compile(r'(?<=^repository = ")[^"]+', re.M), ["Cargo.toml"])]

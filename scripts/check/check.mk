@@ -46,7 +46,7 @@ tidy: compile-commands ## Run clang-tidy over C, C++ and sketches, with the chec
 		xargs -P "$$(nproc)" -n 1 clang-tidy --quiet 2>/dev/null || { echo "tidy: clang-tidy has findings (above)" >&2; exit 1; }
 	@echo "tidy: clang-tidy finds nothing in $$(grep -c '"file"' compile_commands.json) files and their headers"
 
-# In mbm.h and its parts, to which the other headers refer, parameters and returned values need comments too.
+# The other headers refer to mbm.h and its parts, so there parameters and returned values need comments too.
 .PHONY: check-comments
 check-comments:
 	@mkdir -p $(BUILD)/docs
@@ -70,7 +70,7 @@ check-real: $(ARCHIVE) ## Build and run package and example in a real kit's tree
 	@scripts/check/real $(KIT) $(FOLDER) $(BOARDS)
 
 .PHONY: misra
-misra: ## Run cppcheck, for C with its addon for MISRA C; docs/misra.md lists the accepted findings
+misra: ## Run cppcheck, for C with its addon for MISRA C; docs/maintainers/misra.md lists the accepted findings
 	@scripts/need cppcheck
 	@scripts/check/misra
 
@@ -87,7 +87,7 @@ deny: ## Check licences and origin of all crates with cargo-deny, with MBM_ADVIS
 	@$(if $(filter yes,$(MBM_ADVISORIES)),,echo "deny: known vulnerabilities were not looked up: MBM_ADVISORIES=yes does it, with a network")
 
 .PHONY: check-dependencies
-check-dependencies: ## Check that docs/dependencies.md has a reason for every dependency, and that none needs a newer Rust
+check-dependencies: ## Check that docs/maintainers/dependencies.md has a reason for every dependency, and that none needs a newer Rust
 	@CARGO="$(CARGO)" scripts/check/dependencies
 
 .PHONY: semver
@@ -139,12 +139,14 @@ check-pages: linux ## Compile and run the blocks of README and docs, and check l
 		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi gcc-aarch64-linux-gnu libc6-dev-arm64-cross) \
 		$(FIRMWARE_LIBC)
 	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
+	@scripts/build/pictures --check
 	@scripts/check/pages $(PAGES)
 
 # The documentation site.
 .PHONY: docs
 docs: ## Make the documentation site, build/site, and check its links, entries and search
 	@scripts/need python3 python3-venv doxygen tidy git
+	@scripts/build/pictures --check
 	@CARGO="$(CARGO)" docs/site/build
 	@scripts/check/site
 

@@ -42,7 +42,7 @@ class Names(unittest.TestCase):
         self.assertEqual(functions.acting_questions(source), ["ends_echo", "is_of"])
 
 
-# --- scripts/check/dependencies holds docs/dependencies.md to what there is
+# --- scripts/check/dependencies holds docs/maintainers/dependencies.md to what there is
 
 dependencies = load("scripts/check/dependencies")
 
@@ -77,7 +77,7 @@ class CheckDependencies(unittest.TestCase):
     def test_a_dependency_without_a_reason_is_refused(self):
         self.assertEqual(
             complaints_about(Python_package={"peer", "other"}),
-            ["docs/dependencies.md has no reason for the Python package `other`"],
+            ["docs/maintainers/dependencies.md has no reason for the Python package `other`"],
         )
 
     def test_a_new_crate_is_named_with_the_crate_that_brings_it(self):
@@ -85,18 +85,18 @@ class CheckDependencies(unittest.TestCase):
         self.addCleanup(REACH["vec"].discard, "new")
         self.assertEqual(
             complaints_about(crate_in_the_library={"vec", "hash", "new"}),
-            ["docs/dependencies.md has no reason for the crate in the library `new`, which `vec` brings"],
+            ["docs/maintainers/dependencies.md has no reason for the crate in the library `new`, which `vec` brings"],
         )
 
     def test_a_kind_that_the_page_does_not_have_is_refused(self):
         self.assertEqual(
-            complaints_about(npm_package={"linter"}), ["docs/dependencies.md has no reason for the npm package `linter`"]
+            complaints_about(npm_package={"linter"}), ["docs/maintainers/dependencies.md has no reason for the npm package `linter`"]
         )
 
     def test_a_name_that_is_not_needed_any_more_is_refused(self):
         self.assertEqual(
             complaints_about(Python_package=set()),
-            ["docs/dependencies.md names the Python package `peer`, which is not there any more"],
+            ["docs/maintainers/dependencies.md names the Python package `peer`, which is not there any more"],
         )
 
     def test_a_crate_under_one_that_does_not_bring_it_is_refused(self):
@@ -104,7 +104,7 @@ class CheckDependencies(unittest.TestCase):
         present = {"crate in the library": {"vec", "hash", "new"}, "Python package": {"peer"}}
         self.assertEqual(
             list(dependencies.complaints(page, present, REACH, LISTS)),
-            ["docs/dependencies.md says that `vec` brings `new`, but it does not"],
+            ["docs/maintainers/dependencies.md says that `vec` brings `new`, but it does not"],
         )
 
     def test_a_list_stands_for_everything_in_it(self):
@@ -118,7 +118,7 @@ class CheckDependencies(unittest.TestCase):
         page = dependencies.page(text.replace("a peer |", "a peer | `old/requirements.txt` |"))
         self.assertEqual(
             list(dependencies.complaints(page, {"Python package": {"peer"}}, REACH, LISTS)),
-            ["docs/dependencies.md names the Python package `old/requirements.txt`, which is not there any more"],
+            ["docs/maintainers/dependencies.md names the Python package `old/requirements.txt`, which is not there any more"],
         )
 
     def test_an_empty_reason_is_refused(self):

@@ -144,7 +144,7 @@ impl Link {
     }
 
     /// Notes that bytes have arrived.
-    pub fn received(&mut self) {
+    pub fn note_received(&mut self) {
         self.has_received = true;
         self.fruitless = 0;
         self.is_heard = true;

@@ -172,7 +172,7 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
             self.line.forget_late_replies();
         }
         self.queue.interrupt();
-        self.queue.answered(0);
+        self.queue.note_answered(0);
     }
 
     /// Leaves the line to another user of the port until [`Client::take_back`]. Returns

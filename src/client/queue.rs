@@ -160,7 +160,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     }
 
     /// Notes that a request was answered while `in_flight` others wait for their answer.
-    pub(super) fn answered(&mut self, in_flight: u8) {
+    pub(super) fn note_answered(&mut self, in_flight: u8) {
         self.connected = true;
         self.unanswered = below_zero(in_flight);
     }
@@ -173,7 +173,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     }
 
     /// Notes that bytes have arrived.
-    pub fn received(&mut self) {
+    pub fn note_received(&mut self) {
         self.unanswered = below_zero(self.in_flight());
     }
 

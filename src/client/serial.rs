@@ -87,7 +87,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     }
 
     /// Stores the response in the request, and returns the status of the request.
-    fn received(&mut self, request: &mut J, status: Status) -> Status {
+    fn store_reply(&mut self, request: &mut J, status: Status) -> Status {
         request.state_mut().exception = self.engine.exception_code();
         // The content is empty after a broadcast or another request that has no response.
         let content = self.engine.content;
@@ -168,11 +168,11 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
             queue.active = Some(request);
             return None;
         }
-        let status = self.received(&mut request, status);
+        let status = self.store_reply(&mut request, status);
         if status == Status::LINK_LOST {
             queue.disconnect();
         } else if is_answer(status) {
-            queue.answered(0);
+            queue.note_answered(0);
         }
         // The queue has space: the active request has always counted as part of it.
         queue.conclude(request, status, now, &mut self.engine.storage)

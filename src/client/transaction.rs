@@ -143,7 +143,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         header.matches_echo(engine.storage.slice(front + rtu::PDU as u16, length))
     }
 
-    fn ending_reply(engine: &mut ClientEngine<P, S, J>, is_silent: bool) -> u16
+    fn find_ending_reply(engine: &mut ClientEngine<P, S, J>, is_silent: bool) -> u16
     where
         P: Port,
     {

@@ -97,7 +97,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// latest.
     #[inline(always)]
     fn write_record(&mut self) {
-        let place = self.place_of_record();
+        let place = self.find_record_place();
         let timeout = Q::response_timeout(self);
         let silence = timeout
             .wrapping_add(timeout)
@@ -114,11 +114,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         record.owed = self.owed;
     }
 
-    /// The index of the record of the pending request's unit, else of a free one: its unit has been
-    /// silent for long enough. If there is none, [`LATE_UNITS`]: then the last record stands for all
-    /// units from now on.
+    /// Finds the record of the pending request's unit, or else a free one, and frees the records whose
+    /// units have been silent for long enough. Returns its index, or [`LATE_UNITS`] if there is none:
+    /// then the last record stands for all units from now on.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn place_of_record(&mut self) -> usize {
+    fn find_record_place(&mut self) -> usize {
         let (mut place, mut index) = (LATE_UNITS, 0);
         while index < LATE_UNITS {
             // The index is in range, so the compiler leaves the check out.

@@ -48,7 +48,7 @@ enum Phase {
     Gap,
     /// Waits for the reply.
     Reply,
-    /// Gives the slaves time to carry out a broadcast.
+    /// Gives the devices time to carry out a broadcast.
     Turnaround,
     /// Writes the frame to the port.
     Send,

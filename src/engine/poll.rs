@@ -327,7 +327,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// still waits for its reply.
     fn find_in_silence(&mut self) -> bool {
         self.awaits_end = false;
-        let length = Q::ending_reply(self, true);
+        let length = Q::find_ending_reply(self, true);
         if length > S::Count::ZERO && self.accept(length) && self.take_response() {
             return true;
         }

@@ -82,7 +82,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         let is_response = if self.check_end(EXCEPTION_FRAME.into(), function | EXCEPTION) {
             self.accept_exception()
         } else {
-            let length = self.ending_reply();
+            let length = self.find_ending_reply();
             length > S::Count::ZERO && self.accept(length)
         };
         if is_response {
@@ -115,11 +115,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         true
     }
 
-    /// Length of the reply's frame that ends with the last byte, with a right CRC; 0 if there is
-    /// none.
-    fn ending_reply(&mut self) -> S::Count {
+    /// Finds the reply's frame that ends with the last byte, with a right CRC. Returns its length, or
+    /// 0 if there is none.
+    fn find_ending_reply(&mut self) -> S::Count {
         if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
-            return Q::ending_reply(self, false);
+            return Q::find_ending_reply(self, false);
         }
         match self.check_end(self.length, self.function) {
             true => self.length,

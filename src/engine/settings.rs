@@ -72,7 +72,7 @@ pub struct Settings {
     /// Quiet time: the silence before the next request after a request without a reply, so
     /// that a late reply can pass. The default is 100 ms.
     pub quiet_time: MicrosSetting<{ millis(100) }>,
-    /// Turnaround delay: the time that slaves get to carry out a broadcast. The default is 100 ms.
+    /// Turnaround delay: the time that devices get to carry out a broadcast. The default is 100 ms.
     pub turnaround_delay: MicrosSetting<{ millis(100) }>,
     /// Time of one character in microseconds; 0 if the baud rate is unknown.
     pub character: Micros16,

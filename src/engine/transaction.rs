@@ -56,7 +56,7 @@ pub trait Transaction<P, S: Storage>: Sized {
     /// For a reply whose length the request does not determine: the length of the reply's frame
     /// that ends with the last received byte, with a right CRC; 0 if there is none. `is_silent`
     /// is true if the line has been silent since.
-    fn ending_reply(_engine: &mut Engine<P, S, Self>, _is_silent: bool) -> S::Count
+    fn find_ending_reply(_engine: &mut Engine<P, S, Self>, _is_silent: bool) -> S::Count
     where
         P: Port,
     {

@@ -39,7 +39,7 @@ impl<S: GatewayStorage> Gateway<S> {
                     return;
                 }
                 ..0 => self.lose(connection, Status::LINK_LOST),
-                count => self.received(connection, request, have.saturating_add(count as u16)),
+                count => self.take_bytes(connection, request, have.saturating_add(count as u16)),
             }
         }
     }
@@ -78,21 +78,21 @@ impl<S: GatewayStorage> Gateway<S> {
     }
 
     /// Takes the bytes of a frame. The first `have` bytes are there now.
-    fn received(&mut self, connection: u8, request: u16, have: u16) {
+    fn take_bytes(&mut self, connection: u8, request: u16, have: u16) {
         self.storage.request(request).length = have;
         let bytes = self.storage.frame(request).get(..have.into());
         match tcp::header(bytes.unwrap_or_default()) {
             Ok(header) if have >= header.total as u16 => {
                 self.storage.connection_mut(connection).receiving = NONE;
-                self.direct(connection, request, header.unit);
+                self.route(connection, request, header.unit);
             }
             Err(Error::MALFORMED_FRAME) => self.lose(connection, Status::MALFORMED_FRAME),
             _ => {}
         }
     }
 
-    /// Sends a complete request where its unit id leads to.
-    fn direct(&mut self, connection: u8, request: u16, unit: u8) {
+    /// Sends a complete request to the line or unit of its unit id.
+    fn route(&mut self, connection: u8, request: u16, unit: u8) {
         let Some(to) = Route::find(self.storage.routes(), unit) else {
             return self.refuse(request, PATH_UNAVAILABLE);
         };
@@ -129,7 +129,7 @@ impl<S: GatewayStorage> Gateway<S> {
         match response {
             None => {}
             Some(0) => self.release(request),
-            Some(length) => self.answered(request, length),
+            Some(length) => self.set_response(request, length),
         }
     }
 
@@ -144,7 +144,6 @@ impl<S: GatewayStorage> Gateway<S> {
     /// Sends the responses of a connection, until there are no more or the connection takes
     /// no more bytes.
     pub(super) fn send(&mut self, connection: u8) {
-        self.storage.connection_mut(connection).is_blocked = false;
         while let Some(request) = self.next_response(connection) {
             self.storage.connection_mut(connection).sending = request;
             let state = self.storage.request(request);
@@ -156,7 +155,6 @@ impl<S: GatewayStorage> Gateway<S> {
             let sent = sent.saturating_add(count as u16);
             self.storage.request(request).sent = sent;
             if sent < length {
-                self.storage.connection_mut(connection).is_blocked = true;
                 return;
             }
             self.storage.connection_mut(connection).sending = NONE;

@@ -174,11 +174,11 @@ impl<S: GatewayStorage> Gateway<S> {
         if let Some(place) = self.storage.frame(request).get_mut(4..6) {
             place.copy_from_slice(&tcp::length(length.into()));
         }
-        self.answered(request, length + tcp::PDU as u16);
+        self.set_response(request, length + tcp::PDU as u16);
     }
 
-    /// The frame of a request now has its response, of `length` bytes.
-    pub(super) fn answered(&mut self, request: u16, length: u16) {
+    /// Notes that the frame of a request has its response now, of `length` bytes.
+    pub(super) fn set_response(&mut self, request: u16, length: u16) {
         let order = self.next_order();
         let state = self.storage.request(request);
         state.stage = Stage::Answered;

@@ -63,14 +63,8 @@ impl<S: GatewayStorage> Gateway<S> {
         }
         for request in 0..self.storage.request_count() {
             let own = match self.storage.request(request).stage {
-                Stage::Local => EXTERNAL_POLL_DELAY,
-                Stage::Answered => {
-                    let connection = self.connection_of(request);
-                    match self.storage.connection_mut(connection).is_blocked {
-                        true => EXTERNAL_POLL_DELAY,
-                        false => 0,
-                    }
-                }
+                // What poll has not sent of a response, the connection did not take.
+                Stage::Local | Stage::Answered => EXTERNAL_POLL_DELAY,
                 Stage::Queued => self.delay_in_queue(request),
                 _ => u32::MAX,
             };

@@ -76,8 +76,6 @@ pub struct ConnectionState {
     pub(super) is_open: bool,
     /// Why it is not open any more, or [`Status::OK`].
     pub(super) end: Status,
-    /// It accepted fewer bytes than were to be sent.
-    pub(super) is_blocked: bool,
     /// It was not read, because there was no place for another request.
     pub(super) is_held: bool,
     /// The request whose bytes arrive, or [`NONE`].
@@ -93,7 +91,6 @@ impl ConnectionState {
     pub const FREE: ConnectionState = ConnectionState {
         is_open: false,
         end: Status::OK,
-        is_blocked: false,
         is_held: false,
         receiving: NONE,
         sending: NONE,
@@ -110,7 +107,6 @@ impl ConnectionState {
     pub(super) fn clear(&mut self, is_open: bool, end: Status) {
         self.is_open = is_open;
         self.end = end;
-        self.is_blocked = false;
         self.is_held = false;
         self.receiving = NONE;
         self.sending = NONE;

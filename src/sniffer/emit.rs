@@ -125,7 +125,7 @@ impl Sniffer {
         let overdue = if is_unchanged {
             None
         } else {
-            self.overdue(time)
+            self.find_overdue(time)
         };
         if let Some(overdue) = overdue {
             return self.expire(overdue, time);

@@ -232,7 +232,7 @@ impl Sniffer {
         }
         // Bytes that were not reported yet may contain the reply, so they delay the timeout.
         let known = now.wrapping_sub(self.waited(0, now).max(self.waited(1, now)));
-        if let Some(overdue) = self.overdue(known) {
+        if let Some(overdue) = self.find_overdue(known) {
             return Some(self.expire(overdue, now));
         }
         self.idle_from = now;
@@ -269,9 +269,9 @@ impl Sniffer {
         self.timeout.saturating_mul(LATE_TIMEOUTS)
     }
 
-    /// The index of a request that is overdue, if any. Removes the requests whose late reply is
-    /// no longer expected.
-    fn overdue(&mut self, now: u32) -> Option<usize> {
+    /// Finds a request that is overdue, and forgets the requests whose late reply is no longer
+    /// expected. Returns its index.
+    fn find_overdue(&mut self, now: u32) -> Option<usize> {
         self.requests.forget(now, self.late());
         self.requests.overdue(now, self.timeout)
     }

@@ -2,7 +2,7 @@
 
 use super::request::{mbm_clientRequest, RequestPtr};
 use crate::packet::{mbm_packet, MBM_PACKET_RESPONSE};
-use crate::pointers::{buffer, overlap, put};
+use crate::pointers::{buffer, overlap, put, required};
 use mbm::client::ClientRequest as _;
 use mbm::error::{Error, Status};
 use mbm::pdu::custom::{Function, Rule};
@@ -93,8 +93,8 @@ pub unsafe extern "C" fn mbm_client_reply(
         if request.lies_in(|bytes, length| overlap(bytes, length, pdu, capacity)) {
             return Err(Error::INVALID_ARGUMENT);
         }
-        let place = buffer(pdu, capacity).filter(|_| !packet.is_null());
-        packet_of(request, place.ok_or(Error::INVALID_ARGUMENT)?)
+        required(packet)?;
+        packet_of(request, buffer(pdu, capacity)?)
     };
     match made() {
         Ok(made) => put(packet, made),

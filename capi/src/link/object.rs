@@ -284,7 +284,7 @@ unsafe fn advance_noting(
     (*link).has_read = false;
     let ended = ((*(*link).transport).advance)(object, now, fresh);
     if (*link).has_read {
-        client::queue(object).received();
+        client::queue(object).note_received();
     }
     ended
 }

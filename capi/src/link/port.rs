@@ -39,7 +39,7 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
         if count > 0 {
             let link = context.cast::<Object>();
             (*link).has_read = true;
-            (*link).core.received();
+            (*link).core.note_received();
         }
         count
     }

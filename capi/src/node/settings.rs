@@ -7,12 +7,12 @@ use mbm::error::Status;
 
 /// Sets the unit to which the master sends later requests.
 ///
-/// @param slave  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
-///               255, which the standard reserves
+/// @param unit  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
+///              255, which the standard reserves
 #[no_mangle]
-pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, slave: u8) -> u8 {
+pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, unit: u8) -> u8 {
     with(node, |node| {
-        node.core.set_unit(slave);
+        node.core.set_unit(unit);
         Status::OK
     })
 }

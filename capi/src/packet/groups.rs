@@ -2,7 +2,7 @@
 
 use super::{mbm_packet, side, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
 use crate::functions::MBM_MEI_READ_DEVICE_IDENTIFICATION;
-use crate::pointers::{array_or_empty, buffer, get, overlap, put};
+use crate::pointers::{buffer, get, overlap, put, required, slice};
 use mbm::error::{Error, Status};
 use mbm::packet::groups;
 use mbm::pdu::files::Record;
@@ -48,7 +48,8 @@ unsafe fn next<T>(
     first: impl FnOnce(&mbm_packet, &[u8]) -> Option<(T, usize)>,
 ) -> u8 {
     let found = || {
-        let (packet, at) = (get(packet).filter(|_| !group.is_null())?, get(cursor)?);
+        required(group).ok()?;
+        let (packet, at) = (get(packet).ok()?, get(cursor).ok()?);
         let rest = packet.data().ok()?.get(at.into()..)?;
         let (found, length) = first(&packet, rest)?;
         put(cursor, at.saturating_add(length as u16));
@@ -145,13 +146,13 @@ unsafe fn add(
 ) -> Result<(), Error> {
     let refused = Error::INVALID_ARGUMENT;
     // Data and storage do not overlap.
-    let mut extended = get(packet).ok_or(refused)?;
+    let mut extended = get(packet)?;
     let is_contiguous = extended.dataLength == 0 || core::ptr::eq(extended.data, storage);
     if !is_contiguous || (length > 0 && overlap(data, length, storage, capacity)) {
         return Err(refused);
     }
-    let data = array_or_empty(data, length.into()).ok_or(refused)?;
-    let place = buffer(storage, capacity).ok_or(refused)?;
+    let data = slice(data, length.into())?;
+    let place = buffer(storage, capacity)?;
     let used = extended.dataLength;
     let space = place.get_mut(used.into()..).ok_or(refused)?;
     let more = write(&mut extended, data, space)?;
@@ -180,7 +181,7 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
     capacity: u16,
     record: *const mbm_record,
 ) -> u8 {
-    let Some((added, current)) = get(record).zip(get(packet)) else {
+    let (Ok(added), Ok(current)) = (get(record), get(packet)) else {
         return Status::INVALID_ARGUMENT.code();
     };
     // A request of function 14 names the registers and has no data.
@@ -222,7 +223,7 @@ pub unsafe extern "C" fn mbm_packet_addObject(
     capacity: u16,
     object: *const mbm_object,
 ) -> u8 {
-    let Some(added) = get(object) else {
+    let Ok(added) = get(object) else {
         return Status::INVALID_ARGUMENT.code();
     };
     let write = |packet: &mut mbm_packet, value: &[u8], space: &mut [u8]| {

@@ -7,7 +7,7 @@ mod groups;
 pub use groups::*;
 
 use super::functions::{declared, mbm_function};
-use super::pointers::{array_or_empty, overlap, put};
+use super::pointers::{overlap, put, slice};
 use mbm::error::{Error, Status};
 use mbm::packet::{self, PduKind};
 use mbm::pdu::custom::Function;
@@ -162,8 +162,7 @@ impl mbm_packet {
     /// # Safety
     /// `data` is NULL or points to `dataLength` bytes.
     pub(super) unsafe fn data<'a>(&self) -> Result<&'a [u8], Error> {
-        let data = array_or_empty(self.data, self.dataLength.into());
-        data.ok_or(Error::INVALID_ARGUMENT)
+        slice(self.data, self.dataLength.into())
     }
 
     /// True if the data overlap a buffer that is to be written.
@@ -231,8 +230,7 @@ pub(super) unsafe fn own(
     count: u8,
     code: Option<u8>,
 ) -> Result<Option<Function>, Error> {
-    let functions = array_or_empty(functions, count.into());
-    declared(functions.ok_or(Error::INVALID_ARGUMENT)?, code)
+    declared(slice(functions, count.into())?, code)
 }
 
 /// Measures the reply to a request. Fails for a request that cannot be built.

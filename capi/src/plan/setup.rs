@@ -215,11 +215,11 @@ impl ReadLimits for mbm_planSetup {
 
     fn units(&self) -> &[UnitLimits] {
         // SAFETY: as above.
-        unsafe { pointers::array(self.units.cast(), self.unitCount.into()).unwrap_or(&[]) }
+        unsafe { pointers::slice_or_empty(self.units.cast(), self.unitCount.into()) }
     }
 
     fn excluded(&self) -> &[ExcludedRange] {
         // SAFETY: as above.
-        unsafe { pointers::array(self.excluded.cast(), self.excludedCount.into()).unwrap_or(&[]) }
+        unsafe { pointers::slice_or_empty(self.excluded.cast(), self.excludedCount.into()) }
     }
 }

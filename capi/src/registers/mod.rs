@@ -117,7 +117,7 @@ unsafe fn view(
     call_order: u8,
     to_write: bool,
 ) -> Result<Registers<BorrowedRegisters>, Error> {
-    let fields = pointers::get(registers).ok_or(Error::INVALID_ARGUMENT)?;
+    let fields = pointers::get(registers)?;
     if fields.data.is_null() {
         return Err(Error::NOT_INITIALISED);
     }

@@ -106,12 +106,12 @@ pub unsafe extern "C" fn mbm_registers_setDouble(
     #[cfg(target_arch = "avr")]
     {
         match pointers::get(value.cast::<ShortDouble>()) {
-            Some(double) => {
+            Ok(double) => {
                 let mut bytes = double.to_bytes();
                 bytes.reverse();
                 set(registers, address, order, bytes.as_ptr(), 8)
             }
-            None => Error::INVALID_ARGUMENT.code(),
+            Err(refused) => refused.code(),
         }
     }
 }

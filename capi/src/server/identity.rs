@@ -4,8 +4,8 @@
 use super::units::{add_only, request};
 use super::{mbm_service, mbm_unit};
 use crate::packet::mbm_object;
+use crate::pointers::slice_or_empty;
 use core::ffi::c_void;
-use core::slice::from_raw_parts;
 use mbm::server::identity::{self, Objects};
 
 /// The eight exception status outputs of function 07. Initialise the struct with MBM_INIT and
@@ -67,25 +67,14 @@ unsafe extern "C" fn serve_exception_status(
     identity::serve_exception_status(outputs, pdu, length).code()
 }
 
-/// The `length` bytes at a pointer; an empty slice for NULL.
-///
-/// # Safety
-/// `first` is NULL or points to `length` bytes, which nothing changes while the slice lives.
-unsafe fn bytes<'a>(first: *const u8, length: u8) -> &'a [u8] {
-    if first.is_null() {
-        return &[];
-    }
-    from_raw_parts(first, length.into())
-}
-
 unsafe extern "C" fn serve_server_id(
     service: *mut mbm_service,
     pdu: *mut u8,
     info: *const c_void,
 ) -> usize {
     let record = service.cast::<mbm_serverId>();
-    let id = bytes((*record).id, (*record).idLength);
-    let additional = bytes((*record).additional, (*record).additionalLength);
+    let id = slice_or_empty((*record).id, (*record).idLength.into());
+    let additional = slice_or_empty((*record).additional, (*record).additionalLength.into());
     let running = (*record).running != 0;
     let (pdu, length) = request(pdu, info);
     identity::serve_server_id(id, running, additional, pdu, length).code()
@@ -105,7 +94,7 @@ impl Objects for CObjects {
             }
             for _ in 0..(*self.0).count {
                 if (*object).id == id {
-                    return Some(bytes((*object).data, (*object).length));
+                    return Some(slice_or_empty((*object).data, (*object).length.into()));
                 }
                 object = object.add(1);
             }

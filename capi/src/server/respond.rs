@@ -65,8 +65,8 @@ pub unsafe extern "C" fn mbm_unit_respond(
         unsafe { response.write(0) }
     }
     let (framing, delimiter) = match get(framing) {
-        Some(fields) => (fields.of_frames(), fields.end()),
-        None => return Status::INVALID_ARGUMENT.code(),
+        Ok(fields) => (fields.of_frames(), fields.end()),
+        Err(_) => return Status::INVALID_ARGUMENT.code(),
     };
     let framing = match framing {
         Ok(framing) if !units.is_null() && !frame.is_null() && !response.is_null() => framing,

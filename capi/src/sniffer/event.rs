@@ -1,7 +1,7 @@
 //! The events of a sniffer, and events as text.
 
 use crate::packet::{mbm_packet, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
-use crate::pointers::{array_or_empty, get};
+use crate::pointers::{get, slice};
 use crate::text::{line, outcome};
 use core::ffi::c_char;
 use mbm::error::{Error, Status};
@@ -147,10 +147,6 @@ impl mbm_event {
     /// # Safety
     /// `frame` and `pdu` are NULL or point to as many bytes as their lengths say.
     unsafe fn core_event<'a>(&self) -> Result<Event<'a>, Error> {
-        let (frame, pdu) = (
-            array_or_empty(self.frame, self.frameLength.into()),
-            array_or_empty(self.pdu, self.pduLength.into()),
-        );
         let head = self.requestHead.get(..self.requestHeadLength.into());
         let asked = head
             .map(RequestStart::new)
@@ -163,8 +159,8 @@ impl mbm_event {
             transaction: self.packet.transaction,
             unit: self.unit,
             function: self.function,
-            frame: frame.ok_or(Error::INVALID_ARGUMENT)?,
-            pdu: pdu.ok_or(Error::INVALID_ARGUMENT)?,
+            frame: slice(self.frame, self.frameLength.into())?,
+            pdu: slice(self.pdu, self.pduLength.into())?,
             length: self.length.into(),
             asked,
         })
@@ -189,7 +185,7 @@ pub unsafe extern "C" fn mbm_event_text(
 ) -> u8 {
     let write = || {
         let mut line = line(text, size)?;
-        let event = get(event).ok_or(Error::INVALID_ARGUMENT)?;
+        let event = get(event)?;
         event.core_event()?.text(&mut line);
         Ok(line)
     };

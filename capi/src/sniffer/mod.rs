@@ -6,7 +6,7 @@ pub use event::*;
 
 use crate::framing::is_delimiter;
 use crate::functions::{declared, mbm_function};
-use crate::pointers::{self, array_or_empty, buffer, c_object, put, read, BEGUN};
+use crate::pointers::{self, buffer, c_object, put, read, slice, BEGUN};
 use core::ffi::c_void;
 use mbm::error::{Error, Status};
 use mbm::frame::Framing;
@@ -144,13 +144,13 @@ pub unsafe extern "C" fn mbm_sniffer_setFunctions(
     count: u8,
 ) -> u8 {
     pointers::with(sniffer, |object| {
-        match array_or_empty(functions, count.into()).map(convert) {
-            Some(Ok(functions)) => {
+        match slice(functions, count.into()).and_then(convert) {
+            Ok(functions) => {
                 object.functions = functions;
                 object.count = count;
                 Status::OK
             }
-            _ => Status::INVALID_ARGUMENT,
+            Err(_) => Status::INVALID_ARGUMENT,
         }
     })
 }
@@ -243,12 +243,13 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
         _ => return 0,
     };
     // Begin demands that the buffer is valid.
-    let bytes = array_or_empty(bytes, length.into());
-    let Some(bytes) = bytes else { return 0 };
+    let Ok(bytes) = slice(bytes, length.into()) else {
+        return 0;
+    };
     read(sniffer, 0, |object| {
         match buffer(object.buffer, object.size) {
-            Some(buffer) => object.core.feed(buffer, direction, bytes, nowUs) as u16,
-            None => 0,
+            Ok(buffer) => object.core.feed(buffer, direction, bytes, nowUs) as u16,
+            Err(_) => 0,
         }
     })
 }
@@ -290,7 +291,7 @@ pub unsafe extern "C" fn mbm_sniffer_next(
 /// The object was begun with a buffer that is still valid. `event` points to an event.
 #[inline(never)]
 unsafe fn next(object: &mut Object, now: u32, event: *mut mbm_event) -> u8 {
-    let Some(buffer) = buffer(object.buffer, object.size) else {
+    let Ok(buffer) = buffer(object.buffer, object.size) else {
         return 0;
     };
     let functions = object.functions.get(..object.count.into());

@@ -9,7 +9,7 @@ use crate::functions::declared;
 use crate::node::mbm_node;
 use crate::packet::side;
 use crate::pointers::{
-    array_or_empty, c_object, check, get, object, with, with_hooks, CObject, BEGUN, IN_HOOK,
+    c_object, check, get, object, slice, with, with_hooks, CObject, BEGUN, IN_HOOK,
 };
 use crate::port::{countable, mbm_port, PortRef};
 use core::ffi::c_void;
@@ -189,11 +189,10 @@ unsafe fn begin(
 ) -> Result<(), Error> {
     let (described, kind) = described(framing)?;
     let sends = side(sends)?;
-    let port = get(port).filter(mbm_port::is_complete);
-    let port = port.ok_or(Error::INVALID_ARGUMENT)?;
+    let port = get(port)?;
     // A trace that passes its own bytes on to itself would never end.
     let is_own = port.context == trace.cast();
-    if trace.is_null() || buffer.is_null() || hook.is_none() || is_own {
+    if !port.is_complete() || trace.is_null() || buffer.is_null() || hook.is_none() || is_own {
         return Err(Error::INVALID_ARGUMENT);
     }
     if size < MBM_MIN_TRACE_BUFFER {
@@ -238,9 +237,9 @@ unsafe fn begin(
 /// # Safety
 /// `framing` is NULL or points to a description whose declarations are valid.
 unsafe fn described(framing: *const mbm_framing) -> Result<(mbm_framing, Framing), Error> {
-    let described = get(framing).ok_or(Error::INVALID_ARGUMENT)?;
-    let functions = array_or_empty(described.functions, described.functionCount.into());
-    declared(functions.ok_or(Error::INVALID_ARGUMENT)?, None)?;
+    let described = get(framing)?;
+    let functions = slice(described.functions, described.functionCount.into())?;
+    declared(functions, None)?;
     if !is_delimiter(described.end()) {
         return Err(Error::INVALID_ARGUMENT);
     }

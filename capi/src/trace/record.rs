@@ -2,7 +2,7 @@
 
 use crate::functions::{declared, mbm_function};
 use crate::packet::{MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
-use crate::pointers::{array_or_empty, get};
+use crate::pointers::{get, slice};
 use crate::sniffer::{mbm_event, MBM_EVENT_BAD_CRC, MBM_EVENT_NOISE, MBM_EVENT_TIMEOUT};
 use core::ffi::c_void;
 use mbm::error::Status;
@@ -79,7 +79,7 @@ impl Observer for CObserver {
 
     fn declaration(&self, code: u8) -> Option<Function> {
         // SAFETY: the begin functions demand that the declarations stay valid.
-        let functions = unsafe { array_or_empty(self.functions, self.function_count.into()) }?;
+        let functions = unsafe { slice(self.functions, self.function_count.into()) }.ok()?;
         declared(functions, Some(code)).ok().flatten()
     }
 }
@@ -96,7 +96,9 @@ pub unsafe extern "C" fn mbm_trace_ofEvent(
     event: *const mbm_event,
     record: *mut mbm_traceRecord,
 ) -> u8 {
-    let event = get(event).filter(|event| event.kind != MBM_EVENT_TIMEOUT);
+    let event = get(event)
+        .ok()
+        .filter(|event| event.kind != MBM_EVENT_TIMEOUT);
     let (Some(event), false) = (event, record.is_null()) else {
         return Status::INVALID_ARGUMENT.code();
     };

@@ -1,4 +1,4 @@
-"""What Zephyr's build does before it compiles: checks zephyr/module.yml, reads the Kconfig files
+"""Plays the part of Zephyr's build before it compiles: checks zephyr/module.yml, reads the Kconfig files
 and prj.conf with kconfiglib, the devicetree and its overlay with Zephyr's own library, and writes
 autoconf.h, a list of options for CMake, and the devicetree's values for stand-in/include.
 

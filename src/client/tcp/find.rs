@@ -20,7 +20,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     }
 
     /// Ends the request at the index `at`, which was answered, with `status`.
-    fn answered<J: ClientRequest, const N: usize>(
+    fn end_answered<J: ClientRequest, const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
         at: usize,
@@ -33,7 +33,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             // The bytes that wait for the port may be this request: the response is a false one.
             self.remove_unsent(queue.queue.get(at)?.state().wire);
         }
-        queue.answered(self.in_flight);
+        queue.note_answered(self.in_flight);
         if is_answer(status) {
             self.storage.count(Counter::Replies, 1);
             if status != Status::OK {
@@ -92,7 +92,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             // Bytes of the frame that did not fit are skipped as they arrive.
             self.skip = header.total as u16;
             self.skip_frame();
-            if let Some(request) = self.answered(queue, at, status, now) {
+            if let Some(request) = self.end_answered(queue, at, status, now) {
                 return Some(request);
             }
         }

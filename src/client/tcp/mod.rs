@@ -176,7 +176,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
                 return self.find(queue, now);
             }
             self.in_flight = self.in_flight.wrapping_sub(1);
-            status = self.overdue(queue.queue.get(at)?);
+            status = self.expire(queue.queue.get(at)?);
         }
         queue.end(at, status, now, &mut self.storage)
     }
@@ -343,9 +343,9 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         false
     }
 
-    /// Returns the status of a request whose time is over.
+    /// Counts a request whose time is over, and discards its unsent bytes. Returns its status.
     #[cold]
-    fn overdue<J: ClientRequest>(&mut self, request: &J) -> Status {
+    fn expire<J: ClientRequest>(&mut self, request: &J) -> Status {
         let state = request.state();
         if !state.header.is_answered() {
             return Status::OK;

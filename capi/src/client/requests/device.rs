@@ -4,7 +4,7 @@ use super::{code_only, two_words, with_more};
 use crate::client::request::RequestFields;
 use crate::client::{mbm_client, mbm_clientRequest};
 use crate::functions::{mbm_rule, MBM_RULE_COUNTED, MBM_RULE_FIXED, MBM_RULE_SILENCE};
-use crate::pointers::array_or_empty;
+use core::slice::from_raw_parts;
 use mbm::error::Status;
 use mbm::pdu::functions::{FunctionSpec, COUNTS, FIXED, OWN};
 use mbm::pdu::header::{RequestHeader, GROUP};
@@ -207,10 +207,12 @@ pub unsafe fn forward<const MAY_LACK_COUNT: bool>(
         FunctionSpec::CUSTOM,
         words,
         Some(|fields, words, _| {
-            let body = core::ptr::with_exposed_provenance(words[2]);
+            let body: *const u8 = core::ptr::with_exposed_provenance(words[2]);
             let header = &mut fields.state.header;
-            let Some(bytes) = array_or_empty(body, words[1]) else {
-                return Status::INVALID_ARGUMENT;
+            let bytes = match words[1] {
+                0 => &[],
+                _ if body.is_null() => return Status::INVALID_ARGUMENT,
+                count => from_raw_parts(body, count),
             };
             let function = words[0] as u8;
             let status = if MAY_LACK_COUNT {

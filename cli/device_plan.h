@@ -1,0 +1,40 @@
+/* The plan that reads the fields of a device: its storage, a trial of it, and its values as text.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef DEVICE_PLAN_H
+#define DEVICE_PLAN_H
+
+#include "device.h"
+
+/* Gives `setup` the fields of a device that can be read, and storage for their plan: as much as any
+ * plan takes, and `requests` requests. One read may cover up to `gap` addresses between two fields.
+ * Returns 0 without memory. device_plan_free frees the storage in both cases. */
+int device_plan_make(mbm_planSetup *setup, const device *of, uint16_t gap, uint8_t requests);
+void device_plan_free(mbm_planSetup *setup);
+
+/* Begins a plan on a client that has no line, to see what the library makes of the fields. Returns
+ * the status of mbm_plan_begin, which sets `wrong`. The caller ends the plan; another trial may
+ * begin then. */
+uint8_t device_plan_try(mbm_plan *plan, const mbm_planSetup *setup, uint16_t *wrong);
+
+/* Returns why the plan of the device file at `path` was refused: a sentence without its full stop,
+ * "meter.yaml:12: ...", in a buffer that the fourth next call overwrites. */
+const char *device_plan_wrong(const device *of, const char *path, uint8_t status, uint16_t wrong);
+
+/* The longest value as text: 2000 bits or 125 numbers, or a text. */
+enum { DEVICE_TEXT_LONGEST = 16384 };
+
+/* Writes the value that the plan has of a field: plain, or as JSON if `is_json` is 1. Several
+ * values are separated by commas, in JSON in an array. Returns 0 if no value has arrived yet. */
+int device_plan_text(const mbm_plan *plan, const device *of, uint16_t field, int is_json,
+                     char text[DEVICE_TEXT_LONGEST]);
+
+/* How many values a field has: several numbers in a row or bits of a table; otherwise 1. */
+uint16_t device_plan_count(const mbm_planField *planned);
+
+/* Returns the name that the enumeration of a field has for one of its values. NULL if it has none,
+ * or if no value has arrived yet. */
+const char *device_plan_name(const mbm_plan *plan, const device *of, uint16_t field,
+                             uint16_t index);
+
+#endif
