@@ -116,7 +116,7 @@ SIM_TEST(hooks_that_claim_too_many_bytes_do_no_harm)
 TEST(the_clock_may_wrap_at_any_time_of_a_transaction)
 {
     for (uint32_t ahead = 0; ahead < 12000; ahead += 25) {
-        SIM;
+        sim *s = sim_of_test();
 
         s->clock_start = (uint32_t)(0u - ahead - s->now);
         mbm_line_setPostFlushHold(&s->line, 1);
@@ -138,7 +138,7 @@ TEST(the_clock_may_wrap_in_a_long_wait)
     static const uint32_t ahead[] = {100, 5000, 50000, 500000, 1999000, 2050000, 2100000};
 
     for (size_t i = 0; i < COUNT(ahead); i++) {
-        SIM;
+        sim *s = sim_of_test();
 
         s->clock_start = (uint32_t)(0u - ahead[i] - s->now);
         sim_begin(s, 17);

@@ -3,6 +3,8 @@
 
 fixture each_test = {reset_board, nullptr};
 
+#define CLIENT_TEST(name) TEST_OF(ModbusSerialClient, client, begin(Serial, 19200), name)
+
 TEST(a_reply_ends_in_the_words_of_its_request)
 {
     ModbusSerialClient client;
@@ -23,11 +25,9 @@ TEST(a_reply_ends_in_the_words_of_its_request)
     assert_int_equal(request.wireTransaction(), 0);
 }
 
-TEST(an_exception_leaves_the_words)
+CLIENT_TEST(an_exception_leaves_the_words)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    client.begin(Serial, 19200);
     request[0] = 0x5555;
     expect_exchange(client, client.readInputRegisters(request, 8, 1), {17, 4, 0, 8, 0, 1},
                     {17, 0x84, 2});
@@ -44,13 +44,11 @@ static void count_call(ModbusRequest &request)
     assert_int_equal(request.status(), MBM_OK);
 }
 
-TEST(a_function_or_a_lambda_is_called_when_a_request_has_ended)
+CLIENT_TEST(a_function_or_a_lambda_is_called_when_a_request_has_ended)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
     uint16_t seen = 0;
     unsigned times = 0;
-    client.begin(Serial, 19200);
     calls = 0;
     request.onDone(count_call);
     expect_exchange(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
@@ -72,12 +70,10 @@ TEST(a_function_or_a_lambda_is_called_when_a_request_has_ended)
     assert_int_equal(request[0], 11);
 }
 
-TEST(a_callback_may_replace_itself_and_send_a_request)
+CLIENT_TEST(a_callback_may_replace_itself_and_send_a_request)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
     unsigned order = 0, times = 0;
-    client.begin(Serial, 19200);
     request.onDone([&](ModbusRequest &first) {
         first.onDone([&order, &times](ModbusRequest &) { order = order * 10 + 2, times++; });
         order = order * 10 + 1; // the captures of this callback still exist
@@ -97,11 +93,9 @@ TEST(a_callback_may_replace_itself_and_send_a_request)
     assert_int_equal(Serial.sent.size(), 2);
 }
 
-TEST(requests_are_sent_in_their_order)
+CLIENT_TEST(requests_are_sent_in_their_order)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> first(1), second(2), third(3);
-    client.begin(Serial, 19200);
     for (int unit = 1; unit <= 3; unit++)
         Serial.reply(adu({unit, 3, 2, 0, unit * 11}));
     client.readHoldingRegisters(first, 5, 1);
@@ -115,11 +109,9 @@ TEST(requests_are_sent_in_their_order)
     assert_int_equal(Serial.sent.size(), 3);
 }
 
-TEST(a_pending_request_is_refused_and_unchanged)
+CLIENT_TEST(a_pending_request_is_refused_and_unchanged)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    client.begin(Serial, 19200);
     assert_int_equal(client.readHoldingRegisters(request, 5, 1), MBM_PENDING);
     assert_int_equal(client.readInputRegisters(request, 6, 1), MBM_BUSY);
     assert_int_equal(client.writeMultipleRegisters(request, 6, 2), MBM_BUSY);
@@ -135,11 +127,9 @@ TEST(a_pending_request_is_refused_and_unchanged)
                     {4, 3, 2, 0, 2});
 }
 
-TEST(a_request_refuses_a_unit_and_a_timeout_that_are_too_large)
+CLIENT_TEST(a_request_refuses_a_unit_and_a_timeout_that_are_too_large)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17), beyond(300);
-    client.begin(Serial, 19200);
     assert_int_equal(beyond.getUnitID(), 300);
     assert_int_equal(client.readHoldingRegisters(beyond, 5, 1), MBM_INVALID_ARGUMENT);
     assert_int_equal(beyond.status(), MBM_INVALID_ARGUMENT);
@@ -157,12 +147,10 @@ TEST(a_request_refuses_a_unit_and_a_timeout_that_are_too_large)
     assert_int_equal(client.pending(), 0);
 }
 
-TEST(a_request_that_needs_more_words_than_it_has_is_refused)
+CLIENT_TEST(a_request_that_needs_more_words_than_it_has_is_refused)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<2> request(17);
     ModbusRequest bare(17);
-    client.begin(Serial, 19200);
     const uint8_t small = MBM_BUFFER_TOO_SMALL;
     assert_int_equal(client.readHoldingRegisters(request, 0, 3), small);
     assert_int_equal(client.readCoils(request, 0, 33), small);
@@ -185,11 +173,9 @@ TEST(a_request_that_needs_more_words_than_it_has_is_refused)
                     {17, 6, 0, 3, 0x12, 0x34});
 }
 
-TEST(a_request_has_its_own_timeout_and_retries)
+CLIENT_TEST(a_request_has_its_own_timeout_and_retries)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17), other(17);
-    client.begin(Serial, 19200);
     client.setResponseTimeout(50);
     assert_int_equal(request.setRetryLimit(1), MBM_OK);
     assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_INVALID_ARGUMENT);
@@ -222,11 +208,9 @@ TEST(a_request_has_its_own_timeout_and_retries)
     Serial.sent.clear();
 }
 
-TEST(a_request_is_repeated_as_often_as_set)
+CLIENT_TEST(a_request_is_repeated_as_often_as_set)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    client.begin(Serial, 19200);
     client.setResponseTimeout(50);
     client.setRetries(2);
     assert_int_equal(client.setBackoff(MBM_BACKOFF_FIXED, 20, 20), MBM_OK);
@@ -242,11 +226,9 @@ TEST(a_request_is_repeated_as_often_as_set)
     assert_int_equal(request[0], 5);
 }
 
-TEST(poll_returns_before_the_reply_comes)
+CLIENT_TEST(poll_returns_before_the_reply_comes)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    client.begin(Serial, 19200);
     client.setResponseTimeout(300);
     client.readHoldingRegisters(request, 0, 1);
     unsigned polls = 0;
@@ -281,11 +263,9 @@ TEST(wait_returns_how_a_request_ended)
     assert_int_equal(other.cancel(foreign), MBM_NOT_PENDING);
 }
 
-TEST(the_driver_is_on_while_a_request_leaves)
+CLIENT_TEST(the_driver_is_on_while_a_request_leaves)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    client.begin(Serial, 19200);
     client.preTransmission([] { board().logEvent("on"); });
     client.postTransmission([](void *what) { board().logEvent(static_cast<const char *>(what)); },
                             const_cast<char *>("off"));
@@ -299,11 +279,9 @@ TEST(the_driver_is_on_while_a_request_leaves)
 static ModbusSerialClient *called_client;
 static ModbusRequest *other_request;
 
-TEST(a_driver_callback_can_call_nothing)
+CLIENT_TEST(a_driver_callback_can_call_nothing)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17), another(18);
-    client.begin(Serial, 19200);
     called_client = &client;
     other_request = &another;
     client.preTransmission([] {
@@ -348,11 +326,9 @@ TEST(the_settings_of_the_line_reach_the_client)
     assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT); // that was the echo
 }
 
-TEST(begin_resets_the_settings_of_a_client)
+CLIENT_TEST(begin_resets_the_settings_of_a_client)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    client.begin(Serial, 19200);
     client.setRetries(3);
     client.setResponseTimeout(20);
     assert_int_equal(client.begin(Serial1, 19200), MBM_OK);
@@ -379,11 +355,9 @@ TEST(ascii_frames_go_both_ways)
     assert_int_equal(client.setDelimiter('!'), MBM_OK);
 }
 
-TEST(a_broadcast_ends_without_a_response)
+CLIENT_TEST(a_broadcast_ends_without_a_response)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> all(0);
-    client.begin(Serial, 19200);
     client.setTurnaroundDelay(30);
     assert_int_equal(client.readCoils(all, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
     assert_int_equal(client.writeSingleCoil(all, 1, true), MBM_PENDING);
@@ -393,15 +367,13 @@ TEST(a_broadcast_ends_without_a_response)
     assert_int_equal(all.status(), MBM_OK);
 }
 
-TEST(a_seventeenth_request_finds_the_queue_full)
+CLIENT_TEST(a_seventeenth_request_finds_the_queue_full)
 {
-    ModbusSerialClient client;
     uint16_t words[17] = {};
     ModbusRequest requests[17] = {
         {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1},
         {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1},
         {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}};
-    client.begin(Serial, 19200);
     for (unsigned i = 0; i < 16; i++)
         assert_int_equal(client.readCoils(requests[i], 0, 1), MBM_PENDING);
     assert_int_equal(client.readCoils(requests[16], 0, 1), MBM_QUEUE_FULL);
@@ -450,11 +422,9 @@ TEST(a_stream_that_returns_0_for_what_it_sends_works)
     assert_int_equal(request.status(), MBM_OK);
 }
 
-TEST(a_sketch_may_sleep_until_the_next_poll_is_due)
+CLIENT_TEST(a_sketch_may_sleep_until_the_next_poll_is_due)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    client.begin(Serial, 19200);
     client.setResponseTimeout(500);
     assert_int_equal(client.pollDelay(), 0xFFFFFFFF);
     client.readHoldingRegisters(request, 0, 1);

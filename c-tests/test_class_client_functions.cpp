@@ -7,6 +7,8 @@
 
 fixture each_test = {reset_board, nullptr};
 
+#define CLIENT_TEST(name) TEST_OF(ModbusSerialClient, client, begin(Serial, 19200), name)
+
 static void words_of(ModbusRequest &request, std::initializer_list<uint16_t> values)
 {
     uint16_t index = 0;
@@ -14,11 +16,9 @@ static void words_of(ModbusRequest &request, std::initializer_list<uint16_t> val
         request[index++] = value;
 }
 
-TEST(bits_are_read_and_written)
+CLIENT_TEST(bits_are_read_and_written)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<4> request(17);
-    client.begin(Serial, 19200);
     expect_exchange(client, client.readCoils(request, 0x13, 0x13), {17, 1, 0, 0x13, 0, 0x13},
                     {17, 1, 3, 0xCD, 0x6B, 5});
     assert_true(request.getBit(0) && !request.getBit(1) && request.getBit(2));
@@ -41,11 +41,9 @@ TEST(bits_are_read_and_written)
     assert_int_equal(request.status(), MBM_OK);
 }
 
-TEST(registers_are_read_and_written)
+CLIENT_TEST(registers_are_read_and_written)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<6> request(17);
-    client.begin(Serial, 19200);
     expect_exchange(client, client.readInputRegisters(request, 8, 1), {17, 4, 0, 8, 0, 1},
                     {17, 4, 2, 0, 10});
     assert_int_equal(request[0], 10);
@@ -69,11 +67,9 @@ TEST(registers_are_read_and_written)
     assert_int_equal(request[1], 0x1284);
 }
 
-TEST(the_functions_of_a_serial_line_are_sent)
+CLIENT_TEST(the_functions_of_a_serial_line_are_sent)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<8> request(17);
-    client.begin(Serial, 19200);
     expect_exchange(client, client.readExceptionStatus(request), {17, 7}, {17, 7, 0x6D});
     assert_int_equal(request.getByte(0), 0x6D);
     words_of(request, {0xA537});
@@ -97,11 +93,9 @@ TEST(the_functions_of_a_serial_line_are_sent)
     assert_int_equal(request.getByte(1), 'b');
 }
 
-TEST(files_are_read_and_written)
+CLIENT_TEST(files_are_read_and_written)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<8> request(17);
-    client.begin(Serial, 19200);
     expect_exchange(client, client.readFileRecord(request, 4, 1, 2),
                     {17, 20, 7, 6, 0, 4, 0, 1, 0, 2}, {17, 20, 6, 5, 6, 0x0D, 0xFE, 0, 0x20});
     assert_int_equal(request[0], 0x0DFE);
@@ -124,11 +118,9 @@ TEST(files_are_read_and_written)
     assert_int_equal(request.status(), MBM_OK);
 }
 
-TEST(a_device_identifies_itself)
+CLIENT_TEST(a_device_identifies_itself)
 {
-    ModbusSerialClient client;
     ModbusRequestOf<16> request(17);
-    client.begin(Serial, 19200);
     expect_exchange(client, client.readDeviceIdentification(request, MBM_DEVICE_ID_BASIC),
                     {17, 43, 14, 1, 0}, {17, 43, 14, 1, 1, 0, 0, 1, 0, 3, 'm', 'b', 'm'});
     assert_int_equal(request.status(), MBM_OK);

@@ -61,10 +61,8 @@ TEST(idle_is_called_only_while_the_master_waits_for_a_reply)
     assert_true(yields_before_sending > 100); // the wait for the silence yields too
 }
 
-TEST(the_driver_is_off_again_after_a_failure)
+MASTER_TEST(the_driver_is_off_again_after_a_failure)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(20);
     logs_callbacks(node);
     node.idle(nullptr);
@@ -83,10 +81,8 @@ TEST(the_response_timeout_is_two_seconds)
     }
 }
 
-TEST(exception_codes_are_returned_unchanged)
+MASTER_TEST(exception_codes_are_returned_unchanged)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     for (int code : {1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 0x55, 0x7F}) {
         Serial.reply(adu({1, 0x83, code}));
         assert_int_equal(node.readHoldingRegisters(0, 1), code);
@@ -94,10 +90,8 @@ TEST(exception_codes_are_returned_unchanged)
     }
 }
 
-TEST(each_failure_has_its_status)
+MASTER_TEST(each_failure_has_its_status)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({2, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBInvalidSlaveID);
     Serial.reply(adu({1, 4, 2, 0, 7}));
@@ -107,10 +101,8 @@ TEST(each_failure_has_its_status)
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
 }
 
-TEST(a_failure_keeps_the_response_words_and_a_transaction_the_transmit_words)
+MASTER_TEST(a_failure_keeps_the_response_words_and_a_transaction_the_transmit_words)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setTransmitBuffer(0, 0x0A0B);
     Serial.reply(adu({1, 3, 4, 0, 7, 0, 8}));
     assert_int_equal(node.readHoldingRegisters(0, 2), 0);
@@ -124,10 +116,8 @@ TEST(a_failure_keeps_the_response_words_and_a_transaction_the_transmit_words)
     assert_sent(Serial, {1, 16, 0, 0, 0, 1, 2, 0x0A, 0x0B});
 }
 
-TEST(any_transaction_empties_the_queue)
+MASTER_TEST(any_transaction_empties_the_queue)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.beginTransmission(0);
     node.send(0x1234);
     Serial.reply(adu({1, 3, 2, 0, 7}));
@@ -145,10 +135,8 @@ TEST(any_transaction_empties_the_queue)
     assert_sent(Serial, {1, 16, 0, 0, 0, 1, 2, 0x56, 0x78});
 }
 
-TEST(any_transaction_takes_receive_back_to_the_first_word)
+MASTER_TEST(any_transaction_takes_receive_back_to_the_first_word)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 3, 4, 0, 7, 0, 8}));
     assert_int_equal(node.readHoldingRegisters(0, 2), 0);
     assert_int_equal(node.receive(), 7);
@@ -157,10 +145,8 @@ TEST(any_transaction_takes_receive_back_to_the_first_word)
     assert_int_equal(node.receive(), 7);
 }
 
-TEST(the_write_address_is_shared)
+MASTER_TEST(the_write_address_is_shared)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.beginTransmission(0x11);
     Serial.reply(adu({1, 6, 0, 0x55, 0, 1}));
     assert_int_equal(node.writeSingleRegister(0x55, 1), 0);
@@ -171,10 +157,8 @@ TEST(the_write_address_is_shared)
     assert_sent(Serial, {1, 16, 0, 0x55, 0, 1, 2, 0, 9});
 }
 
-TEST(reads_of_65_to_125_registers_are_sent)
+MASTER_TEST(reads_of_65_to_125_registers_are_sent)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     for (int quantity : {65, 66, 125}) {
         Serial.reply(adu({1, 0x83, 2}));
         assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)), 2);
@@ -220,10 +204,8 @@ TEST(zero_and_nullptr_remove_callbacks)
     assert_string_equal(board().log.c_str(), "write flush read ");
 }
 
-TEST(a_long_idle_does_not_lose_the_reply)
+MASTER_TEST(a_long_idle_does_not_lose_the_reply)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.idle([] { board().now += 1900000; });
     Serial.delay = 1500000;
     Serial.reply(adu({1, 3, 2, 0, 7}));
@@ -296,10 +278,8 @@ TEST(copies_have_buffers_and_callbacks_of_their_own)
     assert_in_range(board().now - Serial.sentAt, 40000, 40200);
 }
 
-TEST(a_copy_leaves_a_pending_request_to_the_original)
+MASTER_TEST(a_copy_leaves_a_pending_request_to_the_original)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setBlocking(false);
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);

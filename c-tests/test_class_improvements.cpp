@@ -9,10 +9,8 @@ fixture each_test = {reset_board, nullptr};
 
 static const uint32_t gap_without_baud_rate = 4000;
 
-TEST(available_counts_every_word)
+MASTER_TEST(available_counts_every_word)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
     assert_int_equal(node.available(), 1);
@@ -20,10 +18,8 @@ TEST(available_counts_every_word)
     assert_int_equal(node.available(), 0);
 }
 
-TEST(the_largest_reads_are_complete)
+MASTER_TEST(the_largest_reads_are_complete)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Bytes registers = raw({1, 3, 250}), coils = raw({1, 1, 250});
     for (int i = 0; i < 250; i++) {
         registers.push_back(static_cast<uint8_t>(i));
@@ -42,10 +38,8 @@ TEST(the_largest_reads_are_complete)
                          (254 - 2 * i) << 8 | (255 - 2 * i));
 }
 
-TEST(writes_of_more_than_the_buffer_send_nothing)
+MASTER_TEST(writes_of_more_than_the_buffer_send_nothing)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     for (int quantity : {124, 256, 257, 65535}) {
         uint16_t words = static_cast<uint16_t>(quantity);
         assert_int_equal(node.writeMultipleRegisters(0, words), 3);
@@ -56,10 +50,8 @@ TEST(writes_of_more_than_the_buffer_send_nothing)
     assert_int_equal(Serial.sent.size(), 0);
 }
 
-TEST(a_byte_count_of_251_to_255_is_malformed)
+MASTER_TEST(a_byte_count_of_251_to_255_is_malformed)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(50);
     for (int count = 251; count <= 255; count++) {
         Serial.reply(adu({1, 3, count, 0, 7}));
@@ -68,10 +60,8 @@ TEST(a_byte_count_of_251_to_255_is_malformed)
     }
 }
 
-TEST(a_reply_with_fewer_words_than_requested_is_malformed)
+MASTER_TEST(a_reply_with_fewer_words_than_requested_is_malformed)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(50);
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 4), ModbusMaster::ku8MBMalformedReply);
@@ -79,10 +69,8 @@ TEST(a_reply_with_fewer_words_than_requested_is_malformed)
     assert_int_equal(node.available(), 0);
 }
 
-TEST(an_echo_with_other_values_is_malformed)
+MASTER_TEST(an_echo_with_other_values_is_malformed)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(50);
     Serial.reply(adu({1, 6, 0, 2, 0, 7}));
     assert_int_equal(node.writeSingleRegister(1, 7), ModbusMaster::ku8MBMalformedReply);
@@ -98,10 +86,8 @@ TEST(an_echo_with_other_values_is_malformed)
     assert_int_equal(node.maskWriteRegister(1, 2, 3), ModbusMaster::ku8MBMalformedReply);
 }
 
-TEST(exceptions_are_checked)
+MASTER_TEST(exceptions_are_checked)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(50);
     Serial.reply(raw({1, 0x83, 2, 0, 0}));
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBInvalidCRC);
@@ -135,10 +121,8 @@ TEST(noise_and_frames_of_other_units_before_the_reply_are_skipped)
     }
 }
 
-TEST(a_lenient_object_accepts_replies_that_deviate)
+MASTER_TEST(a_lenient_object_accepts_replies_that_deviate)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(50);
     node.setLenient(true);
     Serial.reply(adu({1, 6, 0, 1, 0, 8}));
@@ -198,10 +182,8 @@ static uint32_t silence_before(ModbusMaster &first, ModbusMaster &second,
     return port.startedAt - end;
 }
 
-TEST(a_silence_is_kept_before_each_request)
+MASTER_TEST(a_silence_is_kept_before_each_request)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     assert_in_range(silence_before(node, node), gap_without_baud_rate - 100,
                     gap_without_baud_rate + 100);
     node.setBaudRate(115200);
@@ -282,10 +264,8 @@ TEST(the_silence_counts_from_another_objects_last_use)
     }
 }
 
-TEST(a_line_that_was_silent_for_long_enough_needs_no_wait)
+MASTER_TEST(a_line_that_was_silent_for_long_enough_needs_no_wait)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
     board().now += 1000000;
@@ -313,10 +293,8 @@ TEST(a_pause_between_two_objects_counts_as_silence)
 }
 
 /* A device whose first reply is later than the timeout. It replies to all requests in order. */
-TEST(a_late_reply_is_not_taken_for_that_of_a_later_request)
+MASTER_TEST(a_late_reply_is_not_taken_for_that_of_a_later_request)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(50);
     assert_int_equal(node.readHoldingRegisters(0, 1), node.ku8MBResponseTimedOut);
     Serial.reply(joined(adu({1, 3, 2, 0, 0}), adu({1, 3, 2, 0, 1})));
@@ -328,10 +306,8 @@ TEST(a_late_reply_is_not_taken_for_that_of_a_later_request)
     }
 }
 
-TEST(the_response_timeout_can_be_set)
+MASTER_TEST(the_response_timeout_can_be_set)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     for (int ms : {1, 200, 5000}) {
         node.setResponseTimeout(static_cast<uint16_t>(ms));
         node.setQuietTime(0);
@@ -371,10 +347,8 @@ TEST(the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_work)
     assert_in_range(failing_call(node), call, call + slack);
 }
 
-TEST(the_slave_can_be_changed)
+MASTER_TEST(the_slave_can_be_changed)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setSlaveID(9);
     assert_int_equal(node.getSlaveID(), 9);
     Serial.reply(adu({9, 6, 0, 1, 0, 2}));
@@ -394,20 +368,16 @@ TEST(a_broadcast_succeeds_after_the_turnaround_delay)
     assert_int_equal(Serial.sent.size(), 0);
 }
 
-TEST(a_reply_complete_as_the_deadline_passes_succeeds)
+MASTER_TEST(a_reply_complete_as_the_deadline_passes_succeeds)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.idle([] { board().now += 3000000; });
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
     assert_int_equal(node.getResponseBuffer(0), 7);
 }
 
-TEST(coils_are_padded_with_zeros)
+MASTER_TEST(coils_are_padded_with_zeros)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 1, 1, 0xFF}));
     assert_int_equal(node.readCoils(0, 3), 0);
     assert_int_equal(node.getResponseBuffer(0), 0x0007);
@@ -418,10 +388,8 @@ TEST(coils_are_padded_with_zeros)
     assert_sent(Serial, {1, 15, 0, 0, 0, 3, 1, 0x07});
 }
 
-TEST(a_word_after_bits_starts_a_new_word)
+MASTER_TEST(a_word_after_bits_starts_a_new_word)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.beginTransmission(0);
     node.sendBit(true);
     node.send(0x0203);
@@ -456,10 +424,8 @@ TEST(the_driver_can_be_held_on_after_the_flush)
     assert_in_range(released - Serial.sentAt, 2 * 1146, 2 * 1146 + 100);
 }
 
-TEST(an_echo_is_dropped_with_setEcho)
+MASTER_TEST(an_echo_is_dropped_with_setEcho)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(50);
     node.setEchoDiscard(true);
     Serial.reply(adu({1, 6, 0, 1, 0, 2}));
@@ -470,10 +436,8 @@ TEST(an_echo_is_dropped_with_setEcho)
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
 }
 
-TEST(the_wait_yields)
+MASTER_TEST(the_wait_yields)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(100);
     unsigned before = board().yields;
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
@@ -498,10 +462,8 @@ TEST(a_request_without_a_reply_is_repeated_with_setRetries)
     assert_int_equal(counters.badCrc, 1);
 }
 
-TEST(a_request_may_be_polled_or_cancelled)
+MASTER_TEST(a_request_may_be_polled_or_cancelled)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setBlocking(false);
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);

@@ -116,10 +116,8 @@ TEST(transmit_words_past_the_end_are_refused_with_02)
     assert_int_equal(node.setTransmitBuffer(255, 1), 2);
 }
 
-TEST(set_transmit_buffer_does_not_move_the_queue)
+MASTER_TEST(set_transmit_buffer_does_not_move_the_queue)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.beginTransmission(0);
     node.setTransmitBuffer(5, 5);
     node.send(0x0708);
@@ -128,10 +126,8 @@ TEST(set_transmit_buffer_does_not_move_the_queue)
     assert_sent(Serial, {1, 16, 0, 0, 0, 1, 2, 7, 8});
 }
 
-TEST(clearing_the_words_keeps_the_indices)
+MASTER_TEST(clearing_the_words_keeps_the_indices)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 3, 4, 0, 1, 0, 2}));
     assert_int_equal(node.readHoldingRegisters(0, 2), 0);
     assert_int_equal(node.receive(), 1);
@@ -149,10 +145,8 @@ TEST(clearing_the_words_keeps_the_indices)
     assert_sent(Serial, {1, 16, 0, 0, 0, 2, 4, 0, 0, 0x22, 0x22});
 }
 
-TEST(begin_transmission_sets_the_address_and_keeps_the_words)
+MASTER_TEST(begin_transmission_sets_the_address_and_keeps_the_words)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.beginTransmission(1);
     node.send(0xAAAA);
     node.send(0xBBBB);
@@ -199,10 +193,8 @@ TEST(send_takes_every_integer_type)
     assert_queues(-1L, {0xFF, 0xFF, 0xFF, 0xFF});
 }
 
-TEST(words_past_the_end_are_dropped)
+MASTER_TEST(words_past_the_end_are_dropped)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.beginTransmission(0);
     for (int i = 0; i < 123; i++)
         assert_int_equal(node.send(i), 0);
@@ -214,10 +206,8 @@ TEST(words_past_the_end_are_dropped)
     assert_int_equal(Serial.sent.at(0).at(252), 122);
 }
 
-TEST(bits_are_queued_lowest_first_and_count_complete_words)
+MASTER_TEST(bits_are_queued_lowest_first_and_count_complete_words)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.beginTransmission(4);
     for (int i = 0; i < 18; i++)
         node.sendBit(i == 0 || i == 9 || i == 17);
@@ -233,10 +223,8 @@ TEST(bits_are_queued_lowest_first_and_count_complete_words)
     assert_sent(Serial, {1, 16, 0, 4, 0, 1, 2, 0xFF, 0xFF});
 }
 
-TEST(request_from_reads_words_for_receive)
+MASTER_TEST(request_from_reads_words_for_receive)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 3, 4, 0, 8, 0, 9}));
     assert_int_equal(node.requestFrom(0x10, 2), 2);
     assert_sent(Serial, {1, 3, 0, 0x10, 0, 2});
@@ -250,10 +238,8 @@ TEST(request_from_reads_words_for_receive)
     assert_int_equal(node.status(), 2);
 }
 
-TEST(each_read_has_its_function_code)
+MASTER_TEST(each_read_has_its_function_code)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 1, 2, 0xCD, 0x01}));
     assert_int_equal(node.readCoils(0x13, 9), 0);
     assert_sent(Serial, {1, 1, 0, 0x13, 0, 9});
@@ -269,10 +255,8 @@ TEST(each_read_has_its_function_code)
     assert_int_equal(node.getResponseBuffer(0), 10);
 }
 
-TEST(each_write_has_its_function_code)
+MASTER_TEST(each_write_has_its_function_code)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 5, 0, 0xAC, 0xFF, 0}));
     assert_int_equal(node.writeSingleCoil(0xAC, 0x55), 0);
     assert_sent(Serial, {1, 5, 0, 0xAC, 0xFF, 0});
@@ -291,10 +275,8 @@ TEST(each_write_has_its_function_code)
     assert_sent(Serial, {1, 16, 0, 1, 0, 2, 4, 0, 0xF2, 0, 0x25});
 }
 
-TEST(reading_and_writing_at_once_has_two_forms)
+MASTER_TEST(reading_and_writing_at_once_has_two_forms)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setTransmitBuffer(0, 0x00FF);
     Serial.reply(adu({1, 0x17, 2, 0, 0xFE}));
     assert_int_equal(node.readWriteMultipleRegisters(3, 1, 14, 1), 0);
@@ -308,10 +290,8 @@ TEST(reading_and_writing_at_once_has_two_forms)
     assert_int_equal(node.getResponseBuffer(0), 0xFE);
 }
 
-TEST(write_single_register_overwrites_word_0)
+MASTER_TEST(write_single_register_overwrites_word_0)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 6, 0, 1, 0x99, 0x88}));
     assert_int_equal(node.writeSingleRegister(1, 0x9988), 0);
     Serial.sent.clear();

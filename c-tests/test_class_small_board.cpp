@@ -62,10 +62,8 @@ TEST(the_buffer_ends_after_64_words)
     assert_int_equal(node.setTransmitBuffer(64, 0), 2);
 }
 
-TEST(transfers_of_64_registers_fit)
+MASTER_TEST(transfers_of_64_registers_fit)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Bytes reply = raw({1, 3, 128});
     for (int i = 0; i < 128; i++)
         reply.push_back(static_cast<uint8_t>(i));
@@ -80,10 +78,8 @@ TEST(transfers_of_64_registers_fit)
 }
 
 /* With the least frame that each function has. */
-TEST(a_late_reply_fits_beside_the_right_one)
+MASTER_TEST(a_late_reply_fits_beside_the_right_one)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(300);
     for (int words : {1, 2, 20, 64}) {
         Bytes late = raw({1, 3, 2 * words}), right = late;
@@ -102,10 +98,8 @@ TEST(a_late_reply_fits_beside_the_right_one)
 
 /* The first reply after a timeout is held. A frame of another unit follows it, which is as long as
  * a reply, or short if two replies do not fit into the longest frame. */
-TEST(a_held_reply_stays_beside_a_frame_of_another_unit)
+MASTER_TEST(a_held_reply_stays_beside_a_frame_of_another_unit)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(300);
     for (int words : {1, 2, 20, 33, 34, 60, 64}) {
         Bytes right = raw({1, 3, 2 * words});
@@ -127,10 +121,8 @@ TEST(a_held_reply_stays_beside_a_frame_of_another_unit)
     }
 }
 
-TEST(noise_longer_than_the_frame_is_skipped)
+MASTER_TEST(noise_longer_than_the_frame_is_skipped)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     for (int byte : {0x00, 0x01, 0x03, 0xFF}) {
         Bytes noise(300, static_cast<uint8_t>(byte));
         Serial.reply(joined(noise, adu({1, 3, 2, 0, byte})));
@@ -141,10 +133,8 @@ TEST(noise_longer_than_the_frame_is_skipped)
     }
 }
 
-TEST(every_function_has_a_frame_that_suffices)
+MASTER_TEST(every_function_has_a_frame_that_suffices)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 1, 3, 1, 2, 3}));
     assert_int_equal(node.readCoils(0, 17), 0);
     Serial.reply(adu({1, 2, 1, 1}));
@@ -181,10 +171,8 @@ TEST(every_function_has_a_frame_that_suffices)
     assert_int_equal(node.receive(), 9);
 }
 
-TEST(reads_of_65_registers_are_sent)
+MASTER_TEST(reads_of_65_registers_are_sent)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     node.setResponseTimeout(300);
     for (int quantity : {65, 66, 125}) {
         Serial.reply(adu({1, 0x83, 2}));
@@ -201,10 +189,8 @@ TEST(reads_of_65_registers_are_sent)
     }
 }
 
-TEST(writes_of_more_than_the_buffer_send_nothing)
+MASTER_TEST(writes_of_more_than_the_buffer_send_nothing)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     assert_int_equal(node.writeMultipleRegisters(0, 65), 3);
     assert_int_equal(node.writeMultipleCoils(0, 64 * 16 + 1), 3);
     assert_int_equal(node.readWriteMultipleRegisters(0, 1, 0, 65), 3);
@@ -213,10 +199,8 @@ TEST(writes_of_more_than_the_buffer_send_nothing)
 
 /* Until here the frame lies on the stack. The next test keeps it for all later ones. */
 
-TEST(a_lenient_read_of_65_to_125_registers_delivers_64)
+MASTER_TEST(a_lenient_read_of_65_to_125_registers_delivers_64)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     for (int quantity : {64, 65, 66, 100, 125}) {
         node.clearResponseBuffer();
         node.setLenient(true);
@@ -309,10 +293,8 @@ static void use_the_stack()
         byte = 0x5A;
 }
 
-TEST(a_request_that_outlives_its_function_keeps_its_frame)
+MASTER_TEST(a_request_that_outlives_its_function_keeps_its_frame)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 3, 2, 0, 6}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
     node.setBlocking(false);
@@ -335,10 +317,8 @@ TEST(a_request_that_outlives_its_function_keeps_its_frame)
 
 static ModbusMaster *own;
 
-TEST(an_idle_callback_may_cancel_and_make_another_request)
+MASTER_TEST(an_idle_callback_may_cancel_and_make_another_request)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     own = &node;
     node.idle([] {
         own->idle(nullptr);

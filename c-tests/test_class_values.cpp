@@ -160,10 +160,8 @@ TEST(texts_are_read_and_written)
     assert_writes(node, {'A', 'B', '3', 0, 0, 0});
 }
 
-TEST(coils_are_read_and_written_one_by_one)
+MASTER_TEST(coils_are_read_and_written_one_by_one)
 {
-    ModbusMaster node;
-    node.begin(1, Serial);
     Serial.reply(adu({1, 1, 3, 0xCD, 0x6B, 0x05}));
     assert_int_equal(node.readCoils(19, 19), 0);
     Serial.sent.clear();

@@ -313,112 +313,110 @@ SIM_TEST(a_device_is_heard_again_whatever_limit_and_pause_a_program_has)
         (void)fclose(table);
 }
 
+/* A test that each kind of reader from `first` on passes. */
+#define READERS_TEST(name, first)                                                                  \
+    static void each_##name(sim *s, bench *b, int kind);                                           \
+    SIM_TEST(name)                                                                                 \
+    {                                                                                              \
+        bench b;                                                                                   \
+                                                                                                   \
+        for (int kind = first; kind < READERS; kind++) {                                           \
+            begin(&b, s, (reader_kind)kind);                                                       \
+            each_##name(s, &b, kind);                                                              \
+        }                                                                                          \
+    }                                                                                              \
+    static void each_##name(__attribute__((unused)) sim *s, bench *b,                              \
+                            __attribute__((unused)) int kind)
+
 /* Declares a bench and its kind of reader. */
 #define BENCH                                                                                      \
     int kind;                                                                                      \
     bench b;                                                                                       \
-    SIM
+    sim *s = sim_of_test()
 #define BEGIN begin(&b, s, (reader_kind)kind)
 
 /* Cancelled while it waits for the gap. */
-TEST(a_request_that_is_cancelled_before_its_frame_left_changes_nothing)
+READERS_TEST(a_request_that_is_cancelled_before_its_frame_left_changes_nothing, NODE_READS)
 {
     unsigned sent;
-    BENCH;
 
-    for (kind = 0; kind < READERS; kind++) {
-        BEGIN;
-        if (kind == ASCII_CLIENT_READS)
-            OK(mbm_client_setGap(&b.client, GAP));
-        add(&b, UNIT, PROMPT);
-        reads_well(&b, UNIT, 1);
-        sent = s->sent;
-        IS(MBM_CANCELLED, reads(&b, UNIT, 1, GAP / 2));
-        assert_int_equal(s->sent, sent);
-        OK(reads(&b, UNIT, 2, EXCHANGE));
-        assert_int_equal(s->sent, sent + 1);
-        sim_assert_time(s->frames[sent].silence, GAP);
-        assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
-    }
+    if (kind == ASCII_CLIENT_READS)
+        OK(mbm_client_setGap(&b->client, GAP));
+    add(b, UNIT, PROMPT);
+    reads_well(b, UNIT, 1);
+    sent = s->sent;
+    IS(MBM_CANCELLED, reads(b, UNIT, 1, GAP / 2));
+    assert_int_equal(s->sent, sent);
+    OK(reads(b, UNIT, 2, EXCHANGE));
+    assert_int_equal(s->sent, sent + 1);
+    sim_assert_time(s->frames[sent].silence, GAP);
+    assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
 }
 
-TEST(a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_nothing)
+READERS_TEST(a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_nothing, NODE_READS)
 {
-    BENCH;
-
-    for (kind = 0; kind < READERS; kind++) {
-        BEGIN;
-        add(&b, UNIT, PROMPT);
-        reads_well(&b, UNIT, 1);
-        s->now += EXCHANGE;
-        s->write_piece = 5;
-        s->write_busy = 1;
-        IS(MBM_PENDING, starts(&b, UNIT, 1));
-        while (s->sent < 2) {
-            IS(MBM_PENDING, polls(&b));
-            s->now += 10;
-        }
-        cancels(&b);
-        s->write_piece = s->write_busy = 0;
-        reads_well(&b, UNIT, 2);
-        assert_false(s->frames[1].whole);
-        assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
-        s->cut_allowed = 1; /* in the frames since `begin` */
+    add(b, UNIT, PROMPT);
+    reads_well(b, UNIT, 1);
+    s->now += EXCHANGE;
+    s->write_piece = 5;
+    s->write_busy = 1;
+    IS(MBM_PENDING, starts(b, UNIT, 1));
+    while (s->sent < 2) {
+        IS(MBM_PENDING, polls(b));
+        s->now += 10;
     }
+    cancels(b);
+    s->write_piece = s->write_busy = 0;
+    reads_well(b, UNIT, 2);
+    assert_false(s->frames[1].whole);
+    assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
+    s->cut_allowed = 1; /* in the frames since `begin` */
 }
 
 /* As a program does that looks in each round whether the unit is there again. */
-TEST(requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer)
+READERS_TEST(requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer, NODE_READS)
 {
     uint64_t sent;
     unsigned count;
-    BENCH;
 
-    for (kind = 0; kind < READERS; kind++) {
-        BEGIN;
-        sent = loses_one(&b, add(&b, UNIT, PROMPT));
-        count = s->sent;
-        while (s->now < sent + CLEAN - 60 * MS)
-            IS(MBM_CANCELLED, reads(&b, UNIT, 1, 30 * MS));
-        assert_int_equal(s->sent, count);
-        OK(reads(&b, UNIT, 2, 2 * EXCHANGE));
-        assert_in_range(s->frames[count].begin - sent, CLEAN, CLEAN + 20 * MS);
-        reads_well(&b, UNIT, 20);
-    }
+    sent = loses_one(b, add(b, UNIT, PROMPT));
+    count = s->sent;
+    while (s->now < sent + CLEAN - 60 * MS)
+        IS(MBM_CANCELLED, reads(b, UNIT, 1, 30 * MS));
+    assert_int_equal(s->sent, count);
+    OK(reads(b, UNIT, 2, 2 * EXCHANGE));
+    assert_in_range(s->frames[count].begin - sent, CLEAN, CLEAN + 20 * MS);
+    reads_well(b, UNIT, 20);
 }
 
-TEST(a_request_that_waits_does_not_stop_the_clients_queue)
+READERS_TEST(a_request_that_waits_does_not_stop_the_clients_queue, CLIENT_READS)
 {
     mbm_clientRequest other = {0};
     uint16_t word = 0;
     uint64_t sent, began;
-    BENCH;
 
-    for (kind = CLIENT_READS; kind < READERS; kind++) {
-        BEGIN;
-        add(&b, OTHER, PROMPT);
-        sent = loses_one(&b, add(&b, UNIT, PROMPT));
-        s->now += QUIET;
-        IS(MBM_PENDING, starts(&b, UNIT, 1));
-        other.unit = OTHER;
-        other.reply = &word;
-        other.replyBytes = sizeof word;
-        /* The other unit is read again and again; the one that waits has its turn when it is due.
-         */
-        do {
-            IS(MBM_PENDING, mbm_client_readHoldingRegisters(&b.client, &other, 7, 1));
-            began = s->now;
-            while (mbm_client_poll(&b.client) == MBM_PENDING && other.status == MBM_PENDING)
-                sleep_until_a_byte(s, mbm_client_pollDelay(&b.client), UINT64_MAX);
-            OK(other.status);
-            assert_int_equal(word, fault_value(7));
-            assert_in_range(s->now - began, 0, 2 * EXCHANGE);
-            s->now += GAP;
-        } while (b.request.status == MBM_PENDING && s->now < sent + 2 * CLEAN);
-        OK(b.request.status);
-        assert_int_equal(b.word, fault_value(1));
-        assert_in_range(s->now - sent, CLEAN, CLEAN + 2 * EXCHANGE);
-    }
+    add(b, OTHER, PROMPT);
+    sent = loses_one(b, add(b, UNIT, PROMPT));
+    s->now += QUIET;
+    IS(MBM_PENDING, starts(b, UNIT, 1));
+    other.unit = OTHER;
+    other.reply = &word;
+    other.replyBytes = sizeof word;
+    /* The other unit is read again and again; the one that waits has its turn when it is due.
+     */
+    do {
+        IS(MBM_PENDING, mbm_client_readHoldingRegisters(&b->client, &other, 7, 1));
+        began = s->now;
+        while (mbm_client_poll(&b->client) == MBM_PENDING && other.status == MBM_PENDING)
+            sleep_until_a_byte(s, mbm_client_pollDelay(&b->client), UINT64_MAX);
+        OK(other.status);
+        assert_int_equal(word, fault_value(7));
+        assert_in_range(s->now - began, 0, 2 * EXCHANGE);
+        s->now += GAP;
+    } while (b->request.status == MBM_PENDING && s->now < sent + 2 * CLEAN);
+    OK(b->request.status);
+    assert_int_equal(b->word, fault_value(1));
+    assert_in_range(s->now - sent, CLEAN, CLEAN + 2 * EXCHANGE);
 }
 
 /* The other node, with a word of its own. */
@@ -495,61 +493,46 @@ TEST(a_request_of_a_blocking_node_that_waits_does_not_give_way)
 }
 
 /* The late reply shows that the unit owes nothing any more. */
-TEST(a_late_reply_lets_the_request_that_waits_be_sent_at_once)
+READERS_TEST(a_late_reply_lets_the_request_that_waits_be_sent_at_once, NODE_READS)
 {
     uint64_t sent;
-    BENCH;
+    device *d;
 
-    for (kind = 0; kind < READERS; kind++) {
-        device *d;
-
-        BEGIN;
-        d = add(&b, UNIT, PROMPT);
-        reads_well(&b, UNIT, 3);
-        be_late(d, TIMEOUT + 200 * MS);
-        IS(MBM_CANCELLED, reads(&b, UNIT, 1, 50 * MS));
-        sent = s->frames[s->sent - 1].end;
-        OK(reads(&b, UNIT, 2, NEVER));
-        assert_in_range(s->frames[s->sent - 1].begin - sent, TIMEOUT + 200 * MS,
-                        TIMEOUT + 200 * MS + EXCHANGE);
-        reads_well(&b, UNIT, 50);
-    }
+    d = add(b, UNIT, PROMPT);
+    reads_well(b, UNIT, 3);
+    be_late(d, TIMEOUT + 200 * MS);
+    IS(MBM_CANCELLED, reads(b, UNIT, 1, 50 * MS));
+    sent = s->frames[s->sent - 1].end;
+    OK(reads(b, UNIT, 2, NEVER));
+    assert_in_range(s->frames[s->sent - 1].begin - sent, TIMEOUT + 200 * MS,
+                    TIMEOUT + 200 * MS + EXCHANGE);
+    reads_well(b, UNIT, 50);
 }
 
 /* It comes within the quiet time. */
-TEST(a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait)
+READERS_TEST(a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait, NODE_READS)
 {
-    BENCH;
+    device *d;
 
-    for (kind = 0; kind < READERS; kind++) {
-        device *d;
-
-        BEGIN;
-        d = add(&b, UNIT, PROMPT);
-        be_late(d, 60 * MS);
-        IS(MBM_CANCELLED, reads(&b, UNIT, 1, 40 * MS));
-        OK(reads(&b, UNIT, 2, 2 * EXCHANGE));
-        reads_well(&b, UNIT, 50);
-    }
+    d = add(b, UNIT, PROMPT);
+    be_late(d, 60 * MS);
+    IS(MBM_CANCELLED, reads(b, UNIT, 1, 40 * MS));
+    OK(reads(b, UNIT, 2, 2 * EXCHANGE));
+    reads_well(b, UNIT, 50);
 }
 
-TEST(a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well)
+READERS_TEST(a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well, NODE_READS)
 {
-    BENCH;
+    device *d;
 
-    for (kind = 0; kind < READERS; kind++) {
-        device *d;
-
-        BEGIN;
-        d = add(&b, UNIT, PROMPT);
-        add(&b, OTHER, 400 * MS);
-        be_late(d, 300 * MS);
-        IS(MBM_CANCELLED, reads(&b, UNIT, 1, 50 * MS));
-        OK(reads(&b, OTHER, 2, NEVER));
-        assert_in_range(s->now, d->free, d->free + TIMEOUT);
-        OK(reads(&b, UNIT, 3, EXCHANGE));
-        reads_well(&b, UNIT, 50);
-    }
+    d = add(b, UNIT, PROMPT);
+    add(b, OTHER, 400 * MS);
+    be_late(d, 300 * MS);
+    IS(MBM_CANCELLED, reads(b, UNIT, 1, 50 * MS));
+    OK(reads(b, OTHER, 2, NEVER));
+    assert_in_range(s->now, d->free, d->free + TIMEOUT);
+    OK(reads(b, UNIT, 3, EXCHANGE));
+    reads_well(b, UNIT, 50);
 }
 
 static const uint8_t alike[] = {33, 65, 97, 129, 225, 255};
@@ -678,59 +661,46 @@ static void broadcast(bench *b)
 }
 
 /* Even if more units owe replies than are remembered one by one. */
-TEST(a_broadcast_does_not_wait_after_a_cancelled_request)
+READERS_TEST(a_broadcast_does_not_wait_after_a_cancelled_request, NODE_READS)
 {
-    BENCH;
-
-    for (kind = 0; kind < READERS; kind++) {
-        BEGIN;
-        (void)loses_one(&b, add(&b, UNIT, PROMPT));
-        broadcast(&b);
-        for (uint8_t unit = ABSENT; unit < ABSENT + 20; unit++)
-            (void)reads(&b, unit, 0, QUIET + 40 * MS);
-        broadcast(&b);
-        /* And it lets no reply be late. */
-        s->now += CLEAN;
-        reads_well(&b, UNIT, 1);
-        broadcast(&b);
-        reads_well(&b, UNIT, 5);
-    }
+    (void)loses_one(b, add(b, UNIT, PROMPT));
+    broadcast(b);
+    for (uint8_t unit = ABSENT; unit < ABSENT + 20; unit++)
+        (void)reads(b, unit, 0, QUIET + 40 * MS);
+    broadcast(b);
+    /* And it lets no reply be late. */
+    s->now += CLEAN;
+    reads_well(b, UNIT, 1);
+    broadcast(b);
+    reads_well(b, UNIT, 5);
 }
 
 /* More units than are remembered one by one. */
-TEST(a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones)
+READERS_TEST(a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones, NODE_READS)
 {
     uint64_t last;
-    BENCH;
 
-    for (kind = 0; kind < READERS; kind++) {
-        BEGIN;
-        add(&b, UNIT, PROMPT);
-        reads_well(&b, UNIT, 3);
-        for (uint8_t unit = ABSENT; unit < ABSENT + 20; unit++)
-            (void)reads(&b, unit, 0, QUIET + 40 * MS);
-        last = s->frames[s->sent - 1].begin;
-        while (reads(&b, UNIT, 1, QUIET + EXCHANGE) != MBM_OK)
-            assert_true(s->now < last + UINT64_C(5) * TIMEOUT);
-        reads_well(&b, UNIT, 50);
-    }
+    add(b, UNIT, PROMPT);
+    reads_well(b, UNIT, 3);
+    for (uint8_t unit = ABSENT; unit < ABSENT + 20; unit++)
+        (void)reads(b, unit, 0, QUIET + 40 * MS);
+    last = s->frames[s->sent - 1].begin;
+    while (reads(b, UNIT, 1, QUIET + EXCHANGE) != MBM_OK)
+        assert_true(s->now < last + UINT64_C(5) * TIMEOUT);
+    reads_well(b, UNIT, 50);
 }
 
-TEST(a_quiet_time_of_0_gives_it_all_up)
+READERS_TEST(a_quiet_time_of_0_gives_it_all_up, NODE_READS)
 {
     device *d;
-    BENCH;
 
-    for (kind = 0; kind < READERS; kind++) {
-        BEGIN;
-        set_quiet_time(&b, 0);
-        d = add(&b, UNIT, PROMPT);
-        (void)loses_one(&b, d);
-        reads_well(&b, UNIT, 50);
-        lose(d, 1);
-        IS(MBM_RESPONSE_TIMED_OUT, reads(&b, UNIT, 1, NEVER));
-        reads_well(&b, UNIT, 50);
-    }
+    set_quiet_time(b, 0);
+    d = add(b, UNIT, PROMPT);
+    (void)loses_one(b, d);
+    reads_well(b, UNIT, 50);
+    lose(d, 1);
+    IS(MBM_RESPONSE_TIMED_OUT, reads(b, UNIT, 1, NEVER));
+    reads_well(b, UNIT, 50);
 }
 
 TEST(a_device_whose_replies_always_deviate_is_heard_again)

@@ -62,6 +62,8 @@ static void begin(void)
     id.context = &handed;
 }
 
+fixture each_test = {begin, NULL};
+
 /* Waits until a request is sent, and lets a reply arrive. `objects` are the bytes after the
  * number of objects. */
 static void answer(uint8_t more, uint8_t next, uint8_t count, const char *objects, size_t bytes)
@@ -110,7 +112,6 @@ static void assert_ended(uint8_t status, unsigned objects)
 
 TEST(all_objects_are_read_with_as_many_requests_as_it_takes)
 {
-    begin();
     read_all(MBM_DEVICE_ID_EXTENDED);
     ANSWER(0xFF, 2, 2, "\x00\x03mbm\x01\x00");
     assert_int_equal(handed, 2);
@@ -136,7 +137,6 @@ TEST(all_objects_are_read_with_as_many_requests_as_it_takes)
 
 TEST(one_object_is_read_alone)
 {
-    begin();
     IS(MBM_PENDING, mbm_identification_read(&id, &client, MBM_DEVICE_ID_INDIVIDUAL, 4));
     ANSWER(0, 0, 1, "\x04\x01n");
     assert_ended(MBM_OK, 1);
@@ -145,7 +145,6 @@ TEST(one_object_is_read_alone)
 
 TEST(another_object_than_the_one_requested_alone_is_malformed)
 {
-    begin();
     IS(MBM_PENDING, mbm_identification_read(&id, &client, MBM_DEVICE_ID_INDIVIDUAL, 4));
     ANSWER(0, 0, 1, "\x03\x01n");
     assert_ended(MBM_MALFORMED_REPLY, 0);
@@ -153,7 +152,6 @@ TEST(another_object_than_the_one_requested_alone_is_malformed)
 
 TEST(a_device_that_lacks_the_first_object_may_begin_with_its_first)
 {
-    begin();
     IS(MBM_PENDING, mbm_identification_read(&id, &client, MBM_DEVICE_ID_REGULAR, 5));
     ANSWER(0, 0, 2, "\x01\x01n\x00\x01m");
     assert_ended(MBM_OK, 2);
@@ -161,7 +159,6 @@ TEST(a_device_that_lacks_the_first_object_may_begin_with_its_first)
 
 TEST(the_same_next_object_forever_is_no_progress)
 {
-    begin();
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 1, 1, "\x00\x01m");
     ANSWER(0xFF, 1, 1, "\x01\x01n"); /* it names the object that it has just sent */
@@ -176,7 +173,6 @@ TEST(the_same_next_object_forever_is_no_progress)
 
 TEST(a_next_object_before_those_received_is_no_progress)
 {
-    begin();
     read_all(MBM_DEVICE_ID_EXTENDED);
     ANSWER(0xFF, 0x80, 1, "\x00\x01m");
     ANSWER(0xFF, 3, 1, "\x81\x01n");
@@ -185,7 +181,6 @@ TEST(a_next_object_before_those_received_is_no_progress)
 
 TEST(objects_that_were_sent_before_are_not_handed_out_again)
 {
-    begin();
     read_all(MBM_DEVICE_ID_EXTENDED);
     ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
     /* It does not know the object that it named, and begins again. */
@@ -209,7 +204,6 @@ TEST(objects_that_were_sent_before_are_not_handed_out_again)
 
 TEST(no_object_although_more_follow_is_no_progress)
 {
-    begin();
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 1, 0, "");
     assert_ended(MBM_NO_PROGRESS, 0);
@@ -225,7 +219,6 @@ TEST(a_device_that_names_every_object_is_asked_256_times)
 {
     char object[] = "?\x01x";
 
-    begin();
     read_all(MBM_DEVICE_ID_EXTENDED);
     for (unsigned next = 0; next < 256; next++) {
         object[0] = (char)next;
@@ -237,7 +230,6 @@ TEST(a_device_that_names_every_object_is_asked_256_times)
 
 TEST(an_object_that_is_cut_off_is_malformed)
 {
-    begin();
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 1, 1, "\x00\x01m");
     ANSWER(0, 0, 2, "\x01\x01n\x02\x05v");
@@ -258,7 +250,6 @@ TEST(an_exception_ends_it_with_that_status)
 {
     uint8_t frame[] = {0, 0, 0, 0, 0, 3, UNIT, 0xAB, MBM_ILLEGAL_DATA_ADDRESS};
 
-    begin();
     read_all(MBM_DEVICE_ID_REGULAR);
     ANSWER(0xFF, 3, 1, "\x02\x01v");
     memory_port_send(&m, &client);
@@ -271,7 +262,6 @@ TEST(an_exception_ends_it_with_that_status)
 
 TEST(a_device_that_falls_silent_ends_it_with_a_timeout)
 {
-    begin();
     OK(mbm_client_setRetries(&client, 1));
     read_all(MBM_DEVICE_ID_REGULAR);
     ANSWER(0xFF, 3, 1, "\x02\x01v");
@@ -281,7 +271,6 @@ TEST(a_device_that_falls_silent_ends_it_with_a_timeout)
 
 TEST(a_reply_that_does_not_fit_ends_it)
 {
-    begin();
     id.request.replyBytes = 9;
     read_all(MBM_DEVICE_ID_REGULAR);
     ANSWER(0xFF, 1, 1, "\x00\x03mbm");
@@ -302,7 +291,6 @@ static void fill_the_queue(void)
 
 TEST(others_may_fill_the_queue_meanwhile)
 {
-    begin();
     OK(mbm_client_setInFlight(&client, 1));
     in_object = fill_the_queue;
     read_all(MBM_DEVICE_ID_BASIC);
@@ -323,7 +311,6 @@ static void cancel(void)
 
 TEST(cancelling_in_object_ends_the_calls)
 {
-    begin();
     in_object = cancel;
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
@@ -341,7 +328,6 @@ TEST(cancelling_in_object_ends_the_calls)
 
 TEST(it_may_be_cancelled_between_two_replies)
 {
-    begin();
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 2, 1, "\x00\x01m");
     OK(mbm_client_cancel(&client, &id.request));
@@ -353,7 +339,6 @@ TEST(it_may_be_cancelled_between_two_replies)
 
 TEST(beginning_the_client_again_gives_it_up)
 {
-    begin();
     in_object = begin_port;
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
@@ -372,7 +357,6 @@ static void spoil_the_reply(void)
 
 TEST(overwriting_the_reply_in_object_harms_nothing)
 {
-    begin();
     in_object = spoil_the_reply;
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0, 0, 2, "\x00\x01m\x01\x01n");
@@ -394,7 +378,6 @@ static void read_again(void)
 
 TEST(it_is_busy_while_it_is_pending_and_in_its_object)
 {
-    begin();
     read_all(MBM_DEVICE_ID_BASIC);
     refuses(MBM_BUSY, &client, MBM_DEVICE_ID_BASIC);
     in_object = read_again;
@@ -407,7 +390,6 @@ TEST(wrong_arguments_change_nothing)
 {
     static mbm_client never_begun;
 
-    begin();
     IS(MBM_INVALID_ARGUMENT, mbm_identification_read(NULL, &client, MBM_DEVICE_ID_BASIC, 0));
     refuses(MBM_INVALID_ARGUMENT, NULL, MBM_DEVICE_ID_BASIC);
     refuses(MBM_NOT_INITIALISED, &never_begun, MBM_DEVICE_ID_BASIC);
@@ -434,7 +416,6 @@ static void read_the_next(void *context, mbm_identification *identification)
 
 TEST(done_may_read_the_next)
 {
-    begin();
     id.done = read_the_next;
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0, 0, 1, "\x00\x01m");

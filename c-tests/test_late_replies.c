@@ -9,8 +9,6 @@
 
 #include <string.h>
 
-fixture each_test = {sim_setup, sim_teardown};
-
 enum {
     TIMEOUT_MS = 500,
     LATE = 750000,  /* microseconds that the device takes for a late reply */
@@ -60,15 +58,19 @@ static void answer_in_order(sim *s, const sim_frame *request)
     d->free = at + length * s->character;
 }
 
-/* Declares the simulation with such a device. Its first reply is late. */
-#define DEVICE                                                                                     \
-    in_order device = {.takes = {LATE}};                                                           \
-    NODE;                                                                                          \
-                                                                                                   \
-    s->limit = 2000000000;                                                                         \
-    s->device = answer_in_order;                                                                   \
-    s->context = &device;                                                                          \
-    OK(mbm_node_setResponseTimeout(n, TIMEOUT_MS))
+static in_order device;
+
+/* The simulation with such a device. Its first reply is late. */
+static void begin_device(sim *s)
+{
+    device = (in_order){.takes = {LATE}};
+    s->limit = 2000000000;
+    s->device = answer_in_order;
+    s->context = &device;
+    OK(mbm_node_setResponseTimeout(&s->node, TIMEOUT_MS));
+}
+
+#define DEVICE_TEST(name) SIM_TEST_WITH(name, begin_device)
 
 static void assert_reads(sim *s, uint16_t address, uint16_t quantity)
 {
@@ -82,20 +84,16 @@ static uint8_t read_at(sim *s, uint16_t address)
     return mbm_node_readHoldingRegisters(&s->node, address, 1);
 }
 
-TEST(one_late_reply_does_not_shift_the_answers_of_later_requests)
+DEVICE_TEST(one_late_reply_does_not_shift_the_answers_of_later_requests)
 {
-    DEVICE;
-
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     for (uint16_t i = 1; i < 100; i++)
         assert_reads(s, i, 1);
     assert_int_equal(s->counters.foreignFrames, 1);
 }
 
-TEST(a_late_reply_does_not_shift_the_answers_after_a_retry)
+DEVICE_TEST(a_late_reply_does_not_shift_the_answers_after_a_retry)
 {
-    DEVICE;
-
     device.takes[1] = 50000; /* longer than the gap before the next request */
     OK(mbm_line_setRetries(&s->line, 1));
     for (uint16_t i = 0; i < 100; i++)
@@ -103,29 +101,24 @@ TEST(a_late_reply_does_not_shift_the_answers_after_a_retry)
 }
 
 /* The frame buffer has space for one reply of this length, not for two. */
-TEST(a_late_reply_of_the_longest_length_does_not_shift_later_answers)
+DEVICE_TEST(a_late_reply_of_the_longest_length_does_not_shift_later_answers)
 {
-    DEVICE;
-
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
     for (uint16_t i = 1; i < 10; i++)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
 
-TEST(a_late_reply_to_a_write_of_the_same_value_costs_one_request)
+DEVICE_TEST(a_late_reply_to_a_write_of_the_same_value_costs_one_request)
 {
-    DEVICE;
-
     assert_int_equal(mbm_node_writeSingleRegister(n, 1, 5), MBM_RESPONSE_TIMED_OUT);
     for (unsigned i = 0; i < 10; i++)
         OK(mbm_node_writeSingleRegister(n, 1, 5));
     assert_reads(s, 9, 1);
 }
 
-TEST(several_late_replies_in_a_row_are_all_skipped)
+DEVICE_TEST(several_late_replies_in_a_row_are_all_skipped)
 {
     uint16_t i;
-    DEVICE;
 
     device.takes[0] = 1700000; /* after two more requests */
     for (i = 0; i < 3; i++)
@@ -136,20 +129,17 @@ TEST(several_late_replies_in_a_row_are_all_skipped)
 }
 
 /* The reply is held beyond the response timeout. */
-TEST(a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer)
+DEVICE_TEST(a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer)
 {
-    DEVICE;
-
     device.takes[0] = 1000 * (TIMEOUT_MS + TIMEOUT_MS) + QUIET - 1000;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     for (uint16_t i = 1; i < 50; i++)
         assert_reads(s, i, 1);
 }
 
-TEST(a_late_exception_is_not_the_answer_to_a_later_request)
+DEVICE_TEST(a_late_exception_is_not_the_answer_to_a_later_request)
 {
     static const uint8_t codes[] = {2, 5, 6, 0x0B};
-    DEVICE;
 
     for (unsigned i = 0; i < COUNT(codes); i++) {
         memset(&device, 0, sizeof device);
@@ -162,10 +152,8 @@ TEST(a_late_exception_is_not_the_answer_to_a_later_request)
     }
 }
 
-TEST(after_an_exception_in_time_no_reply_is_held)
+DEVICE_TEST(after_an_exception_in_time_no_reply_is_held)
 {
-    DEVICE;
-
     device.takes[0] = 0;
     device.exception = 5;
     assert_int_equal(read_at(s, 0), 5);
@@ -175,10 +163,8 @@ TEST(after_an_exception_in_time_no_reply_is_held)
 }
 
 /* The reply that was held first is most likely the late one. */
-TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged)
+DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged)
 {
-    DEVICE;
-
     device.damaged = 2;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_at(s, 1), MBM_INVALID_CRC);
@@ -187,10 +173,8 @@ TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged)
     assert_reads(s, 3, 1);
 }
 
-TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
+DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
 {
-    DEVICE;
-
     device.cut = 2;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_at(s, 1), MBM_RESPONSE_TIMED_OUT);
@@ -200,10 +184,8 @@ TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
 }
 
 /* As when an RS-485 driver releases the line. */
-TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
+DEVICE_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
 {
-    DEVICE;
-
     device.trailing = 1;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     for (uint16_t i = 1; i < 10; i++)
@@ -214,10 +196,9 @@ TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
 
-TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else)
+DEVICE_TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else)
 {
     uint64_t begin;
-    DEVICE;
 
     device.takes[0] = 0xFFFFFFFF; /* no reply */
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
@@ -231,10 +212,8 @@ TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_
 }
 
 /* The damaged reply has come, so none is late. */
-TEST(after_a_damaged_reply_the_next_reply_costs_one_quiet_time)
+DEVICE_TEST(after_a_damaged_reply_the_next_reply_costs_one_quiet_time)
 {
-    DEVICE;
-
     device.takes[0] = 0;
     device.damaged = 1;
     assert_int_equal(read_at(s, 0), MBM_INVALID_CRC);
@@ -242,10 +221,8 @@ TEST(after_a_damaged_reply_the_next_reply_costs_one_quiet_time)
     assert_in_range(s->now - s->last_byte, QUIET, QUIET + SIM_SLACK);
 }
 
-TEST(a_program_that_polls_late_does_not_lengthen_the_hold)
+DEVICE_TEST(a_program_that_polls_late_does_not_lengthen_the_hold)
 {
-    DEVICE;
-
     device.takes[0] = 0;
     device.damaged = 1;
     OK(mbm_node_setBlocking(n, 0));
@@ -264,12 +241,11 @@ TEST(a_program_that_polls_late_does_not_lengthen_the_hold)
 }
 
 /* The line is free, so the reply belongs to an earlier request, and another may follow. */
-TEST(a_right_reply_before_a_request_lets_the_next_one_be_held)
+DEVICE_TEST(a_right_reply_before_a_request_lets_the_next_one_be_held)
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
     size_t length = fault_right_reply(frame, request);
-    DEVICE;
 
     device.takes[0] = 0;
     assert_reads(s, 0, 1);
@@ -282,12 +258,11 @@ TEST(a_right_reply_before_a_request_lets_the_next_one_be_held)
     assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
 }
 
-TEST(noise_and_other_replies_before_a_request_let_no_reply_be_held)
+DEVICE_TEST(noise_and_other_replies_before_a_request_let_no_reply_be_held)
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 2};
     size_t length = fault_right_reply(frame, request);
-    DEVICE;
 
     device.takes[0] = 0;
     assert_reads(s, 0, 1);
@@ -299,10 +274,8 @@ TEST(noise_and_other_replies_before_a_request_let_no_reply_be_held)
     sim_assert_sent(s, 1, "11 03 00 01 00 01 +");
 }
 
-TEST(without_a_quiet_time_no_reply_is_held)
+DEVICE_TEST(without_a_quiet_time_no_reply_is_held)
 {
-    DEVICE;
-
     OK(mbm_line_setQuietTime(&s->line, 0));
     device.takes[0] = 0xFFFFFFFF;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
@@ -312,10 +285,8 @@ TEST(without_a_quiet_time_no_reply_is_held)
 }
 
 /* Unit 18 answers between the failed request to unit 17 and the late reply. */
-TEST(the_reply_of_another_unit_does_not_end_the_holding)
+DEVICE_TEST(the_reply_of_another_unit_does_not_end_the_holding)
 {
-    DEVICE;
-
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     OK(mbm_node_setSlaveID(n, 18));
     assert_reads(s, 5, 1);
@@ -353,10 +324,9 @@ static void begin_client(sim *s, mbm_client *client)
     OK(mbm_client_setResponseTimeout(client, TIMEOUT_MS));
 }
 
-TEST(one_late_reply_does_not_shift_the_clients_answers)
+DEVICE_TEST(one_late_reply_does_not_shift_the_clients_answers)
 {
     mbm_client client;
-    DEVICE;
 
     begin_client(s, &client);
     client_reads(s, &client, 0, MBM_RESPONSE_TIMED_OUT);
@@ -364,10 +334,9 @@ TEST(one_late_reply_does_not_shift_the_clients_answers)
         client_reads(s, &client, i, MBM_OK);
 }
 
-TEST(a_late_reply_does_not_shift_the_clients_answers_after_a_retry)
+DEVICE_TEST(a_late_reply_does_not_shift_the_clients_answers_after_a_retry)
 {
     mbm_client client;
-    DEVICE;
 
     begin_client(s, &client);
     OK(mbm_client_setRetries(&client, 1));
@@ -391,10 +360,9 @@ static uint8_t echoes(sim *s, mbm_client *client, uint16_t data)
 }
 
 /* So this request finds out at once whether the answers are in step. */
-TEST(a_reply_that_repeats_data_of_its_own_is_not_held)
+DEVICE_TEST(a_reply_that_repeats_data_of_its_own_is_not_held)
 {
     mbm_client client;
-    DEVICE;
 
     begin_client(s, &client);
     device.takes[0] = LATE + 200000;
@@ -406,13 +374,12 @@ TEST(a_reply_that_repeats_data_of_its_own_is_not_held)
 }
 
 /* A request must end, however many right replies arrive. */
-TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_ending)
+DEVICE_TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_ending)
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
     size_t length = fault_right_reply(frame, request);
     uint64_t at;
-    DEVICE;
 
     /* The device owes more replies than are counted, so each one is held. */
     device.takes[0] = 0xFFFFFFFF;
@@ -428,10 +395,8 @@ TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_ending)
 }
 
 /* The late reply, then the one to the request. The unit owes no other, so it is not held. */
-TEST(the_last_reply_that_the_unit_owes_is_delivered_at_once)
+DEVICE_TEST(the_last_reply_that_the_unit_owes_is_delivered_at_once)
 {
-    DEVICE;
-
     device.takes[0] = LATE;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     for (uint16_t i = 1; i < 4; i++) {
@@ -442,13 +407,12 @@ TEST(the_last_reply_that_the_unit_owes_is_delivered_at_once)
 }
 
 /* The program polls when a byte has arrived, and else when mbm_node_pollDelay says. */
-TEST(a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_most)
+DEVICE_TEST(a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_most)
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
     size_t length = fault_right_reply(frame, request);
     uint64_t at, sent;
-    DEVICE;
 
     device.takes[0] = 0xFFFFFFFF;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);

@@ -9,21 +9,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-fixture each_test = {sim_setup, sim_teardown};
-
 enum { TIMEOUT_MS = 200, TIMEOUT = 200000 };
 
 /* The simulation with a lenient master. */
-#define LENIENT                                                                                    \
-    NODE;                                                                                          \
-                                                                                                   \
-    OK(mbm_node_setResponseTimeout(n, TIMEOUT_MS));                                                \
-    OK(mbm_node_setLenient(n, 1))
+static void make_lenient(sim *s)
+{
+    OK(mbm_node_setResponseTimeout(&s->node, TIMEOUT_MS));
+    OK(mbm_node_setLenient(&s->node, 1));
+}
 
-TEST(a_write_whose_reply_repeats_other_content_is_accepted)
+#define LENIENT_TEST(name) SIM_TEST_WITH(name, make_lenient)
+
+LENIENT_TEST(a_write_whose_reply_repeats_other_content_is_accepted)
 {
     static const char *const values[] = {"11 06 00 01 00 08 +", "11 06 00 02 00 07 +"};
-    LENIENT;
 
     for (unsigned i = 0; i < 2; i++) {
         sim_answer(s, 1, 500, values[i]);
@@ -42,10 +41,8 @@ TEST(a_write_whose_reply_repeats_other_content_is_accepted)
     assert_int_equal(s->counters.timeouts, 0);
 }
 
-TEST(without_it_the_same_replies_are_malformed)
+LENIENT_TEST(without_it_the_same_replies_are_malformed)
 {
-    LENIENT;
-
     OK(mbm_node_setLenient(n, 0));
     sim_answer(s, 1, 500, "11 06 00 01 00 08 +");
     assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_MALFORMED_REPLY);
@@ -53,10 +50,8 @@ TEST(without_it_the_same_replies_are_malformed)
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_MALFORMED_REPLY);
 }
 
-TEST(a_read_takes_the_registers_that_come)
+LENIENT_TEST(a_read_takes_the_registers_that_come)
 {
-    LENIENT;
-
     sim_answer(s, 1, 500, "11 03 06 00 01 00 02 00 03 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     assert_int_equal(mbm_node_available(n), 3);
@@ -79,10 +74,8 @@ TEST(a_read_takes_the_registers_that_come)
     assert_int_equal(s->counters.foreignFrames, 0);
 }
 
-TEST(the_bytes_may_come_one_at_a_time_or_all_at_once)
+LENIENT_TEST(the_bytes_may_come_one_at_a_time_or_all_at_once)
 {
-    LENIENT;
-
     for (uint16_t piece = 1; piece < 20; piece++) {
         s->read_piece = piece;
         sim_answer(s, 1, 500, "11 03 06 00 01 11 03 11 83 +"); /* data like the head of a reply */
@@ -99,11 +92,10 @@ TEST(the_bytes_may_come_one_at_a_time_or_all_at_once)
 }
 
 /* Such a reply has a right CRC one byte before its end. */
-TEST(a_reply_that_ends_with_the_byte_0_is_accepted)
+LENIENT_TEST(a_reply_that_ends_with_the_byte_0_is_accepted)
 {
     uint8_t read[9] = {17, 3, 4}, write[8] = {17, 6, 0, 1};
     unsigned value, reads = 0, writes = 0;
-    LENIENT;
 
     for (value = 1; value < 3000; value++) {
         read[3] = write[4] = (uint8_t)(value >> 8);
@@ -126,10 +118,8 @@ TEST(a_reply_that_ends_with_the_byte_0_is_accepted)
     assert_true(reads > 5 && writes > 5);
 }
 
-TEST(a_right_reply_is_better_before_and_after_it)
+LENIENT_TEST(a_right_reply_is_better_before_and_after_it)
 {
-    LENIENT;
-
     sim_answer(s, 1, 500, "11 03 04 00 01 00 02 + / 11 03 02 00 2A +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     assert_int_equal(mbm_node_available(n), 1);
@@ -145,10 +135,8 @@ TEST(a_right_reply_is_better_before_and_after_it)
     assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_ILLEGAL_DATA_ADDRESS);
 }
 
-TEST(half_a_reply_in_front_hides_no_right_one)
+LENIENT_TEST(half_a_reply_in_front_hides_no_right_one)
 {
-    LENIENT;
-
     sim_answer(s, 1, 500, "11 03 20 00 01 / 11 03 02 00 2A +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     assert_int_equal(s->response[0], 0x2A);
@@ -156,7 +144,7 @@ TEST(half_a_reply_in_front_hides_no_right_one)
 }
 
 /* Unit, function and CRC must be right, and the byte count must be that of the frame. */
-TEST(what_is_no_reply_to_the_request_is_not_accepted)
+LENIENT_TEST(what_is_no_reply_to_the_request_is_not_accepted)
 {
     static const struct {
         const char *bytes;
@@ -170,7 +158,6 @@ TEST(what_is_no_reply_to_the_request_is_not_accepted)
         {"11 83 00 +", MBM_MALFORMED_REPLY},
         {"11 03 00 00 00 01 +", MBM_MALFORMED_REPLY}, /* the request itself */
     };
-    LENIENT;
 
     mbm_line_setQuietTime(&s->line, 0);
     for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++) {
@@ -212,10 +199,9 @@ static void answer_largest(sim *s, const sim_frame *frame)
     sim_deliver(s, frame->end + 500, bytes, length);
 }
 
-TEST(a_read_of_more_words_than_the_buffer_fills_it)
+LENIENT_TEST(a_read_of_more_words_than_the_buffer_fills_it)
 {
     static const uint16_t frames[] = {MBM_FRAME_BYTES(64), 255};
-    LENIENT;
 
     s->device = answer_largest;
     OK(mbm_line_setQuietTime(&s->line, 0));
@@ -235,10 +221,8 @@ TEST(a_read_of_more_words_than_the_buffer_fills_it)
     }
 }
 
-TEST(what_the_buffer_does_not_hold_is_checked_too)
+LENIENT_TEST(what_the_buffer_does_not_hold_is_checked_too)
 {
-    LENIENT;
-
     s->device = answer_largest;
     s->context = s;
     OK(mbm_node_begin(n, &s->line, 17, s->response, 64, s->transmit, 64));
@@ -247,10 +231,8 @@ TEST(what_the_buffer_does_not_hold_is_checked_too)
     assert_int_equal(s->response[0], 0);
 }
 
-TEST(a_small_frame_buffer_is_not_left)
+LENIENT_TEST(a_small_frame_buffer_is_not_left)
 {
-    LENIENT;
-
     s->device = answer_largest;
     for (uint16_t size = 8; size < 255; size++) {
         uint8_t *frame = malloc(size); /* the sanitizer looks at its ends */
@@ -271,10 +253,8 @@ TEST(a_small_frame_buffer_is_not_left)
     }
 }
 
-TEST(a_read_from_unit_0_is_sent_and_its_reply_accepted)
+LENIENT_TEST(a_read_from_unit_0_is_sent_and_its_reply_accepted)
 {
-    LENIENT;
-
     OK(mbm_node_setSlaveID(n, 0));
     sim_answer(s, 1, 150000, "00 03 02 00 2A +"); /* later than the turnaround delay */
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
@@ -290,10 +270,8 @@ TEST(a_read_from_unit_0_is_sent_and_its_reply_accepted)
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
 }
 
-TEST(it_cannot_be_set_while_a_request_is_pending)
+LENIENT_TEST(it_cannot_be_set_while_a_request_is_pending)
 {
-    LENIENT;
-
     OK(mbm_node_setBlocking(n, 0));
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_PENDING);
     assert_int_equal(mbm_node_setLenient(n, 0), MBM_BUSY);
@@ -305,10 +283,8 @@ TEST(it_cannot_be_set_while_a_request_is_pending)
 }
 
 /* After a failure a reply is held, for it may be the late one. */
-TEST(a_late_reply_that_deviates_is_not_better_than_the_next)
+LENIENT_TEST(a_late_reply_that_deviates_is_not_better_than_the_next)
 {
-    LENIENT;
-
     assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_RESPONSE_TIMED_OUT);
     sim_answer(s, 1, 500, "11 06 00 01 00 07 + / 11 06 00 02 00 08 +");
     OK(mbm_node_writeSingleRegister(n, 2, 8));

@@ -79,4 +79,16 @@ inline void reset_board()
         shimSerial(i).reset();
 }
 
+/* A test of an object, as `ModbusMaster node`, after a call of it, as `begin(1, Serial)`. */
+#define TEST_OF(type, object, call, name)                                                          \
+    static void with_##name(type &object);                                                         \
+    TEST(name)                                                                                     \
+    {                                                                                              \
+        type object;                                                                               \
+        object.call;                                                                               \
+        with_##name(object);                                                                       \
+    }                                                                                              \
+    static void with_##name(type &object)
+#define MASTER_TEST(name) TEST_OF(ModbusMaster, node, begin(1, Serial), name)
+
 #endif

@@ -131,21 +131,17 @@ void sim_reads(sim *s, uint32_t delay);
 /* Begins only the node again, for `unit`. */
 void sim_node(sim *s, uint8_t unit);
 
-/* Declares the simulation in a test; the simulation and its node. */
-#define SIM sim *s = sim_of_test()
-#define NODE                                                                                       \
-    SIM;                                                                                           \
-    mbm_node *n = &s->node
-
-/* A test of a simulation and its node. */
-#define SIM_TEST(name)                                                                             \
+/* A test of a simulation and its node, with a function that goes on with its setup. */
+#define SIM_TEST_WITH(name, prepare)                                                               \
     static void with_##name(sim *s, mbm_node *n);                                                  \
     TEST_WITH(name, sim_setup, sim_teardown)                                                       \
     {                                                                                              \
         sim *s = sim_of_test();                                                                    \
                                                                                                    \
+        prepare(s);                                                                                \
         with_##name(s, &s->node);                                                                  \
     }                                                                                              \
     static void with_##name(__attribute__((unused)) sim *s, __attribute__((unused)) mbm_node *n)
+#define SIM_TEST(name) SIM_TEST_WITH(name, (void))
 
 #endif
