@@ -1,5 +1,6 @@
 /* Bad arguments, objects and buffers: each call returns a status, never crashes, and sends
  * nothing malformed. */
+#include "every_call.h"
 #include "sim.h"
 #include "test.h"
 
@@ -8,48 +9,17 @@
 
 fixture each_test = {sim_setup, sim_teardown};
 
-/* Calls the functions that make a request. */
-static void all_requests_answer(mbm_node *m, uint8_t status)
-{
-    IS(status, mbm_node_readCoils(m, 0, 1));
-    IS(status, mbm_node_readDiscreteInputs(m, 0, 1));
-    IS(status, mbm_node_readHoldingRegisters(m, 0, 1));
-    IS(status, mbm_node_readInputRegisters(m, 0, 1));
-    IS(status, mbm_node_writeSingleCoil(m, 0, 1));
-    IS(status, mbm_node_writeSingleRegister(m, 0, 1));
-    IS(status, mbm_node_writeMultipleCoils(m, 0, 1));
-    IS(status, mbm_node_writeQueuedCoils(m));
-    IS(status, mbm_node_writeMultipleRegisters(m, 0, 1));
-    IS(status, mbm_node_writeQueuedRegisters(m));
-    IS(status, mbm_node_maskWriteRegister(m, 0, 1, 2));
-    IS(status, mbm_node_readWriteMultipleRegisters(m, 0, 1, 0, 1));
-    IS(status, mbm_node_readWriteQueuedRegisters(m, 0, 1));
-}
-
 /* Calls all others except begin, setFrame and statusText. */
 static void all_others_answer(mbm_line *l, mbm_node *m, uint8_t status)
 {
-    mbm_counters counters;
-
     IS(status, mbm_node_poll(m));
     IS(status, mbm_node_cancel(m));
     IS(status, mbm_node_status(m));
     IS(status, mbm_node_setSlaveID(m, 1));
     IS(status, mbm_node_setResponseTimeout(m, 1));
-    IS(status, mbm_line_setBaudRate(l, 9600));
-    IS(status, mbm_line_setGap(l, 1));
-    IS(status, mbm_line_setTurnaroundDelay(l, 1));
-    IS(status, mbm_line_setQuietTime(l, 1));
-    IS(status, mbm_line_setRetries(l, 1));
-    IS(status, mbm_line_setEchoDiscard(l, 1));
     IS(status, mbm_node_setLenient(m, 1));
-    IS(status, mbm_line_setPostFlushHold(l, 1));
     IS(status, mbm_node_setBlocking(m, 1));
-    IS(status, mbm_line_setCounters(l, &counters));
-    IS(status, mbm_line_setCounters(l, NULL));
-    IS(status, mbm_line_used(l));
-    IS(status, mbm_line_usedAt(l, 0));
-    IS(status, mbm_line_cancel(l));
+    every_line_call_returns(status, l);
     IS(status, mbm_node_beginTransmission(m, 1));
     IS(status, mbm_node_send(m, 1));
     IS(status, mbm_node_send(m, 1));
@@ -67,7 +37,7 @@ SIM_TEST(null_is_an_invalid_argument_everywhere)
     uint16_t words[2] = {0, 0};
     uint8_t frame[16];
 
-    all_requests_answer(NULL, MBM_INVALID_ARGUMENT);
+    every_node_request_returns(MBM_INVALID_ARGUMENT, NULL);
     all_others_answer(NULL, NULL, MBM_INVALID_ARGUMENT);
     IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(NULL, &s->port, frame, 16));
     IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(NULL, NULL, frame, 16));
@@ -80,7 +50,7 @@ SIM_TEST(null_is_an_invalid_argument_everywhere)
     IS(MBM_INVALID_ARGUMENT, mbm_node_begin(&m, NULL, 1, words, 2, words, 2));
     IS(MBM_INVALID_ARGUMENT, mbm_node_begin(&m, &l, 1, NULL, 1, words, 2));
     IS(MBM_INVALID_ARGUMENT, mbm_node_begin(&m, &l, 1, words, 2, NULL, 1));
-    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    every_node_request_returns(MBM_NOT_INITIALISED, &m);
     all_others_answer(&l, &m, MBM_NOT_INITIALISED);
 }
 
@@ -91,7 +61,7 @@ TEST(a_zeroed_object_is_not_initialised_and_stays_zero)
     static mbm_node m;
     static const mbm_node zero;
 
-    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    every_node_request_returns(MBM_NOT_INITIALISED, &m);
     all_others_answer(&l, &m, MBM_NOT_INITIALISED);
     assert_memory_equal(&l, &zero_line, sizeof l);
     assert_memory_equal(&m, &zero, sizeof m);
@@ -113,7 +83,7 @@ SIM_TEST(a_line_without_a_frame_buffer_sends_no_request)
 
     OK(mbm_line_beginRtu(&l, &s->port, NULL, 0));
     OK(mbm_node_begin(&m, &l, 17, NULL, 0, NULL, 0));
-    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    every_node_request_returns(MBM_NOT_INITIALISED, &m);
     sim_assert_order(s, "PWFOIR", "");
     IS(MBM_BUFFER_TOO_SMALL, mbm_node_send(&m, 1));
     IS(MBM_BUFFER_TOO_SMALL, mbm_node_sendBit(&m, 1));
@@ -129,7 +99,7 @@ TEST(a_line_without_a_port_sends_no_request)
 
     OK(mbm_node_begin(&m, &l, 17, words, 1, words + 1, 1));
     OK(mbm_line_setFrame(&l, frame, sizeof frame));
-    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    every_node_request_returns(MBM_NOT_INITIALISED, &m);
     IS(MBM_NOT_INITIALISED, mbm_node_poll(&m));
     OK(mbm_line_used(&l));
     OK(mbm_line_usedAt(&l, 1));
@@ -153,7 +123,7 @@ SIM_TEST(a_port_without_its_three_hooks_is_refused)
     IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&l, &write_less, s->buffer, MBM_MAX_FRAME));
     IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&l, &clock_less, s->buffer, MBM_MAX_FRAME));
     IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&l, &empty, s->buffer, MBM_MAX_FRAME));
-    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    every_node_request_returns(MBM_NOT_INITIALISED, &m);
     /* A begin that is refused leaves a line that was begun before as it was. */
     IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&s->line, &empty, s->buffer, 8));
     assert_int_equal(mbm_node_getSlaveID(n), 17);

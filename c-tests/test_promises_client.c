@@ -1,5 +1,6 @@
 /* Each function of the client and of its link is held to its comment in mbm.h: results, limits,
  * defaults, NULL. */
+#include "every_call.h"
 #include "refused.h"
 #include "crc.h"
 #include "hooked_port.h"
@@ -458,39 +459,20 @@ TEST(the_response_timeout_of_a_unit_can_be_read)
 
 TEST(a_client_that_was_never_begun_has_no_settings)
 {
-    static const mbm_rule silence = {.kind = MBM_RULE_SILENCE};
     mbm_client *const clients[] = {NULL, &never};
 
     for (unsigned i = 0; i < COUNT(clients); i++) {
         mbm_client *n = clients[i];
         uint8_t status = n == NULL ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
 
-        IS(status, mbm_client_setResponseTimeout(n, 1));
-        IS(status, mbm_client_setTurnaroundDelay(n, 1));
-        IS(status, mbm_client_setQuietTime(n, 1));
-        IS(status, mbm_client_setBusyRetries(n, 1, 1));
-        IS(status, mbm_client_setBackoff(n, 1, 1, 1));
-        IS(status, mbm_client_setJitter(n, 0, NULL, NULL));
-        IS(status, mbm_client_setGap(n, 1));
-        IS(status, mbm_client_setBaudRate(n, 9600));
-        IS(status, mbm_client_setRetries(n, 1));
-        IS(status, mbm_client_setEchoDiscard(n, 1));
-        IS(status, mbm_client_setPostFlushHold(n, 1));
-        IS(status, mbm_client_setUnits(n, NULL, 0));
-        IS(status, mbm_client_setCounters(n, NULL));
-        IS(status, mbm_client_setInFlight(n, 1));
+        every_client_setting_returns(status, n);
+        every_client_request_returns(status, n, &r);
         IS(status, mbm_client_setDelimiter(n, '\n'));
         IS(status, mbm_client_poll(n));
         IS(status, mbm_client_cancel(n, &r));
         IS(status, mbm_client_reconnect(n, NULL));
         IS(status, mbm_client_suspend(n, NULL));
         IS(status, mbm_client_resume(n, NULL));
-        IS(status, mbm_client_diagnostics(n, &r, 0, 1));
-        IS(status, mbm_client_readDeviceIdentification(n, &r, 1, 0));
-        IS(status, mbm_client_readFileRecord(n, &r, 1, 0, 1));
-        IS(status, mbm_client_custom(n, &r, 65, 1, &silence));
-        IS(status, mbm_client_forward(n, &r, 65, reply, 1));
-        IS(status, mbm_client_writeFileRecord(n, &r, 1, 0, 1));
         assert_int_equal(mbm_client_pending(n), 0);
         assert_int_equal(mbm_client_pollDelay(n), 0xFFFFFFFF);
     }

@@ -1,5 +1,6 @@
 /* Every function of a line, a node or a server, called from within each of its hooks. Where no call
  * is allowed, it returns MBM_BUSY and changes nothing. Where calls are allowed, they work. */
+#include "every_call.h"
 #include "unchanged.h"
 #include "hooked_port.h"
 #include "test.h"
@@ -35,35 +36,10 @@ fixture each_test = {reset, NULL};
 
 static void every_function_of_the_line_is_busy(void)
 {
-    mbm_counters counters;
-    mbm_node *m = &master;
-
     IS(MBM_BUSY, mbm_line_beginRtu(&line, &port, other_frame, 8));
     IS(MBM_BUSY, mbm_line_setFrame(&line, other_frame, 8));
-    IS(MBM_BUSY, mbm_line_cancel(&line));
-    IS(MBM_BUSY, mbm_line_setBaudRate(&line, 1));
-    IS(MBM_BUSY, mbm_line_setGap(&line, 1));
-    IS(MBM_BUSY, mbm_line_setTurnaroundDelay(&line, 1));
-    IS(MBM_BUSY, mbm_line_setQuietTime(&line, 1));
-    IS(MBM_BUSY, mbm_line_setRetries(&line, 1));
-    IS(MBM_BUSY, mbm_line_setEchoDiscard(&line, 1));
-    IS(MBM_BUSY, mbm_line_setPostFlushHold(&line, 1));
-    IS(MBM_BUSY, mbm_line_setCounters(&line, &counters));
-    IS(MBM_BUSY, mbm_line_used(&line));
-    IS(MBM_BUSY, mbm_line_usedAt(&line, 0));
-    IS(MBM_BUSY, mbm_node_readCoils(m, 0, 1));
-    IS(MBM_BUSY, mbm_node_readDiscreteInputs(m, 0, 1));
-    IS(MBM_BUSY, mbm_node_readHoldingRegisters(m, 0, 1));
-    IS(MBM_BUSY, mbm_node_readInputRegisters(m, 0, 1));
-    IS(MBM_BUSY, mbm_node_writeSingleCoil(m, 0, 1));
-    IS(MBM_BUSY, mbm_node_writeSingleRegister(m, 0, 1));
-    IS(MBM_BUSY, mbm_node_writeMultipleCoils(m, 0, 1));
-    IS(MBM_BUSY, mbm_node_writeQueuedCoils(m));
-    IS(MBM_BUSY, mbm_node_writeMultipleRegisters(m, 0, 1));
-    IS(MBM_BUSY, mbm_node_writeQueuedRegisters(m));
-    IS(MBM_BUSY, mbm_node_maskWriteRegister(m, 0, 1, 2));
-    IS(MBM_BUSY, mbm_node_readWriteMultipleRegisters(m, 0, 1, 0, 1));
-    IS(MBM_BUSY, mbm_node_readWriteQueuedRegisters(m, 0, 1));
+    every_line_call_returns(MBM_BUSY, &line);
+    every_node_request_returns(MBM_BUSY, &master);
 }
 
 /* Of a node whose request is pending. */
@@ -435,68 +411,6 @@ static void reset_client(void)
     entered = 0;
 }
 
-static uint32_t random_number(void *context)
-{
-    (void)context;
-    return 7;
-}
-
-static void every_setting_of_the_client_answers(uint8_t status)
-{
-    static mbm_clientUnit units[1];
-
-    IS(status, mbm_client_setResponseTimeout(&client, 5));
-    IS(status, mbm_client_setBaudRate(&client, 19200));
-    IS(status, mbm_client_setGap(&client, 1));
-    IS(status, mbm_client_setTurnaroundDelay(&client, 1));
-    IS(status, mbm_client_setQuietTime(&client, 1));
-    IS(status, mbm_client_setEchoDiscard(&client, 0));
-    IS(status, mbm_client_setPostFlushHold(&client, 0));
-    IS(status, mbm_client_setRetries(&client, 0));
-    IS(status, mbm_client_setBusyRetries(&client, 0, 1));
-    IS(status, mbm_client_setBackoff(&client, 0, 1, 1));
-    IS(status, mbm_client_setJitter(&client, 1, random_number, NULL));
-    IS(status, mbm_client_setCounters(&client, NULL));
-    IS(status, mbm_client_setUnits(&client, units, 0));
-    IS(status, mbm_client_setInFlight(&client, 1));
-}
-
-static void every_request_of_the_client_answers(uint8_t status, mbm_clientRequest *r)
-{
-    const mbm_rule rule = {.kind = MBM_RULE_SILENCE};
-
-#define ASKED(call)                                                                                \
-    do {                                                                                           \
-        IS(status, call);                                                                          \
-        if (status == MBM_PENDING)                                                                 \
-            OK(mbm_client_cancel(&client, r));                                                     \
-    } while (0)
-    ASKED(mbm_client_readCoils(&client, r, 0, 1));
-    ASKED(mbm_client_readCoils(&client, r, 0, 1));
-    ASKED(mbm_client_readDiscreteInputs(&client, r, 0, 1));
-    ASKED(mbm_client_readDiscreteInputs(&client, r, 0, 1));
-    ASKED(mbm_client_readHoldingRegisters(&client, r, 0, 1));
-    ASKED(mbm_client_readHoldingRegisters(&client, r, 0, 1));
-    ASKED(mbm_client_readInputRegisters(&client, r, 0, 1));
-    ASKED(mbm_client_readInputRegisters(&client, r, 0, 1));
-    ASKED(mbm_client_writeSingleCoil(&client, r, 0, 1));
-    ASKED(mbm_client_writeSingleRegister(&client, r, 0, 1));
-    ASKED(mbm_client_writeMultipleCoils(&client, r, 0, 1));
-    ASKED(mbm_client_writeMultipleRegisters(&client, r, 0, 1));
-    ASKED(mbm_client_maskWriteRegister(&client, r, 0, 1, 1));
-    ASKED(mbm_client_readWriteMultipleRegisters(&client, r, 0, 1, 0, 1));
-    ASKED(mbm_client_readExceptionStatus(&client, r));
-    ASKED(mbm_client_diagnostics(&client, r, 0, 1));
-    ASKED(mbm_client_getCommEventCounter(&client, r));
-    ASKED(mbm_client_getCommEventLog(&client, r));
-    ASKED(mbm_client_reportServerId(&client, r));
-    ASKED(mbm_client_readFileRecord(&client, r, 1, 0, 1));
-    ASKED(mbm_client_writeFileRecord(&client, r, 1, 0, 1));
-    ASKED(mbm_client_readFifoQueue(&client, r, 0));
-    ASKED(mbm_client_readDeviceIdentification(&client, r, 1, 0));
-    ASKED(mbm_client_custom(&client, r, 65, 1, &rule));
-}
-
 /* No read begins an identification, or it is cancelled again. */
 static void an_identification_answers(uint8_t status)
 {
@@ -521,14 +435,14 @@ static void every_function_of_the_client_is_busy(void)
     IS(MBM_BUSY, mbm_client_beginAscii(&client, &port, other_frame, 260));
     IS(MBM_BUSY, mbm_client_beginRtuOverTcp(&client, &port, other_frame, 260));
     IS(MBM_BUSY, mbm_client_beginTcp(&client, &port, other_frame, 260, other_frame, 260));
-    every_setting_of_the_client_answers(MBM_BUSY);
+    every_client_setting_returns(MBM_BUSY, &client);
     another.data = words;
     memcpy(asked, &another, sizeof another);
-    every_request_of_the_client_answers(MBM_BUSY, &another);
+    every_client_request_returns(MBM_BUSY, &client, &another);
     assert_memory_equal(asked, &another, sizeof another);
     an_identification_answers(MBM_BUSY);
     memcpy(asked, &request, sizeof request);
-    every_request_of_the_client_answers(MBM_BUSY, &request);
+    every_client_request_returns(MBM_BUSY, &client, &request);
     IS(MBM_BUSY, mbm_client_cancel(&client, &request));
     assert_memory_equal(asked, &request, sizeof request);
     IS(MBM_BUSY, mbm_client_setDelimiter(&client, '!'));
@@ -633,11 +547,11 @@ static void done(void *context, mbm_clientRequest *ended)
     IS(MBM_BUSY, mbm_client_poll(&client));
     switch (done_does) {
     case 0:
-        every_setting_of_the_client_answers(MBM_OK);
+        every_client_setting_returns(MBM_OK, &client);
         another.unit = ended->unit = 17;
         another.data = ended->data = words;
-        every_request_of_the_client_answers(MBM_PENDING, &another);
-        every_request_of_the_client_answers(MBM_PENDING, ended);
+        every_client_request_returns(MBM_PENDING, &client, &another);
+        every_client_request_returns(MBM_PENDING, &client, ended);
         an_identification_answers(MBM_PENDING);
         assert_true(mbm_client_pollDelay(&client) == 0xFFFFFFFFu);
         assert_int_equal(mbm_client_pending(&client), 0);
