@@ -9,7 +9,7 @@ pub fn move_to_front(bytes: &mut [u8], from: usize) {
     move_items(cells, cells.get(from..).unwrap_or_default());
 }
 
-/// Moves items forward in a slice that holds both stretches. In line, which is smaller
+/// Moves items forward in a slice that holds both stretches. It is inlined, which is smaller
 /// where firmware has one call.
 #[inline(always)]
 pub(crate) fn move_items<T: Copy>(to: &[Cell<T>], from: &[Cell<T>]) {

@@ -121,10 +121,11 @@ pub fn after_characters(start: u32, count: usize, character: &u16) -> u32 {
     time
 }
 
-/// How long after the start of a frame of `count` characters its last bit has not left for sure, in
-/// microseconds: up to an eighth of the time and a character before its end. A character may have
-/// 10 bits instead of 11, clocks differ, and a program that sleeps so long may wake up late, though
-/// the driver must go off in time. 0 if `character` is 0, the length of an unknown one.
+/// For how many microseconds after the start of a frame of `count` characters its last bit is
+/// sure not to have left: until an eighth of the time and a character before its end. A
+/// character may have 10 bits instead of 11, clocks differ, and a program that sleeps for this
+/// time may wake up late, though the driver must go off in time. 0 if `character` is 0, the
+/// length of an unknown one.
 pub const fn sure_to_be_sending(character: u16, count: u16) -> u32 {
     character as u32 * (count - count / 8).saturating_sub(1) as u32
 }

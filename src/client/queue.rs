@@ -188,7 +188,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         self.active.is_none() && self.delay(now) == 0
     }
 
-    /// Marks the requests as lost that have waited for the link since `since`, as long as their
+    /// Marks the requests as lost that have waited for the link, from `since` on, for their
     /// response timeout. `timeout` is that of the client.
     pub fn fail_overdue(
         &mut self,

@@ -94,7 +94,7 @@ pub struct Request<'a> {
 impl<'a> Request<'a> {
     /// A request of any function, for those that have no constructor here. `build` calls one of the
     /// functions of its header. `sends` has the data in the order of the wire, as many bytes as the
-    /// header says; `takes` is the place for those of the response.
+    /// header says; `takes` is the place for the data of the response.
     ///
     /// ```
     /// use mbm::client::Request;
@@ -153,8 +153,8 @@ impl<'a> Request<'a> {
     /// 01: reads 1 to 2000 coils, as many as `coils` has.
     ///
     /// # Errors
-    /// Of this and the other constructors: [`Error::ILLEGAL_DATA_VALUE`] for a quantity that the
-    /// standard does not allow; [`Error::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535.
+    /// This and the other constructors return [`Error::ILLEGAL_DATA_VALUE`] for a quantity that
+    /// the standard does not allow; [`Error::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535.
     pub fn read_coils(unit: u8, address: u16, coils: &'a mut [bool]) -> Result<Self, Error> {
         let words = (address, quantity(coils.len()));
         let spec = FunctionSpec::READ_COILS;

@@ -127,7 +127,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             if record.left(self.now) == 0 {
                 record.owed = 0;
             }
-            // Its own record, also if it is free: so no other record is of this unit alone.
+            // A unit takes its own record even if that is free, so it never has two records.
             if record.unit == self.unit || record.owed == ANY {
                 return index;
             }

@@ -2,7 +2,7 @@
 
 use crate::time::Micros;
 
-/// How many units are remembered exactly that owe replies at the same time: 10 on a host, 4 where
+/// How many units that owe replies at the same time are remembered exactly: 10 on a host, 4 where
 /// pointers have 32 bits, 1 on an AVR, where each takes 8 bytes of 2048.
 pub(super) const LATE_UNITS: usize = match size_of::<usize>() {
     2 => 1,

@@ -111,9 +111,9 @@ pub struct Engine<P, S: Storage, Q> {
     outgoing: S::Count,
     /// How many bytes of the request were sent.
     sent: S::Count,
-    /// How many of them were counted, and the request with the first of them.
+    /// How many of the sent bytes were counted. The request is counted with the first of them.
     counted: S::Count,
-    /// How many frames with a right CRC were skipped that were not counted yet.
+    /// How many skipped frames with a right CRC were not counted yet.
     pub(crate) foreign_frames: i8,
     /// CRC of the bytes that have arrived since the last frame ended.
     run: Crc16,

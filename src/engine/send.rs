@@ -138,7 +138,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// The status of a request whose port does not go on.
     fn stalled(&self) -> Status {
-        // As long as the request waits for its reply, after as long as it waited for silence.
+        // The port has as long as the request waited for silence, and the response timeout.
         if self.is_overdue(self.since) {
             Status::LINE_BUSY
         } else {

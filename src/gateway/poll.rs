@@ -32,8 +32,8 @@ impl<S: GatewayStorage> Gateway<S> {
         }
     }
 
-    /// Microseconds until a request that waits for its line has waited too long, or for its unit
-    /// long enough.
+    /// Microseconds until a queued request has waited too long for its line, or long enough for
+    /// its unit.
     fn delay_in_queue(&mut self, request: u16) -> u32 {
         let mut delay = u32::MAX;
         if self.queue_time != 0 {
@@ -63,7 +63,7 @@ impl<S: GatewayStorage> Gateway<S> {
         }
         for request in 0..self.storage.request_count() {
             let own = match self.storage.request(request).stage {
-                // What poll has not sent of a response, the connection did not take.
+                // If a response is not sent completely, the connection did not take the rest.
                 Stage::Local | Stage::Answered => EXTERNAL_POLL_DELAY,
                 Stage::Queued => self.delay_in_queue(request),
                 _ => u32::MAX,

@@ -55,7 +55,7 @@ pub trait GatewayStorage {
     /// requests, [`Status::BUSY`] while it cannot be used, [`Status::OK`] if it has none, and
     /// another status if it is no line any more.
     fn poll_line(&mut self, line: u8) -> Status;
-    /// As [`Gateway::poll_delay`](super::Gateway::poll_delay), of a line.
+    /// As [`Gateway::poll_delay`](super::Gateway::poll_delay), for a line.
     fn line_delay(&mut self, line: u8) -> u32;
     /// How many requests of the gateway a line may have at a time.
     fn line_depth(&self, line: u8) -> u16;

@@ -40,8 +40,8 @@ fn may_be_longer(side: PduKind, pdu: &[u8]) -> bool {
     side == PduKind::Response && pdu.first() == Some(&REPORT_SERVER_ID)
 }
 
-/// The length of the frame that begins with `bytes`. [`Length::Silence`] of an ASCII frame
-/// means that its end character ends it. `end` is the last character of an ASCII frame.
+/// The length of the frame that begins with `bytes`. For an ASCII frame, [`Length::Silence`]
+/// means that the end character ends it. `end` is the last character of an ASCII frame.
 ///
 /// # Errors
 /// [`Error::MALFORMED_FRAME`] if no frame of this framing begins with these bytes, or if the

@@ -64,8 +64,8 @@ macro_rules! functions {
         }
 
         impl FunctionSpec {
-            /// How the request of a function is composed that has at most two words and one kind of
-            /// data; otherwise the empty one.
+            /// How the request of a function is composed, if it has at most two words and one
+            /// kind of data; otherwise the empty one.
             pub const fn of(function: u8) -> FunctionSpec {
                 match function {
                     $($constant => FunctionSpec::$spec,)*
@@ -183,9 +183,9 @@ functions! {
         NONE;
 }
 
-/// The first address and the quantity in the request that begins with `head`; of 17 (hex) those to
-/// read, of a function that writes one register or coil a quantity of 1. `None` if the function has
-/// none, or if `head` ends before.
+/// The first address and the quantity in the request that begins with `head`: for 17 (hex)
+/// those to read; for a function that writes one register or coil the quantity is 1. `None` if
+/// the function has none, or if `head` ends before.
 pub fn range(head: &[u8]) -> (Option<u16>, Option<u16>) {
     let Some((function, body)) = head.split_first() else {
         return (None, None);

@@ -11,8 +11,8 @@ pub enum Next {
     End,
     /// A request for the objects from this one on.
     Request(u8),
-    /// More objects follow, but the device names one that cannot follow those that it has
-    /// sent, so that reading on would never end.
+    /// More objects follow, but the device names one that cannot follow those that it has sent:
+    /// reading on would never end.
     Stuck,
 }
 
@@ -23,7 +23,7 @@ pub struct ObjectStream {
     code: u8,
     /// The object that the last request named.
     requested: u8,
-    /// The least id that the next reply may have: that of the object requested, except in the
+    /// The least id that the next reply may have: that of the requested object, except in the
     /// first request.
     least: u16,
 }

@@ -53,7 +53,7 @@ pub struct Field {
     pub bit: u8,
     /// The first bit or register, 0 to 65535, as on the wire.
     pub address: u16,
-    /// The number of values, of a text the number of characters; 0 means 1.
+    /// The number of values, or of the characters of a text; 0 means 1.
     pub count: u16,
     /// The time from one read to the next, 1 to [`LONGEST_INTERVAL_MS`].
     pub interval_ms: u32,
@@ -104,7 +104,7 @@ impl Field {
         }
     }
 
-    /// The number of values, of a text of characters, of bits of a register of these; at least 1.
+    /// The number of values, of the characters of a text, or of bits of a register; at least 1.
     pub const fn count(&self) -> u16 {
         if self.count == 0 {
             1
@@ -118,7 +118,7 @@ impl Field {
         self.value_type == BIT && !self.is_in_bits()
     }
 
-    /// The number of bits of a value that is bits of a register; 16 for any other.
+    /// The number of bits of a value that consists of bits of a register; 16 for any other value.
     pub(super) const fn bits(&self) -> u32 {
         if self.is_part_of_register() {
             self.count() as u32
@@ -136,7 +136,7 @@ impl Field {
         }
     }
 
-    /// The registers of one value, as a power of 2; 0 for a type without.
+    /// The registers of one value, as a power of 2; 0 for a type without registers.
     pub(super) const fn value_shift(&self) -> u32 {
         // Two bits for each type. (A table would be a constant of its own in flash.)
         const SHIFTS: u32 = 1 << (2 * UINT32)

@@ -10,7 +10,7 @@ use crate::error::Status;
 pub struct Refusal {
     /// What is wrong.
     pub status: Status,
-    /// The index of the field that it is wrong with; `usize::MAX` if no field is at fault.
+    /// The index of the field at fault; `usize::MAX` if no field is at fault.
     pub field: usize,
 }
 

@@ -90,8 +90,8 @@ pub trait ReadLimits {
         }
     }
 
-    /// True if an address is excluded whose place (see `Field::place`) is from `first` up to, but
-    /// not including, `end`.
+    /// True if one of the places (see `Field::place`) from `first` up to, but not including,
+    /// `end` is excluded.
     fn excludes(&self, first: u32, end: u32) -> bool {
         self.excluded().iter().any(|range| {
             let unit = match range.unit {

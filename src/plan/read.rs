@@ -56,7 +56,7 @@ impl Position {
     }
 }
 
-/// The last two reads of the unit that ended had no answer, or all since.
+/// The last two reads of the unit that ended had no answer, and neither had any since.
 pub(super) const SUSPENDED: u8 = 1;
 /// The read of the unit that ended last had no answer.
 pub(super) const DOUBTED: u8 = 2;
@@ -153,7 +153,7 @@ impl Read {
         self.flags.get() & HAS_DATA != 0
     }
 
-    /// The milliseconds since the last good reply. Without one it means nothing.
+    /// The milliseconds since the last good reply. Undefined before the first one.
     pub const fn age(&self, now: u32) -> u32 {
         now.wrapping_sub(self.read_at.get())
     }

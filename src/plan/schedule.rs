@@ -115,9 +115,9 @@ impl Schedule {
         first.filter(|first| has_come(now, first.due.get()))
     }
 
-    /// For how many milliseconds [`Schedule::next`] returns none, after it has returned none: more
-    /// than the longest interval, up to [`FOREVER`], if that depends on reads that are queued. 0 says
-    /// only that it may return one.
+    /// For how many milliseconds [`Schedule::next`] goes on to return none, after it has
+    /// returned none. If that depends on queued reads, the result is longer than the longest
+    /// interval, up to [`FOREVER`]. 0 says only that it may return one.
     pub fn idle(&self, reads: &[Read], now: u32) -> u32 {
         let idle = until(self.wake.get(), now);
         let first = reads.get(usize::from(self.root.get()));
@@ -134,8 +134,8 @@ impl Schedule {
         }
     }
 
-    /// Takes up that a read has ended, and sets when it is next due. Returns true if its status
-    /// is news of all reads of its unit.
+    /// Notes that a read has ended, and sets when it is next due. Returns true if its status
+    /// holds for all reads of its unit from now on.
     ///
     /// A read without an answer waits as `backoff` says. After two reads of one unit in a row
     /// without an answer all its reads wait, with this status, and then it is tried with one read
@@ -206,7 +206,7 @@ impl Schedule {
             return;
         }
         read.due.set(now);
-        // The heap is made anew, for this read has another place in it.
+        // The heap is made anew, because this read has another place in it.
         self.wake.set(now);
         if read.flags.get() & HELD == 0 {
             return;

@@ -55,9 +55,9 @@ impl<D, C> EmbeddedIo<D, C> {
         }
     }
 
-    /// As this port, with an RS-485 driver: `driver` switches it on with `true` before the first
-    /// byte is sent, and off after the last one. From the baud rate the port computes when that
-    /// byte has left; it stays on for one character more.
+    /// As this port, with an RS-485 driver: `driver` switches it on with `true` before the
+    /// first byte is sent, and off after the last one. The port computes from the baud rate
+    /// when that byte has left; the driver stays on for one character more.
     pub fn with_driver<E: FnMut(bool)>(self, driver: E, baud: u32) -> EmbeddedIo<D, C, E> {
         EmbeddedIo {
             device: self.device,

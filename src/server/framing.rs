@@ -148,7 +148,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.end_of_block(&B::serves)
     }
 
-    /// Handles a silence, with which a frame or a block of it ends. `serves` says which units the
+    /// Handles a silence. A frame, or a block of it, ends with it. `serves` says which units the
     /// server has. As [`Server::look`].
     ///
     /// If the bytes contain the start of a request to a unit of the server, whose other bytes have

@@ -22,7 +22,7 @@ pub fn serve_exception_status(outputs: u8, pdu: &mut [u8], length: usize) -> Rep
     }
 }
 
-/// Serves function 11, with `pdu` and `length` as of [`serve_exception_status`]. The response
+/// Serves function 11, with `pdu` and `length` as for [`serve_exception_status`]. The response
 /// has the server's id, the run indicator and the additional data.
 pub fn serve_server_id(
     id: &[u8],
@@ -63,7 +63,7 @@ const LAST: [u8; 3] = [0x02, 0x7F, 0xFF];
 /// Bytes of a response PDU before its objects.
 const OBJECTS: usize = 7;
 
-/// Serves function 2B/0E, with `pdu` and `length` as of [`serve_exception_status`].
+/// Serves function 2B/0E, with `pdu` and `length` as for [`serve_exception_status`].
 pub fn serve_identification(objects: &impl Objects, pdu: &mut [u8], length: usize) -> Reply {
     let (code, id) = match pdu.get(..length) {
         Some([ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, rest @ ..]) => {

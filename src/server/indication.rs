@@ -50,8 +50,8 @@ impl Addressing {
         self.0 as u8
     }
 
-    /// How the frame addresses the units that it is not for: a broadcast is for them too, any other
-    /// frame is not.
+    /// How the frame addresses the units whose id it does not have: a broadcast is for them
+    /// too, any other frame is not.
     #[inline(always)]
     #[must_use]
     pub const fn to_others(self) -> Addressing {

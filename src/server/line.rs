@@ -27,7 +27,7 @@ const RECEIVE_LATENCY: u32 = time::millis(50);
 const FIFO_TIMEOUT: usize = 10;
 
 /// The length of a character in microseconds while the baud rate is unknown: a little more than
-/// that at 9600 baud, and that of no rate that is in use. (A number of few bits takes less flash.)
+/// that at 9600 baud, so no rate in use has it. (A number of few bits takes less flash.)
 const UNKNOWN_CHARACTER: u16 = 1_152;
 
 /// The storage that the caller supplies for a server.
@@ -359,7 +359,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.deadline = time::after_characters(latest, count + FIFO_TIMEOUT, &self.character);
     }
 
-    /// After another frame than the echo of a response, or none in time: the line has no echo.
+    /// Notes that the line has no echo: after a response, another frame than its echo has come,
+    /// or none in time.
     #[inline(always)]
     pub(super) fn give_up_echo(&mut self) {
         if self.sent != 0 {

@@ -34,10 +34,10 @@ pub enum EventKind {
 pub struct Event<'a> {
     /// The kind of event.
     pub kind: EventKind,
-    /// [`Status::OK`], or: of a request, the exception that a server would respond with; of an
-    /// exception, its code; [`Status::MALFORMED_REPLY`] of a reply that does not answer the
-    /// request; [`Status::RESPONSE_TIMED_OUT`] of a timeout; [`Status::INVALID_CRC`] of a
-    /// damaged frame; [`Status::BUFFER_TOO_SMALL`] of noise that may have been a frame longer
+    /// [`Status::OK`], or: for a request, the exception that a server would respond with; for
+    /// an exception, its code; [`Status::MALFORMED_REPLY`] for a reply that does not answer the
+    /// request; [`Status::RESPONSE_TIMED_OUT`] for a timeout; [`Status::INVALID_CRC`] for a
+    /// damaged frame; [`Status::BUFFER_TOO_SMALL`] for noise that may have been a frame longer
     /// than the buffer.
     pub status: Status,
     /// Time of the last byte, in microseconds; for a timeout, the time at which it expired.

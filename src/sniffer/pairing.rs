@@ -45,13 +45,12 @@ impl RequestStart {
         function
     }
 
-    /// The first address, of function 17 the first address to read; 0 if the function has no
-    /// address.
+    /// The first address, for function 17 the first one to read; 0 if the function has no address.
     pub fn address(&self) -> u16 {
         functions::range(self.head()).0.unwrap_or(0)
     }
 
-    /// The quantity, of function 17 the quantity to read; 0 if the function has no quantity.
+    /// The quantity, for function 17 the one to read; 0 if the function has no quantity.
     pub fn quantity(&self) -> u16 {
         functions::range(self.head()).1.unwrap_or(0)
     }

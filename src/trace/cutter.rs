@@ -19,8 +19,8 @@ pub(super) struct Rules {
     pub direction: Direction,
     /// The kind of PDU that this side sends.
     pub kind: PduKind,
-    /// Frames of the other kind may come too: the echo of a request, or what others on the same
-    /// line send.
+    /// Frames of the other kind may come too: the echo of a request, or frames of others on the
+    /// same line.
     pub both: bool,
 }
 
@@ -333,10 +333,10 @@ pub struct Record<'a> {
     /// The kind of the PDU. If a received frame can be both, it is the kind that the other side
     /// of this link sends.
     pub kind: PduKind,
-    /// [`Status::OK`] of a frame; [`Status::INVALID_CRC`] of a frame whose CRC or LRC is wrong;
-    /// [`Status::INCOMPLETE_FRAME`] of the beginning of a frame; [`Status::MALFORMED_FRAME`] of
-    /// bytes that begin no frame; [`Status::BUFFER_TOO_SMALL`] of a piece of a frame that is
-    /// longer than the buffer.
+    /// [`Status::OK`] for a frame; [`Status::INVALID_CRC`] for a frame whose CRC or LRC is
+    /// wrong; [`Status::INCOMPLETE_FRAME`] for the beginning of a frame;
+    /// [`Status::MALFORMED_FRAME`] for bytes that begin no frame; [`Status::BUFFER_TOO_SMALL`]
+    /// for a piece of a frame that is longer than the buffer.
     pub status: Status,
     /// Time of the first byte, in microseconds, by the clock of the port. The time of a frame that
     /// followed other bytes without a pause is estimated.

@@ -269,8 +269,8 @@ impl RequestHeader {
         self.validate_content(pdu, byte)
     }
 
-    /// As [`RequestHeader::validate`], of a response with the right length that is no exception,
-    /// unless its length and byte count are all that the request determines.
+    /// The check of the content in [`RequestHeader::validate`], for a response with the right length
+    /// that is no exception. A request that determines only length and byte count does not need it.
     #[cfg_attr(not(target_os = "none"), inline(never))]
     fn validate_content(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
         let repeated = if self.spec.has(REPEATS_DATA) {

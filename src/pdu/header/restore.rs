@@ -16,8 +16,8 @@ impl RequestHeader {
         self.data_at() > 0
     }
 
-    /// True if the response repeats the data of the request: that of 15. The response to a
-    /// query of 08 does too, but the client stores those data.
+    /// True if the response repeats the data of the request, as that of function 15 does. The
+    /// response to a query of 08 does too, but the client stores those data.
     pub const fn repeats_data(&self) -> bool {
         self.spec.has(REPEATS_DATA) && !self.has_data()
     }
