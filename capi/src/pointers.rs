@@ -257,8 +257,9 @@ pub(crate) unsafe fn zero<O: CObject>(object: *mut O) {
     }
 }
 
-/// As [`zero`] on a host, where a begin function tolerates storage that was not zeroed. Nothing in
-/// firmware: a line would take 20 bytes of flash more, a node and a server as much.
+/// As [`zero`] on a host, where a begin function tolerates storage that was not zeroed. It does
+/// nothing in firmware, where a line would take 20 bytes of flash more, and a node and a server
+/// as much.
 ///
 /// # Safety
 /// As for [`zero`].

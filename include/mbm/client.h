@@ -127,7 +127,7 @@ typedef struct mbm_identification {
      *  Its `status` is that of the identification: MBM_PENDING while objects are missing;
      *  MBM_OK when `object` was called for all; MBM_NO_PROGRESS if the device repeats itself;
      *  MBM_MALFORMED_REPLY also for a reply whose objects are not whole, and for one with
-     *  another object than the one that was requested alone; otherwise as of
+     *  another object than the one that was requested alone; otherwise as for
      *  mbm_client_readCoils. Objects that were handed out before a failure are sound. */
     mbm_clientRequest request;
     /** Optional: mbm_client_poll calls it for each object. `object` and its data are valid

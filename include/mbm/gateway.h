@@ -173,7 +173,7 @@ uint8_t mbm_gateway_open(mbm_gateway *gateway, uint8_t connection, const mbm_por
 uint8_t mbm_gateway_close(mbm_gateway *gateway, uint8_t connection);
 
 /**
- * Returns how a connection is. Call it after mbm_gateway_poll for each connection: if the
+ * Returns the state of a connection. Call it after mbm_gateway_poll for each connection: if the
  * connection is lost, close its socket, and call mbm_gateway_close or mbm_gateway_open.
  *
  * @param connection  the number of the place

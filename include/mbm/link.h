@@ -29,8 +29,8 @@ extern "C" {
  *  MBM_RESPONSE_TIMED_OUT if the link has closed it since the device had fallen silent: see
  *  mbm_link_setReplaceAfter. */
 #define MBM_LINK_EVENT_LOST 1u
-/** An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
- *  mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long. */
+/** An event of a link: an attempt to open it failed. The status is the result of `connect` or
+ *  `status` of mbm_linkHooks; MBM_CONNECT_TIMED_OUT if the connection took too long. */
 #define MBM_LINK_EVENT_FAILED 2u
 
 /**

@@ -90,8 +90,9 @@ typedef struct mbm_planField {
     uint8_t bit;
     /** The first bit or register, 0 to 65535, as on the wire. */
     uint16_t address;
-    /** The number of values; of a text the number of characters, of bits of a register that of
-     *  these bits. 0 means 1. */
+    /**
+     * The number of values, of the characters of a text, or of the bits of a register. 0 means 1.
+     */
     uint16_t count;
     /** The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL. */
     uint32_t intervalMs;
@@ -281,8 +282,8 @@ uint32_t mbm_plan_pollDelay(mbm_plan *plan);
 
 /**
  * How the last read of a field ended, and how old its value is. The functions that get a value
- * return the last one that was read, also after a read has failed: this says whether it is
- * still worth something.
+ * return the last one that was read, also after a read has failed: this function says how old
+ * that value is.
  *
  * @param field  the index of the field
  * @param ageMs  gets the milliseconds since the value arrived, 2147483647 (24 days) at most;

@@ -126,7 +126,7 @@ typedef struct mbm_access {
     /** The line or connection that the request came from: the `context` of the port of the
      *  server that received it, or the `connection` of mbm_unit_respond. */
     void *connection;
-    /** The address of the first cell; of a file, the number of the first record. */
+    /** The address of the first cell; for a file, the number of the first record. */
     uint16_t address;
     /** How many cells, 1 to 2000. */
     uint16_t quantity;
@@ -189,8 +189,9 @@ typedef struct mbm_dataCallbacks {
      *  exists, else 0. A request for an address that does not exist is answered with
      *  exception 02. */
     uint8_t (*isValid)(void *context, uint16_t address);
-    /** Required. Returns the value of an existing cell; of a bit, 0 for off and any other
-     *  value for on. */
+    /**
+     * Required. Returns the value of an existing cell; for a bit, 0 is off and any other value on.
+     */
     uint16_t (*get)(void *context, uint16_t address);
     /** Sets an existing cell; a bit to 0 or 1. Coils and holding registers without it are
      *  read-only: the unit answers functions that write them with exception 01, unless a

@@ -66,7 +66,7 @@ typedef struct mbm_sniffer {
  * with that sniffer.
  */
 typedef struct mbm_event {
-    /** The bytes of the frame; of MBM_EVENT_NOISE all its bytes. An ASCII frame is
+    /** The bytes of the frame; for MBM_EVENT_NOISE all bytes of the noise. An ASCII frame is
      *  decoded: unit id, PDU, LRC. */
     const uint8_t *frame;
     /** The PDU within the frame; NULL without a PDU. */
@@ -94,15 +94,15 @@ typedef struct mbm_event {
     uint16_t quantity;
     /** One of MBM_EVENT_... */
     uint8_t kind;
-    /** MBM_OK; of a request that a server must refuse, the exception for it; of an
-     *  exception its code; MBM_MALFORMED_REPLY if a reply does not match its request;
-     *  MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL for noise that may
-     *  be a frame longer than the buffer. */
+    /** MBM_OK; for a request that a server must refuse, the exception; for an exception, its
+     *  code; MBM_MALFORMED_REPLY if a reply does not match its request; MBM_RESPONSE_TIMED_OUT;
+     *  MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL for noise that may be a frame longer than the
+     *  buffer. */
     uint8_t status;
     /** The unit that the request addresses, or that replies; for MBM_EVENT_BAD_CRC the
      *  byte at that position. */
     uint8_t unit;
-    /** The function code, of an exception the one of the request; for MBM_EVENT_BAD_CRC
+    /** The function code; for an exception that of the request; for MBM_EVENT_BAD_CRC
      *  the byte at that position. */
     uint8_t function;
     /** The first bytes of the request's PDU: for replies, exceptions and timeouts, and

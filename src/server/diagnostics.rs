@@ -145,7 +145,7 @@ impl Diagnostics {
         served
     }
 
-    /// Counts the outcome of a request for which `count_frame` returned true.
+    /// Counts the result of a request for which `count_frame` returned true.
     pub fn count_outcome(&mut self, addressing: Addressing, function: u8, reply: Reply) {
         let code = reply.exception_code();
         if self.cleared != 0 {

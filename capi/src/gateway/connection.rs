@@ -87,7 +87,7 @@ pub unsafe extern "C" fn mbm_gateway_close(gateway: *mut mbm_gateway, connection
     })
 }
 
-/// Returns how a connection is. Call it after mbm_gateway_poll for each connection: if the
+/// Returns the state of a connection. Call it after mbm_gateway_poll for each connection: if the
 /// connection is lost, close its socket, and call mbm_gateway_close or mbm_gateway_open.
 ///
 /// @param connection  the number of the place

@@ -27,8 +27,8 @@ pub const MBM_LINK_EVENT_CONNECTED: u8 = 0;
 /// MBM_RESPONSE_TIMED_OUT if the link has closed it since the device had fallen silent: see
 /// mbm_link_setReplaceAfter.
 pub const MBM_LINK_EVENT_LOST: u8 = 1;
-/// An event of a link: an attempt to open it failed. The status is what `connect` or `status` of
-/// mbm_linkHooks returned; MBM_CONNECT_TIMED_OUT if the connection took too long.
+/// An event of a link: an attempt to open it failed. The status is the result of `connect` or
+/// `status` of mbm_linkHooks; MBM_CONNECT_TIMED_OUT if the connection took too long.
 pub const MBM_LINK_EVENT_FAILED: u8 = 2;
 
 /// The default of mbm_link_setReplaceAfter on TCP.

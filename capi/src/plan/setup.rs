@@ -28,8 +28,7 @@ pub struct mbm_planField {
     pub bit: u8,
     /// The first bit or register, 0 to 65535, as on the wire.
     pub address: u16,
-    /// The number of values; of a text the number of characters, of bits of a register that of
-    /// these bits. 0 means 1.
+    /// The number of values, of the characters of a text, or of the bits of a register. 0 means 1.
     pub count: u16,
     /// The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL.
     pub intervalMs: u32,

@@ -122,8 +122,8 @@ unsafe fn get<T>(
 }
 
 /// How the last read of a field ended, and how old its value is. The functions that get a value
-/// return the last one that was read, also after a read has failed: this says whether it is
-/// still worth something.
+/// return the last one that was read, also after a read has failed: this function says how old
+/// that value is.
 ///
 /// @param field  the index of the field
 /// @param ageMs  gets the milliseconds since the value arrived, 2147483647 (24 days) at most;

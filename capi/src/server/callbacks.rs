@@ -22,8 +22,7 @@ pub struct mbm_dataCallbacks {
     /// exists, else 0. A request for an address that does not exist is answered with
     /// exception 02.
     pub isValid: Option<unsafe extern "C" fn(context: *mut c_void, address: u16) -> u8>,
-    /// Required. Returns the value of an existing cell; of a bit, 0 for off and any other
-    /// value for on.
+    /// Required. Returns the value of an existing cell; for a bit, 0 is off and any other value on.
     pub get: Option<unsafe extern "C" fn(context: *mut c_void, address: u16) -> u16>,
     /// Sets an existing cell; a bit to 0 or 1. Coils and holding registers without it are
     /// read-only: the unit answers functions that write them with exception 01, unless a

@@ -32,7 +32,7 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
     reply.code()
 }
 
-/// Counts a frame, has the unit serve it if it is for this unit, and counts the outcome.
+/// Counts a frame, lets the unit serve it if it is for this unit, and counts the result.
 ///
 /// # Safety
 /// `unit` is a unit with diagnostics; `pdu` has the length and the space that `info` gives.

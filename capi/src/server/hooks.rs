@@ -17,7 +17,7 @@ pub struct mbm_access {
     /// The line or connection that the request came from: the `context` of the port of the
     /// server that received it, or the `connection` of mbm_unit_respond.
     pub connection: *mut c_void,
-    /// The address of the first cell; of a file, the number of the first record.
+    /// The address of the first cell; for a file, the number of the first record.
     pub address: u16,
     /// How many cells, 1 to 2000.
     pub quantity: u16,

@@ -44,7 +44,7 @@ const _: () = {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_event {
-    /// The bytes of the frame; of MBM_EVENT_NOISE all its bytes. An ASCII frame is
+    /// The bytes of the frame; for MBM_EVENT_NOISE all bytes of the noise. An ASCII frame is
     /// decoded: unit id, PDU, LRC.
     pub frame: *const u8,
     /// The PDU within the frame; NULL without a PDU.
@@ -72,15 +72,15 @@ pub struct mbm_event {
     pub quantity: u16,
     /// One of MBM_EVENT_...
     pub kind: u8,
-    /// MBM_OK; of a request that a server must refuse, the exception for it; of an
-    /// exception its code; MBM_MALFORMED_REPLY if a reply does not match its request;
-    /// MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL for noise that may
-    /// be a frame longer than the buffer.
+    /// MBM_OK; for a request that a server must refuse, the exception; for an exception, its
+    /// code; MBM_MALFORMED_REPLY if a reply does not match its request; MBM_RESPONSE_TIMED_OUT;
+    /// MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL for noise that may be a frame longer than the
+    /// buffer.
     pub status: u8,
     /// The unit that the request addresses, or that replies; for MBM_EVENT_BAD_CRC the
     /// byte at that position.
     pub unit: u8,
-    /// The function code, of an exception the one of the request; for MBM_EVENT_BAD_CRC
+    /// The function code; for an exception that of the request; for MBM_EVENT_BAD_CRC
     /// the byte at that position.
     pub function: u8,
     /// The first bytes of the request's PDU: for replies, exceptions and timeouts, and
