@@ -466,7 +466,7 @@ fn send_and_cancel(end: &End, client: &mut Transport, unit: u8) -> u32 {
     end.now() - began
 }
 
-/// More units than there are records for: then all wait. It does not stay so.
+/// There are more units than records, so all wait, but not for ever.
 #[test]
 fn units_are_remembered_exactly_again_after_too_many_were_cancelled() {
     let (end, mut client) = rtu_client();

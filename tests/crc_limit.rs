@@ -1,4 +1,4 @@
-//! What damage of a reply CRC-16 does not detect: computed exactly, and tried on the master. No
+//! The damage of a reply that CRC-16 does not detect: computed exactly, and tried on the master. No
 //! receiver of RTU frames can detect more. `make corruption` writes the figures to
 //! docs/reliability.md.
 
@@ -183,7 +183,7 @@ impl Port for Line {
     }
 }
 
-/// What a master delivers that reads registers and receives `frame`.
+/// The registers that a master delivers if it receives `frame` as the reply.
 fn read(registers: usize, frame: &[u8]) -> Option<Vec<u16>> {
     let line = Line {
         now: 0,

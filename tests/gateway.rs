@@ -242,7 +242,7 @@ impl GatewayStorage for World {
     }
 }
 
-/// What a client has asked and not been answered yet: unit and last byte, by transaction.
+/// The requests of a client that are not answered yet: unit and last byte, by transaction.
 type Asked = HashMap<u16, (u8, u8)>;
 
 /// Checks all complete responses that a client has received.

@@ -2,8 +2,8 @@
 //! lost. Two properties hold together, whatever limits, pauses and orders a program has:
 //! - Safety: a read that succeeds has the value of its own request.
 //! - Liveness: once a device answers each request within its latency, then after at most five
-//!   response timeouts each read of it succeeds that is given the latency, the gap and the quiet
-//!   time; twice the latency if the program has cancelled a read of it sooner.
+//!   response timeouts each read of it that is given the latency, the gap and the quiet time
+//!   succeeds. It needs twice the latency if the program has cancelled a read of it sooner.
 //!
 //! `MBM_LIVES` in the environment is the number of lives of each test, `MBM_SEED` the first one.
 
@@ -57,7 +57,7 @@ impl Random {
     }
 }
 
-/// What becomes of the replies of a device, counted from its first request, which is 0.
+/// The fate of a device's replies, counted from its first request, which is 0.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     None,

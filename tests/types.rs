@@ -1,4 +1,5 @@
-//! What a program in Rust writes down of the types: in a struct, in a static, for tasks and threads.
+//! The ways in which a program in Rust names the types: in a struct, in a static, for tasks and
+//! threads.
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async"))]
 
 use embedded_hal_async::delay::DelayNs;

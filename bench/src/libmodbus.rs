@@ -1,5 +1,5 @@
 //! The work, done by libmodbus over a pair of sockets, as it has no other way.
-//! Counting is on while it works; of what is counted, its own code matters.
+//! Counting is on while it works; only the counts of its own code matter.
 
 use crate::ours::UNIT;
 use crate::toggle;

@@ -61,7 +61,7 @@ pub fn answer(
 ) -> Result<usize, Error> {
     let request = Request::parse(open(framing, frame)?.pdu)?;
     let response = match request {
-        // From addresses that begin a word, as the peers' tables do a byte.
+        // The addresses begin a word, as those of the peers' tables begin a byte.
         Request::ReadBits {
             function,
             address,

@@ -506,7 +506,7 @@ impl State {
                 slow.received = 0;
             }
         }
-        // What is promised has an end: a reply that is still to come then is taken for the right one.
+        // The promise ends here: a reply that is still to come then is taken for the right one.
         device.beyond_bound |= device.since == CLEAN && !device.owed.is_empty();
         device.since = 0;
         device.owed.push(self.number);

@@ -1,4 +1,4 @@
-//! What the tests of a plan's grouping share: a field, and a table grouped with its result checked.
+//! Shared by the tests of a plan's grouping: a field, and a table grouped with its result checked.
 #![allow(dead_code)] // Not every test uses everything.
 
 use mbm::plan::field::{HOLDING_REGISTERS, UINT16};
@@ -56,7 +56,7 @@ fn check_groups(fields: &[Field], positions: &[Position], reads: &[Read]) {
     check_positions(&sorted, &taken_positions, &taken);
 }
 
-/// Every field is in one read, all of it, and no read has anything else's fields.
+/// Every field lies completely in exactly one read, of its unit, table and interval.
 fn check_positions(fields: &[Field], positions: &[Position], reads: &[Read]) {
     let mut seen = vec![false; fields.len()];
     for (index, read) in reads.iter().enumerate() {

@@ -1,4 +1,4 @@
-// What the example of the asynchronous master hides: an executor, its timer, and a UART.
+// The code that the example of the asynchronous master hides: an executor, its timer, and a UART.
 
 use std::future::{pending, poll_fn, Future};
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -1,4 +1,5 @@
-// What the example of a socket hides: a server in a thread, which has registers 107 to 109.
+// The code that the example of a socket hides: a server in a thread, which has registers 107 to
+// 109.
 
 use mbm::frame::Framing;
 use mbm::server::storage::{HoldingRegisters, RegisterArray};

@@ -1,4 +1,5 @@
-// What the examples of the documentation hide: a `Uart` with a simulated device on its line.
+// The code that the examples of the documentation hide: a `Uart` with a simulated device on its
+// line.
 
 /// Each call of the clock takes 100 us. After a write, `sends` arrives.
 struct Uart {

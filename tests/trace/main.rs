@@ -256,7 +256,7 @@ fn a_frame_of_an_unknown_function_ends_with_silence_or_by_its_declaration() {
     }];
     bench.receive(&reply);
     assert_eq!(bench.taken(), expected);
-    // What is sent ends with the write that accepts its last byte.
+    // A sent frame ends with the write that accepts its last byte.
     let sent = frame(Framing::Rtu, &[0x64, 9]);
     bench.send(&sent);
     assert_eq!(bench.taken(), [record(Sent, Request, Status::OK, 0, &sent)]);

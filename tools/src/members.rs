@@ -25,7 +25,7 @@ type Fragment<'a> = Vec<&'a str>;
 
 #[derive(Default)]
 struct Text<'a> {
-    /// What comes before the first section, such as `.syntax unified`; it is for each member.
+    /// The lines before the first section, such as `.syntax unified`; each member gets them.
     preamble: Vec<&'a str>,
     fragments: Vec<Fragment<'a>>,
     /// The fragment that defines a name.
@@ -232,7 +232,7 @@ pub fn split(text: &str, exports: &BTreeSet<String>) -> Result<Vec<Member>, Stri
         .iter()
         .map(home)
         .collect::<Result<Vec<usize>, String>>()?;
-    // What only one group refers to joins it, until there is no such thing.
+    // Lets each fragment that only one group refers to join that group, until there are no more.
     let members = loop {
         let users = needed(&edges, &entries, &groups);
         let mut joined = false;

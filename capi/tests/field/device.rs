@@ -40,10 +40,10 @@ struct Manner {
     closes: Option<u32>,
     /// It does not answer after this number of replies on one connection.
     deaf: Option<u32>,
-    /// It does not answer before so long after the connection was opened.
+    /// It does not answer until this time after the connection was opened.
     slow_start: u64,
     is_dead: bool,
-    /// It does not receive a request without so long a silence before it.
+    /// It does not receive a request without this silence before it.
     gap: u64,
     /// It sends its replies in pieces of this number of bytes, with a pause between them.
     pieces: Option<(usize, u64)>,

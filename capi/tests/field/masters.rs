@@ -1,4 +1,4 @@
-//! Those that send requests: nodes of a line, a client, and a client of a gateway.
+//! The senders of requests: nodes of a line, a client, and a client of a gateway.
 
 use crate::case::{Case, Framing, Request, RequestKind};
 use crate::frame;

@@ -69,7 +69,7 @@ pub unsafe fn use_objects(context: *mut c_void) {
             mbm_server_pollDelay(server);
         }
         if !trace.is_null() {
-            // From within hooks that are only passed on it succeeds, and calls the trace's hook.
+            // It succeeds from within hooks that are only passed on, and calls the trace's hook.
             mbm_trace_flush(trace);
             mbm_trace_setFrameTimeout(trace, 10);
         }
@@ -102,7 +102,7 @@ unsafe fn use_line(context: *mut c_void) {
         assert_eq!(mbm_node_send(node, 5), MBM_OK);
         assert_eq!(mbm_node_beginTransmission(node, 3), MBM_OK);
         mbm_node_receive(node);
-        // Nor is another node the line's, but its requests are refused.
+        // Another node is not the line's either, but its requests are refused.
         let words = {
             let state = state(context);
             state.words

@@ -31,7 +31,7 @@ fn refusal(w: &World) -> u8 {
     }
 }
 
-/// Reads the access that a hook was given, before and after other calls. Of a write, it has data.
+/// Reads the access that a hook was given, before and after other calls. That of a write has data.
 unsafe fn read_access<'a>(access: *const mbm_access, writes: bool) -> &'a World {
     let read = || {
         // SAFETY: the header promises an access.

@@ -322,7 +322,7 @@ fn cut<'a, T>(edges: &[usize], per_cell: usize, cells: &'a mut [T]) -> Vec<(usiz
     pieces
 }
 
-/// What callbacks of C get: the cells from an index on, and which of the four tables.
+/// The argument of callbacks of C: the cells from an index on, and which of the four tables.
 struct Called {
     memory: *mut Memory,
     first: usize,

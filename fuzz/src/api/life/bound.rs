@@ -52,7 +52,7 @@ impl Limits {
         late + hold + sending + reply + self.backoff + self.rest
     }
 
-    /// The longest time until a request has ended that has `ahead` others before it, while the
+    /// The longest time until a request with `ahead` others before it has ended, while the
     /// client may use its line.
     pub fn request(&self, ahead: u64) -> u64 {
         let attempts = 1 + self.retries + self.busy_retries;
