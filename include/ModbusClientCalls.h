@@ -145,7 +145,7 @@ public:
     {
         return mbm_client_readExceptionStatus(&client, withWords(request));
     }
-    /** Function 08: sends the request's words and reads as many; 1, or 1 to 125 of sub-function 0. */
+    /** Function 08: sends the request's words and reads as many; 1, or 1 to 125 with sub-function 0. */
     uint8_t diagnostics(ModbusRequest &request, uint16_t subFunction, uint16_t quantity = 1)
     {
         return holds(request, 1, quantity)
@@ -219,9 +219,9 @@ public:
     /** How often a request is repeated if its reply is missing, damaged or malformed, 0 to 255; 0 at first. */
     uint8_t setRetries(uint8_t retries) { return mbm_client_setRetries(&client, retries); }
     /**
-     * How often a request is repeated, after `waitMs` milliseconds each time, that the device
-     * refuses because it is busy (exception 06), or that only reads and that the device
-     * answers with exception 05; 0 to 255. See mbm_client_setBusyRetries.
+     * How often a request that a busy device refuses is repeated, after `waitMs` milliseconds
+     * each time, 0 to 255: any request that it answers with exception 06, and one that only
+     * reads that it answers with exception 05. See mbm_client_setBusyRetries.
      */
     uint8_t setBusyRetries(uint8_t retries, uint32_t waitMs)
     {

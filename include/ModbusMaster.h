@@ -182,9 +182,9 @@ public:
     }
 
     /**
-     * Queues a value: types of up to 16 bits and int as one word, wider ones as
-     * two, the low word first. (int is one word everywhere, so that send(5) means
-     * the same on every board; of a wider int the low 16 bits are sent.)
+     * Queues a value: types of up to 16 bits and int as one word, wider ones as two, the low
+     * word first. (int is one word everywhere, so that send(5) means the same on every board;
+     * only the low 16 bits of a wider int are sent.)
      *
      * @return ku8MBSuccess, or ku8MBBufferTooSmall if a word did not fit
      */

@@ -96,8 +96,8 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
 }
 
 /**
- * The texts of mbm_status_textOf: as modbusStatusText, but of a request that was refused before it
- * was sent, the text says so.
+ * The texts of mbm_status_textOf: as modbusStatusText, but for a request that was refused
+ * before it was sent, the text says so.
  *
  * @param status         the status of the request
  * @param exceptionCode  the exception code of the reply, 0 if there was none
