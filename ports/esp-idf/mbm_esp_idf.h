@@ -49,12 +49,8 @@ typedef struct mbm_espIdfLine {
  */
 esp_err_t mbm_espIdf_open(mbm_espIdfLine *line, mbm_port *port);
 
-/**
- * Removes the UART driver. Objects that use the port then report a lost link. Does nothing if
- * the line is not open.
- *
- * @param line  the line
- */
+/** Removes the UART driver. Objects that use the port then report a lost link. Does nothing if
+ *  the line is not open. */
 void mbm_espIdf_close(mbm_espIdfLine *line);
 
 /**

@@ -116,11 +116,7 @@ typedef struct mbm_loop {
  */
 int mbm_loop_open(mbm_loop *loop, mbm_loop_place *places, uint32_t count);
 
-/**
- * Ends a loop. Remove its entries before. Does nothing if it is not open, and within `poll`.
- *
- * @param loop  the loop
- */
+/** Ends a loop. Remove its entries before. Does nothing if it is not open, and within `poll`. */
 void mbm_loop_close(mbm_loop *loop);
 
 /**
@@ -190,12 +186,8 @@ int mbm_loop_addFd(mbm_loop *loop, mbm_loop_entry *entry, int fd);
  */
 void mbm_loop_remove(mbm_loop_entry *entry);
 
-/**
- * Has the next wait poll an entry, without a sleep before. Call it after you have queued a request
- * outside the entry's `poll`. Does nothing if the entry is in no loop.
- *
- * @param entry  the entry
- */
+/** Has the next wait poll an entry, without a sleep before. Call it after you have queued a
+ *  request outside the entry's `poll`. Does nothing if the entry is in no loop. */
 void mbm_loop_wake(mbm_loop_entry *entry);
 
 /**

@@ -150,7 +150,6 @@ int mbm_tcp_openLater(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *ho
 /**
  * Returns in words why there is no link: `lookupError`, or `error`.
  *
- * @param tcp  the socket
  * @return a text of the system; strerror of 0 if there is a link
  */
 const char *mbm_tcp_text(const mbm_tcp *tcp);
@@ -164,12 +163,8 @@ const char *mbm_tcp_text(const mbm_tcp *tcp);
  */
 int mbm_tcp_attach(mbm_tcp *tcp, int fd);
 
-/**
- * Closes the socket, and frees the place for mbm_tcp_accept. Does nothing if the place is
- * free already.
- *
- * @param tcp  the socket
- */
+/** Closes the socket, and frees the place for mbm_tcp_accept. Does nothing if the place is free
+ *  already. */
 void mbm_tcp_close(mbm_tcp *tcp);
 
 /**
@@ -177,7 +172,6 @@ void mbm_tcp_close(mbm_tcp *tcp);
  * mbm_tcp_accept until mbm_tcp_close, also while the connection is being made and after it
  * was lost.
  *
- * @param tcp  the place
  * @return 1 if it is in use, 0 if it is free; a zeroed one is free
  */
 int mbm_tcp_isInUse(const mbm_tcp *tcp);
@@ -185,7 +179,6 @@ int mbm_tcp_isInUse(const mbm_tcp *tcp);
 /**
  * Returns for how long a connection has been idle: since the port last read or wrote a byte.
  *
- * @param tcp  the socket
  * @return milliseconds, or -1 if there is no connection
  */
 int64_t mbm_tcp_idleFor(const mbm_tcp *tcp);
@@ -194,7 +187,6 @@ int64_t mbm_tcp_idleFor(const mbm_tcp *tcp);
  * Returns whether there is a connection, as far as the system knows without sending
  * anything. The end of the stream is seen only after all bytes were read.
  *
- * @param tcp  the socket
  * @return 1 if connected, 0 while connecting, -1 if the link is lost or closed
  */
 int mbm_tcp_isConnected(mbm_tcp *tcp);
@@ -295,11 +287,7 @@ int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *ser
  */
 int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count);
 
-/**
- * Stops listening. Connections stay.
- *
- * @param listener  the socket
- */
+/** Stops listening. Connections stay. */
 void mbm_tcp_closeListener(mbm_tcp_listener *listener);
 
 /**
@@ -342,11 +330,7 @@ int mbm_tcp_openSet(mbm_tcp_set *set);
  */
 int mbm_tcp_add(mbm_tcp_set *set, mbm_tcp *tcp);
 
-/**
- * Takes a socket out of its set and leaves it open. Does nothing if it is in no set.
- *
- * @param tcp  the socket
- */
+/** Takes a socket out of its set and leaves it open. Does nothing if it is in no set. */
 void mbm_tcp_remove(mbm_tcp *tcp);
 
 /**
@@ -383,12 +367,7 @@ int mbm_tcp_waitSet(mbm_tcp_set *set, uint32_t timeoutUs);
  */
 mbm_tcp *mbm_tcp_nextReady(mbm_tcp_set *set);
 
-/**
- * Ends a set. Close its sockets and its listener before. Does nothing if the set is not
- * open.
- *
- * @param set  the set
- */
+/** Ends a set. Close its sockets and its listener before. Does nothing if the set is not open. */
 void mbm_tcp_closeSet(mbm_tcp_set *set);
 
 /* Private: shared by the sources of this port. */

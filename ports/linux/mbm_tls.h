@@ -180,12 +180,8 @@ typedef struct mbm_tls {
  */
 uint8_t mbm_tls_begin(mbm_tls_identity *identity, const mbm_tls_options *options);
 
-/**
- * Frees what mbm_tls_begin read. Close all connections before. Does nothing if the identity
- * is not in use.
- *
- * @param identity  the identity
- */
+/** Frees what mbm_tls_begin read. Close all connections before. Does nothing if the identity is
+ *  not in use. */
 void mbm_tls_end(mbm_tls_identity *identity);
 
 /**
@@ -223,7 +219,6 @@ mbm_port mbm_tls_port(mbm_tls *tls);
  * the end. Looks whether the peer ended the session. Call it while no client or server reads
  * the port, for example from mbm_tls_open on until the session is open.
  *
- * @param tls  the connection
  * @return its `status`
  */
 uint8_t mbm_tls_poll(mbm_tls *tls);
@@ -234,7 +229,6 @@ uint8_t mbm_tls_poll(mbm_tls *tls);
  * below would report, or if a handshake can go on without further bytes; it says so once,
  * until the port's read or write, or mbm_tls_poll, was called again.
  *
- * @param tls  the connection
  * @return microseconds, UINT32_MAX without a limit
  */
 uint32_t mbm_tls_pollDelay(mbm_tls *tls);
@@ -254,18 +248,13 @@ const char *mbm_tls_role(const mbm_tls *tls);
  * on the port reads and accepts no bytes. Call it again while it returns MBM_TLS_CLOSING, if
  * the close_notify shall be sent although the stream below is full.
  *
- * @param tls  the connection
  * @return MBM_TLS_CLOSED, MBM_TLS_CLOSING, or why the connection ended
  */
 uint8_t mbm_tls_shutDown(mbm_tls *tls);
 
-/**
- * Ends the session, with close_notify if the stream below accepts it at once, and frees what
- * Mbed TLS allocated for it. The stream below stays as it is. Does nothing if the connection
- * is not in use.
- *
- * @param tls  the connection
- */
+/** Ends the session, with close_notify if the stream below accepts it at once, and frees what
+ *  Mbed TLS allocated for it. The stream below stays as it is. Does nothing if the connection is
+ *  not in use. */
 void mbm_tls_close(mbm_tls *tls);
 
 /**

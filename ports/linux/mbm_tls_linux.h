@@ -50,11 +50,7 @@ int mbm_tls_random(void *context, unsigned char *bytes, size_t count);
 int mbm_tls_load(mbm_tls_files *files, mbm_tls_options *options, const char *certificate,
                  const char *key, const char *authorities);
 
-/**
- * Overwrites the key with zeros. Call it after mbm_tls_begin, which has copied the key.
- *
- * @param files  the files
- */
+/** Overwrites the key with zeros. Call it after mbm_tls_begin, which has copied the key. */
 void mbm_tls_forgetKey(mbm_tls_files *files);
 
 /**

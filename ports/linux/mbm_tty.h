@@ -119,12 +119,8 @@ int mbm_tty_attach(mbm_tty *tty, int fd);
  */
 int mbm_tty_settings(struct termios *settings, const mbm_tty_options *options);
 
-/**
- * Closes the terminal and restores its settings. Waits until all bytes are sent. Does
- * nothing if it is closed already, except that mbm_tty_connect then opens it no more.
- *
- * @param tty  the terminal
- */
+/** Closes the terminal and restores its settings. Waits until all bytes are sent. Does nothing
+ *  if it is closed already, except that mbm_tty_connect then opens it no more. */
 void mbm_tty_close(mbm_tty *tty);
 
 /**

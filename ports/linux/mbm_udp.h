@@ -89,11 +89,7 @@ int mbm_udp_open(mbm_udp *udp, const char *host, const char *service);
  */
 int mbm_udp_listen(mbm_udp *udp, const char *host, const char *service);
 
-/**
- * Closes the socket. Does nothing if there is none.
- *
- * @param udp  the socket
- */
+/** Closes the socket. Does nothing if there is none. */
 void mbm_udp_close(mbm_udp *udp);
 
 /**

@@ -49,12 +49,8 @@ typedef struct mbm_rtThreadLine {
  */
 rt_err_t mbm_rtThread_open(mbm_rtThreadLine *line, mbm_port *port);
 
-/**
- * Closes the device. Objects that use the port then report a lost link. Does nothing if the line
- * is not open.
- *
- * @param line  the line
- */
+/** Closes the device. Objects that use the port then report a lost link. Does nothing if the
+ *  line is not open. */
 void mbm_rtThread_close(mbm_rtThreadLine *line);
 
 /**

@@ -77,7 +77,6 @@ void mbm_zephyr_wait(mbm_zephyrLine *line, uint32_t timeoutUs);
 /**
  * Returns how many received bytes found no place because the thread read too late.
  *
- * @param line  the line
  * @return bytes since mbm_zephyr_open
  */
 uint16_t mbm_zephyr_lost(const mbm_zephyrLine *line);
