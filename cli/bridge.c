@@ -66,7 +66,7 @@ static int prepare(bridge *b, const bridge_setup *from, unsigned index, next_lin
         next->line = bridge_line_make(&b->settings, from->lines[index].text, file,
                                       from->lines[index].topic, &from->lines[index].place);
     if (!next->line) {
-        snprintf(wrong, YAML_FILE_WRONG_BYTES, "not enough memory");
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, REPORT_NO_MEMORY);
         return CODE_SYSTEM;
     }
     if (!next->is_new && strcmp(next->line->path, file) == 0 &&
@@ -176,7 +176,7 @@ static int read_setup(bridge *b, bridge_setup *into)
 {
     if (bridge_setup_copy(into, &b->given))
         return b->path ? bridge_file_read(into, b->path) : CODE_DONE;
-    snprintf(into->wrong, sizeof into->wrong, "not enough memory");
+    snprintf(into->wrong, sizeof into->wrong, REPORT_NO_MEMORY);
     return CODE_SYSTEM;
 }
 
@@ -495,7 +495,7 @@ static int begin(bridge *b)
     if (code != CODE_DONE)
         return report(code, "%s", b->setup.wrong);
     if (!bridge_setup_options(&b->setup, &b->to))
-        return report(CODE_SYSTEM, "not enough memory");
+        return report(CODE_SYSTEM, REPORT_NO_MEMORY);
     b->settings.is_plain = (uint8_t)bridge_setup_is(&b->setup, BRIDGE_PLAIN);
     b->settings.is_every = (uint8_t)bridge_setup_is(&b->setup, BRIDGE_ALL);
     b->settings.has_discovery = (uint8_t)bridge_setup_is(&b->setup, BRIDGE_DISCOVERY);

@@ -21,7 +21,6 @@ enum { LINE, THE_FILE, LINE_TOPIC, LINE_KEYS };
 static const char *const LINE_NAMES[] = {"line", "file", "topic", NULL};
 static const char *const ANSWERS[] = {"no", "yes", NULL};
 static const char *const DISCOVERIES[] = {"homeassistant", NULL};
-static const char NO_MEMORY[] = "there is not enough memory";
 
 /* --- settings --- */
 
@@ -88,7 +87,7 @@ const char *bridge_setup_value(bridge_setup *to, int setting, const char *text)
         return wrong;
     copy = strdup(text);
     if (!copy)
-        return NO_MEMORY;
+        return REPORT_NO_MEMORY;
     free(to->values[setting]);
     to->values[setting] = copy;
     return NULL;
@@ -209,7 +208,7 @@ const char *bridge_setup_line(bridge_setup *to, const char *name, const char *pa
     to->lines[at].topic = strdup(topic);
     to->line_count++;
     if (!to->lines[at].text || !to->lines[at].path || !to->lines[at].topic)
-        return NO_MEMORY;
+        return REPORT_NO_MEMORY;
     return place_read(&to->lines[at].place, to->lines[at].text, 0);
 }
 

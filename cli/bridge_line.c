@@ -102,7 +102,7 @@ bridge_table *bridge_table_read(const char *path, uint8_t register_gap, int *cod
     bridge_table *table = (bridge_table *)calloc(1, sizeof *table);
 
     if (!table) {
-        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: not enough memory", path);
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: " REPORT_NO_MEMORY, path);
         *code = CODE_SYSTEM;
         return NULL;
     }
@@ -112,7 +112,7 @@ bridge_table *bridge_table_read(const char *path, uint8_t register_gap, int *cod
         *code = check_fields(&table->fields, path, wrong);
     if (*code == CODE_DONE && !make_storage(table, register_gap)) {
         *code = CODE_SYSTEM;
-        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: not enough memory", path);
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: " REPORT_NO_MEMORY, path);
     }
     if (*code == CODE_DONE)
         *code = try_plan(table, path, wrong);

@@ -92,7 +92,7 @@ static int begin_line(gateway *g, unsigned index)
 
     if (!gateway_line_begin(&g->lines[slot], &g->setup.lines[index].place,
                             &g->setup.lines[index].pace))
-        return report(CODE_SYSTEM, "not enough memory");
+        return report(CODE_SYSTEM, REPORT_NO_MEMORY);
     set_line(g, index);
     return CODE_DONE;
 }

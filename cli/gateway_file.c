@@ -5,6 +5,7 @@
 #include "gateway_file.h"
 
 #include "numbers.h"
+#include "report.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -101,7 +102,7 @@ const char *gateway_setup_line(gateway_setup *to, const char *text)
             return say("the line %s is there twice", text);
     to->lines[i].text = strdup(text);
     if (!to->lines[i].text)
-        return "there is not enough memory";
+        return REPORT_NO_MEMORY;
     to->line_count++;
     to->lines[i].pace = (gateway_pace){0};
     wrong = place_read(&to->lines[i].place, to->lines[i].text, 0);
@@ -116,7 +117,7 @@ const char *gateway_setup_listen(gateway_setup *to, const char *text)
 
     to->listen_text = strdup(text);
     if (!to->listen_text)
-        return "there is not enough memory";
+        return REPORT_NO_MEMORY;
     wrong = place_read(&to->listen, to->listen_text, 1);
     if (wrong || to->listen.kind == PLACE_TCP)
         return wrong;

@@ -104,7 +104,7 @@ char *header_lower(const char *upper)
 
 static int fail(void)
 {
-    (void)report(CODE_SYSTEM, "there is no memory");
+    (void)report(CODE_SYSTEM, REPORT_NO_MEMORY);
     return 0;
 }
 
@@ -304,7 +304,7 @@ static int find_scales(header *h)
 
     h->scales = (header_scale *)calloc(h->of->count, sizeof *h->scales);
     if (!h->scales)
-        return report(CODE_SYSTEM, "there is no memory");
+        return report(CODE_SYSTEM, REPORT_NO_MEMORY);
     for (i = 0; i < h->of->count; i++)
         if (!find_scale(&h->of->fields[i].form.scale, &h->scales[i]))
             return report(
@@ -388,7 +388,7 @@ static int begin_plan(header *h, const mbm_planSetup *setup)
         return report(CODE_WRONG, "%s", device_plan_wrong(h->of, h->path, status, wrong));
     is_noted = note_reads(h, &plan);
     (void)mbm_plan_end(&plan);
-    return is_noted ? CODE_DONE : report(CODE_SYSTEM, "there is no memory");
+    return is_noted ? CODE_DONE : report(CODE_SYSTEM, REPORT_NO_MEMORY);
 }
 
 /* Copies the fields that can be read, with their scales. */
@@ -422,7 +422,7 @@ static int group_fields(header *h)
         setup.fields = fields;
         code = begin_plan(h, &setup);
     } else {
-        code = report(CODE_SYSTEM, "there is no memory for %u fields", count);
+        code = report(CODE_SYSTEM, REPORT_NO_MEMORY);
     }
     free(fields);
     device_plan_free(&setup);

@@ -596,6 +596,6 @@ int header_write_server(header *h)
 
     free(of);
     if (!is_right)
-        (void)report(CODE_SYSTEM, "there is no memory");
+        (void)report(CODE_SYSTEM, REPORT_NO_MEMORY);
     return is_right;
 }

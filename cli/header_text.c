@@ -117,7 +117,7 @@ static int write_labels(header *h, uint16_t at)
 
         if (!name || asprintf(&suffix, "_%s", name) < 0) {
             free(name);
-            (void)report(CODE_SYSTEM, "there is no memory");
+            (void)report(CODE_SYSTEM, REPORT_NO_MEMORY);
             return 0;
         }
         if (name[0] == '\0') {

@@ -128,7 +128,7 @@ static int begin_plan(polling *p)
     if (p->meter.readable == 0)
         return report(CODE_WRONG, "%s has no field that can be read", p->file);
     if (!device_plan_make(&p->setup, &p->meter, p->gap, requests))
-        return report(CODE_SYSTEM, "there is no memory for %u fields", p->meter.readable);
+        return report(CODE_SYSTEM, REPORT_NO_MEMORY);
     p->setup.update = take_field;
     p->setup.context = p;
     status = mbm_plan_begin(&p->plan, &p->at.client, &p->setup, &wrong);

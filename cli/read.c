@@ -467,7 +467,7 @@ int read_command(int argc, char **argv)
     advice_keep(argc, argv, r->address_text);
     r->before = (history *)calloc(r->unit_count, sizeof *r->before);
     if (!r->before)
-        return report(CODE_SYSTEM, "there is no memory for %u units", r->unit_count);
+        return report(CODE_SYSTEM, REPORT_NO_MEMORY);
     if (line_open(&r->at, &r->where) != CODE_DONE)
         return report_code;
     if (r->interval == 0 && line_connect(&r->at) != CODE_DONE) {

@@ -28,6 +28,9 @@ enum {
     "  6  the reply was damaged or malformed\n"                                                    \
     "Of several results the first failure counts.\n"
 
+/* What every command says without memory. */
+#define REPORT_NO_MEMORY "there is not enough memory"
+
 /* "mbm" and the command, which begin each sentence. */
 extern const char *report_name;
 

@@ -509,7 +509,7 @@ static int make_units(serving *s, const device *from, served_hook *hook)
                 : served_make_units(&s->units, s->is_random ? SERVED_RANDOM : SERVED_ECHO, s->ids,
                                     s->id_count, hook);
 
-    return status == 0 ? CODE_DONE : report(CODE_SYSTEM, "there is no memory for the units");
+    return status == 0 ? CODE_DONE : report(CODE_SYSTEM, REPORT_NO_MEMORY);
 }
 
 static int serve(serving *s)
