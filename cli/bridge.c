@@ -404,6 +404,7 @@ static void check_options(bridge *b, const struct argp_state *state)
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     bridge *b = (bridge *)state->input;
+
     if (key >= SETTING && key < SETTING + BRIDGE_SETTINGS) {
         take_value(b, state, key - SETTING, text);
         return 0;

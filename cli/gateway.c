@@ -452,6 +452,7 @@ static void read_word(gateway *g, const struct argp_state *state, char *text)
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     gateway *g = (gateway *)state->input;
+
     switch (key) {
     case 'c':
         g->given.connections =

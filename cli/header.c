@@ -29,6 +29,7 @@ enum { NAME = 0x2000, GAP, MARKDOWN };
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     job *j = (job *)state->input;
+
     switch (key) {
     case 'o': j->output = text; return 0;
     case NAME: j->name = text; return 0;

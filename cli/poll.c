@@ -43,6 +43,7 @@ enum { ROUNDS = 0x2000, FOR, ONCE, GAP, SHOW_PLAN };
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     polling *p = (polling *)state->input;
+
     switch (key) {
     case ROUNDS:
         p->rounds = (uint32_t)options_number(state, "--rounds", text, 1, 1000000000);

@@ -87,6 +87,7 @@ static void check_arguments(reading *r, const struct argp_state *state)
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     reading *r = (reading *)state->input;
+
     switch (key) {
     case 'u': r->unit_count = options_units(state, "--unit", text, r->units); return 0;
     case EVERY: r->interval = options_time(state, "--every", text, 1, 86400000); return 0;

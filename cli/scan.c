@@ -35,6 +35,7 @@ enum { UNITS_KEY = 1, RATES_KEY, PARITIES_KEY };
 static void read_rate(const struct argp_state *state, char *item)
 {
     scanning *s = (scanning *)state->input;
+
     if (s->rate_count == RATES)
         options_wrong(state, "--rates has more than %d rates", RATES);
     s->rates[s->rate_count++] = (uint32_t)options_number(state, "--rates", item, 50, 4000000);
@@ -85,6 +86,7 @@ static void check_arguments(scanning *s, const struct argp_state *state)
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     scanning *s = (scanning *)state->input;
+
     switch (key) {
     case UNITS_KEY: s->unit_count = options_units(state, "--units", text, s->units); return 0;
     case RATES_KEY: read_list(state, text, read_rate); return 0;

@@ -198,9 +198,9 @@ static void name_network(serve_line *l, uint16_t port, char *name)
              bracket, l->at.host, end, port);
 }
 
-/* Opens the place of a zeroed line. Returns CODE_DONE, or another exit code after reporting the
- * reason. `name` receives the place as its masters write it, with the port or the terminal that the
- * system has chosen. */
+/* Opens the place of a line that is zeroed but for its faults. Returns CODE_DONE, or another exit
+ * code after reporting the reason. `name` receives the place as its masters write it, with the port
+ * or the terminal that the system has chosen. */
 static int open_line(serve_line *l, const place *where, char name[NAME_BYTES])
 {
     int code;
@@ -437,6 +437,7 @@ static void check(serving *s, const struct argp_state *state)
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     serving *s = (serving *)state->input;
+
     switch (key) {
     case 'u': s->unit_text = text; return 0;
     case RANDOM_KEY: s->is_random = 1; return 0;

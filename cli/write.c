@@ -93,6 +93,7 @@ static void check_arguments(writing *w, const struct argp_state *state)
 static error_t parse(int key, char *text, struct argp_state *state)
 {
     writing *w = (writing *)state->input;
+
     switch (key) {
     case MULTIPLE: w->is_multiple = 1; return 0;
     case ARGP_KEY_ARG:
