@@ -153,6 +153,27 @@ typedef struct mbm_gatewayConfig {
 uint8_t mbm_gateway_begin(mbm_gateway *gateway, const mbm_gatewayConfig *config);
 
 /**
+ * Polls the clients of all lines, receives requests, passes them on, and sends responses.
+ * Never waits.
+ *
+ * Call it often. You need not poll the clients of the lines; you may.
+ *
+ * @return a status; MBM_BUSY also from within a hook of a port of its lines
+ */
+uint8_t mbm_gateway_poll(mbm_gateway *gateway);
+
+/**
+ * Returns for how long mbm_gateway_poll will have nothing to do, unless a byte arrives on a
+ * line whose client has requests, or on a connection that the gateway reads (see
+ * mbm_gateway_isReading), or a connection is lost.
+ *
+ * @return microseconds; 0 means poll now, also from within a hook of the gateway; 0xFFFFFFFF means
+ *         that no request is pending. While a connection does not accept a response, and while a
+ *         function of the gateway's own units returns MBM_REPLY_PENDING, it is at most 1000
+ */
+uint32_t mbm_gateway_pollDelay(mbm_gateway *gateway);
+
+/**
  * Gives the gateway an accepted TCP connection. mbm_gateway_poll then reads its requests and
  * writes their responses. The gateway never opens or closes the socket itself.
  *
@@ -201,27 +222,6 @@ uint16_t mbm_gateway_pending(const mbm_gateway *gateway, uint8_t connection);
  * @return 1 or 0
  */
 uint8_t mbm_gateway_isReading(const mbm_gateway *gateway, uint8_t connection);
-
-/**
- * Polls the clients of all lines, receives requests, passes them on, and sends responses.
- * Never waits.
- *
- * Call it often. You need not poll the clients of the lines; you may.
- *
- * @return a status; MBM_BUSY also from within a hook of a port of its lines
- */
-uint8_t mbm_gateway_poll(mbm_gateway *gateway);
-
-/**
- * Returns for how long mbm_gateway_poll will have nothing to do, unless a byte arrives on a
- * line whose client has requests, or on a connection that the gateway reads (see
- * mbm_gateway_isReading), or a connection is lost.
- *
- * @return microseconds; 0 means poll now, also from within a hook of the gateway; 0xFFFFFFFF means
- *         that no request is pending. While a connection does not accept a response, and while a
- *         function of the gateway's own units returns MBM_REPLY_PENDING, it is at most 1000
- */
-uint32_t mbm_gateway_pollDelay(mbm_gateway *gateway);
 
 /**
  * Sets how many requests of one connection may be pending at once

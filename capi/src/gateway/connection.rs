@@ -1,7 +1,7 @@
 //! The connections of a gateway.
 
-use super::object::{mbm_gateway, Core};
 use super::parts::mbm_gatewayConnection;
+use super::{mbm_gateway, Core};
 use crate::pointers;
 use crate::port::mbm_port;
 use mbm::error::Status;

@@ -1,7 +1,7 @@
 //! The settings of a gateway, its own units and its own functions.
 
-use super::object::{mbm_gateway, Core};
 use super::storage::Parts;
+use super::{mbm_gateway, Core};
 use crate::client::{mbm_client, mbm_clientRequest, mbm_client_custom};
 use crate::framing::{mbm_framing, MBM_FRAMING_TCP, MBM_MAX_TCP_FRAME};
 use crate::functions::{declared, mbm_function};

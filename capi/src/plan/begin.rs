@@ -1,7 +1,7 @@
 //! Beginning and ending a plan.
 
+use super::mbm_plan;
 use super::setup::mbm_planSetup;
-use super::storage::mbm_plan;
 use crate::client::{self, mbm_client, mbm_client_cancel};
 use crate::pointers;
 use core::ptr::null_mut;

@@ -1,7 +1,7 @@
 //! The object behind `mbm_plan`, and its clock.
 
+use super::mbm_plan;
 use super::setup::mbm_planSetup;
-use super::storage::mbm_plan;
 use crate::client::{self, mbm_client};
 use crate::pointers::{self, c_object};
 use core::slice::from_raw_parts;

@@ -1,7 +1,7 @@
 //! Sending the reads that are due, and taking their replies.
 
+use super::mbm_plan;
 use super::object::{time, Object};
-use super::storage::mbm_plan;
 use super::MBM_PLAN_LONGEST_INTERVAL;
 use crate::client::{self, mbm_clientRequest, mbm_client_pending, MBM_CLIENT_DEPTH};
 use crate::pointers;

@@ -1,6 +1,6 @@
 //! The arguments of a plan in C: its table, its limits and its storage.
 
-use super::storage::mbm_plan;
+use super::mbm_plan;
 use crate::client::mbm_clientRequest;
 use crate::pointers;
 use core::ffi::c_void;

@@ -1,7 +1,7 @@
 //! The values of a plan, how old they are, and its reads.
 
+use super::mbm_plan;
 use super::object::{time, Object};
-use super::storage::mbm_plan;
 use crate::pointers::{self, slice_mut};
 use crate::registers::{mbm_registers, MBM_REGISTERS_OF_WORDS};
 use core::ffi::c_char;
