@@ -24,8 +24,8 @@ typedef struct bridge {
     bridge_line *lines[BRIDGE_LINES];
     unsigned line_count;
     unsigned long reloads, refused_reloads;
-    uint32_t alone_since; /* since when there is no broker */
-    int is_alone;         /* and that was reported */
+    uint32_t aloneSinceMs; /* since when there is no broker */
+    int is_alone;          /* and that was reported */
     int is_check;
     found_round round;
     int has_events; /* of the broker, as far as is known */
@@ -247,11 +247,11 @@ static void take_events(bridge *b)
 static uint32_t watch_broker(bridge *b)
 {
     if (atomic_load(&b->settings.mqtt.is_connected)) {
-        b->alone_since = line_milliseconds();
+        b->aloneSinceMs = line_milliseconds();
         b->is_alone = 0;
         return UINT32_MAX;
     }
-    if (!b->is_alone && line_milliseconds() - b->alone_since >= UNREACHED_MS) {
+    if (!b->is_alone && line_milliseconds() - b->aloneSinceMs >= UNREACHED_MS) {
         report_log(REPORT_WARNING,
                    "the broker %s cannot be reached. The bridge reads on, and tries it again",
                    b->settings.mqtt.address);
@@ -509,7 +509,7 @@ static int begin(bridge *b)
         code = service_begin(fill_stats, b);
     if (code == CODE_DONE)
         code = broker_begin(&b->settings.mqtt, &b->to);
-    b->alone_since = line_milliseconds();
+    b->aloneSinceMs = line_milliseconds();
     return code;
 }
 

@@ -265,7 +265,7 @@ static void add_piece(fault_port *port, uint32_t pause, const uint8_t *bytes, ui
         port->ends[port->count - 1] = port->end;
         return;
     }
-    port->pauses[port->count] = pause;
+    port->pausesUs[port->count] = pause;
     port->ends[port->count++] = port->end;
 }
 
@@ -316,7 +316,7 @@ static void send_due(fault_port *port)
         uint16_t until;
         int16_t count;
 
-        if (now - port->since < port->pause)
+        if (now - port->sinceUs < port->pauseUs)
             return;
         if (port->is_closing) {
             port->is_closing = 0;
@@ -333,11 +333,11 @@ static void send_due(fault_port *port)
         if (count <= 0)
             return;
         port->sent = (uint16_t)(port->sent + count);
-        port->since = now;
-        port->pause = slow;
+        port->sinceUs = now;
+        port->pauseUs = slow;
         if (port->sent == port->ends[port->piece] && ++port->piece < port->count &&
-            port->pauses[port->piece] > slow)
-            port->pause = port->pauses[port->piece];
+            port->pausesUs[port->piece] > slow)
+            port->pauseUs = port->pausesUs[port->piece];
     }
 }
 
@@ -358,8 +358,8 @@ static int16_t write_bytes(void *context, const uint8_t *bytes, uint16_t length)
     if (port->is_lost)
         return -1;
     port->count = port->piece = port->sent = port->end = 0;
-    port->since = port->below.micros(port->below.context);
-    port->pause = port->chosen.has[FAULT_LATE] ? port->chosen.value[FAULT_LATE] * 1000u : 0;
+    port->sinceUs = port->below.micros(port->below.context);
+    port->pauseUs = port->chosen.has[FAULT_LATE] ? port->chosen.value[FAULT_LATE] * 1000u : 0;
     if (port->chosen.has[FAULT_CLOSE])
         port->is_closing = 1;
     else if (!port->chosen.has[FAULT_DEAF])
@@ -396,7 +396,7 @@ mbm_port fault_port_begin(fault_port *port, const mbm_port *below, uint8_t frami
 
 uint32_t fault_port_delay(fault_port *port)
 {
-    const uint32_t passed = port->below.micros(port->below.context) - port->since;
+    const uint32_t passed = port->below.micros(port->below.context) - port->sinceUs;
 
     /* The next read says so. */
     if (port->is_lost)
@@ -404,5 +404,5 @@ uint32_t fault_port_delay(fault_port *port)
     if (!is_waiting(port))
         return UINT32_MAX;
     /* The port below accepts no bytes now. */
-    return passed < port->pause ? port->pause - passed : 1000;
+    return passed < port->pauseUs ? port->pauseUs - passed : 1000;
 }

@@ -81,9 +81,9 @@ typedef struct fault_port {
     /* The answer that is still to be sent: pieces, each after a pause. */
     uint8_t bytes[FAULT_PORT_BYTES];
     uint16_t ends[FAULT_PORT_PIECES];
-    uint32_t pauses[FAULT_PORT_PIECES]; /* microseconds */
+    uint32_t pausesUs[FAULT_PORT_PIECES];
     uint16_t count, piece, sent, end;
-    uint32_t since, pause; /* the next byte is due `pause` after `since`, in microseconds */
+    uint32_t sinceUs, pauseUs; /* the next byte is due `pauseUs` after `sinceUs` */
     uint32_t random;
 } fault_port;
 

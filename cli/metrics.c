@@ -23,7 +23,7 @@ enum {
 
 typedef struct visitor {
     int fd; /* 0: a free place */
-    int64_t since;
+    int64_t sinceMs;
     size_t have, length, sent;
     char *reply; /* NULL while the request is read */
     char request[REQUEST_BYTES];
@@ -141,7 +141,7 @@ uint32_t metrics_delay(void)
 
         if (visitors[i].fd <= 0)
             continue;
-        left = visitors[i].since + LIFE_MS - clock_milliseconds();
+        left = visitors[i].sinceMs + LIFE_MS - clock_milliseconds();
         if (left < 0)
             left = 0;
         if ((uint32_t)left * 1000u < delay)
@@ -165,11 +165,11 @@ static void take_visitor(void)
         return;
     }
     for (i = 1; i < METRICS_PLACES && place->fd > 0; i++)
-        if (visitors[i].fd <= 0 || visitors[i].since < place->since)
+        if (visitors[i].fd <= 0 || visitors[i].sinceMs < place->sinceMs)
             place = &visitors[i];
     drop(place);
     place->fd = fd;
-    place->since = clock_milliseconds();
+    place->sinceMs = clock_milliseconds();
     place->have = place->sent = place->length = 0;
 }
 
@@ -269,7 +269,7 @@ void metrics_work(char *(*render)(void))
             read_request(one, render);
         if (one->fd > 0 && one->reply)
             write_reply(one);
-        if (one->fd > 0 && clock_milliseconds() - one->since >= LIFE_MS)
+        if (one->fd > 0 && clock_milliseconds() - one->sinceMs >= LIFE_MS)
             drop(one);
     }
 }

@@ -69,7 +69,7 @@ static int16_t read_found(void *context, uint8_t *bytes, uint16_t capacity)
     count = port->below.read(port->below.context, bytes, capacity);
     if (port->round && count >= 0 && count < capacity) {
         port->empty_in = port->round->number;
-        port->time = now;
+        port->timeUs = now;
     }
     return count;
 }
@@ -86,7 +86,7 @@ static uint32_t found_micros(void *context)
 {
     const found_port *port = (const found_port *)context;
 
-    return is_empty(port) ? port->time : port->below.micros(port->below.context);
+    return is_empty(port) ? port->timeUs : port->below.micros(port->below.context);
 }
 
 mbm_port found_port_begin(found_port *port, const mbm_port *below)
@@ -103,7 +103,7 @@ mbm_port found_port_begin(found_port *port, const mbm_port *below)
 
 void found_port_begin_round(found_round *round)
 {
-    round->began = (uint32_t)clock_micros(CLOCK_MONOTONIC);
+    round->beganUs = (uint32_t)clock_micros(CLOCK_MONOTONIC);
     round->number++;
     round->is_on = 1;
 }
@@ -114,7 +114,7 @@ void found_port_note(found_port *port, const found_round *round, const struct po
     if (!(found->events & POLLIN) || found->revents)
         return;
     port->empty_in = round->number;
-    port->time = round->began;
+    port->timeUs = round->beganUs;
 }
 
 void found_port_end_round(found_round *round)

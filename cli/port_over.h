@@ -23,8 +23,8 @@ mbm_port port_over(mbm_port *below, const mbm_port *real);
  * round. Without a round all calls pass. */
 
 typedef struct found_round {
-    uint64_t number; /* of the last round */
-    uint32_t began;  /* when, by CLOCK_MONOTONIC */
+    uint64_t number;  /* of the last round */
+    uint32_t beganUs; /* when, by CLOCK_MONOTONIC */
     int is_on;
 } found_round;
 
@@ -32,7 +32,7 @@ typedef struct found_port {
     mbm_port below;
     const found_round *round; /* that of the last wait; NULL before it */
     uint64_t empty_in;        /* the round in which it has no bytes; 0: none */
-    uint32_t time;            /* of the clock meanwhile */
+    uint32_t timeUs;          /* of the clock meanwhile */
 } found_port;
 
 /* Begins. Returns the port to use in place of the one below, whose clock is CLOCK_MONOTONIC; `port`

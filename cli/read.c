@@ -31,7 +31,7 @@ typedef struct reading {
     line at;
     place where;
     const char *address_text, *count_text;
-    uint32_t interval, rounds;
+    uint32_t intervalMs, rounds;
     int is_csv;
 
     /* The units, which are read one after another; `turn` is the index of the one at work. */
@@ -63,7 +63,7 @@ static void check_arguments(reading *r, const struct argp_state *state)
     if (r->count_text)
         r->count = (uint32_t)options_number(state, "COUNT", r->count_text, 1,
                                             is_text ? VALUE_LONGEST_TEXT : ADDRESSES);
-    if (r->rounds > 0 && r->interval == 0)
+    if (r->rounds > 0 && r->intervalMs == 0)
         options_wrong(state, "--times needs --every");
     if (r->is_csv && options.is_json)
         options_wrong(state, "--csv and --json exclude each other");
@@ -90,7 +90,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
 
     switch (key) {
     case 'u': r->unit_count = options_units(state, "--unit", text, r->units); return 0;
-    case EVERY: r->interval = options_time(state, "--every", text, 1, 86400000); return 0;
+    case EVERY: r->intervalMs = options_time(state, "--every", text, 1, 86400000); return 0;
     case TIMES:
         r->rounds = (uint32_t)options_number(state, "--times", text, 1, 1000000000);
         return 0;
@@ -372,7 +372,7 @@ static void show(reading *r, uint32_t round)
         print_json(r, time);
     else if (r->is_csv)
         print_csv(r, time);
-    else if (r->interval > 0 || r->unit_count > 1)
+    else if (r->intervalMs > 0 || r->unit_count > 1)
         print_table(r, round);
     else
         print_rows(r, 0);
@@ -442,7 +442,7 @@ static void read_rounds(reading *r)
         round++;
         failed += !right;
         /* If a round took longer than the interval, the next one follows at once. */
-        due += r->interval;
+        due += r->intervalMs;
         if ((int32_t)(due - line_milliseconds()) < 0)
             due = line_milliseconds();
         while (!report_stopped && !ferror(stdout) && round != r->rounds &&
@@ -471,13 +471,13 @@ int read_command(int argc, char **argv)
         return report(CODE_SYSTEM, REPORT_NO_MEMORY);
     if (line_open(&r->at, &r->where) != CODE_DONE)
         return report_code;
-    if (r->interval == 0 && line_connect(&r->at) != CODE_DONE) {
+    if (r->intervalMs == 0 && line_connect(&r->at) != CODE_DONE) {
         line_close(&r->at);
         return report_code;
     }
     if (r->is_csv)
         print_csv_head(r);
-    if (r->interval > 0) {
+    if (r->intervalMs > 0) {
         read_rounds(r);
     } else {
         (void)read_units(r, 0, &right);

@@ -43,8 +43,8 @@ typedef struct sniff {
     mbm_sniffer sniffer;
     uint8_t buffer[MBM_MAX_ASCII_FRAME];
     unsigned long totals[KINDS];
-    uint64_t first, now; /* microseconds that do not wrap, unlike the sniffer's */
-    uint64_t epoch;      /* the time of `first`, since 1970; of a recording 0 */
+    uint64_t firstUs, nowUs; /* they do not wrap, unlike the sniffer's */
+    uint64_t epochUs;        /* the time of `firstUs`, since 1970; for a recording 0 */
     uint32_t slowest;
 } sniff;
 
@@ -173,15 +173,16 @@ static void print_event(sniff *s, const mbm_event *event)
 {
     /* If several frames arrive in the first piece, the first ones ended before `first`. A recording
      * has no time before 1970. */
-    const int64_t time = (int64_t)(s->now - s->first) - (int64_t)((uint32_t)s->now - event->timeUs),
-                  since_1970 = (int64_t)s->epoch + time;
+    const int64_t time = (int64_t)(s->nowUs - s->firstUs) -
+                         (int64_t)((uint32_t)s->nowUs - event->timeUs),
+                  since_1970 = (int64_t)s->epochUs + time;
 
     trace_event(event, s->where.framing, s->where.text, since_1970 > 0 ? (uint64_t)since_1970 : 0);
     s->totals[event->kind]++;
     if (event->kind == MBM_EVENT_REPLY && event->responseTimeUs > s->slowest)
         s->slowest = event->responseTimeUs;
     if (options.is_json)
-        print_json(event, time, s->epoch ? (uint64_t)since_1970 : 0);
+        print_json(event, time, s->epochUs ? (uint64_t)since_1970 : 0);
     else
         print_text(event, time);
 }
@@ -191,8 +192,8 @@ static void print_events(sniff *s, uint64_t time)
 {
     mbm_event event;
 
-    s->now = time;
-    while (mbm_sniffer_next(&s->sniffer, (uint32_t)s->now, &event))
+    s->nowUs = time;
+    while (mbm_sniffer_next(&s->sniffer, (uint32_t)s->nowUs, &event))
         print_event(s, &event);
 }
 
@@ -202,8 +203,8 @@ static void feed(sniff *s, const uint8_t *bytes, uint16_t length)
 
     while (fed < length) {
         fed = (uint16_t)(fed + mbm_sniffer_feed(&s->sniffer, MBM_DIRECTION_BOTH, bytes + fed,
-                                                (uint16_t)(length - fed), (uint32_t)s->now));
-        print_events(s, s->now);
+                                                (uint16_t)(length - fed), (uint32_t)s->nowUs));
+        print_events(s, s->nowUs);
     }
 }
 
@@ -220,21 +221,21 @@ static int watch(sniff *s)
     if (code == CODE_DONE && place_is_tcp(&s->where))
         code = line_connect(&at);
     port = place_is_tcp(&s->where) ? mbm_tcp_port(&at.tcp) : mbm_tty_port(&at.tty);
-    s->first = clock_micros(CLOCK_MONOTONIC);
+    s->firstUs = clock_micros(CLOCK_MONOTONIC);
     if (code == CODE_DONE)
-        s->epoch = clock_micros(CLOCK_REALTIME);
+        s->epochUs = clock_micros(CLOCK_REALTIME);
     while (code == CODE_DONE && !report_stopped && !ferror(stdout)) {
         int length;
 
         line_wait(&at, -1, LIVE_STEP);
         length = port.read(port.context, bytes, sizeof bytes);
-        s->now = clock_micros(CLOCK_MONOTONIC);
+        s->nowUs = clock_micros(CLOCK_MONOTONIC);
         if (length > 0)
             feed(s, bytes, (uint16_t)length);
         else if (length < 0)
             code = report(CODE_LINE, "%s: the line was lost: %s", s->where.text,
                           report_error_text(place_is_tcp(&s->where) ? at.tcp.error : at.tty.error));
-        print_events(s, s->now);
+        print_events(s, s->nowUs);
         report_flush();
     }
     line_close(&at);
@@ -251,8 +252,8 @@ static int watch(sniff *s)
  * The time and the colon may be left out. `#` at the beginning of a line makes it a comment. */
 typedef struct recording {
     FILE *file;
-    unsigned line; /* the number of the last line, from 1 */
-    uint64_t time; /* of the last line, in microseconds */
+    unsigned line;   /* the number of the last line, from 1 */
+    uint64_t timeUs; /* of the last line */
     uint16_t length;
     uint8_t bytes[RECORDING_BYTES];
 } recording;
@@ -280,13 +281,14 @@ static const char *read_bytes(const char *text, recording *into)
 static const char *read_line(char *text, recording *into)
 {
     char *hex = strchr(text, ':'), *tail = hex;
-    const double time = hex ? strtod(text, &tail) * 1000.0 : (double)(into->time + RECORDING_STEP);
+    const double time =
+        hex ? strtod(text, &tail) * 1000.0 : (double)(into->timeUs + RECORDING_STEP);
 
     if (tail != hex)
         return "before the colon stands a time in milliseconds";
-    if (!(time >= (double)into->time && time < LAST_TIME))
+    if (!(time >= (double)into->timeUs && time < LAST_TIME))
         return "the time is not between that of the line before and 30 years";
-    into->time = (uint64_t)time;
+    into->timeUs = (uint64_t)time;
     return read_bytes(hex ? hex + 1 : text, into);
 }
 
@@ -308,12 +310,12 @@ static int read_record(recording *from, const char **wrong)
 /* Lets time pass and prints events, as on a line. */
 static void pass_time(sniff *s, uint64_t until)
 {
-    const uint64_t silent = s->now;
+    const uint64_t silent = s->nowUs;
 
-    while (s->now < until) {
-        const uint64_t step = s->now - silent < ALL_ENDED ? LOOK_STEP : SELDOM_STEP;
+    while (s->nowUs < until) {
+        const uint64_t step = s->nowUs - silent < ALL_ENDED ? LOOK_STEP : SELDOM_STEP;
 
-        print_events(s, until - s->now < step ? until : s->now + step);
+        print_events(s, until - s->nowUs < step ? until : s->nowUs + step);
     }
 }
 
@@ -325,14 +327,14 @@ static int replay(sniff *s)
 
     from.file = stdin;
     while (!report_stopped && (found = read_record(&from, &wrong)) > 0) {
-        pass_time(s, from.time);
+        pass_time(s, from.timeUs);
         feed(s, from.bytes, from.length);
     }
     if (ferror(stdin))
         return report(CODE_SYSTEM, "the recording: %s", strerror(errno));
     if (found < 0)
         return report(CODE_WRONG, "line %u of the recording: %s", from.line, wrong);
-    pass_time(s, s->now + ALL_ENDED);
+    pass_time(s, s->nowUs + ALL_ENDED);
     return CODE_DONE;
 }
 
@@ -434,7 +436,7 @@ int sniff_command(int argc, char **argv)
     begin(s);
     code = s->is_recording ? replay(s) : watch(s);
     /* A line that could not be opened has nothing to sum up. */
-    if (!options.is_quiet && (code == CODE_DONE || s->epoch))
+    if (!options.is_quiet && (code == CODE_DONE || s->epochUs))
         fprintf(stderr,
                 "%s: requests: %lu, replies: %lu, exceptions: %lu, unpaired: %lu, timeouts: %lu, "
                 "bad CRCs: %lu, noise: %lu times, slowest reply: %.1f ms.\n",
