@@ -191,7 +191,8 @@ pub(crate) unsafe fn check<O: CObject>(object: *const O) -> Status {
 }
 
 /// As [`check`], inlined: for a function that is, in most images, the only one of its
-/// object's type that checks.
+/// object's type that checks. With `check` for all, a server takes 12 bytes more on a Cortex-M0+,
+/// and a master 16.
 ///
 /// # Safety
 /// As for [`check`].

@@ -11,9 +11,6 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Makes the settings `retries`, `echo_discard` and `post_flush_characters` effective.
     pub fn use_extras(&mut self) {
         self.extras = Some(Engine::extras);
-        if self.extension.is_none() {
-            self.extension = self.extras;
-        }
     }
 
     /// See [`super::Extension`].
@@ -63,7 +60,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     fn repeat_if_allowed(&mut self) -> bool {
         let retries = self.settings.retries;
         let is_final = self.seen.is_response() || self.seen == Finding::TOO_LONG;
-        if !Q::HAS_FIXED_REPLY || self.retries >= retries || is_final {
+        if !Q::IS_REPEATED || self.retries >= retries || is_final {
             return false;
         }
         self.retries += 1;

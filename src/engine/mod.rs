@@ -140,9 +140,8 @@ pub struct Engine<P, S: Storage, Q> {
     pub(crate) request: Q,
     /// Times and options of the requests.
     pub settings: Settings,
-    /// The function that the engine calls at the moments of a request: `extras`, or `lenient`,
-    /// which calls `extras` in turn.
-    pub(crate) extension: Option<Extension<P, S, Q>>,
+    /// What accepts deviating replies, and calls `extras` in turn; `None` if nothing does.
+    lenient: Option<Extension<P, S, Q>>,
     /// Retries, echo discarding and the post-flush hold (see `extras`).
     pub(crate) extras: Option<Extension<P, S, Q>>,
 }
@@ -214,17 +213,12 @@ const _: () = {
 impl<P, S: Storage, Q> Engine<P, S, Q> {
     /// True if deviating replies are accepted.
     pub fn is_lenient(&self) -> bool {
-        let address = |extension: Option<Extension<P, S, Q>>| extension.map_or(0, |f| f as usize);
-        address(self.extension) != address(self.extras)
+        self.lenient.is_some()
     }
 
     /// Sets what [`Engine::lenient`] returns, for later requests. Call it only while no request
     /// is pending.
     pub fn set_lenient(&mut self, lenient: Option<Extension<P, S, Q>>) {
-        self.extension = if lenient.is_some() {
-            lenient
-        } else {
-            self.extras
-        };
+        self.lenient = lenient;
     }
 }

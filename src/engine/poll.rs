@@ -107,7 +107,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             port,
             request: Q::NONE,
             tally: Some(Engine::count),
-            extension: Some(Engine::extras),
+            lenient: None,
             extras: Some(Engine::extras),
             settings: Settings::DEFAULT,
         }
@@ -355,8 +355,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// moment.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn run_extension(&mut self, moment: Moment) -> bool {
-        self.extension
-            .is_some_and(|extension| extension(self, moment))
+        let extension = match Q::MAY_DEVIATE {
+            true => self.lenient.or(self.extras),
+            false => self.extras,
+        };
+        extension.is_some_and(|extension| extension(self, moment))
     }
 
     /// Cancels the request and switches the driver off. If the request was sent completely,

@@ -5,6 +5,7 @@ use crate::error::Status;
 use crate::frame::checksum::crc16;
 use crate::frame::rtu;
 use crate::port::Port;
+use crate::time::add_characters;
 
 impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Starts the request to `unit`; the calls of `poll` send it. A refused request sends
@@ -26,7 +27,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.unit = unit;
         self.function = self.request.function();
         self.length = self.request.reply_length();
-        if Q::HAS_FIXED_REPLY {
+        if Q::IS_REPEATED {
             self.retries = 0;
         }
         self.begin()
@@ -159,15 +160,10 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Extends the wait by `count` characters of `character` microseconds. (An AVR would need 84
-    /// bytes of libgcc for a product of 32 bits.)
+    /// Extends the wait by `count` characters of `character` microseconds.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn wait_for_characters(&mut self, character: u16, count: S::Count) {
-        let mut left = count;
-        while left > S::Count::ZERO {
-            self.wait = self.wait.wrapping_add(character.into());
-            left -= 1u8.into();
-        }
+        add_characters(&mut self.wait, count, character);
     }
 }
 

@@ -9,9 +9,16 @@ pub trait Transaction<P, S: Storage>: Sized {
     /// No request.
     const NONE: Self;
 
-    /// True if the request determines the length of its reply, and the engine repeats the
-    /// request as its settings say.
+    /// True if every request determines the length of its reply.
     const HAS_FIXED_REPLY: bool;
+
+    /// True if the engine repeats a request as its settings say; false if the queue of a client
+    /// does.
+    const IS_REPEATED: bool;
+
+    /// True if deviating replies may be accepted. Without this constant, clients take 18 bytes more
+    /// on an AVR.
+    const MAY_DEVIATE: bool;
 
     /// The function code.
     fn function(&self) -> u8;

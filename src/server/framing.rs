@@ -1,7 +1,7 @@
 //! How each framing finds a request in the received bytes, and encodes a response.
 
 use super::indication::{SERIAL, STREAM};
-use super::line::{EncodeAdu, Receive, Server, ServerStorage};
+use super::line::{Receive, Server, ServerStorage};
 use super::{Indication, Reply, Units};
 use crate::error::{Error, Status};
 use crate::frame::ascii::{CharacterKind, Decoded};
@@ -258,11 +258,11 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.found_frame(end - start)
     }
 
-    /// True for RTU frames on a serial line. A silence of t3.5 ends them.
-    pub fn is_rtu_line(&self) -> bool {
-        let rtu: EncodeAdu<P, B> = Self::encode_rtu;
-        let is_rtu = |encode_adu| core::ptr::fn_addr_eq(encode_adu, rtu);
-        self.request.is_serial() && self.encode_adu.is_some_and(is_rtu)
+    /// True for RTU frames on a serial line. A silence of t3.5 ends them. A buffer has less space
+    /// for the PDU of an ASCII frame.
+    pub fn is_rtu_line(&mut self) -> bool {
+        let space = self.storage.capacity().wrapping_sub(rtu::OVERHEAD);
+        self.request.is_serial() && self.request.space == space as u16
     }
 
     /// Says whether the receiver gets the bytes that the driver sends. If so, the server drops a frame

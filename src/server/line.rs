@@ -338,7 +338,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         received
     }
 
-    /// As [`Server::read_bytes`], for the framings other than RTU. It is not inlined.
+    /// As [`Server::read_bytes`], for the framings other than RTU. It is not inlined. With one
+    /// function for all, a server takes 52 bytes more on a Cortex-M0+ and 100 on an AVR.
     #[inline(never)]
     pub(super) fn read_bytes_not_inlined(&mut self, until: usize) -> isize {
         self.read_bytes(until, usize::from(self.request.head) == rtu::PDU)
@@ -355,8 +356,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn wait_for(&mut self, count: usize, start: u32) {
         self.is_waiting = true;
-        let latest = start.wrapping_add(self.receive_latency);
-        self.deadline = time::after_characters(latest, count + FIFO_TIMEOUT, &self.character);
+        self.deadline = start.wrapping_add(self.receive_latency);
+        time::add_characters(&mut self.deadline, count + FIFO_TIMEOUT, self.character);
     }
 
     /// Notes that the line has no echo: after a response, another frame than its echo has come,
@@ -464,7 +465,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.answer_served(reply.or_illegal())
     }
 
-    /// As [`Server::answer`], for a request that a service has served.
+    /// As [`Server::answer`], for a reply other than [`Reply::NOT_HANDLED`]. With one function for
+    /// both, a server takes 8 bytes more on a Cortex-M0+ and 10 on an AVR.
     #[doc(hidden)]
     #[cfg_attr(target_os = "none", inline(always))]
     pub fn answer_served(&mut self, reply: Reply) -> bool {

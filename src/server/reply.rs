@@ -86,7 +86,7 @@ impl Reply {
         self.or_illegal().write_served_exception(pdu)
     }
 
-    /// As [`Reply::write_exception`], for a request that a service has served.
+    /// As [`Reply::write_exception`], for a reply other than [`Reply::NOT_HANDLED`].
     #[inline(always)]
     pub(super) fn write_served_exception(self, pdu: &mut [u8]) -> usize {
         if self.0 & 0x0100 == 0 {

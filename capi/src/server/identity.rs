@@ -6,6 +6,9 @@ use super::{mbm_service, mbm_unit};
 use crate::packet::mbm_object;
 use crate::pointers::slice_or_empty;
 use core::ffi::c_void;
+use mbm::pdu::functions::{
+    ENCAPSULATED_INTERFACE_TRANSPORT, READ_EXCEPTION_STATUS, REPORT_SERVER_ID,
+};
 use mbm::server::identity::{self, Objects};
 
 /// The eight exception status outputs of function 07. Initialise the struct with MBM_INIT and
@@ -119,12 +122,12 @@ functions! {
     ///
     /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
     fn mbm_unit_serveExceptionStatus(status: *mut mbm_exceptionStatus)
-        = add_only(status.cast(), serve_exception_status);
+        = add_only(status.cast(), READ_EXCEPTION_STATUS, serve_exception_status);
 
     /// Serves function 11 (hex), Report Server ID.
     ///
     /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
-    fn mbm_unit_serveServerId(id: *mut mbm_serverId) = add_only(id.cast(), serve_server_id);
+    fn mbm_unit_serveServerId(id: *mut mbm_serverId) = add_only(id.cast(), REPORT_SERVER_ID, serve_server_id);
 
     /// Serves function 2B/0E (hex), Read Device Identification: streams of objects, and
     /// single objects. If the objects do not fit into one response, the client reads the rest
@@ -133,5 +136,5 @@ functions! {
     ///
     /// @return a status; see mbm_unit_serveFiles. MBM_BUSY if the unit serves another such record
     fn mbm_unit_serveIdentification(identification: *mut mbm_serverIdentification)
-        = add_only(identification.cast(), serve_identification);
+        = add_only(identification.cast(), ENCAPSULATED_INTERFACE_TRANSPORT, serve_identification);
 }

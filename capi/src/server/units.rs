@@ -97,19 +97,21 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
 }
 
 /// As [`add`], for a family of records of which a unit serves only one: the unit would never
-/// call a second one. Returns [`Status::BUSY`] for it.
+/// call a second one. No other family has records of this `kind`. Returns [`Status::BUSY`] for it.
 ///
 /// # Safety
 /// As for [`add`].
-pub(super) unsafe fn add_only(unit: *mut mbm_unit, service: *mut mbm_service, serve: Serve) -> u8 {
-    let is_other = |known: *mut mbm_service| {
-        let same = |other| core::ptr::fn_addr_eq(other, serve);
-        known != service && (*known).serve.is_some_and(same)
-    };
+pub(super) unsafe fn add_only(
+    unit: *mut mbm_unit,
+    service: *mut mbm_service,
+    kind: u8,
+    serve: Serve,
+) -> u8 {
+    let is_other = |known: *mut mbm_service| known != service && (*known).kind == kind;
     if !unit.is_null() && Services::new(unit).any(is_other) {
         return Status::BUSY.code();
     }
-    add(unit, service, serve)
+    add_as(unit, service, kind, serve).code()
 }
 
 /// The services of a unit, one after the other, up to the first free place. The code that
