@@ -65,7 +65,7 @@ MCUS := $(shell scripts/build/archive --list)
 archives: ## Build the archives for microcontrollers, build/archives
 	@scripts/build/archive --packages $(MCUS)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
-	@scripts/check/archive
+	@scripts/check/archive $(MCUS)
 	@scripts/check/stack >build/stack.txt && tail -n 1 build/stack.txt
 
 .PHONY: install
@@ -130,14 +130,18 @@ format: ## Format Rust, C and C++ as `make check` requires
 
 # One job more than processors, because the tests in Rust often wait for peers.
 JOBS ?= $(shell echo $$(($$(nproc) + 1)))
-BUILDS := plain sanitized valgrind
+BUILDS := plain sanitized
 # The programs in valgrind come first, because they take the longest.
 PROGRAMS = $(foreach build,$(filter valgrind,$(BUILDS)) $(filter-out valgrind,$(BUILDS)),$(TESTS:%=$(BUILD)/$(build)/%))
 
 .PHONY: test
-test: need-test ## Run every test: Rust, C and C++, also with sanitizers and in valgrind
+test: need-test ## Run every test: Rust, C and C++, also with sanitizers. BUILDS=valgrind runs C and C++ in valgrind
 	@rm -rf $(BUILD)/tests
 	@$(MAKE) --no-print-directory --keep-going -j$(JOBS) build-rust test-rust run-c-tests; scripts/check/test-totals
+
+.PHONY: nightly
+nightly: ## Run what .ci/run leaves out: valgrind, all archives, QEMU, fuzzing, packages, the site in a browser; prints the time of each step
+	@.ci/nightly
 
 .PHONY: test-c
 test-c: need-test ## Run only C and C++: TESTS="test_ring test_bits" BUILDS="plain valgrind" TEST=one_test
@@ -167,8 +171,8 @@ coverage-tests: $(TESTS:%=$(BUILD)/coverage/%)
 venv: ## Create the Python environment for tests/peer, build/venv
 	@scripts/venv
 
-.PHONY: miri
-miri: ## Check the hooks against Rust's aliasing rules, with Miri of the nightly toolchain
+.PHONY: test-miri
+test-miri: ## Check the hooks against Rust's aliasing rules, with Miri of the nightly toolchain
 	@$(CARGO) +nightly miri test --quiet --package mbm-c --test reentry
 	@MIRIFLAGS=-Zmiri-tree-borrows $(CARGO) +nightly miri test --quiet --package mbm-c --test reentry
 
@@ -346,8 +350,8 @@ $(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure_server mbm_tls mbm_tls_i
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections $(TLS_LIBS) -o $@
 UDP := $(BUILD)/plain/linux/udp
 
-.PHONY: secure
-secure: tool ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
+.PHONY: test-secure
+test-secure: tool ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
 	@scripts/need python3 python3-venv gcc libc6-dev libmbedtls-dev openssl
 	@$(MAKE) --no-print-directory venv certificates $(SECURE)
 	@$(BUILD)/venv/bin/python scripts/check/examples secure $(BUILD)/plain $(BUILD)/certificates
@@ -358,20 +362,20 @@ measure-secure: ## Measure what handshakes cost other clients of that server, an
 	@$(MAKE) --no-print-directory certificates $(SECURE)
 	@python3 scripts/bench/secure $(SECURE) $(BUILD)/certificates
 
-.PHONY: udp
-udp: ## Build and check the example over UDP, build/plain/linux/udp
+.PHONY: test-udp
+test-udp: ## Build and check the example over UDP, build/plain/linux/udp
 	@scripts/need python3 python3-venv gcc libc6-dev
 	@$(MAKE) --no-print-directory venv $(UDP)
 	@$(BUILD)/venv/bin/python scripts/check/examples udp $(BUILD)/plain
 
-.PHONY: keep-link
-keep-link: ## Show a client whose connection opens itself again, while a libmodbus server goes and comes back
+.PHONY: test-keep-link
+test-keep-link: ## Show a client whose connection opens itself again, while a libmodbus server goes and comes back
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/keep_link $(PEERS)
 	@scripts/check/examples keep_link $(BUILD)/plain
 
-.PHONY: sniff
-sniff: tool ## Check the command that watches a bus, `mbm sniff`
+.PHONY: test-sniff
+test-sniff: tool ## Check the command that watches a bus, `mbm sniff`
 	@scripts/need python3
 	@scripts/check/sniff $(BUILD)/plain
 
@@ -381,8 +385,8 @@ SERVE_MANY := $(BUILD)/plain/serve_many
 $(SERVE_MANY): $(patsubst %,$(BUILD)/plain/%.o,serve_many support/server support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) -lmodbus -lpthread -o $@
 
-.PHONY: many-devices
-many-devices: ## Poll DEVICES (1000) for MANY_SECONDS (20) in one process, while a third of their libmodbus servers goes and comes
+.PHONY: test-many-devices
+test-many-devices: ## Poll DEVICES (1000) for MANY_SECONDS (20) in one process, while a third of their libmodbus servers goes and comes
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/many_devices $(SERVE_MANY)
 	@scripts/check/examples many_devices $(BUILD)/plain $(DEVICES) $(MANY_SECONDS)
@@ -428,14 +432,14 @@ test-tool: man ## Test that tool, also with the sanitizers, on other clients, se
 	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(BUILD)/plain/linux/calls $(PEERS)
 	@$(BUILD)/venv/bin/python -B -m pytest -c tests/tool/pytest.ini --rootdir tests/tool tests/tool $(if $(ONLY),-k "$(ONLY)")
 
-.PHONY: trace
-trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
+.PHONY: test-trace
+test-trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
 	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv tool $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
 
-.PHONY: gateway
-gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients and devices of libmodbus and pymodbus
+.PHONY: test-gateway
+test-gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients and devices of libmodbus and pymodbus
 	@scripts/need python3 python3-venv gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev strace
 	@$(MAKE) --no-print-directory venv tool $(BUILD)/sanitized/mbm $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain $(BUILD)/sanitized/mbm
@@ -453,8 +457,8 @@ plan: tool ## A plan of ten fields at work against a libmodbus server
 	@$(MAKE) --no-print-directory $(PEERS)
 	@scripts/check/examples plan $(BUILD)/plain
 
-.PHONY: mqtt
-mqtt: ## Show and check the bridge to MQTT, `mbm bridge`, on a libmodbus server and a mosquitto broker
+.PHONY: test-mqtt
+test-mqtt: ## Show and check the bridge to MQTT, `mbm bridge`, on a libmodbus server and a mosquitto broker
 	@scripts/need gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev python3 mosquitto mosquitto-clients openssl
 	@$(MAKE) --no-print-directory tool $(BUILD)/sanitized/mbm $(PEERS)
 	@scripts/check/mqtt $(BUILD)/plain $(BUILD)/sanitized/mbm
@@ -498,8 +502,8 @@ include firmware-tests/qemu/qemu.mk
 # The packages in dist/, and releases.
 include packaging/packaging.mk
 
-.PHONY: firmware-test
-firmware-test: ## Run firmware on simulated chips against a libmodbus server
-	@$(MAKE) --no-print-directory firmware-test-avr
-	@$(MAKE) --no-print-directory firmware-test-qemu
-	@echo "firmware-test: sketches on AVR boards and bare metal on QEMU work"
+.PHONY: test-firmware
+test-firmware: ## Run firmware on simulated chips against a libmodbus server
+	@$(MAKE) --no-print-directory test-firmware-avr
+	@$(MAKE) --no-print-directory test-firmware-qemu
+	@echo "test-firmware: sketches on AVR boards and bare metal on QEMU work"

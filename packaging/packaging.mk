@@ -3,7 +3,7 @@
 # Each processor's archive. scripts/build/archive lets builds wait that share a folder, so `make -j`
 # builds the others at the same time. The first ones share no folder.
 APART := atmega328p atmega2560 cortex-m0plus cortex-m3 riscv32imc esp8266 esp32 cortex-m4 cortex-m33 riscv32imac
-MCU_BUILDS := $(patsubst %,build-archive-%,$(APART) $(filter-out $(APART),$(MCUS)))
+MCU_BUILDS := $(patsubst %,build-archive-%,$(filter $(MCUS),$(APART)) $(filter-out $(APART),$(MCUS)))
 .PHONY: $(MCU_BUILDS)
 $(MCU_BUILDS): build-archive-%:
 	+@scripts/build/archive $*

@@ -144,8 +144,8 @@ $(AVR_TESTS) $(TIMING): %: %.o $(AVR_SUPPORT)
 .PHONY: avr-tests
 avr-tests: $(AVR_TESTS)
 
-.PHONY: firmware-test-avr
-firmware-test-avr: need-avr
+.PHONY: test-firmware-avr
+test-firmware-avr: need-avr
 	@$(MAKE) -s --no-print-directory avr-sketches avr-tests
 	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(AVR_TESTS)
 
@@ -153,8 +153,8 @@ UPSTREAM_TEST := $(BUILD)/avr-tests/upstream
 UPSTREAM_WIRE := $(BUILD)/avr-tests/upstream_wire
 $(UPSTREAM_TEST) $(UPSTREAM_WIRE): %: %.o $(BUILD)/avr-tests/upstream_device.o $(AVR_SUPPORT)
 	@gcc $^ -lsimavr -lelf -lmodbus -lcmocka -lpthread -o $@
-.PHONY: firmware-test-upstream
-firmware-test-upstream: need-avr library-stamp ## The examples of ModbusMaster, in the folder SKETCHES, on simulated boards
+.PHONY: test-firmware-upstream
+test-firmware-upstream: need-avr library-stamp ## The examples of ModbusMaster, in the folder SKETCHES, on simulated boards
 	@$(MAKE) -s --no-print-directory $(UPSTREAM_TEST) \
 		$(foreach board,$(UPSTREAM_BOARDS),$(UPSTREAM:%=$(AVR_OUT)/$(board)/%.elf))
 	@MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(UPSTREAM_TEST)

@@ -19,15 +19,15 @@ $(QEMU_TESTS) $(RUST_QEMU_TEST): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(
 # The images with the library as assembler source.
 FROM_SOURCE := $(BUILD)/baremetal-source
 
-.PHONY: firmware-test-rust
-firmware-test-rust: ## Run firmware in Rust on a Cortex-M7 in QEMU, over the traits of embedded-io
+.PHONY: test-firmware-rust
+test-firmware-rust: ## Run firmware in Rust on a Cortex-M7 in QEMU, over the traits of embedded-io
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm gcc-arm-none-eabi
 	@CARGO="$(CARGO)" examples/rust/build $(BUILD)/baremetal/mps2-an500/rust.elf
 	@$(MAKE) -s --no-print-directory $(RUST_QEMU_TEST)
 	@scripts/check/run-c-tests $(RUST_QEMU_TEST)
 
-.PHONY: firmware-test-qemu
-firmware-test-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, RISC-V, Xtensa
+.PHONY: test-firmware-qemu
+test-firmware-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, RISC-V, Xtensa
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm qemu-system-misc \
 		gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-xtensa-lx106 clang-22 llvm-22
 	@set -e; for machine in $(MACHINES); do \
@@ -45,7 +45,7 @@ firmware-test-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, R
 	for machine in $(MACHINES); do build $$machine main; build $$machine serve; done; \
 	for variant in $(VARIANTS); do build $$variant main; done
 	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
-	@$(MAKE) -s --no-print-directory firmware-test-rust
+	@$(MAKE) -s --no-print-directory test-firmware-rust
 	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
 	@MBM_FIRMWARE=$(FROM_SOURCE) MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
-	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire; from archives, and from assembler source"
+	@echo "test-firmware-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire; from archives, and from assembler source"

