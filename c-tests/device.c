@@ -1,6 +1,6 @@
 /* A program from the header that mbm header writes: a client with a plan, and a server with its
- * tables. tests/tool/test_header.py compiles it for each device of examples/devices and holds it against
- * mbm serve and mbm poll.
+ * tables. tests/tool/test_header.py compiles it for each device of examples/devices and holds it
+ * against mbm serve and mbm poll.
  *
  *     device poll HOST PORT     reads every field once, and prints the values of each in a line
  *     device serve PORT         serves the values of the device file; PORT 0 takes a free one
