@@ -296,9 +296,8 @@ SIM_TEST(a_whole_reply_longer_than_the_frame_buffer_ends_the_request_at_once)
 SIM_TEST(a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception)
 {
     char reply[600] = "11 03 84";
-    buffers b;
 
-    b = give_buffers(s, 64, 64, MBM_FRAME_BYTES(64));
+    buffers b = give_buffers(s, 64, 64, MBM_FRAME_BYTES(64));
     sim_answer(s, 1, 500, "11 83 02 +");
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_readHoldingRegisters(n, 0, 66));
     sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
@@ -315,9 +314,7 @@ SIM_TEST(a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception)
 
 SIM_TEST(a_reply_longer_than_the_response_words_changes_none)
 {
-    buffers b;
-
-    b = give_buffers(s, 2, 0, 256);
+    buffers b = give_buffers(s, 2, 0, 256);
     sim_answer(s, 1, 500, "11 03 06 11 11 22 22 33 33 +");
     IS(MBM_BUFFER_TOO_SMALL, mbm_node_readHoldingRegisters(n, 0, 3));
     IS(MBM_BUFFER_TOO_SMALL, mbm_node_status(n));
@@ -336,9 +333,7 @@ SIM_TEST(a_reply_longer_than_the_response_words_changes_none)
 
 SIM_TEST(writes_beyond_the_transmit_words_return_3_and_nothing_is_sent)
 {
-    buffers b;
-
-    b = give_buffers(s, 2, 2, 256);
+    buffers b = give_buffers(s, 2, 2, 256);
     IS(3, mbm_node_writeMultipleRegisters(n, 0, 3));
     IS(3, mbm_node_writeMultipleCoils(n, 0, 33));
     IS(3, mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, 3));
@@ -352,9 +347,7 @@ SIM_TEST(writes_beyond_the_transmit_words_return_3_and_nothing_is_sent)
 
 SIM_TEST(single_writes_need_no_transmit_words)
 {
-    buffers b;
-
-    b = give_buffers(s, 0, 0, 16);
+    buffers b = give_buffers(s, 0, 0, 16);
     sim_answer(s, 1, 500, "11 06 00 01 12 34 +");
     OK(mbm_node_writeSingleRegister(n, 1, 0x1234));
     sim_answer(s, 1, 500, "11 16 00 01 12 34 56 78 +");
@@ -366,9 +359,7 @@ SIM_TEST(single_writes_need_no_transmit_words)
 
 SIM_TEST(a_frame_buffer_of_64_kilobytes_works)
 {
-    buffers b;
-
-    b = give_buffers(s, 125, 123, 65535);
+    buffers b = give_buffers(s, 125, 123, 65535);
     sim_answer(s, 1, 500, "00 00 / 11 03 02 12 34 +");
     OK(mbm_node_readHoldingRegisters(n, 1, 1));
     free_buffers(s, b);

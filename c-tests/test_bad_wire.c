@@ -31,12 +31,11 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
 {
     responder device;
     node n;
-    mbm_port port;
     uint8_t first = MBM_OK, status;
 
     fault_start(&device, f);
     node_begin(&n, device.line.ours, FAULT_UNIT);
-    port = mbm_tty_port(&n.tty);
+    mbm_port port = mbm_tty_port(&n.tty);
     port = fault_port(&device, &port);
     mbm_line_beginRtu(&n.line, &port, n.frame, MBM_MAX_FRAME);
     mbm_node_setResponseTimeout(&n.node, 400);

@@ -351,11 +351,10 @@ TEST(a_request_that_done_queues_again_is_waited_for)
 TEST(a_call_that_cannot_go_on_is_refused)
 {
     static mbm_client idle;
-    mbm_caller wrong;
 
     begin_on_pair();
     IS(MBM_INVALID_ARGUMENT, mbm_call(NULL, MBM_PENDING));
-    wrong = caller;
+    mbm_caller wrong = caller;
     wrong.client = NULL;
     IS(MBM_INVALID_ARGUMENT, mbm_call(&wrong, MBM_PENDING));
     wrong = caller;

@@ -132,13 +132,12 @@ static uint8_t reads(uint16_t address)
 /* Microseconds from the call whose reply is lost to the first good value. */
 static int64_t time_to_hear_it_again(void)
 {
-    int64_t began;
     uint16_t address;
 
     for (address = 0; address < 5; address++)
         OK(reads(address));
     lost = requests + 1;
-    began = clock_now;
+    int64_t began = clock_now;
     IS(MBM_RESPONSE_TIMED_OUT, reads(address++));
     while (reads(address++) != MBM_OK)
         assert_true(address < 1000);

@@ -311,7 +311,6 @@ TEST(a_broadcast_arrives_and_the_delay_after_it_is_kept)
 {
     mbm_clientUnit units[1] = {{0}};
     mbm_clientRequest r = asker_request(0, NULL, 0, NULL);
-    uint32_t begun;
     server s;
 
     server_start(&s, UNIT);
@@ -323,7 +322,7 @@ TEST(a_broadcast_arrives_and_the_delay_after_it_is_kept)
     OK(mbm_client_setUnits(&a.client, units, 1));
     r.unit = UNIT;
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
-    begun = a.port.micros(a.port.context);
+    uint32_t begun = a.port.micros(a.port.context);
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
     assert_true(a.port.micros(a.port.context) - begun >= 49000);
     assert_int_equal(units[0].requests, 2);

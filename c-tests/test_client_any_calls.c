@@ -197,7 +197,6 @@ static void queue_any(void)
 {
     unsigned i = chance(REQUESTS);
     mbm_clientRequest *r = &jobs[i].request;
-    uint8_t status;
 
     if (jobs[i].pending) {
         assert_int_equal(queue_one(r), MBM_BUSY);
@@ -211,7 +210,7 @@ static void queue_any(void)
     r->reply = chance(10) ? jobs[i].reply : NULL;
     r->replyBytes = chance(5) ? sizeof jobs[i].reply : any(10);
     r->transaction = chance(2) ? 0 : any(30);
-    status = queue_one(r);
+    uint8_t status = queue_one(r);
     assert_int_equal(r->status, status);
     jobs[i].pending = status == MBM_PENDING;
 }

@@ -65,10 +65,8 @@ static void send_read(void)
 /* The milliseconds after which a request that was sent ends without a reply. */
 static uint32_t time_of_read(void)
 {
-    uint32_t sent;
-
     send_read();
-    sent = m.now;
+    uint32_t sent = m.now;
     IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, STEPS));
     return (m.now - sent) / MS;
 }
@@ -167,10 +165,8 @@ TEST(a_record_with_a_unit_or_a_timeout_that_is_too_large_is_refused)
 /* How often a read is sent that gets no reply. */
 static unsigned sendings(void)
 {
-    size_t one;
-
     send_read();
-    one = m.sent_count;
+    size_t one = m.sent_count;
     IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, STEPS));
     assert_int_equal(m.sent_count % one, 0);
     return (unsigned)(m.sent_count / one);

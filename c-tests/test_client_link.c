@@ -176,7 +176,6 @@ TEST(any_random_function_gives_the_whole_range_of_jitter)
 TEST(the_transaction_identifier_on_the_wire_can_be_read)
 {
     mbm_clientRequest other = {0};
-    uint16_t first;
 
     begin(MBM_FRAMING_TCP);
     assert_int_equal(mbm_client_wireTransaction(&request), 0);
@@ -193,7 +192,7 @@ TEST(the_transaction_identifier_on_the_wire_can_be_read)
     IS(MBM_PENDING, mbm_client_readCoils(&client, &other, 0, 1));
     memory_port_send(&m, &client);
     assert_int_equal(m.sent_count, 24);
-    first = mbm_client_wireTransaction(&request);
+    uint16_t first = mbm_client_wireTransaction(&request);
     assert_int_equal(first, m.sent[0] << 8 | m.sent[1]);
     assert_int_equal(mbm_client_wireTransaction(&other), m.sent[12] << 8 | m.sent[13]);
     assert_int_not_equal(first, mbm_client_wireTransaction(&other));

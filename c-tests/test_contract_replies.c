@@ -113,10 +113,8 @@ SIM_TEST(the_most_specific_failure_is_reported)
 
 SIM_TEST(a_bad_crc_fails_after_t35_and_not_after_the_timeout)
 {
-    uint64_t over;
-
     assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
-    over = s->frames[0].end + 500 + 7 * s->character;
+    uint64_t over = s->frames[0].end + 500 + 7 * s->character;
     assert_in_range(s->now, over + 4000, over + 4100);
 }
 
@@ -124,9 +122,8 @@ SIM_TEST(all_125_registers_and_2000_bits_are_readable)
 {
     uint8_t reply[256];
     char text[1024];
-    unsigned at;
 
-    at = (unsigned)snprintf(text, sizeof text, "11 03 FA ");
+    unsigned at = (unsigned)snprintf(text, sizeof text, "11 03 FA ");
     for (unsigned i = 0; i < 250; i++)
         at += (unsigned)snprintf(text + at, sizeof text - at, "%02X ", i);
     snprintf(text + at, sizeof text - at, "+");
@@ -268,11 +265,9 @@ SIM_TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second)
  * first call ends, its reply must not become the second call's data. */
 SIM_TEST(a_reply_after_noise_and_a_pause_is_not_taken_for_the_next)
 {
-    uint8_t status;
-
     sim_answer(s, 1, 500, "11 03 02 00 00 00 00");
     sim_answer(s, 1, 6500, "11 03 02 11 11 +");
-    status = mbm_node_readHoldingRegisters(n, 100, 1);
+    uint8_t status = mbm_node_readHoldingRegisters(n, 100, 1);
     assert_true(status == MBM_OK || status == MBM_INVALID_CRC);
     sim_answer(s, 1, 5000, "11 03 02 22 22 +");
     if (mbm_node_readHoldingRegisters(n, 200, 1) == MBM_OK)

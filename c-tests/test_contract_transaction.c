@@ -213,22 +213,18 @@ SIM_TEST(the_gap_counts_from_the_last_byte_sent)
 
 SIM_TEST(a_gap_that_has_passed_already_is_not_waited_for)
 {
-    uint64_t asked;
-
     sim_reads(s, 500);
     s->now += 10000;
-    asked = s->now;
+    uint64_t asked = s->now;
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].begin - asked, 0);
 }
 
 SIM_TEST(line_used_makes_the_gap_count_from_now)
 {
-    uint64_t asked;
-
     sim_reads(s, 500);
     s->now += 10000;
-    asked = s->now;
+    uint64_t asked = s->now;
     OK(mbm_line_used(&s->line));
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].begin - asked, 4000);
@@ -244,11 +240,9 @@ SIM_TEST(idle_is_not_called_while_bytes_wait)
 
 SIM_TEST(no_gap_is_waited_for_after_begin_on_a_silent_line)
 {
-    uint64_t asked;
-
     s->now += 10000;
     sim_begin(s, 17);
-    asked = s->now;
+    uint64_t asked = s->now;
     sim_reads(s, 500);
     sim_assert_time(s->frames[0].begin - asked, 0);
     /* After a request of the object on that line the gap is kept. */
@@ -268,11 +262,9 @@ SIM_TEST(bytes_that_arrive_after_begin_start_the_gap)
 
 SIM_TEST(the_gap_counts_from_the_reported_use_of_the_line)
 {
-    uint64_t asked;
-
     sim_reads(s, 500);
     s->now += 10000;
-    asked = s->now;
+    uint64_t asked = s->now;
     OK(mbm_line_usedAt(&s->line, (uint32_t)s->now - 3000));
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].begin - asked, 1000);
@@ -284,12 +276,10 @@ SIM_TEST(the_gap_counts_from_the_reported_use_of_the_line)
 
 SIM_TEST(a_reported_use_counts_also_after_40_minutes_without_one)
 {
-    uint64_t asked;
-
     sim_reads(s, 500);
     s->now += 40ull * 60 * 1000000;
     s->limit = s->now + 1000000;
-    asked = s->now;
+    uint64_t asked = s->now;
     OK(mbm_line_usedAt(&s->line, (uint32_t)s->now - 3000));
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].begin - asked, 1000);

@@ -77,10 +77,8 @@ SIM_TEST(a_long_idle_while_a_reply_arrives_is_tolerated)
 
 SIM_TEST(the_quiet_time_is_kept_after_a_timeout)
 {
-    uint64_t failed;
-
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
-    failed = s->now;
+    uint64_t failed = s->now;
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].begin - failed, 100000);
     /* This request's reply was held, see test_late_replies.c. After a held reply there is
@@ -98,11 +96,9 @@ SIM_TEST(the_quiet_time_is_kept_after_a_timeout)
 /* It is the reply that the quiet time waits for. */
 SIM_TEST(a_reply_in_the_quiet_time_is_dropped_and_ends_it)
 {
-    uint64_t failed;
-
     sim_answer(s, 1, 2050000, "11 03 02 66 66 +");
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
-    failed = s->now;
+    uint64_t failed = s->now;
     sim_reads(s, 500);
     assert_true(s->frames[1].begin >= failed + 50000);
     sim_assert_time(s->frames[1].silence, 4000);
@@ -279,8 +275,6 @@ SIM_TEST(a_reply_behind_400_bytes_is_found_by_polls_without_a_wait)
 
 SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout)
 {
-    uint64_t begin;
-
     OK(mbm_node_setBlocking(n, 0));
     OK(mbm_node_setResponseTimeout(n, 500));
     assert_int_equal(sim_read_one(s), MBM_PENDING);
@@ -289,7 +283,7 @@ SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout)
 
     /* Each repetition waits for the quiet time and for its own reply. */
     OK(mbm_line_setRetries(&s->line, 2));
-    begin = s->now;
+    uint64_t begin = s->now;
     assert_int_equal(sim_read_one(s), MBM_PENDING);
     assert_int_equal(poll_as_rarely_as_allowed(s), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(s->sent, 4);
@@ -408,15 +402,13 @@ SIM_TEST(a_program_polls_while_a_frame_leaves_at_an_unknown_rate)
 
 SIM_TEST(a_program_sleeps_while_the_driver_stays_on)
 {
-    unsigned polls;
-
     OK(mbm_node_setBlocking(n, 0));
     OK(mbm_line_setBaudRate(&s->line, 9600));
     OK(mbm_line_setPostFlushHold(&s->line, 200));
     s->character = 100;
     s->flush_lies = 1;
     assert_int_equal(sim_read_one(s), MBM_PENDING);
-    polls = poll_while_the_frame_leaves(s, poll_node, node_delay);
+    unsigned polls = poll_while_the_frame_leaves(s, poll_node, node_delay);
     /* 200 characters of 11 bits after the frame has been written. */
     assert_in_range(sim_time_of(s, 'O') - sim_time_of(s, 'W'), 200 * 1146, 200 * 1147 + 100);
     assert_in_range(polls, 1, 4);

@@ -70,7 +70,6 @@ static void expect_refused(const char *text, const char *reason)
 TEST(a_field_has_what_its_file_says)
 {
     const mbm_planField *planned;
-    const device_field *field;
 
     read_text("device: SDM120\nunit: 3\ninterval: 2s\norder: CDAB\n"
               "fields:\n"
@@ -87,7 +86,7 @@ TEST(a_field_has_what_its_file_says)
     assert_string_equal(meter.name, "SDM120");
     assert_int_equal(meter.count, 2);
     assert_int_equal(meter.readable, 2);
-    field = meter.fields;
+    const device_field *field = meter.fields;
     planned = meter.planned;
     assert_string_equal(field->name, "voltage");
     assert_string_equal(field->unit_of_measurement, "V");
@@ -505,10 +504,9 @@ TEST(a_file_has_at_most_as_many_fields_as_a_plan)
 {
     const size_t size = 80 * ((size_t)MBM_PLAN_MAX_FIELDS + 1);
     char *text = malloc(size), reason[100];
-    size_t length;
 
     assert_non_null(text);
-    length = (size_t)snprintf(text, size, "fields:\n");
+    size_t length = (size_t)snprintf(text, size, "fields:\n");
     for (int i = 0; i <= MBM_PLAN_MAX_FIELDS; i++)
         length += (size_t)snprintf(text + length, size - length,
                                    "- {name: n%d, table: coils, address: %d}\n", i, i);

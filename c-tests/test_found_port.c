@@ -80,11 +80,9 @@ TEST(without_a_round_every_call_passes)
 
 TEST(a_line_without_bytes_is_not_read_and_its_time_stands_still)
 {
-    uint32_t waited;
-
     found_port_begin_round(&the_round);
     found_port_note(&found, &the_round, &NOTHING);
-    waited = time_of(&line);
+    uint32_t waited = time_of(&line);
     /* They come after the wait: they must not be late for what ends meanwhile. */
     end = 5;
     now = 900000;

@@ -344,10 +344,10 @@ TEST(a_serial_broadcast_and_a_bad_frame_get_no_exception)
 {
     mbm_packet head = {.unit = 0}, packet;
     uint8_t frame[32], reply[32];
-    uint16_t length, size;
+    uint16_t size;
     const uint8_t pdu[] = {9}, exception[] = {0x83};
 
-    length = wrap(ascii, &head, pdu, 1, frame);
+    uint16_t length = wrap(ascii, &head, pdu, 1, frame);
     IS(MBM_ILLEGAL_FUNCTION, mbm_frame_parse(ascii, MBM_PACKET_REQUEST, frame, length, &packet));
     IS(MBM_BROADCAST_NOT_ALLOWED,
        mbm_frame_exception(ascii, &packet, MBM_ILLEGAL_FUNCTION, reply, 32, &size));

@@ -30,11 +30,10 @@ static uint8_t parsed(const mbm_framing *f, uint8_t side, const uint8_t *frame, 
     uint8_t *copy = malloc(length ? length : 1), again[MBM_MAX_ASCII_FRAME];
     mbm_packet packet;
     uint16_t size;
-    uint8_t status;
 
     assert_non_null(copy);
     memcpy(copy, frame, length);
-    status = mbm_frame_parse(f, side, copy, length, &packet);
+    uint8_t status = mbm_frame_parse(f, side, copy, length, &packet);
     if (status == MBM_OK) {
         OK(mbm_frame_build(f, &packet, again, sizeof again, &size));
         assert_int_equal(size, length);

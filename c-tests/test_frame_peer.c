@@ -113,10 +113,9 @@ static void sends_what_we_build(modbus_t *client, int fd, const mbm_framing *f)
 TEST(mbm_builds_the_requests_that_libmodbus_sends_over_rtu)
 {
     pty line;
-    modbus_t *client;
 
     pty_open(&line);
-    client = modbus_new_rtu(line.path, 115200, 'N', 8, 1);
+    modbus_t *client = modbus_new_rtu(line.path, 115200, 'N', 8, 1);
     assert_non_null(client);
     assert_int_equal(modbus_connect(client), 0);
     sends_what_we_build(client, line.ours, &rtu);
@@ -127,11 +126,10 @@ TEST(mbm_builds_the_requests_that_libmodbus_sends_over_rtu)
 
 TEST(mbm_builds_the_requests_that_libmodbus_sends_over_tcp)
 {
-    modbus_t *client;
     uint16_t port;
     int listener = tcp_listen(&port), peer;
 
-    client = modbus_new_tcp("127.0.0.1", port);
+    modbus_t *client = modbus_new_tcp("127.0.0.1", port);
     assert_non_null(client);
     assert_int_equal(modbus_connect(client), 0);
     peer = accept(listener, NULL, NULL);
@@ -220,10 +218,9 @@ TEST(mbm_parses_the_responses_of_libmodbus_over_rtu)
 TEST(mbm_parses_the_responses_of_libmodbus_over_tcp)
 {
     tcp_server peer;
-    int fd;
 
     tcp_server_start(&peer);
-    fd = tcp_connect(peer.port);
+    int fd = tcp_connect(peer.port);
     answers_what_we_parse(fd, &tcp, peer.mapping);
     close(fd);
     tcp_server_stop(&peer);

@@ -329,7 +329,6 @@ static void have_line(void)
 
 TEST(a_request_to_a_lost_line_gets_0a_until_the_line_is_back)
 {
-    double start;
     uint16_t word;
 
     lose_line();
@@ -338,7 +337,7 @@ TEST(a_request_to_a_lost_line_gets_0a_until_the_line_is_back)
     modbus_set_slave(client, SERVED_UNIT);
     assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
     have_line();
-    start = seconds();
+    double start = seconds();
     modbus_set_slave(client, PEER_UNIT);
     while (modbus_read_registers(client, 0, 1, &word) != 1)
         assert_true(seconds() - start < PATIENCE_MS * 1e-3);

@@ -201,10 +201,9 @@ TEST(a_reply_that_does_not_answer_the_request_becomes_0b)
     };
     static const uint8_t lengths[][2] = {{5, 4}, {5, 8}, {5, 3}, {5, 5}, {5, 5}};
     gateway g;
-    int fd;
 
     start(&g, "500ms", NULL);
-    fd = tcp_connect(g.port);
+    int fd = tcp_connect(g.port);
     for (unsigned i = 0; i < COUNT(no_answers); i++) {
         const uint8_t *request = (const uint8_t *)no_answers[i][0];
         const uint8_t no_response[] = {request[0] | 0x80, 0x0B};
@@ -222,10 +221,9 @@ TEST(a_request_that_the_standard_forbids_does_not_reach_the_line)
 {
     gateway g;
     struct pollfd asked = {0, POLLIN, 0};
-    int fd;
 
     start(&g, TIMEOUT, NULL);
-    fd = tcp_connect(g.port);
+    int fd = tcp_connect(g.port);
     ASK(fd, "\x03\x00\x64\x00\x00");
     EXPECT(fd, "\x83\x03");
     ASK(fd, "\x03\xFF\xFF\x00\x02");
@@ -241,10 +239,9 @@ TEST(a_request_that_the_standard_forbids_does_not_reach_the_line)
 TEST(force_listen_only_mode_is_passed_on_and_gets_no_response)
 {
     gateway g;
-    int fd;
 
     start(&g, TIMEOUT, NULL);
-    fd = tcp_connect(g.port);
+    int fd = tcp_connect(g.port);
     ASK(fd, "\x08\x00\x04\x00\x00");
     REQUEST(&g, "\x08\x00\x04\x00\x00");
     ASK(fd, "\x07");
@@ -258,10 +255,9 @@ TEST(force_listen_only_mode_is_passed_on_and_gets_no_response)
 TEST(unknown_functions_pass_through)
 {
     gateway g;
-    int fd;
 
     start(&g, TIMEOUT, NULL);
-    fd = tcp_connect(g.port);
+    int fd = tcp_connect(g.port);
     ASK(fd, "\x64 any data");
     REQUEST(&g, "\x64 any data");
     REPLY(&g, "\x64 of any length at all");
@@ -284,19 +280,17 @@ TEST(every_function_of_our_server_passes_through)
 {
     gateway g;
     static served ours;
-    modbus_t *client;
-    int fd;
 
     served_prepare(&ours);
     served_on_line(&ours, MBM_FRAMING_RTU);
     start_at(&g, ours.line.path, TIMEOUT, NULL);
-    fd = tcp_connect(g.port);
+    int fd = tcp_connect(g.port);
     asked_functions(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
     fd = tcp_connect(g.port);
     asked_lies(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
-    client = modbus_new_tcp("127.0.0.1", g.port);
+    modbus_t *client = modbus_new_tcp("127.0.0.1", g.port);
     assert_non_null(client);
     assert_int_equal(modbus_connect(client), 0);
     modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
@@ -322,13 +316,11 @@ TEST(the_quiet_time_is_an_option)
         {"gateway", "--quiet-time", "", "tcp://:0", "rtu:/dev/null", "1-9"},
         {"gateway", "--no-such-time", "1s", "tcp://:0", "rtu:/dev/null", "1-9"},
     };
-    double before;
     gateway g;
-    int fd;
 
     start(&g, "200ms", options);
-    fd = tcp_connect(g.port);
-    before = seconds();
+    int fd = tcp_connect(g.port);
+    double before = seconds();
     ASK(fd, "\x03\x00\x00\x00\x03");
     REQUEST(&g, "\x03\x00\x00\x00\x03");
     EXPECT(fd, "\x83\x0B");

@@ -159,14 +159,13 @@ TEST(a_declared_function_has_its_lengths)
         {0x41, {MBM_RULE_FIXED, 3, 0}, {MBM_RULE_COUNTED, 1, 1}},
         {0x03, {MBM_RULE_FIXED, 9, 0}, {MBM_RULE_FIXED, 9, 0}}, /* the standard's meaning holds */
     };
-    uint32_t before;
 
     OK(mbm_gateway_setFunctions(&b.gateway, functions, COUNT(functions)));
     ASK(0, 1, 2, "\x41\x01");
     EXPECT(0, 1, 2, "\xC1\x03");
     ASK(0, 2, 2, "\x41\x01\x02");
     ON_LINE(0, 2, "\x41\x01\x02");
-    before = b.wires[0].now;
+    uint32_t before = b.wires[0].now;
     REPLY(0, 2, "\x41\x02zzx");
     EXPECT(0, 2, 2, "\x41\x02zzx");
     /* No silence was waited for. */

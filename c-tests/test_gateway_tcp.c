@@ -76,10 +76,9 @@ fixture each_test = {begin, end};
 static int accept_gateway(void)
 {
     struct pollfd waiting = {listener, POLLIN, 0};
-    int fd;
 
     assert_int_equal(poll(&waiting, 1, PATIENCE_MS), 1);
-    fd = accept(listener, NULL, NULL);
+    int fd = accept(listener, NULL, NULL);
     assert_true(fd >= 0);
     return fd;
 }
@@ -150,12 +149,11 @@ TEST(libmodbus_reaches_a_libmodbus_server_over_tcp)
 {
     uint16_t words[125], values[] = {1, 0xFFFE, 0x1234};
     tcp_server far;
-    modbus_t *peer;
 
     memset(&far, 0, sizeof far);
     tcp_server_start(&far);
     start("tcp://127.0.0.1", far.port, NULL);
-    peer = modbus_new_tcp("127.0.0.1", port);
+    modbus_t *peer = modbus_new_tcp("127.0.0.1", port);
     assert_non_null(peer);
     assert_int_equal(modbus_connect(peer), 0);
     modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
@@ -178,11 +176,10 @@ TEST(a_line_of_rtu_over_tcp_has_frames_of_rtu)
 {
     uint8_t request[] = {UNIT, 3, 0, 7, 0, 1, 0, 0}, response[] = {UNIT, 3, 2, 0, 9, 0, 0};
     uint8_t found[sizeof request];
-    int device;
 
     listener = tcp_listen(&device_port);
     start("rtu+tcp://127.0.0.1", device_port, NULL);
-    device = accept_gateway();
+    int device = accept_gateway();
     ask(7);
     get(device, found, sizeof found);
     seal(request, sizeof request - 2);
@@ -222,11 +219,9 @@ TEST(a_device_that_closes_an_idle_connection_costs_no_request)
 
 TEST(a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again)
 {
-    int device;
-
     listener = tcp_listen(&device_port);
     start("tcp://127.0.0.1", device_port, NULL);
-    device = accept_gateway();
+    int device = accept_gateway();
     ask(1);
     (void)take(device, 1);
     close(device);
@@ -278,11 +273,10 @@ TEST(a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says)
     static const char *const options[] = {"--in-flight", "4", NULL};
     uint16_t transactions[4];
     uint8_t byte;
-    int device;
 
     listener = tcp_listen(&device_port);
     start("tcp://127.0.0.1", device_port, options);
-    device = accept_gateway();
+    int device = accept_gateway();
     for (int i = 0; i < 6; i++)
         ask((uint8_t)(10 + i));
     for (int i = 0; i < 4; i++)

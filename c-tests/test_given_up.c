@@ -193,15 +193,13 @@ SIM_TEST(a_cancel_in_the_hold_switches_the_driver_off)
 
 SIM_TEST(begin_mid_send_is_refused_until_the_request_is_given_up)
 {
-    mbm_port other;
-
     mbm_node_setBlocking(n, 0);
     s->write_piece = 1;
     s->character = 0; /* bytes are on the wire as soon as they are handed over */
     s->cut_allowed = 1;
     IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 3);
-    other = s->port;
+    mbm_port other = s->port;
     other.postTransmission = NULL;
     IS(MBM_BUSY, mbm_line_beginRtu(&s->line, &other, s->buffer, MBM_MAX_FRAME));
     IS(MBM_BUSY, mbm_node_begin(n, &s->line, 3, s->response, 1, NULL, 0));

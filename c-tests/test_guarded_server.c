@@ -26,17 +26,16 @@ static modbus_t *client_of(int port)
 TEST(libmodbus_clients_are_told_apart)
 {
     const char *const any[] = {"0", NULL};
-    modbus_t *operator_of, *guest;
     uint16_t words[2];
     program p;
 
     program_start(&p, "linux/guarded_server", any);
     program_line(&p, output, sizeof output);
     assert_int_equal(strncmp(output, "ready ", 6), 0);
-    operator_of = client_of(atoi(output + 6));
+    modbus_t *operator_of = client_of(atoi(output + 6));
     assert_int_equal(modbus_read_registers(operator_of, 0, 2, words), 2);
     assert_true(words[0] == 201 && words[1] == 1);
-    guest = client_of(atoi(output + 6));
+    modbus_t *guest = client_of(atoi(output + 6));
     assert_int_equal(modbus_read_registers(guest, 0, 2, words), 2);
     assert_true(words[0] == 202 && words[1] == 2);
     assert_int_equal(modbus_write_register(operator_of, 9, 5), 1);

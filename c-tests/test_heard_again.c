@@ -57,8 +57,6 @@ static void answer(sim *s, const sim_frame *request)
 {
     bench *b = (bench *)s->context;
     uint8_t frame[300], asked[8];
-    uint64_t at;
-    size_t length;
     device *d = NULL;
 
     for (unsigned i = 0; i < b->count; i++)
@@ -74,9 +72,9 @@ static void answer(sim *s, const sim_frame *request)
         asked[5] = (uint8_t)(asked[5] + d->deviates);
     else if (d->repeats_wrong)
         asked[5] ^= 0x55;
-    length = fault_right_reply(frame, asked);
-    at = (d->free > request->end ? d->free : request->end) +
-         (d->requests == d->late ? d->takes_for_late : d->takes);
+    size_t length = fault_right_reply(frame, asked);
+    uint64_t at = (d->free > request->end ? d->free : request->end) +
+                  (d->requests == d->late ? d->takes_for_late : d->takes);
     if (request->ascii)
         sim_deliver_ascii(s, at, frame, length);
     else
@@ -208,10 +206,8 @@ static uint8_t goes_on(bench *b, uint16_t address, uint32_t limit)
 /* Reads a register; gives up after the limit. A read that succeeds has the right value. */
 static uint8_t reads(bench *b, uint8_t unit, uint16_t address, uint32_t limit)
 {
-    uint8_t status;
-
     IS(MBM_PENDING, starts(b, unit, address));
-    status = goes_on(b, address, limit);
+    uint8_t status = goes_on(b, address, limit);
     if (status == MBM_PENDING) {
         cancels(b);
         status = MBM_CANCELLED;
@@ -244,14 +240,13 @@ static unsigned time_to_the_first_value(sim *s, reader_kind kind, uint32_t limit
                                         uint32_t pause, unsigned lost)
 {
     bench b;
-    device *d;
     uint64_t began, well;
     uint16_t i;
     uint8_t status;
 
     begin(&b, s, kind);
     set_timeout(&b, timeout);
-    d = add(&b, UNIT, PROMPT);
+    device *d = add(&b, UNIT, PROMPT);
     for (i = 0; i < 10; i++)
         OK(reads(&b, UNIT, i, limit));
     lose(d, lost);
@@ -376,11 +371,8 @@ READERS_TEST(a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_noth
 /* As a program does that looks in each round whether the unit is there again. */
 READERS_TEST(requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer, NODE_READS)
 {
-    uint64_t sent;
-    unsigned count;
-
-    sent = loses_one(b, add(b, UNIT, PROMPT));
-    count = s->sent;
+    uint64_t sent = loses_one(b, add(b, UNIT, PROMPT));
+    unsigned count = s->sent;
     while (s->now < sent + CLEAN - 60 * MS)
         IS(MBM_CANCELLED, reads(b, UNIT, 1, 30 * MS));
     assert_int_equal(s->sent, count);
@@ -393,10 +385,10 @@ READERS_TEST(a_request_that_waits_does_not_stop_the_clients_queue, CLIENT_READS)
 {
     mbm_clientRequest other = {0};
     uint16_t word = 0;
-    uint64_t sent, began;
+    uint64_t began;
 
     add(b, OTHER, PROMPT);
-    sent = loses_one(b, add(b, UNIT, PROMPT));
+    uint64_t sent = loses_one(b, add(b, UNIT, PROMPT));
     s->now += QUIET;
     IS(MBM_PENDING, starts(b, UNIT, 1));
     other.unit = OTHER;
@@ -472,14 +464,13 @@ static void try_the_second_node(sim *s)
 
 TEST(a_request_of_a_blocking_node_that_waits_does_not_give_way)
 {
-    uint64_t sent;
     BENCH;
 
     kind = NODE_READS;
     BEGIN;
     begin_second(s, OTHER);
     add(&b, OTHER, PROMPT);
-    sent = loses_one(&b, add(&b, UNIT, PROMPT));
+    uint64_t sent = loses_one(&b, add(&b, UNIT, PROMPT));
     OK(mbm_node_setBlocking(&s->node, 1));
     refused = 0;
     s->on_idle = try_the_second_node;
@@ -496,9 +487,8 @@ TEST(a_request_of_a_blocking_node_that_waits_does_not_give_way)
 READERS_TEST(a_late_reply_lets_the_request_that_waits_be_sent_at_once, NODE_READS)
 {
     uint64_t sent;
-    device *d;
 
-    d = add(b, UNIT, PROMPT);
+    device *d = add(b, UNIT, PROMPT);
     reads_well(b, UNIT, 3);
     be_late(d, TIMEOUT + 200 * MS);
     IS(MBM_CANCELLED, reads(b, UNIT, 1, 50 * MS));
@@ -512,9 +502,7 @@ READERS_TEST(a_late_reply_lets_the_request_that_waits_be_sent_at_once, NODE_READ
 /* It comes within the quiet time. */
 READERS_TEST(a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait, NODE_READS)
 {
-    device *d;
-
-    d = add(b, UNIT, PROMPT);
+    device *d = add(b, UNIT, PROMPT);
     be_late(d, 60 * MS);
     IS(MBM_CANCELLED, reads(b, UNIT, 1, 40 * MS));
     OK(reads(b, UNIT, 2, 2 * EXCHANGE));
@@ -523,9 +511,7 @@ READERS_TEST(a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wai
 
 READERS_TEST(a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well, NODE_READS)
 {
-    device *d;
-
-    d = add(b, UNIT, PROMPT);
+    device *d = add(b, UNIT, PROMPT);
     add(b, OTHER, 400 * MS);
     be_late(d, 300 * MS);
     IS(MBM_CANCELLED, reads(b, UNIT, 1, 50 * MS));
@@ -678,13 +664,11 @@ READERS_TEST(a_broadcast_does_not_wait_after_a_cancelled_request, NODE_READS)
 /* More units than are remembered one by one. */
 READERS_TEST(a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones, NODE_READS)
 {
-    uint64_t last;
-
     add(b, UNIT, PROMPT);
     reads_well(b, UNIT, 3);
     for (uint8_t unit = ABSENT; unit < ABSENT + 20; unit++)
         (void)reads(b, unit, 0, QUIET + 40 * MS);
-    last = s->frames[s->sent - 1].begin;
+    uint64_t last = s->frames[s->sent - 1].begin;
     while (reads(b, UNIT, 1, QUIET + EXCHANGE) != MBM_OK)
         assert_true(s->now < last + UINT64_C(5) * TIMEOUT);
     reads_well(b, UNIT, 50);
@@ -692,10 +676,8 @@ READERS_TEST(a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones, N
 
 READERS_TEST(a_quiet_time_of_0_gives_it_all_up, NODE_READS)
 {
-    device *d;
-
     set_quiet_time(b, 0);
-    d = add(b, UNIT, PROMPT);
+    device *d = add(b, UNIT, PROMPT);
     (void)loses_one(b, d);
     reads_well(b, UNIT, 50);
     lose(d, 1);

@@ -198,14 +198,12 @@ DEVICE_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
 
 DEVICE_TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else)
 {
-    uint64_t begin;
-
     device.takes[0] = 0xFFFFFFFF; /* no reply */
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     memset(&device, 0, sizeof device);
     assert_reads(s, 1, 1);
     assert_in_range(s->now - s->last_byte, 1000 * TIMEOUT_MS, 1000 * TIMEOUT_MS + SIM_SLACK);
-    begin = s->now;
+    uint64_t begin = s->now;
     assert_reads(s, 2, 1);
     assert_in_range(s->now - begin, 0, PROMPT + 20 * s->character + SIM_SLACK);
     assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);

@@ -309,7 +309,6 @@ TEST(a_call_that_is_refused_changes_nothing)
     const mbm_linkHooks none = {.disconnect = disconnect};
     static mbm_link zero, second;
     static mbm_client unused;
-    mbm_link before;
 
     memset(&second, 0, sizeof second);
     begin_up(MBM_FRAMING_TCP);
@@ -325,7 +324,7 @@ TEST(a_call_that_is_refused_changes_nothing)
     IS(MBM_NOT_INITIALISED, mbm_link_setRequestsWait(&second, 1));
     assert_int_equal(mbm_link_state(&second), 0);
     assert_int_equal(mbm_link_state(NULL), 0);
-    before = kept;
+    mbm_link before = kept;
     IS(MBM_INVALID_ARGUMENT, mbm_link_begin(&kept, &client, &none));
     IS(MBM_NOT_INITIALISED, mbm_link_begin(&kept, &unused, &hooks));
     IS(MBM_INVALID_ARGUMENT, mbm_link_setBackoff(&kept, 4, 1, 1));

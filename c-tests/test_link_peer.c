@@ -58,12 +58,10 @@ static void poll_once(void)
 
 static void begin_tcp(void)
 {
-    mbm_linkHooks hooks;
-
     peer = tcp_peer_new();
     port = tcp_peer_start(peer, 0);
     asker_begin_tcp(&a, port);
-    hooks = mbm_tcp_link(&a.tcp);
+    mbm_linkHooks hooks = mbm_tcp_link(&a.tcp);
     keep(&hooks);
     UNTIL(mbm_link_state(&kept) == MBM_LINK_IS_UP);
 }

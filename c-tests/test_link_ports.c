@@ -132,8 +132,6 @@ static void read_word(uint16_t address, uint16_t expected)
 
 static void begin_tcp(void)
 {
-    mbm_linkHooks hooks;
-
     memset(&a, 0, sizeof a);
     strcpy(a.service, "502");
     a.port = mbm_tcp_port(&a.tcp);
@@ -147,7 +145,7 @@ static void begin_tcp(void)
     assert_int_equal(mbm_tcp_openLater(&a.tcp, &a.addresses, "meter.plant.example", a.service), 0);
     assert_int_equal(mbm_tcp_isInUse(&a.tcp), 1);
     assert_int_equal(lookups, 0);
-    hooks = mbm_tcp_link(&a.tcp);
+    mbm_linkHooks hooks = mbm_tcp_link(&a.tcp);
     keep(&hooks);
 }
 
@@ -197,12 +195,11 @@ TEST(a_server_that_moves_to_another_address_is_found_again)
 TEST(an_address_that_never_answers_does_not_keep_the_link_from_the_next)
 {
     tcp_peer *peer = tcp_peer_new();
-    int listener, filler;
 
     begin_tcp();
-    listener = tcp_listen(&ports[0]);
+    int listener = tcp_listen(&ports[0]);
     assert_int_equal(listen(listener, 0), 0);
-    filler = tcp_connect(ports[0]);
+    int filler = tcp_connect(ports[0]);
     ports[1] = tcp_peer_start(peer, 0);
     count_of_addresses = 2;
     OK(mbm_link_setConnectTimeout(&kept, 50));
@@ -273,7 +270,6 @@ static void unplug(void)
 TEST(a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_comes)
 {
     const mbm_tty_options options = {.baud = 115200, .parity = 'N', .stop = 1};
-    mbm_linkHooks hooks;
 
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/tty", folder);
@@ -286,7 +282,7 @@ TEST(a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_comes)
     OK(mbm_client_beginRtu(&a.client, &a.port, a.incoming, sizeof a.incoming));
     OK(mbm_client_setBaudRate(&a.client, options.baud));
     assert_int_equal(mbm_tty_openLater(&a.tty, path, &options), 0);
-    hooks = mbm_tty_link(&a.tty);
+    mbm_linkHooks hooks = mbm_tty_link(&a.tty);
     keep(&hooks);
     for (unsigned i = 1; i <= 3; i++) {
         /* While it is closed, the wait sleeps. */

@@ -274,13 +274,12 @@ static void changed(void *context, uint8_t event, uint8_t status)
 static void begin(line *l)
 {
     mbm_port port = {0};
-    uint8_t *frame, *outgoing;
     const int framing = (int)below(4);
     const uint16_t bytes = (uint16_t)(below(2) ? 520 : 40), more = (uint16_t)(below(2) ? 300 : 20);
     uint8_t status;
 
-    frame = (uint8_t *)malloc(bytes);
-    outgoing = (uint8_t *)malloc(more);
+    uint8_t *frame = (uint8_t *)malloc(bytes);
+    uint8_t *outgoing = (uint8_t *)malloc(more);
     port.context = l;
     port.read = read_bytes;
     port.write = write_bytes;
@@ -319,7 +318,6 @@ static void begin(line *l)
 static void queue(int at)
 {
     job *j = &jobs[below(JOBS)];
-    uint8_t status;
 
     if (j->is_pending) {
         HOLDS(mbm_client_readCoils(lines[at].client, j->request, 0, 1) != MBM_PENDING);
@@ -343,9 +341,10 @@ static void queue(int at)
     j->request->replyBytes = sizeof *j->words;
     ended[next_id] = 0;
     j->id = next_id++;
-    status = below(3) == 0 && j->request->unit
-                 ? mbm_client_readHoldingRegisters(lines[at].client, j->request, j->id, 1)
-                 : mbm_client_writeSingleRegister(lines[at].client, j->request, j->id, j->id);
+    uint8_t status =
+        below(3) == 0 && j->request->unit
+            ? mbm_client_readHoldingRegisters(lines[at].client, j->request, j->id, 1)
+            : mbm_client_writeSingleRegister(lines[at].client, j->request, j->id, j->id);
     j->is_pending = status == MBM_PENDING;
     j->at = at;
     HOLDS(j->is_pending == (j->request->status == MBM_PENDING));

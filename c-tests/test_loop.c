@@ -160,7 +160,6 @@ TEST_WITH(many_clients_are_served_by_one_wait, begin, end)
 TEST_WITH(a_client_that_gets_no_answer_ends_while_others_are_busy, begin, end)
 {
     device *silent = &devices[TCP_PEER_CONNECTIONS];
-    uint32_t from;
     uint16_t port;
     int listener = tcp_listen(&port);
 
@@ -169,7 +168,7 @@ TEST_WITH(a_client_that_gets_no_answer_ends_while_others_are_busy, begin, end)
     begin_device(silent, port, 1);
     silent->request.timeoutMs = 0;
     OK(mbm_client_setResponseTimeout(&silent->client, 150));
-    from = mbm_tcp_port(&silent->tcp).micros(&silent->tcp);
+    uint32_t from = mbm_tcp_port(&silent->tcp).micros(&silent->tcp);
     UNTIL(&loop, silent->failed == 1);
     IS(MBM_RESPONSE_TIMED_OUT, silent->request.status);
     assert_true(mbm_tcp_port(&silent->tcp).micros(&silent->tcp) - from >= 150 * MS);
@@ -220,11 +219,10 @@ TEST_WITH(a_request_that_is_queued_outside_needs_a_wake, begin, end)
 TEST_WITH(without_a_descriptor_links_wait_and_connect_later, begin, end)
 {
     struct rlimit limit;
-    int next;
 
     SKIP_WITHOUT_LIMITS();
     start_peers(1);
-    next = dup(0);
+    int next = dup(0);
     close(next);
     limit = (struct rlimit){(rlim_t)next + 2, found.rlim_max};
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
@@ -443,7 +441,6 @@ TEST(a_call_that_is_refused_changes_nothing)
     static mbm_tcp tcp;
     static mbm_tcp_listener listener, second;
     mbm_loop_entry entry = {0}, another = {0};
-    int file;
 
     FAILS(EBUSY, mbm_loop_open(&loop, places, PLACES));
     FAILS(EINVAL, mbm_loop_open(&closed, NULL, 1));
@@ -456,7 +453,7 @@ TEST(a_call_that_is_refused_changes_nothing)
     FAILS(EBADF, mbm_loop_addTty(&loop, &entry, &tty));
     FAILS(EBADF, mbm_loop_addUdp(&loop, &entry, &udp));
     FAILS(EBADF, mbm_loop_addListener(&loop, &entry, &listener));
-    file = open("/proc/self/exe", O_RDONLY | O_CLOEXEC);
+    int file = open("/proc/self/exe", O_RDONLY | O_CLOEXEC);
     FAILS(EPERM, mbm_loop_addFd(&loop, &entry, file));
     close(file);
     FAILS(EBADF, mbm_loop_addFd(&loop, &entry, file));

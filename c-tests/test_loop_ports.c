@@ -193,7 +193,6 @@ TEST(bytes_that_are_not_read_do_not_end_the_wait_again)
     int pair[2];
     struct sockaddr_in to = none;
     uint8_t bytes[16];
-    int sender;
     pty ends;
 
     pty_open(&ends);
@@ -210,7 +209,7 @@ TEST(bytes_that_are_not_read_do_not_end_the_wait_again)
     assert_int_equal(mbm_loop_wait(&loop, 0), 3);
     assert_int_equal(write(pair[1], "abcd", 4), 4);
     assert_int_equal(write(ends.theirs, "abcd", 4), 4);
-    sender = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    int sender = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     to.sin_port = htons(udp_server.port);
     to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     assert_int_equal(sendto(sender, "x", 1, 0, (struct sockaddr *)&to, sizeof to), 1);
@@ -244,7 +243,6 @@ TEST(a_terminal_that_is_closed_is_not_reported)
 {
     mbm_loop_entry line = {.poll = poll_nothing};
     unsigned polls = 0;
-    int other;
     pty ends;
 
     pty_open(&ends);
@@ -252,7 +250,7 @@ TEST(a_terminal_that_is_closed_is_not_reported)
     line.context = &polls;
     assert_int_equal(mbm_loop_addTty(&loop, &line, &tty), 0);
     assert_int_equal(mbm_loop_wait(&loop, 0), 1);
-    other = dup(tty.fd);
+    int other = dup(tty.fd);
     mbm_tty_close(&tty);
     assert_int_equal(write(ends.theirs, "x", 1), 1);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
@@ -348,10 +346,8 @@ TEST(servers_and_clients_share_a_loop)
 
 TEST(bytes_that_are_no_modbus_end_the_connection_of_a_server)
 {
-    int peer;
-
     begin_to_listen();
-    peer = tcp_connect(listener.port);
+    int peer = tcp_connect(listener.port);
     UNTIL(&loop, places_in_use() == 1);
     assert_int_equal(write(peer, "GET / HTTP/1.1\r\n\r\n", 18), 18);
     UNTIL(&loop, places_in_use() == 0);

@@ -288,7 +288,6 @@ static void remove_chore(chore *one)
 static uint32_t poll_chore(mbm_loop_entry *entry)
 {
     chore *one = (chore *)(void *)entry, *other = &chores[chance(SOME)];
-    uint32_t delay;
 
     assert_true(one->isIn);
     assert_true(one->isWoken || (one->due >= 0 && one->due <= now));
@@ -312,7 +311,7 @@ static uint32_t poll_chore(mbm_loop_entry *entry)
     }
     if (!one->isIn)
         return chance(100);
-    delay = chance(8) == 0 ? MBM_LOOP_FOREVER : chance(8) == 0 ? 0 : 1 + chance(50 * MS);
+    uint32_t delay = chance(8) == 0 ? MBM_LOOP_FOREVER : chance(8) == 0 ? 0 : 1 + chance(50 * MS);
     one->due = delay == MBM_LOOP_FOREVER ? -1 : now + delay;
     if (delay == 0 && !one->isWoken) {
         one->isWoken = 1;

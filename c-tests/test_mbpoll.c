@@ -53,10 +53,9 @@ static int mbpoll(const char *where, const char *arguments, const char *values)
 static unsigned long value(unsigned reference, int base)
 {
     char label[16];
-    const char *found;
 
     snprintf(label, sizeof label, "[%u]: \t", reference);
-    found = strstr(output, label);
+    const char *found = strstr(output, label);
     if (!found)
         print_error("%s", output);
     assert_non_null(found);

@@ -29,15 +29,13 @@ static void other_reads(sim *s)
 
 NODES_TEST(the_gap_counts_from_the_last_use_by_any_node)
 {
-    uint64_t asked;
-
     sim_reads(s, 500);
     other_reads(s);
     sim_assert_time(s->frames[1].silence, 4000);
     sim_reads(s, 500);
     sim_assert_time(s->frames[2].silence, 4000);
     s->now += 10000;
-    asked = s->now;
+    uint64_t asked = s->now;
     other_reads(s);
     sim_assert_time(s->frames[3].begin - asked, 0);
 }

@@ -117,13 +117,12 @@ static uint8_t use_server(mbm_server *server, begin_server *begin, const char *r
 {
     mbm_unit unit = MBM_INIT;
     mbm_registerTable table = MBM_INIT;
-    uint8_t begun;
 
     unit.id = 17;
     table.words = words;
     table.size = 4;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
-    begun = begin(server, &port, &unit, 1, frame, sizeof frame);
+    uint8_t begun = begin(server, &port, &unit, 1, frame, sizeof frame);
     if (begun != MBM_OK)
         return begun;
     if (length == 5)
@@ -167,12 +166,11 @@ static uint8_t use_link(void *object)
     static mbm_client client;
     unsigned connects = 0;
     mbm_linkHooks hooks = MBM_INIT;
-    uint8_t begun;
 
     hooks.context = &connects;
     hooks.connect = connected;
     OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
-    begun = mbm_link_begin(object, &client, &hooks);
+    uint8_t begun = mbm_link_begin(object, &client, &hooks);
     if (begun != MBM_OK)
         return begun;
     OK(mbm_client_poll(&client));
@@ -186,13 +184,12 @@ static uint8_t use_plan(void *object)
     static plan_device device;
     uint32_t ageMs;
     uint16_t field;
-    uint8_t begun;
 
     memset(&device, 0, sizeof device);
     plan_device_begin(&device, 0);
     plan_device_add(&device, 17, MBM_TABLE_HOLDING_REGISTERS, MBM_TYPE_UINT16, 0, 1000);
     device.setup.update = NULL;
-    begun = mbm_plan_begin(object, &device.client, &device.setup, &field);
+    uint8_t begun = mbm_plan_begin(object, &device.client, &device.setup, &field);
     if (begun != MBM_OK)
         return begun;
     IS(MBM_PENDING, mbm_plan_getStatus(object, 0, &ageMs));
@@ -211,7 +208,6 @@ static uint8_t use_gateway(void *object)
     mbm_gatewayConnection connection = MBM_INIT;
     mbm_gatewayRequest request = MBM_INIT;
     mbm_gatewayConfig config = MBM_INIT;
-    uint8_t begun;
 
     OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
     line.client = &client;
@@ -221,7 +217,7 @@ static uint8_t use_gateway(void *object)
     config.requests = &request;
     config.requestCount = 1;
     config.routeCount = config.lineCount = config.connectionCount = 1;
-    begun = mbm_gateway_begin(object, &config);
+    uint8_t begun = mbm_gateway_begin(object, &config);
     if (begun != MBM_OK)
         return begun;
     OK(mbm_gateway_poll(object));

@@ -18,7 +18,6 @@ static uint16_t parse_bytes(uint8_t type, const char *scale, const char *payload
     value_form form = {.type = type, .order = MBM_ORDER_ABCD};
     /* Memory that ends with the payload, so that sanitizers see each byte read beyond it. */
     char *copy = malloc(length > 0 ? length : 1);
-    uint16_t count;
 
     assert_non_null(copy);
     memcpy(copy, payload, length);
@@ -26,7 +25,7 @@ static uint16_t parse_bytes(uint8_t type, const char *scale, const char *payload
     if (scale) {
         assert_int_equal(value_scale_read(scale, &form.scale), 1);
     }
-    count = payload_parse(&form, copy, length, words, &wrong);
+    uint16_t count = payload_parse(&form, copy, length, words, &wrong);
     free(copy);
     return count;
 }
@@ -499,12 +498,11 @@ static uint16_t parse_all(uint8_t type, uint16_t count, const char *payload, siz
 {
     const value_form form = {.type = type, .order = MBM_ORDER_ABCD};
     char *copy = malloc(length > 0 ? length : 1);
-    uint16_t words_used;
 
     assert_non_null(copy);
     memcpy(copy, payload, length);
     memset(all, 0xEE, sizeof all);
-    words_used = payload_parse_all(&form, count, copy, length, all, &wrong);
+    uint16_t words_used = payload_parse_all(&form, count, copy, length, all, &wrong);
     free(copy);
     return words_used;
 }

@@ -84,14 +84,12 @@ TEST(limits_above_255_are_not_reduced)
 
 TEST(each_read_keeps_its_interval)
 {
-    unsigned fast, slow;
-
     add(1, 10, 100);
     add(1, 50, SECOND);
     plan_device_start(&d);
     plan_device_run(&d, 10 * SECOND);
-    fast = plan_device_updates(&d, 0);
-    slow = plan_device_updates(&d, 1);
+    unsigned fast = plan_device_updates(&d, 0);
+    unsigned slow = plan_device_updates(&d, 1);
     assert_in_range(fast, 100, 101);
     assert_in_range(slow, 10, 11);
 }

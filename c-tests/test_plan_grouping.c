@@ -45,16 +45,14 @@ static mbm_planField field_of(uint32_t shape, uint32_t characters, int is_bits)
 static uint16_t make_table(uint32_t number, mbm_planField *fields, mbm_planSetup *setup)
 {
     static const uint16_t counts[] = {5, 10, 20, 50, 100, 200, 500, 1000};
-    uint32_t count, spread;
     uint16_t made = 0;
-    int is_bits;
 
     state = number;
-    count = counts[below(8)];
-    spread = 2 + below(20);
+    uint32_t count = counts[below(8)];
+    uint32_t spread = 2 + below(20);
     setup->registersPerRead = setup->bitsPerRead = (uint16_t)(20 + below(106));
     setup->excludedCount = below(3) == 0;
-    is_bits = below(4) == 0;
+    int is_bits = below(4) == 0;
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t shape = below(8);
         const uint16_t unit = (uint16_t)(1 + below(3));

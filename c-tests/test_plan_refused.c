@@ -34,10 +34,8 @@ static void refuses(uint8_t status, uint16_t wrong)
 
 TEST(a_wrong_field_is_named)
 {
-    mbm_planField *field;
-
     add(MBM_TYPE_UINT16, 0);
-    field = add(MBM_TYPE_UINT32, 20);
+    mbm_planField *field = add(MBM_TYPE_UINT32, 20);
     field->type = 99;
     refuses(MBM_INVALID_ARGUMENT, 1);
     field->type = MBM_TYPE_UINT32;
@@ -267,11 +265,10 @@ TEST(a_wrong_field_of_a_grouped_table_is_named)
 {
     static const uint16_t counts[] = {1, 2};
     uint16_t field = 77;
-    mbm_planField *last;
 
     add(MBM_TYPE_UINT16, 0);
     add(MBM_TYPE_UINT16, 20);
-    last = add(MBM_TYPE_UINT16, 21);
+    mbm_planField *last = add(MBM_TYPE_UINT16, 21);
     d.setup.readCount = 2;
 #define NAMES(status)                                                                              \
     do {                                                                                           \

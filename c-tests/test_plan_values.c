@@ -194,12 +194,10 @@ TEST(bits_of_a_register_are_one_number_in_every_order)
 
 TEST(fields_that_overlap_have_their_own_values_from_one_read)
 {
-    mbm_planField *half;
-
     put(10, 0x12345678, 2, MBM_ORDER_ABCD);
     add(MBM_TYPE_UINT32, 10);
     add(MBM_TYPE_UINT16, 10);
-    half = add(MBM_TYPE_UINT16, 11);
+    mbm_planField *half = add(MBM_TYPE_UINT16, 11);
     half->divisor = 2;
     add(MBM_TYPE_UINT16, 11);
     read_all();

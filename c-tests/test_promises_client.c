@@ -317,13 +317,11 @@ static uint32_t random_number(void *context)
 /* The silence that is left before a request, if a byte arrives just now. */
 static uint32_t gap(void)
 {
-    uint32_t delay;
-
     wire.step = 0;
     hooked_port_arrive(&wire, "x", 1);
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&c, &r, 0, 1));
     IS(MBM_PENDING, mbm_client_poll(&c));
-    delay = mbm_client_pollDelay(&c);
+    uint32_t delay = mbm_client_pollDelay(&c);
     assert_int_equal(wire.length, 0);
     OK(mbm_client_cancel(&c, &r));
     return delay;

@@ -60,7 +60,6 @@ TEST(a_request_that_was_refused_here_is_no_exception_of_the_device)
     static uint16_t words[1];
     static hooked_port wire;
     const mbm_port port = hooked_port_of(&wire);
-    uint8_t refused;
 
     for (unsigned status = 0; status < 256; status++) {
         for (unsigned code = 0; code < 256; code++) {
@@ -76,7 +75,7 @@ TEST(a_request_that_was_refused_here_is_no_exception_of_the_device)
     wire.step = 500;
     OK(mbm_line_beginRtu(&line, &port, buffer, sizeof buffer));
     OK(mbm_node_begin(&node, &line, 17, words, 1, NULL, 0));
-    refused = mbm_node_readHoldingRegisters(&node, 0, 126);
+    uint8_t refused = mbm_node_readHoldingRegisters(&node, 0, 126);
     IS(MBM_ILLEGAL_DATA_VALUE, refused);
     assert_string_equal(
         mbm_status_textOf(refused, mbm_node_getExceptionCode(&node)),

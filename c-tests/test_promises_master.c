@@ -354,12 +354,10 @@ TEST(a_line_gives_up_the_request_of_any_node)
 /* The silence that is left before a request, if the wire was used just now. */
 static uint32_t gap(void)
 {
-    uint32_t delay;
-
     OK(mbm_line_usedAt(&line, wire.now));
     IS(MBM_PENDING, read_holding(0, 1));
     IS(MBM_PENDING, mbm_node_poll(&m));
-    delay = mbm_node_pollDelay(&m);
+    uint32_t delay = mbm_node_pollDelay(&m);
     assert_int_equal(wire.length, 0);
     OK(mbm_node_cancel(&m));
     /* A request that was not sent leaves no reply to wait for. */
@@ -387,12 +385,11 @@ TEST(the_gap_is_that_of_the_header)
 static unsigned frames(uint32_t *us)
 {
     uint32_t begin = wire.now;
-    unsigned sent;
 
     wire.called[HOOK_PRE] = 0;
     IS(MBM_PENDING, read_holding(0, 1));
     IS(MBM_RESPONSE_TIMED_OUT, run());
-    sent = wire.called[HOOK_PRE];
+    unsigned sent = wire.called[HOOK_PRE];
     *us = wire.now - begin;
     return sent;
 }
@@ -446,15 +443,13 @@ TEST(lenient_is_refused_while_a_request_is_pending)
  * status. */
 static uint8_t answered_after(uint32_t ms)
 {
-    uint32_t sent;
-
     wire.length = 0;
     IS(MBM_PENDING, write_registers(0, 123));
     while (wire.length < 255) {
         IS(MBM_PENDING, mbm_node_poll(&m));
         wire.now += 100;
     }
-    sent = wire.now;
+    uint32_t sent = wire.now;
     while (wire.now - sent < 1000 * ms) {
         uint32_t delay = mbm_node_pollDelay(&m), left = sent + 1000 * ms - wire.now;
         uint8_t status = mbm_node_poll(&m);

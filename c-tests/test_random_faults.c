@@ -141,7 +141,6 @@ static void device(sim *s, const sim_frame *sent)
 {
     run *r = (run *)s->context;
     uint64_t at = sent->end + 500 + draw(r, 10000);
-    frame f;
 
     r->received_length = 0;
     assert_true(request_parse(&r->asked, sent->bytes, sent->length));
@@ -153,7 +152,7 @@ static void device(sim *s, const sim_frame *sent)
     r->reply.length = model_answer(&r->device, &r->asked, r->reply.bytes);
     r->ledger[r->written++ % LEDGER] = r->reply;
     r->carried_out = 1;
-    f = r->reply;
+    frame f = r->reply;
     damage(r, &f);
     if (r->faults & DELAY)
         at += 1000 * (TIMEOUT_MS + draw(r, 300));
@@ -284,13 +283,12 @@ static int is_blind(const sim *s, const run *r, uint8_t status)
 static void transact(sim *s, run *r, unsigned retries)
 {
     uint64_t began = s->now;
-    uint8_t status;
 
     s->sent = 0;
     s->order_length = 0;
     r->carried_out = 0;
     s->limit = s->now + (retries + 1) * 400000u; /* the call hangs if it takes longer */
-    status = make_request(s, r);
+    uint8_t status = make_request(s, r);
     if (status == MBM_PENDING)
         status = sim_poll(s);
     for (unsigned i = 0; i < s->sent; i++)

@@ -280,10 +280,10 @@ TEST(unused_bits_are_zero)
 /* Asserts that there is no reply, and that the packet does not change. */
 static void refuses(uint8_t status)
 {
-    mbm_packet found, before;
+    mbm_packet found;
 
     memset(&found, 0x5A, sizeof found);
-    before = found;
+    mbm_packet before = found;
     IS(status, mbm_client_reply(&request, pdu, sizeof pdu, &found));
     assert_memory_equal(&found, &before, sizeof found);
 }

@@ -60,7 +60,6 @@ static uint16_t serve(void *context, const mbm_request *asked, uint8_t *response
 static void begin(uint8_t framing, const char *bytes, uint16_t count)
 {
     const mbm_port bare_port = memory_port_of(&near_end), far_port = memory_port_of(&far_end);
-    const mbm_port *near_port;
 
     memset(&near_end, 0, sizeof near_end);
     memset(&far_end, 0, sizeof far_end);
@@ -74,7 +73,7 @@ static void begin(uint8_t framing, const char *bytes, uint16_t count)
     memset(reply, 0xEE, sizeof reply);
     OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &bare_port, FRAMING(framing), traced,
                        sizeof traced, keep, NULL));
-    near_port = mbm_trace_port(&trace);
+    const mbm_port *near_port = mbm_trace_port(&trace);
     answer.bytes = bytes;
     answer.count = count;
     answer.calls = 0;

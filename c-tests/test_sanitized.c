@@ -43,10 +43,9 @@ static int fills_ring(uint16_t bytes, char *report, size_t capacity)
     size_t length = 0;
     ssize_t more;
     int ends[2], result;
-    pid_t child;
 
     assert_int_equal(pipe(ends), 0);
-    child = fork();
+    pid_t child = fork();
     assert_true(child >= 0);
     if (child == 0) {
         dup2(ends[1], STDERR_FILENO);

@@ -101,7 +101,6 @@ static int is_answered(const uart *from, uint32_t baud, unsigned quantity)
 {
     const uint32_t character = BITS * 1000000u / baud + 1;
     const uint8_t head[7] = {UNIT, 0x10, 0, 0, 0, (uint8_t)quantity, (uint8_t)(2 * quantity)};
-    uint64_t end;
 
     begin(baud);
     memset(&line, 0, sizeof line);
@@ -125,7 +124,7 @@ static int is_answered(const uart *from, uint32_t baud, unsigned quantity)
             line.at[i] = start + (arrived + from->periodUs - 1) / from->periodUs * from->periodUs;
         }
     }
-    end = line.at[line.count - 1] + 200000;
+    uint64_t end = line.at[line.count - 1] + 200000;
     for (; line.now < end; line.now += 50)
         OK(mbm_server_poll(&server));
     for (unsigned i = 0; i < quantity && line.answers == 1; i++)
@@ -262,7 +261,6 @@ TEST(libmodbus_and_mbm_answer_a_request_through_an_adapter)
 {
     pthread_t thread;
     mbm_tty tty;
-    mbm_port port;
     pty ours;
 
     pty_open(&ours);
@@ -283,7 +281,7 @@ TEST(libmodbus_and_mbm_answer_a_request_through_an_adapter)
     memset(&tty, 0, sizeof tty);
     pty_open(&ours);
     assert_int_equal(mbm_tty_open(&tty, ours.path, 9600, 'N', 1), 0);
-    port = mbm_tty_port(&tty);
+    mbm_port port = mbm_tty_port(&tty);
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_setBaudRate(&server, 9600));
     OK(mbm_server_setReceiveLatency(&server, 9000)); /* the machine may be busy */

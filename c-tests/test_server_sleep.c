@@ -170,12 +170,10 @@ static int wait_for_tty(uint32_t timeoutUs)
 
 TEST(on_a_tty_the_server_goes_on_after_the_reply)
 {
-    mbm_port port;
-
     reset();
     pty_open(&line);
     assert_int_equal(mbm_tty_open(&tty, line.path, 115200, 'E', 1), 0);
-    port = mbm_tty_port(&tty);
+    mbm_port port = mbm_tty_port(&tty);
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     link_ = (link_under_test){wait_for_tty, line.ours, 0};
     goes_on_after_each_reply();
@@ -202,7 +200,6 @@ static int wait_for_set(uint32_t timeoutUs)
 
 static void open_tcp(int in_set, int has_header)
 {
-    mbm_port port;
     int pair[2];
 
     reset();
@@ -213,7 +210,7 @@ static void open_tcp(int in_set, int has_header)
         assert_int_equal(mbm_tcp_openSet(&set), 0);
         assert_int_equal(mbm_tcp_add(&set, &tcp), 0);
     }
-    port = mbm_tcp_port(&tcp);
+    mbm_port port = mbm_tcp_port(&tcp);
     if (has_header)
         OK(mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame));
     else

@@ -305,9 +305,8 @@ TEST(an_echo_of_any_length_is_kept_inside_the_buffer)
 {
     static const uint8_t read[] = {3, 0, 0, 0, 2};
     uint8_t frame[2 * MOST];
-    unsigned length;
 
-    length = framed(frame, mbm_server_beginRtu, read, sizeof read);
+    unsigned length = framed(frame, mbm_server_beginRtu, read, sizeof read);
     for (unsigned size = 16; size < 24; size++) {
         for (unsigned pieces = 1; pieces < 12; pieces++) {
             for (unsigned more = 0; more < 3 * size; more += 5) {

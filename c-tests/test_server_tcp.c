@@ -362,13 +362,12 @@ TEST_WITH(damaged_and_cut_frames_are_not_answered, start_lines, stop_lines)
 TEST_WITH(listen_only_mode_is_silent_until_a_restart, start_lines, stop_lines)
 {
     int fd = modbus_get_socket(client);
-    uint16_t messages;
 
     /* Each frame is followed by a wait: of two requests without silence between, only one
      * counts. */
     asked_frames(fd, MBM_FRAMING_RTU, SERVED_UNIT, (const uint8_t *)"\x08\0\x04\0\0", 5, NULL, 0);
     AWAIT(line_rtu.diagnostics.listenOnly == 1);
-    messages = line_rtu.diagnostics.busMessages;
+    uint16_t messages = line_rtu.diagnostics.busMessages;
     asked_frames(fd, MBM_FRAMING_RTU, SERVED_UNIT, (const uint8_t *)"\x07", 1, NULL, 0);
     AWAIT(line_rtu.diagnostics.busMessages != messages);
     assert_int_equal(line_rtu.diagnostics.listenOnly, 1);

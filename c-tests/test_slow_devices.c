@@ -166,10 +166,8 @@ static void sleep_until_a_byte(world *w, uint32_t delay)
 
 static uint8_t node_reads(world *w, mbm_node *m, uint8_t unit, uint16_t address, uint16_t *value)
 {
-    uint8_t status;
-
     OK(mbm_node_setSlaveID(m, unit));
-    status = mbm_node_readHoldingRegisters(m, address, 1);
+    uint8_t status = mbm_node_readHoldingRegisters(m, address, 1);
     while (status == MBM_PENDING) {
         sleep_until_a_byte(w, mbm_node_pollDelay(m));
         status = mbm_node_poll(m);

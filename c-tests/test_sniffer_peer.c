@@ -180,12 +180,11 @@ TEST(frames_of_libmodbus_on_a_serial_line_are_reported)
 {
     static server device;
     pty ours;
-    modbus_t *client;
 
     server_start(&device, 17);
     pty_open(&ours);
     listen_between(ours.ours, device.line.ours, MBM_FRAMING_RTU, 0);
-    client = modbus_new_rtu(ours.path, 115200, 'N', 8, 1);
+    modbus_t *client = modbus_new_rtu(ours.path, 115200, 'N', 8, 1);
     assert_non_null(client);
     modbus_set_slave(client, 17);
     assert_int_equal(modbus_connect(client), 0);
@@ -201,17 +200,15 @@ TEST(frames_of_libmodbus_on_a_serial_line_are_reported)
 static void over_tcp(uint8_t apart)
 {
     tcp_server device;
-    modbus_t *client;
     uint16_t port;
-    int proxy, to_client, to_server;
 
     tcp_server_start(&device);
-    to_server = tcp_connect(device.port);
-    proxy = tcp_listen(&port);
-    client = modbus_new_tcp("127.0.0.1", port);
+    int to_server = tcp_connect(device.port);
+    int proxy = tcp_listen(&port);
+    modbus_t *client = modbus_new_tcp("127.0.0.1", port);
     modbus_set_slave(client, 17);
     assert_int_equal(modbus_connect(client), 0);
-    to_client = accept(proxy, NULL, NULL);
+    int to_client = accept(proxy, NULL, NULL);
     assert_true(to_client >= 0);
     listen_between(to_client, to_server, MBM_FRAMING_TCP, apart);
     run(client);

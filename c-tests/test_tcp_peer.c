@@ -179,8 +179,6 @@ TEST(a_delay_delays_one_reply_only)
 
 TEST(hold_changes_the_order_of_replies)
 {
-    int64_t start;
-
     tcp_peer_fault(peer, 1, FAULT_HOLD, 2);
     tcp_peer_fault(peer, 4, FAULT_HOLD, 3);
     send_requests(1, 3);
@@ -188,7 +186,7 @@ TEST(hold_changes_the_order_of_replies)
     expect(3);
     expect(1);
     /* No other reply follows, so it is sent when its time is over. */
-    start = now_ms();
+    int64_t start = now_ms();
     send_request(4);
     expect(4);
     assert_true(now_ms() - start >= HELD_MS);
@@ -198,7 +196,6 @@ TEST(join_puts_replies_into_one_send)
 {
     uint8_t got[64], right[3 * REPLY];
     unsigned before = segments();
-    int64_t start;
 
     tcp_peer_fault(peer, 1, FAULT_JOIN, 2);
     send_requests(1, 3);
@@ -210,7 +207,7 @@ TEST(join_puts_replies_into_one_send)
     assert_int_equal(segments() - before, 1);
     /* Another reply should join it, but none comes, so it is sent alone. */
     tcp_peer_fault(peer, 4, FAULT_JOIN, 1);
-    start = now_ms();
+    int64_t start = now_ms();
     send_request(4);
     expect(4);
     assert_true(now_ms() - start >= HELD_MS);

@@ -53,10 +53,9 @@ static int16_t read_register(void)
 {
     const uint8_t read_one[12] = {0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1};
     uint8_t reply[11] = {0};
-    int16_t count;
 
     await_connection();
-    count = port.write(port.context, read_one, sizeof read_one);
+    int16_t count = port.write(port.context, read_one, sizeof read_one);
     if (count < 0)
         return count;
     assert_int_equal(count, sizeof read_one);
@@ -68,18 +67,15 @@ static int16_t read_register(void)
 
 TEST(a_client_asks_and_reads_the_reply)
 {
-    uint32_t before, after;
-    double begun, took;
-
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(read_register(), 11);
     assert_int_equal(read_register(), 11);
     assert_int_equal(tcp.error, 0);
-    begun = seconds();
-    before = port.micros(port.context);
+    double begun = seconds();
+    uint32_t before = port.micros(port.context);
     usleep(2000);
-    after = port.micros(port.context);
-    took = seconds() - begun;
+    uint32_t after = port.micros(port.context);
+    double took = seconds() - begun;
     assert_true(after - before >= 2000 && (after - before) * 1e-6 <= took + 2e-6);
 }
 
@@ -304,7 +300,6 @@ TEST(a_connection_without_a_place_is_ended_without_a_reset)
 {
     mbm_tcp_listener listener = {0};
     mbm_tcp places[2] = {0};
-    mbm_port line;
     int clients[4], i;
     char byte;
 
@@ -324,7 +319,7 @@ TEST(a_connection_without_a_place_is_ended_without_a_reset)
 
     /* A lost connection keeps its place, since an object still uses it. */
     close(clients[0]);
-    line = mbm_tcp_port(&places[0]);
+    mbm_port line = mbm_tcp_port(&places[0]);
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) == 1);
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) < 0);
     clients[0] = tcp_connect(listener.port);
@@ -429,11 +424,10 @@ TEST(a_server_listens_again_at_once_after_it_closed_a_connection)
 {
     mbm_tcp_listener listener = MBM_INIT;
     mbm_tcp accepted = MBM_INIT;
-    int client;
 
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     snprintf(service, sizeof service, "%u", listener.port);
-    client = tcp_connect(listener.port);
+    int client = tcp_connect(listener.port);
     assert_int_equal(mbm_tcp_wait(NULL, 0, &listener, -1, PATIENCE), 1);
     assert_int_equal(mbm_tcp_accept(&listener, &accepted, 1), 0);
     mbm_tcp_close(&accepted);

@@ -198,10 +198,9 @@ TEST(bytes_that_are_not_read_do_not_end_the_wait_again)
 TEST(a_full_socket_is_ready_once_it_accepts_bytes_again)
 {
     static uint8_t much[60000];
-    mbm_port port;
 
     fill(1);
-    port = mbm_tcp_port(&tcps[0]);
+    mbm_port port = mbm_tcp_port(&tcps[0]);
     peer_sends(0, "x");
     expect_ready(&tcps[0]);
     while (port.write(port.context, much, sizeof much) > 0)
@@ -220,8 +219,6 @@ TEST(a_full_socket_is_ready_once_it_accepts_bytes_again)
 
 TEST(a_closed_socket_is_not_reported)
 {
-    int other;
-
     fill(4);
     for (unsigned i = 0; i < 4; i++)
         peer_sends(i, "x");
@@ -234,7 +231,7 @@ TEST(a_closed_socket_is_not_reported)
     assert_int_equal(read_some(0, 16), 1);
     expect_silence();
     /* The same while another descriptor keeps the socket open, as in a child process. */
-    other = dup(tcps[0].fd);
+    int other = dup(tcps[0].fd);
     mbm_tcp_close(&tcps[0]);
     peer_sends(0, "x");
     expect_silence();

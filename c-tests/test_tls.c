@@ -235,11 +235,10 @@ TEST(a_peer_that_is_silent_in_the_handshake_is_given_up_in_time)
 /* The client is gone after each number of bytes that it sends in a handshake. */
 TEST(a_peer_that_is_gone_in_the_handshake_is_a_lost_link)
 {
-    size_t whole;
     unsigned polls;
 
     tls_pair_run(&pair);
-    whole = pair.to_server.moved;
+    size_t whole = pair.to_server.moved;
     assert_true(whole > 500);
     for (size_t cut = 0; cut < whole - 100; cut += tls_step(151, 500)) {
         tls_pair_open(&pair, NULL);
@@ -339,11 +338,10 @@ TEST(a_forged_record_ends_the_session)
 TEST(a_record_that_is_sent_twice_ends_the_session)
 {
     uint8_t bytes[64], copy[64];
-    size_t length;
 
     tls_pair_run(&pair);
     assert_int_equal(send_from(&pair.client, secret, 20), 20);
-    length = pair.to_server.count;
+    size_t length = pair.to_server.count;
     assert_true(length <= sizeof copy);
     memcpy(copy, pair.to_server.bytes + pair.to_server.from, length);
     assert_int_equal(read_at(&pair.server, bytes, sizeof bytes), 20);

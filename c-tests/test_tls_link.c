@@ -208,10 +208,9 @@ TEST(a_peer_that_never_answers_is_a_timeout_of_the_connection)
                                    "the handshake took too long"};
     static linked l;
     mbm_tls_identity who = {0};
-    int silent;
     uint16_t at;
 
-    silent = tcp_listen(&at);
+    int silent = tcp_listen(&at);
     tls_identify(&who, "operator", "authority", 0);
     who.handshakeUs = 20000;
     keep(&l, &who, at);
@@ -363,11 +362,10 @@ static int find(const extensions *e, size_t length, char *found)
 {
     uint8_t *copy = (uint8_t *)malloc(length ? length : 1);
     mbedtls_x509_buf buffer = {.len = length, .p = copy};
-    int result;
 
     memcpy(copy, e->bytes, length);
     memset(found, 'x', MBM_TLS_ROLE_BYTES + 1);
-    result = mbm_tls_findRole(&buffer, found);
+    int result = mbm_tls_findRole(&buffer, found);
     free(copy);
     if (result != MBM_TLS_ONE_ROLE)
         assert_int_equal(found[0], 'x');

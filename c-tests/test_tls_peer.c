@@ -248,10 +248,9 @@ TEST(a_client_without_tls_is_refused)
 {
     int fd = tcp_connect(listener.port);
     uint8_t received[64];
-    size_t have;
 
     assert_int_equal(write(fd, ask, sizeof ask), sizeof ask);
-    have = read_to_end(fd, received, sizeof received);
+    size_t have = read_to_end(fd, received, sizeof received);
     assert_int_equal(ended, MBM_TLS_NOT_TLS);
     /* An alert at most: 7 bytes that begin with 21. */
     assert_true(have == 0 || (have == 7 && received[0] == 21));

@@ -125,11 +125,9 @@ fixture each_test = {begin, end};
 /* One round of the server's loop. The wait also ends when there are bytes at `fd`. */
 static void go_round(int fd)
 {
-    int i;
-
     (void)mbm_tls_wait(tlss, tcps, PLACES, &listener, fd, STEP_US);
     looks_left = looks;
-    i = mbm_tls_accept(&listener, &identity, tlss, tcps, PLACES);
+    int i = mbm_tls_accept(&listener, &identity, tlss, tcps, PLACES);
     looks_left = 0;
     if (i >= 0) {
         const mbm_port port = mbm_tls_port(&tlss[i]);

@@ -235,10 +235,9 @@ TEST(two_links_are_told_apart_by_their_contexts)
 TEST(the_rest_is_handed_out_by_flush)
 {
     uint8_t bytes[8];
-    const mbm_port *traced;
 
     begin_master();
-    traced = mbm_trace_port(&trace);
+    const mbm_port *traced = mbm_trace_port(&trace);
     hooked_port_arrive(&wire, REPLY, 5);
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
     assert_int_equal(count, 0);
@@ -252,10 +251,9 @@ TEST(the_rest_is_handed_out_by_flush)
 TEST(the_frame_timeout_can_be_set)
 {
     uint8_t bytes[8];
-    const mbm_port *traced;
 
     begin_master();
-    traced = mbm_trace_port(&trace);
+    const mbm_port *traced = mbm_trace_port(&trace);
     OK(mbm_trace_setFrameTimeout(&trace, 200));
     hooked_port_arrive(&wire, REPLY, 5);
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
@@ -270,10 +268,9 @@ TEST(the_frame_timeout_can_be_set)
 TEST(a_trace_begun_again_drops_what_it_has_not_handed_out)
 {
     uint8_t bytes[8];
-    const mbm_port *traced;
 
     begin_master();
-    traced = mbm_trace_port(&trace);
+    const mbm_port *traced = mbm_trace_port(&trace);
     OK(mbm_trace_setFrameTimeout(&trace, 60000));
     hooked_port_arrive(&wire, REPLY, 5);
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
@@ -299,7 +296,6 @@ TEST(a_trace_goes_on_after_refused_calls)
     const mbm_framing *const framings[] = {NULL,          &no_frames,      &unknown,
                                            &no_functions, &wrong_function, &wrong_end};
     mbm_port incomplete = port;
-    const mbm_port *traced;
     uint8_t bytes[16];
 
     incomplete.micros = NULL;
@@ -314,7 +310,7 @@ TEST(a_trace_goes_on_after_refused_calls)
     begin_master();
     hooked_port_arrive_rtu(&wire, 17, REPLY + 1, sizeof REPLY - 1);
     wire.last = 4;
-    traced = mbm_trace_port(&trace);
+    const mbm_port *traced = mbm_trace_port(&trace);
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 4);
     for (size_t i = 0; i < COUNT(framings); i++)
         REFUSED(MBM_INVALID_ARGUMENT, trace,
@@ -401,11 +397,10 @@ TEST(the_port_of_a_trace_neither_reads_nor_writes_within_the_hook)
     const mbm_framing rtu = {0};
     const mbm_port *traced;
     uint8_t sent[8] = {17, 5, 0, 1, 0xFF, 0};
-    uint16_t crc;
 
     OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, buffer, 64, keep, NULL));
     traced_port = traced = mbm_trace_port(&trace);
-    crc = mbm_frame_crc16(sent, 6);
+    uint16_t crc = mbm_frame_crc16(sent, 6);
     sent[6] = (uint8_t)crc;
     sent[7] = (uint8_t)(crc >> 8);
     within_hook = use_the_port;

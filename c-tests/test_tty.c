@@ -41,10 +41,9 @@ static struct {
 int ioctl(int fd, unsigned long request, ...)
 {
     va_list arguments;
-    void *argument;
 
     va_start(arguments, request);
-    argument = va_arg(arguments, void *);
+    void *argument = va_arg(arguments, void *);
     va_end(arguments);
     if (driver.there && request == TIOCGRS485) {
         memcpy(argument, &driver.state, sizeof driver.state);
@@ -143,11 +142,10 @@ TEST(any_rate_is_set_if_the_options_allow_it)
     static const uint32_t rates[] = {76800, 100000, 250000, 19201, 3250000, 9600};
     struct termios before = settings_of(line.theirs), after;
     mbm_tty_options options = PLAIN;
-    uint32_t rate;
     mbm_tty tty;
 
     SKIP_IF_EMULATED();
-    rate = rate_of(line.theirs);
+    uint32_t rate = rate_of(line.theirs);
     options.anyRate = 1;
     for (size_t i = 0; i < COUNT(rates); i++) {
         options.baud = rates[i];
@@ -392,11 +390,10 @@ TEST(an_rs485_delay_that_the_driver_shortens_is_refused)
 TEST(a_lost_line_is_reported_with_its_errno)
 {
     uint8_t byte;
-    mbm_port port;
     mbm_tty tty;
 
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    port = mbm_tty_port(&tty);
+    mbm_port port = mbm_tty_port(&tty);
     assert_int_equal(port.read(port.context, &byte, 1), 0);
     assert_int_equal(port.write(port.context, (const uint8_t *)"ab", 2), 2);
     assert_int_equal(read(line.ours, &byte, 1), 1);
@@ -415,12 +412,11 @@ TEST(a_full_line_accepts_no_bytes_and_is_not_lost)
 {
     static uint8_t much[40000];
     int16_t taken;
-    mbm_port port;
     mbm_tty tty;
     unsigned rounds = 0;
 
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    port = mbm_tty_port(&tty);
+    mbm_port port = mbm_tty_port(&tty);
     while ((taken = port.write(port.context, much, sizeof much)) > 0)
         assert_true(++rounds < 1000);
     assert_int_equal(taken, 0);
@@ -432,12 +428,11 @@ TEST(a_socket_can_be_attached)
 {
     int pair[2];
     mbm_tty tty;
-    mbm_port port;
     uint8_t byte;
 
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
     assert_int_equal(mbm_tty_attach(&tty, pair[0]), 0);
-    port = mbm_tty_port(&tty);
+    mbm_port port = mbm_tty_port(&tty);
     /* A socket has no transmitter to wait for. */
     assert_int_equal(port.flush(port.context), 1);
     assert_int_equal(port.read(port.context, &byte, 1), 0);
@@ -496,15 +491,13 @@ static void end_wait(void)
 
 TEST_WITH(wait_ends_with_a_byte_with_the_time_or_with_the_line, begin_wait, end_wait)
 {
-    mbm_port port;
     uint8_t byte;
     mbm_tty tty;
-    double start;
 
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    port = mbm_tty_port(&tty);
+    mbm_port port = mbm_tty_port(&tty);
     assert_int_equal(mbm_tty_wait(&tty, 0), 0);
-    start = seconds();
+    double start = seconds();
     assert_int_equal(mbm_tty_wait(&tty, 30500), 0);
     assert_true(seconds() - start >= 0.0305);
     assert_int_equal(write(line.ours, "x", 1), 1);
@@ -519,12 +512,11 @@ TEST_WITH(wait_ends_with_a_byte_with_the_time_or_with_the_line, begin_wait, end_
 /* A server whose function is pending reads nothing, so its program sleeps. */
 TEST_WITH(bytes_that_are_not_read_do_not_end_the_next_wait, begin_wait, end_wait)
 {
-    mbm_port port;
     uint8_t byte;
     mbm_tty tty;
 
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    port = mbm_tty_port(&tty);
+    mbm_port port = mbm_tty_port(&tty);
     assert_int_equal(write(line.ours, "ab", 2), 2);
     assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
     assert_int_equal(mbm_tty_wait(&tty, 1000), 0);
@@ -539,11 +531,10 @@ TEST_WITH(bytes_that_are_not_read_do_not_end_the_next_wait, begin_wait, end_wait
 /* A program that has sent something waits for what comes back, also if it has not read before. */
 TEST_WITH(after_a_write_bytes_end_the_wait_again, begin_wait, end_wait)
 {
-    mbm_port port;
     mbm_tty tty;
 
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    port = mbm_tty_port(&tty);
+    mbm_port port = mbm_tty_port(&tty);
     assert_int_equal(write(line.ours, "a", 1), 1);
     assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
     assert_int_equal(mbm_tty_wait(&tty, 1000), 0);
@@ -571,14 +562,13 @@ TEST_WITH(a_server_with_a_pending_function_sleeps_between_polls, begin_wait, end
     static mbm_unit unit;
     static mbm_custom custom;
     uint8_t frame[MBM_MAX_FRAME];
-    mbm_port port;
     mbm_tty tty;
 
     unit.id = 0x11;
     custom.code = 0x41;
     custom.serve = pending;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    port = mbm_tty_port(&tty);
+    mbm_port port = mbm_tty_port(&tty);
     OK(mbm_unit_serveCustom(&unit, &custom));
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     assert_int_equal(write(line.ours, request, sizeof request), sizeof request);

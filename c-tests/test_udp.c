@@ -249,7 +249,7 @@ TEST(a_lost_datagram_is_repeated_and_a_late_or_second_reply_is_passed_over)
 {
     struct sockaddr_in own = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}}, from;
     const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    uint8_t first, second;
+    uint8_t second;
 
     own.sin_port = htons(receiver.port);
     mbm_udp_close(&receiver);
@@ -257,7 +257,7 @@ TEST(a_lost_datagram_is_repeated_and_a_late_or_second_reply_is_passed_over)
     OK(mbm_client_setResponseTimeout(&client, 30));
     OK(mbm_client_setRetries(&client, 255));
     ask(1);
-    first = receive_request(fd, &from);
+    uint8_t first = receive_request(fd, &from);
     do
         second = receive_request(fd, &from);
     while (second == first);

@@ -50,7 +50,6 @@ void asked_writes(modbus_t *client, served *s)
     uint16_t words[MODBUS_MAX_WR_WRITE_REGISTERS + 2], back[MODBUS_MAX_READ_REGISTERS];
     uint8_t cells[MODBUS_MAX_WRITE_BITS];
     unsigned i, before = s->written;
-    uint16_t kept;
 
     assert_int_equal(modbus_write_register(client, SERVED_BASE, 0xABCD), 1);
     assert_int_equal(s->words[0], 0xABCD);
@@ -68,7 +67,7 @@ void asked_writes(modbus_t *client, served *s)
     assert_memory_equal(&s->words[20], words, 2 * MODBUS_MAX_WRITE_REGISTERS);
     for (i = 0; i < MODBUS_MAX_WRITE_BITS; i++)
         cells[i] = i % 3 == 0;
-    kept = s->bits[5 + MODBUS_MAX_WRITE_BITS / 8 + 1];
+    uint16_t kept = s->bits[5 + MODBUS_MAX_WRITE_BITS / 8 + 1];
     assert_int_equal(modbus_write_bits(client, SERVED_BASE + 43, MODBUS_MAX_WRITE_BITS, cells),
                      MODBUS_MAX_WRITE_BITS);
     for (i = 0; i < MODBUS_MAX_WRITE_BITS; i++)
@@ -192,12 +191,11 @@ int asked_is_served(int fd, uint8_t unit, uint8_t last)
     const uint8_t request[] = {0, 1, 0, 0, 0, 2, unit, 7};
     struct pollfd input = {fd, POLLIN, 0};
     uint8_t answer[9];
-    ssize_t count;
 
     if (send(fd, request, sizeof request, MSG_NOSIGNAL) != sizeof request)
         return 0;
     assert_int_equal(poll(&input, 1, PATIENCE_MS), 1);
-    count = recv(fd, answer, sizeof answer, 0);
+    ssize_t count = recv(fd, answer, sizeof answer, 0);
     if (count <= 0)
         return 0;
     assert_int_equal(count, sizeof answer);
@@ -210,11 +208,10 @@ void asked_frames(int fd, int framing, uint8_t unit, const uint8_t *pdu, size_t 
 {
     uint8_t frame[600], answer[600], wanted[600];
     size_t size = frame_of(framing, unit, pdu, length, frame);
-    size_t got;
 
     if (expected)
         expected = frame_of(framing, unit, response, expected, wanted);
-    got = asked_bytes(fd, frame, size, answer, expected);
+    size_t got = asked_bytes(fd, frame, size, answer, expected);
     assert_int_equal(got, expected);
     assert_memory_equal(answer, wanted, expected);
 }

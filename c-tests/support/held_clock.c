@@ -48,10 +48,8 @@ void held_clock_start(held_clock *c)
 
 int64_t held_clock_now(held_clock *c)
 {
-    int64_t shown;
-
     pthread_mutex_lock(&c->lock);
-    shown = read_clock(c);
+    int64_t shown = read_clock(c);
     pthread_mutex_unlock(&c->lock);
     return shown;
 }
@@ -111,7 +109,6 @@ static int16_t clock_read(void *context, uint8_t *bytes, uint16_t capacity)
 static int16_t clock_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     held_clock *c = (held_clock *)context;
-    int16_t taken;
 
     /* Before the write, because the device may process the bytes at once. The bytes are
      * written at the time that the master read last, so the master is never late either. */
@@ -121,7 +118,7 @@ static int16_t clock_write(void *context, const uint8_t *bytes, uint16_t length)
         c->stopped = c->readTime;
     c->bytes += length;
     pthread_mutex_unlock(&c->lock);
-    taken = c->port.write(c->port.context, bytes, length);
+    int16_t taken = c->port.write(c->port.context, bytes, length);
     held_clock_done(c, c->link, taken < 0 ? length : (uint32_t)(length - taken));
     return taken;
 }
@@ -129,11 +126,10 @@ static int16_t clock_write(void *context, const uint8_t *bytes, uint16_t length)
 static uint32_t clock_micros(void *context)
 {
     held_clock *c = (held_clock *)context;
-    uint32_t shown;
 
     pthread_mutex_lock(&c->lock);
     c->readTime = read_clock(c);
-    shown = (uint32_t)c->readTime;
+    uint32_t shown = (uint32_t)c->readTime;
     pthread_mutex_unlock(&c->lock);
     return shown;
 }

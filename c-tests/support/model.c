@@ -58,7 +58,6 @@ size_t model_answer(model *m, const request *r, uint8_t *reply)
     unsigned unit = (unsigned)(r->unit - MODEL_FIRST_UNIT) % MODEL_UNITS;
     unsigned i, at = r->address, to = r->write_address;
     int reads = r->function <= 4 || r->function == 0x17;
-    uint16_t *cell;
     size_t length = 0;
 
     reply[0] = r->unit;
@@ -68,7 +67,7 @@ size_t model_answer(model *m, const request *r, uint8_t *reply)
         reply[2] = 2;
         return seal(reply, 3);
     }
-    cell = &m->holding[unit][to];
+    uint16_t *cell = &m->holding[unit][to];
     switch (r->function) {
     case 0x01: length = pack(reply, &m->coils[unit][at], r->quantity); break;
     case 0x02: length = pack(reply, &m->inputs[unit][at], r->quantity); break;

@@ -16,11 +16,9 @@ static void log_update(void *context, mbm_plan *plan, uint16_t field)
 
 void plan_device_begin(plan_device *d, int is_tcp)
 {
-    mbm_port port;
-
     memset(d, 0, sizeof *d);
     d->is_tcp = is_tcp != 0;
-    port = memory_port_of(&d->memory);
+    mbm_port port = memory_port_of(&d->memory);
     if (is_tcp)
         OK(mbm_client_beginTcp(&d->client, &port, d->frame, sizeof d->frame, d->outgoing,
                                sizeof d->outgoing));

@@ -64,11 +64,10 @@ void program_start_limited(program *p, const char *name, const char *const *argu
 {
     char path[4096];
     ssize_t length = readlink("/proc/self/exe", path, sizeof path - 64);
-    char *end;
 
     must(length > 0, "/proc/self/exe");
     path[length] = 0;
-    end = strrchr(path, '/');
+    char *end = strrchr(path, '/');
     must(end != NULL && strlen(name) < 48, name);
     sprintf(end, "/%s", name);
     start(p, path, name, arguments, descriptors, getenv("MBM_EMULATOR"));
@@ -111,13 +110,12 @@ size_t program_rest(const program *p, char *text, size_t capacity)
 static int is_asleep(const program *p)
 {
     char path[64], text[512], *name;
-    size_t length;
     FILE *file;
 
     snprintf(path, sizeof path, "/proc/%d/stat", (int)p->pid);
     file = fopen(path, "r");
     must(file != NULL, path);
-    length = fread(text, 1, sizeof text - 1, file);
+    size_t length = fread(text, 1, sizeof text - 1, file);
     (void)fclose(file);
     text[length] = 0;
     name = strrchr(text, ')');

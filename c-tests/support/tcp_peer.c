@@ -118,7 +118,6 @@ static void answer(tcp_peer *p, const uint8_t *request, size_t length, reply *r)
 {
     static const uint8_t has[] = {1, 2, 3, 4, 5, 6, 0x0F, 0x10, 0x11, 0x16, 0x17};
     uint8_t whole[TCP_PEER_FRAME] = {0};
-    ssize_t count;
 
     if (!memchr(has, request[7], sizeof has) || (request[7] != 0x11 && length < 12)) {
         exception(request, memchr(has, request[7], sizeof has) ? 3 : 1, r);
@@ -126,7 +125,7 @@ static void answer(tcp_peer *p, const uint8_t *request, size_t length, reply *r)
     }
     memcpy(whole, request, length);
     must(modbus_reply(p->replier, whole, (int)length, p->memory) > 0, "modbus_reply");
-    count = recv(p->capture[1], r->bytes, sizeof r->bytes, 0);
+    ssize_t count = recv(p->capture[1], r->bytes, sizeof r->bytes, 0);
     must(count > HEADER, "the reply");
     r->length = (size_t)count;
 }

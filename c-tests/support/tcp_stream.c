@@ -100,13 +100,11 @@ void stream_release(stream *c, int64_t now, int one_was_sent)
 
 void stream_hold(stream *c, const reply *r, int64_t due, unsigned replies_before)
 {
-    waiting *w;
-
     if (c->holds == STREAM_HELD) {
         c->held[0].due = 0;
         stream_release(c, 0, 0);
     }
-    w = &c->held[c->holds++];
+    waiting *w = &c->held[c->holds++];
     w->what = *r;
     w->due = due;
     w->replies_before = replies_before;
