@@ -144,7 +144,7 @@ nightly: ## Run what .ci/run leaves out: valgrind, all archives, QEMU, fuzzing, 
 	@.ci/nightly
 
 .PHONY: test-c
-test-c: need-test ## Run only C and C++: TESTS="test_ring test_bits" BUILDS="plain valgrind" TEST=one_test
+test-c: need-test ## Run only C and C++: TESTS="test_ring test_registers" BUILDS="plain valgrind" TEST=one_test
 	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests
 
 .PHONY: build-rust test-rust run-c-tests
@@ -269,8 +269,7 @@ $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsu
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
-$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device device_file yaml_file value numbers report)
-$(BUILD)/$(1)/test_place: $(patsubst %,$(BUILD)/$(1)/cli/%.o,place numbers)
+$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device place device_file yaml_file value numbers report)
 $(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over clock)
 $(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))

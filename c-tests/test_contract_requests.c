@@ -374,3 +374,307 @@ SIM_TEST(set_slave_id_counts_from_the_next_request_on)
     assert_int_equal(mbm_node_getSlaveID(n), 247);
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
 }
+
+/* One transaction of the contract with programs for ModbusMaster: the order of its steps
+ * and the gap before it, on a simulated clock. Unit 17 is 11 on the wire. */
+
+SIM_TEST(steps_come_in_order)
+{
+    sim_deliver_text(s, s->now, "DE AD BE EF");
+    sim_reads(s, 5000);
+    /* Old bytes dropped, driver on, write, flush, driver off, idle, reply. */
+    sim_assert_order(s, "PWFOR", "RPWFOR");
+    sim_assert_order(s, "POI", "IPOI");
+    assert_int_equal(s->counters.resynchronisations, 0);
+    sim_assert_sent(s, 0, "11 03 00 00 00 01 +");
+}
+
+SIM_TEST(steps_come_in_order_when_the_port_takes_bytes_one_by_one)
+{
+    s->write_piece = 1;
+    s->write_busy = 3;
+    sim_reads(s, 5000);
+    sim_assert_order(s, "PWFO", "PWFO");
+    assert_int_equal(s->counters.bytesSent, 8);
+}
+
+/* A port that takes a byte at every other call. */
+SIM_TEST(bytes_are_counted_as_they_are_sent)
+{
+    OK(mbm_node_setBlocking(n, 0));
+    s->write_piece = 1;
+    s->write_busy = 1;
+    s->character = 1000;
+    for (unsigned again = 0; again < 2; again++) {
+        const unsigned before = again * 8;
+
+        assert_int_equal(sim_read_one(s), MBM_PENDING);
+        while (s->counters.bytesSent < before + 8) {
+            const uint32_t sent = s->sent > again ? s->frames[again].length : 0;
+
+            assert_int_equal(s->counters.bytesSent, before + sent);
+            assert_int_equal(s->counters.requests, again + (sent > 0));
+            assert_int_equal(mbm_node_poll(n), MBM_PENDING);
+            s->now += s->idle_step;
+        }
+        /* The last byte has not left yet. The end of the request counts nothing again. */
+        assert_true(s->now < s->transmitted);
+        while (s->driver_on) {
+            assert_int_equal(mbm_node_poll(n), MBM_PENDING);
+            s->now += s->idle_step;
+        }
+        OK(mbm_node_cancel(n));
+        assert_int_equal(s->counters.bytesSent, before + 8);
+        assert_int_equal(s->counters.requests, again + 1);
+    }
+}
+
+SIM_TEST(a_request_of_which_the_port_takes_no_byte_is_counted)
+{
+    OK(mbm_node_setResponseTimeout(n, 100));
+    s->write_never = 1;
+    assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
+    assert_int_equal(s->counters.requests, 1);
+    assert_int_equal(s->counters.bytesSent, 0);
+}
+
+SIM_TEST(a_client_counts_bytes_as_they_are_sent)
+{
+    static mbm_client client;
+    static uint8_t frame[MBM_MAX_ASCII_FRAME];
+    mbm_counters counters = {0};
+
+    s->write_piece = 1;
+    for (unsigned ascii = 0; ascii <= 1; ascii++) {
+        const uint32_t length = ascii ? 17 : 8;
+        mbm_clientRequest request = {.unit = 17};
+
+        memset(&client, 0, sizeof client);
+        memset(&counters, 0, sizeof counters);
+        if (ascii)
+            OK(mbm_client_beginAscii(&client, &s->port, frame, sizeof frame));
+        else
+            OK(mbm_client_beginRtu(&client, &s->port, frame, sizeof frame));
+        OK(mbm_client_setCounters(&client, &counters));
+        assert_int_equal(mbm_client_writeSingleRegister(&client, &request, 0, 1), MBM_PENDING);
+        while (counters.bytesSent < length) {
+            const uint32_t before = counters.bytesSent;
+
+            assert_int_equal(mbm_client_poll(&client), MBM_PENDING);
+            assert_in_range(counters.bytesSent, before, before + 1);
+            s->now += s->idle_step;
+        }
+        /* The request ends when its last bit has left. */
+        s->now += 20 * s->character;
+        OK(mbm_client_cancel(&client, &request));
+        assert_int_equal(counters.bytesSent, length);
+        assert_int_equal(counters.requests, 1);
+    }
+}
+
+SIM_TEST(bytes_that_wait_in_the_receiver_are_no_part_of_the_reply)
+{
+    sim_deliver_text(s, s->now, "11 03 02 66 66 +");
+    sim_reads(s, 500);
+}
+
+SIM_TEST(the_driver_is_switched_off_only_after_the_last_bit)
+{
+    s->character = 1146;
+    sim_reads(s, 500);
+    sim_assert_time(sim_time_of(s, 'O'), s->frames[0].end);
+}
+
+SIM_TEST(the_driver_is_held_on_after_an_early_flush)
+{
+    s->character = 1146;
+    s->flush_lies = 1;
+    OK(mbm_line_setBaudRate(&s->line, 9600));
+    OK(mbm_line_setPostFlushHold(&s->line, 9));
+    sim_reads(s, 500);
+    assert_int_equal(s->post_before_last_bit, 0);
+    sim_assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 9 * 1146);
+    assert_int_equal(s->idle_while_driving, 0);
+}
+
+SIM_TEST(without_a_baud_rate_the_hold_is_that_of_9600_baud)
+{
+    s->flush_lies = 1;
+    OK(mbm_line_setPostFlushHold(&s->line, 2));
+    sim_reads(s, 500);
+    sim_assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 2 * 1146);
+}
+
+SIM_TEST(all_hooks_except_three_may_be_missing)
+{
+    s->port.flush = NULL;
+    s->port.preTransmission = NULL;
+    s->port.postTransmission = NULL;
+    s->port.idle = NULL;
+    OK(mbm_line_beginRtu(&s->line, &s->port, s->buffer, MBM_MAX_FRAME));
+    sim_reads(s, 500);
+    sim_assert_order(s, "PFOI", "");
+}
+
+SIM_TEST(the_first_request_waits_for_the_gap_after_begin)
+{
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[0].silence, 4000);
+}
+
+static void gap_after_reply(sim *s, uint32_t wanted)
+{
+    sim_reads(s, 500);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[s->sent - 1].silence, wanted);
+}
+
+SIM_TEST(the_gap_is_4_ms_while_no_baud_rate_is_set)
+{
+    gap_after_reply(s, 4000);
+    mbm_line_setBaudRate(&s->line, 115200);
+    mbm_line_setBaudRate(&s->line, 0);
+    gap_after_reply(s, 4000);
+}
+
+SIM_TEST(the_gap_is_three_and_a_half_characters_up_to_19200_baud)
+{
+    OK(mbm_line_setBaudRate(&s->line, 9600));
+    gap_after_reply(s, 4011);
+    OK(mbm_line_setBaudRate(&s->line, 1200));
+    gap_after_reply(s, 32084);
+    OK(mbm_line_setBaudRate(&s->line, 19200));
+    gap_after_reply(s, 2006);
+}
+
+SIM_TEST(the_gap_is_1750_us_above_19200_baud)
+{
+    OK(mbm_line_setBaudRate(&s->line, 19201));
+    gap_after_reply(s, 1750);
+    OK(mbm_line_setBaudRate(&s->line, 1000000));
+    gap_after_reply(s, 1750);
+}
+
+SIM_TEST(a_set_gap_holds_until_a_baud_rate_is_set)
+{
+    OK(mbm_line_setGap(&s->line, 20000));
+    gap_after_reply(s, 20000);
+    OK(mbm_line_setGap(&s->line, 0));
+    gap_after_reply(s, 0);
+    OK(mbm_line_setBaudRate(&s->line, 115200));
+    gap_after_reply(s, 1750);
+}
+
+SIM_TEST(the_gap_counts_from_the_last_foreign_byte)
+{
+    sim_reads(s, 500);
+    sim_deliver_text(s, s->now + 3000, "05 03 02 00 01 +");
+    sim_deliver_text(s, s->now + 6000, "99");
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].silence, 4000);
+    sim_assert_order(s, "PR", "PRPR");
+}
+
+SIM_TEST(the_gap_counts_from_the_last_byte_sent)
+{
+    mbm_line_setTurnaroundDelay(&s->line, 0);
+    mbm_node_setSlaveID(n, 0);
+    OK(mbm_node_writeSingleCoil(n, 1, 1));
+    OK(mbm_node_writeSingleCoil(n, 1, 1));
+    sim_assert_time(s->frames[1].begin - s->frames[0].end, 4000);
+}
+
+SIM_TEST(a_gap_that_has_passed_already_is_not_waited_for)
+{
+    sim_reads(s, 500);
+    s->now += 10000;
+    uint64_t asked = s->now;
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].begin - asked, 0);
+}
+
+SIM_TEST(line_used_makes_the_gap_count_from_now)
+{
+    sim_reads(s, 500);
+    s->now += 10000;
+    uint64_t asked = s->now;
+    OK(mbm_line_used(&s->line));
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].begin - asked, 4000);
+}
+
+SIM_TEST(idle_is_not_called_while_bytes_wait)
+{
+    s->character = 0;
+    s->read_piece = 1;
+    sim_reads(s, 500);
+    sim_assert_order(s, "IRO", "IOIR");
+}
+
+SIM_TEST(no_gap_is_waited_for_after_begin_on_a_silent_line)
+{
+    s->now += 10000;
+    sim_begin(s, 17);
+    uint64_t asked = s->now;
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[0].begin - asked, 0);
+    /* After a request of the object on that line the gap is kept. */
+    sim_begin(s, 17);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].silence, 4000);
+}
+
+SIM_TEST(bytes_that_arrive_after_begin_start_the_gap)
+{
+    s->now += 10000;
+    sim_begin(s, 17);
+    sim_deliver_text(s, s->now - 100, "05 03 02");
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[0].silence, 4000);
+}
+
+SIM_TEST(the_gap_counts_from_the_reported_use_of_the_line)
+{
+    sim_reads(s, 500);
+    s->now += 10000;
+    uint64_t asked = s->now;
+    OK(mbm_line_usedAt(&s->line, (uint32_t)s->now - 3000));
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].begin - asked, 1000);
+    /* The line's own last byte is later than this. */
+    OK(mbm_line_usedAt(&s->line, (uint32_t)asked - 3000));
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[2].silence, 4000);
+}
+
+SIM_TEST(a_reported_use_counts_also_after_40_minutes_without_one)
+{
+    sim_reads(s, 500);
+    s->now += 40ull * 60 * 1000000;
+    s->limit = s->now + 1000000;
+    uint64_t asked = s->now;
+    OK(mbm_line_usedAt(&s->line, (uint32_t)s->now - 3000));
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].begin - asked, 1000);
+}
+
+/* Two objects that know nothing of each other, each with a line. */
+SIM_TEST(several_lines_share_a_stream)
+{
+    mbm_line line = MBM_INIT;
+    mbm_node other = MBM_INIT;
+    uint16_t words[4];
+    uint8_t frame[MBM_FRAME_BYTES(4)];
+
+    OK(mbm_line_beginRtu(&line, &s->port, frame, sizeof frame));
+    OK(mbm_node_begin(&other, &line, 3, words, 4, NULL, 0));
+    sim_reads(s, 500);
+    mbm_line_used(&line);
+    sim_answer(s, 1, 500, "03 04 02 00 07 +");
+    OK(mbm_node_readInputRegisters(&other, 0, 1));
+    assert_int_equal(words[0], 7);
+    sim_assert_time(s->frames[1].silence, 4000);
+    assert_int_equal(s->response[0], 42);
+    mbm_line_used(&s->line);
+    sim_reads(s, 500);
+}

@@ -286,3 +286,340 @@ TEST(a_link_without_a_status_hook_waits_for_the_connect_timeout)
     assert_int_equal(next_attempt(), 500);
     assert_int_equal(disconnects, 0);
 }
+
+/* A client's link: what its hooks and its callback may call, how it ends and begins again, and
+ * what a refused call leaves. */
+
+static unsigned called;
+
+static void use_everything(void)
+{
+    called++;
+    IS(MBM_BUSY, mbm_client_poll(&client));
+    IS(MBM_BUSY, mbm_client_readCoils(&client, &other, 0, 1));
+    IS(MBM_BUSY, mbm_client_cancel(&client, &request));
+    IS(MBM_BUSY, mbm_client_reconnect(&client, NULL));
+    IS(MBM_BUSY, mbm_client_suspend(&client, NULL));
+    IS(MBM_BUSY, mbm_link_begin(&kept, &client, &hooks));
+    IS(MBM_BUSY, mbm_link_end(&kept));
+    IS(MBM_BUSY, mbm_link_reconnect(&kept));
+    IS(MBM_BUSY, mbm_link_setBackoff(&kept, 0, 0, 0));
+    IS(MBM_BUSY, mbm_link_setJitter(&kept, 0, NULL, NULL));
+    IS(MBM_BUSY, mbm_link_setConnectTimeout(&kept, 0));
+    IS(MBM_BUSY, mbm_link_setRequestsWait(&kept, 0));
+    IS(MBM_BUSY, mbm_link_setCallback(&kept, NULL, NULL));
+    IS(MBM_BUSY, mbm_link_setCounters(&kept, NULL));
+    assert_int_equal(mbm_link_state(&kept), 0);
+    assert_int_equal(mbm_client_pollDelay(&client), 0);
+}
+
+TEST(the_hooks_of_a_link_may_use_neither_link_nor_client)
+{
+    begin(MBM_FRAMING_TCP);
+    called = 0;
+    within = use_everything;
+    connects_with = MBM_PENDING;
+    OK(mbm_client_poll(&client));
+    assert_int_equal(called, 2); /* status, connect */
+    status_is = MBM_LINK_LOST;
+    OK(mbm_client_poll(&client));
+    assert_int_equal(called, 4); /* status, disconnect */
+    assert_string_equal(events, "FE6 ");
+}
+
+static int what;
+
+/* Does one thing in the callback: the client goes on, or nothing of it is used any more. */
+static void act(void *context, uint8_t event, uint8_t status)
+{
+    const mbm_port port = memory_port_of(&m);
+
+    (void)context;
+    (void)status;
+    called++;
+    if (event != MBM_LINK_EVENT_LOST)
+        return;
+    IS(MBM_BUSY, mbm_client_poll(&client));
+    switch (what) {
+    case 0: OK(mbm_link_end(&kept)); break;
+    case 1: OK(mbm_link_begin(&kept, &client, &hooks)); break;
+    case 2: OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame)); break;
+    case 3: memset(&client, 0, sizeof client); break;
+    case 4:
+        OK(mbm_link_end(&kept));
+        memset(&kept, 0, sizeof kept);
+        break;
+    case 5: queue_read(&request); break;
+    case 6: OK(mbm_link_reconnect(&kept)); break;
+    case 7: OK(mbm_link_setCallback(&kept, NULL, NULL)); break;
+    default: break;
+    }
+}
+
+TEST(the_callback_may_use_link_and_client)
+{
+    static const uint8_t after[] = {MBM_OK, MBM_OK, MBM_OK, MBM_NOT_INITIALISED,
+                                    MBM_OK, MBM_OK, MBM_OK, MBM_OK};
+
+    for (unsigned i = 0; i < COUNT(framings); i++)
+        for (what = 0; what < 8; what++) {
+            begin_up(framings[i]);
+            OK(mbm_link_setCallback(&kept, act, NULL));
+            called = 0;
+            m.is_lost = 1;
+            /* The link was lost before, so a request of the callback ends. */
+            IS(MBM_OK, mbm_client_poll(&client));
+            assert_int_equal(called, 1);
+            m.is_lost = 0;
+            IS(after[what], mbm_client_poll(&client));
+            run(1000);
+            assert_int_equal(mbm_link_state(&kept), what == 0 || what == 4   ? 0
+                                                    : what == 2 || what == 3 ? MBM_LINK_IS_DOWN
+                                                                             : MBM_LINK_IS_UP);
+            if (what == 5)
+                IS(MBM_LINK_LOST, request.status);
+        }
+}
+
+TEST(a_client_without_its_link_works_as_before)
+{
+    for (unsigned i = 0; i < COUNT(framings); i++) {
+        begin_up(framings[i]);
+        OK(mbm_link_end(&kept));
+        IS(MBM_NOT_INITIALISED, mbm_link_end(&kept));
+        assert_int_equal(mbm_client_pollDelay(&client), UINT32_MAX);
+        m.is_lost = 1;
+        OK(mbm_client_poll(&client));
+        m.is_lost = 0;
+        queue_read(&request);
+        memory_port_send(&m, &client);
+        answer(framings[i]);
+        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+        m.is_lost = 1;
+        queue_read(&request);
+        IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 1000));
+        assert_string_equal(events, "");
+        m.is_lost = 0;
+        OK(mbm_link_begin(&kept, &client, &hooks));
+        OK(mbm_client_poll(&client));
+        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+    }
+}
+
+TEST(a_client_that_is_begun_again_has_no_link)
+{
+    begin_up(MBM_FRAMING_TCP);
+    begin_client(MBM_FRAMING_RTU);
+    assert_int_equal(mbm_client_pollDelay(&client), UINT32_MAX);
+    OK(mbm_link_begin(&kept, &client, &hooks));
+    begin_client(MBM_FRAMING_TCP);
+    OK(mbm_link_end(&kept));
+    OK(mbm_link_begin(&kept, &client, &hooks));
+    OK(mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+}
+
+TEST(a_link_uses_nothing_of_a_client_that_was_begun_again)
+{
+    static mbm_client linked, next;
+    const mbm_port port = memory_port_of(&m);
+
+    begin_up(MBM_FRAMING_TCP);
+    memcpy(&linked, &client, sizeof client);
+    begin_client(MBM_FRAMING_RTU);
+    /* The client has ended. Its storage has other content, which looks like a client. */
+    memcpy(&client, &linked, sizeof client);
+    memset(&next, 0, sizeof next);
+    OK(mbm_client_beginRtu(&next, &port, frame, sizeof frame));
+    OK(mbm_link_begin(&kept, &next, &hooks));
+    assert_memory_equal(&client, &linked, sizeof client);
+    OK(mbm_client_poll(&next));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+}
+
+TEST(a_link_begun_again_has_its_default_settings)
+{
+    begin_up(MBM_FRAMING_TCP);
+    OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 7, 7));
+    OK(mbm_link_setRequestsWait(&kept, 1));
+    OK(mbm_link_begin(&kept, &client, &hooks));
+    OK(mbm_client_poll(&client));
+    assert_string_equal(events, "");
+    m.is_lost = 1;
+    OK(mbm_client_poll(&client));
+    queue_read(&request);
+    OK(mbm_client_poll(&client));
+    IS(MBM_LINK_LOST, request.status);
+    assert_int_equal(mbm_client_pollDelay(&client), 500 * MS);
+}
+
+TEST(a_suspended_client_leaves_its_link_alone)
+{
+    static mbm_line line;
+    static mbm_node node;
+    static uint16_t registers[2];
+    static uint8_t buffer[16];
+    mbm_link second = {0};
+
+    memset(&line, 0, sizeof line);
+    memset(&node, 0, sizeof node);
+    begin_up(MBM_FRAMING_RTU);
+    OK(mbm_line_setFrame(&line, buffer, sizeof buffer));
+    OK(mbm_node_begin(&node, &line, 1, registers, 2, registers, 0));
+    OK(mbm_node_setBlocking(&node, 0));
+    OK(mbm_client_suspend(&client, &line));
+    memory_port_bytes(&m, frame, 1);
+    IS(MBM_BUSY, mbm_client_poll(&client));
+    assert_int_equal(m.arriving_count, 1);
+    assert_int_equal(mbm_client_pollDelay(&client), UINT32_MAX);
+    IS(MBM_BUSY, mbm_link_end(&kept));
+    IS(MBM_BUSY, mbm_link_begin(&kept, &client, &hooks));
+    IS(MBM_BUSY, mbm_link_begin(&second, &client, &hooks));
+    /* The master learns of the loss, and then the client. */
+    m.is_lost = 1;
+    IS(MBM_PENDING, mbm_node_readCoils(&node, 0, 1));
+    IS(MBM_LINK_LOST, mbm_node_poll(&node));
+    OK(mbm_client_resume(&client, &line));
+    OK(mbm_client_poll(&client));
+    assert_string_equal(events, "LE6 ");
+    /* A master on a link that is down learns it too. */
+    connects_with = MBM_LINK_LOST;
+    OK(mbm_client_suspend(&client, &line));
+    IS(MBM_PENDING, mbm_node_readCoils(&node, 0, 1));
+    IS(MBM_LINK_LOST, mbm_node_poll(&node));
+    OK(mbm_client_resume(&client, &line));
+}
+
+TEST(a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link)
+{
+    for (unsigned i = 0; i < COUNT(framings); i++) {
+        begin_up(framings[i]);
+        queue_read(&request);
+        memory_port_send(&m, &client);
+        m.now += 10000 * MS;
+        m.is_lost = 1;
+        OK(mbm_client_poll(&client));
+        IS(MBM_LINK_LOST, request.status);
+        assert_string_equal(events, "LE6 ");
+    }
+}
+
+TEST(a_reconnection_on_demand_closes_the_link_and_opens_it_at_once)
+{
+    begin_up(MBM_FRAMING_TCP);
+    OK(mbm_link_setRequestsWait(&kept, 1));
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    OK(mbm_link_reconnect(&kept));
+    OK(mbm_link_reconnect(&kept));
+    assert_int_equal(mbm_client_pollDelay(&client), 0);
+    OK(mbm_client_poll(&client));
+    IS(MBM_LINK_LOST, request.status);
+    OK(mbm_client_poll(&client));
+    assert_string_equal(events, "LE6 C00 ");
+    assert_int_equal(disconnects, 1);
+    assert_int_equal(connects, 2);
+    /* While the connection is being made. */
+    connects_with = status_is = MBM_PENDING;
+    OK(mbm_link_reconnect(&kept));
+    OK(mbm_client_poll(&client));
+    OK(mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
+    OK(mbm_link_reconnect(&kept));
+    OK(mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
+    assert_int_equal(disconnects, 3);
+    assert_int_equal(connects, 4);
+    /* While it is down. */
+    connects_with = MBM_LINK_LOST;
+    status_is = MBM_LINK_LOST;
+    OK(mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
+    OK(mbm_link_reconnect(&kept));
+    assert_int_equal(next_attempt(), 0);
+}
+
+TEST(queued_requests_wait_for_a_reconnection_on_demand)
+{
+    for (unsigned is_down = 0; is_down < 2; is_down++) {
+        mbm_clientRequest queued = {.unit = 17};
+
+        begin_up(MBM_FRAMING_RTU);
+        if (is_down) {
+            connects_with = status_is = MBM_LINK_LOST;
+            OK(mbm_link_reconnect(&kept));
+            OK(mbm_client_poll(&client));
+            OK(mbm_client_poll(&client));
+            assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
+            connects_with = MBM_OK;
+        }
+        IS(MBM_PENDING, mbm_client_readCoils(&client, &queued, 0, 1));
+        OK(mbm_link_reconnect(&kept));
+        (void)mbm_client_poll(&client);
+        (void)mbm_client_poll(&client);
+        IS(MBM_PENDING, queued.status);
+        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+        /* If the attempt fails, they end. */
+        connects_with = status_is = MBM_LINK_LOST;
+        OK(mbm_link_reconnect(&kept));
+        (void)mbm_client_poll(&client);
+        (void)mbm_client_poll(&client);
+        IS(MBM_LINK_LOST, queued.status);
+    }
+}
+
+static void queue_again(void *context, mbm_clientRequest *ended)
+{
+    (void)context;
+    called++;
+    queue_read(ended);
+}
+
+TEST(a_request_of_done_fails_or_waits_as_all_do)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        begin_up(MBM_FRAMING_TCP);
+        OK(mbm_link_setRequestsWait(&kept, (uint8_t)i));
+        connects_with = MBM_LINK_LOST;
+        request.done = queue_again;
+        queue_read(&request);
+        memory_port_send(&m, &client);
+        m.is_lost = 1;
+        called = 0;
+        IS(MBM_PENDING, mbm_client_poll(&client));
+        /* One poll ends at most 17 requests; the loss was one of them. */
+        assert_int_equal(called, i == 0 ? 16 : 1);
+    }
+}
+
+TEST(a_call_that_is_refused_changes_nothing)
+{
+    const mbm_linkHooks none = {.disconnect = disconnect};
+    static mbm_link zero, second;
+    static mbm_client unused;
+
+    memset(&second, 0, sizeof second);
+    begin_up(MBM_FRAMING_TCP);
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(NULL, &client, &hooks));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(&second, NULL, &hooks));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(&second, &client, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(&second, &client, &none));
+    IS(MBM_NOT_INITIALISED, mbm_link_begin(&second, &unused, &hooks));
+    IS(MBM_BUSY, mbm_link_begin(&second, &client, &hooks));
+    assert_memory_equal(&second, &zero, sizeof zero);
+    IS(MBM_NOT_INITIALISED, mbm_link_end(&second));
+    IS(MBM_NOT_INITIALISED, mbm_link_reconnect(&second));
+    IS(MBM_NOT_INITIALISED, mbm_link_setRequestsWait(&second, 1));
+    assert_int_equal(mbm_link_state(&second), 0);
+    assert_int_equal(mbm_link_state(NULL), 0);
+    mbm_link before = kept;
+    IS(MBM_INVALID_ARGUMENT, mbm_link_begin(&kept, &client, &none));
+    IS(MBM_NOT_INITIALISED, mbm_link_begin(&kept, &unused, &hooks));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_setBackoff(&kept, 4, 1, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_setJitter(&kept, 1, NULL, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_setJitter(&kept, 101, half, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_link_end(NULL));
+    assert_memory_equal(&before, &kept, sizeof kept);
+    run(3000);
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+}
