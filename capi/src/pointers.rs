@@ -287,6 +287,20 @@ pub(crate) unsafe fn with<'a, O: CObject>(
     status.code()
 }
 
+/// As [`with`], for an action that nothing refuses.
+///
+/// # Safety
+/// As for [`with`].
+pub(crate) unsafe fn change<'a, O: CObject>(
+    object: *mut O,
+    action: impl FnOnce(O::Access<'a>),
+) -> u8 {
+    with(object, |fields| {
+        action(fields);
+        Status::OK
+    })
+}
+
 /// Checks the object and returns what `getter` reads of it. Returns `otherwise` if the
 /// check refuses.
 ///

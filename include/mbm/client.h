@@ -754,8 +754,8 @@ uint8_t mbm_client_forward(mbm_client *client, mbm_clientRequest *request, uint8
 /**
  * Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the
  * request has been sent. In TCP frames it starts when mbm_client_poll puts the request into
- * the outgoing buffer, also if the port accepts it later. `timeoutMs` of a request or of a unit
- * replaces this time.
+ * the outgoing buffer, also if the port accepts it later. `timeoutMs` of a request or of a
+ * unit replaces this time.
  *
  * @param timeoutMs  milliseconds, 0 to 1000000 (16 minutes); the default is 2000
  */
@@ -774,8 +774,8 @@ uint8_t mbm_client_setBaudRate(mbm_client *client, uint32_t baud);
  * Sets the silence before a request, instead of t3.5. A later call of
  * mbm_client_setBaudRate sets it back to t3.5. It has no effect on TCP.
  *
- * @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36 minutes)
- *               means 2^31
+ * @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36
+ *               minutes) means 2^31
  */
 uint8_t mbm_client_setGap(mbm_client *client, uint32_t gapUs);
 
@@ -814,8 +814,8 @@ uint8_t mbm_client_setEchoDiscard(mbm_client *client, uint8_t on);
  * Sets how long the driver stays on after the port's flush, for platforms whose flush
  * returns before the last bit was sent. It has no effect on TCP.
  *
- * @param characters  the time in characters at the baud rate of mbm_client_setBaudRate (without
- *                    one, at 9600); the default is 0
+ * @param characters  the time in characters at the baud rate of mbm_client_setBaudRate
+ *                    (without one, at 9600); the default is 0
  */
 uint8_t mbm_client_setPostFlushHold(mbm_client *client, uint8_t characters);
 

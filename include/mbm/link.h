@@ -112,8 +112,8 @@ uint8_t mbm_link_end(mbm_link *link);
 
 /**
  * Closes the link and opens it again, at the next poll of the client and without a wait. Call
- * it when you know better than the link: the network is back, the address has changed. Requests
- * in flight end with MBM_LINK_LOST; queued ones wait for this attempt.
+ * it when you know better than the link: the network is back, the address has changed.
+ * Requests in flight end with MBM_LINK_LOST; queued ones wait for this attempt.
  */
 uint8_t mbm_link_reconnect(mbm_link *link);
 
@@ -168,13 +168,13 @@ uint8_t mbm_link_setReplaceAfter(mbm_link *link, uint8_t requests);
 
 /**
  * Sets whether requests wait for the link. By default they do not: while the link is down,
- * every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took longer
- * than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
+ * every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took
+ * longer than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
  * request again at once then polls without a pause: let it wait.) If requests wait, they stay
  * in the queue until the link is open again or until you cancel them; their response timeout
  * begins when they are sent. While a connection is being made, requests always wait; those for
- * which a lost link is opened again end with MBM_CONNECT_TIMED_OUT if that takes as long as their
- * response timeout.
+ * which a lost link is opened again end with MBM_CONNECT_TIMED_OUT if that takes as long as
+ * their response timeout.
  *
  * @param on  0 (the default) or 1
  */

@@ -138,8 +138,8 @@ uint8_t mbm_line_setBaudRate(mbm_line *line, uint32_t baud);
  * the gap, and more than t3.5 for devices that need longer before they can receive again.
  * A later call of mbm_line_setBaudRate sets it back to t3.5.
  *
- * @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36 minutes)
- *               means 2^31
+ * @param gapUs  microseconds from the last byte received or sent; a value above 2^31 (36
+ *               minutes) means 2^31
  */
 uint8_t mbm_line_setGap(mbm_line *line, uint32_t gapUs);
 
@@ -201,8 +201,8 @@ uint8_t mbm_line_setEchoDiscard(mbm_line *line, uint8_t on);
  * Sets how long the driver stays on after the port's flush, for platforms whose flush
  * returns before the last bit was sent.
  *
- * @param characters  the time in characters at the baud rate of mbm_line_setBaudRate (without one,
- *                    at 9600); the default is 0
+ * @param characters  the time in characters at the baud rate of mbm_line_setBaudRate (without
+ *                    one, at 9600); the default is 0
  */
 uint8_t mbm_line_setPostFlushHold(mbm_line *line, uint8_t characters);
 

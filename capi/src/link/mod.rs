@@ -7,7 +7,7 @@ pub use object::{mbm_link, mbm_linkCounters};
 
 use crate::client::object::{self as client, LinkedKind, TransportKind};
 use crate::client::{mbm_client, mbm_linkHooks, set_backoff};
-use crate::pointers::{self, CObject as _};
+use crate::pointers::{self, change, with, CObject as _};
 use core::ffi::c_void;
 use mbm::client::{LinkEvent, LinkState, MOST_REPLACE_AFTER};
 use mbm::error::Status;
@@ -187,7 +187,7 @@ unsafe fn end(link: *mut Object) -> Status {
 /// @return a status; MBM_BUSY also while the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_end(link: *mut mbm_link) -> u8 {
-    pointers::with(link, |object| {
+    with(link, |object| {
         let status = end(object);
         if status == Status::OK {
             mbm_link::mark(link).write(0);
@@ -196,37 +196,28 @@ pub unsafe extern "C" fn mbm_link_end(link: *mut mbm_link) -> u8 {
     })
 }
 
-/// Closes the link and opens it again, at the next poll of the client and without a wait. Call
-/// it when you know better than the link: the network is back, the address has changed. Requests
-/// in flight end with MBM_LINK_LOST; queued ones wait for this attempt.
-#[no_mangle]
-pub unsafe extern "C" fn mbm_link_reconnect(link: *mut mbm_link) -> u8 {
-    pointers::with(link, |object| {
-        (*object).core.restart();
-        Status::OK
-    })
-}
+functions! {
+    (link: *mut mbm_link)
 
-/// Sets the wait before an attempt to open the link. The first attempt after a loss waits for
-/// `delayMs`; each attempt that fails lets the wait grow. It starts anew when the link was open
-/// for as long as the last wait, or bytes have arrived. A request does not wait for the first
-/// attempt after the loss of such a link: it is made at once.
-///
-/// @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
-///                    mbm_client_setBackoff
-/// @param delayMs     the first wait in milliseconds, 0 to 1000000; the default is 500
-/// @param maxDelayMs  the longest wait in milliseconds, 0 to 1000000; the default is 30000
-#[no_mangle]
-pub unsafe extern "C" fn mbm_link_setBackoff(
-    link: *mut mbm_link,
-    backoff: u8,
-    delayMs: u32,
-    maxDelayMs: u32,
-) -> u8 {
-    pointers::with(link, |object| {
-        let policy = &mut (*object).core.policy;
-        set_backoff(policy, backoff, delayMs, maxDelayMs)
-    })
+    /// Closes the link and opens it again, at the next poll of the client and without a wait. Call
+    /// it when you know better than the link: the network is back, the address has changed.
+    /// Requests in flight end with MBM_LINK_LOST; queued ones wait for this attempt.
+    fn mbm_link_reconnect() = change(|object| (*object).core.restart());
+
+    /// Sets the wait before an attempt to open the link. The first attempt after a loss waits for
+    /// `delayMs`; each attempt that fails lets the wait grow. It starts anew when the link was open
+    /// for as long as the last wait, or bytes have arrived. A request does not wait for the first
+    /// attempt after the loss of such a link: it is made at once.
+    ///
+    /// @param backoff     MBM_BACKOFF_NONE to MBM_BACKOFF_EXPONENTIAL (the default), as of
+    ///                    mbm_client_setBackoff
+    /// @param delayMs     the first wait in milliseconds, 0 to 1000000; the default is 500
+    /// @param maxDelayMs  the longest wait in milliseconds, 0 to 1000000; the default is 30000
+    fn mbm_link_setBackoff(backoff: u8, delayMs: u32, maxDelayMs: u32)
+        = with(|object| {
+            let policy = &mut (*object).core.policy;
+            set_backoff(policy, backoff, delayMs, maxDelayMs)
+        });
 }
 
 /// Shortens each wait before an attempt by a random part, so that many clients that lost their
@@ -243,7 +234,7 @@ pub unsafe extern "C" fn mbm_link_setJitter(
     random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
     context: *mut c_void,
 ) -> u8 {
-    pointers::with(link, |object| {
+    with(link, |object| {
         if !(*object).core.policy.set_jitter(percent, random.is_some()) {
             return Status::INVALID_ARGUMENT;
         }
@@ -260,7 +251,7 @@ pub unsafe extern "C" fn mbm_link_setJitter(
 ///                   MBM_PENDING. The default is 10000
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeoutMs: u32) -> u8 {
-    pointers::with(link, |object| {
+    with(link, |object| {
         let Some(timeout) = timeout(timeoutMs) else {
             return Status::INVALID_ARGUMENT;
         };
@@ -282,7 +273,7 @@ pub unsafe extern "C" fn mbm_link_setConnectTimeout(link: *mut mbm_link, timeout
 /// @param requests  0 to 100; 0 for never. The default is 2 on TCP, and 0 on a serial line
 #[no_mangle]
 pub unsafe extern "C" fn mbm_link_setReplaceAfter(link: *mut mbm_link, requests: u8) -> u8 {
-    pointers::with(link, |object| {
+    with(link, |object| {
         if requests > MOST_REPLACE_AFTER {
             return Status::INVALID_ARGUMENT;
         }
@@ -291,55 +282,40 @@ pub unsafe extern "C" fn mbm_link_setReplaceAfter(link: *mut mbm_link, requests:
     })
 }
 
-/// Sets whether requests wait for the link. By default they do not: while the link is down,
-/// every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took longer
-/// than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
-/// request again at once then polls without a pause: let it wait.) If requests wait, they stay
-/// in the queue until the link is open again or until you cancel them; their response timeout
-/// begins when they are sent. While a connection is being made, requests always wait; those for
-/// which a lost link is opened again end with MBM_CONNECT_TIMED_OUT if that takes as long as their
-/// response timeout.
-///
-/// @param on  0 (the default) or 1
-#[no_mangle]
-pub unsafe extern "C" fn mbm_link_setRequestsWait(link: *mut mbm_link, on: u8) -> u8 {
-    pointers::with(link, |object| {
-        (*object).core.keeps_requests = on != 0;
-        Status::OK
-    })
-}
+functions! {
+    (link: *mut mbm_link)
 
-/// Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
-/// attempt has failed.
-///
-/// @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
-///                  request may, and call every function on the link; NULL for none
-/// @param context   your pointer, passed to `callback`; may be NULL
-#[no_mangle]
-pub unsafe extern "C" fn mbm_link_setCallback(
-    link: *mut mbm_link,
-    callback: Option<unsafe extern "C" fn(context: *mut c_void, event: u8, status: u8)>,
-    context: *mut c_void,
-) -> u8 {
-    pointers::with(link, |object| {
-        (*object).callback = callback;
-        (*object).callback_context = context;
-        Status::OK
-    })
-}
+    /// Sets whether requests wait for the link. By default they do not: while the link is down,
+    /// every request ends at the next poll: with MBM_CONNECT_TIMED_OUT if the last attempt took
+    /// longer than the connect timeout, else with MBM_LINK_LOST. (A program whose `done` queues the
+    /// request again at once then polls without a pause: let it wait.) If requests wait, they stay
+    /// in the queue until the link is open again or until you cancel them; their response timeout
+    /// begins when they are sent. While a connection is being made, requests always wait; those for
+    /// which a lost link is opened again end with MBM_CONNECT_TIMED_OUT if that takes as long as
+    /// their response timeout.
+    ///
+    /// @param on  0 (the default) or 1
+    fn mbm_link_setRequestsWait(on: u8) = change(|object| (*object).core.keeps_requests = on != 0);
 
-/// Sets your storage for counters, in which the link counts from now on.
-///
-/// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
-#[no_mangle]
-pub unsafe extern "C" fn mbm_link_setCounters(
-    link: *mut mbm_link,
-    counters: *mut mbm_linkCounters,
-) -> u8 {
-    pointers::with(link, |object| {
-        (*object).counters = counters;
-        Status::OK
-    })
+    /// Sets the function that mbm_client_poll calls when the link was opened or lost, or when an
+    /// attempt has failed.
+    ///
+    /// @param callback  gets an MBM_LINK_EVENT_ constant and a status. It may do what `done` of a
+    ///                  request may, and call every function on the link; NULL for none
+    /// @param context   your pointer, passed to `callback`; may be NULL
+    fn mbm_link_setCallback(
+        callback: Option<unsafe extern "C" fn(context: *mut c_void, event: u8, status: u8)>,
+        context: *mut c_void)
+        = change(|object| {
+            (*object).callback = callback;
+            (*object).callback_context = context;
+        });
+
+    /// Sets your storage for counters, in which the link counts from now on.
+    ///
+    /// @param counters  your counters, initialised with MBM_INIT; NULL stops counting
+    fn mbm_link_setCounters(counters: *mut mbm_linkCounters)
+        = change(|object| (*object).counters = counters);
 }
 
 /// Returns what a link is doing.

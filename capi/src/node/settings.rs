@@ -2,7 +2,7 @@
 
 use super::mbm_node;
 use crate::line::Core;
-use crate::pointers::{read, with};
+use crate::pointers::{change, read, with};
 use mbm::error::Status;
 
 /// Sets the unit to which the master sends later requests.
@@ -11,10 +11,7 @@ use mbm::error::Status;
 ///              255, which the standard reserves
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setSlaveID(node: *mut mbm_node, unit: u8) -> u8 {
-    with(node, |node| {
-        node.core.set_unit(unit);
-        Status::OK
-    })
+    change(node, |node| node.core.set_unit(unit))
 }
 
 /// Returns the unit to which the master sends requests.
@@ -43,10 +40,7 @@ pub unsafe extern "C" fn mbm_node_setResponseTimeout(node: *mut mbm_node, timeou
 /// @param on  1 blocking, 0 non-blocking; it applies from the next request on
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_setBlocking(node: *mut mbm_node, on: u8) -> u8 {
-    with(node, |node| {
-        node.words.is_non_blocking = on == 0;
-        Status::OK
-    })
+    change(node, |node| node.words.is_non_blocking = on == 0)
 }
 
 /// Accepts replies of devices that deviate from the standard. It has these effects:

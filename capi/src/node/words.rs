@@ -1,7 +1,7 @@
 //! The words to send and the received words.
 
 use super::mbm_node;
-use crate::pointers::{read, with};
+use crate::pointers::{change, read, with};
 use mbm::error::Status;
 use mbm::master::node::NO_WORD;
 
@@ -11,10 +11,7 @@ use mbm::master::node::NO_WORD;
 /// @param address  the address to which the functions with Queued in their name write, 0 to 65535
 #[no_mangle]
 pub unsafe extern "C" fn mbm_node_beginTransmission(node: *mut mbm_node, address: u16) -> u8 {
-    with(node, |node| {
-        node.core.begin_transmission(address);
-        Status::OK
-    })
+    change(node, |node| node.core.begin_transmission(address))
 }
 
 /// The status of a word or bit that was queued if it `fits`.

@@ -64,10 +64,7 @@ c_object! { mbm_sniffer, &mut Object }
 /// # Safety
 /// As for [`pointers::with`].
 unsafe fn with(sniffer: *mut mbm_sniffer, change: impl FnOnce(&mut Sniffer)) -> u8 {
-    pointers::with(sniffer, |object| {
-        change(&mut object.core);
-        Status::OK
-    })
+    pointers::change(sniffer, |object| change(&mut object.core))
 }
 
 const NO_FUNCTION: Function = Function {

@@ -9,7 +9,7 @@ use crate::functions::declared;
 use crate::node::mbm_node;
 use crate::packet::side;
 use crate::pointers::{
-    c_object, check, get, object, slice, with, with_hooks, CObject, BEGUN, IN_HOOK,
+    c_object, change, check, get, object, slice, with_hooks, CObject, BEGUN, IN_HOOK,
 };
 use crate::port::{countable, mbm_port, PortRef};
 use core::ffi::c_void;
@@ -321,10 +321,7 @@ pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeou
         Ok(timeout) if timeout > 0 => millis(timeout),
         _ => return Status::INVALID_ARGUMENT.code(),
     };
-    with(trace, |core| {
-        (*core).set_frame_timeout(timeout);
-        Status::OK
-    })
+    change(trace, |core| (*core).set_frame_timeout(timeout))
 }
 
 /// Calls the hook for the bytes that wait for the rest of their frame: before the program
