@@ -122,13 +122,11 @@ def tools():
 
 
 def python_packages():
-    """The packages of lists with hashes, each package once."""
+    """The packages of the list with hashes."""
     found = {}
-    for path in files("requirements*.txt"):
-        # A list continues a line with a backslash.
-        for line in path.read_text().replace("\\\n", " ").splitlines():
-            if match := REQUIREMENT.match(line):
-                found.setdefault(match.groups(), set()).update(re.findall(r"--hash=sha256:([0-9a-f]{64})", line))
+    for line in pathlib.Path("packaging/requirements.txt").read_text().splitlines():
+        if match := REQUIREMENT.match(line):
+            found[match.groups()] = re.findall(r"--hash=sha256:([0-9a-f]{64})", line)
     for (name, version), hashes in sorted(found.items()):
         yield component("pypi", name, version, licence=None, purpose=TOOLS, sha256=sorted(hashes))
 

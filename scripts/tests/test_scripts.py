@@ -60,7 +60,7 @@ PAGE = """# Dependencies
 |---|---|
 | `peer` | a peer |
 """
-LISTS = {"peers/requirements.txt": {"peer", "helper"}}
+LISTS = {"set peers": {"peer", "helper"}}
 REACH = {"vec": {"hash"}, "hash": set(), "new": set()}
 
 
@@ -109,16 +109,16 @@ class CheckDependencies(unittest.TestCase):
 
     def test_a_list_stands_for_everything_in_it(self):
         text = PAGE.replace("| package | reason |\n|---|---|", "| package | reason | brings |\n|---|---|---|")
-        page = dependencies.page(text.replace("a peer |", "a peer | `peers/requirements.txt` |"))
+        page = dependencies.page(text.replace("a peer |", "a peer | `set peers` |"))
         present = {"Python package": {"peer", "helper"}}
         self.assertEqual(list(dependencies.complaints(page, present, REACH, LISTS)), [])
 
     def test_a_list_that_is_not_there_is_refused(self):
         text = PAGE.replace("| package | reason |\n|---|---|", "| package | reason | brings |\n|---|---|---|")
-        page = dependencies.page(text.replace("a peer |", "a peer | `old/requirements.txt` |"))
+        page = dependencies.page(text.replace("a peer |", "a peer | `set old` |"))
         self.assertEqual(
             list(dependencies.complaints(page, {"Python package": {"peer"}}, REACH, LISTS)),
-            ["docs/maintainers/dependencies.md names the Python package `old/requirements.txt`, which is not there any more"],
+            ["docs/maintainers/dependencies.md names the Python package `set old`, which is not there any more"],
         )
 
     def test_an_empty_reason_is_refused(self):
