@@ -1,7 +1,6 @@
-/* Counts what a transaction takes in a program with many links, with the wait: 1000 links of which
- * 100 have a pending request. Three programs: one that waits with a set of sockets and forgets
- * the timeouts, one that asks each client for its pollDelay before each wait, and one with
- * mbm_loop.
+/* Counts what a transaction takes in a program with many links, with the wait: 1000 links, 100 of
+ * them with a pending request. Three programs: one that waits with a set of sockets and forgets the
+ * timeouts, one that asks each client for its pollDelay before each wait, and one with mbm_loop.
  *
  *     bench_loop          for callgrind, which counts only what is toggled on here
  *     bench_loop memory   prints the bytes of each part
@@ -63,7 +62,7 @@ static uint16_t pattern(unsigned address)
     return (uint16_t)(address * 259u + 17u);
 }
 
-/* --- the devices: each answers the request that it has got. None of this is counted. */
+/* --- the devices: each answers the request that it has got. The benchmark does not count this. */
 
 static void make_answer(device *d, const uint8_t *request)
 {

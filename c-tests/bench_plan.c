@@ -202,7 +202,7 @@ static const struct {
               {"one unit of ten is silent", UNITS, 1, 3},
               {"all units are silent", 1, 1, 3}};
 
-/* Polls plan and client as a program does, until so many requests were sent. */
+/* Polls plan and client as a program does, until this many requests were sent. */
 static void run(unsigned requests, unsigned line_ms)
 {
     for (sent = 0; sent < requests;) {

@@ -450,8 +450,7 @@ SIM_TEST(a_link_lost_mid_write_switches_the_driver_off)
     assert_int_equal(s->sent, 9);
 }
 
-/* Without the gap, a device would take the sent half of the request and the next request
- * for one frame. */
+/* Without the gap, a device would take the sent half and the next request for one frame. */
 SIM_TEST(the_gap_is_kept_after_a_link_lost_mid_write)
 {
     s->character = 0; /* bytes are on the wire as soon as they are handed over */

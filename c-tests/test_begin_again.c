@@ -1,4 +1,4 @@
-/* What begins an object that was begun already: it gives up all that was pending. */
+/* Beginning an object again: it gives up all that was pending. */
 #include "refused.h"
 #include "hooked_port.h"
 #include "mbm.h"

@@ -84,7 +84,7 @@ static uint8_t read_words(uint16_t count)
     return mbm_client_readHoldingRegisters(&client, &request, FIRST, count);
 }
 
-/* What a program with libmodbus does in one line each. */
+/* A program with libmodbus does each of these in one line. */
 static void asks_everything(mbm_caller *with)
 {
     static const uint16_t written[] = {0x1234, 0xFEDC};

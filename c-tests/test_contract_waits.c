@@ -93,7 +93,7 @@ SIM_TEST(the_quiet_time_is_kept_after_a_timeout)
     sim_assert_time(s->frames[5].begin - failed, 250000);
 }
 
-/* It is the reply that the quiet time waits for. */
+/* The quiet time waits for this reply. */
 SIM_TEST(a_reply_in_the_quiet_time_is_dropped_and_ends_it)
 {
     sim_answer(s, 1, 2050000, "11 03 02 66 66 +");
@@ -116,7 +116,7 @@ SIM_TEST(a_reply_late_in_the_quiet_time_does_not_make_the_line_busy)
 SIM_TEST(a_foreign_frame_in_the_quiet_time_does_not_lengthen_it)
 {
     mbm_node_setResponseTimeout(n, 50);
-    /* Within the frame is what seems to be a damaged exception. */
+    /* The frame contains bytes that look like a damaged exception. */
     sim_answer(s, 1, 60000, "05 03 06 11 83 00 00 00 00 +");
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     sim_reads(s, 500);
@@ -245,8 +245,7 @@ static uint8_t poll_as_rarely_as_allowed(sim *s)
     return status;
 }
 
-/* A poll does not take all of 407 bytes. Those that are left need no wait, also if the deadline
- * has passed. */
+/* A poll does not take all of 407 bytes. The rest needs no wait, also after the deadline. */
 SIM_TEST(a_reply_behind_400_bytes_is_found_by_polls_without_a_wait)
 {
     static const uint32_t pauses[] = {1000000, 3000000};

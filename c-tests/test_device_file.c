@@ -62,7 +62,7 @@ static void expect_refused(const char *text, const char *reason)
     expect_reason(text, strlen(text), reason);
 }
 
-/* A file with one field, of these lines. */
+/* A file with one field that has these lines. */
 #define FIELD(lines) "fields:\n  - name: level\n    table: holding\n    address: 7\n" lines
 #define UINT16(lines) FIELD("    type: uint16\n" lines)
 
@@ -527,7 +527,7 @@ static uint32_t next_random(uint32_t *state)
     return *state;
 }
 
-/* The sanitizers find what reads or frees too much, and what is not freed. */
+/* The sanitizers find a read or a free too many, and memory that is not freed. */
 TEST(any_damaged_file_is_read_or_refused)
 {
     static const char whole[] =

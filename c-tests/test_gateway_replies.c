@@ -1,4 +1,4 @@
-/* Which replies of a device the gateway passes on. The test plays the device. */
+/* The gateway passes on some replies of a device, and not others. The test plays the device. */
 #define _GNU_SOURCE
 #include "asked.h"
 #include "await.h"

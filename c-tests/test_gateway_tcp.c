@@ -296,7 +296,7 @@ TEST(a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says)
     close(listener);
 }
 
-/* Connects many clients, of which the first `places` are served and the others closed. */
+/* Connects many clients. The first `places` are served, and the others are closed. */
 static void expect_places(const char *const *options, unsigned places)
 {
     int fds[MANY];

@@ -119,8 +119,8 @@ TEST(the_connections_take_turns_on_a_line)
     SILENT(b.wires[0]);
 }
 
-/* However much one client sends: between two requests of another client at most two requests
- * of others reach the line. Counted in requests, so it does not depend on time. */
+/* Between two requests of a client at most two requests of others reach the line, however much
+ * another client sends. The test counts requests, so it does not depend on time. */
 TEST(a_flood_of_one_client_does_not_starve_another)
 {
     unsigned round, i, served = 0, others = 0;
@@ -167,7 +167,7 @@ TEST(a_client_that_floods_leaves_a_place_for_each_other)
     next_is(3);
     next_is(4);
     next_is(2);
-    /* The place that is free now is not for the one that has most. */
+    /* The client that has most requests does not get the free place. */
     next_is(3);
 }
 

@@ -368,7 +368,7 @@ READERS_TEST(a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_noth
     s->cut_allowed = 1; /* in the frames since `begin` */
 }
 
-/* As a program does that looks in each round whether the unit is there again. */
+/* Like a program that looks in each round whether the unit is there again. */
 READERS_TEST(requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer, NODE_READS)
 {
     uint64_t sent = loses_one(b, add(b, UNIT, PROMPT));
@@ -569,7 +569,7 @@ TEST(a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits)
             }
 }
 
-/* What one of them has cancelled, or waited for in vain, the other one must know. */
+/* Each of them must know which requests the other one has cancelled, or waited for in vain. */
 TEST(two_nodes_of_one_unit_know_of_each_others_late_replies)
 {
     static const uint32_t with[] = {50 * MS, NEVER};

@@ -214,7 +214,7 @@ TEST(no_object_although_more_follow_is_no_progress)
     assert_ended(MBM_OK, 0);
 }
 
-/* However a device lies, it is asked at most once for each of the 256 objects. */
+/* The client asks at most once for each of the 256 objects, whatever the device answers. */
 TEST(a_device_that_names_every_object_is_asked_256_times)
 {
     char object[] = "?\x01x";

@@ -183,7 +183,7 @@ DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
     assert_reads(s, 3, 1);
 }
 
-/* As when an RS-485 driver releases the line. */
+/* A driver of RS-485 that releases the line can do this. */
 DEVICE_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
 {
     device.trailing = 1;

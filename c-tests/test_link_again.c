@@ -236,7 +236,7 @@ TEST(a_silent_connection_is_replaced_after_two_requests)
     }
 }
 
-/* A unit behind a gateway is absent, and the gateway says nothing. Another one is there. */
+/* A unit on a gateway's line is absent, and the gateway sends nothing. Another one is there. */
 TEST(a_silent_unit_costs_the_others_no_request)
 {
     for (unsigned i = 0; i < COUNT(streams); i++) {
@@ -492,7 +492,7 @@ static void works_over_the_new_link(int framing)
     assert_int_equal(driver, 0);
 }
 
-/* What `status` and `connect` return in the first polls. */
+/* The results of `status` and `connect` in the first polls. */
 static const struct {
     uint8_t status_is, connects_with;
 } courses[] = {
@@ -628,7 +628,7 @@ TEST(a_link_that_the_program_closes_while_it_is_being_made_sends_nothing_old)
     }
 }
 
-/* The link is lost, and what its callback does next. */
+/* The link is lost, and its callback does this next. */
 static void end_it(void *context, uint8_t event, uint8_t status)
 {
     (void)context;

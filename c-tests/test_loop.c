@@ -461,7 +461,7 @@ TEST(a_call_that_is_refused_changes_nothing)
     mbm_loop_remove(&entry);
     assert_int_equal(loop.count, 0);
     assert_int_equal(mbm_loop_wait(&loop, 0), 0);
-    /* What is in a loop is in no other. */
+    /* An entry or a port is in one loop only. */
     assert_int_equal(mbm_loop_open(&other, one_place, 1), 0);
     assert_int_equal(mbm_loop_addFd(&loop, &inlets[0].entry, -1), -1);
     add_inlet(&inlets[0]);

@@ -1,4 +1,4 @@
-/* What a loop waits for beside clients over TCP: serial lines, UDP, and servers with their
+/* A loop over ports other than clients over TCP: serial lines, UDP, and servers with their
  * listener. */
 #define _GNU_SOURCE
 #include "await.h"
@@ -474,7 +474,7 @@ TEST(a_client_and_a_server_over_udp_take_part)
     assert_memory_equal(by_udp.words, words, sizeof words);
     /* No poll more than the requests need: one to begin, one for each reply. */
     assert_in_range(by_udp.polls, 50, 60);
-    /* Without a request, what arrives does not keep the program busy. */
+    /* Bytes that arrive without a request do not keep the program busy. */
     mbm_udp_close(&udp_server);
     mbm_loop_remove(&lone_entry);
     assert_true(mbm_loop_wait(&loop, 1000) >= 0);

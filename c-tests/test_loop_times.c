@@ -256,8 +256,7 @@ typedef struct chore {
     mbm_loop_entry entry;
     int64_t due; /* when it is to be polled next; -1: never */
     uint8_t isIn, isWoken;
-    unsigned
-        wokenIn; /* in which wait it was woken; before the first and between two: the one before */
+    unsigned wokenIn; /* the wait in which it was woken, or the last one before */
 } chore;
 
 static chore chores[SOME];

@@ -62,7 +62,7 @@ NODES_TEST(a_request_is_refused_while_another_node_has_one_pending)
     IS(MBM_PENDING, sim_read_one(s));
     IS(MBM_BUSY, mbm_node_readInputRegisters(&o.node, 0, 1));
     OK(mbm_node_status(&o.node));
-    /* What the other one does changes nothing. */
+    /* The calls of the other one change nothing. */
     OK(mbm_node_poll(&o.node));
     OK(mbm_node_cancel(&o.node));
     assert_true(mbm_node_pollDelay(&o.node) == UINT32_MAX);

@@ -645,7 +645,7 @@ TEST(random_integers_are_written_exactly)
     }
 }
 
-/* Any bytes: what is taken as a number is one for strtod too, up to its end, and is the number that
+/* Any bytes: if the payload is taken as a number, strtod takes all of it too, and the same number
  * is written. */
 TEST(random_bytes_are_numbers_or_refused)
 {

@@ -1,4 +1,4 @@
-/* When a plan reads what: over a port in memory with a clock of its own. */
+/* When a plan reads which fields, over a port in memory with a clock of its own. */
 #include "plan_fixture.h"
 #include "test.h"
 
@@ -296,8 +296,7 @@ TEST(update_may_begin_the_plan_anew)
     IS(MBM_INVALID_ARGUMENT, status(1));
 }
 
-/* What a plan does if units do not answer, or not well: over a port in memory with a clock of its
- * own. */
+/* A plan whose units do not answer, or not well, over a port in memory with a clock of its own. */
 
 TEST(a_unit_that_is_gone_keeps_its_last_value_with_status_and_age)
 {

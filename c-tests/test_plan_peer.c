@@ -130,7 +130,7 @@ TEST(every_value_is_that_of_the_server_on_a_line)
     IS(MBM_INVALID_ARGUMENT, mbm_plan_getRead(&plan, 5, &read));
     poll_until(MBM_OK);
     check_values(s.mapping);
-    /* What changes is seen. */
+    /* The plan sees values that change. */
     s.mapping->tab_registers[3] = 4711;
     {
         unsigned before = updates[0];

@@ -1,4 +1,4 @@
-/* What a plan refuses, and that it changes nothing then. */
+/* A plan refuses these, and changes nothing then. */
 #include "refused.h"
 #include "plan_device.h"
 #include "test.h"

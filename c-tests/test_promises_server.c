@@ -77,7 +77,7 @@ TEST(a_begin_is_refused_without_a_change)
     }
 }
 
-/* The silence that ends a frame of which one byte arrives just now. */
+/* The silence that ends a frame after its first byte, which arrives just now. */
 static uint32_t silence(void)
 {
     hooked_port_arrive(&wire, ":", 1);

@@ -314,8 +314,7 @@ TEST(a_bit_is_found_by_its_address)
     IS(MBM_INVALID_ARGUMENT, mbm_bits_isSetInWords(wide, 10, 10, 10, NULL));
 }
 
-/* What a refused call leaves in the caller's variables: lengths become 0, all other
- * variables stay as they were. */
+/* A refused call sets the caller's lengths to 0, and leaves all other variables as they were. */
 
 /* --- values --- */
 

@@ -1,5 +1,5 @@
-/* Thousands of transactions on a bad wire. Whatever happens to a reply, the data of a
- * call that succeeds are right.
+/* Thousands of transactions on a bad wire. The data of a call that succeeds are right, whatever
+ * happens to its reply.
  *
  * No RTU master can notice two kinds of wrong data. They are counted separately:
  * - blind: the damaged bytes are a frame with a right CRC, one in 65536;

@@ -42,7 +42,7 @@ static void every_function_of_the_line_is_busy(void)
     every_node_request_returns(MBM_BUSY, &master);
 }
 
-/* Of a node whose request is pending. */
+/* Calls on a node whose request is pending. */
 static void its_request_is_busy(void)
 {
     IS(MBM_BUSY, mbm_node_setLenient(&master, 1));
@@ -121,7 +121,7 @@ TEST(no_hook_of_a_masters_port_may_call_the_master)
     OK(mbm_node_getSlaveID(&master) == 17 ? MBM_OK : MBM_BUSY);
 }
 
-/* What the idle hook does. Each value is tried in a request of its own. */
+/* The actions of the idle hook. Each value is tried in a request of its own. */
 static int idle_does;
 
 static void within_idle(int hook)

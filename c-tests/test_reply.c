@@ -475,7 +475,7 @@ static uint8_t serve(const mbm_clientRequest *until)
     return until->status;
 }
 
-/* Asserts that a request was queued, and reads its data_reply. */
+/* Asserts that a request was queued, and reads its reply. */
 static void reads(uint8_t queued)
 {
     IS(MBM_PENDING, queued);

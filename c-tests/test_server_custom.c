@@ -152,7 +152,7 @@ TEST(a_record_that_was_zeroed_serves_nothing)
     assert_int_equal(answers(FIRST_CODE + 7), 7);
 }
 
-/* What the declining function returns, and its last request. */
+/* The result of the declining function, and its last request. */
 static struct {
     uint16_t reply;
     unsigned calls;

@@ -350,7 +350,7 @@ TEST_WITH(a_baud_rate_is_refused_except_on_an_rtu_line, reset_for_begin, NULL)
     IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 9600));
     OK(mbm_server_beginAscii(&server, &port, &unit, 1, begin_frame, sizeof begin_frame));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 115200));
-    /* A pause of half a second between two characters does not end an ASCII begin_frame. */
+    /* A pause of half a second between two characters does not end an ASCII frame. */
     for (unsigned i = 0; request[i] != '\0'; i++) {
         hooked_port_arrive(&wire, request + i, 1);
         OK(mbm_server_poll(&server));

@@ -363,8 +363,7 @@ TEST_WITH(listen_only_mode_is_silent_until_a_restart, start_lines, stop_lines)
 {
     int fd = modbus_get_socket(client);
 
-    /* Each frame is followed by a wait: of two requests without silence between, only one
-     * counts. */
+    /* A wait follows each frame: if two requests come without silence between, only one counts. */
     asked_frames(fd, MBM_FRAMING_RTU, SERVED_UNIT, (const uint8_t *)"\x08\0\x04\0\0", 5, NULL, 0);
     AWAIT(line_rtu.diagnostics.listenOnly == 1);
     uint16_t messages = line_rtu.diagnostics.busMessages;

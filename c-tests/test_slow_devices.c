@@ -1,8 +1,8 @@
-/* Devices that answer in order and within the response timeout, but slowly. Some of their
- * replies are late once. Whatever the latency, no read may return the data of another one. (A
- * reply that comes when the device was silent for two response timeouts is beyond that promise:
- * with pauses as long as those of 700 ms, none is later than the timeout by more than itself.)
- * Prints the second table of docs/reports/fault-table.md. On a simulated clock. */
+/* Devices that answer in order and within the response timeout, but slowly. Some of their replies
+ * are late once. No read may return the data of another one, whatever the latency is. (A reply that
+ * comes when the device was silent for two response timeouts is beyond that promise: with pauses as
+ * long as those of 700 ms, none is later than the timeout by more than itself.) Prints the second
+ * table of docs/reports/fault-table.md. On a simulated clock. */
 #include "crc.h"
 #include "mbm.h"
 #include "test.h"

@@ -217,7 +217,7 @@ TEST(user_defined_functions_are_reported)
     many[0].code = 0;
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFunctions(&sniffer, many, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFunctions(&sniffer, NULL, 1));
-    /* What is refused leaves the functions as they were. */
+    /* A refused function leaves the others as they were. */
     feed(frame, size);
     assert_next("unit 17  reply      55 unknown function: 01 02");
     OK(mbm_sniffer_setFunctions(&sniffer, NULL, 0));
@@ -359,8 +359,8 @@ static const struct {
 
 static uint32_t now; /* of the promised */
 
-/* Feeds the first bytes of a request, of which there are at most `most`, and returns the
- * milliseconds until the first event of one of two kinds. */
+/* Feeds the first bytes of a request, at most `most`, and returns the milliseconds until the first
+ * event of one of two kinds. */
 static uint32_t event_after(uint8_t framing, uint16_t most, uint8_t kind, uint8_t other)
 {
     const mbm_framing as = {.kind = framing};

@@ -148,7 +148,7 @@ TEST(a_long_write_is_accepted_in_parts_while_the_wire_is_full)
         count = send_from(&pair.client, sent + accepted, sizeof sent - accepted);
         assert_in_range(count, 0, MBM_MAX_TCP_FRAME);
         accepted += (size_t)count;
-        /* What was accepted goes on without further writes. */
+        /* Accepted bytes are sent without further writes. */
         assert_int_equal(pair.client.port.flush(pair.client.port.context),
                          pair.client.tls.toSend == 0);
         count = read_at(&pair.server, received + have, sizeof received - have);
@@ -306,7 +306,7 @@ TEST(the_end_of_the_session_waits_for_a_full_wire)
     assert_int_equal(mbm_tls_poll(&pair.client.tls), MBM_TLS_CLOSING);
     pair.to_server.capacity = TLS_LANE;
     assert_int_equal(mbm_tls_poll(&pair.client.tls), MBM_TLS_CLOSED);
-    /* What was accepted before the end arrives, then the end does. */
+    /* Bytes that were accepted before the end arrive, then the end does. */
     assert_int_equal(read_at(&pair.server, bytes, sizeof bytes), 20);
     assert_memory_equal(bytes, secret, 20);
     assert_true(read_at(&pair.server, bytes, sizeof bytes) < 0);

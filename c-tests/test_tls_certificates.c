@@ -1,4 +1,4 @@
-/* Whom each side lets in: certificates, roles, names, and what mbm_tls_begin reads. */
+/* Each side lets some peers in: certificates, roles, names, and the files for mbm_tls_begin. */
 #define _GNU_SOURCE
 #include "test.h"
 #include "tls_pair.h"

@@ -356,8 +356,8 @@ static void add(extensions *e, const uint8_t *bytes, size_t length)
     e->bytes[1] = (uint8_t)(e->length - 2);
 }
 
-/* Looks for the found in a copy that ends where the extensions do, so that the address
- * sanitizer and valgrind see a byte too many. */
+/* Looks for the role in a copy that ends where the extensions do, so that the address sanitizer and
+ * valgrind see a byte too many. */
 static int find(const extensions *e, size_t length, char *found)
 {
     uint8_t *copy = (uint8_t *)malloc(length ? length : 1);
@@ -405,8 +405,8 @@ TEST_WITH(two_roles_are_no_role, NULL, NULL)
     assert_int_equal(find(&e, e.length, found), MBM_TLS_WRONG_ROLE);
 }
 
-/* No length and no change of a byte makes the search leave the extensions, or find a found that
- * is not two characters long. */
+/* No length and no change of a byte makes the search leave the extensions, or find a role that is
+ * not two characters long. */
 TEST_WITH(damaged_extensions_are_read_within_their_bounds, NULL, NULL)
 {
     char found[MBM_TLS_ROLE_BYTES + 1];
@@ -447,7 +447,7 @@ static int may(const mbm_tls *connection, const char *found)
     return own && strcmp(own, found) == 0;
 }
 
-/* Refuses with exception 01 what the found does not allow, before any record is asked. */
+/* Refuses with exception 01 what the role does not allow, before any record is asked. */
 static uint16_t authorise(void *context, const mbm_request *asked, uint8_t *response,
                           uint16_t capacity)
 {

@@ -1,5 +1,5 @@
-/* Who has the places of a secure server when there are more clients than places: clients that do
- * not finish their handshake leave first. openssl's s_client is the client that comes late. */
+/* The places of a secure server with more clients than places: clients that do not finish their
+ * handshake leave first. openssl's s_client is the client that comes late. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "program.h"
@@ -234,7 +234,7 @@ TEST(the_oldest_unfinished_handshake_leaves_for_a_new_client)
     close_all(fds, 2 * PLACES);
 }
 
-/* As on a busy machine, which may stop a program between two looks at the clock. */
+/* A busy machine may stop a program between two looks at the clock. */
 TEST(the_oldest_leaves_also_if_time_passes_while_handshakes_are_compared)
 {
     int fds[PLACES + 1];
@@ -266,7 +266,7 @@ TEST(a_client_whose_first_message_is_there_stays_longer_than_one_that_sent_half)
     close_all(fds, PLACES + 1);
 }
 
-/* However far its handshakes have come, and however old that of the other is. */
+/* This holds however far its handshakes have come, and however old that of the other is. */
 TEST(the_address_with_the_most_unfinished_handshakes_loses_one_first)
 {
     int fds[PLACES + 1];

@@ -522,7 +522,7 @@ TEST_WITH(bytes_that_are_not_read_do_not_end_the_next_wait, begin_wait, end_wait
     assert_int_equal(mbm_tty_wait(&tty, 1000), 0);
     assert_int_equal(port.write(port.context, &byte, 0), 0);
     assert_int_equal(mbm_tty_wait(&tty, 1000), 0);
-    /* After the program has read from the port, bytes end_wait the wait again. */
+    /* After the program has read from the port, bytes end the wait again. */
     assert_int_equal(port.read(port.context, &byte, 1), 1);
     assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
     mbm_tty_close(&tty);
@@ -589,7 +589,7 @@ static void ignore_signal(int signal_number)
 
 static volatile int waited;
 
-/* A signal before the wait does not end_wait it, so this thread sends one after the other. */
+/* A signal before the wait does not end it, so this thread sends one after the other. */
 static void *interrupt(void *thread)
 {
     while (!waited) {

@@ -1,5 +1,5 @@
-/* A simulated multi-drop bus with a clock of its own. All other taps receive what one tap
- * sends one character time later. What two taps send at the same time arrives garbled. */
+/* A simulated multi-drop bus with a clock of its own. All other taps receive what one tap sends one
+ * character time later. If two taps send at the same time, the bytes arrive garbled. */
 #ifndef BUS_H
 #define BUS_H
 

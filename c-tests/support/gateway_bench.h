@@ -55,7 +55,7 @@ void gateway_bench_reply(gateway_bench *b, unsigned line, uint8_t unit, const ch
 #define ON_LINE(line, unit, pdu) gateway_bench_on_line(&b, line, unit, pdu, sizeof(pdu) - 1)
 #define REPLY(line, unit, pdu) gateway_bench_reply(&b, line, unit, pdu, sizeof(pdu) - 1)
 
-/* Nothing was sent to a TCP client, or on a line, and nothing will be. */
+/* The gateway has sent nothing to a TCP client, or on a line, and will send nothing. */
 #define SILENT(port)                                                                               \
     do {                                                                                           \
         gateway_bench_settle(&b);                                                                  \

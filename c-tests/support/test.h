@@ -12,8 +12,8 @@
 
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
-/* What runs before and after a test; NULL is nothing. A program may define `each_test`, which each
- * TEST has, and `all_tests`, which runs before the first and after the last test. */
+/* The functions before and after a test; NULL for none. A program may define `each_test`, which
+ * each TEST has, and `all_tests`, which runs before the first and after the last test. */
 typedef struct fixture {
     void (*setup)(void), (*teardown)(void);
 } fixture;
