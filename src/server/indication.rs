@@ -1,5 +1,6 @@
 //! Finds the unit to which a received frame is addressed.
 
+use super::reply::Refusal;
 use super::table::MachineByte;
 use crate::frame::rtu;
 use crate::pdu::functions::{self, Direction};
@@ -21,9 +22,8 @@ pub struct Indication {
     /// The frame was served before, and the service returned that it is not finished. After the
     /// response it means that bytes may have arrived that the server has not read.
     pub again: bool,
-    /// The exception code if no service of the unit answers: 01, or 02 as soon as a service has
-    /// returned [`Reply::ABSENT`](super::Reply::ABSENT).
-    pub refusal: u8,
+    /// What the services of the unit lack that were called. A service of C looks at it.
+    pub refusal: Refusal,
     /// Length of the PDU; 0 if the frame is damaged.
     pub length: u16,
     /// Greatest length of the response PDU.
@@ -70,7 +70,7 @@ impl Indication {
         overrun: false,
         head: 1,
         again: false,
-        refusal: 1,
+        refusal: Refusal::NONE,
         length: 0,
         space: 0,
     };

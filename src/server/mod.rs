@@ -25,5 +25,5 @@ mod units;
 pub use framing::{respond, DELIMITER};
 pub use indication::{only_writes, Addressing, Indication, ANY};
 pub use line::{Server, ServerStorage};
-pub use reply::Reply;
-pub use units::{dispatch, first_reply, Dispatch, Service, Unit, Units};
+pub use reply::{Refusal, Reply};
+pub use units::{dispatch, Dispatch, Service, Unit, Units};

@@ -99,3 +99,39 @@ impl Reply {
         2
     }
 }
+
+/// The exception with which a unit refuses a request, as far as its services were called: 01 as
+/// long as none of them serves the function, 02 once one of them has returned [`Reply::ABSENT`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(transparent)]
+pub struct Refusal(u8);
+
+impl Refusal {
+    /// No service was called.
+    pub const NONE: Refusal = Refusal(1);
+
+    /// Notes the reply of a service. Returns false if that service answers the request, so that no
+    /// other one is called.
+    #[inline(always)]
+    pub fn note(&mut self, reply: Reply) -> bool {
+        if reply == Reply::NOT_HANDLED {
+            return true;
+        }
+        if !reply.is_absent() {
+            return false;
+        }
+        *self = Refusal(2);
+        true
+    }
+
+    /// True if a service serves the function, but lacks the cells of the request. A function of the
+    /// user that serves any function is not called then.
+    pub const fn is_of_cells(&self) -> bool {
+        self.0 != Refusal::NONE.0
+    }
+
+    /// The reply if no service answers.
+    pub const fn reply(&self) -> Reply {
+        Reply::exception(self.0)
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::diagnostics::Diagnostics;
 use super::indication::ANY;
-use super::{Addressing, Indication, Reply};
+use super::{Addressing, Indication, Refusal, Reply};
 use core::fmt;
 
 /// A service: one family of functions.
@@ -92,32 +92,6 @@ pub fn dispatch(units: &mut impl Dispatch, mut all: Addressing) -> Reply {
     answer
 }
 
-/// Lets `services` serve a request one after the other, until one of them answers it.
-/// [`Reply::ILLEGAL_FUNCTION`] if none serves the function, [`Reply::ABSENT`] if none has the
-/// cells of the request. Once a service lacks the cells, the services for which `is_custom` is
-/// true are not asked.
-#[inline(always)]
-pub fn first_reply<S>(
-    services: impl IntoIterator<Item = S>,
-    is_custom: impl Fn(&S) -> bool,
-    mut serve: impl FnMut(S) -> Reply,
-) -> Reply {
-    let mut answer = Reply::ILLEGAL_FUNCTION;
-    for service in services {
-        if answer.is_absent() && is_custom(&service) {
-            continue;
-        }
-        let reply = serve(service);
-        if reply != Reply::NOT_HANDLED {
-            answer = reply;
-            if !reply.is_absent() {
-                break;
-            }
-        }
-    }
-    answer
-}
-
 impl Service for Diagnostics {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
         self.serve(pdu, length).0
@@ -125,15 +99,21 @@ impl Service for Diagnostics {
 }
 
 impl Unit<'_> {
+    /// Lets the services serve a request one after the other, until one of them answers it.
     fn serve_pdu(&mut self, pdu: &mut [u8], length: usize) -> Reply {
         let services = self.services.iter_mut().map(|service| &mut **service);
         let line = self.diagnostics.as_deref_mut();
-        let line = line.map(|line| line as &mut dyn Service);
-        first_reply(
-            services.chain(line),
-            |service| service.is_custom(),
-            |service| service.serve(pdu, length),
-        )
+        let mut refusal = Refusal::NONE;
+        for service in services.chain(line.map(|line| line as &mut dyn Service)) {
+            if refusal.is_of_cells() && service.is_custom() {
+                continue;
+            }
+            let reply = service.serve(pdu, length);
+            if !refusal.note(reply) {
+                return reply;
+            }
+        }
+        refusal.reply()
     }
 
     /// Serves a frame that is addressed to this unit. Counts any frame in the diagnostics.

@@ -2,7 +2,7 @@
 
 use super::hooks::connection;
 use super::records::{is_custom, mbm_custom, mbm_request, CUSTOM};
-use super::units::{add_as, add_first, are_absent, is_ignored_broadcast, request, Services};
+use super::units::{add_as, add_first, is_ignored_broadcast, refusal_of, request, Services};
 use super::{mbm_service, mbm_unit};
 use crate::functions;
 use core::ffi::c_void;
@@ -38,7 +38,7 @@ pub struct mbm_functionMask {
 /// gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     let code = (*service.cast::<mbm_custom>()).code;
-    if code != *pdu && (code != 0 || are_absent(info)) {
+    if code != *pdu && (code != 0 || (*refusal_of(info)).is_of_cells()) {
         return Reply::NOT_HANDLED.code();
     }
     call_handler(service.cast(), pdu, info)

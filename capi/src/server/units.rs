@@ -5,7 +5,7 @@ use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
-use mbm::server::{dispatch, only_writes, Addressing, Dispatch, Indication, Reply};
+use mbm::server::{dispatch, only_writes, Addressing, Dispatch, Indication, Refusal, Reply};
 
 /// The most records that one unit can serve. Each is one struct that you pass to a
 /// mbm_unit_serve function.
@@ -172,68 +172,29 @@ pub(super) unsafe fn call_services(
 ) -> usize {
     // The loop ends at the next field, the pointer to the monitor function: see the assertion
     // below. It is not NULL if a service that declines has added diagnostics to the unit.
-    begin_refusal(info);
+    let refusal = refusal_of(info);
+    refusal.write(Refusal::NONE);
     let mut place = unit
         .byte_add(offset_of!(mbm_unit, services))
         .cast::<*mut mbm_service>();
     let end = (&raw mut (*unit).monitor).cast();
     while place != end && !(*place).is_null() {
-        let reply = call_service(*place, info, pdu);
-        if take_reply(reply, info) {
-            return reply;
+        let reply = Reply::from_number(call_service(*place, info, pdu));
+        if !(*refusal).note(reply) {
+            return reply.code();
         }
         place = place.add(1);
     }
-    refusal(info)
+    (*refusal).reply().code()
 }
 
-/// The field `refusal` of the request.
+/// What the services of the unit that were called lack.
 ///
 /// # Safety
 /// As for [`Serve`].
-unsafe fn refusal_field(info: *const c_void) -> *mut u8 {
+pub(super) unsafe fn refusal_of(info: *const c_void) -> *mut Refusal {
     // `info` is part of a server, which is not constant.
     &raw mut (*info.cast::<Indication>().cast_mut()).refusal
-}
-
-/// Before the services of a unit are called.
-///
-/// # Safety
-/// As for [`Serve`].
-unsafe fn begin_refusal(info: *const c_void) {
-    refusal_field(info).write(Reply::ILLEGAL_FUNCTION.exception_code())
-}
-
-/// Takes the reply of a service. Returns false if the next service is called too, and notes it if
-/// this one lacks cells of the request.
-///
-/// # Safety
-/// As for [`Serve`].
-unsafe fn take_reply(reply: usize, info: *const c_void) -> bool {
-    if reply == Reply::NOT_HANDLED.code() {
-        return false;
-    }
-    if !Reply::from_number(reply).is_absent() {
-        return true;
-    }
-    refusal_field(info).write(Reply::ILLEGAL_DATA_ADDRESS.exception_code());
-    false
-}
-
-/// The reply if no service answers.
-///
-/// # Safety
-/// As for [`Serve`].
-unsafe fn refusal(info: *const c_void) -> usize {
-    Reply::exception(refusal_field(info).read()).code()
-}
-
-/// True if a service before this one serves the function, but lacks cells of the request.
-///
-/// # Safety
-/// As for [`Serve`].
-pub(super) unsafe fn are_absent(info: *const c_void) -> bool {
-    refusal_field(info).read() != Reply::ILLEGAL_FUNCTION.exception_code()
 }
 
 const _: () = {
