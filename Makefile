@@ -347,13 +347,6 @@ bench: ## Compare speed and instructions with other libraries, NANOMODBUS=clone 
 SECURE := $(BUILD)/plain/linux/secure_server
 $(SECURE): $(patsubst %,$(BUILD)/plain/linux/%.o,secure_server mbm_tls mbm_tls_identity mbm_tls_linux mbm_tls_listener mbm_tls_text mbm_tcp mbm_tcp_listener) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections $(TLS_LIBS) -o $@
-UDP := $(BUILD)/plain/linux/udp
-
-.PHONY: test-secure
-test-secure: tool ## Show Modbus/TCP Security: roles, and who is refused; certificates are in build/certificates
-	@scripts/need python3 python3-venv gcc libc6-dev libmbedtls-dev openssl
-	@$(MAKE) --no-print-directory venv certificates $(SECURE)
-	@$(BUILD)/venv/bin/python scripts/check/examples secure $(BUILD)/plain $(BUILD)/certificates
 
 .PHONY: measure-secure
 measure-secure: ## Measure what handshakes cost other clients of that server, and who gets in under attack
@@ -361,34 +354,9 @@ measure-secure: ## Measure what handshakes cost other clients of that server, an
 	@$(MAKE) --no-print-directory certificates $(SECURE)
 	@python3 scripts/bench/secure $(SECURE) $(BUILD)/certificates
 
-.PHONY: test-udp
-test-udp: ## Build and check the example over UDP, build/plain/linux/udp
-	@scripts/need python3 python3-venv gcc libc6-dev
-	@$(MAKE) --no-print-directory venv $(UDP)
-	@$(BUILD)/venv/bin/python scripts/check/examples udp $(BUILD)/plain
-
-.PHONY: test-keep-link
-test-keep-link: ## Show a client whose connection opens itself again, while a libmodbus server goes and comes back
-	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
-	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/keep_link $(PEERS)
-	@scripts/check/examples keep_link $(BUILD)/plain
-
-.PHONY: test-sniff
-test-sniff: tool ## Check the command that watches a bus, `mbm sniff`
-	@scripts/need python3
-	@scripts/check/sniff $(BUILD)/plain
-
-DEVICES ?= 1000
-MANY_SECONDS ?= 20
 SERVE_MANY := $(BUILD)/plain/serve_many
 $(SERVE_MANY): $(patsubst %,$(BUILD)/plain/%.o,serve_many support/server support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) -lmodbus -lpthread -o $@
-
-.PHONY: test-many-devices
-test-many-devices: ## Poll DEVICES (1000) for MANY_SECONDS (20) in one process, while a third of their libmodbus servers goes and comes
-	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
-	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/many_devices $(SERVE_MANY)
-	@scripts/check/examples many_devices $(BUILD)/plain $(DEVICES) $(MANY_SECONDS)
 
 PEERS := $(BUILD)/plain/serve_libmodbus
 $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support/tcp_server support/pty) $(ARCHIVE)
@@ -423,44 +391,26 @@ man: tool ## Make the man pages of that tool, build/man
 	@scripts/need help2man
 	@cli/man $(BUILD)/plain/mbm $(BUILD)/man
 
-# ONLY is an expression of pytest's -k: words of names, with and, or and not.
+# ONLY is an expression of pytest's -k: words of names, with and, or and not. DEVICES (1000) and MANY_SECONDS (20) are those of
+# the test of many_devices.
+TOOL_PEERS := $(PEERS) $(SERVE_MANY) $(SECURE) $(addprefix $(BUILD)/plain/linux/,calls keep_link many_devices udp)
 .PHONY: test-tool
-test-tool: man ## Test that tool, also with the sanitizers, on other clients, servers and brokers: ONLY="tls or udp"
+test-tool: man ## Test that tool and programs of examples/linux on other clients, servers and brokers: ONLY="tls or udp"
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev gcc-avr avr-libc gcc-arm-none-eabi libnewlib-arm-none-eabi \
-		pkg-config libmodbus-dev mbpoll openssl strace
-	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(BUILD)/plain/linux/calls $(PEERS)
-	@$(BUILD)/venv/bin/python -B -m pytest -c tests/tool/pytest.ini --rootdir tests/tool tests/tool $(if $(ONLY),-k "$(ONLY)")
+		pkg-config libmodbus-dev libmbedtls-dev mbpoll mosquitto mosquitto-clients openssl strace tshark
+	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(TOOL_PEERS)
+	@DEVICES="$(DEVICES)" MANY_SECONDS="$(MANY_SECONDS)" \
+		$(BUILD)/venv/bin/python -B -m pytest -c tests/tool/pytest.ini --rootdir tests/tool tests/tool $(if $(ONLY),-k "$(ONLY)")
 
-.PHONY: test-trace
-test-trace: ## Compare what mbm and examples print with --trace with what tshark reads in their --pcap files
-	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
-	@$(MAKE) --no-print-directory venv tool $(PEERS)
-	@$(BUILD)/venv/bin/python scripts/check/trace $(BUILD)/plain
-
-.PHONY: test-gateway
-test-gateway: ## Show the gateway, `mbm gateway`, at work between pymodbus clients and devices of libmodbus and pymodbus
-	@scripts/need python3 python3-venv gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev strace
-	@$(MAKE) --no-print-directory venv tool $(BUILD)/sanitized/mbm $(PEERS)
-	@$(BUILD)/venv/bin/python scripts/check/gateway $(BUILD)/plain $(BUILD)/sanitized/mbm
-
-.PHONY: demo
+.PHONY: demo plan
 demo: tool ## Show every function against a libmodbus server, frame by frame, and a plan at work
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(PEERS)
-	@scripts/check/examples demo $(BUILD)/plain
+	@scripts/demo
 	@$(MAKE) --no-print-directory plan
-
-.PHONY: plan
 plan: tool ## A plan of ten fields at work against a libmodbus server
-	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(PEERS)
-	@scripts/check/examples plan $(BUILD)/plain
-
-.PHONY: test-mqtt
-test-mqtt: ## Show and check the bridge to MQTT, `mbm bridge`, on a libmodbus server and a mosquitto broker
-	@scripts/need gcc clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev python3 mosquitto mosquitto-clients openssl
-	@$(MAKE) --no-print-directory tool $(BUILD)/sanitized/mbm $(PEERS)
-	@scripts/check/mqtt $(BUILD)/plain $(BUILD)/sanitized/mbm
+	@scripts/demo plan
 
 # The tests in C as programs for AArch64, run by QEMU's user mode. The machine stays as it is: the
 # libraries for AArch64 are unpacked below build.
