@@ -115,7 +115,7 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
 unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) -> i16 {
     let (w, port) = enter(context, Grant::Nothing, 64);
     assert!(
-        !bytes.is_null() && length <= i16::MAX as u16,
+        !bytes.is_null() && (1..=i16::MAX as u16).contains(&length),
         "write of {length}"
     );
     let mut taken = unsafe { std::slice::from_raw_parts(bytes, length.into()) };

@@ -25,6 +25,7 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
 }
 
 unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) -> i16 {
+    assert!(length > 0, "a write of no bytes");
     let life = Life::current();
     let socket = &life.gateway.sockets[context as usize];
     if socket.is_lost.get() {

@@ -176,6 +176,7 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
 }
 
 unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) -> i16 {
+    assert!(length > 0, "a write of no bytes");
     let (life, wire) = wire(context);
     if !wire.is_open.get() {
         return if wire.is_opening.get() { 0 } else { -1 };
