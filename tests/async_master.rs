@@ -165,7 +165,7 @@ fn a_read_as_long_as_a_frame_is_answered() {
     bench.wire.borrow_mut().is_cut = true;
     let mut reply = vec![18, 3, 250];
     reply.extend((0..250).map(|byte| byte as u8));
-    let reply = common::device::sealed(&reply);
+    let reply = common::frame::sealed(&reply);
     let mut words = [0; 125];
     let wire = bench.wire.clone();
     let answer = async {
@@ -486,7 +486,7 @@ fn a_reply_that_arrived_before_the_request_is_not_taken_for_its_reply() {
     let read = master.read_holding_registers(100, &mut words);
     assert_eq!(bench.run(read), Ok(()));
     // The device sends its reply twice. The UART keeps the second one for a long time.
-    let again = common::device::sealed(&[17, 3, 2, 0x10, 0x00]);
+    let again = common::frame::sealed(&[17, 3, 2, 0x10, 0x00]);
     bench.wire.borrow_mut().arrive(&again);
     bench.wire.borrow_mut().now += 10_000_000;
     let read = master.read_holding_registers(105, &mut words);
@@ -499,7 +499,7 @@ fn many_bytes_that_arrived_before_the_request_are_skipped() {
     let mut bench = Bench::new();
     let mut master = master(&bench);
     let mut bytes = vec![0x55; 300];
-    bytes.extend(common::device::sealed(&[17, 3, 2, 0x12, 0x34]));
+    bytes.extend(common::frame::sealed(&[17, 3, 2, 0x12, 0x34]));
     bench.wire.borrow_mut().arrive(&bytes);
     bench.wire.borrow_mut().read_fails = true;
     bench.wire.borrow_mut().now += 10_000_000;

@@ -4,6 +4,8 @@
 
 #[path = "common/exchanges.rs"]
 mod exchanges;
+#[path = "common/frame.rs"]
+mod frame;
 #[path = "common/wire.rs"]
 mod wire;
 
@@ -11,18 +13,12 @@ use exchanges::{Case, CASES};
 use mbm::client::{Client, Serial};
 use mbm::engine::{Frame, MicrosSetting, Storage as _};
 use mbm::error::Status;
-use mbm::frame::{ascii, Framing};
+use mbm::frame::Framing;
 use proptest::prelude::*;
 use wire::{End, Lent, Task};
 
-/// Returns the frame of a PDU.
 fn encoded(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = vec![0; framing.max_frame()];
-    let length = framing.emit(&mut buffer, 0, unit, ascii::END, |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.unwrap()].to_vec()
+    frame::framed(framing, 0, unit, pdu)
 }
 
 /// Bytes to arrive: random ones, and parts that resemble the expected reply.

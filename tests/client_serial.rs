@@ -2,6 +2,8 @@
 
 #[path = "common/exchanges.rs"]
 mod exchanges;
+#[path = "common/frame.rs"]
+mod frame;
 #[path = "common/wire.rs"]
 mod wire;
 
@@ -9,7 +11,7 @@ use exchanges::CASES;
 use mbm::client::{Client, Serial};
 use mbm::engine::{Frame, MicrosSetting};
 use mbm::error::Status;
-use mbm::frame::{ascii, rtu};
+use mbm::frame::Framing;
 use mbm::pdu::custom::Rule;
 use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
@@ -55,21 +57,11 @@ fn sent(end: &End, client: &mut Transport) -> Vec<u8> {
 }
 
 fn frame(unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 256];
-    let length = rtu::emit(&mut buffer, unit, |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.unwrap()].to_vec()
+    frame::framed(Framing::Rtu, 0, unit, pdu)
 }
 
 fn characters(unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 513];
-    let length = ascii::emit(&mut buffer, unit, ascii::END, |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.unwrap()].to_vec()
+    frame::framed(Framing::Ascii, 0, unit, pdu)
 }
 
 #[test]

@@ -1,9 +1,12 @@
 //! The master, used from Rust with a port that is written in Rust.
 
+#[path = "common/frame.rs"]
+mod frame;
+
+use frame::sealed;
 use mbm::engine::Buffers;
 use mbm::engine::Counter;
 use mbm::error::Status;
-use mbm::frame::checksum::crc16;
 use mbm::master::Master;
 use mbm::port::Port;
 
@@ -38,12 +41,6 @@ impl Port for Wire {
 }
 
 type Lent = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
-
-fn sealed(bytes: &[u8]) -> Vec<u8> {
-    let mut frame = bytes.to_vec();
-    frame.extend(crc16(bytes).to_bytes());
-    frame
-}
 
 fn master(reply: &[u8]) -> Master<Wire, Lent> {
     let wire = Wire {

@@ -5,7 +5,8 @@ mod common;
 #[path = "common/vectors.rs"]
 mod vectors;
 
-use common::master::{frame, sealed, Call, TestMaster};
+use common::frame::sealed;
+use common::master::{frame, Call, TestMaster};
 use mbm::engine::Counter;
 use mbm::error::{Error, Status};
 use mbm::frame::rtu;

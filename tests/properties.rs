@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::master::{frame, sealed, Call, TestMaster};
+use common::frame::sealed;
+use common::master::{frame, Call, TestMaster};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::pdu::request::Request;

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::device::sealed;
+use common::frame::sealed;
 use common::line::{Line, CHARACTER, SILENCE};
 use mbm::frame::Framing;
 use mbm::server::{Indication, Reply, Units};

@@ -4,6 +4,7 @@
 mod common;
 
 use common::device::Device;
+use common::frame::adu;
 use common::line::{Line, CHARACTER, SILENCE};
 use mbm::frame::Framing;
 use mbm::server::custom::HandlerResult;
@@ -43,15 +44,6 @@ fn equals_its_request(content: &[u8]) -> bool {
 /// How much later than it is sent the receiver gets the echo, in microseconds.
 const HELD_BACK: [u32; 4] = [0, 2_000, 16_000, 40_000];
 
-fn framed(framing: Framing, content: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 600];
-    let length = framing.emit(&mut buffer, 0, content[0], b'\n', |place| {
-        place[..content.len() - 1].copy_from_slice(&content[1..]);
-        Ok(content.len() - 1)
-    });
-    buffer[..length.unwrap()].to_vec()
-}
-
 fn line(framing: Framing) -> Line {
     let mut line = Line::new(framing);
     line.device = Device::new();
@@ -81,7 +73,7 @@ fn a_server_that_receives_what_it_sends_answers_each_request_once() {
                 for request in REQUESTS {
                     let mut line = line_with_echo(framing, late, glitch);
                     for round in 0..3 {
-                        line.arrive(0, &framed(framing, request));
+                        line.arrive(0, &adu(framing, request));
                         let sent = line.frames(300_000, 100);
                         let case = format!("{framing:?} {late} {glitch:?} {request:02X?} {round}");
                         assert_eq!(sent.len(), 1, "{case}");
@@ -96,7 +88,7 @@ fn a_server_that_receives_what_it_sends_answers_each_request_once() {
 fn an_echo_is_not_counted_as_damage() {
     let mut line = line_with_echo(Framing::Rtu, 0, &[]);
     for _ in 0..4 {
-        line.arrive(0, &framed(Framing::Rtu, &READ));
+        line.arrive(0, &adu(Framing::Rtu, &READ));
         assert_eq!(line.frames(300_000, 100).len(), 1);
     }
     assert_eq!(line.device.diagnostics.bus_communication_errors, 0);
@@ -109,7 +101,7 @@ fn a_damaged_echo_is_not_answered() {
         let mut line = line_with_echo(Framing::Rtu, 0, &[]);
         line.wire.borrow_mut().echo_damage = 0x10;
         for _ in 0..3 {
-            line.arrive(0, &framed(Framing::Rtu, request));
+            line.arrive(0, &adu(Framing::Rtu, request));
             assert_eq!(line.frames(500_000, 100).len(), 1, "{request:02X?}");
         }
     }
@@ -120,7 +112,7 @@ fn an_echo_that_arrives_together_with_the_next_request_is_still_an_echo() {
     for framing in [Framing::Rtu, Framing::Ascii] {
         for damage in [0, 0x10] {
             let mut line = line_with_echo(framing, 3 * CHARACTER, &[]);
-            line.arrive(0, &framed(framing, &READ));
+            line.arrive(0, &adu(framing, &READ));
             // The UART hands over both in one block, or the end of one is damaged.
             while line.wire.borrow().sent.is_empty() {
                 let _ = line.poll();
@@ -128,10 +120,10 @@ fn an_echo_that_arrives_together_with_the_next_request_is_still_an_echo() {
                 line.wire.borrow_mut().now = now.wrapping_add(50);
             }
             line.wire.borrow_mut().arriving[0].1 ^= damage;
-            line.arrive(0, &framed(framing, &WRITE));
+            line.arrive(0, &adu(framing, &WRITE));
             let sent = line.frames(300_000, 50);
             assert_eq!(sent.len(), 2, "{framing:?}, {damage}: {sent:02X?}");
-            line.arrive(0, &framed(framing, &WRITE));
+            line.arrive(0, &adu(framing, &WRITE));
             assert_eq!(line.frames(300_000, 50).len(), 1, "{framing:?}, {damage}");
         }
     }
@@ -145,12 +137,12 @@ fn the_same_write_again_is_carried_out_on_a_line_without_an_echo() {
             .filter(|content| equals_its_request(content))
         {
             let mut line = line(framing);
-            line.arrive(0, &framed(framing, &READ));
+            line.arrive(0, &adu(framing, &READ));
             assert_eq!(line.frames(20_000, 100).len(), 1);
             // Another frame than the echo has followed a response: the line has none.
             for _ in 0..20 {
-                line.arrive(SILENCE, &framed(framing, request));
-                let time = framed(framing, request).len() as u32 * CHARACTER + 2 * SILENCE;
+                line.arrive(SILENCE, &adu(framing, request));
+                let time = adu(framing, request).len() as u32 * CHARACTER + 2 * SILENCE;
                 let sent = line.frames(time, 100);
                 assert_eq!(sent.len(), 1, "{framing:?} {request:02X?}");
             }
@@ -162,7 +154,7 @@ fn the_same_write_again_is_carried_out_on_a_line_without_an_echo() {
 fn the_same_write_again_is_carried_out_after_the_time_of_an_echo() {
     let mut line = line(Framing::Rtu);
     for _ in 0..5 {
-        line.arrive(80_000, &framed(Framing::Rtu, &WRITE));
+        line.arrive(80_000, &adu(Framing::Rtu, &WRITE));
         assert_eq!(line.frames(100_000, 100).len(), 1);
     }
 }
@@ -171,7 +163,7 @@ fn the_same_write_again_is_carried_out_after_the_time_of_an_echo() {
 fn noise_after_a_response_does_not_prove_that_the_line_has_no_echo() {
     for noise in [&[0][..], &[0xFF], &[0xFF, 0xFF], &[0, 0, 0]] {
         let mut line = line_with_echo(Framing::Rtu, 5 * SILENCE, &[]);
-        line.arrive(0, &framed(Framing::Rtu, &WRITE));
+        line.arrive(0, &adu(Framing::Rtu, &WRITE));
         while line.wire.borrow().sent.is_empty() {
             let _ = line.poll();
             let now = line.wire.borrow().now;
@@ -184,7 +176,7 @@ fn noise_after_a_response_does_not_prove_that_the_line_has_no_echo() {
         // The echo after the noise may be answered, but its echo is not.
         let sent = line.frames(500_000, 50);
         assert!(sent.len() <= 2, "{noise:02X?}: {}", sent.len());
-        line.arrive(0, &framed(Framing::Rtu, &WRITE));
+        line.arrive(0, &adu(Framing::Rtu, &WRITE));
         assert_eq!(line.frames(500_000, 50).len(), 1, "{noise:02X?}");
     }
 }
@@ -196,7 +188,7 @@ fn a_program_that_polls_seldom_carries_each_write_out_once() {
             let mut line = line(framing);
             line.wire.borrow_mut().echo = echo;
             for round in 0..5 {
-                line.arrive(0, &framed(framing, &WRITE));
+                line.arrive(0, &adu(framing, &WRITE));
                 let sent = line.frames(2_000_000, 200_000);
                 assert_eq!(sent.len(), 1, "{framing:?}, {echo}, {round}");
             }
@@ -211,12 +203,12 @@ fn an_echo_that_is_held_back_is_dropped_if_the_program_says_that_there_is_one() 
             let mut line = line(Framing::Rtu);
             assert!(line.server.set_echo_discard(true));
             // A response without an echo proves nothing here.
-            line.arrive(0, &framed(Framing::Rtu, &READ));
+            line.arrive(0, &adu(Framing::Rtu, &READ));
             assert_eq!(line.frames(300_000, 100).len(), 1);
             line.wire.borrow_mut().echo = true;
             line.wire.borrow_mut().echo_late = late;
             for _ in 0..3 {
-                line.arrive(0, &framed(Framing::Rtu, request));
+                line.arrive(0, &adu(Framing::Rtu, request));
                 assert_eq!(line.frames(300_000, 100).len(), 1, "{late} {request:02X?}");
             }
         }
@@ -228,7 +220,7 @@ fn the_same_write_again_is_carried_out_if_the_program_says_that_there_is_no_echo
     let mut line = line(Framing::Rtu);
     assert!(line.server.set_echo_discard(false));
     for _ in 0..5 {
-        line.arrive(SILENCE, &framed(Framing::Rtu, &WRITE));
+        line.arrive(SILENCE, &adu(Framing::Rtu, &WRITE));
         assert_eq!(line.frames(8 * CHARACTER + 2 * SILENCE, 100).len(), 1);
     }
 }
@@ -236,11 +228,11 @@ fn the_same_write_again_is_carried_out_if_the_program_says_that_there_is_no_echo
 #[test]
 fn a_line_whose_echo_appears_later_is_recognised() {
     let mut line = line(Framing::Rtu);
-    line.arrive(0, &framed(Framing::Rtu, &READ));
+    line.arrive(0, &adu(Framing::Rtu, &READ));
     assert_eq!(line.frames(300_000, 100).len(), 1);
     line.wire.borrow_mut().echo = true;
     for request in [&READ, &WRITE, &WRITE, &READ] {
-        line.arrive(0, &framed(Framing::Rtu, request));
+        line.arrive(0, &adu(Framing::Rtu, request));
         assert_eq!(line.frames(300_000, 100).len(), 1);
     }
 }
@@ -252,7 +244,7 @@ fn a_function_code_of_an_exception_is_never_answered_on_a_serial_line() {
             let mut line = line(framing);
             // Function 0x42 and every other one without a service of its own.
             for content in [&[17, code, 2][..], &[17, code, 0, 100, 0, 1], &[17, code]] {
-                line.arrive(3_000, &framed(framing, content));
+                line.arrive(3_000, &adu(framing, content));
                 let sent = line.frames(800_000, 200);
                 assert!(sent.is_empty(), "{framing:?} {content:02X?}: {sent:02X?}");
             }
@@ -270,9 +262,9 @@ fn twins(framing: Framing, request: &[u8]) -> [usize; 2] {
     let mut lines = [line(framing), line(framing)];
     // So that each is beyond its first requests.
     for line in &mut lines {
-        line.arrive(0, &framed(framing, &READ));
+        line.arrive(0, &adu(framing, &READ));
         assert_eq!(line.frames(300_000, 100).len(), 1);
-        line.arrive(0, &framed(framing, request));
+        line.arrive(0, &adu(framing, request));
     }
     let mut sent = [0; 2];
     for _ in 0..20_000 {

@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::device::{ask, sealed, Device};
+use common::device::{ask, Device};
+use common::frame::sealed;
 use mbm::frame::Framing;
 use mbm::server::custom::HandlerResult;
 use mbm::server::respond;

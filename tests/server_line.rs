@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::device::sealed;
+use common::frame::sealed;
 use common::line::{Line, CHARACTER, SILENCE};
 use mbm::error::Status;
 use mbm::frame::Framing;

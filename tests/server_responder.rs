@@ -261,9 +261,9 @@ fn hooks_get_the_written_range_and_the_new_values() {
 fn a_reply_that_does_not_fit_is_exception_04_and_nothing_is_written() {
     let mut device = Device::new();
     let mut buffer = [0; 16];
-    let frame = common::device::sealed(&[17, 0x17, 0, 100, 0, 10, 0, 100, 0, 1, 2, 1]);
+    let frame = common::frame::sealed(&[17, 0x17, 0, 100, 0, 10, 0, 100, 0, 1, 2, 1]);
     assert_eq!(frame.len(), 14);
-    let request = common::device::sealed(&[17, 3, 0, 100, 0, 10]);
+    let request = common::frame::sealed(&[17, 3, 0, 100, 0, 10]);
     buffer[..8].copy_from_slice(&request);
     let length =
         device.with_unit(|unit| respond(Framing::Rtu, 10, &mut buffer, 8, &mut [unit][..]));
@@ -428,12 +428,12 @@ fn frames_of_other_units_damaged_frames_and_broadcasts_are_not_answered() {
     let mut device = Device::new();
     let mut buffer = [0; 256];
     for (frame, changed) in [
-        (common::device::sealed(&[18, 6, 0, 100, 1, 1]), false),
+        (common::frame::sealed(&[18, 6, 0, 100, 1, 1]), false),
         (vec![17, 6, 0, 100, 1, 1, 0, 0], false),
         (vec![17, 6], false),
         (vec![], false),
-        (common::device::sealed(&[0, 3, 0, 100, 0, 1]), false),
-        (common::device::sealed(&[0, 6, 0, 100, 1, 1]), true),
+        (common::frame::sealed(&[0, 3, 0, 100, 0, 1]), false),
+        (common::frame::sealed(&[0, 6, 0, 100, 1, 1]), true),
     ] {
         let before = device.holding;
         buffer[..frame.len()].copy_from_slice(&frame);

@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::device::{sealed, Device};
+use common::device::Device;
+use common::frame::{adu, sealed};
 use common::line::Line;
 use mbm::error::Status;
 use mbm::frame::Framing;
@@ -114,15 +115,6 @@ impl Program {
     }
 }
 
-fn framed(framing: Framing, bytes: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 600];
-    let length = framing.emit(&mut buffer, 1, bytes[0], b'\n', |place| {
-        place[..bytes.len() - 1].copy_from_slice(&bytes[1..]);
-        Ok(bytes.len() - 1)
-    });
-    buffer[..length.unwrap()].to_vec()
-}
-
 #[test]
 fn a_request_that_arrives_while_a_function_is_pending_is_answered_after_the_reply() {
     for framing in ALL {
@@ -131,17 +123,17 @@ fn a_request_that_arrives_while_a_function_is_pending_is_answered_after_the_repl
                 let mut program = Program::new(framing, polled);
                 program.slow_until = program.slow_until.wrapping_add(300_000);
                 program.slow_reply = reply;
-                program.line.arrive(0, &framed(framing, &[17, SLOW]));
-                program.line.arrive(100_000, &framed(framing, &READ));
-                let mut expected = vec![framed(framing, &ANSWER)];
+                program.line.arrive(0, &adu(framing, &[17, SLOW]));
+                program.line.arrive(100_000, &adu(framing, &READ));
+                let mut expected = vec![adu(framing, &ANSWER)];
                 if reply != Reply::NO_RESPONSE {
-                    expected.insert(0, framed(framing, &[17, SLOW]));
+                    expected.insert(0, adu(framing, &[17, SLOW]));
                 }
                 let case = format!("{framing:?}, {polled:?}, {reply:?}");
                 assert_eq!(program.run(), expected, "{case}");
                 // The port has been read since, so the server sleeps until bytes arrive.
-                program.line.arrive(10_000, &framed(framing, &READ));
-                assert_eq!(program.run(), [framed(framing, &ANSWER)], "{case}");
+                program.line.arrive(10_000, &adu(framing, &READ));
+                assert_eq!(program.run(), [adu(framing, &ANSWER)], "{case}");
             }
         }
     }
@@ -153,19 +145,19 @@ fn a_request_that_arrives_while_a_response_is_sent_is_answered() {
         for polled in [Polled::AsOnHost, Polled::AsInFirmware] {
             let mut program = Program::new(framing, polled);
             program.line.wire.borrow_mut().piece = 1;
-            program.line.arrive(0, &framed(framing, &READ));
+            program.line.arrive(0, &adu(framing, &READ));
             while program.line.wire.borrow().sent.is_empty() {
                 program.poll();
                 let wire = &mut *program.line.wire.borrow_mut();
                 wire.now = wire.now.wrapping_add(50);
             }
             let now = program.line.wire.borrow().now;
-            program.line.arrive(0, &framed(framing, &READ));
+            program.line.arrive(0, &adu(framing, &READ));
             // All of it arrives at once.
             for byte in &mut program.line.wire.borrow_mut().arriving {
                 byte.0 = now;
             }
-            let expected = vec![framed(framing, &ANSWER); 2];
+            let expected = vec![adu(framing, &ANSWER); 2];
             assert_eq!(program.run(), expected, "{framing:?}, {polled:?}");
         }
     }
@@ -189,12 +181,12 @@ fn a_program_that_slept_for_an_hour_carries_the_same_write_out_again() {
     for framing in [Framing::Rtu, Framing::Ascii] {
         let mut program = Program::new(framing, Polled::AsInFirmware);
         for round in 0..3 {
-            program.line.arrive(0, &framed(framing, &write));
+            program.line.arrive(0, &adu(framing, &write));
             // The bytes wake the program.
             let wire = program.line.wire.clone();
             let now = wire.borrow().arriving.back().unwrap().0;
             wire.borrow_mut().now = now;
-            let expected = [framed(framing, &write)];
+            let expected = [adu(framing, &write)];
             assert_eq!(program.run(), expected, "{framing:?}, {round}");
             let now = wire.borrow().now;
             wire.borrow_mut().now = now.wrapping_add(3_000_000_000);
@@ -307,18 +299,18 @@ fn a_program_sleeps_while_a_response_leaves() {
 fn bytes_that_arrived_before_the_begin_are_received() {
     for framing in ALL {
         let mut program = Program::new(framing, Polled::AsOnHost);
-        program.line.arrive(0, &framed(framing, &READ));
+        program.line.arrive(0, &adu(framing, &READ));
         let now = program.line.wire.borrow().arriving.back().unwrap().0;
         program.line.wire.borrow_mut().now = now;
         assert_eq!(program.line.server.poll_delay(now), 0, "{framing:?}");
-        assert_eq!(program.run(), [framed(framing, &ANSWER)], "{framing:?}");
+        assert_eq!(program.run(), [adu(framing, &ANSWER)], "{framing:?}");
     }
 }
 
 #[test]
 fn a_program_whose_requests_are_answered_at_once_polls_once_for_each() {
     let mut line = Line::new(Framing::Tcp);
-    line.arrive(0, &framed(Framing::Tcp, &READ));
+    line.arrive(0, &adu(Framing::Tcp, &READ));
     let now = line.wire.borrow().arriving.back().unwrap().0;
     line.wire.borrow_mut().now = now;
     let _ = line.poll();

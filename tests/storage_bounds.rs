@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::master::{sealed, Call, Line};
+use common::frame::sealed;
+use common::master::{Call, Line};
 use mbm::engine::{Buffers, Counter, Storage, Words};
 use mbm::master::Master;
 use proptest::prelude::*;

@@ -3,6 +3,8 @@
 
 pub mod api;
 pub mod asked;
+#[path = "../../tests/common/frame.rs"]
+pub mod frame;
 pub mod lengths;
 pub mod naive;
 pub mod search;

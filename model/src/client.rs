@@ -10,7 +10,7 @@ mod wire;
 use mbm::client::{Client, Serial};
 use mbm::engine::MicrosSetting;
 use mbm::error::Status;
-use mbm::frame::rtu;
+use mbm::frame::Framing;
 use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use std::collections::VecDeque;
@@ -108,12 +108,7 @@ pub struct Ended {
 }
 
 fn frame(pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 16];
-    let length = rtu::emit(&mut buffer, UNIT, |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.expect("the frame fits")].to_vec()
+    crate::frame::framed(Framing::Rtu, 0, UNIT, pdu)
 }
 
 /// The device: the numbers of the requests that it has not answered, in order.

@@ -3,7 +3,7 @@
 use crate::wire::{self, Lent, Wire};
 use mbm::engine::MicrosSetting;
 use mbm::error::Status;
-use mbm::frame::rtu;
+use mbm::frame::Framing;
 use mbm::master::request::Line;
 use mbm::master::Master;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -210,12 +210,7 @@ impl PartialEq for State {
 }
 
 fn frame(unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 16];
-    let length = rtu::emit(&mut buffer, unit, |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.expect("the frame fits")].to_vec()
+    crate::frame::framed(Framing::Rtu, 0, unit, pdu)
 }
 
 fn reply(unit: u8, number: u8) -> Vec<u8> {

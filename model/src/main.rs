@@ -6,6 +6,8 @@
 //! for that time.
 
 mod client;
+#[path = "../../tests/common/frame.rs"]
+mod frame;
 mod line;
 mod server;
 mod streams;

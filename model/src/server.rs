@@ -4,7 +4,7 @@
 //! one response, and to nothing else, ever.
 
 use crate::wire::Wire;
-use mbm::frame::{rtu, Framing};
+use mbm::frame::Framing;
 use mbm::server::{Indication, Reply, Server, Units};
 use std::time::{Duration, Instant};
 
@@ -55,12 +55,7 @@ const REQUESTS: [(&[u8], &[u8]); 4] = [
 ];
 
 fn frame(pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 32];
-    let length = rtu::emit(&mut buffer, UNIT, |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.expect("the frame fits")].to_vec()
+    crate::frame::framed(Framing::Rtu, 0, UNIT, pdu)
 }
 
 /// Answers as [`REQUESTS`] says; anything else with exception 03.

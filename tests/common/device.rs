@@ -1,5 +1,6 @@
 //! A device with everything that a server can serve, for tests to send requests to.
 
+use super::frame::sealed;
 use mbm::frame::checksum::crc16;
 use mbm::frame::Framing;
 use mbm::pdu::files::Record;
@@ -12,13 +13,6 @@ use mbm::server::storage::{
     BitArray, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, RegisterArray,
 };
 use mbm::server::{Reply, Service, Unit};
-
-/// The bytes followed by their CRC.
-pub fn sealed(bytes: &[u8]) -> Vec<u8> {
-    let mut frame = bytes.to_vec();
-    frame.extend(crc16(bytes).to_bytes());
-    frame
-}
 
 /// Unit 17: ten registers and 20 bits of each kind from address 100 on, files 3 and 4 with
 /// ten records each, and FIFO queues of 2, 31 and 32 registers.

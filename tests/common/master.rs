@@ -2,7 +2,6 @@
 
 use mbm::engine::{Buffers, Words};
 use mbm::error::{Error, Status};
-use mbm::frame::checksum::crc16;
 use mbm::master::request::MasterRequest;
 use mbm::master::Master;
 use mbm::pdu::functions;
@@ -194,9 +193,4 @@ impl<const SINGLE: bool> TestMaster<SINGLE> {
 /// The frame of a request to `unit` that sends `words`.
 pub fn frame(unit: u8, call: Call, words: &[u16]) -> Vec<u8> {
     TestMaster::<false>::new(unit, 256).send(call, words)
-}
-
-/// The bytes followed by their CRC.
-pub fn sealed(bytes: &[u8]) -> Vec<u8> {
-    [bytes, &crc16(bytes).to_bytes()].concat()
 }

@@ -2,6 +2,7 @@
 
 #[allow(dead_code)]
 pub mod device;
+pub mod frame;
 #[allow(dead_code)]
 pub mod line;
 #[allow(dead_code)]

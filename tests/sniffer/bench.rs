@@ -1,7 +1,8 @@
 //! A sniffer with its buffer, a clock, and a record of all its events.
 
+pub use crate::frame::framed as frame;
 use mbm::error::Status;
-use mbm::frame::{ascii, Framing};
+use mbm::frame::Framing;
 use mbm::pdu::custom::Function;
 use mbm::sniffer::{BusDirection, EventKind, Sniffer};
 use mbm::text::TextWriter;
@@ -118,15 +119,6 @@ impl Bench {
             .map(|event| (event.kind, event.pdu.clone()))
             .collect()
     }
-}
-
-pub fn frame(framing: Framing, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 600];
-    let length = framing.emit(&mut buffer, transaction, unit, ascii::END, |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.unwrap()].to_vec()
 }
 
 pub fn rtu(unit: u8, pdu: &[u8]) -> Vec<u8> {

@@ -4,5 +4,7 @@ mod bench;
 mod bus;
 mod exchanges;
 mod faults;
+#[path = "../common/frame.rs"]
+mod frame;
 mod random;
 mod times;

@@ -155,20 +155,8 @@ impl Bench {
     }
 }
 
-pub fn with_crc(bytes: &[u8]) -> Vec<u8> {
-    let mut frame = bytes.to_vec();
-    frame.extend(mbm::frame::checksum::crc16(bytes).to_bytes());
-    frame
-}
-
 pub fn frame(framing: Framing, pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; ascii::MAX_FRAME];
-    let write = |place: &mut [u8]| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    };
-    let length = framing.emit(&mut buffer, 7, 17, ascii::END, write).unwrap();
-    buffer[..length].to_vec()
+    crate::frame::framed(framing, 7, 17, pdu)
 }
 
 pub fn record(

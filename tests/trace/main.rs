@@ -1,9 +1,12 @@
 //! The trace: bytes of both directions become frames, however they are split.
 
 mod bench;
+#[path = "../common/frame.rs"]
+mod frame;
 mod properties;
 
-use bench::{frame, record, with_crc, Bench, Kept, Shared, TestPort, ALL, READ, REPLY};
+use bench::{frame, record, Bench, Kept, Shared, TestPort, ALL, READ, REPLY};
+use frame::sealed;
 use mbm::engine::Buffers;
 use mbm::error::{Error, Status};
 use mbm::frame::{ascii, rtu, Framing};
@@ -264,7 +267,7 @@ fn a_frame_of_an_unknown_function_ends_with_silence_or_by_its_declaration() {
 
 #[test]
 fn a_frame_with_a_wrong_byte_count_but_a_right_crc_is_a_frame() {
-    let reply = with_crc(&[17, 3, 6, 2, 43]);
+    let reply = sealed(&[17, 3, 6, 2, 43]);
     let mut bench = Bench::new(Framing::Rtu, Request);
     bench.receive(&reply);
     bench.trace.hand_out_rest();

@@ -2,19 +2,14 @@
 
 use super::records;
 use super::world::{Grant, World};
-use mbm::frame::{ascii, Framing};
+use crate::frame;
+use mbm::frame::Framing;
 use mbm_c::*;
 
 /// The frame of a PDU; the framing is one of MBM_FRAMING_*, modulo 4.
 pub fn framed(framing: u8, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
     let framing = Framing::from_code(framing % 4).expect("one of four");
-    let pdu = &pdu[..pdu.len().min(253)];
-    let mut buffer = [0; 600];
-    let length = framing.emit(&mut buffer, transaction, unit, ascii::END, |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.expect("the frame fits")].to_vec()
+    frame::framed(framing, transaction, unit, &pdu[..pdu.len().min(253)])
 }
 
 /// The PDU of a request, most often a valid one.

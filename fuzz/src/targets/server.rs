@@ -2,7 +2,7 @@
 //! blocks of any length, and a receiver that may get what the driver sends, also in blocks and held
 //! back. One request on the line leads to at most one response, and to nothing else, ever.
 
-use crate::Input;
+use crate::{frame, Input};
 use mbm::frame::Framing;
 use mbm::port::Port;
 use mbm::server::{Addressing, Indication, Reply, Server, Units};
@@ -91,12 +91,7 @@ impl Unit {
 }
 
 fn framed(framing: Framing, pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 600];
-    let length = framing.emit(&mut buffer, 0, UNIT, b'\n', |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.expect("the frame fits")].to_vec()
+    frame::framed(framing, 0, UNIT, pdu)
 }
 
 /// A request that a client may send.

@@ -2,6 +2,7 @@
 //! bytes, reported frames are valid, and a reply comes after its request.
 
 use crate::asked::Asked;
+use crate::frame::framed;
 use crate::{naive, Input};
 use mbm::frame::{ascii, Framing};
 use mbm::sniffer::{BusDirection, EventKind, Sniffer, MIN_BUFFER};
@@ -33,10 +34,18 @@ pub fn run(data: &[u8]) {
                 continue;
             }
             1 => input.counted().to_vec(),
-            2 => framed(framing, input.u8(), input.counted()),
-            3 => framed(framing, asked.unit, &asked.pdu),
-            4 => framed(framing, asked.unit, &asked.response(&mut input)),
-            _ => framed(framing, asked.unit, &[asked.function() | 0x80, input.u8()]),
+            2 => {
+                let (unit, pdu) = (input.u8(), input.counted());
+                framed(framing, 7, unit, &pdu[..pdu.len().min(253)])
+            }
+            3 => framed(framing, 7, asked.unit, &asked.pdu),
+            4 => framed(framing, 7, asked.unit, &asked.response(&mut input)),
+            _ => framed(
+                framing,
+                7,
+                asked.unit,
+                &[asked.function() | 0x80, input.u8()],
+            ),
         };
         for some in bytes.chunks(piece) {
             bus.feed(some);
@@ -53,17 +62,6 @@ pub fn run(data: &[u8]) {
         bus.reported == bus.line.len() || ahead && bus.reported > bus.line.len(),
         "some bytes belong to no event, or to two"
     );
-}
-
-/// The frame of a PDU.
-fn framed(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; 600];
-    let pdu = &pdu[..pdu.len().min(253)];
-    let length = framing.emit(&mut buffer, 7, unit, ascii::END, |place| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    });
-    buffer[..length.expect("the frame fits")].to_vec()
 }
 
 struct Bus {

@@ -2,6 +2,7 @@
 //! exactly one record, in order; what is called a frame is one; and a frame that arrives alone on
 //! a silent line is found.
 
+use crate::frame::framed;
 use crate::Input;
 use mbm::error::Status;
 use mbm::frame::{ascii, Framing};
@@ -45,16 +46,6 @@ impl Port for TestPort {
     }
 }
 
-fn framed(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let mut buffer = [0; ascii::MAX_FRAME];
-    let write = |place: &mut [u8]| {
-        place[..pdu.len()].copy_from_slice(pdu);
-        Ok(pdu.len())
-    };
-    let length = framing.emit(&mut buffer, 7, unit, ascii::END, write);
-    buffer[..length.unwrap()].to_vec()
-}
-
 pub fn run(data: &[u8]) {
     let mut input = Input(data);
     let code = input.u8();
@@ -94,11 +85,11 @@ pub fn run(data: &[u8]) {
                 let pdu = &pdu[..pdu.len().min(253)];
                 wire.borrow_mut()
                     .arriving
-                    .extend(framed(framing, unit, pdu));
+                    .extend(framed(framing, 7, unit, pdu));
             }
             3 => {
                 wire.borrow_mut().accepts = usize::from(input.u8());
-                let bytes = framed(framing, 1, &[input.counted(), &[3]].concat()[..1]);
+                let bytes = framed(framing, 7, 1, &[input.counted(), &[3]].concat()[..1]);
                 assert!(trace.write(&bytes).is_ok());
             }
             _ => {
@@ -112,7 +103,7 @@ pub fn run(data: &[u8]) {
     assert_eq!(wire.borrow().moved, wire.borrow().handed_out);
 
     // A frame that fits into the buffer and arrives alone.
-    let reply = framed(framing, 17, &[3, 2, 0, 1]);
+    let reply = framed(framing, 7, 17, &[3, 2, 0, 1]);
     let before = wire.borrow().frames;
     wire.borrow_mut().arriving.extend(&reply);
     while matches!(trace.read(&mut place), Ok(1..)) {}
