@@ -260,7 +260,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// True for RTU frames on a serial line. A silence of t3.5 ends them. A buffer has less space
     /// for the PDU of an ASCII frame.
-    pub fn is_rtu_line(&mut self) -> bool {
+    pub fn is_rtu_line(&self) -> bool {
         let space = self.storage.capacity().wrapping_sub(rtu::OVERHEAD);
         self.request.is_serial() && self.request.space == space as u16
     }

@@ -36,9 +36,7 @@ pub trait ServerStorage {
     fn frame(&mut self) -> &mut [u8];
 
     /// Size of the frame buffer in bytes.
-    fn capacity(&mut self) -> usize {
-        self.frame().len()
-    }
+    fn capacity(&self) -> usize;
 
     /// The bytes of the frame buffer from `start` to `end`. Callers ensure that `start` is not
     /// after `end`, and that `end` is not after the end of the buffer.
@@ -75,11 +73,19 @@ impl ServerStorage for &mut [u8] {
     fn frame(&mut self) -> &mut [u8] {
         self
     }
+
+    fn capacity(&self) -> usize {
+        self.len()
+    }
 }
 
 impl<const N: usize> ServerStorage for [u8; N] {
     fn frame(&mut self) -> &mut [u8] {
         self
+    }
+
+    fn capacity(&self) -> usize {
+        self.len()
     }
 }
 

@@ -74,7 +74,7 @@ impl ServerStorage for ServerBuffers {
         }
     }
 
-    fn capacity(&mut self) -> usize {
+    fn capacity(&self) -> usize {
         self.bytes.into()
     }
 
