@@ -5,7 +5,6 @@
 #include "board.h"
 #include "mbm.h"
 #include "report.h"
-#include "sleep.h"
 
 enum { TIMEOUT = PRESENT_TIMEOUT };
 

@@ -4,7 +4,6 @@
  * mbm reads the clock all the time while a request is pending; between requests a lost
  * turn does no harm.
  * Licence: MIT OR Apache-2.0. */
-#include "counter.h"
 #include "board.h"
 #include "machine.h"
 

@@ -1,6 +1,5 @@
 /* The lower half of RISC-V's machine timer. Licence: MIT OR Apache-2.0. */
 #include "board.h"
-#include "counter.h"
 #include "machine.h"
 
 void counter_start(void) {}

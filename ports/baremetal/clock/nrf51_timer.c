@@ -1,7 +1,6 @@
 /* TIMER0 of the nRF51 at 1 MHz, 32 bits: the chip's Cortex-M0 has no SysTick. Licence: MIT
  * OR Apache-2.0. */
 #include "board.h"
-#include "counter.h"
 
 #define TIMER0 0x40008000u
 #define START REGISTER(TIMER0 + 0x000u)

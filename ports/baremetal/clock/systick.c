@@ -1,7 +1,6 @@
 /* Cortex-M's SysTick: 24 bits, counting down. It wraps after 0.1 s at 168 MHz. Licence: MIT
  * OR Apache-2.0. */
 #include "board.h"
-#include "counter.h"
 
 #define CONTROL REGISTER(0xE000E010u)
 #define RELOAD REGISTER(0xE000E014u)

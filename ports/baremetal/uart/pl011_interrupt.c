@@ -3,7 +3,7 @@
  * OR Apache-2.0. */
 #include "mbm.h"
 #include "pl011.h"
-#include "sleep.h"
+#include "board.h"
 
 #define FIFO_LEVELS REGISTER(UART_BASE + 0x34u)
 #define INTERRUPT_MASK REGISTER(UART_BASE + 0x38u)

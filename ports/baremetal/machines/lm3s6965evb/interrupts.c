@@ -1,7 +1,6 @@
 /* A sleep that ends with an interrupt of the UART or of a timer. Licence: MIT OR Apache-2.0. */
 #include "board.h"
 #include "machine.h"
-#include "sleep.h"
 
 #define RUN_CLOCKS REGISTER(0x400FE104u)
 #define TIMER 0x40030000u
