@@ -128,10 +128,6 @@ pub unsafe extern "C" fn mbm_bits_set(
 /// As mbm_bits_isSet, but in words, for example the response words of a node.
 ///
 /// @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
-/// @param first     the address of the first coil of the read
-/// @param quantity  the number of coils that were read; `words` holds that many bits
-/// @param address   the address of the coil
-/// @param on        receives 0 or 1
 /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
 ///         passes address 65535
 #[no_mangle]
@@ -148,10 +144,6 @@ pub unsafe extern "C" fn mbm_bits_isSetInWords(
 /// As mbm_bits_set, but in words, for example the transmit words of a node.
 ///
 /// @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
-/// @param first     the address of the first coil of the write
-/// @param quantity  the number of coils of the write; `words` holds that many bits
-/// @param address   the address of the coil
-/// @param on        0 is off, any other value is on
 /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
 ///         passes address 65535
 #[no_mangle]

@@ -17,7 +17,10 @@ PARAMETER = re.compile(r"(mbm_\w+)?[ *]+(\w+)(?:,|$)")
 
 def explained(found, comments):
     comment, end, head, parameters, tail = found.groups()
-    others = [comments.get(name, "") for name in re.findall(r"\b(?:[Aa]s|see) (mbm_\w+)", comment)]
+    others = [comment]
+    for other in others:
+        names = re.findall(r"\b(?:[Aa]s|see) (mbm_\w+)", other)
+        others += [comments[name] for name in names if name in comments and comments[name] not in others]
     for kind, name in PARAMETER.findall(parameters):
         named = re.compile(rf"@param {name}\b")
         if named.search(comment):

@@ -48,10 +48,8 @@ struct mbm_line;
  * and changes nothing, and a getter returns its value for an object that was never begun.
  */
 typedef struct mbm_client {
-    /** Private. */
-    void *pointers[63];
-    /** Private. */
-    uint32_t words[22];
+    void *pointers[63]; /**< Private. */
+    uint32_t words[22]; /**< Private. */
 } mbm_client;
 
 /**
@@ -103,10 +101,8 @@ typedef struct mbm_clientRequest {
      *  mbm_client_setBusyRetries and mbm_client_setUnits was called on it: only they link the
      *  code for repetitions. */
     uint8_t retryLimit;
-    /** Private. */
-    uint8_t bytes[6];
-    /** Private. */
-    uint32_t words[7];
+    uint8_t bytes[6]; /**< Private. */
+    uint32_t words[7]; /**< Private. */
 } mbm_clientRequest;
 
 /**
@@ -139,17 +135,14 @@ typedef struct mbm_identification {
     void (*done)(void *context, struct mbm_identification *identification);
     /** Your pointer, passed to both; may be NULL. */
     void *context;
-    /** Private. */
-    mbm_client *client;
+    mbm_client *client; /**< Private. */
     /** How many objects `object` was called for, or would have been. */
     uint16_t count;
     /** The conformity level in the last reply, by the standard 01 to 03 or 81 to 83 (hex). It
      *  is not checked: some devices send a wrong one, and reading does not depend on it. */
     uint8_t conformity;
-    /** Private. */
-    uint8_t handingOut;
-    /** Private. */
-    uint16_t stream[2];
+    uint8_t handingOut; /**< Private. */
+    uint16_t stream[2]; /**< Private. */
 } mbm_identification;
 
 /**
@@ -187,8 +180,7 @@ typedef struct mbm_clientUnit {
     /** Set by you: the minimum time from the end of a request to the next request to this
      *  unit, in microseconds; a value above 2^31 (36 minutes) means 2^31. */
     uint32_t delayUs;
-    /** Private. */
-    uint32_t lastUs;
+    uint32_t lastUs; /**< Private. */
     /** Set by you: the response timeout of this unit in milliseconds, 1 to 1000000 (16
      *  minutes); 0: that of mbm_client_setResponseTimeout. mbm_client_setUnits refuses a
      *  greater number. If you set it later, it means 1000000. */
@@ -198,8 +190,7 @@ typedef struct mbm_clientUnit {
     uint16_t unit;
     /** The status of the last request that ended; MBM_OK if none has ended. */
     uint8_t status;
-    /** Private. */
-    uint8_t cooling_down;
+    uint8_t cooling_down; /**< Private. */
     /** Set by you: how often the client repeats a request to this unit at most, 1 to 254;
      *  MBM_NO_RETRIES: never; 0: as often as mbm_client_setRetries says. */
     uint8_t retryLimit;

@@ -38,10 +38,8 @@ struct mbm_unit;
  * request of your own that mbm_gateway_poll ends.
  */
 typedef struct mbm_gateway {
-    /** Private. */
-    void *pointers[13];
-    /** Private. */
-    uint32_t words[2];
+    void *pointers[13]; /**< Private. */
+    uint32_t words[2]; /**< Private. */
 } mbm_gateway;
 
 /**
@@ -87,16 +85,13 @@ typedef struct mbm_gatewayLine {
      *  connection to a device that takes several requests at once, it can have more in flight:
      *  as many as mbm_client_setInFlight allows its client. */
     uint8_t inFlight;
-    /** Private. */
-    uint8_t last;
+    uint8_t last; /**< Private. */
 } mbm_gatewayLine;
 
 /** A place for a TCP connection. */
 typedef struct mbm_gatewayConnection {
-    /** Private. */
-    mbm_port port;
-    /** Private. */
-    uint32_t words[3];
+    mbm_port port; /**< Private. */
+    uint32_t words[3]; /**< Private. */
 } mbm_gatewayConnection;
 
 /**
@@ -104,12 +99,9 @@ typedef struct mbm_gatewayConnection {
  * machine.
  */
 typedef struct mbm_gatewayRequest {
-    /** Private. */
-    mbm_clientRequest request;
-    /** Private. */
-    uint32_t words[5];
-    /** Private. */
-    uint8_t frame[MBM_MAX_TCP_FRAME];
+    mbm_clientRequest request; /**< Private. */
+    uint32_t words[5]; /**< Private. */
+    uint8_t frame[MBM_MAX_TCP_FRAME]; /**< Private. */
 } mbm_gatewayRequest;
 
 /** The parts of a gateway. The gateway copies this struct, but not the arrays that it points to. */

@@ -41,10 +41,8 @@ extern "C" {
  * mbm_link_end or until the client was begun again.
  */
 typedef struct mbm_link {
-    /** Private. */
-    void *pointers[34];
-    /** Private. */
-    uint32_t words[24];
+    void *pointers[34]; /**< Private. */
+    uint32_t words[24]; /**< Private. */
 } mbm_link;
 
 /**

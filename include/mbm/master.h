@@ -33,10 +33,8 @@ extern "C" {
  * as mbm_node_readCoils describes.
  */
 typedef struct mbm_node {
-    /** Private. */
-    void *pointers[5];
-    /** Private. */
-    uint32_t words[4];
+    void *pointers[5]; /**< Private. */
+    uint32_t words[4]; /**< Private. */
 } mbm_node;
 
 /**
@@ -50,10 +48,8 @@ typedef struct mbm_node {
  * A call that is refused changes nothing.
  */
 typedef struct mbm_line {
-    /** Private. */
-    void *pointers[25];
-    /** Private. */
-    uint32_t words[14];
+    void *pointers[25]; /**< Private. */
+    uint32_t words[14]; /**< Private. */
 } mbm_line;
 
 /**

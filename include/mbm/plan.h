@@ -65,10 +65,8 @@ extern "C" {
  * mbm_plan_end.
  */
 typedef struct mbm_plan {
-    /** Private. */
-    void *pointers[3];
-    /** Private. */
-    uint32_t words[4];
+    void *pointers[3]; /**< Private. */
+    uint32_t words[4]; /**< Private. */
 } mbm_plan;
 
 /**
@@ -106,14 +104,12 @@ typedef struct mbm_planField {
 
 /** Storage of a plan, one for each field. */
 typedef struct mbm_planPosition {
-    /** Private. */
-    uint32_t words[2];
+    uint32_t words[2]; /**< Private. */
 } mbm_planPosition;
 
 /** Storage of a plan, one for each read. */
 typedef struct mbm_planRead {
-    /** Private. */
-    uint32_t words[8];
+    uint32_t words[8]; /**< Private. */
 } mbm_planRead;
 
 /** How much one read of a unit may request, if not as much as the plan's other reads. */

@@ -27,12 +27,9 @@ extern "C" {
  * disable interrupts.
  */
 typedef struct mbm_ring {
-    /** Private. */
-    uint8_t *bytes;
-    /** Private. */
-    uint16_t size;
-    /** Private. */
-    uint16_t positions[3];
+    uint8_t *bytes; /**< Private. */
+    uint16_t size; /**< Private. */
+    uint16_t positions[3]; /**< Private. */
 } mbm_ring;
 
 /**

@@ -47,8 +47,7 @@ typedef struct mbm_service {
  * them at any time. The sub-functions below are those of function 08 (V1.1b3, 6.8), in hex.
  */
 typedef struct mbm_diagnostics {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** Optional: called when the client restarts the communications (sub-function 01).
      *  `clearLog` is 1 if the client cleared the event log too, else 0. */
     void (*restart)(void *context, uint8_t clearLog);
@@ -76,8 +75,7 @@ typedef struct mbm_diagnostics {
     uint16_t events;
     /** 1 in listen only mode, else 0. */
     uint8_t listenOnly;
-    /** Private. */
-    uint8_t hidden[67];
+    uint8_t hidden[67]; /**< Private. */
 } mbm_diagnostics;
 
 /**
@@ -105,8 +103,7 @@ typedef struct mbm_unit {
                       const void *info,
                       uint8_t addressing,
                       uint8_t *pdu);
-    /** Private. */
-    mbm_diagnostics *diagnostics;
+    mbm_diagnostics *diagnostics; /**< Private. */
     /** The unit id, 1 to 247 (serial line guide V1.02, 2.2). The ids 248 to 255, which
      *  the standard reserves, are accepted. 0 answers to every id. A unit without any
      *  record does not answer. A begin function of a server refuses a greater id
@@ -181,8 +178,7 @@ typedef struct mbm_recordHooks {
  * that you need, and pass it to mbm_unit_serveCallbacks.
  */
 typedef struct mbm_dataCallbacks {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** Passed to each function. Any value; may be NULL. */
     void *context;
     /** Optional; NULL if every address exists. Otherwise returns 1 if this address
@@ -228,8 +224,7 @@ typedef struct mbm_request {
  * for the cells that they lack; a function with code 0 is not.
  */
 typedef struct mbm_custom {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** Carries out a request and writes the data of the response, without the function
      *  code, to `response`. `capacity` is the space in bytes that the frame buffer has
      *  after the request; the server sends at most 252 bytes. Returns the number of bytes
@@ -254,10 +249,8 @@ typedef struct mbm_custom {
  * mbm_unit_switchFunction.
  */
 typedef struct mbm_functionMask {
-    /** Private. */
-    mbm_service service;
-    /** Private. */
-    uint8_t off[16];
+    mbm_service service; /**< Private. */
+    uint8_t off[16]; /**< Private. */
 } mbm_functionMask;
 
 /** One file: an array of records. A record is one register. */
@@ -275,8 +268,7 @@ typedef struct mbm_file {
  * it to mbm_unit_serveFiles.
  */
 typedef struct mbm_files {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** The files: an array of `count` elements. */
     const mbm_file *files;
     /** How many files. */
@@ -301,8 +293,7 @@ typedef struct mbm_fifo {
  * pass it to mbm_unit_serveFifos.
  */
 typedef struct mbm_fifos {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** The queues: an array of `count` elements. A read leaves the registers in the
      *  queue. */
     const mbm_fifo *fifos;
@@ -315,8 +306,7 @@ typedef struct mbm_fifos {
  * pass it to mbm_unit_serveExceptionStatus.
  */
 typedef struct mbm_exceptionStatus {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** The outputs, one bit each. You may change them at any time. */
     uint8_t outputs;
 } mbm_exceptionStatus;
@@ -329,8 +319,7 @@ typedef struct mbm_exceptionStatus {
  * exception 04.
  */
 typedef struct mbm_serverId {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** The server id; NULL only if idLength is 0. */
     const uint8_t *id;
     /** The data after the run indicator; NULL only if additionalLength is 0. */
@@ -348,8 +337,7 @@ typedef struct mbm_serverId {
  * and pass it to mbm_unit_serveIdentification.
  */
 typedef struct mbm_serverIdentification {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** The objects, in any order. Every device has the ids 0 (vendor name), 1 (product
      *  code) and 2 (revision). Optional are 3 (vendor URL), 4 (product name), 5 (model
      *  name) and 6 (application name), and from 0x80 on your own. An object has at most
@@ -368,8 +356,7 @@ typedef struct mbm_serverIdentification {
  * zero it first.
  */
 typedef struct mbm_registerTable {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** The registers: `size` words. */
     uint16_t *words;
     /** Optional; NULL if every register exists. Otherwise a bitmap with one bit for each
@@ -390,8 +377,7 @@ typedef struct mbm_registerTable {
  * mbm_unit_serveDiscreteInputs.
  */
 typedef struct mbm_bitTable {
-    /** Private. */
-    mbm_service service;
+    mbm_service service; /**< Private. */
     /** The bits: `size` bits, in (size + 7) / 8 bytes. */
     uint8_t *bits;
     /** As in mbm_registerTable. */
@@ -601,10 +587,8 @@ uint8_t mbm_registerTable_serveMaskAndReadWrite(mbm_registerTable *table);
  * mbm_unit_serve functions on any unit.
  */
 typedef struct mbm_server {
-    /** Private. */
-    void *pointers[16];
-    /** Private. */
-    uint32_t words[10];
+    void *pointers[16]; /**< Private. */
+    uint32_t words[10]; /**< Private. */
 } mbm_server;
 
 /**

@@ -53,10 +53,8 @@ extern "C" {
  * interrupt through an mbm_ring.
  */
 typedef struct mbm_sniffer {
-    /** Private. */
-    void *pointers[1];
-    /** Private. */
-    uint32_t words[171];
+    void *pointers[1]; /**< Private. */
+    uint32_t words[171]; /**< Private. */
 } mbm_sniffer;
 
 /**

@@ -36,10 +36,8 @@ struct mbm_event;
  * re-entrant: use it from the thread of the object that uses its port.
  */
 typedef struct mbm_trace {
-    /** Private. */
-    void *pointers[26];
-    /** Private. */
-    uint32_t words[9];
+    void *pointers[26]; /**< Private. */
+    uint32_t words[9]; /**< Private. */
 } mbm_trace;
 
 /** One frame on a line or connection, or bytes that are no frame. */

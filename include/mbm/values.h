@@ -125,10 +125,6 @@ uint8_t mbm_bits_set(uint8_t *bytes, uint16_t first, uint16_t quantity, uint16_t
  * As mbm_bits_isSet, but in words, for example the response words of a node.
  *
  * @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
- * @param first     the address of the first coil of the read
- * @param quantity  the number of coils that were read; `words` holds that many bits
- * @param address   the address of the coil
- * @param on        receives 0 or 1
  * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
  *         passes address 65535
  */
@@ -139,10 +135,6 @@ uint8_t mbm_bits_isSetInWords(const uint16_t *words, uint16_t first, uint16_t qu
  * As mbm_bits_set, but in words, for example the transmit words of a node.
  *
  * @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
- * @param first     the address of the first coil of the write
- * @param quantity  the number of coils of the write; `words` holds that many bits
- * @param address   the address of the coil
- * @param on        0 is off, any other value is on
  * @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
  *         passes address 65535
  */
@@ -167,11 +159,9 @@ uint8_t mbm_registers_ofWords(mbm_registers *registers, const uint16_t *words, u
 /**
  * As mbm_registers_ofWords, for the data bytes of a reply or a request.
  *
- * @param registers  the view to fill in; without data after an error
  * @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must stay
  *                   valid while the view is used
  * @param length     how many bytes, an even number
- * @param first      the device's address of the first register, 0 to 65535
  * @return a status; see mbm_registers_ofWords. MBM_INVALID_ARGUMENT for an odd length
  */
 uint8_t mbm_registers_ofBytes(mbm_registers *registers, const uint8_t *bytes, uint16_t length,
@@ -181,10 +171,6 @@ uint8_t mbm_registers_ofBytes(mbm_registers *registers, const uint8_t *bytes, ui
  * As mbm_registers_ofWords, for words that you also write, for example the transmit
  * words of mbm_node.
  *
- * @param registers  the view to fill in; without data after an error
- * @param words      the words to write; must stay valid while the view is used
- * @param count      how many words
- * @param first      the device's address of the first register, 0 to 65535
  * @return a status; see mbm_registers_ofWords
  */
 uint8_t mbm_registers_intoWords(mbm_registers *registers, uint16_t *words, uint16_t count,
@@ -193,10 +179,6 @@ uint8_t mbm_registers_intoWords(mbm_registers *registers, uint16_t *words, uint1
 /**
  * As mbm_registers_ofBytes, for bytes that you also write.
  *
- * @param registers  the view to fill in; without data after an error
- * @param bytes      the bytes to write; must stay valid while the view is used
- * @param length     how many bytes, an even number
- * @param first      the device's address of the first register, 0 to 65535
  * @return a status; see mbm_registers_ofBytes
  */
 uint8_t mbm_registers_intoBytes(mbm_registers *registers, uint8_t *bytes, uint16_t length,

@@ -213,11 +213,9 @@ functions! {
 
     /// As mbm_registers_ofWords, for the data bytes of a reply or a request.
     ///
-    /// @param registers  the view to fill in; without data after an error
     /// @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must stay
     ///                   valid while the view is used
     /// @param length     how many bytes, an even number
-    /// @param first      the device's address of the first register, 0 to 65535
     /// @return a status; see mbm_registers_ofWords. MBM_INVALID_ARGUMENT for an odd length
     fn mbm_registers_ofBytes(bytes: *const u8, length: u16, first: u16)
         = fill(bytes.cast(), MBM_REGISTERS_OF_BYTES, length, first);
@@ -225,20 +223,12 @@ functions! {
     /// As mbm_registers_ofWords, for words that you also write, for example the transmit
     /// words of mbm_node.
     ///
-    /// @param registers  the view to fill in; without data after an error
-    /// @param words      the words to write; must stay valid while the view is used
-    /// @param count      how many words
-    /// @param first      the device's address of the first register, 0 to 65535
     /// @return a status; see mbm_registers_ofWords
     fn mbm_registers_intoWords(words: *mut u16, count: u16, first: u16)
         = fill(words.cast(), MBM_REGISTERS_INTO_WORDS, count, first);
 
     /// As mbm_registers_ofBytes, for bytes that you also write.
     ///
-    /// @param registers  the view to fill in; without data after an error
-    /// @param bytes      the bytes to write; must stay valid while the view is used
-    /// @param length     how many bytes, an even number
-    /// @param first      the device's address of the first register, 0 to 65535
     /// @return a status; see mbm_registers_ofBytes
     fn mbm_registers_intoBytes(bytes: *mut u8, length: u16, first: u16)
         = fill(bytes.cast(), MBM_REGISTERS_INTO_BYTES, length, first);
