@@ -394,13 +394,14 @@ man: tool ## Make the man pages of that tool, build/man
 # ONLY is an expression of pytest's -k: words of names, with and, or and not. DEVICES (1000) and MANY_SECONDS (20) are those of
 # the test of many_devices.
 TOOL_PEERS := $(PEERS) $(SERVE_MANY) $(SECURE) $(addprefix $(BUILD)/plain/linux/,calls keep_link many_devices udp)
-.PHONY: test-tool
-test-tool: man ## Test that tool and programs of examples/linux on other clients, servers and brokers: ONLY="tls or udp"
+.PHONY: test-tool test-tool-programs
+test-tool: test-tool-programs ## Test that tool and programs of examples/linux on other clients, servers and brokers: ONLY="tls or udp"
+	@DEVICES="$(DEVICES)" MANY_SECONDS="$(MANY_SECONDS)" \
+		$(BUILD)/venv/bin/python -B -m pytest -c tests/tool/pytest.ini --rootdir tests/tool tests/tool $(if $(ONLY),-k "$(ONLY)")
+test-tool-programs: man
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev gcc-avr avr-libc gcc-arm-none-eabi libnewlib-arm-none-eabi \
 		pkg-config libmodbus-dev libmbedtls-dev mbpoll mosquitto mosquitto-clients openssl strace tshark
 	@$(MAKE) --no-print-directory venv certificates $(BUILD)/sanitized/mbm $(TOOL_PEERS)
-	@DEVICES="$(DEVICES)" MANY_SECONDS="$(MANY_SECONDS)" \
-		$(BUILD)/venv/bin/python -B -m pytest -c tests/tool/pytest.ini --rootdir tests/tool tests/tool $(if $(ONLY),-k "$(ONLY)")
 
 .PHONY: demo plan
 demo: tool ## Show every function against a libmodbus server, frame by frame, and a plan at work
