@@ -14,9 +14,10 @@ pub fn begin(life: &Life, at: usize) -> u8 {
     let client = line.client.get();
     let port = w.put(wire::port(at, w.byte() & 3 != 0));
     let framing = w.byte() % 4;
-    let (frame, out) = (w.noise(600), w.noise(300));
     let size: u16 = if w.byte() & 7 == 0 { 40 } else { 600 };
     let more: u16 = if w.byte() & 3 == 0 { 20 } else { 300 };
+    let mut buffers = [size, more].map(|size| vec![0; size.into()].into_boxed_slice());
+    let [frame, out] = buffers.each_mut().map(|buffer| buffer.as_mut_ptr());
     let status = match framing {
         MBM_FRAMING_RTU => call!(w, mbm_client_beginRtu(client, port, frame, size)),
         MBM_FRAMING_ASCII => call!(w, mbm_client_beginAscii(client, port, frame, size)),
@@ -24,6 +25,7 @@ pub fn begin(life: &Life, at: usize) -> u8 {
         _ => call!(w, mbm_client_beginRtuOverTcp(client, port, frame, size)),
     };
     if status == OK {
+        line.buffers.replace(buffers);
         line.has_link.set(false);
         line.wire.framing.set(framing);
         // Before a client is begun again, the program opens the line anew.

@@ -110,7 +110,7 @@ pub fn set(life: &Life, at: usize) {
     }
     let link = line.link.get();
     let (byte, word) = (w.byte(), u16::from(w.byte()));
-    match byte % 4 {
+    match byte % 5 {
         0 => {
             call!(
                 w,
@@ -126,6 +126,9 @@ pub fn set(life: &Life, at: usize) {
             if call!(w, mbm_link_setRequestsWait(link, byte >> 2 & 1)) == OK {
                 line.keeps.set(byte >> 2 & 1 != 0);
             }
+        }
+        3 => {
+            call!(w, mbm_link_setReplaceAfter(link, byte % 101));
         }
         _ => {
             let chance: Option<unsafe extern "C" fn(*mut c_void) -> u32> = Some(number);

@@ -5,7 +5,8 @@
 //! - A request that has ended is never sent. Each request has an address of its own, so the device
 //!   knows which request it receives.
 //! - Every request ends, once, within a time that the settings give. The clock moves on by the
-//!   results of the pollDelay functions.
+//!   results of the pollDelay functions. In a quarter of the lives it jumps; then the time counts
+//!   from the last jump.
 
 mod bound;
 mod client;
@@ -36,6 +37,16 @@ fn act(life: &Life) {
         26 | 27 => gateway::act(life),
         28 => gateway::ask(life),
         29 => plan::act(life),
+        30 if life.may_jump.get() && life.w.byte() & 3 == 0 => {
+            let most = [5_000_000, 3_000_000_000, u32::MAX][usize::from(life.w.byte()) % 3];
+            let jump = life.w.random() % most;
+            let jump = if life.w.byte() & 1 == 0 {
+                jump
+            } else {
+                0u32.wrapping_sub(jump)
+            };
+            life.jumped.set(life.jumped.get().wrapping_add(jump));
+        }
         // The program polls late.
         30 => life.now.set(life.now.get() + u64::from(life.w.word())),
         31 if life.w.byte() & 1 == 0 => life.lines[at].wire.guess(life),
@@ -104,8 +115,11 @@ fn poll(life: &Life) {
     }
 }
 
-/// Fails if a request has lasted too long.
+/// Fails if a request has lasted too long. While the clock jumps, nothing says how long.
 fn check(life: &Life) {
+    if life.may_jump.get() {
+        return;
+    }
     for job in &life.jobs {
         let line = &life.lines[job.line.get()];
         if let Some(since) = job.since.get() {
@@ -143,6 +157,29 @@ fn is_busy(life: &Life) -> bool {
         .iter()
         .any(|master| master.pending.get().is_some())
 }
+/// The times of all that is pending begin anew.
+fn restart(life: &Life) {
+    let awake = |at: usize| life.lines[at].awake.get();
+    for job in &life.jobs {
+        job.since
+            .set(job.since.get().map(|_| awake(job.line.get())));
+    }
+    for master in &life.masters {
+        let pending = master.pending.get();
+        master
+            .pending
+            .set(pending.map(|(id, _)| (id, life.now.get())));
+    }
+    for socket in &life.gateway.sockets {
+        for (line, since) in socket.asked.borrow_mut().values_mut() {
+            *since = awake(*line);
+        }
+    }
+    for news in &life.plan.news {
+        news.set(awake(life.plan.line.get()));
+    }
+}
+
 /// Runs one input.
 pub fn run(data: &[u8]) {
     let life = Life::new(data, act);
@@ -157,6 +194,9 @@ pub fn run(data: &[u8]) {
     }
     // Every request ends; `check` fails if one does not.
     life.inside.set(2);
+    if life.may_jump.replace(false) {
+        restart(&life);
+    }
     life.w.note(|| "every request ends".to_string());
     let heals = life.w.byte() & 7 != 0;
     for line in life.lines.iter().filter(|_| heals) {

@@ -38,6 +38,8 @@ pub struct Line {
     pub limits: Cell<Limits>,
     /// For how long the client could use its line so far, in microseconds.
     pub awake: Cell<u64>,
+    /// The buffers of the client. It gets others when it begins again, and these are released.
+    pub buffers: RefCell<[Box<[u8]>; 2]>,
 }
 
 /// A master that uses the port of a client: a line with two nodes, and its pending request.
@@ -66,6 +68,9 @@ pub struct Life {
     pub step: fn(&Life),
     pub w: Box<World>,
     pub now: Cell<u64>,
+    /// What the clock has jumped by, and whether it may jump on.
+    pub jumped: Cell<u32>,
+    pub may_jump: Cell<bool>,
     pub lines: Vec<Line>,
     pub masters: Vec<Master>,
     pub jobs: Vec<Job>,
@@ -149,6 +154,7 @@ impl Life {
                 borrower: Cell::new(None),
                 limits: Cell::new(Limits::DEFAULT),
                 awake: Cell::new(0),
+                buffers: RefCell::default(),
             }
         });
         let masters = (0..2).map(|_| Master {
@@ -170,6 +176,8 @@ impl Life {
             step,
             // The clock wraps during the life.
             now: Cell::new(u64::from(u32::MAX) - 3_000_000),
+            jumped: Cell::new(0),
+            may_jump: Cell::new(w.byte() & 3 == 0),
             lines,
             masters,
             jobs,

@@ -190,7 +190,8 @@ unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) 
 }
 
 pub unsafe extern "C" fn micros(_: *mut c_void) -> u32 {
-    Life::current().now.get() as u32
+    let life = Life::current();
+    (life.now.get() as u32).wrapping_add(life.jumped.get())
 }
 
 unsafe extern "C" fn flush(context: *mut c_void) -> u8 {
