@@ -205,7 +205,7 @@ fault-table: need-test ## Generate docs/reports/fault-table.md and the table of 
 	@scripts/build/pictures
 
 .PHONY: conformance
-conformance: ## Write docs/reports/conformance*.md from conformance.toml: each clause and its tests
+conformance: ## Write docs/reports/conformance.md from conformance.toml: each clause and its tests
 	@scripts/need python3
 	@scripts/check/functions --write
 
