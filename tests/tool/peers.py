@@ -10,6 +10,7 @@ import resource
 import select
 import signal
 import socket
+import ssl
 import subprocess
 import sys
 import threading
@@ -222,6 +223,27 @@ def ten_registers():
     from pymodbus.simulator import DataType, SimData, SimDevice
 
     return SimDevice(17, simdata=[SimData(100, values=[1000 + i for i in range(10)], datatype=DataType.REGISTERS)])
+
+
+def keys(name):
+    """The files of a certificate and of its key."""
+    return f"{CERTIFICATES}/{name}.pem", f"{CERTIFICATES}/{name}.key.pem"
+
+
+def context(name, protocol):
+    """What Python's TLS needs to be `name`."""
+    made = ssl.SSLContext(protocol)
+    made.minimum_version = ssl.TLSVersion.TLSv1_2
+    made.load_cert_chain(*keys(name))
+    made.load_verify_locations(f"{CERTIFICATES}/authority.pem")
+    made.check_hostname = False
+    made.verify_mode = ssl.CERT_REQUIRED
+    return made
+
+
+def tls_line(port, name, more=""):
+    certificate, key = keys(name)
+    return f"tls://127.0.0.1:{port}?ca={CERTIFICATES}/authority.pem&cert={certificate}&key={key}{more}"
 
 
 class Strace:

@@ -6,7 +6,7 @@ import signal
 
 import peers
 import pytest
-from peers import CERTIFICATES, LINE, SYSTEM, WRONG, bit, wait, word, words
+from peers import CERTIFICATES, WRONG, bit, wait, word, words
 from services import Broker, Subscriber, metrics
 
 FIELDS = """\
@@ -160,31 +160,6 @@ def test_a_retained_write_is_refused(hall):
     subscriber.expect_last("hall/status", "offline")
 
 
-def test_a_bridge_publishes_everything_again_to_a_broker_that_has_forgotten_it(hall, subscriber):
-    subscriber.expect_value("hall/phases", PHASES)
-    hall.broker.go()
-    hall.bridge.await_line("is lost")
-    hall.broker.come()
-    subscriber = Subscriber(hall.broker)
-    subscriber.expect_last("hall/status", "online")
-    subscriber.expect_value("hall/phases", PHASES)
-    subscriber.expect_last("hall/unit/17/status", "online")
-    hall.bridge.end()
-    subscriber.expect_last("hall/status", "offline")
-
-
-def test_a_device_that_is_away_for_a_while_is_seen_in_the_status_of_its_values(hall, subscriber):
-    subscriber.expect_value("hall/phases", PHASES)
-    is_success = lambda: json.loads(subscriber.last["hall/phases"])["status"] == "success"
-    hall.device.tell(signal.SIGSTOP)
-    subscriber.expect_last("hall/unit/17/status", "offline")
-    assert wait(lambda: not is_success())
-    subscriber.expect_value("hall/phases", PHASES)
-    hall.device.tell(signal.SIGCONT)
-    subscriber.expect_last("hall/unit/17/status", "online")
-    assert wait(is_success)
-
-
 def test_a_bridge_survives_a_device_over_tcp_that_closes_its_connection(hall):
     subscriber = Subscriber(hall.broker)
     bridge = hall.begin(place=f"tcp://127.0.0.1:{hall.port}")
@@ -211,16 +186,6 @@ def test_the_broker_says_that_a_killed_bridge_is_offline(hall, subscriber):
     subscriber.expect_last("hall/status", "offline")
 
 
-def test_a_bridge_waits_for_a_broker_that_is_absent_at_first(hall, folder):
-    broker = Broker(folder)
-    bridge = hall.begin(broker=broker)
-    bridge.await_line("cannot be reached")
-    broker.come()
-    subscriber = Subscriber(broker)
-    subscriber.expect_last("hall/status", "online")
-    subscriber.expect_value("hall/phases", PHASES)
-
-
 def test_plain_payloads_have_the_value_alone(hall):
     subscriber = Subscriber(hall.broker)
     hall.begin("--plain")
@@ -231,7 +196,8 @@ def test_plain_payloads_have_the_value_alone(hall):
 
 def test_a_broker_may_want_a_certificate_of_the_bridge(hall, folder):
     path = lambda name: f"{CERTIFICATES}/{name}.pem"
-    broker = Broker(folder, f"cafile {path('authority')}", f"certfile {path('server')}", f"keyfile {path('server.key')}", "require_certificate true").come()
+    broker = Broker(folder, f"cafile {path('authority')}", f"certfile {path('server')}", f"keyfile {path('server.key')}",
+                    "require_certificate true").come()
     broker.place = f"localhost:{broker.port}"
     broker.client += ("--cafile", path("authority"), "--cert", path("operator"), "--key", path("operator.key"), "-h", "localhost")
     subscriber = Subscriber(broker)
@@ -283,24 +249,3 @@ def test_a_wrong_field_is_refused_with_its_line(plain, write, field, sentence):
 ])
 def test_a_file_without_fields_is_refused(plain, write, text, sentence):
     plain.fails(WRONG, sentence, "bridge", "-b", "127.0.0.1:1", PLACE, write("wrong.yaml", text))
-
-
-@pytest.mark.parametrize("code, arguments, sentence", [
-    (WRONG, "PLACE", "a bridge needs LINE and FILE"),
-    (WRONG, "PLACE FIELDS FIELDS", "is not a line"),
-    (WRONG, "FIELDS PLACE", "one word too many: the lines are in the file"),
-    (WRONG, "/dev/ttyUSB0 FIELDS", '"/dev/ttyUSB0" is not a line'),
-    (SYSTEM, "PLACE /nowhere/nothing.yaml", "nothing.yaml: No such file or directory"),
-    (WRONG, "-b 127.0.0.1,1883 PLACE FIELDS", "127.0.0.1,1883"),
-    (WRONG, "-b 127.0.0.1:0 PLACE FIELDS", "from 1 to 65535 is allowed"),
-    (WRONG, "-b ::1 PLACE FIELDS", "an IPv6 address needs brackets"),
-    (WRONG, "-t hall/# PLACE FIELDS", '--topic "hall/#" is not 1 to 200 bytes without + and #'),
-    (WRONG, f"-t {'h' * 201} PLACE FIELDS", "is not 1 to 200 bytes without + and #"),
-    (WRONG, "--timeout 200 PLACE FIELDS", '--timeout "200" is not a time'),
-    (WRONG, "--gap 124 PLACE FIELDS", "from 0 to 123 is allowed"),
-    (WRONG, "--cert me.crt PLACE FIELDS", "--cert and --key need --ca"),
-    (WRONG, "--ca /nowhere/no.crt PLACE FIELDS", "Check --ca, --cert and --key"),
-    (LINE, "rtu:/dev/no-such-line FIELDS", "Is the adapter plugged in?"),
-])
-def test_wrong_words_of_bridge_are_named(plain, fields, wire, code, arguments, sentence):
-    plain.fails(code, sentence, "bridge", *arguments.replace("PLACE", f"rtu:{wire.names[1]}").replace("FIELDS", fields).split())

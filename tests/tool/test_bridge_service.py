@@ -456,11 +456,12 @@ def test_a_full_disk_for_statistics_is_reported(drill):
 
 def test_a_broker_that_is_absent_at_first_is_reported(begin, broker, write):
     broker.go()
-    bridge = begin(Model().line, write("pump.yaml", FIELDS % ("pump", 2)))
+    bridge = begin(Model(1, 2).line, write("pump.yaml", FIELDS % ("pump", 2)))
     name = f"the broker 127\\.0\\.0\\.1:{broker.port}"
     bridge.await_line(rf"^warning: {name} cannot be reached\. The bridge reads on, and tries it again\.$")
     broker.come()
     bridge.await_line(rf"^info: {name} is connected\.$")
+    subscribed(broker).expect_value("hall/speed", 2)
 
 
 def test_a_cable_that_is_pulled_and_plugged_in_again_is_reported(drill, serial):
@@ -482,9 +483,12 @@ def test_a_device_that_does_not_answer_is_reported(drill, serial, mood, status):
     drill.await_line(rf"^warning: rtu:.*: unit 7 does not answer: .*{status}.*\.$", since=since)
     drill.subscriber.expect_last("hall/meter/unit/7/status", "offline")
     assert wait(lambda: status in drill.subscriber.last["hall/meter/level"])
+    # The last value stays.
+    assert drill.subscriber.value("hall/meter/level") == 7
     serial.mood = "right"
     drill.await_line(r"^info: rtu:.*: unit 7 answers\.$", since=since)
     drill.subscriber.expect_last("hall/meter/unit/7/status", "online")
+    assert wait(lambda: '"status":"success"' in drill.subscriber.last["hall/meter/level"])
 
 
 def test_a_broker_that_goes_and_comes_back_is_reported(drill):
@@ -495,7 +499,13 @@ def test_a_broker_that_goes_and_comes_back_is_reported(drill):
     drill.model.registers[1] = 23
     drill.broker.come()
     drill.await_line(rf"^info: {drill.name} is connected\.$", since=since)
-    subscribed(drill.broker).expect_value("hall/pump/speed", 23)
+    # It has forgotten what was retained, and gets everything again.
+    subscriber = subscribed(drill.broker)
+    subscriber.expect_value("hall/pump/speed", 23)
+    subscriber.expect_value("hall/meter/level", 7)
+    subscriber.expect_last("hall/meter/unit/7/status", "online")
+    drill.end()
+    subscriber.expect_last("hall/status", "offline")
 
 
 def test_a_broker_that_takes_nothing_more_is_lost_after_the_keep_alive_time(drill):

@@ -12,8 +12,8 @@ import time
 
 import peers
 import pytest
-from peers import (CERTIFICATES, NO_REPLY, PATIENCE, PLAIN, ROOT, Peer, Program, demonstration, numbered, run, served,
-                   ten_registers, wait, word)
+from peers import (CERTIFICATES, NO_REPLY, PATIENCE, PLAIN, ROOT, Peer, Program, context, demonstration, keys, numbered, run, served,
+                   ten_registers, tls_line, wait, word)
 
 # --- the demonstration
 
@@ -45,51 +45,8 @@ def test_a_plan_reads_ten_fields_by_five_requests_and_none_is_old(plain):
 
 # --- keep_link
 
-class Passage:
-    """A port that passes connections on to a server, and that can be closed and opened again."""
-
-    def __init__(self, server):
-        self.server, self.sockets, self.port = server, [], 0
-        self.open()
-        peers.endings.append(self.close)
-
-    def open(self):
-        listener = socket.create_server(("127.0.0.1", self.port))
-        self.port = listener.getsockname()[1]
-        self.sockets.append(listener)
-        threading.Thread(target=self.accept, args=[listener], daemon=True).start()
-
-    def accept(self, listener):
-        try:
-            while True:
-                ends = listener.accept()[0], socket.create_connection(("127.0.0.1", self.server))
-                self.sockets += ends
-                for here, there in ends, reversed(ends):
-                    threading.Thread(target=self.pass_on, args=[here, there], daemon=True).start()
-        except OSError:
-            pass
-
-    @staticmethod
-    def pass_on(here, there):
-        try:
-            while part := here.recv(512):
-                there.sendall(part)
-        except OSError:
-            pass
-
-    def close(self):
-        while self.sockets:
-            end = self.sockets.pop()
-            try:
-                end.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass
-            end.close()
-
-
-def test_keep_link_connects_again_to_a_server_that_goes_and_comes_back(libmodbus):
-    passage = Passage(libmodbus.port)
-    program = Program(f"{PLAIN}/linux/keep_link", "127.0.0.1", passage.port)
+def test_keep_link_connects_again_to_a_server_that_goes_and_comes_back(device):
+    program = Program(f"{PLAIN}/linux/keep_link", "127.0.0.1", device.port)
     program.is_ours = False
     at = 0
 
@@ -100,11 +57,11 @@ def test_keep_link_connects_again_to_a_server_that_goes_and_comes_back(libmodbus
         at = program.output.index(found, at) + 1
         return found
 
-    assert [until("link"), until("register")] == ["link: connected", f"register 0: {word(0)}"]
-    passage.close()
+    assert [until("link"), until("register")] == ["link: connected", "register 0: 42"]
+    device.go()
     assert [until("link").split(": ")[1], until("link").split(": ")[1]] == ["lost", "not connected"]
-    passage.open()
-    assert [until("link: connected"), until("register")] == ["link: connected", f"register 0: {word(0)}"]
+    device.come()
+    assert [until("link: connected"), until("register")] == ["link: connected", "register 0: 42"]
 
 
 # --- many_devices
@@ -246,20 +203,6 @@ def test_a_client_over_udp_reads_a_server_of_pymodbus():
 NOT_ALLOWED = "unit 17: exception 01: illegal function. The device does not have this function; values may be in another table.\n"
 
 
-def keys(name):
-    return [f"{CERTIFICATES}/{name}.pem", f"{CERTIFICATES}/{name}.key.pem"]
-
-
-def context(name, protocol):
-    made = ssl.SSLContext(protocol)
-    made.minimum_version = ssl.TLSVersion.TLSv1_2
-    made.load_cert_chain(*keys(name))
-    made.load_verify_locations(f"{CERTIFICATES}/authority.pem")
-    made.check_hostname = False
-    made.verify_mode = ssl.CERT_REQUIRED
-    return made
-
-
 @pytest.fixture
 def secure():
     """The port of secure_server: who may do what is in the roles of certificates."""
@@ -270,8 +213,7 @@ def secure():
 
 def reads_and_writes(mbm, port, name, host="localhost"):
     """What mbm prints of a read and of a write, without the place."""
-    certificate, key = keys(name)
-    line = f"tls://127.0.0.1:{port}?ca={CERTIFICATES}/authority.pem&cert={certificate}&key={key}&name={host}"
+    line = tls_line(port, name, f"&name={host}")
     found = [mbm(command, line, "--unit", "17", "--timeout", "15s", "100", more) for command, more in (("read", "3"), ("write", "2000"))]
     return [(one.out + one.error).replace(f"{line}: ", "") for one in found]
 
@@ -330,12 +272,3 @@ def test_a_client_without_tls_gets_no_reply(secure):
 
     client = ModbusTcpClient("127.0.0.1", port=secure, retries=0, timeout=20)
     assert answers(client, lambda: client.read_holding_registers(100, count=2, device_id=17)) == ["no reply"]
-
-
-@pytest.mark.parametrize("name, wanted", [("server", [values(1000), WROTE]),
-                                          ("stranger-server", refused("no known authority signed the peer's certificate"))])
-def test_mbm_is_a_client_of_a_tls_server_of_pymodbus(plain, name, wanted):
-    from pymodbus.server import ModbusTlsServer
-
-    port = served(lambda: ModbusTlsServer(ten_registers(), address=("127.0.0.1", 0), sslctx=context(name, ssl.PROTOCOL_TLS_SERVER)))
-    assert reads_and_writes(plain, port, "operator") == wanted

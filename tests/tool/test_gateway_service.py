@@ -74,19 +74,6 @@ def test_a_wrong_file_is_refused_with_its_line(mbm, write, text, sentence):
     mbm.fails(WRONG, sentence, "gateway", write("gateway.yaml", text))
 
 
-@pytest.mark.parametrize("words, sentence", [
-    (["--metrics", "0.0.0.0:9100"], '"0.0.0.0:9100" is not an address of this machine'),
-    (["--metrics", "192.168.0.1:9100"], "is not an address of this machine"),
-    (["--metrics", "127.0.0.1"], "is not an address of this machine and a port"),
-    (["--metrics", "127.0.0.1:x"], "is not an address of this machine and a port"),
-    (["--stats-every", "10s"], "--stats-every needs --stats"),
-    (["--log-level", "loud"], "is not one of error, warning, info and debug"),
-    (["--log-level", "info", "rtu:/dev/null"], "one word too many"),
-])
-def test_wrong_options_of_a_service_are_named(mbm, setting, words, sentence):
-    mbm.fails(WRONG, sentence, "gateway", setting(NOWHERE), *words)
-
-
 def test_check_only_looks_at_the_file(mbm, setting, folder):
     assert mbm("gateway", "--check", setting(NOWHERE)) == (0, "", "")
     mbm.fails(SYSTEM, "No such file", "gateway", f"{folder}/none.yaml")

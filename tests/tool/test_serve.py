@@ -11,7 +11,7 @@ import time
 import tty
 
 import pytest
-from peers import (CERTIFICATES, DAMAGED, DONE, EXCEPTION, LINE, NO_REPLY, PATIENT, READ, ROOT, SYSTEM, WRONG, Client, Program, Strace, Wire,
+from peers import (CERTIFICATES, DAMAGED, DONE, EXCEPTION, LINE, NO_REPLY, PATIENT, READ, ROOT, Client, Program, Strace, Wire,
                    between_sends, endings, number, run, sealed, tcp_frame)
 
 METER = f"{ROOT}/examples/devices/energy-meter.yaml"
@@ -161,7 +161,8 @@ def test_a_fault_happens_to_the_second_of_three_requests(serving, file, kind, fa
     assert peer.ask(read_request(), len(right)) == right
 
 
-@pytest.mark.parametrize("when, wanted", [("", "FFFFFFF"), ("@1", "F......"), ("@3", "..F...."), ("@3-", "..FFFFF"), ("@2/3", ".F..F.."), ("@1/2", "F.F.F.F")])
+@pytest.mark.parametrize("when, wanted", [("", "FFFFFFF"), ("@1", "F......"), ("@3", "..F...."), ("@3-", "..FFFFF"), ("@2/3", ".F..F.."),
+                                          ("@1/2", "F.F.F.F")])
 def test_a_fault_happens_to_the_requests_that_its_option_names(mbm, file, when, wanted):
     client = Client(port_of(mbm.serve(TCP, file, "--fault", f"exception=4{when}")))
     assert "".join("F" if client.ask(UNIT, read_request()[1:])[0] == 0x83 else "." for _ in wanted) == wanted
@@ -393,7 +394,7 @@ def test_a_server_over_tls_refuses_clients_of_another_authority(mbm):
     assert code == LINE and "230.1 V" not in out, error
 
 
-# --- the command line
+# --- what a server costs, and the place where it listens
 
 def test_a_request_over_tcp_costs_few_system_calls_however_many_connections_are_idle(plain, folder, record_property):
     """Three, and one more if the machine wakes the server twice."""
@@ -406,71 +407,6 @@ def test_a_request_over_tcp_costs_few_system_calls_however_many_connections_are_
     each, sent = between_sends(strace.calls(), count - 1)
     record_property("system calls of mbm serve for a request", f"{each:.2f}")
     assert sent == count + 12 and each <= 4
-
-
-FAULTS = "late, deaf, slow, damaged, cut, noise, twice, exception, foreign, wrong-length"
-PLACE = "tcp://127.0.0.1:1"
-
-
-@pytest.mark.parametrize("words, sentence", [
-    ("serve", "LINE is missing"),
-    ("serve pty:", "give a device FILE, or --random, or --echo"),
-    ("serve pty: FILE --echo", "give a device FILE, or --random, or --echo"),
-    ("serve pty: --random --echo", "give a device FILE, or --random, or --echo"),
-    ("serve pty: FILE more", '"more" is one word too many'),
-    ("serve pty: FILE -u 3", "--unit goes with --random and --echo"),
-    ("serve pty: --echo -u 0", '--unit "0" is out of range: from 1 to 255 is allowed'),
-    ("serve pty: --echo -u 9-5", '--unit "5" is out of range: from 9 to 255 is allowed'),
-    ("serve pty: --echo -u ,", '--unit "" is not a whole decimal number'),
-    ("serve pty: --echo -u 1,,2", '--unit "" is not a whole decimal number'),
-    ("serve pty: --echo -u 1-3,2", "--unit: unit 2 is there twice"),
-    ("serve pty: --echo -u 1,x", '--unit "x" is not a whole decimal number'),
-    ("serve carrier:pigeon FILE", '"carrier:pigeon" is not a line'),
-    ("serve pty: FILE --fault lait", f'--fault "lait" is no fault: on this line they are {FAULTS}'),
-    ("serve pty: FILE --fault close", f'--fault "close": this line cannot have it: it can have {FAULTS}'),
-    ("serve udp://:0 FILE --fault cut=3", "it can have late, deaf, twice, exception, foreign"),
-    ("serve pty: FILE --fault late", '--fault "late": the value is missing, such as late=750ms'),
-    ("serve pty: FILE --fault late=", '--fault "late=": "" is not a time'),
-    ("serve pty: FILE --fault late=750", '"750" is not a time: write a whole number and its unit'),
-    ("serve pty: FILE --fault late=11m", '"11m" is out of range: from 1ms to 10m is allowed'),
-    ("serve pty: FILE --fault deaf=1", '--fault "deaf=1": deaf has no value'),
-    ("serve pty: FILE --fault cut=0", '"0" is out of range: from 1 to 512 is allowed'),
-    ("serve pty: FILE --fault exception=128", '"128" is out of range: from 1 to 127 is allowed'),
-    ("serve pty: FILE --fault noise=0x4", '"0x4" is not a whole decimal number'),
-    ("serve pty: FILE --fault deaf@", "after @ stand N, N- or N/M, such as @3, @3- or @3/10"),
-    ("serve pty: FILE --fault deaf@0", '"0" is out of range: from 1'),
-    ("serve pty: FILE --fault deaf@3/0", '"0" is out of range: from 1'),
-    ("serve pty: FILE --fault deaf@-3", "after @ stand N, N- or N/M"),
-    ("serve pty: FILE" + " --fault deaf" * 33, "there are more than 32 --fault options"),
-    ("serve pty: BAD", 'BAD:5: type: "real" is not one of bit, uint16,'),
-    ("serve tls://:0?ca=/a&cert=/b&key=/c --echo", "serve: /b: No such file or directory"),
-    ("poll", "LINE is missing"),
-    (f"poll {PLACE}", "FILE is missing"),
-    ("poll pty: FILE", "only a server makes a pseudo terminal"),
-    (f"poll {PLACE} FILE more", '"more" is one word too many'),
-    (f"poll {PLACE} FILE --rounds 0", '--rounds "0" is out of range'),
-    (f"poll {PLACE} FILE --for 10", '--for "10" is not a time'),
-    (f"poll {PLACE} FILE --gap 2001", '--gap "2001" is out of range'),
-    (f"poll {PLACE} BAD", 'BAD:5: type: "real" is not one of bit, uint16,'),
-    (f"poll {PLACE} WRITTEN", "WRITTEN has no field that can be read"),
-])
-def test_wrong_words_of_serve_and_poll_are_named(mbm, file, write, words, sentence):
-    names = {"FILE": file, "BAD": write("bad.yaml", "fields:\n  - name: a\n    table: input\n    address: 0\n    type: real\n"),
-             "WRITTEN": write("written.yaml", "fields:\n  - {name: a, table: coils, address: 0, access: write}\n")}
-    sentence = sentence.replace("BAD", names["BAD"]).replace("WRITTEN", names["WRITTEN"])
-    mbm.fails(WRONG, sentence, *(names.get(word, word) for word in words.split()))
-
-
-@pytest.mark.parametrize("words, code, sentence", [
-    ("serve pty: /nowhere.yaml", SYSTEM, "/nowhere.yaml: No such file or directory"),
-    (f"poll {PLACE} /nowhere.yaml", SYSTEM, "/nowhere.yaml: No such file or directory"),
-    ("serve rtu:/dev/no-such-line --echo", LINE, "rtu:/dev/no-such-line: No such file or directory"),
-    ("serve tcp://no-such-host.invalid:1502 --echo", LINE, "tcp://no-such-host.invalid:1502: "),
-    (f"serve pty:{METER} --echo", LINE, f"{METER} is there already and is no link"),
-    (f"poll {PLACE} {METER} --once", LINE, "Connection refused"),
-])
-def test_a_file_or_line_that_is_not_there_is_named(mbm, words, code, sentence):
-    mbm.fails(code, sentence, *words.split())
 
 
 def test_a_port_that_is_in_use_is_refused(mbm):

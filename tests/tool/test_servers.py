@@ -7,8 +7,8 @@ import struct
 import types
 
 import pytest
-from peers import (CERTIFICATES, DONE, EXCEPTION, LINE, NO_REPLY, PATIENT, PLAIN, WRONG, Wire, bit, bits, libmodbus, numbered, pymodbus, run,
-                   served, ten_registers, word, words)
+from peers import (CERTIFICATES, DONE, EXCEPTION, LINE, NO_REPLY, PATIENT, PLAIN, WRONG, Wire, bit, bits, context, keys, libmodbus, numbered,
+                   pymodbus, run, served, ten_registers, tls_line, word, words)
 
 ADDRESS = "exception 02: illegal data address"
 # pymodbus has so many objects, which need several responses.
@@ -39,7 +39,8 @@ def of_pymodbus(framing):
 @pytest.fixture(scope="module", params=["libmodbus rtu", "libmodbus tcp", "pymodbus rtu", "pymodbus ascii", "pymodbus tcp", "pymodbus rtu-over-tcp"])
 def server(request):
     who, framing = request.param.split()
-    made = {"options": (), "units": ("17", [17], ("--in-flight", 1, *PATIENT)), "port": None, "refusal": None, **(of_libmodbus if who == "libmodbus" else of_pymodbus)(framing)}
+    made = {"options": (), "units": ("17", [17], ("--in-flight", 1, *PATIENT)), "port": None, "refusal": None,
+            **(of_libmodbus if who == "libmodbus" else of_pymodbus)(framing)}
     made["read"] = ("read", made["line"], "-u", made["unit"], *made["options"])
     return types.SimpleNamespace(**made)
 
@@ -192,28 +193,16 @@ def test_several_units_have_a_table_a_row_or_an_object_each(mbm, libmodbus):
 
 # --- UDP and TLS
 
-def keys(name):
-    return f"{CERTIFICATES}/{name}.pem", f"{CERTIFICATES}/{name}.key.pem"
-
-
 @pytest.fixture(scope="module")
 def secured():
     """The ports of two servers of pymodbus with TLS, by their certificate."""
     from pymodbus.server import ModbusTlsServer
 
     def port(name):
-        made = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        made.load_cert_chain(*keys(name))
-        made.load_verify_locations(f"{CERTIFICATES}/authority.pem")
-        made.verify_mode = ssl.CERT_REQUIRED
+        made = context(name, ssl.PROTOCOL_TLS_SERVER)
         return served(lambda: ModbusTlsServer(ten_registers(), address=("127.0.0.1", 0), sslctx=made))
 
     return {name: port(name) for name in ("server", "stranger-server")}
-
-
-def tls(port, name, more=""):
-    certificate, key = keys(name)
-    return f"tls://127.0.0.1:{port}?ca={CERTIFICATES}/authority.pem&cert={certificate}&key={key}{more}"
 
 
 def test_read_reads_over_udp(mbm):
@@ -224,9 +213,11 @@ def test_read_reads_over_udp(mbm):
     mbm.fails(NO_REPLY, "no right reply from unit 1 within 1s: Connection refused", "read", "udp://127.0.0.1:1", 0)
 
 
-def test_read_reads_over_tls(mbm, secured):
-    mbm.prints(numbered(100, range(1000, 1010)), "read", tls(secured["server"], "operator"), "-u", 17, 100, 10)
-    mbm.prints(numbered(100, [1000]), "read", tls(secured["server"], "operator", "&name=localhost"), "-u", 17, 100)
+def test_registers_are_read_and_written_over_tls(mbm, secured):
+    mbm.prints(numbered(100, range(1000, 1010)), "read", tls_line(secured["server"], "operator"), "-u", 17, 100, 10)
+    line = tls_line(secured["server"], "operator", "&name=localhost")
+    mbm.prints("unit 17: wrote 1 holding register from address 109 on, function 06\n", "write", line, "-u", 17, 109, 1009)
+    mbm.prints(numbered(109, [1009]), "read", line, "-u", 17, 109)
 
 
 @pytest.mark.parametrize("server, client, more, code, sentence", [
@@ -236,13 +227,13 @@ def test_read_reads_over_tls(mbm, secured):
     ("stranger-server", "operator", "", LINE, "no known authority signed the peer's certificate"),
 ])
 def test_a_tls_line_that_fails_says_why(mbm, secured, server, client, more, code, sentence):
-    mbm.fails(code, sentence, "read", tls(secured[server], client, more), 100)
+    mbm.fails(code, sentence, "read", tls_line(secured[server], client, more), 100)
 
 
 @pytest.mark.parametrize("line, code, sentence", [
     ("tls://127.0.0.1?ca={0}&cert={0}&key=/none/key", WRONG, "mbm read: /none/key: No such file"),
     ("tls://127.0.0.1?ca=/dev&cert={0}&key={1}", WRONG, "mbm read: /dev: Is a directory"),
-    (tls(1, "operator"), LINE, "Connection refused. Check host and port"),
+    (tls_line(1, "operator"), LINE, "Connection refused. Check host and port"),
 ])
 def test_a_tls_line_without_its_files_or_its_server_says_why(mbm, line, code, sentence):
     mbm.fails(code, sentence, "read", line.format(*keys("operator")), 100)

@@ -8,7 +8,7 @@ import struct
 import time
 
 import pytest
-from peers import LINE, ROOT, SYSTEM, WRONG
+from peers import LINE, ROOT, WRONG
 
 REQUEST, REPLY = bytes.fromhex("1103006b00037687"), bytes.fromhex("110306022b00000064c8ba")
 AT = ("--baud", "19200", "-")
@@ -78,30 +78,6 @@ def test_of_several_frames_in_one_piece_the_first_ones_ended_before_its_time(sni
 def test_a_frame_may_come_in_two_pieces_within_its_timeout(sniff, limit, kinds):
     recording = f"0: {REQUEST[:4].hex()}\n120: {REQUEST[4:].hex()}\n"
     assert [one["event"] for one in events_of(sniff("--json", "--frame-timeout", limit, "-", text=recording))] == kinds
-
-
-@pytest.mark.parametrize("code, words, sentence", [
-    (WRONG, "", "LINE is missing"),
-    (WRONG, "- -", "one word too many"),
-    (WRONG, "/dev/null", "is not a line: it begins with rtu:"),
-    (WRONG, "tcp://127.0.0.1", "a sniffer listens to rtu:, ascii: or rtu+tcp://"),
-    (WRONG, "rtu:/dev/null?baud=19200x", '"19200x" is not a whole decimal number'),
-    (WRONG, "rtu:/dev/null?baud=0", "from 50 to 4000000"),
-    (WRONG, "rtu:/dev/null?parity=X", '"X" is not one of none, even and odd'),
-    (WRONG, "rtu:/dev/null?speed=9600", 'the key "speed" is unknown'),
-    (WRONG, "rtu:/dev/null --baud 9600", "--baud and --framing are for a recording"),
-    (WRONG, "- --baud many", '--baud "many" is not a whole decimal number'),
-    (WRONG, "- --framing usb", '"usb" is not one of rtu, ascii and tcp'),
-    (WRONG, "- --timeout 5", '"5" is not a time'),
-    (WRONG, "- --frame-timeout 0ms", '--frame-timeout "0ms" is out of range: from 1ms to 65535ms'),
-    (WRONG, "- --pcap", "requires an argument"),
-    (SYSTEM, "- --pcap /nowhere/file", "/nowhere/file"),
-    (LINE, "rtu:/dev/no-such-line", "Is the adapter plugged in?"),
-    (LINE, "rtu:/dev/null", "/dev/null"),
-    (LINE, "rtu+tcp://127.0.0.1:1", "Check host and port"),
-])
-def test_wrong_words_of_sniff_are_named(plain, code, words, sentence):
-    plain.fails(code, sentence, "sniff", *words.split())
 
 
 @pytest.mark.parametrize("recording, sentence", [
