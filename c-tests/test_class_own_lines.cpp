@@ -8,11 +8,9 @@ fixture each_test = {reset_board, nullptr};
 
 static HardwareSerial other_line;
 
-TEST(objects_have_a_line_each)
-{
-    assert_in_range(sizeof(ModbusMaster),
-                    2 * (125 + 123) + sizeof(mbm_line) + sizeof(mbm_node) + 255, 1300);
-}
+TEST_ROW(objects_have_a_line_each,
+         assert_in_range(sizeof(ModbusMaster),
+                         2 * (125 + 123) + sizeof(mbm_line) + sizeof(mbm_node) + 255, 1300))
 
 TEST(two_objects_have_a_pending_request_at_the_same_time)
 {

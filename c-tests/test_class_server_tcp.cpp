@@ -82,20 +82,9 @@ template <typename Listener> static void each_function_is_served()
     AWAIT((server.poll(), server.connections() == 0));
 }
 
-TEST(libmodbus_reads_and_writes_over_ethernet)
-{
-    each_function_is_served<EthernetServer>();
-}
-
-TEST(libmodbus_reads_and_writes_over_wifi)
-{
-    each_function_is_served<WiFiServer>();
-}
-
-TEST(a_library_without_accept_serves_too)
-{
-    each_function_is_served<OlderServer>();
-}
+TEST_ROW(libmodbus_reads_and_writes_over_ethernet, each_function_is_served<EthernetServer>())
+TEST_ROW(libmodbus_reads_and_writes_over_wifi, each_function_is_served<WiFiServer>())
+TEST_ROW(a_library_without_accept_serves_too, each_function_is_served<OlderServer>())
 
 static int read_first(modbus_t *peer)
 {

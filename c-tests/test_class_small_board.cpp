@@ -21,10 +21,8 @@ TEST(a_uart_that_the_board_lacks_falls_back_to_the_first)
     }
 }
 
-TEST(objects_are_small)
-{
-    assert_in_range(sizeof(ModbusMaster), 2 * 128, 2 * 128 + sizeof(mbm_node) + 80);
-}
+TEST_ROW(objects_are_small,
+         assert_in_range(sizeof(ModbusMaster), 2 * 128, 2 * 128 + sizeof(mbm_node) + 80))
 
 TEST(objects_may_share_the_frame_buffer)
 {

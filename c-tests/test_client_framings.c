@@ -165,25 +165,10 @@ static void every_function(int framing)
     end();
 }
 
-TEST(every_function_in_rtu)
-{
-    every_function(MBM_FRAMING_RTU);
-}
-
-TEST(every_function_in_ascii)
-{
-    every_function(MBM_FRAMING_ASCII);
-}
-
-TEST(every_function_in_tcp)
-{
-    every_function(MBM_FRAMING_TCP);
-}
-
-TEST(every_function_in_rtu_over_tcp)
-{
-    every_function(MBM_FRAMING_RTU_OVER_TCP);
-}
+TEST_ROW(every_function_in_rtu, every_function(MBM_FRAMING_RTU))
+TEST_ROW(every_function_in_ascii, every_function(MBM_FRAMING_ASCII))
+TEST_ROW(every_function_in_tcp, every_function(MBM_FRAMING_TCP))
+TEST_ROW(every_function_in_rtu_over_tcp, every_function(MBM_FRAMING_RTU_OVER_TCP))
 
 TEST(a_broadcast_reaches_every_unit_in_ascii_and_is_refused_in_rtu_over_tcp)
 {

@@ -68,7 +68,15 @@ static void each_variant(void (*test)(void))
     }
 }
 
-static void resume_in_turn(void)
+#define VARIANTS_TEST(name)                                                                        \
+    static void each_##name(void);                                                                 \
+    TEST(name)                                                                                     \
+    {                                                                                              \
+        each_variant(each_##name);                                                                 \
+    }                                                                                              \
+    static void each_##name(void)
+
+VARIANTS_TEST(a_client_resumes_only_from_the_one_who_has_its_line)
 {
     static mbm_line fresh;
 
@@ -96,12 +104,7 @@ static void resume_in_turn(void)
     OK(mbm_client_resume(client, &other_line));
 }
 
-TEST(a_client_resumes_only_from_the_one_who_has_its_line)
-{
-    each_variant(resume_in_turn);
-}
-
-static void lend_and_end(void)
+VARIANTS_TEST(a_master_uses_nothing_of_a_client_that_has_resumed)
 {
     OK(mbm_client_suspend(client, &line));
     (void)mbm_client_resume(client, NULL);
@@ -113,11 +116,6 @@ static void lend_and_end(void)
     assert_int_equal(mbm_node_pollDelay(&node), UINT32_MAX);
     OK(mbm_line_used(&line));
     OK(mbm_node_cancel(&node));
-}
-
-TEST(a_master_uses_nothing_of_a_client_that_has_resumed)
-{
-    each_variant(lend_and_end);
 }
 
 /* After the end of the client whose line the master had. */
@@ -132,7 +130,7 @@ static void the_master_keeps_the_other_port(void)
     assert_int_equal(other_m.sent_count, 8);
 }
 
-static void begin_the_master(void)
+VARIANTS_TEST(a_master_that_began_on_a_port_of_its_own_keeps_that_port)
 {
     const mbm_port port = memory_port_of(&other_m);
 
@@ -142,12 +140,7 @@ static void begin_the_master(void)
     the_master_keeps_the_other_port();
 }
 
-TEST(a_master_that_began_on_a_port_of_its_own_keeps_that_port)
-{
-    each_variant(begin_the_master);
-}
-
-static void lend_to_the_master_of_another(void)
+VARIANTS_TEST(a_master_with_the_lines_of_two_clients_keeps_the_second)
 {
     const mbm_port port = memory_port_of(&other_m);
     static mbm_client second;
@@ -164,12 +157,7 @@ static void lend_to_the_master_of_another(void)
     IS(MBM_NOT_INITIALISED, mbm_node_readCoils(&node, 0, 1));
 }
 
-TEST(a_master_with_the_lines_of_two_clients_keeps_the_second)
-{
-    each_variant(lend_to_the_master_of_another);
-}
-
-static void forget_the_master(void)
+VARIANTS_TEST(a_client_resumes_from_a_master_that_was_zeroed)
 {
     OK(mbm_client_suspend(client, &line));
     memset(&line, 0, sizeof line);
@@ -177,11 +165,6 @@ static void forget_the_master(void)
     OK(mbm_client_resume(client, &line));
     OK(mbm_client_poll(client));
     IS(MBM_NOT_INITIALISED, mbm_line_cancel(&line));
-}
-
-TEST(a_client_resumes_from_a_master_that_was_zeroed)
-{
-    each_variant(forget_the_master);
 }
 
 /* --- from within `done` --- */
@@ -197,7 +180,7 @@ static void lend(void *context, mbm_clientRequest *request)
     OK(mbm_client_suspend(client, &line));
 }
 
-static void suspend_when_done(void)
+VARIANTS_TEST(a_client_that_is_suspended_when_a_request_is_done_sends_nothing)
 {
     static const uint8_t reply[] = {17, 6, 0, 1, 0, 2};
 
@@ -223,9 +206,4 @@ static void suspend_when_done(void)
     for (unsigned i = 0; i < 100 && m.sent_count == 8; i++, m.now += 10000)
         IS(MBM_PENDING, mbm_client_poll(client));
     assert_int_equal(m.sent_count, 16);
-}
-
-TEST(a_client_that_is_suspended_when_a_request_is_done_sends_nothing)
-{
-    each_variant(suspend_when_done);
 }

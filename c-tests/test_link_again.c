@@ -525,15 +525,10 @@ static void requests_in_flight_end_when_the_link_was_closed(uint16_t accepted)
             }
 }
 
-TEST(requests_that_were_sent_end_when_a_link_begins_that_is_closed)
-{
-    requests_in_flight_end_when_the_link_was_closed(ALL);
-}
-
-TEST(a_request_that_the_port_took_in_part_is_not_sent_on_over_the_new_link)
-{
-    requests_in_flight_end_when_the_link_was_closed(5);
-}
+TEST_ROW(requests_that_were_sent_end_when_a_link_begins_that_is_closed,
+         requests_in_flight_end_when_the_link_was_closed(ALL))
+TEST_ROW(a_request_that_the_port_took_in_part_is_not_sent_on_over_the_new_link,
+         requests_in_flight_end_when_the_link_was_closed(5))
 
 TEST(a_request_that_ended_with_the_old_link_is_never_sent)
 {

@@ -31,10 +31,7 @@ static mbm_packet read_of(uint16_t quantity)
 
 /* --- mbm_version, mbm_status_text, mbm_status_textOf --- */
 
-TEST(the_archive_is_that_of_the_header)
-{
-    assert_string_equal(mbm_version(), MBM_VERSION);
-}
+TEST_ROW(the_archive_is_that_of_the_header, assert_string_equal(mbm_version(), MBM_VERSION))
 
 TEST(every_number_has_a_text)
 {

@@ -161,8 +161,19 @@ static void with_each_exchange(void (*check)(uint8_t kind, const mbm_packet *ask
     assert_true(count > 25);
 }
 
-static void check_request(uint8_t kind, const mbm_packet *asked, const mbm_packet *response,
-                          const uint8_t *body, uint16_t bytes)
+#define EXCHANGES_TEST(name)                                                                       \
+    static void each_##name(uint8_t kind, const mbm_packet *asked, const mbm_packet *response,     \
+                            const uint8_t *body, uint16_t bytes);                                  \
+    TEST(name)                                                                                     \
+    {                                                                                              \
+        with_each_exchange(each_##name);                                                           \
+    }                                                                                              \
+    static void each_##name(                                                                       \
+        __attribute__((unused)) uint8_t kind, __attribute__((unused)) const mbm_packet *asked,     \
+        __attribute__((unused)) const mbm_packet *response,                                        \
+        __attribute__((unused)) const uint8_t *body, __attribute__((unused)) uint16_t bytes)
+
+EXCHANGES_TEST(the_reply_of_each_function_is_the_packet_of_its_frame)
 {
     uint8_t received[MBM_MAX_ASCII_FRAME];
     mbm_packet wanted;
@@ -180,13 +191,7 @@ static void check_request(uint8_t kind, const mbm_packet *asked, const mbm_packe
     assert_reply_is(&wanted);
 }
 
-TEST(the_reply_of_each_function_is_the_packet_of_its_frame)
-{
-    with_each_exchange(check_request);
-}
-
-static void check_forwarded(uint8_t kind, const mbm_packet *asked, const mbm_packet *response,
-                            const uint8_t *body, uint16_t bytes)
+EXCHANGES_TEST(the_reply_of_a_forwarded_request_is_the_packet_of_its_frame)
 {
     uint8_t received[MBM_MAX_ASCII_FRAME];
     mbm_packet wanted;
@@ -196,13 +201,7 @@ static void check_forwarded(uint8_t kind, const mbm_packet *asked, const mbm_pac
     assert_reply_is(&wanted);
 }
 
-TEST(the_reply_of_a_forwarded_request_is_the_packet_of_its_frame)
-{
-    with_each_exchange(check_forwarded);
-}
-
-static void check_exception(uint8_t kind, const mbm_packet *asked, const mbm_packet *response,
-                            const uint8_t *body, uint16_t bytes)
+EXCHANGES_TEST(the_reply_of_a_refused_request_is_an_exception_packet)
 {
     const mbm_packet refusal = {.kind = MBM_PACKET_EXCEPTION,
                                 .function = asked->function,
@@ -218,11 +217,6 @@ static void check_exception(uint8_t kind, const mbm_packet *asked, const mbm_pac
     IS(MBM_SERVER_DEVICE_FAILURE, answer(kind, &refusal, received, &wanted));
     assert_reply_is(&wanted);
     assert_int_equal(wanted.exceptionCode, MBM_SERVER_DEVICE_FAILURE);
-}
-
-TEST(the_reply_of_a_refused_request_is_an_exception_packet)
-{
-    with_each_exchange(check_exception);
 }
 
 TEST(one_file_record_has_its_head_again)
@@ -569,10 +563,7 @@ static void with_each_framing(void (*check)(void))
     }
 }
 
-TEST(the_fields_of_the_servers_replies_have_names)
-{
-    with_each_framing(check_fields);
-}
+TEST_ROW(the_fields_of_the_servers_replies_have_names, with_each_framing(check_fields))
 
 static char texts[OBJECTS][LENGTH];
 static unsigned handed, first;
@@ -626,7 +617,5 @@ static void check_identification(void)
     assert_read(MBM_DEVICE_ID_INDIVIDUAL, 0x80 + 20, 1, 1);
 }
 
-TEST(an_identification_of_many_objects_is_read_to_its_end)
-{
-    with_each_framing(check_identification);
-}
+TEST_ROW(an_identification_of_many_objects_is_read_to_its_end,
+         with_each_framing(check_identification))

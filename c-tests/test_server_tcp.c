@@ -269,25 +269,13 @@ static void stop_lines(void)
     served_stop(&ascii);
 }
 
-TEST_WITH(libmodbus_reads_every_table, start_lines, stop_lines)
-{
-    asked_reads(client);
-}
-
-TEST_WITH(libmodbus_writes_every_table, start_lines, stop_lines)
-{
-    asked_writes(client, &line_rtu);
-}
-
-TEST_WITH(accesses_at_the_limits_of_every_table_are_right, start_lines, stop_lines)
-{
-    asked_edges(client);
-}
-
-TEST_WITH(a_refused_write_changes_nothing, start_lines, stop_lines)
-{
-    asked_refusals(client, &line_rtu);
-}
+TEST_ROW_WITH(libmodbus_reads_every_table, start_lines, stop_lines, asked_reads(client))
+TEST_ROW_WITH(libmodbus_writes_every_table, start_lines, stop_lines,
+              asked_writes(client, &line_rtu))
+TEST_ROW_WITH(accesses_at_the_limits_of_every_table_are_right, start_lines, stop_lines,
+              asked_edges(client))
+TEST_ROW_WITH(a_refused_write_changes_nothing, start_lines, stop_lines,
+              asked_refusals(client, &line_rtu))
 
 TEST_WITH(the_server_id_is_reported, start_lines, stop_lines)
 {
@@ -297,15 +285,10 @@ TEST_WITH(the_server_id_is_reported, start_lines, stop_lines)
     assert_memory_equal(id, "mbm\xFFtest", 8);
 }
 
-TEST_WITH(every_function_is_served_on_a_line, start_lines, stop_lines)
-{
-    asked_functions(modbus_get_socket(client), MBM_FRAMING_RTU, &line_rtu);
-}
-
-TEST_WITH(wrong_byte_counts_are_refused_in_time, start_lines, stop_lines)
-{
-    asked_lies(modbus_get_socket(client), MBM_FRAMING_RTU, &line_rtu);
-}
+TEST_ROW_WITH(every_function_is_served_on_a_line, start_lines, stop_lines,
+              asked_functions(modbus_get_socket(client), MBM_FRAMING_RTU, &line_rtu))
+TEST_ROW_WITH(wrong_byte_counts_are_refused_in_time, start_lines, stop_lines,
+              asked_lies(modbus_get_socket(client), MBM_FRAMING_RTU, &line_rtu))
 
 TEST_WITH(ascii_serves_every_function_too, start_lines, stop_lines)
 {

@@ -323,10 +323,8 @@ TEST(a_device_of_any_latency_never_gives_the_data_of_another_read)
         (void)fclose(table);
 }
 
-TEST(reads_of_a_fast_device_in_between_do_not_shift_those_of_a_slow_one)
-{
-    assert_never_wrong(1, NULL);
-}
+TEST_ROW(reads_of_a_fast_device_in_between_do_not_shift_those_of_a_slow_one,
+         assert_never_wrong(1, NULL))
 
 /* The second unit that does not answer must not make the master forget the first. */
 TEST(a_late_reply_is_expected_though_another_unit_is_silent)

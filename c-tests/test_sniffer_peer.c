@@ -222,12 +222,5 @@ static void over_tcp(uint8_t apart)
     tcp_server_stop(&device);
 }
 
-TEST(frames_of_libmodbus_over_tcp_are_reported)
-{
-    over_tcp(0);
-}
-
-TEST(frames_of_libmodbus_over_tcp_are_reported_with_known_direction)
-{
-    over_tcp(1);
-}
+TEST_ROW(frames_of_libmodbus_over_tcp_are_reported, over_tcp(0))
+TEST_ROW(frames_of_libmodbus_over_tcp_are_reported_with_known_direction, over_tcp(1))

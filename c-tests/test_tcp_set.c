@@ -124,10 +124,7 @@ static void expect_silence(void)
     assert_null(mbm_tcp_nextReady(&set));
 }
 
-TEST(a_connection_takes_little_memory)
-{
-    assert_true(sizeof(mbm_tcp) <= 64);
-}
+TEST_ROW(a_connection_takes_little_memory, assert_true(sizeof(mbm_tcp) <= 64))
 
 TEST(the_wait_says_which_of_many_sockets_are_ready)
 {

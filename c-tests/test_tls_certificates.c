@@ -121,10 +121,8 @@ TEST(a_client_whose_time_is_over_or_not_come_is_refused)
 }
 
 /* A certificate says what it is for. */
-TEST(a_client_with_the_certificate_of_a_server_is_refused)
-{
-    server_refuses("server", MBM_TLS_BAD_CERTIFICATE);
-}
+TEST_ROW(a_client_with_the_certificate_of_a_server_is_refused,
+         server_refuses("server", MBM_TLS_BAD_CERTIFICATE))
 
 TEST(a_server_of_another_authority_is_refused)
 {
@@ -132,10 +130,8 @@ TEST(a_server_of_another_authority_is_refused)
     client_refuses("stranger-server", NULL, MBM_TLS_UNKNOWN_AUTHORITY);
 }
 
-TEST(a_server_whose_time_is_over_is_refused)
-{
-    client_refuses("expired-server", "localhost", MBM_TLS_EXPIRED);
-}
+TEST_ROW(a_server_whose_time_is_over_is_refused,
+         client_refuses("expired-server", "localhost", MBM_TLS_EXPIRED))
 
 /* The peer's certificate is right. It is this side's authority whose time is over. */
 TEST(an_authority_of_this_side_whose_time_is_over_or_not_come_is_named)

@@ -214,10 +214,7 @@ TEST(openssl_without_a_right_certificate_is_refused)
 }
 
 /* Mbed TLS does not know the extension, and so must refuse it where it is critical. */
-TEST(a_critical_role_is_refused)
-{
-    is_refused("role-critical", NULL, MBM_TLS_BAD_CERTIFICATE);
-}
+TEST_ROW(a_critical_role_is_refused, is_refused("role-critical", NULL, MBM_TLS_BAD_CERTIFICATE))
 
 TEST(other_versions_and_ciphers_that_hide_nothing_are_refused)
 {

@@ -31,6 +31,14 @@ void test_add(const char *name, void (*test)(void), void (*setup)(void), void (*
     }                                                                                              \
     static void name(void)
 
+/* A test that is one call, as a row of a table of tests. */
+#define TEST_ROW(name, call) TEST_ROW_WITH(name, each_test.setup, each_test.teardown, call)
+#define TEST_ROW_WITH(name, setup, teardown, call)                                                 \
+    TEST_WITH(name, setup, teardown)                                                               \
+    {                                                                                              \
+        call;                                                                                      \
+    }
+
 /* Compares the status that a function of mbm.h returns. */
 #define IS(status, call) assert_int_equal(call, status)
 #define OK(call) IS(MBM_OK, call)
