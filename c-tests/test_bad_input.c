@@ -67,15 +67,6 @@ TEST(a_zeroed_object_is_not_initialised_and_stays_zero)
     assert_memory_equal(&m, &zero, sizeof m);
 }
 
-TEST(every_status_has_a_text)
-{
-    for (unsigned status = 0; status < 256; status++) {
-        assert_non_null(mbm_status_text((uint8_t)status));
-        assert_true(strlen(mbm_status_text((uint8_t)status)) > 0);
-    }
-    assert_string_not_equal(mbm_status_text(MBM_OK), mbm_status_text(MBM_INVALID_CRC));
-}
-
 SIM_TEST(a_line_without_a_frame_buffer_sends_no_request)
 {
     mbm_line l = MBM_INIT;
@@ -131,46 +122,6 @@ SIM_TEST(a_port_without_its_three_hooks_is_refused)
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
-SIM_TEST(forbidden_quantities_return_3_and_nothing_is_sent)
-{
-    static const uint16_t beyond[] = {0, 2001, 2048, 4096, 32768, 65535};
-    static const uint16_t registers[] = {0, 126, 128, 256, 257, 512, 32769, 65535};
-
-    for (size_t i = 0; i < COUNT(beyond); i++) {
-        IS(3, mbm_node_readCoils(n, 0, beyond[i]));
-        IS(3, mbm_node_readDiscreteInputs(n, 0, beyond[i]));
-        IS(3, mbm_node_writeMultipleCoils(n, 0, beyond[i]));
-    }
-    IS(3, mbm_node_writeMultipleCoils(n, 0, 1969));
-    for (size_t i = 0; i < COUNT(registers); i++) {
-        IS(3, mbm_node_readHoldingRegisters(n, 0, registers[i]));
-        IS(3, mbm_node_readInputRegisters(n, 0, registers[i]));
-        IS(3, mbm_node_writeMultipleRegisters(n, 0, registers[i]));
-        IS(3, mbm_node_readWriteMultipleRegisters(n, 0, registers[i], 0, 1));
-        IS(3, mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, registers[i]));
-    }
-    IS(3, mbm_node_writeMultipleRegisters(n, 0, 124));
-    IS(3, mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, 122));
-    assert_int_equal(s->sent, 0);
-    assert_int_equal(mbm_node_getExceptionCode(n), 0);
-    sim_assert_order(s, "PWO", "");
-}
-
-SIM_TEST(ranges_beyond_65535_return_2_and_nothing_is_sent)
-{
-    IS(2, mbm_node_readCoils(n, 65535, 2));
-    IS(2, mbm_node_readDiscreteInputs(n, 63537, 2000));
-    IS(2, mbm_node_readHoldingRegisters(n, 65412, 125));
-    IS(2, mbm_node_readInputRegisters(n, 65535, 2));
-    IS(2, mbm_node_writeMultipleCoils(n, 65535, 2));
-    IS(2, mbm_node_writeMultipleRegisters(n, 65414, 123));
-    IS(2, mbm_node_readWriteMultipleRegisters(n, 65535, 2, 0, 1));
-    IS(2, mbm_node_readWriteMultipleRegisters(n, 0, 1, 65535, 2));
-    /* The quantity is checked before the address, as a device does. */
-    IS(3, mbm_node_readHoldingRegisters(n, 65535, 126));
-    assert_int_equal(s->sent, 0);
-}
-
 SIM_TEST(the_last_address_can_be_read_and_written)
 {
     sim_answer(s, 1, 500, "11 03 02 00 07 +");
@@ -210,16 +161,6 @@ static void free_buffers(sim *s, buffers b)
     free(b.response);
     free(b.transmit);
     free(b.frame);
-}
-
-SIM_TEST(a_frame_buffer_below_8_bytes_is_refused)
-{
-    for (uint16_t bytes = 1; bytes < 8; bytes++)
-        IS(MBM_INVALID_ARGUMENT, mbm_line_beginRtu(&s->line, &s->port, s->buffer, bytes));
-    for (uint16_t bytes = 0; bytes < 8; bytes++)
-        IS(MBM_INVALID_ARGUMENT, mbm_line_setFrame(&s->line, s->buffer, bytes));
-    OK(mbm_line_setFrame(&s->line, s->buffer, 8));
-    OK(mbm_line_beginRtu(&s->line, &s->port, s->buffer, 8));
 }
 
 SIM_TEST(a_request_is_sent_whole_or_not_at_all)

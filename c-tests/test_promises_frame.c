@@ -44,6 +44,7 @@ TEST(every_number_has_a_text)
         assert_in_range(strlen(text), 1, 80);
     }
     assert_string_equal(mbm_status_text(MBM_OK), "success");
+    assert_string_not_equal(mbm_status_text(MBM_INVALID_CRC), "success");
     assert_string_equal(mbm_status_text(200), "not a status");
 }
 

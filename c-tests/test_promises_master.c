@@ -46,45 +46,19 @@ static uint8_t run(void)
 
 typedef uint8_t (*request)(uint16_t address, uint16_t quantity);
 
-static uint8_t write_coils(uint16_t address, uint16_t quantity)
-{
-    return mbm_node_writeMultipleCoils(&m, address, quantity);
-}
-
-static uint8_t write_registers(uint16_t address, uint16_t quantity)
-{
-    return mbm_node_writeMultipleRegisters(&m, address, quantity);
-}
-
-static uint8_t read_coils(uint16_t address, uint16_t quantity)
-{
-    return mbm_node_readCoils(&m, address, quantity);
-}
-
-static uint8_t read_inputs(uint16_t address, uint16_t quantity)
-{
-    return mbm_node_readDiscreteInputs(&m, address, quantity);
-}
-
-static uint8_t read_holding(uint16_t address, uint16_t quantity)
-{
-    return mbm_node_readHoldingRegisters(&m, address, quantity);
-}
-
-static uint8_t read_input(uint16_t address, uint16_t quantity)
-{
-    return mbm_node_readInputRegisters(&m, address, quantity);
-}
-
-static uint8_t read_of_both(uint16_t address, uint16_t quantity)
-{
-    return mbm_node_readWriteMultipleRegisters(&m, address, quantity, 0, 1);
-}
-
-static uint8_t write_of_both(uint16_t address, uint16_t quantity)
-{
-    return mbm_node_readWriteMultipleRegisters(&m, 0, 1, address, quantity);
-}
+#define REQUEST(name, ...)                                                                         \
+    static uint8_t name(uint16_t address, uint16_t quantity)                                       \
+    {                                                                                              \
+        return mbm_node_##__VA_ARGS__;                                                             \
+    }
+REQUEST(write_coils, writeMultipleCoils(&m, address, quantity))
+REQUEST(write_registers, writeMultipleRegisters(&m, address, quantity))
+REQUEST(read_coils, readCoils(&m, address, quantity))
+REQUEST(read_inputs, readDiscreteInputs(&m, address, quantity))
+REQUEST(read_holding, readHoldingRegisters(&m, address, quantity))
+REQUEST(read_input, readInputRegisters(&m, address, quantity))
+REQUEST(read_of_both, readWriteMultipleRegisters(&m, address, quantity, 0, 1))
+REQUEST(write_of_both, readWriteMultipleRegisters(&m, 0, 1, address, quantity))
 
 static uint8_t read_queued(uint16_t address, uint16_t quantity)
 {
@@ -119,36 +93,43 @@ static const struct {
                 {read_of_both, 125},      {write_of_both, 121},      {read_queued, 125},
                 {write_queued, TRANSMIT}, {write_queued_coils, 1968}};
 
+static void request_returns(uint8_t status, request call, unsigned address, unsigned quantity)
+{
+    setup();
+    IS(status, call((uint16_t)address, (uint16_t)quantity));
+    if (status == MBM_PENDING) {
+        IS(MBM_RESPONSE_TIMED_OUT, run());
+        assert_in_range(wire.length, 8, MBM_MAX_FRAME);
+        return;
+    }
+    assert_int_equal(wire.called[HOOK_PRE] + wire.called[HOOK_WRITE] + wire.called[HOOK_POST], 0);
+    assert_int_equal(wire.length, 0);
+    assert_int_equal(mbm_node_getExceptionCode(&m), 0);
+    assert_int_equal(response[0], 0x5555);
+    assert_int_equal(mbm_node_pollDelay(&m), 0xFFFFFFFF);
+}
+
 TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
 {
-    for (unsigned i = 0; i < COUNT(requests); i++) {
-        uint16_t most = requests[i].most;
-        const struct {
-            uint16_t address, quantity;
-            uint8_t status;
-        } rows[] = {{0, 1, MBM_PENDING},
-                    {0, most, MBM_PENDING},
-                    {(uint16_t)(65536 - most), most, MBM_PENDING},
-                    {65535, 1, MBM_PENDING},
-                    {0, 0, MBM_ILLEGAL_DATA_VALUE},
-                    {0, (uint16_t)(most + 1), MBM_ILLEGAL_DATA_VALUE},
-                    {0, 65535, MBM_ILLEGAL_DATA_VALUE},
-                    {65535, 2, MBM_ILLEGAL_DATA_ADDRESS},
-                    {(uint16_t)(65537 - most), most, MBM_ILLEGAL_DATA_ADDRESS}};
+    static const uint16_t beyond[] = {128, 256, 257, 512, 2001, 2048, 4096, 32768, 32769, 65535};
 
-        for (unsigned nth = 0; nth < COUNT(rows); nth++) {
-            setup();
-            IS(rows[nth].status, requests[i].call(rows[nth].address, rows[nth].quantity));
-            if (rows[nth].status == MBM_PENDING) {
-                IS(MBM_RESPONSE_TIMED_OUT, run());
-                assert_in_range(wire.length, 8, MBM_MAX_FRAME);
-            } else {
-                assert_int_equal(wire.length, 0);
-                assert_int_equal(mbm_node_getExceptionCode(&m), 0);
-                assert_int_equal(response[0], 0x5555);
-                assert_int_equal(mbm_node_pollDelay(&m), 0xFFFFFFFF);
-            }
-        }
+    for (unsigned i = 0; i < COUNT(requests); i++) {
+        const request call = requests[i].call;
+        const unsigned most = requests[i].most;
+
+        request_returns(MBM_PENDING, call, 0, 1);
+        request_returns(MBM_PENDING, call, 0, most);
+        request_returns(MBM_PENDING, call, 65536 - most, most);
+        request_returns(MBM_PENDING, call, 65535, 1);
+        request_returns(MBM_ILLEGAL_DATA_VALUE, call, 0, 0);
+        request_returns(MBM_ILLEGAL_DATA_VALUE, call, 0, most + 1);
+        for (unsigned k = 0; k < COUNT(beyond); k++)
+            if (beyond[k] > most)
+                request_returns(MBM_ILLEGAL_DATA_VALUE, call, 0, beyond[k]);
+        request_returns(MBM_ILLEGAL_DATA_ADDRESS, call, 65535, 2);
+        request_returns(MBM_ILLEGAL_DATA_ADDRESS, call, 65537 - most, most);
+        /* The quantity is checked before the address, as a device does. */
+        request_returns(MBM_ILLEGAL_DATA_VALUE, call, 65535, most + 1);
     }
 }
 
@@ -224,7 +205,11 @@ TEST(a_begin_is_refused_without_a_change)
 #define LINE(status, p, f, fs) REFUSED(status, line, mbm_line_beginRtu(&line, p, f, fs))
     LINE(MBM_INVALID_ARGUMENT, NULL, frame, 8);
     LINE(MBM_INVALID_ARGUMENT, &port, NULL, 8);
-    LINE(MBM_INVALID_ARGUMENT, &port, frame, 7);
+    for (uint16_t bytes = 0; bytes < 8; bytes++) {
+        if (bytes > 0)
+            LINE(MBM_INVALID_ARGUMENT, &port, frame, bytes);
+        REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_setFrame(&line, frame, bytes));
+    }
     lacking.read = NULL;
     LINE(MBM_INVALID_ARGUMENT, &lacking, frame, 8);
     lacking = port;
@@ -234,7 +219,9 @@ TEST(a_begin_is_refused_without_a_change)
     lacking.micros = NULL;
     LINE(MBM_INVALID_ARGUMENT, &lacking, frame, 8);
     REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_setFrame(&line, NULL, 8));
-    REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_setFrame(&line, frame, 7));
+    OK(mbm_line_setFrame(&line, frame, 8));
+    OK(mbm_line_beginRtu(&line, &port, frame, 8));
+    OK(mbm_line_setFrame(&line, frame, sizeof frame));
 #define WORDS(status, r, rs, t, ts) REFUSED(status, m, mbm_node_begin(&m, &line, 17, r, rs, t, ts))
     REFUSED(MBM_INVALID_ARGUMENT, m, mbm_node_begin(&m, NULL, 17, response, 1, transmit, 1));
     WORDS(MBM_INVALID_ARGUMENT, NULL, 1, transmit, 1);
