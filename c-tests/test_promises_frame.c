@@ -162,11 +162,10 @@ TEST(every_null_is_refused)
     uint8_t frame[MBM_MAX_ASCII_FRAME] = {17, 3, 0, 107, 0, 3, 0x76, 0x87};
     mbm_packet packet = read_of(3), kept;
     mbm_length expected;
-    uint16_t length = 9, end;
+    uint16_t length = 9;
     char text[80];
 
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(NULL, &packet, frame, 99, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, NULL, frame, 99, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, NULL, 99, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, frame + 20, 99, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(NULL, 0, frame, 8, &packet));
@@ -181,16 +180,13 @@ TEST(every_null_is_refused)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 1, frame, 11, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(PDU(NULL, 0), &packet, 1, frame, 11, &length));
     assert_memory_equal(&kept, &packet, sizeof packet);
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(NULL, 0, frame, 2, &expected));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 2, frame, 2, &expected));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 0, NULL, 2, &expected));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 0, frame, 2, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(NULL, &packet, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, NULL, &expected));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, &packet, NULL));
     packet.kind = MBM_PACKET_RESPONSE;
     IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, &packet, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(NULL, 8, 0, &end));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(frame, 8, 0, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_text(NULL, 0, frame, 8, text, sizeof text));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_text(&rtu, 2, frame, 8, text, sizeof text));
@@ -571,4 +567,98 @@ TEST(the_version_is_that_of_the_packages_in_header_and_archive)
     assert_string_equal(mbm_version(), numbers);
     read_version("Cargo.toml", package);
     assert_string_equal(package, numbers);
+}
+
+/* --- what a refused call leaves in the caller's variables --- */
+
+TEST(a_refused_call_sets_its_length_to_0)
+{
+    const mbm_framing none = {.kind = 9};
+    mbm_packet packet = {.function = 3, .quantity = 1, .unit = 17};
+    mbm_length expected;
+    uint8_t frame[16] = {17, 3, 0, 0, 0, 1};
+    uint16_t length;
+    mbm_unit unit;
+
+#define NO_LENGTH(status, call)                                                                    \
+    do {                                                                                           \
+        length = 0x7777;                                                                           \
+        IS(status, call);                                                                          \
+        assert_int_equal(length, 0);                                                               \
+    } while (0)
+#define UNKNOWN(status, call)                                                                      \
+    do {                                                                                           \
+        memset(&expected, 0x77, sizeof expected);                                                  \
+        IS(status, call);                                                                          \
+        assert_int_equal(expected.bytes, 0);                                                       \
+        assert_int_equal(expected.kind, MBM_LENGTH_UNKNOWN);                                       \
+    } while (0)
+    memset(&unit, 0, sizeof unit);
+    NO_LENGTH(MBM_INVALID_ARGUMENT,
+              mbm_unit_respond(&unit, 1, NULL, FRAMING(4), frame, 8, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT,
+              mbm_unit_respond(NULL, 1, NULL, FRAMING(0), frame, 8, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT,
+              mbm_unit_respond(&unit, 1, NULL, FRAMING(0), NULL, 8, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT,
+              mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 17, 16, &length));
+    NO_LENGTH(MBM_OK, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 8, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 8, 16, NULL));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_build(&none, &packet, frame, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, NULL, frame, 16, &length));
+    NO_LENGTH(MBM_BUFFER_TOO_SMALL, mbm_frame_build(&rtu, &packet, frame, 7, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), NULL, frame, 16, &length));
+    NO_LENGTH(MBM_BUFFER_TOO_SMALL, mbm_frame_build(PDU(NULL, 0), &packet, frame, 4, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 0, frame, 16, &length));
+    NO_LENGTH(MBM_BUFFER_TOO_SMALL, mbm_frame_exception(&rtu, &packet, 1, frame, 4, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(NULL, 8, 0, &length));
+    NO_LENGTH(MBM_INCOMPLETE_FRAME,
+              mbm_frame_looksLikeTcp((const uint8_t *)"\0\1\0\0", 4, 0, &length));
+    UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 9, frame, 2, &expected));
+    UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(NULL, 0, frame, 2, &expected));
+    UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, NULL, &expected));
+    UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(PDU(NULL, 0), 0, NULL, 2, &expected));
+    packet.quantity = 0;
+    UNKNOWN(MBM_ILLEGAL_DATA_VALUE, mbm_frame_replyLength(PDU(NULL, 0), &packet, &expected));
+    UNKNOWN(MBM_ILLEGAL_DATA_VALUE, mbm_frame_replyLength(&rtu, &packet, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(PDU(NULL, 0), &packet, NULL));
+}
+
+TEST(a_refused_call_leaves_other_variables_unchanged)
+{
+    const mbm_framing none = {.kind = 9};
+    static mbm_sniffer sniffer;
+    mbm_packet packet;
+    mbm_record record;
+    mbm_object object;
+    mbm_event event;
+    uint8_t frame[8] = {0};
+    uint16_t cursor = 0;
+
+    memset(&packet, 0x77, sizeof packet);
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&none, 0, frame, 8, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(PDU(NULL, 0), 2, frame, 8, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(PDU(NULL, 0), 0, NULL, 8, &packet));
+    memset(&packet, 0, sizeof packet);
+    memset(&record, 0x77, sizeof record);
+    memset(&object, 0x77, sizeof object);
+    REFUSED(0, record, mbm_packet_nextRecord(&packet, &cursor, &record));
+    REFUSED(0, object, mbm_packet_nextObject(&packet, &cursor, &object));
+    packet.function = 0x14;
+    packet.data = (const uint8_t *)"\6\0\1\0\0\0\1";
+    packet.dataLength = 7;
+    REFUSED(0, cursor, mbm_packet_nextRecord(&packet, &cursor, NULL));
+    REFUSED(1, packet, mbm_packet_nextRecord(&packet, &cursor, &record));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, NULL, 8, &record));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, frame, 8, &object));
+    memset(&sniffer, 0, sizeof sniffer);
+    memset(&event, 0x77, sizeof event);
+    REFUSED(0, event, mbm_sniffer_next(&sniffer, 0, &event));
+}
+
+TEST(the_text_of_invalid_argument_mentions_ranges)
+{
+    assert_non_null(strstr(mbm_status_text(MBM_INVALID_ARGUMENT), "out of range"));
+    assert_non_null(strstr(mbm_status_text(MBM_INVALID_ARGUMENT), "NULL"));
+    assert_non_null(strstr(mbm_status_text(MBM_BUSY), "hook"));
 }
