@@ -462,36 +462,3 @@ TEST(first_bytes_that_begin_no_frame_are_malformed)
     OK(FIRST(ascii, ":0155"));
     assert_int_equal(expected.kind, MBM_LENGTH_SILENCE);
 }
-
-TEST(null_is_an_invalid_argument)
-{
-    const mbm_framing unknown = {.kind = 5}, no_list = {.functionCount = 1};
-    mbm_packet packet = {.unit = 1, .function = 0x03, .quantity = 1};
-    mbm_length expected;
-    uint8_t frame[16];
-    uint16_t length;
-
-    OK(mbm_frame_build(&rtu, &packet, frame, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(NULL, &packet, frame, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&unknown, &packet, frame, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&no_list, &packet, frame, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, NULL, frame, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, NULL, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, frame, 16, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(NULL, 0, frame, 8, &packet));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(&rtu, 2, frame, 8, &packet));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(&rtu, 0, NULL, 8, &packet));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(&rtu, 0, frame, 8, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(NULL, &packet, 1, frame, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, NULL, 1, frame, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 1, NULL, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 1, frame, 16, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 0, frame, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(NULL, 0, frame, 1, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 2, frame, 1, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 0, NULL, 1, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 0, frame, 1, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(NULL, &packet, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, NULL, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, &packet, NULL));
-}

@@ -87,44 +87,16 @@ TEST(a_gateway_goes_on_after_a_refused_begin)
 TEST(a_refused_call_changes_nothing)
 {
     static const mbm_function bad[] = {{0x41, {0}, {0}}, {128, {0}, {0}}};
-    mbm_port port = memory_port_of(&b.sockets[0]), deaf = port;
+    mbm_port deaf = memory_port_of(&b.sockets[0]);
     mbm_unit beyond = {.id = 300};
 
     deaf.read = NULL;
     OK(mbm_gateway_close(&b.gateway, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_open(&b.gateway, 1, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_open(&b.gateway, 1, &deaf));
-    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_open(&b.gateway, BENCH_CONNECTIONS, &port));
-    REFUSED(MBM_BUSY, b, mbm_gateway_open(&b.gateway, 0, &port));
-    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_close(&b.gateway, BENCH_CONNECTIONS));
-    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setMaxPending(&b.gateway, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_serveUnits(&b.gateway, NULL, 1));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_serveUnits(&b.gateway, &beyond, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setFunctions(&b.gateway, NULL, 1));
     REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setFunctions(&b.gateway, bad, COUNT(bad)));
     assert_int_equal(mbm_gateway_pending(&b.gateway, 250), 0);
     assert_int_equal(mbm_gateway_isReading(&b.gateway, 250), 0);
-}
-
-TEST(an_object_that_was_never_begun_does_nothing)
-{
-    static mbm_gateway none;
-    const mbm_port port = memory_port_of(&b.sockets[0]);
-
-    IS(MBM_NOT_INITIALISED, mbm_gateway_poll(&none));
-    IS(MBM_INVALID_ARGUMENT, mbm_gateway_poll(NULL));
-    IS(MBM_NOT_INITIALISED, mbm_gateway_open(&none, 0, &port));
-    IS(MBM_NOT_INITIALISED, mbm_gateway_close(&none, 0));
-    IS(MBM_NOT_INITIALISED, mbm_gateway_status(&none, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_gateway_status(NULL, 0));
-    IS(MBM_NOT_INITIALISED, mbm_gateway_setMaxPending(&none, 1));
-    IS(MBM_NOT_INITIALISED, mbm_gateway_setQueueTime(&none, 1));
-    IS(MBM_NOT_INITIALISED, mbm_gateway_serveUnits(&none, NULL, 0));
-    IS(MBM_NOT_INITIALISED, mbm_gateway_setFunctions(&none, NULL, 0));
-    assert_int_equal(mbm_gateway_pollDelay(&none), UINT32_MAX);
-    assert_int_equal(mbm_gateway_pollDelay(NULL), UINT32_MAX);
-    assert_int_equal(mbm_gateway_pending(&none, 0), 0);
-    assert_int_equal(mbm_gateway_isReading(&none, 0), 0);
 }
 
 /* --- begin again --- */

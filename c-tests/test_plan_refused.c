@@ -131,36 +131,6 @@ TEST(limits_and_ranges_of_a_unit_above_255_are_refused)
     plan_device_start(&d);
 }
 
-TEST(what_was_never_begun_is_refused)
-{
-    static mbm_plan plan;
-    mbm_registers view = {0};
-    mbm_planReadInfo read = {0};
-    int64_t integer = 7;
-    float single = 7;
-    double wide = 7;
-    uint32_t age = 7;
-    char text[4] = "abc";
-
-    for (unsigned i = 0; i < 2; i++) {
-        mbm_plan *object = i ? &plan : NULL;
-        uint8_t status = i ? MBM_NOT_INITIALISED : MBM_INVALID_ARGUMENT;
-
-        IS(status, mbm_plan_poll(object));
-        IS(status, mbm_plan_end(object));
-        IS(status, mbm_plan_getStatus(object, 0, &age));
-        IS(status, mbm_plan_getInteger(object, 0, 0, &integer));
-        IS(status, mbm_plan_getFloat(object, 0, 0, &single));
-        IS(status, mbm_plan_getText(object, 0, text, sizeof text));
-        IS(status, mbm_plan_getRegisters(object, 0, &view));
-        IS(status, mbm_plan_getRead(object, 0, &read));
-        IS(status, mbm_plan_refresh(object, 0));
-        assert_int_equal(mbm_plan_pollDelay(object), UINT32_MAX);
-    }
-    assert_true(integer == 7 && single == 7 && wide == 7 && age == 7);
-    assert_string_equal(text, "abc");
-}
-
 TEST(a_plan_that_begins_again_gives_its_requests_up)
 {
     mbm_clientRequest more[2];

@@ -170,6 +170,16 @@ TEST(a_poll_reports_what_its_comment_says)
 
 /* --- units --- */
 
+static uint16_t serve_nothing(void *context, const mbm_request *request, uint8_t *response,
+                              uint16_t capacity)
+{
+    (void)context;
+    (void)request;
+    (void)response;
+    (void)capacity;
+    return 0;
+}
+
 TEST(records_are_refused_without_a_change)
 {
     static mbm_dataCallbacks cells;
@@ -206,11 +216,21 @@ TEST(records_are_refused_without_a_change)
     /* Without `serve`. */
     custom.code = 0x41;
     REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCustom(&unit, &custom));
+    custom.serve = serve_nothing;
+    custom.code = 128;
+    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_unit_serveCustom(&unit, &custom));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCustom(&unit, &custom));
+    custom.code = 0x41;
+    custom.length.kind = 9;
+    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_unit_serveCustom(&unit, &custom));
+    REFUSED(MBM_INVALID_ARGUMENT, cells, mbm_unit_serveCallbacks(&unit, &cells, 3));
     for (unsigned code = 0; code < 256; code++) {
         if (code >= 1 && code <= 127)
             continue;
         REFUSED(MBM_INVALID_ARGUMENT, unit,
                 mbm_unit_switchFunction(&unit, &mask, (uint8_t)code, 0));
+        REFUSED(MBM_INVALID_ARGUMENT, mask,
+                mbm_unit_switchFunction(&unit, &mask, (uint8_t)code, 1));
     }
     REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_switchFunction(&unit, NULL, 3, 0));
     REFUSED(MBM_INVALID_ARGUMENT, mask, mbm_unit_switchFunction(NULL, &mask, 3, 0));
@@ -314,4 +334,6 @@ TEST(a_response_has_no_bytes_where_no_device_answers)
     NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, FRAMING(0), request, 261, 260, &response));
     NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, FRAMING(9), request, 8, 260, &response));
     IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), request, 8, 260, NULL));
+    unit.id = 300;
+    NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, FRAMING(0), request, 8, 260, &response));
 }

@@ -120,6 +120,8 @@ TEST(null_and_views_without_data_are_refused)
         NOTHING(MBM_INVALID_ARGUMENT, a->null(&r));
         r.data = NULL;
         NOTHING(MBM_NOT_INITIALISED, a->call(&r, FIRST, 0));
+        memset(&r, 0, sizeof r);
+        NOTHING(MBM_NOT_INITIALISED, a->call(&r, 0, 0));
     }
 }
 
@@ -253,6 +255,8 @@ TEST(a_view_ends_at_address_65535)
     VIEW(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, bytes, 3, 0));
     VIEW(MBM_INVALID_ARGUMENT, mbm_registers_ofBytes(&r, NULL, 1, 0));
     VIEW(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, NULL, 1, 0));
+    VIEW(MBM_INVALID_ARGUMENT, mbm_registers_ofBytes(&r, NULL, 2, 0));
+    VIEW(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, NULL, 2, 0));
     VIEW(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(&r, NULL, 1, 0));
     VIEW(MBM_INVALID_ARGUMENT, mbm_registers_intoWords(&r, NULL, 1, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(NULL, words, 1, 0));

@@ -120,53 +120,7 @@ TEST(a_zeroed_server_stays_zero_when_a_begin_is_refused)
     free(small);
 }
 
-TEST(settings_of_a_server_that_are_refused_change_nothing)
-{
-    static uint8_t frame[MBM_MAX_TCP_FRAME];
-
-    memset(&server, 0, sizeof server);
-    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setSilence(&server, 1));
-    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setBaudRate(&server, 9600));
-    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setEchoDiscard(&server, 1));
-    OK(mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame));
-    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_setEchoDiscard(&server, 1));
-}
-
 /* Neither the records that are refused nor the units that refuse them change. */
-TEST(refused_records_are_unchanged)
-{
-    mbm_registerTable fresh;
-    mbm_dataCallbacks cells;
-    mbm_custom custom;
-    mbm_functionMask switches;
-
-    memset(&unit, 0, sizeof unit);
-    memset(&fresh, 0, sizeof fresh);
-    memset(&cells, 0, sizeof cells);
-    memset(&custom, 0, sizeof custom);
-    memset(&switches, 0, sizeof switches);
-    REFUSED(MBM_INVALID_ARGUMENT, fresh, mbm_unit_serveHoldingRegisters(NULL, &fresh));
-    REFUSED(MBM_INVALID_ARGUMENT, fresh, mbm_registerTable_serveMaskAndReadWrite(&fresh));
-    REFUSED(MBM_INVALID_ARGUMENT, cells, mbm_unit_serveCallbacks(&unit, &cells, 3));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCallbacks(&unit, &cells, 3));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCustom(&unit, &custom));
-    custom.serve = later;
-    custom.code = 128;
-    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_unit_serveCustom(&unit, &custom));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCustom(&unit, &custom));
-    custom.code = 65;
-    custom.length.kind = 9;
-    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_unit_serveCustom(&unit, &custom));
-    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_unit_switchFunction(NULL, &switches, 3, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_unit_switchFunction(&unit, &switches, 128, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_unit_switchFunction(&unit, &switches, 0, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_switchFunction(&unit, &switches, 0, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveFiles(&unit, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveFifos(&unit, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveDiagnostics(&unit, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveIdentification(&unit, NULL));
-}
-
 /* --- master --- */
 
 TEST(a_master_goes_on_after_refused_calls)
@@ -218,7 +172,7 @@ TEST(a_master_goes_on_after_refused_calls)
     free(transmit);
 }
 
-/* --- sniffer and ring --- */
+/* --- sniffer --- */
 
 TEST(a_sniffer_goes_on_after_refused_calls)
 {
@@ -245,24 +199,6 @@ TEST(a_sniffer_goes_on_after_refused_calls)
     assert_int_equal(event.kind, MBM_EVENT_REQUEST);
     free(buffer);
     free(small);
-}
-
-TEST(a_ring_keeps_its_bytes_when_a_begin_is_refused)
-{
-    mbm_ring ring = {0};
-    uint8_t *bytes = (uint8_t *)malloc(8), *one = (uint8_t *)malloc(1), got[8];
-
-    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, one, 1));
-    OK(mbm_ring_begin(&ring, bytes, 8));
-    assert_int_equal(mbm_ring_write(&ring, (const uint8_t *)"abcd", 4), 4);
-    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, one, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, NULL, 8));
-    REFUSED(0, ring, mbm_ring_write(&ring, NULL, 4));
-    REFUSED(0, ring, mbm_ring_read(&ring, NULL, 4));
-    assert_int_equal(mbm_ring_read(&ring, got, 8), 4);
-    assert_memory_equal(got, "abcd", 4);
-    free(bytes);
-    free(one);
 }
 
 /* --- Sequences of calls for which fuzz/fuzz_targets/c_api.rs found a fault --- */

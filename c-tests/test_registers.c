@@ -340,66 +340,6 @@ TEST(a_view_beyond_register_65535_is_refused)
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getUint16(&r, 0, 0, &word));
 }
 
-TEST(null_and_bad_arguments_return_a_status)
-{
-    static const uint8_t bytes[4] = {1, 2, 3, 4};
-    mbm_registers r, none = {0};
-    uint16_t word = 9;
-    uint32_t value;
-    char text[4];
-
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(NULL, &word, 1, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(&r, NULL, 1, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, NULL, 2, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_ofBytes(&r, NULL, 1, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, NULL, 1, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint16(NULL, 0, 0, &word));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(NULL, 0, 0, 1));
-    IS(MBM_NOT_INITIALISED, mbm_registers_getUint16(&none, 0, 0, &word));
-    IS(MBM_NOT_INITIALISED, mbm_registers_setUint16(&none, 0, 0, 1));
-
-    OK(mbm_registers_ofBytes(&r, bytes, 4, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint16(&r, 0, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getDouble(&r, 0, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBit(&r, 0, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getString(&r, 0, 2, 0, NULL, 4));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytes(&r, 0, MBM_ORDER_ABCD, NULL, 2));
-    OK(mbm_registers_getBytes(&r, 0, MBM_ORDER_ABCD, NULL, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, MBM_ORDER_DCBA + 1, &value));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, 255, &value));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getString(&r, 0, 2, 255, text, 4));
-    r.order = 9;
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, MBM_ORDER_DEFAULT, &value));
-    OK(mbm_registers_ofBytes(&r, bytes, 4, 0));
-    r.kind = 0;
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, 0, &value));
-    r.kind = 5;
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, 0, &value));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint32(&r, 0, 0, 1));
-    OK(mbm_registers_intoWords(&r, &word, 1, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setFloat(&r, 0, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setString(&r, 0, 2, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 0, MBM_ORDER_ABCD, NULL, 2));
-    assert_int_equal(word, 9);
-}
-
-TEST(a_view_for_reading_is_not_written)
-{
-    uint16_t words[4] = {1, 2, 3, 4};
-    uint8_t bytes[2] = {1, 2};
-    mbm_registers r;
-
-    OK(mbm_registers_ofWords(&r, words, 4, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(&r, 0, 0, 9));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBit(&r, 0, 0, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 0, MBM_ORDER_ABCD, bytes, 2));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setString(&r, 0, 2, 0, ""));
-    assert_int_equal(words[0], 1);
-    OK(mbm_registers_ofBytes(&r, bytes, 2, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(&r, 0, 0, 9));
-    assert_int_equal(bytes[1], 2);
-}
-
 /* --- Packed coils, checked against the examples of V1.1b3 --- */
 
 /* The response of 6.1: coils 20 to 38, which have the addresses 19 to 37 on the wire. */
@@ -488,18 +428,3 @@ TEST(coils_are_unpacked_to_one_byte_each)
     assert_int_equal(coils[24], 7);
 }
 
-TEST(null_is_an_invalid_argument)
-{
-    uint8_t byte = 0;
-    uint16_t word = 0;
-
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_pack(NULL, 1, &byte, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_pack(&byte, 1, NULL, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_unpack(NULL, 1, &byte, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_unpack(&byte, 1, NULL, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_isSet(NULL, 0, 1, 0, &byte));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_isSet(&byte, 0, 1, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_isSetInWords(&word, 0, 1, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_set(NULL, 0, 1, 0, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_bits_setInWords(NULL, 0, 1, 0, 1));
-}

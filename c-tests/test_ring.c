@@ -41,37 +41,6 @@ TEST(bytes_beyond_the_capacity_are_counted_and_no_others_are_lost)
     assert_int_equal(mbm_ring_available(&ring), 0);
 }
 
-TEST(a_ring_that_was_never_begun_accepts_and_returns_nothing)
-{
-    static mbm_ring zeroed;
-    mbm_ring *rings[2];
-    uint8_t byte = 0;
-
-    rings[0] = NULL;
-    rings[1] = &zeroed;
-    for (unsigned i = 0; i < COUNT(rings); i++) {
-        assert_int_equal(mbm_ring_put(rings[i], 1), 0);
-        assert_int_equal(mbm_ring_write(rings[i], &byte, 1), 0);
-        assert_int_equal(mbm_ring_read(rings[i], &byte, 1), 0);
-        assert_int_equal(mbm_ring_available(rings[i]), 0);
-        assert_int_equal(mbm_ring_lost(rings[i]), 0);
-    }
-}
-
-TEST(begin_refuses_bad_arguments)
-{
-    static mbm_ring ring;
-    uint8_t storage[4];
-
-    IS(MBM_INVALID_ARGUMENT, mbm_ring_begin(NULL, storage, sizeof storage));
-    IS(MBM_INVALID_ARGUMENT, mbm_ring_begin(&ring, NULL, 4));
-    IS(MBM_INVALID_ARGUMENT, mbm_ring_begin(&ring, storage, 1));
-    assert_int_equal(mbm_ring_put(&ring, 1), 0);
-    OK(mbm_ring_begin(&ring, storage, sizeof storage));
-    assert_int_equal(mbm_ring_write(&ring, NULL, 0), 0);
-    assert_int_equal(mbm_ring_read(&ring, NULL, 0), 0);
-}
-
 static void *put_all(void *context)
 {
     mbm_ring *ring = context;
@@ -129,15 +98,21 @@ TEST_WITH(a_ring_that_was_never_begun_is_empty_and_takes_nothing, setup, NULL)
     assert_int_equal(bytes[0], 1);
 }
 
-TEST_WITH(a_refused_begin_changes_nothing, setup, NULL)
+TEST_WITH(a_refused_call_changes_nothing, setup, NULL)
 {
+    uint8_t taken[8];
+
+    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, NULL, 8));
     OK(mbm_ring_begin(&ring, storage, 8));
-    mbm_ring_put(&ring, 5);
+    assert_int_equal(mbm_ring_write(&ring, (const uint8_t *)"abcd", 4), 4);
     REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, NULL, 8));
     REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, storage, 1));
     REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, storage, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_ring_begin(NULL, storage, 8));
-    assert_int_equal(mbm_ring_available(&ring), 1);
+    REFUSED(0, ring, mbm_ring_write(&ring, NULL, 4));
+    REFUSED(0, ring, mbm_ring_read(&ring, NULL, 4));
+    assert_int_equal(mbm_ring_read(&ring, taken, 8), 4);
+    assert_memory_equal(taken, "abcd", 4);
 }
 
 TEST_WITH(a_ring_holds_one_byte_less_than_its_storage, setup, NULL)

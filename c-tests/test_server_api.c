@@ -98,60 +98,6 @@ static size_t exchange(uint8_t to, const char *pdu, size_t length)
 #define ASK(pdu) exchange(17, pdu, sizeof pdu - 1)
 #define BROADCAST(pdu) exchange(0, pdu, sizeof pdu - 1)
 
-TEST(an_object_that_was_never_begun_is_not_initialised)
-{
-    IS(MBM_NOT_INITIALISED, mbm_server_poll(&server));
-    IS(MBM_NOT_INITIALISED, mbm_server_setSilence(&server, 1));
-    IS(MBM_NOT_INITIALISED, mbm_server_setBaudRate(&server, 9600));
-    IS(MBM_NOT_INITIALISED, mbm_server_setEchoDiscard(&server, 1));
-    assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
-}
-
-TEST(null_is_an_invalid_argument)
-{
-    const mbm_port without_read = {.write = wire_write, .micros = wire_micros};
-    uint16_t length;
-
-    IS(MBM_INVALID_ARGUMENT, mbm_server_poll(NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_setSilence(NULL, 1));
-    assert_int_equal(mbm_server_pollDelay(NULL), 0xFFFFFFFFu);
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(NULL, &port, &unit, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, NULL, &unit, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &port, NULL, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &port, &unit, 1, NULL, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &without_read, &unit, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &port, &unit, 1, frame, 15));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginAscii(&server, &port, &unit, 1, frame, 31));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginTcp(&server, &port, &unit, 1, frame, 259));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtuOverTcp(&server, &port, NULL, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCoils(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveDiscreteInputs(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveHoldingRegisters(NULL, &table));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveInputRegisters(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_registerTable_serveMaskAndReadWrite(NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCallbacks(&unit, NULL, 3));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveFiles(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveFifos(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveExceptionStatus(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveServerId(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveIdentification(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveDiagnostics(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveDiagnostics(NULL, &diagnostics));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCustom(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCustom(&unit, &custom));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(&unit, NULL, 3, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(&unit, &switches, 0, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(&unit, &switches, 128, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(NULL, &switches, 3, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(4), frame, 8, 256, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(NULL, 1, NULL, FRAMING(0), frame, 8, 256, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), NULL, 8, 256, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 8, 256, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 9, 8, &length));
-    unit.id = 300;
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 8, 256, &length));
-}
-
 TEST(a_function_that_is_not_served_gets_exception_01)
 {
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));

@@ -240,33 +240,6 @@ TEST(another_delimiter_ends_ascii_frames)
     assert_next("unit 17  request    07 read exception status");
 }
 
-TEST(a_sniffer_that_was_not_begun_or_has_bad_arguments_is_refused)
-{
-    static mbm_sniffer zeroed;
-    mbm_event event;
-
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(NULL, MBM_FRAMING_RTU, buffer, sizeof buffer));
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, MBM_FRAMING_ASCII, NULL, 64));
-    IS(MBM_BUFFER_TOO_SMALL,
-       mbm_sniffer_begin(&zeroed, MBM_FRAMING_TCP, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, MBM_FRAMING_NONE, buffer, sizeof buffer));
-    IS(MBM_NOT_INITIALISED, mbm_sniffer_setFunctions(&zeroed, NULL, 0));
-    IS(MBM_NOT_INITIALISED, mbm_sniffer_setDelimiter(&zeroed, '!'));
-    IS(MBM_NOT_INITIALISED, mbm_sniffer_setBaudRate(&zeroed, 9600));
-    IS(MBM_NOT_INITIALISED, mbm_sniffer_setResponseTimeout(&zeroed, 1));
-    IS(MBM_NOT_INITIALISED, mbm_sniffer_setFrameTimeout(&zeroed, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setBaudRate(NULL, 9600));
-    assert_int_equal(mbm_sniffer_feed(&zeroed, MBM_DIRECTION_BOTH, request, 1, 0), 0);
-    assert_int_equal(mbm_sniffer_feed(NULL, MBM_DIRECTION_BOTH, request, 1, 0), 0);
-    assert_int_equal(mbm_sniffer_next(&zeroed, 0, &event), 0);
-    begin(MBM_FRAMING_RTU);
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setResponseTimeout(&sniffer, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFrameTimeout(&sniffer, 0));
-    assert_int_equal(mbm_sniffer_feed(&sniffer, 3, request, 1, 0), 0);
-    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, NULL, 1, 0), 0);
-    assert_int_equal(mbm_sniffer_next(&sniffer, 0, NULL), 0);
-}
-
 TEST(a_frame_is_explained_in_each_framing_and_refused_in_words)
 {
     uint8_t kind, frame[MBM_MAX_ASCII_FRAME];

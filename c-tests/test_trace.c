@@ -299,14 +299,6 @@ TEST(a_trace_goes_on_after_refused_calls)
     uint8_t bytes[16];
 
     incomplete.micros = NULL;
-    IS(MBM_NOT_INITIALISED, mbm_trace_flush(&trace));
-    IS(MBM_NOT_INITIALISED, mbm_trace_setFrameTimeout(&trace, 1));
-    assert_null(mbm_trace_port(&trace));
-    assert_null(mbm_trace_port(NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_trace_flush(NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_trace_setFrameTimeout(NULL, 1));
-    IS(MBM_INVALID_ARGUMENT,
-       mbm_trace_begin(NULL, MBM_PACKET_REQUEST, &port, &rtu, buffer, 64, keep, NULL));
     begin_master();
     hooked_port_arrive_rtu(&wire, 17, REPLY + 1, sizeof REPLY - 1);
     wire.last = 4;
