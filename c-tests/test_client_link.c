@@ -221,16 +221,6 @@ TEST(reserved_units_and_sub_functions_are_sent_as_they_are)
     assert_int_equal(words[0], 0x0102);
 }
 
-TEST(an_ascii_frame_buffer_below_17_bytes_is_refused)
-{
-    const mbm_port port = memory_port_of(&m);
-
-    memset(&client, 0, sizeof client);
-    IS(MBM_INVALID_ARGUMENT, mbm_client_beginAscii(&client, &port, frame, 16));
-    IS(MBM_NOT_INITIALISED, mbm_client_poll(&client));
-    OK(mbm_client_beginAscii(&client, &port, frame, 17));
-}
-
 /* Several clients and several servers on one simulated multi-drop bus. By the standard a
  * serial line has one client. Two clients that take turns work. Two that do not may fail,
  * but get no wrong data. */

@@ -560,17 +560,13 @@ TEST(null_returns_nothing_and_adds_nothing)
 
     length = hex_bytes(pdu, "14 07 06 0004 0001 0002");
     OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, length, &packet));
-    assert_false(mbm_packet_nextRecord(NULL, &cursor, &record));
     assert_false(mbm_packet_nextRecord(&packet, NULL, &record));
     assert_false(mbm_packet_nextRecord(&packet, &cursor, NULL));
-    assert_false(mbm_packet_nextObject(NULL, &cursor, &object));
     cursor = 0xFFFF;
     assert_false(mbm_packet_nextRecord(&packet, &cursor, &record));
     packet.dataLength = 0;
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_addRecord(NULL, storage, 16, &record));
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addRecord(&packet, NULL, 16, &record));
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addRecord(&packet, storage, 16, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_addObject(NULL, storage, 16, &object));
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addObject(&packet, storage, 16, NULL));
     object.length = 1;
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addObject(&packet, storage, 16, &object));

@@ -427,4 +427,3 @@ TEST(coils_are_unpacked_to_one_byte_each)
     assert_memory_equal(coils, on_19, 19);
     assert_int_equal(coils[24], 7);
 }
-

@@ -336,18 +336,10 @@ TEST_WITH(a_begin_while_a_response_is_sent_switches_the_driver_off, reset_for_be
     assert_int_equal(answer(), 7);
 }
 
-TEST_WITH(a_baud_rate_is_refused_except_on_an_rtu_line, reset_for_begin, NULL)
+TEST_WITH(a_refused_baud_rate_leaves_the_silence_of_ascii, reset_for_begin, NULL)
 {
     static const char request[] = ":110300000001EB\r\n", response[] = ":1103020000EA\r\n";
 
-    OK(mbm_server_beginRtu(&server, &port, &unit, 1, begin_frame, sizeof begin_frame));
-    OK(mbm_server_setBaudRate(&server, 115200));
-    OK(mbm_server_setEchoDiscard(&server, 1));
-    OK(mbm_server_setBaudRate(&server, 9600));
-    OK(mbm_server_beginTcp(&server, &port, &unit, 1, begin_frame, sizeof begin_frame));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 9600));
-    OK(mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, begin_frame, sizeof begin_frame));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 9600));
     OK(mbm_server_beginAscii(&server, &port, &unit, 1, begin_frame, sizeof begin_frame));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 115200));
     /* A pause of half a second between two characters does not end an ASCII frame. */

@@ -319,7 +319,7 @@ static void setup(void)
     port = hooked_port_of(&wire);
 }
 
-/* --- promised --- */
+/* --- sniffer --- */
 
 /* The framings, with the frame timeout by default in milliseconds. */
 static const struct {

@@ -425,7 +425,7 @@ TEST_WITH(damaged_extensions_are_read_within_their_bounds, NULL, NULL)
         }
 }
 
-/* --- a server that serves by found --- */
+/* --- a server that serves by role --- */
 
 enum { FIRST_WORD = 100, WORDS = 4 };
 
