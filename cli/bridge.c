@@ -20,6 +20,7 @@ typedef struct bridge {
     broker_options to;
     const char *path;      /* of the file; NULL: the command line has the lines */
     const char *last_line; /* of the command line, whose FILE follows; NULL: it was there */
+    service service;
     bridge_settings settings;
     bridge_line *lines[BRIDGE_LINES];
     unsigned line_count;
@@ -280,7 +281,7 @@ static void rest(bridge *b, uint32_t micros)
         count += (nfds_t)line_polls(polled[count], &polls[count]);
     }
     b->has_events = 1;
-    if (service_wait(polls, count, micros) < 0)
+    if (service_wait(&b->service, polls, count, micros) < 0)
         return;
     b->has_events = polls[0].revents != 0;
     found_port_begin_round(&b->round);
@@ -292,9 +293,9 @@ static void work(bridge *b)
 {
     unsigned i, polls;
 
-    if (service_reload_is_wanted())
+    if (service_reload_is_wanted(&b->service))
         reload(b);
-    service_work();
+    service_work(&b->service);
     if (b->has_events)
         take_events(b);
     for (i = 0; i < b->line_count; i++) {
@@ -414,6 +415,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case 't': take_value(b, state, BRIDGE_TOPIC, text); return 0;
     case 'q': options.is_quiet = 1; return 0;
     case CHECK: b->is_check = 1; return 0;
+    case ARGP_KEY_INIT: state->child_inputs[1] = &b->service; return 0;
     case ARGP_KEY_ARG: read_word(b, state, text); return 0;
     case ARGP_KEY_END: check_options(b, state); return 0;
     default: return ARGP_ERR_UNKNOWN;
@@ -506,7 +508,7 @@ static int begin(bridge *b)
     if (b->is_check)
         return code;
     if (code == CODE_DONE)
-        code = service_begin(fill_stats, b);
+        code = service_begin(&b->service, fill_stats, b);
     if (code == CODE_DONE)
         code = broker_begin(&b->settings.mqtt, &b->to);
     b->aloneSinceMs = line_milliseconds();
@@ -526,7 +528,7 @@ int bridge_command(int argc, char **argv)
         service_is_ready();
         while (!report_stopped)
             work(b);
-        service_end();
+        service_end(&b->service);
         broker_end(&b->settings.mqtt);
         if (!options.is_quiet)
             fprintf(stderr, "%s: messages published: %lu, writes lost: %lu.\n", report_name,

@@ -47,6 +47,7 @@ typedef struct gateway {
     ahead_port aheads[GATEWAY_CONNECTIONS];
     mbm_tcp_listener listener;
     int is_client_waiting; /* at the listener, as far as is known */
+    service service;
     sleep_waits waits;
     found_round round;
     unsigned long connected, reloads, refused_reloads;
@@ -317,7 +318,8 @@ static void wait_for_work(gateway *g)
 {
     const uint32_t delay = list_waits(g);
     const int is_listening = g->listener.events != 0;
-    const int found = service_wait(g->waits.polls, g->waits.count + (nfds_t)is_listening, delay);
+    const int found =
+        service_wait(&g->service, g->waits.polls, g->waits.count + (nfds_t)is_listening, delay);
     const struct pollfd *one = g->waits.polls;
     nfds_t n;
 
@@ -348,9 +350,9 @@ static void work(gateway *g)
 {
     unsigned slot, polls = 0;
 
-    if (service_reload_is_wanted())
+    if (service_reload_is_wanted(&g->service))
         reload(g);
-    service_work();
+    service_work(&g->service);
     if (g->is_client_waiting)
         take_connections(g);
     /* A poll may leave work that waits for nothing: a line has got a request. */
@@ -482,6 +484,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case QUEUE_TIME:
         g->given.queueMs = options_time(state, "--queue-time", text, 0, UINT16_MAX);
         return 0;
+    case ARGP_KEY_INIT: state->child_inputs[0] = &g->service; return 0;
     case ARGP_KEY_ARG: read_word(g, state, text); return 0;
     case ARGP_KEY_END:
         if (state->arg_num == 0)
@@ -570,7 +573,7 @@ int gateway_command(int argc, char **argv)
         return CODE_SYSTEM;
     if (mbm_tcp_listen(&g->listener, place_host(&g->setup.listen), g->setup.listen.service) != 0)
         return line_cannot_open(&g->setup.listen, g->listener.lookupError);
-    code = service_begin(fill_stats, g);
+    code = service_begin(&g->service, fill_stats, g);
     if (code != CODE_DONE)
         return code;
     printf("ready %u\n", g->listener.port);
@@ -578,7 +581,7 @@ int gateway_command(int argc, char **argv)
     service_is_ready();
     while (!report_stopped)
         work(g);
-    service_end();
+    service_end(&g->service);
     for (i = 0; i < g->config.connectionCount; i++)
         if (mbm_tcp_isInUse(&g->tcps[i]))
             drop_connection(g, i);

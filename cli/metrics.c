@@ -1,3 +1,6 @@
+/* Accepts the connections of scrapers, reads their requests, and answers them.
+ *
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "metrics.h"
 
@@ -15,24 +18,10 @@
 #include <unistd.h>
 
 enum {
-    REQUEST_BYTES = 2048, /* of the longest request */
-    LIFE_MS = 5000,       /* how long a connection may last */
-    RENDER_MS = 100,      /* a text that is not older is sent again */
-    TIRED_MS = 1000       /* the wait after the system had no descriptor */
+    LIFE_MS = 5000,  /* how long a connection may last */
+    RENDER_MS = 100, /* a text that is not older is sent again */
+    TIRED_MS = 1000  /* the wait after the system had no descriptor */
 };
-
-typedef struct visitor {
-    int fd; /* 0: a free place */
-    int64_t sinceMs;
-    size_t have, length, sent;
-    char *reply; /* NULL while the request is read */
-    char request[REQUEST_BYTES];
-} visitor;
-
-static visitor visitors[METRICS_PLACES];
-static int listener = -1, is_ready;
-static char *rendered;
-static int64_t rendered_at, tired_until; /* no connection is accepted before that time */
 
 /* Reads ADDRESS:PORT. Returns NULL, or what is wrong. */
 static const char *read_address(const char *text, struct sockaddr_storage *to, socklen_t *length)
@@ -77,27 +66,29 @@ const char *metrics_check(const char *text)
     return read_address(text, &address, &length);
 }
 
-int metrics_listen(const char *text)
+int metrics_listen(metrics *m, const char *text, char *(*render)(void *context), void *context)
 {
     struct sockaddr_storage address;
     socklen_t length = 0;
     const int on = 1;
 
+    m->render = render;
+    m->context = context;
     if (read_address(text, &address, &length)) {
         errno = EINVAL;
         return -1;
     }
-    listener = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (listener < 0)
+    m->listener = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (m->listener <= 0)
         return -1;
-    (void)setsockopt(listener, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (bind(listener, (struct sockaddr *)&address, length) != 0 ||
-        listen(listener, METRICS_PLACES) != 0 ||
-        getsockname(listener, (struct sockaddr *)&address, &length) != 0) {
+    (void)setsockopt(m->listener, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    if (bind(m->listener, (struct sockaddr *)&address, length) != 0 ||
+        listen(m->listener, METRICS_PLACES) != 0 ||
+        getsockname(m->listener, (struct sockaddr *)&address, &length) != 0) {
         const int error = errno;
 
-        close(listener);
-        listener = -1;
+        close(m->listener);
+        m->listener = 0;
         errno = error;
         return -1;
     }
@@ -105,7 +96,7 @@ int metrics_listen(const char *text)
                                                : ((struct sockaddr_in *)&address)->sin_port);
 }
 
-static void drop(visitor *one)
+static void drop(metrics_visitor *one)
 {
     if (one->fd > 0)
         close(one->fd);
@@ -114,34 +105,34 @@ static void drop(visitor *one)
     one->fd = 0;
 }
 
-nfds_t metrics_wait(struct pollfd *waits)
+nfds_t metrics_wait(const metrics *m, struct pollfd *waits)
 {
     nfds_t count = 0;
     int i;
 
-    if (listener < 0)
+    if (m->listener <= 0)
         return 0;
-    if (clock_milliseconds() >= tired_until)
-        waits[count++] = (struct pollfd){listener, POLLIN, 0};
+    if (clock_milliseconds() >= m->tired_until)
+        waits[count++] = (struct pollfd){m->listener, POLLIN, 0};
     for (i = 0; i < METRICS_PLACES; i++)
-        if (visitors[i].fd > 0)
+        if (m->visitors[i].fd > 0)
             waits[count++] =
-                (struct pollfd){visitors[i].fd, visitors[i].reply ? POLLOUT : POLLIN, 0};
+                (struct pollfd){m->visitors[i].fd, m->visitors[i].reply ? POLLOUT : POLLIN, 0};
     return count;
 }
 
-uint32_t metrics_delay(void)
+uint32_t metrics_delay(const metrics *m)
 {
     uint32_t delay =
-        listener >= 0 && clock_milliseconds() < tired_until ? TIRED_MS * 1000 : UINT32_MAX;
+        m->listener > 0 && clock_milliseconds() < m->tired_until ? TIRED_MS * 1000 : UINT32_MAX;
     int i;
 
     for (i = 0; i < METRICS_PLACES; i++) {
         int64_t left;
 
-        if (visitors[i].fd <= 0)
+        if (m->visitors[i].fd <= 0)
             continue;
-        left = visitors[i].sinceMs + LIFE_MS - clock_milliseconds();
+        left = m->visitors[i].sinceMs + LIFE_MS - clock_milliseconds();
         if (left < 0)
             left = 0;
         if ((uint32_t)left * 1000u < delay)
@@ -151,29 +142,29 @@ uint32_t metrics_delay(void)
 }
 
 /* Accepts one connection a round. If all places are taken, the oldest connection ends. */
-static void take_visitor(void)
+static void take_visitor(metrics *m)
 {
-    visitor *place = visitors;
+    metrics_visitor *place = m->visitors;
     int i, fd;
 
-    if (clock_milliseconds() < tired_until)
+    if (clock_milliseconds() < m->tired_until)
         return;
-    fd = accept4(listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    fd = accept4(m->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd < 0) {
         if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM)
-            tired_until = clock_milliseconds() + TIRED_MS;
+            m->tired_until = clock_milliseconds() + TIRED_MS;
         return;
     }
     for (i = 1; i < METRICS_PLACES && place->fd > 0; i++)
-        if (visitors[i].fd <= 0 || visitors[i].sinceMs < place->sinceMs)
-            place = &visitors[i];
+        if (m->visitors[i].fd <= 0 || m->visitors[i].sinceMs < place->sinceMs)
+            place = &m->visitors[i];
     drop(place);
     place->fd = fd;
     place->sinceMs = clock_milliseconds();
     place->have = place->sent = place->length = 0;
 }
 
-static void answer(visitor *one, const char *status, const char *body)
+static void answer(metrics_visitor *one, const char *status, const char *body)
 {
     static const char FORMAT[] = "HTTP/1.0 %s\r\n"
                                  "Content-Type: text/plain; version=0.0.4; charset=utf-8\r\n"
@@ -189,7 +180,7 @@ static void answer(visitor *one, const char *status, const char *body)
     one->length = (size_t)length;
 }
 
-static void answer_request(visitor *one, char *(*render)(void))
+static void answer_request(metrics *m, metrics_visitor *one)
 {
     if (strncmp(one->request, "GET ", 4) != 0) {
         answer(one, "405 Method Not Allowed", "Only GET is answered.\n");
@@ -200,18 +191,18 @@ static void answer_request(visitor *one, char *(*render)(void))
         answer(one, "404 Not Found", "The numbers are at /metrics.\n");
         return;
     }
-    if (!rendered || clock_milliseconds() - rendered_at >= RENDER_MS) {
-        free(rendered);
-        rendered = render();
-        rendered_at = clock_milliseconds();
+    if (!m->rendered || clock_milliseconds() - m->rendered_at >= RENDER_MS) {
+        free(m->rendered);
+        m->rendered = m->render(m->context);
+        m->rendered_at = clock_milliseconds();
     }
-    if (rendered)
-        answer(one, "200 OK", rendered);
+    if (m->rendered)
+        answer(one, "200 OK", m->rendered);
     else
         answer(one, "500 Internal Server Error", "There is not enough memory.\n");
 }
 
-static void read_request(visitor *one, char *(*render)(void))
+static void read_request(metrics *m, metrics_visitor *one)
 {
     const ssize_t count =
         recv(one->fd, one->request + one->have, sizeof one->request - 1 - one->have, 0);
@@ -225,12 +216,12 @@ static void read_request(visitor *one, char *(*render)(void))
     one->have += (size_t)count;
     one->request[one->have] = '\0';
     if (strstr(one->request, "\r\n\r\n") || strstr(one->request, "\n\n"))
-        answer_request(one, render);
+        answer_request(m, one);
     else if (one->have == sizeof one->request - 1 || strlen(one->request) < one->have)
         answer(one, "400 Bad Request", "The request is too long, or no HTTP.\n");
 }
 
-static void write_reply(visitor *one)
+static void write_reply(metrics_visitor *one)
 {
     const ssize_t count =
         send(one->fd, one->reply + one->sent, one->length - one->sent, MSG_NOSIGNAL);
@@ -243,30 +234,30 @@ static void write_reply(visitor *one)
         drop(one);
 }
 
-void metrics_polled(const struct pollfd *waits, nfds_t count)
+void metrics_polled(metrics *m, const struct pollfd *waits, nfds_t count)
 {
     nfds_t i;
 
     for (i = 0; i < count; i++)
-        is_ready |= waits[i].revents != 0;
+        m->is_ready |= waits[i].revents != 0;
 }
 
-void metrics_work(char *(*render)(void))
+void metrics_work(metrics *m)
 {
     int i;
 
     /* A visitor may be overdue. */
     for (i = 0; i < METRICS_PLACES; i++)
-        is_ready |= visitors[i].fd > 0;
-    if (listener < 0 || !is_ready)
+        m->is_ready |= m->visitors[i].fd > 0;
+    if (m->listener <= 0 || !m->is_ready)
         return;
-    is_ready = 0;
-    take_visitor();
+    m->is_ready = 0;
+    take_visitor(m);
     for (i = 0; i < METRICS_PLACES; i++) {
-        visitor *one = &visitors[i];
+        metrics_visitor *one = &m->visitors[i];
 
         if (one->fd > 0 && !one->reply)
-            read_request(one, render);
+            read_request(m, one);
         if (one->fd > 0 && one->reply)
             write_reply(one);
         if (one->fd > 0 && clock_milliseconds() - one->sinceMs >= LIFE_MS)
@@ -274,15 +265,15 @@ void metrics_work(char *(*render)(void))
     }
 }
 
-void metrics_close(void)
+void metrics_close(metrics *m)
 {
     int i;
 
     for (i = 0; i < METRICS_PLACES; i++)
-        drop(&visitors[i]);
-    if (listener >= 0)
-        close(listener);
-    listener = -1;
-    free(rendered);
-    rendered = NULL;
+        drop(&m->visitors[i]);
+    if (m->listener > 0)
+        close(m->listener);
+    m->listener = 0;
+    free(m->rendered);
+    m->rendered = NULL;
 }

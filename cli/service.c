@@ -8,6 +8,7 @@
 #include "options.h"
 #include "report.h"
 
+#include <cjson/cJSON.h>
 #include <errno.h>
 #include <inttypes.h>
 #include <signal.h>
@@ -21,13 +22,7 @@
 #include <time.h>
 #include <unistd.h>
 
-static const char *stats_path, *metrics_place;
-static uint32_t every; /* milliseconds; 0: only at the end and when SIGUSR1 comes */
-static int64_t next_time;
-static void (*fill_numbers)(void *context, stats *numbers);
-static void *fill_context;
-static sigset_t awake; /* the signal mask during a sleep */
-static int had_terminal, stats_failed;
+/* Set by signals. */
 static volatile sig_atomic_t reload_wanted, stats_wanted;
 
 /* --- signals --- */
@@ -44,7 +39,7 @@ static void on_stats(int number)
     stats_wanted = 1;
 }
 
-static void catch_signals(void)
+static void catch_signals(service *s)
 {
     struct sigaction action = {0};
     sigset_t all;
@@ -59,16 +54,16 @@ static void catch_signals(void)
     sigaddset(&all, SIGHUP);
     sigaddset(&all, SIGUSR1);
     /* pthread_sigmask, because the thread of libmosquitto must not take them either. */
-    pthread_sigmask(SIG_BLOCK, &all, &awake);
-    had_terminal = isatty(0);
+    pthread_sigmask(SIG_BLOCK, &all, &s->awake);
+    s->had_terminal = isatty(0);
 }
 
-int service_reload_is_wanted(void)
+int service_reload_is_wanted(const service *s)
 {
     const int is_wanted = reload_wanted;
 
     reload_wanted = 0;
-    if (is_wanted && had_terminal && !isatty(0)) {
+    if (is_wanted && s->had_terminal && !isatty(0)) {
         report_stopped = 1;
         return 0;
     }
@@ -113,20 +108,134 @@ void service_is_reloading(void)
     notify(text);
 }
 
-/* --- statistics --- */
+/* --- the statistics as JSON --- */
 
-static char *take(char *(*as_text)(const stats *from))
+/* The numbers of a line, in the order of line_values. */
+static const stats_kind OF_LINE[STATS_OF_LINE] = {
+    {"requests", "Requests sent, repetitions too.", 1},
+    {"replies", "Replies to these requests, exceptions too.", 1},
+    {"exceptions", "Replies that were exceptions.", 1},
+    {"timeouts", "Requests without a reply in time.", 1},
+    {"bad_crcs", "Requests whose reply was damaged.", 1},
+    {"foreign_frames", "Frames of other units and late replies.", 1},
+    {"bytes_sent", "Bytes sent.", 1},
+    {"bytes_received", "Bytes received.", 1},
+    {"reconnects", "How often the line was opened again.", 1},
+    {"line_up", "1 while the line is open.", 0},
+};
+
+static void line_values(const stats_line *line, uint64_t values[STATS_OF_LINE])
+{
+    const mbm_counters *counters = line->counters;
+
+    values[0] = counters->requests;
+    values[1] = counters->replies;
+    values[2] = counters->exceptions;
+    values[3] = counters->timeouts;
+    values[4] = counters->badCrc;
+    values[5] = counters->foreignFrames;
+    values[6] = counters->bytesSent;
+    values[7] = counters->bytesReceived;
+    values[8] = line->link && line->link->connected > 0 ? line->link->connected - 1 : 0;
+    values[9] = line->is_up;
+}
+
+/* Both return a text that the caller frees, or NULL without memory. */
+static char *stats_json(const stats *from)
+{
+    cJSON *root = cJSON_CreateObject(), *list;
+    char when[CLOCK_TEXT_BYTES];
+    size_t at, line;
+    char *text;
+
+    cJSON_AddStringToObject(root, "time", clock_now_text(when));
+    cJSON_AddStringToObject(root, "command", from->command);
+    for (at = 0; at < from->count; at++)
+        cJSON_AddNumberToObject(root, from->kinds[at].name, (double)from->values[at]);
+    list = cJSON_AddArrayToObject(root, "lines");
+    for (line = 0; line < from->line_count; line++) {
+        cJSON *one = cJSON_CreateObject();
+        uint64_t values[STATS_OF_LINE];
+
+        line_values(&from->lines[line], values);
+        cJSON_AddStringToObject(one, "line", from->lines[line].name);
+        for (at = 0; at < STATS_OF_LINE; at++)
+            cJSON_AddNumberToObject(one, OF_LINE[at].name, (double)values[at]);
+        cJSON_AddItemToArray(list, one);
+    }
+    text = cJSON_PrintUnformatted(root);
+    cJSON_Delete(root);
+    return text;
+}
+
+/* --- the statistics in Prometheus' text format 0.0.4 --- */
+
+static void print_head(FILE *to, const stats *from, const stats_kind *kind)
+{
+    const char *end = kind->is_counter ? "_total" : "";
+
+    fprintf(to, "# HELP mbm_%s_%s%s %s\n# TYPE mbm_%s_%s%s %s\n", from->command, kind->name, end,
+            kind->help, from->command, kind->name, end, kind->is_counter ? "counter" : "gauge");
+}
+
+/* Backslash, quote and line feed are escaped in the value of a label. */
+static void print_label(FILE *to, const char *text)
+{
+    for (; *text; text++) {
+        if (*text == '\\' || *text == '"')
+            fputc('\\', to);
+        if (*text == '\n')
+            fputs("\\n", to);
+        else
+            fputc(*text, to);
+    }
+}
+
+static char *stats_prometheus(const stats *from)
+{
+    uint64_t values[STATS_OF_LINE];
+    char *text = NULL;
+    size_t length, at, line;
+    FILE *to = open_memstream(&text, &length);
+
+    if (!to)
+        return NULL;
+    for (at = 0; at < from->count; at++) {
+        print_head(to, from, &from->kinds[at]);
+        fprintf(to, "mbm_%s_%s%s %" PRIu64 "\n", from->command, from->kinds[at].name,
+                from->kinds[at].is_counter ? "_total" : "", from->values[at]);
+    }
+    for (at = 0; at < STATS_OF_LINE; at++) {
+        print_head(to, from, &OF_LINE[at]);
+        for (line = 0; line < from->line_count; line++) {
+            line_values(&from->lines[line], values);
+            fprintf(to, "mbm_%s_%s%s{line=\"", from->command, OF_LINE[at].name,
+                    OF_LINE[at].is_counter ? "_total" : "");
+            print_label(to, from->lines[line].name);
+            fprintf(to, "\"} %" PRIu64 "\n", values[at]);
+        }
+    }
+    if (fclose(to) != 0) {
+        free(text);
+        return NULL;
+    }
+    return text;
+}
+
+/* --- writing them --- */
+
+static char *take(service *s, char *(*as_text)(const stats *from))
 {
     static stats numbers;
 
     memset(&numbers, 0, sizeof numbers);
-    fill_numbers(fill_context, &numbers);
+    s->fill_numbers(s->fill_context, &numbers);
     return as_text(&numbers);
 }
 
-static char *render(void)
+static char *render(void *context)
 {
-    return take(stats_prometheus);
+    return take((service *)context, stats_prometheus);
 }
 
 /* Writes a line to a file. Returns 0, or -1 with errno set. */
@@ -166,49 +275,49 @@ static int replace_file(const char *path, const char *text)
 }
 
 /* Writes the statistics. A failure is reported once, until it is over. */
-static void write_stats(void)
+static void write_stats(service *s)
 {
-    char *text = stats_path ? take(stats_json) : NULL;
+    char *text = s->stats_path ? take(s, stats_json) : NULL;
 
-    if (!stats_path)
+    if (!s->stats_path)
         return;
-    if (text && strcmp(stats_path, "-") == 0) {
+    if (text && strcmp(s->stats_path, "-") == 0) {
         puts(text);
         report_flush();
-    } else if (!text || replace_file(stats_path, text) != 0) {
-        if (!stats_failed)
-            report_log(REPORT_ERROR, "%s: %s. The statistics are not written", stats_path,
+    } else if (!text || replace_file(s->stats_path, text) != 0) {
+        if (!s->stats_failed)
+            report_log(REPORT_ERROR, "%s: %s. The statistics are not written", s->stats_path,
                        text ? strerror(errno) : "not enough memory");
-        stats_failed = 1;
+        s->stats_failed = 1;
     } else {
-        if (stats_failed)
-            report_log(REPORT_INFO, "%s: the statistics are written again", stats_path);
-        stats_failed = 0;
+        if (s->stats_failed)
+            report_log(REPORT_INFO, "%s: the statistics are written again", s->stats_path);
+        s->stats_failed = 0;
     }
     free(text);
 }
 
 /* --- the life of a service --- */
 
-int service_begin(void (*fill)(void *context, stats *numbers), void *context)
+int service_begin(service *s, void (*fill)(void *context, stats *numbers), void *context)
 {
-    fill_numbers = fill;
-    fill_context = context;
-    catch_signals();
-    if (metrics_place) {
-        const int port = metrics_listen(metrics_place);
+    s->fill_numbers = fill;
+    s->fill_context = context;
+    catch_signals(s);
+    if (s->metrics_place) {
+        const int port = metrics_listen(&s->metrics, s->metrics_place, render, s);
 
         if (port < 0)
-            return report(CODE_LINE, "--metrics %s: %s", metrics_place, strerror(errno));
+            return report(CODE_LINE, "--metrics %s: %s", s->metrics_place, strerror(errno));
         report_log(REPORT_INFO, "metrics are at port %d, /metrics", port);
     }
-    next_time = clock_milliseconds() + every;
+    s->next_time = clock_milliseconds() + s->every;
     return CODE_DONE;
 }
 
-int service_wait(struct pollfd *polls, nfds_t count, uint32_t micros)
+int service_wait(service *s, struct pollfd *polls, nfds_t count, uint32_t micros)
 {
-    const uint32_t delay = metrics_delay();
+    const uint32_t delay = metrics_delay(&s->metrics);
     struct timespec time;
     nfds_t added;
     int found;
@@ -217,40 +326,40 @@ int service_wait(struct pollfd *polls, nfds_t count, uint32_t micros)
         return 0;
     if (delay < micros)
         micros = delay;
-    if (every > 0) {
-        const int64_t left = next_time - clock_milliseconds();
+    if (s->every > 0) {
+        const int64_t left = s->next_time - clock_milliseconds();
 
         if (left <= 0)
             micros = 0;
         else if (left * 1000 < micros)
             micros = (uint32_t)(left * 1000);
     }
-    added = metrics_wait(polls + count);
+    added = metrics_wait(&s->metrics, polls + count);
     time = (struct timespec){(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
-    found = ppoll(polls, count + added, micros == UINT32_MAX ? NULL : &time, &awake);
+    found = ppoll(polls, count + added, micros == UINT32_MAX ? NULL : &time, &s->awake);
     if (found > 0)
-        metrics_polled(polls + count, added);
+        metrics_polled(&s->metrics, polls + count, added);
     return found;
 }
 
-void service_work(void)
+void service_work(service *s)
 {
-    metrics_work(render);
-    if (every > 0 && clock_milliseconds() >= next_time) {
-        next_time = clock_milliseconds() + every;
+    metrics_work(&s->metrics);
+    if (s->every > 0 && clock_milliseconds() >= s->next_time) {
+        s->next_time = clock_milliseconds() + s->every;
         stats_wanted = 1;
     }
     if (!stats_wanted)
         return;
     stats_wanted = 0;
-    write_stats();
+    write_stats(s);
 }
 
-void service_end(void)
+void service_end(service *s)
 {
     notify("STOPPING=1");
-    write_stats();
-    metrics_close();
+    write_stats(s);
+    metrics_close(&s->metrics);
 }
 
 /* --- the command line --- */
@@ -259,13 +368,16 @@ enum { STATS = 0x3000, STATS_EVERY, METRICS, LOG_LEVEL };
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
+    service *s = (service *)state->input;
     const char *wrong;
 
     switch (key) {
-    case STATS: stats_path = text; return 0;
-    case STATS_EVERY: every = options_time(state, "--stats-every", text, 100, 86400000); return 0;
+    case STATS: s->stats_path = text; return 0;
+    case STATS_EVERY:
+        s->every = options_time(state, "--stats-every", text, 100, 86400000);
+        return 0;
     case METRICS:
-        metrics_place = text;
+        s->metrics_place = text;
         wrong = metrics_check(text);
         if (wrong)
             options_wrong(state, "--metrics \"%s\" %s", text, wrong);
@@ -275,7 +387,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
             report_level_numbers[options_word(state, "--log-level", text, report_level_names)];
         return 0;
     case ARGP_KEY_END:
-        if (every > 0 && !stats_path)
+        if (s->every > 0 && !s->stats_path)
             options_wrong(state, "--stats-every needs --stats");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
