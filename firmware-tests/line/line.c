@@ -34,6 +34,12 @@ static void fail(const char *what)
     exit(1);
 }
 
+void line_expect(bool fact, const char *what)
+{
+    if (!fact)
+        fail(what);
+}
+
 static uint16_t put(struct way *way, const uint8_t *bytes, uint16_t length)
 {
     uint16_t space = (uint16_t)(CAPACITY - way->count - way->arrived);

@@ -49,6 +49,9 @@ void line_replace_device(void (*step)(uint32_t now));
 uint16_t line_read_as_device(uint8_t *bytes, uint16_t capacity);
 uint16_t line_write_as_device(const uint8_t *bytes, uint16_t length);
 
+/* Ends the program with this message unless the fact is true. */
+void line_expect(bool fact, const char *what);
+
 /* Ends the program with success in the first sleep of half a second or more after the device has
  * answered so many requests. */
 void line_end_after(unsigned answers);

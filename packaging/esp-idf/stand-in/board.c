@@ -10,7 +10,6 @@
 #include "sdkconfig.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 
 void app_main(void);
 
@@ -24,14 +23,6 @@ static struct {
 } fifo = {.threshold = 120, .silence = 10};
 
 static int is_installed, is_even, rts = UART_PIN_NO_CHANGE, is_rs485, is_output;
-
-static void expect(int fact, const char *what)
-{
-    if (!fact) {
-        printf("board: %s\n", what);
-        exit(1);
-    }
-}
 
 /* In this mode the UART switches the driver itself. */
 static void drive(bool on)
@@ -49,26 +40,28 @@ void line_interrupt(void)
 esp_err_t uart_driver_install(uart_port_t uart, int rx_size, int tx_size, int queue_size,
                               QueueHandle_t *queue, int flags)
 {
-    expect(!is_installed && uart == CONFIG_METER_UART, "the driver is installed for another UART");
-    expect(rx_size > 128 && tx_size > 2 * MBM_MAX_FRAME, "the buffers are too small");
-    expect(queue_size == 0 && queue == NULL && flags == 0, "the driver is installed with a queue");
+    line_expect(!is_installed && uart == CONFIG_METER_UART,
+                "the driver is installed for another UART");
+    line_expect(rx_size > 128 && tx_size > 2 * MBM_MAX_FRAME, "the buffers are too small");
+    line_expect(queue_size == 0 && queue == NULL && flags == 0,
+                "the driver is installed with a queue");
     is_installed = 1;
     return ESP_OK;
 }
 
 esp_err_t uart_driver_delete(uart_port_t uart)
 {
-    expect(is_installed && uart == CONFIG_METER_UART, "another driver is removed");
+    line_expect(is_installed && uart == CONFIG_METER_UART, "another driver is removed");
     is_installed = 0;
     return ESP_OK;
 }
 
 esp_err_t uart_param_config(uart_port_t uart, const uart_config_t *config)
 {
-    expect(uart == CONFIG_METER_UART && config->data_bits == UART_DATA_8_BITS, "the format");
-    expect(config->stop_bits ==
-               (config->parity == UART_PARITY_DISABLE ? UART_STOP_BITS_2 : UART_STOP_BITS_1),
-           "a character does not have 11 bits");
+    line_expect(uart == CONFIG_METER_UART && config->data_bits == UART_DATA_8_BITS, "the format");
+    line_expect(config->stop_bits ==
+                    (config->parity == UART_PARITY_DISABLE ? UART_STOP_BITS_2 : UART_STOP_BITS_1),
+                "a character does not have 11 bits");
     is_even = config->parity == UART_PARITY_EVEN;
     fifo.byte_us = 11000000u / (uint32_t)config->baud_rate;
     line_begin((uint32_t)config->baud_rate);
@@ -77,16 +70,16 @@ esp_err_t uart_param_config(uart_port_t uart, const uart_config_t *config)
 
 esp_err_t uart_set_pin(uart_port_t uart, int tx, int rx, int rts_pin, int cts)
 {
-    expect(uart == CONFIG_METER_UART && tx == CONFIG_METER_TX_PIN && rx == CONFIG_METER_RX_PIN,
-           "the pins");
-    expect(cts == UART_PIN_NO_CHANGE, "CTS has a pin");
+    line_expect(uart == CONFIG_METER_UART && tx == CONFIG_METER_TX_PIN && rx == CONFIG_METER_RX_PIN,
+                "the pins");
+    line_expect(cts == UART_PIN_NO_CHANGE, "CTS has a pin");
     rts = rts_pin;
     return ESP_OK;
 }
 
 esp_err_t uart_set_mode(uart_port_t uart, uart_mode_t mode)
 {
-    expect(uart == CONFIG_METER_UART && mode == UART_MODE_RS485_HALF_DUPLEX, "the mode");
+    line_expect(uart == CONFIG_METER_UART && mode == UART_MODE_RS485_HALF_DUPLEX, "the mode");
     is_rs485 = 1;
     line_has_driver();
     return ESP_OK;
@@ -103,7 +96,7 @@ esp_err_t uart_set_rx_timeout(uart_port_t uart, const uint8_t characters)
 
 esp_err_t uart_set_rx_full_threshold(uart_port_t uart, int bytes)
 {
-    expect(uart == CONFIG_METER_UART && is_installed, "no driver has a threshold");
+    line_expect(uart == CONFIG_METER_UART && is_installed, "no driver has a threshold");
     if (bytes < 1 || bytes > 127)
         return ESP_FAIL;
     fifo.threshold = bytes;
@@ -112,15 +105,15 @@ esp_err_t uart_set_rx_full_threshold(uart_port_t uart, int bytes)
 
 esp_err_t uart_wait_tx_done(uart_port_t uart, TickType_t ticks)
 {
-    expect(uart == CONFIG_METER_UART && ticks == 0, "the port waits");
+    line_expect(uart == CONFIG_METER_UART && ticks == 0, "the port waits");
     return line_unsent() == 0 ? ESP_OK : ESP_ERR_TIMEOUT;
 }
 
 int uart_write_bytes(uart_port_t uart, const void *bytes, size_t length)
 {
-    expect(uart == CONFIG_METER_UART && is_installed, "no driver to write to");
+    line_expect(uart == CONFIG_METER_UART && is_installed, "no driver to write to");
     drive(true);
-    expect(line_write(bytes, (uint16_t)length) == length, "the transmit buffer is full");
+    line_expect(line_write(bytes, (uint16_t)length) == length, "the transmit buffer is full");
     return (int)length;
 }
 
@@ -144,7 +137,7 @@ static uint16_t take_from_fifo(void *bytes, uint16_t capacity)
 
 int uart_read_bytes(uart_port_t uart, void *bytes, uint32_t capacity, TickType_t ticks)
 {
-    expect(uart == CONFIG_METER_UART && is_installed && ticks == 0, "the port waits");
+    line_expect(uart == CONFIG_METER_UART && is_installed && ticks == 0, "the port waits");
     return take_from_fifo(bytes, (uint16_t)(capacity < UINT16_MAX ? capacity : UINT16_MAX));
 }
 
@@ -156,16 +149,16 @@ int uart_read_bytes(uart_port_t uart, void *bytes, uint32_t capacity, TickType_t
 
 esp_err_t gpio_set_level(gpio_num_t pin, uint32_t level)
 {
-    expect((int)pin == DRIVER_PIN, "another GPIO is set");
+    line_expect((int)pin == DRIVER_PIN, "another GPIO is set");
     line_drive(level != 0);
     return ESP_OK;
 }
 
 esp_err_t gpio_config(const gpio_config_t *config)
 {
-    expect(DRIVER_PIN >= 0 && config->pin_bit_mask == 1ull << DRIVER_PIN &&
-               config->mode == GPIO_MODE_OUTPUT,
-           "another GPIO is set up");
+    line_expect(DRIVER_PIN >= 0 && config->pin_bit_mask == 1ull << DRIVER_PIN &&
+                    config->mode == GPIO_MODE_OUTPUT,
+                "another GPIO is set up");
     is_output = 1;
     line_has_driver();
     return ESP_OK;
@@ -180,9 +173,9 @@ void vTaskDelay(const TickType_t ticks)
 {
     static int is_checked;
 
-    expect(is_even && (DRIVER_PIN < 0 || is_output || (is_rs485 && rts == DRIVER_PIN)),
-           "the line is not set");
-    expect(fifo.threshold == 1, "the FIFO holds bytes back");
+    line_expect(is_even && (DRIVER_PIN < 0 || is_output || (is_rs485 && rts == DRIVER_PIN)),
+                "the line is not set");
+    line_expect(fifo.threshold == 1, "the FIFO holds bytes back");
     if (!is_checked)
         printf("driver: %s\n", is_rs485 ? "by the UART" : is_output ? "by a pin" : "none");
     is_checked = 1;

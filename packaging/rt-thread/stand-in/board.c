@@ -7,7 +7,6 @@
 #include <rthw.h>
 #include <rtthread.h>
 #include <stdbool.h>
-#include <stdlib.h>
 #include <string.h>
 
 extern int (*const stand_in_command)(int, char **);
@@ -18,14 +17,6 @@ struct rt_device {
 
 static struct rt_device uart;
 static bool is_output;
-
-static void expect(bool fact, const char *what)
-{
-    if (!fact) {
-        printf("board: %s\n", what);
-        exit(1);
-    }
-}
 
 void line_interrupt(void) {}
 
@@ -38,14 +29,15 @@ rt_err_t rt_device_control(rt_device_t device, int command, void *argument)
 {
     const struct serial_configure *config = argument;
 
-    expect(device == &uart && command == RT_DEVICE_CTRL_CONFIG && !uart.is_open, "the control");
-    expect(config->data_bits == DATA_BITS_8 && config->parity == PARITY_EVEN &&
-               config->stop_bits == STOP_BITS_1,
-           "the format");
+    line_expect(device == &uart && command == RT_DEVICE_CTRL_CONFIG && !uart.is_open,
+                "the control");
+    line_expect(config->data_bits == DATA_BITS_8 && config->parity == PARITY_EVEN &&
+                    config->stop_bits == STOP_BITS_1,
+                "the format");
 #ifdef RT_USING_SERIAL_V2
-    expect(config->rx_bufsz >= 256, "the buffer is too small");
+    line_expect(config->rx_bufsz >= 256, "the buffer is too small");
 #else
-    expect(config->bufsz >= 256, "the buffer is too small");
+    line_expect(config->bufsz >= 256, "the buffer is too small");
 #endif
     line_begin(config->baud_rate);
     uart.is_configured = true;
@@ -54,12 +46,13 @@ rt_err_t rt_device_control(rt_device_t device, int command, void *argument)
 
 rt_err_t rt_device_open(rt_device_t device, rt_uint16_t flags)
 {
-    expect(device == &uart && uart.is_configured && !uart.is_open, "the device is opened");
+    line_expect(device == &uart && uart.is_configured && !uart.is_open, "the device is opened");
 #ifdef RT_USING_SERIAL_V2
-    expect(flags == (RT_DEVICE_FLAG_RX_NON_BLOCKING | RT_DEVICE_FLAG_TX_BLOCKING), "the flags");
+    line_expect(flags == (RT_DEVICE_FLAG_RX_NON_BLOCKING | RT_DEVICE_FLAG_TX_BLOCKING),
+                "the flags");
     printf("serial framework: 2\n");
 #else
-    expect(flags == (RT_DEVICE_OFLAG_RDWR | RT_DEVICE_FLAG_INT_RX), "the flags");
+    line_expect(flags == (RT_DEVICE_OFLAG_RDWR | RT_DEVICE_FLAG_INT_RX), "the flags");
     printf("serial framework: 1\n");
 #endif
     uart.is_open = true;
@@ -68,20 +61,20 @@ rt_err_t rt_device_open(rt_device_t device, rt_uint16_t flags)
 
 rt_err_t rt_device_close(rt_device_t device)
 {
-    expect(device == &uart && uart.is_open, "another device is closed");
+    line_expect(device == &uart && uart.is_open, "another device is closed");
     uart.is_open = false;
     return RT_EOK;
 }
 
 rt_ssize_t rt_device_read(rt_device_t device, rt_off_t position, void *bytes, rt_size_t size)
 {
-    expect(device == &uart && uart.is_open && position == 0, "no device to read from");
+    line_expect(device == &uart && uart.is_open && position == 0, "no device to read from");
     return line_read(bytes, (uint16_t)size);
 }
 
 rt_ssize_t rt_device_write(rt_device_t device, rt_off_t position, const void *bytes, rt_size_t size)
 {
-    expect(device == &uart && uart.is_open && position == 0, "no device to write to");
+    line_expect(device == &uart && uart.is_open && position == 0, "no device to write to");
     size = line_write(bytes, (uint16_t)size);
     while (line_unsent() > MBM_EXAMPLE_TAIL)
         line_sleep(1);
@@ -90,14 +83,14 @@ rt_ssize_t rt_device_write(rt_device_t device, rt_off_t position, const void *by
 
 void rt_pin_mode(rt_base_t pin, rt_uint8_t mode)
 {
-    expect(pin == MBM_EXAMPLE_DRIVER_PIN && mode == PIN_MODE_OUTPUT, "the mode of a pin");
+    line_expect(pin == MBM_EXAMPLE_DRIVER_PIN && mode == PIN_MODE_OUTPUT, "the mode of a pin");
     is_output = true;
     line_has_driver();
 }
 
 void rt_pin_write(rt_base_t pin, rt_ssize_t value)
 {
-    expect(pin == MBM_EXAMPLE_DRIVER_PIN && is_output, "another pin is set");
+    line_expect(pin == MBM_EXAMPLE_DRIVER_PIN && is_output, "another pin is set");
     line_drive(value == PIN_HIGH);
 }
 
@@ -130,10 +123,10 @@ int main(void)
 {
     line_ignore_after(2);
     if (rt_device_find(MBM_EXAMPLE_UART) == NULL) {
-        expect(stand_in_command(0, NULL) == -RT_ENOENT, "the command finds a device");
+        line_expect(stand_in_command(0, NULL) == -RT_ENOENT, "the command finds a device");
         return 0;
     }
-    expect(stand_in_command(0, NULL) == 0, "the command fails");
-    expect(!uart.is_open, "the device is left open");
+    line_expect(stand_in_command(0, NULL) == 0, "the command fails");
+    line_expect(!uart.is_open, "the device is left open");
     return 0;
 }

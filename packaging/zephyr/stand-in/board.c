@@ -7,7 +7,6 @@
 
 #include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <zephyr/drivers/gpio.h>
 #include <zephyr/drivers/uart.h>
 #include <zephyr/kernel.h>
@@ -22,14 +21,6 @@ static uart_irq_callback_user_data_t call;
 static void *call_data;
 static bool is_configured = STAND_IN_UART_KIND != CONFIGURABLE;
 static bool is_output, has_rx, has_tx, is_inside, is_updated;
-
-static void expect(bool fact, const char *what)
-{
-    if (!fact) {
-        printf("board: %s\n", what);
-        exit(1);
-    }
-}
 
 __attribute__((constructor)) static void begin(void)
 {
@@ -55,7 +46,7 @@ void line_interrupt(void)
         return;
     is_inside = true;
     while ((has_rx && line_received() > 0) || (has_tx && (line_unsent() < FIFO && times < 2))) {
-        expect(times++ < 100, "the handler does not end");
+        line_expect(times++ < 100, "the handler does not end");
         is_updated = false;
         call(&stand_in_uart, call_data);
     }
@@ -64,13 +55,14 @@ void line_interrupt(void)
 
 int uart_configure(const struct device *dev, const struct uart_config *config)
 {
-    expect(dev == &stand_in_uart && config->baudrate == 19200, "the rate");
+    line_expect(dev == &stand_in_uart && config->baudrate == 19200, "the rate");
     if (STAND_IN_UART_KIND != CONFIGURABLE)
         return -ENOSYS;
-    expect(config->parity == UART_CFG_PARITY_EVEN && config->stop_bits == UART_CFG_STOP_BITS_1 &&
-               config->data_bits == UART_CFG_DATA_BITS_8 &&
-               config->flow_ctrl == UART_CFG_FLOW_CTRL_NONE,
-           "the format");
+    line_expect(config->parity == UART_CFG_PARITY_EVEN &&
+                    config->stop_bits == UART_CFG_STOP_BITS_1 &&
+                    config->data_bits == UART_CFG_DATA_BITS_8 &&
+                    config->flow_ctrl == UART_CFG_FLOW_CTRL_NONE,
+                "the format");
     line_begin(config->baudrate);
     is_configured = true;
     return 0;
@@ -78,7 +70,7 @@ int uart_configure(const struct device *dev, const struct uart_config *config)
 
 int uart_config_get(const struct device *dev, struct uart_config *config)
 {
-    expect(dev == &stand_in_uart, "the settings of another UART");
+    line_expect(dev == &stand_in_uart, "the settings of another UART");
     if (STAND_IN_UART_KIND == FIXED)
         return -ENOSYS;
     *config =
@@ -90,7 +82,7 @@ int uart_config_get(const struct device *dev, struct uart_config *config)
 int uart_irq_callback_user_data_set(const struct device *dev, uart_irq_callback_user_data_t wanted,
                                     void *user_data)
 {
-    expect(dev == &stand_in_uart && is_configured, "a handler for another UART");
+    line_expect(dev == &stand_in_uart && is_configured, "a handler for another UART");
     call = wanted;
     call_data = user_data;
     return 0;
@@ -105,14 +97,14 @@ int uart_irq_update(const struct device *dev)
 int uart_irq_rx_ready(const struct device *dev)
 {
     (void)dev;
-    expect(is_updated, "the state is read without uart_irq_update");
+    line_expect(is_updated, "the state is read without uart_irq_update");
     return has_rx && line_received() > 0;
 }
 
 int uart_irq_tx_ready(const struct device *dev)
 {
     (void)dev;
-    expect(is_updated, "the state is read without uart_irq_update");
+    line_expect(is_updated, "the state is read without uart_irq_update");
     return has_tx && line_unsent() < FIFO;
 }
 
@@ -125,7 +117,7 @@ int uart_irq_is_pending(const struct device *dev)
 int uart_irq_tx_complete(const struct device *dev)
 {
     (void)dev;
-    expect(is_updated, "the state is read without uart_irq_update");
+    line_expect(is_updated, "the state is read without uart_irq_update");
     return line_unsent() <= 1;
 }
 
@@ -149,8 +141,9 @@ void uart_irq_tx_disable(const struct device *dev)
 
 int uart_fifo_read(const struct device *dev, uint8_t *bytes, const int size)
 {
-    expect(dev == &stand_in_uart && is_inside, "the FIFO is read outside of the handler");
-    expect(line_received() > 0, "the FIFO is read while it is empty: some drivers wait for a byte");
+    line_expect(dev == &stand_in_uart && is_inside, "the FIFO is read outside of the handler");
+    line_expect(line_received() > 0,
+                "the FIFO is read while it is empty: some drivers wait for a byte");
     return line_read(bytes, (uint16_t)size);
 }
 
@@ -158,7 +151,7 @@ int uart_fifo_fill(const struct device *dev, const uint8_t *bytes, int size)
 {
     int space = FIFO - line_unsent();
 
-    expect(dev == &stand_in_uart && is_inside, "the FIFO is filled outside of the handler");
+    line_expect(dev == &stand_in_uart && is_inside, "the FIFO is filled outside of the handler");
     return line_write(bytes, (uint16_t)(size < space ? size : space));
 }
 
@@ -166,9 +159,9 @@ int uart_fifo_fill(const struct device *dev, const uint8_t *bytes, int size)
 
 int gpio_pin_configure_dt(const struct gpio_dt_spec *pin, gpio_flags_t flags)
 {
-    expect(pin->port == &stand_in_gpio && pin->pin == STAND_IN_PIN &&
-               flags == GPIO_OUTPUT_INACTIVE && !is_output,
-           "another GPIO is set up");
+    line_expect(pin->port == &stand_in_gpio && pin->pin == STAND_IN_PIN &&
+                    flags == GPIO_OUTPUT_INACTIVE && !is_output,
+                "another GPIO is set up");
     is_output = true;
     line_has_driver();
     printf("driver: pin %d of %s\n", pin->pin, pin->port->name);
@@ -177,8 +170,8 @@ int gpio_pin_configure_dt(const struct gpio_dt_spec *pin, gpio_flags_t flags)
 
 int gpio_pin_set_dt(const struct gpio_dt_spec *pin, int value)
 {
-    expect(pin->port == &stand_in_gpio && pin->pin == STAND_IN_PIN && is_output,
-           "another GPIO is set");
+    line_expect(pin->port == &stand_in_gpio && pin->pin == STAND_IN_PIN && is_output,
+                "another GPIO is set");
     line_drive(value != 0);
     return 0;
 }
