@@ -138,6 +138,7 @@ TIMING := $(BUILD)/avr-tests/timing
 TIMING_PARTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%.o,$(wildcard firmware-tests/avr/timing_*.c)) \
                 $(BUILD)/avr-tests/rows.o
 $(TIMING): $(TIMING_PARTS)
+$(AVR_TESTS): $(BUILD)/avr-tests/test.o
 $(AVR_TESTS) $(TIMING): %: %.o $(AVR_SUPPORT)
 	@gcc $^ -lsimavr -lelf -lmodbus -lcmocka -lpthread -o $@
 
@@ -151,6 +152,7 @@ test-firmware-avr: need-avr
 
 UPSTREAM_TEST := $(BUILD)/avr-tests/upstream
 UPSTREAM_WIRE := $(BUILD)/avr-tests/upstream_wire
+$(UPSTREAM_TEST): $(BUILD)/avr-tests/test.o
 $(UPSTREAM_TEST) $(UPSTREAM_WIRE): %: %.o $(BUILD)/avr-tests/upstream_device.o $(AVR_SUPPORT)
 	@gcc $^ -lsimavr -lelf -lmodbus -lcmocka -lpthread -o $@
 .PHONY: test-firmware-upstream

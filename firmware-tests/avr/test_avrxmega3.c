@@ -25,7 +25,7 @@ static size_t request_response(bus *line, const uint8_t *request, size_t length)
     return crc16(line->last, line->length) == 0 ? line->length - 2 : 0;
 }
 
-static void the_avrxmega3_code_serves_and_sends_requests(void **state)
+TEST(the_avrxmega3_code_serves_and_sends_requests)
 {
     static const uint8_t write[] = {UNIT, 6, 0, 0, 0, 1}, read[] = {UNIT, 3, 0, 1, 0, 4};
     static const uint8_t beyond[] = {UNIT, 3, 0, 7, 0, 2};
@@ -35,7 +35,6 @@ static void the_avrxmega3_code_serves_and_sends_requests(void **state)
     bus line;
     server s;
 
-    (void)state;
     server_start(&s, SLAVE);
     bus_open(&line, b, bare.bus, UNIT);
     board_uart(b, '1', peer_libmodbus, &s);
@@ -55,13 +54,4 @@ static void the_avrxmega3_code_serves_and_sends_requests(void **state)
     bus_close(&line);
     server_stop(&s);
     board_free(b);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_avrxmega3_code_serves_and_sends_requests),
-    };
-
-    return cmocka_run_group_tests_name("code for avrxmega3", tests, NULL, NULL);
 }

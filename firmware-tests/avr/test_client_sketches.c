@@ -65,9 +65,8 @@ static void energy_meter_client(const kind *k)
     board_free(b);
 }
 
-static void two_meters_are_read_without_waiting(void **state)
+TEST(two_meters_are_read_without_waiting)
 {
-    (void)state;
     energy_meter_client(&uno);
     energy_meter_client(&mega);
 }
@@ -102,19 +101,17 @@ static void data_logger(const kind *k)
     board_free(b);
 }
 
-static void a_logger_stores_a_mean_each_second(void **state)
+TEST(a_logger_stores_a_mean_each_second)
 {
-    (void)state;
     data_logger(&uno);
     data_logger(&mega);
 }
 
-static void a_logger_counts_what_failed_and_keeps_its_time(void **state)
+TEST(a_logger_counts_what_failed_and_keeps_its_time)
 {
     board *b = kind_start(&mega, "DataLogger");
     printed_text printed = {""};
 
-    (void)state;
     board_uart(b, mega.bus, NULL, NULL);
     board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 3050 * MS));
@@ -127,7 +124,7 @@ static void a_logger_counts_what_failed_and_keeps_its_time(void **state)
 }
 
 /* A reply that the sniffer is to receive, some time after its request. */
-static void sniffer_prints_a_request_and_its_reply(void **state)
+TEST(sniffer_prints_a_request_and_its_reply)
 {
     static const uint8_t request[] = {17, 3, 0, 107, 0, 3, 0x76, 0x87};
     static const uint8_t reply[] = {17, 3, 6, 2, 43, 0, 0, 0, 100, 0xC8, 0xBA};
@@ -137,7 +134,6 @@ static void sniffer_prints_a_request_and_its_reply(void **state)
     wire *bus;
     char *line;
 
-    (void)state;
     bus = board_uart(b, mega.bus, NULL, NULL);
     board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 50 * MS));
@@ -163,16 +159,4 @@ static void sniffer_prints_a_request_and_its_reply(void **state)
     assert_true(is_high(b, mega.led));
     assert_int_equal(bus->frames, 0); /* nothing was sent */
     board_free(b);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(two_meters_are_read_without_waiting),
-        cmocka_unit_test(a_logger_stores_a_mean_each_second),
-        cmocka_unit_test(a_logger_counts_what_failed_and_keeps_its_time),
-        cmocka_unit_test(sniffer_prints_a_request_and_its_reply),
-    };
-
-    return cmocka_run_group_tests_name("sketches of the client's class", tests, NULL, NULL);
 }

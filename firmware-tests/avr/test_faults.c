@@ -225,11 +225,10 @@ static char outcome(const report *r, unsigned n, uint16_t (*value)(unsigned addr
     return '.';
 }
 
-static void no_fault_costs_more_reads_than_expected(void **state)
+TEST(no_fault_costs_more_reads_than_expected)
 {
     unsigned i, n, worse = 0;
 
-    (void)state;
     for (i = 0; i < COUNT(faults); i++) {
         fault f = faults[i];
         report r = run(play_first, &f);
@@ -246,19 +245,18 @@ static void no_fault_costs_more_reads_than_expected(void **state)
     assert_int_equal(worse, 0);
 }
 
-static void a_sketch_linked_with_mrelax_passes_every_fault_too(void **state)
+TEST(a_sketch_linked_with_mrelax_passes_every_fault_too)
 {
     place = "uno-relax";
-    no_fault_costs_more_reads_than_expected(state);
+    no_fault_costs_more_reads_than_expected();
     place = "uno";
 }
 
-static void an_absent_server_is_a_timeout(void **state)
+TEST(an_absent_server_is_a_timeout)
 {
     report r = run(NULL, NULL);
     unsigned n;
 
-    (void)state;
     for (n = 0; n < READS; n++)
         assert_int_equal(r.status[n], MBM_RESPONSE_TIMED_OUT);
 }
@@ -268,13 +266,12 @@ static uint16_t held(unsigned address)
     return server_pattern(address);
 }
 
-static void a_servers_exceptions_are_returned(void **state)
+TEST(a_servers_exceptions_are_returned)
 {
     report r;
     server s;
     unsigned n;
 
-    (void)state;
     server_start(&s, UNIT);
     s.mapping->nb_registers = 310; /* the last two reads are beyond the end */
     r = run(peer_libmodbus, &s);
@@ -289,30 +286,16 @@ static void a_servers_exceptions_are_returned(void **state)
 }
 
 /* The library must read bytes as fast as the line delivers them. */
-static void a_reply_of_64_registers_at_115200_baud_arrives_whole(void **state)
+TEST(a_reply_of_64_registers_at_115200_baud_arrives_whole)
 {
     board *b = start("FullSpeed");
     uint16_t at = board_symbol(b, "report");
     unsigned n;
 
-    (void)state;
     board_uart(b, '0', peer_right, NULL);
     assert_true(board_run_until(b, at, 1, 2000 * MS));
     for (n = 0; n < 3; n++)
         assert_int_equal(board_byte(b, (uint16_t)(at + 1 + n)), MBM_OK);
     assert_int_equal(board_byte(b, (uint16_t)(at + 4)), 0);
     board_free(b);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_fault_costs_more_reads_than_expected),
-        cmocka_unit_test(a_sketch_linked_with_mrelax_passes_every_fault_too),
-        cmocka_unit_test(an_absent_server_is_a_timeout),
-        cmocka_unit_test(a_servers_exceptions_are_returned),
-        cmocka_unit_test(a_reply_of_64_registers_at_115200_baud_arrives_whole),
-    };
-
-    return cmocka_run_group_tests_name("faults on a simulated board", tests, NULL, NULL);
 }

@@ -53,14 +53,13 @@ static void to_server(wire *w, const uint8_t *frames, size_t length)
     assert_int_equal(length, 0);
 }
 
-static void the_tcp_client_reads_and_writes_a_device(void **state)
+TEST(the_tcp_client_reads_and_writes_a_device)
 {
     board *b = kind_start(&uno, "TcpClient");
     tcp_server s;
     wire *network;
     int fd;
 
-    (void)state;
     tcp_server_start(&s);
     s.mapping->tab_registers[10] = 300;
     s.mapping->tab_registers[11] = 33;
@@ -163,9 +162,8 @@ static void tcp_server_sketch(const kind *k)
     board_free(b);
 }
 
-static void the_tcp_server_serves_a_sensor_and_a_relay(void **state)
+TEST(the_tcp_server_serves_a_sensor_and_a_relay)
 {
-    (void)state;
     tcp_server_sketch(&uno);
     tcp_server_sketch(&mega);
 }
@@ -192,13 +190,12 @@ static int asks_a_unit_of_no_line(modbus_t *peer)
     return modbus_read_registers(peer, 3, 1, words) < 0 ? errno : 0;
 }
 
-static void the_gateway_passes_requests_to_its_line(void **state)
+TEST(the_gateway_passes_requests_to_its_line)
 {
     board *b = kind_start(&mega, "TcpToRtuGateway");
     wire *network, *line;
     server device;
 
-    (void)state;
     server_start(&device, 17);
     line = board_uart(b, '0', peer_libmodbus, &device);
     network = board_uart(b, '1', to_client, NULL);
@@ -213,15 +210,4 @@ static void the_gateway_passes_requests_to_its_line(void **state)
     assert_int_equal(line->frames, 2);
     server_stop(&device);
     board_free(b);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_tcp_client_reads_and_writes_a_device),
-        cmocka_unit_test(the_tcp_server_serves_a_sensor_and_a_relay),
-        cmocka_unit_test(the_gateway_passes_requests_to_its_line),
-    };
-
-    return cmocka_run_group_tests_name("sketches with a network", tests, NULL, NULL);
 }

@@ -91,17 +91,17 @@ static int relay(const served *s)
     return is_high(s->line.on, s->on->pin4);
 }
 
-#define ON_ALL(test)                                                                               \
-    static void test(void **state)                                                                 \
+/* A test on each kind of board. */
+#define ON_ALL(name)                                                                               \
+    static void name##_on(const kind *k);                                                          \
+    TEST(name)                                                                                     \
     {                                                                                              \
-        unsigned i;                                                                                \
-                                                                                                   \
-        (void)state;                                                                               \
-        for (i = 0; i < COUNT(kinds); i++)                                                         \
-            test##_on(kinds[i]);                                                                   \
-    }
+        for (unsigned i = 0; i < COUNT(kinds); i++)                                                \
+            name##_on(kinds[i]);                                                                   \
+    }                                                                                              \
+    static void name##_on(const kind *k)
 
-static void the_sensor_is_an_input_register_on(const kind *k)
+ON_ALL(the_sensor_is_an_input_register)
 {
     static const unsigned volts[] = {1250, 5000, 0};
     static const uint16_t readings[] = {256, 1023, 0};
@@ -124,9 +124,8 @@ static void the_sensor_is_an_input_register_on(const kind *k)
     assert_int_equal(s->responses, 4);
     done(s);
 }
-ON_ALL(the_sensor_is_an_input_register)
 
-static void the_relay_is_a_coil_on(const kind *k)
+ON_ALL(the_relay_is_a_coil)
 {
     served *s = example(k);
     uint8_t on = 7;
@@ -150,9 +149,8 @@ static void the_relay_is_a_coil_on(const kind *k)
     assert_int_equal(relay(s), 0);
     done(s);
 }
-ON_ALL(the_relay_is_a_coil)
 
-static void access_to_absent_data_gets_an_exception_on(const kind *k)
+ON_ALL(access_to_absent_data_gets_an_exception)
 {
     static const uint8_t no_quantity[] = {17, 4, 0, 0, 0, 0}, no_level[] = {17, 5, 0, 0, 1, 2};
     served *s = example(k);
@@ -174,7 +172,6 @@ static void access_to_absent_data_gets_an_exception_on(const kind *k)
     assert_int_equal(relay(s), 0);
     done(s);
 }
-ON_ALL(access_to_absent_data_gets_an_exception)
 
 /* Sets coil 0 with a request to `unit`, which gets no response: the client waits for one,
  * also after a broadcast. Returns the coil as unit 17 has it then. */
@@ -196,7 +193,7 @@ static uint8_t coil_after_write_to(served *s, int unit)
     return on;
 }
 
-static void other_units_and_damaged_frames_get_no_response_on(const kind *k)
+ON_ALL(other_units_and_damaged_frames_get_no_response)
 {
     static const uint8_t broadcast_read[] = {0, 1, 0, 0, 0, 1};
     uint8_t frame[16] = {17, 5, 0, 0, 0xFF, 0};
@@ -225,9 +222,8 @@ static void other_units_and_damaged_frames_get_no_response_on(const kind *k)
     assert_int_equal(s->responses, 1);
     done(s);
 }
-ON_ALL(other_units_and_damaged_frames_get_no_response)
 
-static void a_broadcast_switches_the_relay_without_a_response_on(const kind *k)
+ON_ALL(a_broadcast_switches_the_relay_without_a_response)
 {
     served *s = example(k);
 
@@ -236,11 +232,10 @@ static void a_broadcast_switches_the_relay_without_a_response_on(const kind *k)
     assert_int_equal(s->responses, 1);
     done(s);
 }
-ON_ALL(a_broadcast_switches_the_relay_without_a_response)
 
 /* --- four arrays, two units, a function of the sketch */
 
-static void arrays_units_hooks_and_a_function_are_served(void **state)
+TEST(arrays_units_hooks_and_a_function_are_served)
 {
     static const uint8_t busy[] = {17, 6, 0, 100, 0xFF, 0}, nothing[] = {17, 65};
     static const uint8_t adds[] = {17, 65, 200, 100, 7}, sum[] = {17, 65, 1, 51};
@@ -251,7 +246,6 @@ static void arrays_units_hooks_and_a_function_are_served(void **state)
     unsigned i;
     bus l;
 
-    (void)state;
     bus_open(&l, b, '0', 17);
     assert_true(board_run_until(b, report, 1, 100 * MS));
     for (i = 0; i < 64; i++)
@@ -317,18 +311,4 @@ static void arrays_units_hooks_and_a_function_are_served(void **state)
     assert_int_equal(back[1], 0x1818);
     bus_close(&l);
     board_free(b);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_sensor_is_an_input_register),
-        cmocka_unit_test(the_relay_is_a_coil),
-        cmocka_unit_test(access_to_absent_data_gets_an_exception),
-        cmocka_unit_test(other_units_and_damaged_frames_get_no_response),
-        cmocka_unit_test(a_broadcast_switches_the_relay_without_a_response),
-        cmocka_unit_test(arrays_units_hooks_and_a_function_are_served),
-    };
-
-    return cmocka_run_group_tests_name("sketches that serve", tests, NULL, NULL);
 }

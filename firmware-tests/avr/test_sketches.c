@@ -34,20 +34,18 @@ static void first_read(const kind *k)
     board_free(b);
 }
 
-static void first_read_reads_what_the_server_holds(void **state)
+TEST(first_read_reads_what_the_server_holds)
 {
-    (void)state;
     first_read(&uno);
     first_read(&mega);
 }
 
-static void first_read_prints_that_there_is_no_answer(void **state)
+TEST(first_read_prints_that_there_is_no_answer)
 {
     board *b = kind_start(&mega, "FirstRead");
     printed_text printed = {""};
     wire *bus;
 
-    (void)state;
     bus = board_uart(b, mega.bus, NULL, NULL);
     board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 2500 * MS));
@@ -78,27 +76,24 @@ static void write_and_read_back(const kind *k)
     board_free(b);
 }
 
-static void write_and_read_back_writes_to_the_server(void **state)
+TEST(write_and_read_back_writes_to_the_server)
 {
-    (void)state;
     write_and_read_back(&uno);
     write_and_read_back(&mega);
 }
 
-static void the_largest_chips_with_the_unos_instructions_read_and_write(void **state)
+TEST(the_largest_chips_with_the_unos_instructions_read_and_write)
 {
     static const kind *const chips[] = {&older_mega, &atmega644p, &atmega1284p};
 
-    (void)state;
     for (unsigned i = 0; i < sizeof chips / sizeof chips[0]; i++) {
         first_read(chips[i]);
         write_and_read_back(chips[i]);
     }
 }
 
-static void chips_with_one_uart_have_the_bus_on_it(void **state)
+TEST(chips_with_one_uart_have_the_bus_on_it)
 {
-    (void)state;
     first_read(&atmega328);
     first_read(&atmega644);
 }
@@ -152,9 +147,8 @@ static void half_duplex(const kind *k)
     board_free(b);
 }
 
-static void the_driver_is_on_from_the_first_to_the_last_bit(void **state)
+TEST(the_driver_is_on_from_the_first_to_the_last_bit)
 {
-    (void)state;
     half_duplex(&uno);
     half_duplex(&mega);
 }
@@ -191,9 +185,8 @@ static void several_slaves(const kind *k)
     board_free(b);
 }
 
-static void several_slaves_answer_by_their_units(void **state)
+TEST(several_slaves_answer_by_their_units)
 {
-    (void)state;
     several_slaves(&uno);
     several_slaves(&mega);
 }
@@ -224,9 +217,8 @@ static void non_blocking(const kind *k, int answers)
     board_free(b);
 }
 
-static void without_waiting_the_led_blinks_on(void **state)
+TEST(without_waiting_the_led_blinks_on)
 {
-    (void)state;
     non_blocking(&uno, 1);
     non_blocking(&uno, 0);
     non_blocking(&mega, 1);
@@ -273,19 +265,17 @@ static void energy_meter(const kind *k)
     board_free(b);
 }
 
-static void an_energy_meters_values_or_the_reason_why_not_are_printed(void **state)
+TEST(an_energy_meters_values_or_the_reason_why_not_are_printed)
 {
-    (void)state;
     energy_meter(&uno);
     energy_meter(&mega);
 }
 
-static void values_pass_between_sketch_and_archive(void **state)
+TEST(values_pass_between_sketch_and_archive)
 {
     board *b = kind_start(&uno, "Values");
     printed_text printed = {""};
 
-    (void)state;
     board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 100 * MS));
     assert_string_equal(printed.text, "none\r\n");
@@ -311,9 +301,8 @@ static void basic(const kind *k)
     board_free(b);
 }
 
-static void basic_counts_in_the_server(void **state)
+TEST(basic_counts_in_the_server)
 {
-    (void)state;
     basic(&uno);
     basic(&relaxed);
     basic(&mega);
@@ -375,9 +364,8 @@ static void phoenix_contact(const kind *k)
     board_free(b);
 }
 
-static void phoenix_contact_makes_its_requests(void **state)
+TEST(phoenix_contact_makes_its_requests)
 {
-    (void)state;
     phoenix_contact(&uno);
     phoenix_contact(&relaxed);
     phoenix_contact(&mega);
@@ -433,9 +421,8 @@ static void rates(const kind *k)
     board_free(b);
 }
 
-static void a_uart_of_an_avr_keeps_t3_5_of_its_rate_without_being_told(void **state)
+TEST(a_uart_of_an_avr_keeps_t3_5_of_its_rate_without_being_told)
 {
-    (void)state;
     rates(&uno);
     rates(&mega);
 }
@@ -463,26 +450,24 @@ static void silences_of(const kind *k, const unsigned *uart, unsigned count)
     board_free(b);
 }
 
-static void the_silence_is_that_of_the_port_unless_the_sketch_has_set_it(void **state)
+TEST(the_silence_is_that_of_the_port_unless_the_sketch_has_set_it)
 {
     /* The third request comes after those over the pins. On an Uno the objects share a line, so
      * setGap of one object holds for all. */
     static const unsigned on_uno[] = {0, 1750, 0, 1750, 1750, 4000, 1750, 9000, 9000, 9000, 4010};
     static const unsigned on_mega[] = {0, 1750, 0, 1750, 1750, 4000, 1750, 9000, 9000, 1750, 4010};
 
-    (void)state;
     silences_of(&uno, on_uno, COUNT(on_uno));
     silences_of(&mega, on_mega, COUNT(on_mega));
 }
 
-static void a_bus_on_two_pins_works(void **state)
+TEST(a_bus_on_two_pins_works)
 {
     board *b = kind_start(&uno, "Soft");
     uint16_t report = board_symbol(b, "report");
     unsigned i;
     server s;
 
-    (void)state;
     server_start(&s, 1);
     /* Pins 10 and 11 are port B, bits 2 and 3. */
     board_pins(b, 'B', 2, 3, 9600, peer_libmodbus, &s);
@@ -498,13 +483,12 @@ static void a_bus_on_two_pins_works(void **state)
     board_free(b);
 }
 
-static void two_ports_are_polled_at_once(void **state)
+TEST(two_ports_are_polled_at_once)
 {
     board *b = kind_start(&mega, "TwoPorts");
     uint16_t report = board_symbol(b, "report");
     server left, right;
 
-    (void)state;
     server_start(&left, 1);
     server_start(&right, 2);
     board_uart(b, '1', peer_libmodbus, &left);
@@ -522,7 +506,7 @@ static void two_ports_are_polled_at_once(void **state)
 }
 
 /* The request takes 8 characters of 0.52 ms; the timeout begins with its last bit. */
-static void a_call_without_reply_takes_the_timeout_and_what_is_left_of_the_quiet_time(void **state)
+TEST(a_call_without_reply_takes_the_timeout_and_what_is_left_of_the_quiet_time)
 {
     static const unsigned left[] = {0, 0, 50, 100};
     board *b = kind_start(&uno, "NoReply");
@@ -530,7 +514,6 @@ static void a_call_without_reply_takes_the_timeout_and_what_is_left_of_the_quiet
     wire *bus = board_uart(b, '0', NULL, NULL);
     unsigned i;
 
-    (void)state;
     assert_true(board_run_until(b, report, 1, 2000 * MS));
     assert_int_equal(bus->frames, 4);
     for (i = 0; i < 4; i++) {
@@ -541,14 +524,13 @@ static void a_call_without_reply_takes_the_timeout_and_what_is_left_of_the_quiet
     board_free(b);
 }
 
-static void calls_of_version_0_9_work_on_a_second_port(void **state)
+TEST(calls_of_version_0_9_work_on_a_second_port)
 {
     board *b = kind_start(&mega, "OlderCalls");
     uint16_t report = board_symbol(b, "report");
     unsigned i;
     server s;
 
-    (void)state;
     server_start(&s, 2);
     board_uart(b, '1', peer_libmodbus, &s);
     assert_true(board_run_until(b, report, 1, 2000 * MS));
@@ -564,30 +546,4 @@ static void calls_of_version_0_9_work_on_a_second_port(void **state)
         assert_int_equal(s.mapping->tab_bits[50 + i], i % 2 == 0);
     server_stop(&s);
     board_free(b);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(first_read_reads_what_the_server_holds),
-        cmocka_unit_test(first_read_prints_that_there_is_no_answer),
-        cmocka_unit_test(write_and_read_back_writes_to_the_server),
-        cmocka_unit_test(the_largest_chips_with_the_unos_instructions_read_and_write),
-        cmocka_unit_test(chips_with_one_uart_have_the_bus_on_it),
-        cmocka_unit_test(the_driver_is_on_from_the_first_to_the_last_bit),
-        cmocka_unit_test(several_slaves_answer_by_their_units),
-        cmocka_unit_test(without_waiting_the_led_blinks_on),
-        cmocka_unit_test(an_energy_meters_values_or_the_reason_why_not_are_printed),
-        cmocka_unit_test(values_pass_between_sketch_and_archive),
-        cmocka_unit_test(basic_counts_in_the_server),
-        cmocka_unit_test(phoenix_contact_makes_its_requests),
-        cmocka_unit_test(a_uart_of_an_avr_keeps_t3_5_of_its_rate_without_being_told),
-        cmocka_unit_test(the_silence_is_that_of_the_port_unless_the_sketch_has_set_it),
-        cmocka_unit_test(a_bus_on_two_pins_works),
-        cmocka_unit_test(two_ports_are_polled_at_once),
-        cmocka_unit_test(a_call_without_reply_takes_the_timeout_and_what_is_left_of_the_quiet_time),
-        cmocka_unit_test(calls_of_version_0_9_work_on_a_second_port),
-    };
-
-    return cmocka_run_group_tests_name("sketches on simulated boards", tests, NULL, NULL);
 }

@@ -88,50 +88,32 @@ static void half_duplex(const kind *k, const char *sketch)
     board_free(b);
 }
 
-static void basic_of_2_0_1_counts_in_the_server(void **state)
+TEST(basic_of_2_0_1_counts_in_the_server)
 {
-    (void)state;
     for (unsigned i = 0; i < BOARDS; i++)
         basic(boards[i], "upstream-basic-2");
 }
 
-static void basic_of_0_9_counts_in_the_server(void **state)
+TEST(basic_of_0_9_counts_in_the_server)
 {
-    (void)state;
     for (unsigned i = 0; i < BOARDS; i++)
         basic(boards[i], "upstream-basic-09");
 }
 
-static void phoenix_contact_of_2_0_1_makes_its_calls(void **state)
+TEST(phoenix_contact_of_2_0_1_makes_its_calls)
 {
-    (void)state;
     for (unsigned i = 0; i < BOARDS; i++)
         phoenix_contact(boards[i], "upstream-phoenix-2");
 }
 
-static void phoenix_contact_of_0_9_makes_its_calls(void **state)
+TEST(phoenix_contact_of_0_9_makes_its_calls)
 {
-    (void)state;
     for (unsigned i = 0; i < BOARDS; i++)
         phoenix_contact(boards[i], "upstream-phoenix-09");
 }
 
-static void half_duplex_of_2_0_1_switches_its_driver(void **state)
+TEST(half_duplex_of_2_0_1_switches_its_driver)
 {
-    (void)state;
     for (unsigned i = 0; i < BOARDS; i++)
         half_duplex(boards[i], "upstream-halfduplex-2");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(basic_of_2_0_1_counts_in_the_server),
-        cmocka_unit_test(phoenix_contact_of_2_0_1_makes_its_calls),
-        cmocka_unit_test(half_duplex_of_2_0_1_switches_its_driver),
-        cmocka_unit_test(basic_of_0_9_counts_in_the_server),
-        cmocka_unit_test(phoenix_contact_of_0_9_makes_its_calls),
-    };
-
-    return cmocka_run_group_tests_name("examples of ModbusMaster", tests, NULL, NULL);
 }
