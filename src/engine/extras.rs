@@ -100,7 +100,7 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
         if self.phase <= Phase::Gap {
             return;
         }
-        let more: u16 = (self.sent - self.counted).into();
+        let more = (self.sent - self.counted).to_u16();
         storage.count(Counter::BytesSent, more.into());
         let is_over = status != Status::PENDING;
         if self.counted == S::Count::ZERO && (is_over || more > 0) {

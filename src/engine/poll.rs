@@ -396,7 +396,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             // The port may take the next byte at any time.
             _ if self.has_more || self.phase == Phase::Send => return 0,
             Phase::Flush => {
-                let sent = self.sent.into();
+                let sent = self.sent.to_u16();
                 (
                     sure_to_be_sending(self.settings.character, sent),
                     self.begun,

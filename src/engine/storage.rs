@@ -45,7 +45,6 @@ pub trait Count:
     + AddAssign
     + SubAssign
     + From<u8>
-    + Into<u16>
     + Into<usize>
 {
     /// No byte.
@@ -56,6 +55,9 @@ pub trait Count:
 
     /// The next number; the greatest one stays.
     fn next(self) -> Self;
+
+    /// The number in 16 bits.
+    fn to_u16(self) -> u16;
 }
 
 impl Count for u8 {
@@ -67,6 +69,10 @@ impl Count for u8 {
 
     fn next(self) -> Self {
         self.wrapping_add(u8::from(self != u8::MAX))
+    }
+
+    fn to_u16(self) -> u16 {
+        self.into()
     }
 }
 
@@ -80,12 +86,32 @@ impl Count for u16 {
     fn next(self) -> Self {
         self.saturating_add(1)
     }
+
+    fn to_u16(self) -> u16 {
+        self
+    }
 }
 
-/// The memory of an engine: a frame buffer, and counters.
+impl Count for usize {
+    const ZERO: Self = 0;
+
+    fn of(bytes: usize) -> Self {
+        bytes
+    }
+
+    fn next(self) -> Self {
+        self.saturating_add(1)
+    }
+
+    fn to_u16(self) -> u16 {
+        self as u16
+    }
+}
+
+/// The memory of an engine or a server: a frame buffer, and counters.
 ///
-/// The engine keeps every index and count within [`Storage::capacity`], so an implementation need
-/// not check them.
+/// They keep every index and count within [`Storage::capacity`], so an implementation need not
+/// check them.
 pub trait Storage {
     /// The type of lengths and indexes.
     type Count: Count;
@@ -186,6 +212,37 @@ impl<F: AsRef<[u8]> + AsMut<[u8]>> Storage for Frame<F> {
         bytes.unwrap_or_default()
     }
 }
+
+macro_rules! bytes_are_a_frame_buffer {
+    ($(($($generics:tt)*) $type:ty),*) => {$(
+        impl<$($generics)*> Storage for $type {
+            type Count = usize;
+
+            fn capacity(&self) -> usize {
+                self.len()
+            }
+
+            fn byte(&self, index: usize) -> u8 {
+                self.get(index).copied().unwrap_or(0)
+            }
+
+            fn set_byte(&mut self, index: usize, byte: u8) {
+                self.bytes(index, 1).fill(byte);
+            }
+
+            fn slice(&self, index: usize, count: usize) -> &[u8] {
+                self.get(index..index + count).unwrap_or_default()
+            }
+
+            fn bytes(&mut self, index: usize, count: usize) -> &mut [u8] {
+                self.get_mut(index..index + count).unwrap_or_default()
+            }
+        }
+    )*};
+}
+
+// The frame buffers of a server in Rust. As of a `Frame`, a byte out of range reads 0.
+bytes_are_a_frame_buffer!((const N: usize) [u8; N], () &mut [u8]);
 
 /// The memory of a master in Rust. A word out of range is not filled, and is sent as 0.
 #[derive(Clone, Hash, Debug, Default)]

@@ -98,33 +98,51 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     pub fn begin_rtu(&mut self) {
         // If the buffer is too short for any frame, this wraps. `Server::pdu` is then empty.
         let space = self.storage.capacity().wrapping_sub(rtu::OVERHEAD);
-        self.begin(1, space, Self::receive_rtu, Self::encode_rtu);
+        self.begin(
+            (rtu::PDU, SERIAL),
+            space,
+            Self::receive_rtu,
+            Self::encode_rtu,
+        );
         self.silence = time::DEFAULT_SILENCE;
-        self.request.own = SERIAL;
     }
 
     /// Begins with RTU frames in a TCP stream. Silence does not separate frames there.
     pub fn begin_rtu_over_tcp(&mut self) {
-        let space = rtu_space(self.storage.frame().len());
-        self.begin(1, space, Self::receive_by_length, Self::encode_rtu);
+        let space = rtu_space(self.storage.capacity());
+        self.begin(
+            (rtu::PDU, STREAM),
+            space,
+            Self::receive_by_length,
+            Self::encode_rtu,
+        );
         self.crc = Crc16::START;
         self.set_silence(STREAM_TIMEOUT);
     }
 
     /// Begins with ASCII frames on a serial line.
     pub fn begin_ascii(&mut self) {
-        let space = ascii_space(self.storage.frame().len());
-        self.begin(1, space, Self::receive_ascii, Self::encode_ascii);
+        let space = ascii_space(self.storage.capacity());
+        self.begin(
+            (rtu::PDU, SERIAL),
+            space,
+            Self::receive_ascii,
+            Self::encode_ascii,
+        );
         self.crc = Crc16::START;
         self.delimiter = ascii::END;
         self.set_silence(ASCII_TIMEOUT);
-        self.request.own = SERIAL;
     }
 
     /// Begins with Modbus TCP frames.
     pub fn begin_tcp(&mut self) {
-        let space = tcp_space(self.storage.frame().len());
-        self.begin(tcp::PDU as u8, space, Self::receive_tcp, Self::encode_tcp);
+        let space = tcp_space(self.storage.capacity());
+        self.begin(
+            (tcp::PDU, STREAM),
+            space,
+            Self::receive_tcp,
+            Self::encode_tcp,
+        );
         self.read_ahead = 0;
         self.set_silence(0);
     }
@@ -163,7 +181,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             self.give_up_echo();
             return Status::OK;
         }
-        let start = rtu::find_last(self.storage.part(0, end));
+        let start = rtu::find_last(self.storage.slice(0, end));
         let (mut first, mut awaited) = (0, 0);
         let announced = loop {
             let announced = self.announced_end(first, serves);
@@ -179,11 +197,11 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             self.wait_for(awaited - end, self.deadline);
             return Status::OK;
         }
-        self.storage.keep(start, end);
         let length = end - start;
+        self.storage.move_down(start, length);
         let echo = self.echo.to_bytes();
         if length == usize::from(self.sent)
-            && *self.storage.part(length - 2, length) == echo
+            && *self.storage.slice(length - 2, 2) == echo
             && !(self.has_no_echo && length == usize::from(self.request.length) + rtu::OVERHEAD)
         {
             self.has_no_echo = false;
@@ -195,7 +213,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             // The length is that of a response. So the receiver may get the bytes that the
             // driver sends. The bit keeps the units from serving the frame.
             self.has_no_echo = false;
-            if let [function] = self.storage.part(rtu::PDU, rtu::PDU + 1) {
+            if let [function] = self.storage.bytes(rtu::PDU, 1) {
                 *function |= EXCEPTION;
             }
         } else if start == 0 && length > rtu::OVERHEAD {
@@ -253,8 +271,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     fn last_frame(&mut self) -> Status {
         self.crc = Crc16::START;
         let end = usize::from(self.end);
-        let start = rtu::find_last(self.storage.part(0, end));
-        self.storage.keep(start, end);
+        let start = rtu::find_last(self.storage.slice(0, end));
+        self.storage.move_down(start, end - start);
         self.found_frame(end - start)
     }
 
@@ -296,9 +314,10 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.request.overrun = true;
         let capacity = self.storage.capacity();
         let newest = self.storage.byte(0);
-        self.storage.keep(DROPPED_AT_ONCE, capacity);
+        self.storage
+            .move_down(DROPPED_AT_ONCE, capacity - DROPPED_AT_ONCE);
         let place = capacity.wrapping_sub(DROPPED_AT_ONCE);
-        if let [byte] = self.storage.part(place, place + 1) {
+        if let [byte] = self.storage.bytes(place, 1) {
             *byte = newest;
         }
         place
@@ -322,9 +341,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         let mut taken = 0;
         while taken < MAX_BYTES_PER_POLL {
             let end = usize::from(self.end);
-            let frame = self.storage.frame();
-            let capacity = frame.len();
-            let pdu = frame.get(rtu::PDU..end).unwrap_or_default();
+            let capacity = self.storage.capacity();
+            let frame = self.storage.slice(0, end);
+            let pdu = frame.get(rtu::PDU..).unwrap_or_default();
             let code = pdu.first().copied().unwrap_or(0);
             let total = match self.length(code) {
                 _ if self.resyncing => None,
@@ -364,15 +383,19 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             response: rule,
         });
         let end = usize::from(self.end);
-        let pdu = self.storage.frame().get(rtu::PDU..end).unwrap_or_default();
+        let pdu = self
+            .storage
+            .slice(0, end)
+            .get(rtu::PDU..)
+            .unwrap_or_default();
         length::request(pdu, function.as_slice())
     }
 
     fn encode_rtu(&mut self, length: usize) -> usize {
         let end = rtu::PDU + length;
-        self.echo = Crc16::START.with(self.storage.part(0, end));
+        self.echo = Crc16::START.with(self.storage.slice(0, end));
         let crc = self.echo.to_bytes();
-        if let [low, high] = self.storage.part(end, end + 2) {
+        if let [low, high] = self.storage.bytes(end, 2) {
             [*low, *high] = crc;
         }
         end + 2
@@ -410,14 +433,14 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             };
             match ascii::kind_of(before, last, delimiter) {
                 CharacterKind::Start => {
-                    self.storage.part(0, 1).fill(last);
+                    self.storage.set_byte(0, last);
                     self.end = 1;
                 }
                 CharacterKind::Inside if end == 0 => self.end = 0,
                 CharacterKind::Inside => {}
                 CharacterKind::End => {
                     self.end = end as u16 + 1;
-                    let crc = Crc16::START.with(self.storage.part(0, end + 1));
+                    let crc = Crc16::START.with(self.storage.slice(0, end + 1));
                     // On a line without an echo, the bytes of the request are the same write again.
                     let is_expected =
                         !self.has_no_echo || end != 2 * usize::from(self.request.length) + 6;
@@ -426,7 +449,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                         self.crc = Crc16::START;
                         return self.drop_bytes();
                     }
-                    let frame = self.storage.part(0, end + 1);
+                    let frame = self.storage.bytes(0, end + 1);
                     let length = match ascii::decode(frame, delimiter, true) {
                         Decoded::Valid(content) => content - 1,
                         _ => 0,
@@ -445,15 +468,15 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     fn encode_ascii(&mut self, length: usize) -> usize {
         let delimiter = self.delimiter;
-        let frame = self.storage.frame();
-        let unit = frame.first().copied().unwrap_or(0);
+        let unit = self.storage.byte(0);
         // Sub-function 03 of function 08 changes the end character, from this response on.
-        if let Some(&[_, DIAGNOSTICS, 0, 3, character, 0]) = frame.first_chunk() {
+        if let &[_, DIAGNOSTICS, 0, 3, character, 0] = self.storage.slice(0, 6) {
             self.delimiter = character;
         }
-        let frame = self.storage.frame();
+        let capacity = self.storage.capacity();
+        let frame = self.storage.bytes(0, capacity);
         let total = ascii::emit(frame, unit, delimiter, |_| Ok(length)).unwrap_or(0);
-        self.echo = Crc16::START.with(self.storage.part(0, total));
+        self.echo = Crc16::START.with(self.storage.slice(0, total));
         total
     }
 
@@ -467,7 +490,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         loop {
             let end = usize::from(self.end);
             let mut until = FIRST_READ;
-            match tcp::header(self.storage.part(0, end)) {
+            match tcp::header(self.storage.slice(0, end)) {
                 Ok(header) if end >= header.total => {
                     if end > header.total {
                         self.keep_read_ahead(header.total);
@@ -493,7 +516,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[inline(always)]
     fn keep_read_ahead(&mut self, length: usize) {
         self.read_ahead = self.end as u8 - length as u8;
-        if let [a, b, c, d] = *self.storage.part(length, length + READ_AHEAD) {
+        if let [a, b, c, d] = *self.storage.slice(length, READ_AHEAD) {
             self.receive_latency = u32::from_ne_bytes([a, b, c, d]);
         }
     }
@@ -501,7 +524,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Begins the next frame with the bytes that [`Server::keep_read_ahead`] stored.
     #[inline(always)]
     fn use_read_ahead(&mut self) {
-        if let Some(front) = self.storage.part(0, READ_AHEAD).first_chunk_mut() {
+        if let Some(front) = self.storage.bytes(0, READ_AHEAD).first_chunk_mut() {
             *front = self.receive_latency.to_ne_bytes();
         }
         self.end = self.read_ahead.into();
@@ -509,7 +532,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     fn encode_tcp(&mut self, length: usize) -> usize {
-        if let [high, low] = self.storage.part(4, 6) {
+        if let [high, low] = self.storage.bytes(4, 2) {
             [*high, *low] = tcp::length(length);
         }
         tcp::PDU + length

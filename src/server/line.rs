@@ -4,9 +4,8 @@
 //! out without a reference to the server, and passes the reply back. Then the server sends it. A
 //! framing is two function pointers, so firmware contains only the framings that it begins with.
 
-use super::indication::STREAM;
 use super::{Indication, Reply, Units};
-use crate::bytes::move_to_front;
+use crate::engine::Storage;
 use crate::error::{Error, Status};
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp, Framing};
@@ -30,31 +29,9 @@ const FIFO_TIMEOUT: usize = 10;
 /// that at 9600 baud, so no rate in use has it. (A number of few bits takes less flash.)
 const UNKNOWN_CHARACTER: u16 = 1_152;
 
-/// The storage that the caller supplies for a server.
-pub trait ServerStorage {
-    /// The frame buffer. It holds a request, then its response.
-    fn frame(&mut self) -> &mut [u8];
-
-    /// Size of the frame buffer in bytes.
-    fn capacity(&self) -> usize;
-
-    /// The bytes of the frame buffer from `start` to `end`. Callers ensure that `start` is not
-    /// after `end`, and that `end` is not after the end of the buffer.
-    fn part(&mut self, start: usize, end: usize) -> &mut [u8] {
-        self.frame().get_mut(start..end).unwrap_or_default()
-    }
-
-    /// The byte of the frame buffer at index `place`.
-    fn byte(&mut self, place: usize) -> u8 {
-        self.part(place, place + 1).first().copied().unwrap_or(0)
-    }
-
-    /// Moves the bytes of the frame buffer from `start` to `end` to its front. The indexes are as
-    /// for [`ServerStorage::part`].
-    fn keep(&mut self, start: usize, end: usize) {
-        move_to_front(self.part(0, end), start);
-    }
-
+/// The storage of a server: the frame buffer of [`Storage`], which holds a request, then its
+/// response, and more that is optional.
+pub trait ServerStorage: Storage<Count = usize> {
     /// True if the server serves this unit. On an RTU line it waits for the rest of a request to
     /// such a unit. [`Server::serve`] also asks [`Units::has`].
     fn serves(&self, unit: u8) -> bool {
@@ -69,25 +46,9 @@ pub trait ServerStorage {
     }
 }
 
-impl ServerStorage for &mut [u8] {
-    fn frame(&mut self) -> &mut [u8] {
-        self
-    }
+impl ServerStorage for &mut [u8] {}
 
-    fn capacity(&self) -> usize {
-        self.len()
-    }
-}
-
-impl<const N: usize> ServerStorage for [u8; N] {
-    fn frame(&mut self) -> &mut [u8] {
-        self
-    }
-
-    fn capacity(&self) -> usize {
-        self.len()
-    }
-}
+impl<const N: usize> ServerStorage for [u8; N] {}
 
 /// The phase of a server.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -197,13 +158,13 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[inline(always)]
     pub(super) fn begin(
         &mut self,
-        head: u8,
+        (head, own): (usize, u8),
         space: usize,
         receive: Receive<P, B>,
         encode_adu: EncodeAdu<P, B>,
     ) {
-        self.request.head = head;
-        self.request.own = STREAM;
+        self.request.head = head as u8;
+        self.request.own = own;
         self.request.space = space as u16;
         self.receive = Some(receive);
         self.encode_adu = Some(encode_adu);
@@ -328,7 +289,10 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             start = 0;
             until = 1;
         }
-        let received = isize::from(self.port.read_count(self.storage.part(start, until)));
+        let received = isize::from(
+            self.port
+                .read_count(self.storage.bytes(start, until - start)),
+        );
         if received > 0 {
             self.deadline = self.now.wrapping_add(self.silence);
             if is_full {
@@ -338,7 +302,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             self.end = end as u16;
             self.is_waiting = false;
             if uses_crc {
-                self.crc = self.crc.with(self.storage.part(start, end));
+                self.crc = self.crc.with(self.storage.slice(start, end - start));
             }
         }
         received
@@ -434,10 +398,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     pub fn pdu(&mut self) -> &mut [u8] {
         let head = usize::from(self.request.head);
         let space = usize::from(self.request.space);
-        self.storage
-            .frame()
-            .get_mut(head..head + space)
-            .unwrap_or_default()
+        let capacity = self.storage.capacity();
+        let frame = self.storage.bytes(0, capacity);
+        frame.get_mut(head..head + space).unwrap_or_default()
     }
 
     /// As [`Server::poll`], but `units` serve the request, and their reply is sent. One call
@@ -481,7 +444,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             return false;
         }
         let head = usize::from(self.request.head);
-        let length = reply.write_served_exception(self.storage.part(head, head + 2));
+        let length = reply.write_served_exception(self.storage.bytes(head, 2));
         match self.encode_adu {
             Some(encode_adu) if length != 0 => {
                 self.end = encode_adu(self, length) as u16;
@@ -496,7 +459,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     fn send(&mut self) -> Status {
         let mut status = Status::OK;
-        let rest = self.storage.part(self.sent.into(), self.end.into());
+        let rest = self
+            .storage
+            .slice(self.sent.into(), (self.end - self.sent).into());
         if !rest.is_empty() {
             let sent = self.port.write_count(rest);
             if sent < 0 {

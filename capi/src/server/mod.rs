@@ -32,7 +32,8 @@ use super::pointers::{c_object, check, check_once, object, with_hooks, CObject, 
 use super::port;
 use buffers::{Core, ServerBuffers};
 use core::ffi::c_void;
-use core::slice::from_raw_parts_mut;
+use core::slice::{from_raw_parts, from_raw_parts_mut};
+use mbm::engine::Storage;
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
 use mbm::server::{Reply, ServerStorage};
@@ -64,46 +65,54 @@ struct Object {
     core: Core,
 }
 
-impl ServerStorage for ServerBuffers {
-    fn frame(&mut self) -> &mut [u8] {
-        // SAFETY: begin requires a buffer of `bytes` bytes that is valid for as long as
-        // the object is used, and refuses NULL.
-        unsafe {
-            core::hint::assert_unchecked(!self.frame.is_null());
-            from_raw_parts_mut(self.frame, usize::from(self.bytes))
-        }
-    }
+impl Storage for ServerBuffers {
+    type Count = usize;
 
     fn capacity(&self) -> usize {
         self.bytes.into()
     }
 
-    fn part(&mut self, start: usize, end: usize) -> &mut [u8] {
-        debug_assert!(start <= end && end <= self.bytes.into());
+    fn byte(&self, index: usize) -> u8 {
+        // SAFETY: as for `slice`.
+        unsafe { *self.frame.add(index) }
+    }
+
+    fn set_byte(&mut self, index: usize, byte: u8) {
+        // SAFETY: as for `slice`.
+        unsafe { *self.frame.add(index) = byte }
+    }
+
+    fn slice(&self, index: usize, count: usize) -> &[u8] {
+        debug_assert!(index + count <= self.bytes.into());
         // SAFETY: begin requires a buffer of `bytes` bytes that is valid for as long as the
-        // object is used. The core keeps the contract of `part`: `start` and `end` come from
-        // the counts that the port returned, which the core limits to the buffer.
-        unsafe { from_raw_parts_mut(self.frame.add(start), end - start) }
+        // object is used, and refuses NULL. The core keeps the contract of `Storage`: indexes come from the counts
+        // that the port returned, which the core limits to the buffer.
+        unsafe { from_raw_parts(self.frame.add(index), count) }
     }
 
-    fn byte(&mut self, place: usize) -> u8 {
-        // SAFETY: as for `part`.
-        unsafe { *self.frame.add(place) }
-    }
-
-    fn keep(&mut self, start: usize, end: usize) {
-        // SAFETY: as for `part`.
+    fn bytes(&mut self, index: usize, count: usize) -> &mut [u8] {
+        debug_assert!(index + count <= self.bytes.into());
+        // SAFETY: as for `slice`.
         unsafe {
-            let mut to = self.frame;
-            let mut left = end - start;
+            core::hint::assert_unchecked(!self.frame.is_null());
+            from_raw_parts_mut(self.frame.add(index), count)
+        }
+    }
+
+    fn move_down(&mut self, from: usize, count: usize) {
+        // SAFETY: as for `slice`.
+        unsafe {
+            let (mut to, mut left) = (self.frame, count);
             while left != 0 {
-                *to = *to.add(start);
+                *to = *to.add(from);
                 to = to.add(1);
                 left -= 1;
             }
         }
     }
+}
 
+impl ServerStorage for ServerBuffers {
     fn serves(&self, unit: u8) -> bool {
         // SAFETY: as for `rule`.
         unsafe { units::have(self.units, self.count, unit) }
