@@ -1,8 +1,35 @@
 /* When a plan reads which fields, over a port in memory with a clock of its own. */
-#include "plan_fixture.h"
+#include "plan_device.h"
 #include "test.h"
 
 #include <string.h>
+
+enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS, SECOND = 1000 };
+
+static plan_device d;
+
+static void rtu(void)
+{
+    plan_device_begin(&d, 0);
+}
+
+static void add(uint8_t unit, uint16_t address, uint32_t intervalMs)
+{
+    (void)plan_device_add(&d, unit, HOLDING, MBM_TYPE_UINT16, address, intervalMs);
+}
+
+static uint8_t status(uint16_t field)
+{
+    return mbm_plan_getStatus(&d.plan, field, NULL);
+}
+
+static uint32_t age(uint16_t field)
+{
+    uint32_t ms = 1;
+
+    (void)mbm_plan_getStatus(&d.plan, field, &ms);
+    return ms;
+}
 
 fixture each_test = {rtu, NULL};
 

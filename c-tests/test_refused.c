@@ -1,14 +1,24 @@
 /* A call that is refused changes nothing: the object is compared byte for byte with its
  * state before the call, and pending requests go on. Buffers have exactly the size that
  * begin is given. */
+#include "hooked_port.h"
 #include "every_call.h"
 #include "mbm.h"
 #include "refused.h"
-#include "refused_wire.h"
 #include "test.h"
 
 #include <stdlib.h>
 #include <string.h>
+
+static hooked_port wire;
+static mbm_port port;
+
+static void reset(void)
+{
+    memset(&wire, 0, sizeof wire);
+    wire.step = 100;
+    port = hooked_port_of(&wire);
+}
 
 fixture each_test = {reset, NULL};
 

@@ -1,12 +1,13 @@
 /* The port over TCP sockets: as a client of a peer that plays faults, as a server, and what
  * it does while there is no connection. */
 #define _GNU_SOURCE
+#include "tcp_peer.h"
+#include "mbm_tcp.h"
 #include "await.h"
 #include "clock.h"
 #include "emulated.h"
 #include "fails.h"
 #include "model.h"
-#include "port_of_peer.h"
 #include "tcp_server.h"
 #include "test.h"
 
@@ -19,6 +20,26 @@
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
+
+static tcp_peer *peer;
+static mbm_tcp tcp;
+static mbm_tcp_addresses addresses;
+static mbm_port port;
+static char service[8];
+
+static void begin(void)
+{
+    peer = tcp_peer_new();
+    snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
+    memset(&tcp, 0, sizeof tcp);
+    port = mbm_tcp_port(&tcp);
+}
+
+static void end(void)
+{
+    mbm_tcp_close(&tcp);
+    tcp_peer_stop(peer);
+}
 
 fixture each_test = {begin, end};
 
@@ -435,4 +456,48 @@ TEST(a_server_listens_again_at_once_after_it_closed_a_connection)
     mbm_tcp_closeListener(&listener);
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", service), 0);
     mbm_tcp_closeListener(&listener);
+}
+
+/* --- mbm_tcp_wait sleeps where the program would not react to what it could report --- */
+
+TEST(a_completed_connection_ends_the_wait_once)
+{
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 5 * SECOND), 1);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+}
+
+/* The peer sends, and does not read. The program cannot answer, so it sleeps. */
+TEST(unread_bytes_do_not_end_the_wait_again)
+{
+    static uint8_t much[60000];
+    uint8_t bytes[4];
+    int pair[2];
+
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
+    assert_int_equal(mbm_tcp_attach(&tcp, pair[0]), 0);
+    assert_int_equal(write(pair[1], "abcd", 4), 4);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+    /* They end it again once the program has read, or has written everything that it had to
+     * write. */
+    assert_int_equal(port.read(port.context, bytes, 2), 2);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    while (port.write(port.context, much, sizeof much) > 0)
+        ;
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+    assert_int_equal(fcntl(pair[1], F_SETFL, O_NONBLOCK), 0);
+    while (read(pair[1], much, sizeof much) > 0)
+        ;
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_int_equal(port.write(port.context, much, 10), 10);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_int_equal(port.read(port.context, bytes, 4), 2);
+    /* Nor does the end of the stream, once it was reported. */
+    assert_int_equal(read(pair[1], much, sizeof much), 10);
+    close(pair[1]);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+    assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
+    assert_int_equal(tcp.error, EPIPE);
 }
