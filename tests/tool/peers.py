@@ -140,12 +140,18 @@ class Program:
             self.cpu = ended[2].ru_utime + ended[2].ru_stime
         return self.process.returncode
 
+    @property
+    def sleeps(self):
+        """Whether it waits in the kernel."""
+        with open(f"/proc/{self.pid}/stat") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] == "S"
+
     def await_line(self, pattern="", lines=None, since=0):
         """Waits for a line of the log that matches; returns it."""
         lines = self.log if lines is None else lines
         found = wait(lambda: next(([line] for line in lines[since:] if re.search(pattern, line)), None) or
                      (self.code is not None and not any(reader.is_alive() for reader in self.readers) and [None]))
-        assert found and found[0] is not None, f"no line matches {pattern} in\n" + "\n".join(lines[since:])
+        assert found and found[0] is not None, f"no line matches {pattern} in\n" + "\n".join([*self.output, *self.log])
         return found[0]
 
     def await_output(self, pattern="", since=0):
@@ -339,11 +345,12 @@ class Wire(threading.Thread):
 
     def __init__(self):
         super().__init__(daemon=True)
-        self.ends, self.names, self.sent = [], [], [b"", b""]
+        self.ends, self.terminals, self.names, self.sent = [], [], [], [b"", b""]
         for _ in range(2):
             ours, theirs = os.openpty()
             tty.setraw(theirs)
             self.ends.append(ours)
+            self.terminals.append(theirs)
             self.names.append(os.ttyname(theirs))
         self.start()
 

@@ -5,10 +5,11 @@ import os
 import re
 import socket
 import struct
+import termios
 import time
 
 import pytest
-from peers import LINE, ROOT, WRONG
+from peers import LINE, ROOT, WRONG, wait
 
 REQUEST, REPLY = bytes.fromhex("1103006b00037687"), bytes.fromhex("110306022b00000064c8ba")
 AT = ("--baud", "19200", "-")
@@ -104,8 +105,8 @@ SEEN = ["unit 17 request 03 read holding registers 107..109", "unit 17 reply 03 
 def test_a_terminal_is_watched_until_a_signal(plain, wire):
     program = plain.begin("sniff", f"rtu:{wire.names[1]}?baud=115200&parity=none")
     end = os.open(wire.names[0], os.O_WRONLY | os.O_NOCTTY)
-    # Bytes before the sniffer has opened its terminal may be discarded.
-    time.sleep(1)
+    # The sniffer discards bytes that came before it had set its terminal.
+    assert wait(lambda: termios.tcgetattr(wire.terminals[1])[4] == termios.B115200 and program.sleeps)
     os.write(end, REQUEST)
     time.sleep(0.1)
     os.write(end, REPLY)
