@@ -95,71 +95,87 @@ pub(super) const fn countable(bytes: u16) -> u16 {
     }
 }
 
-// SAFETY, here and below: the hooks are C functions that keep the contract of their
-// comments. Slices are valid for their length, and an i16 can count that. `read`, `write`
-// and `micros` are called on complete ports only, which have them.
+/// The functions of [`Port`] that call the hooks of the port at `$port`.
+///
+/// The hooks are C functions that keep the contract of their comments. Slices are valid for their
+/// length, and an i16 can count that. `read`, `write` and `micros` are called on complete ports
+/// only, which have them.
+macro_rules! calls_hooks {
+    ($self:ident, $port:expr) => {
+        fn read(&mut $self, bytes: &mut [u8]) -> Result<usize, Error> {
+            result($self.read_count(bytes))
+        }
+
+        fn read_count(&mut $self, bytes: &mut [u8]) -> i16 {
+            let port: *const mbm_port = $port;
+            // SAFETY: see above.
+            let count = unsafe {
+                let read = (*port).read.unwrap_unchecked();
+                read((*port).context, bytes.as_mut_ptr(), bytes.len() as u16)
+            };
+            count.min(bytes.len() as i16)
+        }
+
+        fn write(&mut $self, bytes: &[u8]) -> Result<usize, Error> {
+            result($self.write_count(bytes))
+        }
+
+        fn write_count(&mut $self, bytes: &[u8]) -> i16 {
+            let port: *const mbm_port = $port;
+            // SAFETY: see above.
+            let count = unsafe {
+                let write = (*port).write.unwrap_unchecked();
+                write((*port).context, bytes.as_ptr(), bytes.len() as u16)
+            };
+            count.min(bytes.len() as i16)
+        }
+
+        fn micros(&mut $self) -> u32 {
+            // SAFETY: see above.
+            unsafe { now($port) }
+        }
+
+        fn flush(&mut $self) -> bool {
+            let port: *const mbm_port = $port;
+            // SAFETY: see above.
+            unsafe { (*port).flush.is_none_or(|flush| flush((*port).context) != 0) }
+        }
+
+        fn knows_when_sent(&$self) -> bool {
+            let port: *const mbm_port = $port;
+            // SAFETY: see above.
+            unsafe { (*port).flush.is_some() }
+        }
+
+        fn pre_transmission(&mut $self) {
+            let port: *const mbm_port = $port;
+            // SAFETY: see above.
+            unsafe {
+                if let Some(hook) = (*port).preTransmission {
+                    hook((*port).context)
+                }
+            }
+        }
+
+        fn post_transmission(&mut $self) {
+            let port: *const mbm_port = $port;
+            // SAFETY: see above.
+            unsafe {
+                if let Some(hook) = (*port).postTransmission {
+                    hook((*port).context)
+                }
+            }
+        }
+    };
+}
+
 impl Port for mbm_port {
     fn is_ready(&self) -> bool {
         // The begin functions accept complete ports only.
         self.read.is_some()
     }
 
-    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
-        result(self.read_count(bytes))
-    }
-
-    fn read_count(&mut self, bytes: &mut [u8]) -> i16 {
-        // SAFETY: see above.
-        let count = unsafe {
-            let read = self.read.unwrap_unchecked();
-            read(self.context, bytes.as_mut_ptr(), bytes.len() as u16)
-        };
-        count.min(bytes.len() as i16)
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
-        result(self.write_count(bytes))
-    }
-
-    fn write_count(&mut self, bytes: &[u8]) -> i16 {
-        // SAFETY: see above.
-        let count = unsafe {
-            let write = self.write.unwrap_unchecked();
-            write(self.context, bytes.as_ptr(), bytes.len() as u16)
-        };
-        count.min(bytes.len() as i16)
-    }
-
-    fn micros(&mut self) -> u32 {
-        // SAFETY: see above.
-        unsafe { self.micros.unwrap_unchecked()(self.context) }
-    }
-
-    fn flush(&mut self) -> bool {
-        match self.flush {
-            // SAFETY: see above.
-            Some(flush) => unsafe { flush(self.context) != 0 },
-            None => true,
-        }
-    }
-
-    fn knows_when_sent(&self) -> bool {
-        self.flush.is_some()
-    }
-
-    fn pre_transmission(&mut self) {
-        if let Some(hook) = self.preTransmission {
-            // SAFETY: see above.
-            unsafe { hook(self.context) }
-        }
-    }
-
-    fn post_transmission(&mut self) {
-        if let Some(hook) = self.postTransmission {
-            // SAFETY: see above.
-            unsafe { hook(self.context) }
-        }
-    }
+    calls_hooks!(self, &raw const *self);
 }
 
 /// A pointer to a port.
@@ -204,74 +220,11 @@ impl PortRef {
     }
 }
 
-// SAFETY, here and below: the port is complete, as PortRef::set demands. The engine calls no
-// hook if the port is not ready.
+// The port is complete, as PortRef::set demands. The engine calls no hook if the port is not ready.
 impl Port for PortRef {
     fn is_ready(&self) -> bool {
         !self.port.is_null()
     }
 
-    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
-        result(self.read_count(bytes))
-    }
-
-    fn read_count(&mut self, bytes: &mut [u8]) -> i16 {
-        // SAFETY: see above.
-        let count = unsafe {
-            let read = (*self.port).read.unwrap_unchecked();
-            read((*self.port).context, bytes.as_mut_ptr(), bytes.len() as u16)
-        };
-        count.min(bytes.len() as i16)
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
-        result(self.write_count(bytes))
-    }
-
-    fn write_count(&mut self, bytes: &[u8]) -> i16 {
-        // SAFETY: see above.
-        let count = unsafe {
-            let write = (*self.port).write.unwrap_unchecked();
-            write((*self.port).context, bytes.as_ptr(), bytes.len() as u16)
-        };
-        count.min(bytes.len() as i16)
-    }
-
-    fn micros(&mut self) -> u32 {
-        // SAFETY: see above.
-        unsafe { (*self.port).micros.unwrap_unchecked()((*self.port).context) }
-    }
-
-    fn flush(&mut self) -> bool {
-        // SAFETY: see above.
-        unsafe {
-            match (*self.port).flush {
-                Some(flush) => flush((*self.port).context) != 0,
-                None => true,
-            }
-        }
-    }
-
-    fn knows_when_sent(&self) -> bool {
-        // SAFETY: see above.
-        unsafe { (*self.port).flush.is_some() }
-    }
-
-    fn pre_transmission(&mut self) {
-        // SAFETY: see above.
-        unsafe {
-            if let Some(hook) = (*self.port).preTransmission {
-                hook((*self.port).context)
-            }
-        }
-    }
-
-    fn post_transmission(&mut self) {
-        // SAFETY: see above.
-        unsafe {
-            if let Some(hook) = (*self.port).postTransmission {
-                hook((*self.port).context)
-            }
-        }
-    }
+    calls_hooks!(self, self.port);
 }
