@@ -95,6 +95,38 @@ pub(super) const fn countable(bytes: u16) -> u16 {
     }
 }
 
+/// Hooks of a port that pass each call on to another port. `$inner` is the unsafe function that
+/// finds that port by the context. No reference lives while its hook runs, which may use every
+/// object.
+macro_rules! passing_hooks {
+    ($inner:ident) => {
+        unsafe extern "C" fn micros(context: *mut c_void) -> u32 {
+            let port: *const mbm_port = $inner(context);
+            (*port).micros.map_or(0, |micros| micros((*port).context))
+        }
+
+        unsafe extern "C" fn flush(context: *mut c_void) -> u8 {
+            let port: *const mbm_port = $inner(context);
+            (*port).flush.map_or(1, |flush| flush((*port).context))
+        }
+
+        unsafe extern "C" fn pre_transmission(context: *mut c_void) {
+            let port: *const mbm_port = $inner(context);
+            if let Some(hook) = (*port).preTransmission {
+                hook((*port).context);
+            }
+        }
+
+        unsafe extern "C" fn idle(context: *mut c_void, node: *mut mbm_node) {
+            let port: *const mbm_port = $inner(context);
+            if let Some(hook) = (*port).idle {
+                hook((*port).context, node);
+            }
+        }
+    };
+}
+pub(crate) use passing_hooks;
+
 /// The functions of [`Port`] that call the hooks of the port at `$port`.
 ///
 /// The hooks are C functions that keep the contract of their comments. Slices are valid for their

@@ -5,7 +5,7 @@
 use super::object::Object;
 use crate::client::object as client;
 use crate::node::mbm_node;
-use crate::port::mbm_port;
+use crate::port::{mbm_port, passing_hooks};
 use core::ffi::c_void;
 
 /// The port for the client of `link`. It has the optional hooks that the client's own port
@@ -77,45 +77,19 @@ unsafe fn moved(context: *mut c_void, action: impl FnOnce(&mbm_port) -> i16) -> 
     }
 }
 
-unsafe extern "C" fn micros(context: *mut c_void) -> u32 {
-    // SAFETY: see above.
-    unsafe { crate::port::now(&raw const (*context.cast::<Object>()).port) }
+/// The client's own port.
+///
+/// # Safety
+/// As above.
+unsafe fn own(context: *mut c_void) -> *const mbm_port {
+    &raw const (*context.cast::<Object>()).port
 }
 
-unsafe extern "C" fn flush(context: *mut c_void) -> u8 {
-    // SAFETY: see above.
-    unsafe {
-        let own = &(*context.cast::<Object>()).port;
-        own.flush.map_or(1, |flush| flush(own.context))
-    }
-}
-
-unsafe extern "C" fn pre_transmission(context: *mut c_void) {
-    // SAFETY: see above.
-    unsafe {
-        let own = &(*context.cast::<Object>()).port;
-        if let Some(hook) = own.preTransmission {
-            hook(own.context);
-        }
-    }
-}
+passing_hooks!(own);
 
 unsafe extern "C" fn post_transmission(context: *mut c_void) {
-    // SAFETY: see above.
-    unsafe {
-        let own = &(*context.cast::<Object>()).port;
-        if let Some(hook) = own.postTransmission {
-            hook(own.context);
-        }
-    }
-}
-
-unsafe extern "C" fn idle(context: *mut c_void, node: *mut mbm_node) {
-    // SAFETY: see above.
-    unsafe {
-        let own = &(*context.cast::<Object>()).port;
-        if let Some(hook) = own.idle {
-            hook(own.context, node);
-        }
+    let port = own(context);
+    if let Some(hook) = (*port).postTransmission {
+        hook((*port).context);
     }
 }

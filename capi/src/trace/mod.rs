@@ -11,7 +11,7 @@ use crate::packet::side;
 use crate::pointers::{
     c_object, change, check, get, object, slice, with_hooks, CObject, BEGUN, IN_HOOK,
 };
-use crate::port::{countable, mbm_port, PortRef};
+use crate::port::{countable, mbm_port, passing_hooks, PortRef};
 use core::ffi::c_void;
 use core::ptr::null;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
@@ -131,45 +131,11 @@ fn unusable(error: Error) -> i16 {
     }
 }
 
-unsafe extern "C" fn micros(context: *mut c_void) -> u32 {
-    // SAFETY: see above.
-    unsafe {
-        let port = inner(context);
-        (*port).micros.map_or(0, |micros| micros((*port).context))
-    }
-}
-
-unsafe extern "C" fn flush(context: *mut c_void) -> u8 {
-    // SAFETY: see above.
-    unsafe {
-        let port = inner(context);
-        (*port).flush.map_or(1, |flush| flush((*port).context))
-    }
-}
-
-unsafe extern "C" fn pre_transmission(context: *mut c_void) {
-    // SAFETY: see above.
-    unsafe {
-        let port = inner(context);
-        if let Some(hook) = (*port).preTransmission {
-            hook((*port).context);
-        }
-    }
-}
+passing_hooks!(inner);
 
 unsafe extern "C" fn post_transmission(context: *mut c_void) {
     // SAFETY: see above.
     let _ = unsafe { with_core(context.cast(), Core::post_transmission) };
-}
-
-unsafe extern "C" fn idle(context: *mut c_void, node: *mut mbm_node) {
-    // SAFETY: see above. No reference lives, because the hook may use every object.
-    unsafe {
-        let port = inner(context);
-        if let Some(hook) = (*port).idle {
-            hook((*port).context, node);
-        }
-    }
 }
 
 /// Begins a trace; see [`mbm_trace_begin`].
