@@ -1,10 +1,10 @@
 //! Sends one request on a serial line and finds its reply. `poll` moves the request on.
 //!
 //! The master and the client's serial lines use this engine. The client's requests choose
-//! their framing, RTU or ASCII (see `spec`).
+//! their framing, RTU or ASCII.
 //!
-//! - `poll` has the phases of a request and its one timer.
-//! - `send` writes the request and waits until the port has sent it.
+//! - `poll` has the phases of a request and its one timer. It writes the request, and waits until
+//!   the port has sent it.
 //! - `search` finds the reply in RTU frames: for each byte it asks whether the reply ends there.
 //! - `late` keeps a late reply from being delivered as the answer to a later request.
 //! - `extras` has retries, echo discarding, the post-flush hold, and counters.
@@ -19,7 +19,6 @@ mod late;
 mod late_units;
 mod poll;
 mod search;
-mod send;
 mod settings;
 mod storage;
 mod transaction;
@@ -106,8 +105,8 @@ pub struct Engine<P, S: Storage, Q> {
     /// Length of the right reply, unit and PDU, at the front of the frame buffer; 0 if there is
     /// none.
     pub(crate) content: S::Count,
-    /// How many bytes of the frame buffer are to be sent; 0 if received bytes have overwritten
-    /// them. After they were sent: the length of the echo that is expected, or 0.
+    /// Length of the request's frame, as long as it is in the frame buffer to be sent, or its echo
+    /// is expected; otherwise 0.
     outgoing: S::Count,
     /// How many bytes of the request were sent.
     sent: S::Count,

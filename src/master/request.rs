@@ -4,10 +4,9 @@
 use crate::engine::{Engine, Transaction, Words};
 use crate::error::{Error, Status};
 use crate::frame::rtu;
-use crate::pdu::fields::check_range;
 use crate::pdu::functions::{FunctionSpec, BITS, RANGE, READ};
 use crate::pdu::{
-    MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
+    check_range, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,
 };
 use crate::port::Port;

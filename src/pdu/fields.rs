@@ -5,7 +5,7 @@
 use super::functions::COIL_ON;
 use super::MORE;
 use crate::bytes::{Reader, Writer};
-use crate::error::{Error, Status};
+use crate::error::Error;
 
 /// A field of one byte.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -250,18 +250,6 @@ pub(super) fn word(reader: &mut Reader) -> Result<u16, Error> {
 pub(super) fn counted<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Error> {
     let count = usize::from(byte(reader)?);
     reader.take(count).ok_or(Error::ILLEGAL_DATA_VALUE)
-}
-
-/// Checks a range of addresses as every device would (application protocol,
-/// figures 11 and following: quantity first, then addresses).
-pub(crate) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
-    if quantity == 0 || quantity > most {
-        Status::ILLEGAL_DATA_VALUE
-    } else if address.checked_add(quantity - 1).is_none() {
-        Status::ILLEGAL_DATA_ADDRESS
-    } else {
-        Status::OK
-    }
 }
 
 /// Checks that `count` is within `limits`, the least and the greatest value.

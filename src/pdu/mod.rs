@@ -18,6 +18,8 @@ pub mod response;
 
 pub use functions::is_public;
 
+use crate::error::Status;
+
 /// The bit that is set in the function code of an exception response (clause 7).
 pub const EXCEPTION: u8 = 0x80;
 
@@ -52,3 +54,15 @@ pub const WRITE_FILE_BYTES: (usize, usize) = (0x09, 0xFB);
 /// The value of the field "more follows" in a response to 2B/0E if more objects follow; else it is 0
 /// (6.21).
 const MORE: u8 = 0xFF;
+
+/// Checks a range of addresses as every device would (application protocol,
+/// figures 11 and following: quantity first, then addresses).
+pub(crate) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
+    if quantity == 0 || quantity > most {
+        Status::ILLEGAL_DATA_VALUE
+    } else if address.checked_add(quantity - 1).is_none() {
+        Status::ILLEGAL_DATA_ADDRESS
+    } else {
+        Status::OK
+    }
+}

@@ -3,16 +3,14 @@
 
 use super::custom;
 use super::diagnostics::{check_sub_function, sub_function};
-use super::fields::{
-    byte_count, check_range, check_within, expect, Byte, Data, Fields, Flag, Parser, Word,
-};
+use super::fields::{byte_count, check_within, expect, Byte, Data, Fields, Flag, Parser, Word};
 use super::files::{Reads, Writes};
 use super::functions;
 use super::identification::{BASIC, INDIVIDUAL, MEI_READ_DEVICE_IDENTIFICATION};
 use super::length::{self, Length};
 use super::{
-    MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
-    MAX_WRITE_REGISTERS,
+    check_range, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS,
+    MAX_WRITE_BITS, MAX_WRITE_REGISTERS,
 };
 use crate::bytes::{Reader, Writer};
 use crate::error::Error;

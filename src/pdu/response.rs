@@ -2,14 +2,12 @@
 //! response borrow from its bytes.
 
 use super::diagnostics::{check_sub_function, sub_function};
-use super::fields::{
-    byte_count, check_range, expect, Byte, Count, Data, Fields, Flag, Parser, Word,
-};
+use super::fields::{byte_count, expect, Byte, Count, Data, Fields, Flag, Parser, Word};
 use super::files::{Records, Writes};
 use super::identification::{check_head, ObjectList, MEI_READ_DEVICE_IDENTIFICATION};
 use super::{
-    custom, functions, length, EXCEPTION, MAX_EVENTS, MAX_FIFO, MAX_PDU, MAX_READ_BITS,
-    MAX_READ_REGISTERS, MAX_WRITE_BITS, MAX_WRITE_REGISTERS,
+    check_range, custom, functions, length, EXCEPTION, MAX_EVENTS, MAX_FIFO, MAX_PDU,
+    MAX_READ_BITS, MAX_READ_REGISTERS, MAX_WRITE_BITS, MAX_WRITE_REGISTERS,
 };
 use crate::bytes::{Reader, Writer};
 use crate::error::{Error, Status};

@@ -85,8 +85,7 @@ pub struct Server<P, B> {
     pub(super) crc: Crc16,
     /// Index in the buffer after the received bytes, or after the response to send.
     pub(super) end: u16,
-    /// How many bytes of the response were sent; then, on a serial line, how many of them may
-    /// come back as an echo.
+    /// How many bytes of the response were sent; 0 once none of them is expected as an echo.
     pub(super) sent: u16,
     /// The CRC of the response that may come back. In ASCII it is that of its characters.
     pub(super) echo: Crc16,
@@ -106,7 +105,8 @@ pub struct Server<P, B> {
     pub(super) now: Micros,
     /// The silence that ends a frame. Set it with [`Server::set_silence`].
     pub silence: Micros,
-    /// See [`Server::set_receive_latency`].
+    /// See [`Server::set_receive_latency`]. Over TCP, which has no latency, it holds the bytes of the
+    /// next frame: a field for them takes 4 bytes of RAM more in each server.
     pub(super) receive_latency: Micros,
     pub(super) receive: Option<Receive<P, B>>,
     pub(super) encode_adu: Option<EncodeAdu<P, B>>,

@@ -2,7 +2,6 @@
 
 use super::super::custom::Rule;
 use super::super::diagnostics::sub_function;
-use super::super::fields::check_range;
 use super::super::functions::{
     FunctionSpec, BITS, BROADCAST, COUNTS, FIXED, HEAD_LENGTH, LENGTH, OWN, RANGE, READ,
     REPEATS_DATA, UNANSWERED,
@@ -12,8 +11,9 @@ use super::super::{files, EXCEPTION};
 use super::RequestHeader;
 use crate::error::Status;
 use crate::pdu::{
-    FILE_DATA_BYTES, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS,
-    MAX_RECORD, MAX_WRITE_BITS, MAX_WRITE_REGISTERS, READ_FILE_BYTES, WRITE_FILE_BYTES,
+    check_range, FILE_DATA_BYTES, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS,
+    MAX_READ_WRITE_REGISTERS, MAX_RECORD, MAX_WRITE_BITS, MAX_WRITE_REGISTERS, READ_FILE_BYTES,
+    WRITE_FILE_BYTES,
 };
 
 /// The first word of a group of records: the byte count, which is set later, and the
