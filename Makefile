@@ -31,6 +31,8 @@ EXAMPLES := basic calls custom_client custom_server guarded_server keep_link man
 PORTS := $(patsubst ports/%.c,%,$(filter-out $(TLS),$(wildcard ports/linux/mbm_*.c)))
 # The command line tool.
 TOOL := $(wildcard cli/*.c)
+# The tool uses what glibc and musl have beside POSIX, such as argp.
+TOOL_FLAGS := -D_GNU_SOURCE
 TOOL_PORTS := $(wildcard ports/linux/mbm_*.c)
 TOOL_LIBS := -Wl,--gc-sections -lmbedtls -lmbedx509 -lmbedcrypto -lcjson -lyaml -lmosquitto -lm -lpthread
 # The files that clang-format formats. The headers in include/ are documentation too, and are
@@ -257,7 +259,7 @@ $(BUILD)/$(1)/%.o: examples/%.c
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/cli/%.o: cli/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $(TOOL_FLAGS) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: ports/%.c
 	@mkdir -p $$(@D)
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
@@ -373,7 +375,7 @@ INSTALLED_TOOL := $(BUILD)/linux/mbm
 HARDENED := -O2 -D_FORTIFY_SOURCE=2 -fstack-protector-strong -fPIE -pie -Wl,-z,relro,-z,now,--as-needed
 $(INSTALLED_TOOL): linux $(TOOL) $(wildcard cli/*.h)
 	@scripts/need gcc libc6-dev libmbedtls-dev libcjson-dev libyaml-dev libmosquitto-dev
-	@gcc -std=c11 $(HARDENED) -Iinclude -Iports/linux $(TOOL) $(BUILD)/linux/libmbm-tls.a $(LIBRARY) $(TOOL_LIBS) -o $@
+	@gcc -std=c11 $(HARDENED) $(TOOL_FLAGS) -Iinclude -Iports/linux $(TOOL) $(BUILD)/linux/libmbm-tls.a $(LIBRARY) $(TOOL_LIBS) -o $@
 
 .PHONY: install-tool
 install-tool: $(INSTALLED_TOOL) man ## Install that tool, its man pages, completion, units of systemd and examples below PREFIX

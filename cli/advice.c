@@ -2,7 +2,6 @@
  * of the command line.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "advice.h"
 
 #include "numbers.h"

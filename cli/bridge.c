@@ -2,7 +2,6 @@
  * bridge`. docs/mqtt.md has the topics and the options.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "bridge_file.h"
 #include "discovery.h"
 #include "options.h"

@@ -1,7 +1,6 @@
 /* Checks and keeps the settings of a bridge, from options or a file, and reads that file.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "bridge_file.h"
 
 #include "numbers.h"

@@ -1,7 +1,6 @@
 /* Reads a line's table, publishes its values and units, and carries out writes.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "bridge_line.h"
 
 #include "clock.h"

@@ -1,7 +1,6 @@
 /* Connects to the broker with libmosquitto, and hands what arrives to the program through a pipe.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "broker.h"
 
 #include "report.h"

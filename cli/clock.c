@@ -1,7 +1,6 @@
 /* Reads the clocks, and writes times as text.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "clock.h"
 
 #include <stdio.h>

@@ -1,7 +1,6 @@
 /* Makes and tries the plan of a device, and writes what it has read.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "device_plan.h"
 
 #include "numbers.h"

@@ -1,7 +1,6 @@
 /* Writes the topics and the JSON of Home Assistant's MQTT discovery.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "discovery.h"
 
 #include <cjson/cJSON.h>

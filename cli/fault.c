@@ -1,7 +1,6 @@
 /* Reads --fault, chooses the faults of each request, and changes its answer.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "fault.h"
 
 #include "numbers.h"

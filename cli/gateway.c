@@ -5,7 +5,6 @@
  * the others and all connections go on. docs/gateway.md says what a client gets.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "port_over.h"
 #include "gateway_line.h"
 #include "options.h"

@@ -1,7 +1,6 @@
 /* Reads the lines, the map of units and the settings of a gateway, and its file.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "gateway_file.h"
 
 #include "numbers.h"

@@ -1,7 +1,6 @@
 /* The lines of the gateway: their settings, and reports on devices that do not answer.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "gateway_line.h"
 
 #include "advice.h"

@@ -1,7 +1,6 @@
 /* mbm header: writes the C header of a device for firmware, or a page about it.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "header.h"
 
 #include "device_file.h"

@@ -2,7 +2,6 @@
  * the functions that get and set the value of a field in them.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "header.h"
 
 #include "numbers.h"

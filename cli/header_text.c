@@ -2,7 +2,6 @@
  * fields and the table of its plan; and the page of documentation, in Markdown.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "header.h"
 
 #include "report.h"

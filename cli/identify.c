@@ -1,5 +1,4 @@
 /* mbm identify: shows what a device says about itself. Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "advice.h"
 #include "line.h"
 #include "options.h"

@@ -1,7 +1,6 @@
 /* Opens the lines of clients, keeps them open, and says why a request got no reply.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "line.h"
 
 #include "advice.h"

@@ -1,7 +1,6 @@
 /* mbm: one tool for Modbus devices. This file chooses the command.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "options.h"
 #include "mbm.h"
 #include "report.h"

@@ -1,7 +1,6 @@
 /* Accepts the connections of scrapers, reads their requests, and answers them.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "metrics.h"
 
 #include "clock.h"

@@ -1,7 +1,6 @@
 /* Reads numbers, times and words, and says what is wrong with them.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "numbers.h"
 
 #include <ctype.h>

@@ -1,7 +1,6 @@
 /* Parses the options that several commands share.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "options.h"
 
 #include "advice.h"

@@ -1,7 +1,6 @@
 /* Parses the payloads of writes: numbers, truth values, texts, and JSON with these.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "payload.h"
 
 #include "numbers.h"

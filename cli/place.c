@@ -1,7 +1,6 @@
 /* Reads the names of lines, and knows what each kind of line may have.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "place.h"
 
 #include "numbers.h"

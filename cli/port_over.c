@@ -1,7 +1,6 @@
 /* The ports over other ports: what they pass on, hold back and read ahead.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "port_over.h"
 
 #include "clock.h"

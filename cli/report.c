@@ -1,7 +1,6 @@
 /* Prints sentences, log lines and JSON, and keeps the exit code.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "report.h"
 
 #include "mbm.h"

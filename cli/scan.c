@@ -1,5 +1,4 @@
 /* mbm scan: finds the units that answer. Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "advice.h"
 #include "line.h"
 #include "numbers.h"

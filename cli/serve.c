@@ -2,7 +2,6 @@
  * terminal, a pseudo terminal, a socket or a listener with connections.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "device_file.h"
 #include "fault.h"
 #include "line.h"

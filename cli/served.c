@@ -1,7 +1,6 @@
 /* Makes the units that mbm serve serves, and gets and sets their cells.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "served.h"
 
 #include <stdlib.h>

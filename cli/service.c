@@ -1,7 +1,6 @@
 /* Runs what services share: signals, systemd, statistics, and the wait for descriptors.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "service.h"
 
 #include "clock.h"

@@ -2,7 +2,6 @@
  * recording of a bus as text.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "clock.h"
 #include "line.h"
 #include "options.h"

@@ -1,7 +1,6 @@
 /* Opens terminals, and finds in /proc which program has one open.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "terminal.h"
 
 #include "numbers.h"

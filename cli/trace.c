@@ -1,7 +1,6 @@
 /* Takes the frames of traced ports and sniffers, prints them, and writes them to a file.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "trace.h"
 
 #include "clock.h"

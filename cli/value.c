@@ -1,7 +1,6 @@
 /* Reads numbers into registers, and writes registers as text, without rounding.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "value.h"
 
 #include "numbers.h"

@@ -1,5 +1,4 @@
 /* mbm write: writes values. Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "advice.h"
 #include "line.h"
 #include "options.h"

@@ -1,7 +1,6 @@
 /* Parses a YAML file with libyaml, and checks its keys and values.
  *
  * Licence: MIT OR Apache-2.0. */
-#define _GNU_SOURCE
 #include "yaml_file.h"
 
 #include "numbers.h"
