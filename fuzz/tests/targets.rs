@@ -3,7 +3,29 @@
 //! are tried.
 
 use mbm_fuzz::{seeds, targets::TARGETS};
-use std::panic::{catch_unwind, resume_unwind};
+use std::cell::RefCell;
+use std::panic::{set_hook, take_hook};
+use std::sync::Once;
+
+thread_local! {
+    /// The target that runs, and its input.
+    static RUNNING: RefCell<(String, Vec<u8>)> = RefCell::default();
+}
+
+/// Has a panic print the input. One below a function of C ends the program at once.
+fn print_input_of_panics() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let usual = take_hook();
+        set_hook(Box::new(move |panic| {
+            usual(panic);
+            RUNNING.with_borrow(|(name, input)| {
+                let digits: String = input.iter().map(|byte| format!("{byte:02x}")).collect();
+                eprintln!("the input of {name}: {digits}");
+            });
+        }));
+    });
+}
 
 /// A generator of inputs. Its seed is fixed, so a failure can be repeated.
 struct Random(u64);
@@ -58,12 +80,10 @@ fn try_target(name: &str) {
     let mut random = Random(0x9E37_79B9_7F4A_7C15);
     let seeds = seeds::of(name);
     let random = (0..count * times).map(|_| random.input(&seeds));
+    print_input_of_panics();
     for input in seeds.iter().cloned().chain(random) {
-        if let Err(why) = catch_unwind(|| run(&input)) {
-            let digits: String = input.iter().map(|byte| format!("{byte:02x}")).collect();
-            eprintln!("the input of {name}: {digits}");
-            resume_unwind(why);
-        }
+        RUNNING.set((name.to_string(), input.clone()));
+        run(&input);
     }
 }
 
