@@ -326,8 +326,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn wait_for(&mut self, count: usize, start: u32) {
         self.is_waiting = true;
-        self.deadline = start.wrapping_add(self.receive_latency);
+        self.deadline = start;
         time::add_characters(&mut self.deadline, count + FIFO_TIMEOUT, self.character);
+        self.deadline = self.deadline.wrapping_add(self.receive_latency);
     }
 
     /// Notes that the line has no echo: after a response, another frame than its echo has come,
