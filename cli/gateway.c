@@ -300,7 +300,8 @@ static uint32_t list_waits(gateway *g)
 
         if (!g->lines[i].is_used || !line_polls(at, one))
             continue;
-        /* The wait finds noise of an idle line too, or each poll of its client would read. */
+        /* The sleep waits for noise of an idle line too. Otherwise each poll of its client would
+         * read the line. */
         if (place_is_serial(&at->place))
             one->events = POLLIN;
         g->waits.slots[g->waits.count++] = (uint8_t)i;
