@@ -365,18 +365,6 @@ TEST(a_serial_broadcast_and_a_bad_frame_get_no_exception)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(rtu, &packet, 1, reply, 32, &size));
 }
 
-TEST(checksums_are_those_of_the_guide)
-{
-    const uint8_t bytes[] = {0x02, 0x07};
-
-    assert_int_equal(mbm_frame_crc16(bytes, 2), 0x1241);
-    assert_int_equal(mbm_frame_crc16((const uint8_t *)"123456789", 9), 0x4B37);
-    assert_int_equal(mbm_frame_lrc(bytes, 2), 0xF7);
-    assert_int_equal(mbm_frame_crc16(NULL, 2), 0xFFFF);
-    assert_int_equal(mbm_frame_crc16(bytes, 0), 0xFFFF);
-    assert_int_equal(mbm_frame_lrc(NULL, 2), 0);
-}
-
 TEST(a_declared_function_is_built_and_parsed_in_every_framing)
 {
     const mbm_function own = {0x55, {MBM_RULE_COUNTED, 1, 0}, {MBM_RULE_FIXED, 2, 0}};

@@ -314,7 +314,7 @@ TEST(the_first_bytes_may_be_none)
     assert_int_equal(length, 0);
 }
 
-TEST(the_checksums_of_nothing_are_their_start)
+TEST(checksums_are_those_of_the_guide)
 {
     const uint8_t bytes[] = {2, 7};
 
@@ -322,6 +322,7 @@ TEST(the_checksums_of_nothing_are_their_start)
     assert_int_equal(mbm_frame_crc16(bytes, 0), 0xFFFF);
     /* Serial line guide V1.02, 6.2.2: the frame ends with 41 12. */
     assert_int_equal(mbm_frame_crc16(bytes, 2), 0x1241);
+    assert_int_equal(mbm_frame_crc16((const uint8_t *)"123456789", 9), 0x4B37);
     assert_int_equal(mbm_frame_lrc(NULL, 9), 0);
     assert_int_equal(mbm_frame_lrc(bytes, 0), 0);
     assert_int_equal(mbm_frame_lrc(bytes, 2), 0xF7);
