@@ -59,8 +59,10 @@ fn is_array<T>(items: *const T, count: usize) -> bool {
 /// # Safety
 /// As for [`slice_mut`].
 pub(crate) unsafe fn buffer<'a>(bytes: *mut u8, capacity: u16) -> Result<&'a mut [u8], Error> {
-    required(bytes)?;
-    slice_mut(bytes, capacity.into())
+    match is_array(bytes, capacity.into()) {
+        true => Ok(from_raw_parts_mut(bytes, capacity.into())),
+        false => Err(Error::INVALID_ARGUMENT),
+    }
 }
 
 /// True if the `bytes` bytes at `one` and the `more` bytes at `other` have a byte in common.
