@@ -55,7 +55,7 @@ fn give_up(life: &Life, at: usize) {
     for job in life.jobs.iter().filter(|job| job.line.get() == at) {
         if job.since.get().is_some() {
             // SAFETY: the request is that of the job.
-            let status = unsafe { (*job.request).status };
+            let status = unsafe { (*job.request.get()).status };
             assert_eq!(status, MBM_CANCELLED, "a request that was given up");
             job.since.set(None);
             life.ends(job.id.get());
@@ -86,7 +86,7 @@ pub fn replace(life: &Life, at: usize) {
 unsafe extern "C" fn done(context: *mut c_void, request: *mut mbm_clientRequest) {
     let life = Life::current();
     let job = &life.jobs[context as usize];
-    assert_eq!(job.request, request);
+    assert_eq!(job.request.get(), request);
     // SAFETY: the client passes a valid request.
     assert!(
         unsafe { (*request).status } != PENDING,
@@ -108,7 +108,14 @@ pub fn queue(life: &Life, at: usize) {
         return;
     }
     let line = &life.lines[at];
-    let (client, request) = (line.client.get(), job.request);
+    if life.inside.get() == 0 {
+        // SAFETY: the request has ended, so nothing uses it.
+        drop(unsafe { Box::from_raw(job.request.replace(new())) });
+    }
+    let (client, request) = (line.client.get(), job.request.get());
+    let mut words = [w.word(); 2].map(|word| vec![word; 32].into_boxed_slice());
+    let [data, reply] = words.each_mut().map(|words| words.as_mut_ptr());
+    job.words.replace(words);
     let id = life.id();
     let timeout = if w.byte() & 3 == 0 {
         u16::from(w.byte())
@@ -123,8 +130,8 @@ pub fn queue(life: &Life, at: usize) {
     unsafe {
         (*request).done = Some(done);
         (*request).context = index as *mut c_void;
-        (*request).data = w.noise(64).cast();
-        (*request).reply = w.noise(64).cast();
+        (*request).data = data.cast();
+        (*request).reply = reply.cast();
         (*request).replyBytes = 64;
         (*request).unit = unit.into();
         (*request).timeoutMs = timeout.into();
@@ -159,7 +166,7 @@ pub fn cancel(life: &Life) {
     let w = &life.w;
     let job = &life.jobs[usize::from(w.byte()) % life.jobs.len()];
     let client = life.lines[job.line.get()].client.get();
-    let request = job.request;
+    let request = job.request.get();
     let status = call!(w, mbm_client_cancel(client, request));
     if job.since.get().is_some() {
         assert_eq!(status, OK, "cancel");

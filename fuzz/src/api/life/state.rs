@@ -55,7 +55,10 @@ pub struct Master {
 
 /// A request of the program.
 pub struct Job {
-    pub request: *mut mbm_clientRequest,
+    /// Another one for each request, so that the one before is released.
+    pub request: Cell<*mut mbm_clientRequest>,
+    /// Its data, and those of the response.
+    pub words: RefCell<[Box<[u16]>; 2]>,
     pub line: Cell<usize>,
     pub id: Cell<u16>,
     /// `awake` of the line when it was queued; `None` if it has ended.
@@ -165,7 +168,8 @@ impl Life {
             at: Cell::new(0),
         });
         let jobs = (0..JOBS).map(|_| Job {
-            request: w.zeroed(),
+            request: Cell::new(new()),
+            words: RefCell::default(),
             line: Cell::new(0),
             id: Cell::new(0),
             since: Cell::new(None),
@@ -280,6 +284,10 @@ impl Drop for Life {
                 drop(Box::from_raw(line.client.get()));
                 drop(Box::from_raw(line.link.get()));
             }
+        }
+        for job in &self.jobs {
+            // SAFETY: as above.
+            drop(unsafe { Box::from_raw(job.request.get()) });
         }
     }
 }
