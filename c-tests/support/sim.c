@@ -42,8 +42,6 @@ static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
         capacity = s->read_piece;
     while (count < capacity && s->first < s->last && s->incoming[s->first].at <= s->now) {
         bytes[count] = s->incoming[s->first++].byte;
-        if (s->tap)
-            s->tap(s, bytes[count]);
         count++;
     }
     if (s->first == s->last)

@@ -50,7 +50,6 @@ struct sim {
     /* functions of the test */
     void (*device)(sim *s, const sim_frame *frame); /* called after a complete request */
     void (*on_idle)(sim *s);
-    void (*tap)(sim *s, uint8_t byte); /* called when the master has read a byte */
     void *context;
 
     /* what happened */
