@@ -43,8 +43,7 @@ class Tool:
 
     def serve(self, *words):
         """Runs mbm serve; returns the place that it prints."""
-        place = self.begin("serve", *words).await_output("^serving").split()[-1]
-        return place
+        return self.begin("serve", *words).await_output("^serving").split()[-1]
 
     def prints(self, wanted, *words):
         assert self(*words, *PATIENT) == (DONE, wanted, "")

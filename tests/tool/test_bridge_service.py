@@ -242,7 +242,7 @@ def test_a_wrong_file_is_refused_with_its_line(mbm, write, text, sentence):
 
 def test_check_only_looks_at_the_file(mbm, write):
     write("meter.yaml", FIELDS % ("meter", 1))
-    path = write("bridge.yaml", "lines:\n- {line: rtu:/dev/no-such-line, file: meter.yaml}\n")
+    path = write("bridge.yaml", "broker: '[::1]:1883'\nlines:\n- {line: rtu:/dev/no-such-line, file: meter.yaml}\n")
     assert mbm("bridge", "--check", path) == (0, "", "")
 
 

@@ -201,6 +201,7 @@ bridge /dev/ttyUSB0 @FILE|"/dev/ttyUSB0" is not a line
 bridge -b 127.0.0.1,1883 rtu:@TTY @FILE|127.0.0.1,1883
 bridge -b 127.0.0.1:0 rtu:@TTY @FILE|from 1 to 65535 is allowed
 bridge -b ::1 rtu:@TTY @FILE|an IPv6 address needs brackets
+bridge -b [::1]x:1883 rtu:@TTY @FILE|[::1]x:1883
 bridge -t hall/# rtu:@TTY @FILE|--topic "hall/#" is not 1 to 200 bytes without + and #
 bridge --timeout 200 rtu:@TTY @FILE|--timeout "200" is not a time
 bridge --gap 124 rtu:@TTY @FILE|from 0 to 123 is allowed
