@@ -376,7 +376,7 @@ uint8_t mbm_packet_addObject(mbm_packet *packet, uint8_t *storage, uint16_t capa
  * "unit 17  request    03 read holding registers  107..109", or
  * "bad CRC, 8 bytes" if the frame is damaged.
  *
- * Any thread or interrupt may call it. On a Cortex-M it takes 1008 bytes of stack.
+ * Any thread or interrupt may call it. On a Cortex-M it takes 976 bytes of stack.
  *
  * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions
  * @param frame        the frame, from its first byte to its last
