@@ -85,8 +85,8 @@ pub struct Link {
     /// Bytes have arrived since the link was opened, and since [`Link::close_if_silent`].
     has_received: bool,
     is_heard: bool,
-    /// The link was good until it was lost, or the device silent: a request opens it without a wait, and waits for that
-    /// attempt, as long as its response timeout.
+    /// The link was good until it was lost, or the device silent: a request opens it without a
+    /// wait, and waits for that attempt, as long as its response timeout.
     reopens: bool,
     /// The peer has closed the link while no request was there, and has done so twice in a row
     /// without any byte between: only a request opens it.
