@@ -2,32 +2,22 @@
 //! request waits for a reply.
 
 #[allow(dead_code)]
-#[path = "common/wire.rs"]
-mod wire;
+#[path = "common/stream.rs"]
+mod stream;
 
-use mbm::client::{Backoff, Client, Serial, Tcp, Transport};
+use mbm::client::{Backoff, Client, Serial, Transport};
 use mbm::error::Status;
-use mbm::pdu::functions::FunctionSpec;
-use wire::{End, Lent, Task};
+use stream::client;
+use stream::wire::{End, Lent, Task};
 
-type TcpIp = Client<Tcp<End, Lent>, Task, 16>;
 type Rtu = Client<Serial<End, Lent, Task>, Task, 16>;
 
 const TIMEOUT: u32 = 2_000_000;
 /// The length of a request in bytes.
 const REQUEST: usize = 12;
 
-fn client() -> (End, TcpIp) {
-    let end = End::default();
-    let mut client = Client::new(Tcp::new(end.clone(), Lent::default()));
-    client.line.set_in_flight(16);
-    (end, client)
-}
-
 fn read(transaction: u16) -> Task {
-    Task::new(1, transaction, &[], |header| {
-        header.set(FunctionSpec::READ_HOLDING_REGISTERS, transaction, 1)
-    })
+    stream::read(1, transaction)
 }
 
 /// Polls once as C does. Returns the number and the status of each request that ended.
