@@ -71,31 +71,15 @@ static void send_request(int fd, const uint8_t *pdu, size_t length)
     assert_int_equal(write(fd, frame, length + 7), length + 7);
 }
 
-/* Reads exactly `count` bytes. */
-static void get(int fd, uint8_t *bytes, size_t count)
-{
-    struct pollfd readable = {fd, POLLIN, 0};
-
-    while (count > 0) {
-        ssize_t got;
-
-        assert_int_equal(poll(&readable, 1, PATIENCE_MS), 1);
-        got = read(fd, bytes, count);
-        assert_true(got > 0);
-        bytes += got;
-        count -= (size_t)got;
-    }
-}
-
 /* Expects the next response as a TCP client. */
 static void expect(int fd, const uint8_t *pdu, size_t length)
 {
     const uint8_t head[] = {0x12, 0x34, 0, 0, 0, (uint8_t)(length + 1), UNIT};
     uint8_t frame[MBM_MAX_TCP_FRAME];
 
-    get(fd, frame, 9);
+    await_bytes(fd, frame, 9);
     assert_memory_equal(frame, head, sizeof head);
-    get(fd, frame + 9, length - 2);
+    await_bytes(fd, frame + 9, length - 2);
     assert_memory_equal(frame + 7, pdu, length);
 }
 
@@ -106,7 +90,7 @@ static void expect_request(const gateway *g, const uint8_t *pdu, size_t length)
 
     memcpy(wanted + 1, pdu, length);
     length = seal(wanted, length + 1);
-    get(g->line.ours, frame, length);
+    await_bytes(g->line.ours, frame, length);
     assert_memory_equal(frame, wanted, length);
 }
 

@@ -83,21 +83,6 @@ static int accept_gateway(void)
     return fd;
 }
 
-static void get(int fd, uint8_t *bytes, size_t count)
-{
-    struct pollfd readable = {fd, POLLIN, 0};
-
-    while (count > 0) {
-        ssize_t got;
-
-        assert_int_equal(poll(&readable, 1, PATIENCE_MS), 1);
-        got = read(fd, bytes, count);
-        assert_true(got > 0);
-        bytes += got;
-        count -= (size_t)got;
-    }
-}
-
 /* The client asks for one register at an address; the address is the transaction identifier too. */
 static void ask(uint8_t address)
 {
@@ -112,7 +97,7 @@ static uint16_t take(int device, uint8_t address)
     const uint8_t wanted[] = {0, 0, 0, 6, UNIT, 3, 0, address, 0, 1};
     uint8_t request[12];
 
-    get(device, request, sizeof request);
+    await_bytes(device, request, sizeof request);
     assert_memory_equal(request + 2, wanted, sizeof wanted);
     return (uint16_t)(request[0] << 8 | request[1]);
 }
@@ -130,9 +115,9 @@ static void expect_register(uint8_t address, uint8_t value)
     const uint8_t wanted[] = {0, address, 0, 0, 0, 5, UNIT, 3, 2, 0, value};
     uint8_t response[11];
 
-    get(client, response, 9);
+    await_bytes(client, response, 9);
     assert_memory_equal(response, wanted, 9);
-    get(client, response + 9, 2);
+    await_bytes(client, response + 9, 2);
     assert_memory_equal(response, wanted, sizeof wanted);
 }
 
@@ -141,7 +126,7 @@ static void expect_exception(uint8_t address, uint8_t exception)
     const uint8_t wanted[] = {0, address, 0, 0, 0, 3, UNIT, 0x83, exception};
     uint8_t response[9];
 
-    get(client, response, sizeof response);
+    await_bytes(client, response, sizeof response);
     assert_memory_equal(response, wanted, sizeof wanted);
 }
 
@@ -181,7 +166,7 @@ TEST(a_line_of_rtu_over_tcp_has_frames_of_rtu)
     start("rtu+tcp://127.0.0.1", device_port, NULL);
     int device = accept_gateway();
     ask(7);
-    get(device, found, sizeof found);
+    await_bytes(device, found, sizeof found);
     seal(request, sizeof request - 2);
     assert_memory_equal(found, request, sizeof request);
     seal(response, sizeof response - 2);

@@ -5,6 +5,7 @@
 #include "test.h"
 
 #include <poll.h>
+#include <unistd.h>
 
 /* The longest wait, in milliseconds. On a busy machine a thread may not run for seconds.
  * The wait ends as soon as the condition holds. */
@@ -23,5 +24,21 @@ enum { PATIENCE_MS = 20000 };
             poll(NULL, 0, 1);                                                                      \
         }                                                                                          \
     } while (0)
+
+/* Reads exactly `count` bytes from a descriptor, as they arrive. */
+static inline void await_bytes(int fd, uint8_t *bytes, size_t count)
+{
+    struct pollfd readable = {fd, POLLIN, 0};
+
+    while (count > 0) {
+        ssize_t got;
+
+        assert_int_equal(poll(&readable, 1, PATIENCE_MS), 1);
+        got = read(fd, bytes, count);
+        assert_true(got > 0);
+        bytes += got;
+        count -= (size_t)got;
+    }
+}
 
 #endif
