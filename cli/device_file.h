@@ -9,7 +9,7 @@
  *         address: 0
  *         type: float
  *
- * docs/serve.md describes every key.
+ * docs/device-file.md describes every key.
  *
  * Licence: MIT OR Apache-2.0. */
 #ifndef DEVICE_FILE_H

@@ -64,7 +64,7 @@ static const struct argp arguments = {
     .doc =
         "Writes a C header for firmware from a device file: constants, a table for a plan, and tables "
         "and functions for a server.\v"
-        "docs/serve.md describes the device file and the header.\n\n"
+        "docs/device-file.md describes the device file, docs/serve.md the header.\n\n"
         "  mbm header meter.yaml -o meter.h\n"};
 
 /* --- names in C --- */

@@ -86,7 +86,7 @@ static const struct argp arguments = {
     .doc =
         "Reads the fields of a device file, each at its interval, in the fewest requests. A round is "
         "the shortest interval; at its end the values are printed with their age and status.\v"
-        "docs/serve.md describes the device file.\n\n"
+        "docs/device-file.md describes the device file.\n\n"
         "  mbm poll rtu:/dev/ttyUSB0 meter.yaml --rounds 10\n\n" PLACE_HELP,
     .children = children};
 
