@@ -267,16 +267,16 @@ TEST(a_wrong_field_of_a_grouped_table_is_named)
 /* Each function of the plan is held to its comment in mbm.h: results, limits, NULL.
  * test_plan_refused has every table that is refused. */
 
-enum { TYPES = MBM_TYPE_TEXT, UINT16_FIELD = MBM_TYPE_UINT16 - 1 };
+enum { TYPES = MBM_TYPE_REGISTERS, UINT16_FIELD = MBM_TYPE_UINT16 - 1 };
 
 static mbm_plan none;
 
-/* A field of two values, a text of four characters, of every type; its index is
+/* A field of two values, a text of four characters or two registers, of every type; its index is
  * that of the type in `types`. */
 static void start(void)
 {
     plan_device_begin(&d, 0);
-    for (uint8_t type = MBM_TYPE_BIT; type <= MBM_TYPE_TEXT; type++) {
+    for (uint8_t type = MBM_TYPE_BIT; type <= MBM_TYPE_REGISTERS; type++) {
         uint8_t table = type == MBM_TYPE_BIT ? MBM_TABLE_COILS : MBM_TABLE_HOLDING_REGISTERS;
 
         plan_device_add(&d, 1, table, type, (uint16_t)(10 * type), 1000)->count =
@@ -291,7 +291,7 @@ static const struct {
     uint8_t is_integer, is_int32, is_number, is_float, is_text, is_registers;
 } types[] = {{1, 1, 1, 0, 0, 0}, {1, 1, 1, 0, 0, 1}, {1, 1, 1, 0, 0, 1}, {1, 1, 1, 0, 0, 1},
              {1, 1, 1, 0, 0, 1}, {1, 0, 1, 0, 0, 1}, {1, 0, 1, 0, 0, 1}, {0, 0, 1, 1, 0, 1},
-             {0, 0, 1, 1, 0, 1}, {0, 0, 0, 0, 1, 1}};
+             {0, 0, 1, 1, 0, 1}, {0, 0, 0, 0, 1, 1}, {0, 0, 0, 0, 0, 1}};
 
 /* One variable for the values of all types. */
 static union {

@@ -417,6 +417,25 @@ TEST(the_registers_of_a_field_are_a_view)
     IS(MBM_INVALID_ARGUMENT, mbm_plan_getRegisters(&d.plan, 2, &view));
 }
 
+TEST(registers_as_they_are_are_read_whole_and_left_to_the_functions_of_registers)
+{
+    mbm_registers view;
+    uint8_t bytes[6];
+
+    add(MBM_TYPE_UINT16, 9);
+    add(MBM_TYPE_REGISTERS, 10)->count = 3;
+    d.fields[1].order = MBM_ORDER_DCBA;
+    put(10, 0x010203040506, 3, MBM_ORDER_ABCD);
+    read_all();
+    assert_int_equal(d.requested, 1);
+    OK(mbm_plan_getRegisters(&d.plan, 1, &view));
+    assert_int_equal(view.first, 10);
+    assert_int_equal(view.count, 3);
+    assert_int_equal(view.order, MBM_ORDER_DCBA);
+    OK(mbm_registers_getBytes(&view, 10, MBM_ORDER_ABCD, bytes, sizeof bytes));
+    assert_memory_equal(bytes, "\1\2\3\4\5\6", sizeof bytes);
+}
+
 TEST(the_reads_can_be_looked_at)
 {
     mbm_planReadInfo read;

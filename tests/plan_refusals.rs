@@ -5,7 +5,7 @@ mod plan;
 
 use mbm::error::Status;
 use mbm::plan::field::{
-    BIT, COILS, DOUBLE, FLOAT, HOLDING_REGISTERS, INPUT_REGISTERS, TEXT, UINT32,
+    BIT, COILS, DOUBLE, FLOAT, HOLDING_REGISTERS, INPUT_REGISTERS, REGISTERS, TEXT, UINT32,
 };
 use mbm::plan::group::{group, take_groups, Refusal, MAX_FIELDS};
 use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, UnitLimits};
@@ -24,11 +24,11 @@ fn a_wrong_field_is_refused_with_its_index() {
         change(&mut field);
         [self::field(0), self::field(50), field]
     };
-    let invalid: [fn(&mut Field); 12] = [
+    let invalid: [fn(&mut Field); 14] = [
         |field| field.table = 0,
         |field| field.table = 5,
         |field| field.value_type = 0,
-        |field| field.value_type = 11,
+        |field| field.value_type = 12,
         |field| field.table = COILS,
         |field| field.bit = 1,
         |field| (field.value_type, field.bit) = (BIT, 16),
@@ -37,6 +37,8 @@ fn a_wrong_field_is_refused_with_its_index() {
         |field| field.interval_ms = 0,
         |field| field.divisor = -1,
         |field| (field.value_type, field.multiplier) = (TEXT, 2),
+        |field| (field.value_type, field.multiplier) = (REGISTERS, 2),
+        |field| (field.value_type, field.divisor) = (REGISTERS, 10),
     ];
     for change in invalid {
         refused(Status::INVALID_ARGUMENT, 2, &wrong(change), &LIMITS);
@@ -50,6 +52,8 @@ fn a_wrong_field_is_refused_with_its_index() {
     let fields = wrong(|field| (field.value_type, field.count) = (DOUBLE, 32));
     refused(Status::ILLEGAL_DATA_VALUE, 2, &fields, &LIMITS);
     let fields = wrong(|field| (field.value_type, field.count) = (TEXT, 251));
+    refused(Status::ILLEGAL_DATA_VALUE, 2, &fields, &LIMITS);
+    let fields = wrong(|field| (field.value_type, field.count) = (REGISTERS, 126));
     refused(Status::ILLEGAL_DATA_VALUE, 2, &fields, &LIMITS);
 }
 

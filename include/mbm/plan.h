@@ -52,6 +52,9 @@ extern "C" {
 #define MBM_TYPE_DOUBLE 9u
 /** A text, two characters a register, which ends at its first NUL or with its field. */
 #define MBM_TYPE_TEXT 10u
+/** `count` registers as they are, for a type that the plan does not know. mbm_plan_getRegisters
+ *  returns them, and a function mbm_registers_get... their value. */
+#define MBM_TYPE_REGISTERS 11u
 /** The longest interval of a field in milliseconds: a day. */
 #define MBM_PLAN_LONGEST_INTERVAL 86400000
 /** The most fields of one plan. */
@@ -88,17 +91,16 @@ typedef struct mbm_planField {
     uint8_t bit;
     /** The first bit or register, 0 to 65535, as on the wire. */
     uint16_t address;
-    /**
-     * The number of values, of the characters of a text, or of the bits of a register. 0 means 1.
-     */
+    /** The number of values, of the characters of a text, of the bits of a register, or of the
+     *  registers of MBM_TYPE_REGISTERS. 0 means 1. */
     uint16_t count;
     /** The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL. */
     uint32_t intervalMs;
     /** mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
-     *  It is 0 for a text. */
+     *  It is 0 for a text and for MBM_TYPE_REGISTERS. */
     int32_t multiplier;
     /** They divide by this after that; 0 means 1. It must not be negative, and must be 0 for a
-     *  text. */
+     *  text and for MBM_TYPE_REGISTERS. */
     int32_t divisor;
 } mbm_planField;
 
@@ -297,8 +299,8 @@ uint8_t mbm_plan_getStatus(mbm_plan *plan, uint16_t field, uint32_t *ageMs);
  * @param index  which of its values, 0 for the first
  * @param value  gets the number
  * @return a status; MBM_OUT_OF_RANGE if it is not in the range of `value`; MBM_INVALID_ARGUMENT
- *         for a float or a text; if no value has arrived yet the status that mbm_plan_getStatus
- *         returns
+ *         for a float, a text or MBM_TYPE_REGISTERS; if no value has arrived yet the status that
+ *         mbm_plan_getStatus returns
  */
 uint8_t mbm_plan_getInteger(const mbm_plan *plan, uint16_t field, uint16_t index, int64_t *value);
 
@@ -317,7 +319,8 @@ uint8_t mbm_plan_getInt32(const mbm_plan *plan, uint16_t field, uint16_t index, 
  * that.
  *
  * @param value  gets the number; a float that is infinite or not a number stays so
- * @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text
+ * @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text or
+ *         MBM_TYPE_REGISTERS
  */
 uint8_t mbm_plan_getNumber(const mbm_plan *plan, uint16_t field, uint16_t index, double *value);
 

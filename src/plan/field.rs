@@ -31,6 +31,8 @@ pub const FLOAT: u8 = 8;
 pub const DOUBLE: u8 = 9;
 /// A text, two characters a register.
 pub const TEXT: u8 = 10;
+/// Registers as they are, for a type that the plan does not know.
+pub const REGISTERS: u8 = 11;
 
 /// The longest interval: a day.
 pub const LONGEST_INTERVAL_MS: u32 = 86_400_000;
@@ -43,7 +45,7 @@ pub struct Field {
     pub unit: u16,
     /// [`COILS`] to [`INPUT_REGISTERS`].
     pub table: u8,
-    /// [`BIT`] to [`TEXT`].
+    /// [`BIT`] to [`REGISTERS`].
     pub value_type: u8,
     /// The order of the bytes: 0 and 1 for [`Abcd`](crate::data::order::Order::Abcd), 2 to 4 for
     /// the orders that follow.
@@ -53,7 +55,7 @@ pub struct Field {
     pub bit: u8,
     /// The first bit or register, 0 to 65535, as on the wire.
     pub address: u16,
-    /// The number of values, or of the characters of a text; 0 means 1.
+    /// The number of values, of the characters of a text, or of registers; 0 means 1.
     pub count: u16,
     /// The time from one read to the next, 1 to [`LONGEST_INTERVAL_MS`].
     pub interval_ms: u32,
@@ -80,18 +82,19 @@ impl Field {
 
     /// Checks the field by itself: [`Status::OK`]; [`Status::INVALID_ARGUMENT`] for an unknown
     /// table, type or order, a type that the table does not have, bits beyond those of a register,
-    /// a unit above 255, an interval out of range, a negative divisor, or a scale of a text;
+    /// a unit above 255, an interval out of range, a negative divisor, or a scale of a text or of
+    /// [`REGISTERS`];
     /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
     /// field goes beyond address 65535.
     pub fn check(&self) -> Status {
         let known = self.table.wrapping_sub(1) < INPUT_REGISTERS
-            && self.value_type.wrapping_sub(1) < TEXT
+            && self.value_type.wrapping_sub(1) < REGISTERS
             && (self.value_type == BIT || !self.is_in_bits())
             && u32::from(self.bit) + self.bits() <= u16::BITS
             && self.order <= 4
             && self.unit <= u8::MAX.into()
             && self.divisor >= 0
-            && (self.value_type != TEXT || self.multiplier | self.divisor == 0)
+            && (self.value_type < TEXT || self.multiplier | self.divisor == 0)
             && self.interval_ms.wrapping_sub(1) < LONGEST_INTERVAL_MS;
         if !known {
             Status::INVALID_ARGUMENT

@@ -1,7 +1,7 @@
 //! A value as a float of 64 bits, scaled and rounded once. Its bits are computed with integers,
 //! for not every processor has arithmetic on floats.
 
-use super::field::{DOUBLE, FLOAT, TEXT};
+use super::field::{DOUBLE, FLOAT, REGISTERS, TEXT};
 use super::value::{scale, Words};
 use crate::error::Error;
 
@@ -20,13 +20,13 @@ impl Words<'_> {
     /// counts.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] for a text.
+    /// [`Error::INVALID_ARGUMENT`] for a text or for registers as they are.
     pub fn number(&self) -> Result<u64, Error> {
         let field = self.field;
         let (multiplier, divisor) = scale(field);
         let mut sign = if field.multiplier < 0 { SIGN } else { 0 };
         let (significand, exponent) = match field.value_type {
-            TEXT => return Err(Error::INVALID_ARGUMENT),
+            TEXT | REGISTERS => return Err(Error::INVALID_ARGUMENT),
             FLOAT | DOUBLE => {
                 let bits = self.double()?;
                 sign ^= bits & SIGN;

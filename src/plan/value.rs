@@ -183,7 +183,7 @@ impl Words<'_> {
     /// nearest, halves away from 0.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] for a float or a text;
+    /// [`Error::INVALID_ARGUMENT`] for a float, a text or registers as they are;
     /// [`Error::OUT_OF_RANGE`] if the result is out of range.
     pub fn integer(&self) -> Result<i64, Error> {
         let field = self.field;

@@ -44,6 +44,9 @@ pub const MBM_TYPE_FLOAT: u8 = 8;
 pub const MBM_TYPE_DOUBLE: u8 = 9;
 /// A text, two characters a register, which ends at its first NUL or with its field.
 pub const MBM_TYPE_TEXT: u8 = 10;
+/// `count` registers as they are, for a type that the plan does not know. mbm_plan_getRegisters
+/// returns them, and a function mbm_registers_get... their value.
+pub const MBM_TYPE_REGISTERS: u8 = 11;
 
 /// The longest interval of a field in milliseconds: a day.
 pub const MBM_PLAN_LONGEST_INTERVAL: u32 = 86_400_000;
@@ -65,6 +68,7 @@ const _: () = {
     assert!(MBM_TYPE_FLOAT == field::FLOAT);
     assert!(MBM_TYPE_DOUBLE == field::DOUBLE);
     assert!(MBM_TYPE_TEXT == field::TEXT);
+    assert!(MBM_TYPE_REGISTERS == field::REGISTERS);
     assert!(MBM_PLAN_LONGEST_INTERVAL == field::LONGEST_INTERVAL_MS);
     assert!(MBM_PLAN_MAX_FIELDS as usize == mbm::plan::group::MAX_FIELDS);
 };

@@ -28,15 +28,16 @@ pub struct mbm_planField {
     pub bit: u8,
     /// The first bit or register, 0 to 65535, as on the wire.
     pub address: u16,
-    /// The number of values, of the characters of a text, or of the bits of a register. 0 means 1.
+    /// The number of values, of the characters of a text, of the bits of a register, or of the
+    /// registers of MBM_TYPE_REGISTERS. 0 means 1.
     pub count: u16,
     /// The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL.
     pub intervalMs: u32,
     /// mbm_plan_getNumber, mbm_plan_getInteger and mbm_plan_getInt32 multiply by this; 0 means 1.
-    /// It is 0 for a text.
+    /// It is 0 for a text and for MBM_TYPE_REGISTERS.
     pub multiplier: i32,
     /// They divide by this after that; 0 means 1. It must not be negative, and must be 0 for a
-    /// text.
+    /// text and for MBM_TYPE_REGISTERS.
     pub divisor: i32,
 }
 

@@ -161,8 +161,8 @@ pub unsafe extern "C" fn mbm_plan_getStatus(
 /// @param index  which of its values, 0 for the first
 /// @param value  gets the number
 /// @return a status; MBM_OUT_OF_RANGE if it is not in the range of `value`; MBM_INVALID_ARGUMENT
-///         for a float or a text; if no value has arrived yet the status that mbm_plan_getStatus
-///         returns
+///         for a float, a text or MBM_TYPE_REGISTERS; if no value has arrived yet the status that
+///         mbm_plan_getStatus returns
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getInteger(
     plan: *const mbm_plan,
@@ -193,7 +193,8 @@ pub unsafe extern "C" fn mbm_plan_getInt32(
 /// that.
 ///
 /// @param value  gets the number; a float that is infinite or not a number stays so
-/// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text
+/// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text or
+///         MBM_TYPE_REGISTERS
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getNumber(
     plan: *const mbm_plan,
