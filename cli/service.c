@@ -304,8 +304,15 @@ int service_begin(service *s, void (*fill)(void *context, stats *numbers), void 
     s->fill_context = context;
     catch_signals(s);
     if (s->metrics_place) {
-        const int port = metrics_listen(&s->metrics, s->metrics_place, render, s);
+        static const http_page pages[] = {{.path = "/metrics",
+                                           .type = "text/plain; version=0.0.4; charset=utf-8",
+                                           .render = render},
+                                          {0}};
+        int port;
 
+        s->metrics.pages = pages;
+        s->metrics.context = s;
+        port = http_listen(&s->metrics, s->metrics_place);
         if (port < 0)
             return report(CODE_LINE, "--metrics %s: %s", s->metrics_place, strerror(errno));
         report_log(REPORT_INFO, "metrics are at port %d, /metrics", port);
@@ -316,7 +323,7 @@ int service_begin(service *s, void (*fill)(void *context, stats *numbers), void 
 
 int service_wait(service *s, struct pollfd *polls, nfds_t count, uint32_t micros)
 {
-    const uint32_t delay = metrics_delay(&s->metrics);
+    const uint32_t delay = http_delay(&s->metrics);
     struct timespec time;
     nfds_t added;
     int found;
@@ -333,17 +340,17 @@ int service_wait(service *s, struct pollfd *polls, nfds_t count, uint32_t micros
         else if (left * 1000 < micros)
             micros = (uint32_t)(left * 1000);
     }
-    added = metrics_wait(&s->metrics, polls + count);
+    added = http_wait(&s->metrics, polls + count);
     time = (struct timespec){(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
     found = ppoll(polls, count + added, micros == UINT32_MAX ? NULL : &time, &s->awake);
     if (found > 0)
-        metrics_polled(&s->metrics, polls + count, added);
+        http_polled(&s->metrics, polls + count, added);
     return found;
 }
 
 void service_work(service *s)
 {
-    metrics_work(&s->metrics);
+    http_work(&s->metrics);
     if (s->every > 0 && clock_milliseconds() >= s->next_time) {
         s->next_time = clock_milliseconds() + s->every;
         stats_wanted = 1;
@@ -358,7 +365,7 @@ void service_end(service *s)
 {
     notify("STOPPING=1");
     write_stats(s);
-    metrics_close(&s->metrics);
+    http_close(&s->metrics);
 }
 
 /* --- the command line --- */
@@ -377,7 +384,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
         return 0;
     case METRICS:
         s->metrics_place = text;
-        wrong = metrics_check(text);
+        wrong = http_check(text, 0);
         if (wrong)
             options_wrong(state, "--metrics \"%s\" %s", text, wrong);
         return 0;

@@ -6,7 +6,7 @@
 #define SERVICE_H
 
 #include "mbm.h"
-#include "metrics.h"
+#include "http.h"
 
 #include <argp.h>
 #include <signal.h>
@@ -47,13 +47,13 @@ typedef struct service {
     void *fill_context;
     sigset_t awake; /* the signal mask during a sleep */
     int had_terminal, stats_failed;
-    metrics metrics;
+    http metrics;
 } service;
 
 /* WAITS: the descriptors that service_wait adds to those of the program. POLLS: how often an object
  * is polled at most in one round while its pollDelay is 0, so that the other descriptors are not
  * forgotten. */
-enum { SERVICE_WAITS = METRICS_WAITS, SERVICE_POLLS = 4 };
+enum { SERVICE_WAITS = HTTP_WAITS, SERVICE_POLLS = 4 };
 
 /* --stats, --stats-every, --metrics and --log-level. */
 extern const struct argp options_service;

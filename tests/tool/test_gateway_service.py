@@ -205,7 +205,7 @@ def test_a_full_disk_for_frames_stops_no_request(gateway, setting, folder):
 @pytest.mark.parametrize("request_line, status", [
     (b"GET /metrics HTTP/1.0\r\n\r\n", "200 OK"), (b"GET /metrics?a=b HTTP/1.0\n\n", "200 OK"),
     (b"GET / HTTP/1.0\r\n\r\n", "404 Not Found"), (b"GET /metricsx HTTP/1.0\r\n\r\n", "404 Not Found"),
-    (b"POST /metrics HTTP/1.0\r\n\r\n", "405 Method Not Allowed"), (b"x" * 2047, "400 Bad Request"), (b"\0\0", "400 Bad Request")], ids=repr)
+    (b"POST /metrics HTTP/1.0\r\n\r\n", "405 Method Not Allowed"), (b"x" * 8191, "400 Bad Request"), (b"\0\0", "400 Bad Request")], ids=repr)
 def test_the_port_of_metrics_speaks_http(gateway, setting, request_line, status):
     service = gateway(setting(NOWHERE), *METRICS)
     head, _ = http(metrics_port(service), request_line)
