@@ -2,10 +2,9 @@
 #include "advice.h"
 #include "clock.h"
 #include "device_file.h"
-#include "device_plan.h"
-#include "line.h"
 #include "numbers.h"
 #include "options.h"
+#include "polled.h"
 #include "report.h"
 
 #include <cjson/cJSON.h>
@@ -24,10 +23,7 @@ typedef struct polling {
     uint16_t gap;
     uint8_t shows_plan;
 
-    line at;
-    device meter;
-    mbm_plan plan;
-    mbm_planSetup setup;
+    polled read;
     struct {
         uint8_t status, exception;
         uint16_t field;
@@ -92,11 +88,6 @@ static const struct argp arguments = {
 
 /* --- the plan --- */
 
-static uint8_t exception_of(uint8_t status)
-{
-    return status < MBM_INVALID_SLAVE_ID ? status : 0;
-}
-
 /* Notes how a read of a field has ended. */
 static void take_field(void *context, mbm_plan *of, uint16_t field)
 {
@@ -104,17 +95,17 @@ static void take_field(void *context, mbm_plan *of, uint16_t field)
     const uint8_t status = mbm_plan_getStatus(of, field, NULL);
     const char *why;
 
-    line_note(&p->at, status);
-    why = line_why(&p->at, status);
+    line_note(&p->read.at, status);
+    why = line_why(&p->read.at, status);
     if (status == MBM_OK || status == MBM_CANCELLED || report_stopped)
         return;
     if (p->first_failure.status == MBM_OK) {
         p->first_failure.status = status;
-        p->first_failure.exception = exception_of(status);
+        p->first_failure.exception = polled_exception(status);
         p->first_failure.field = field;
         snprintf(p->first_failure.why, sizeof p->first_failure.why, "%s", why ? why : "");
     }
-    (void)report_note(report_code_of(status, exception_of(status)));
+    (void)report_note(report_code_of(status, polled_exception(status)));
 }
 
 /* Returns CODE_DONE, or another exit code after reporting the reason. */
@@ -125,16 +116,16 @@ static int begin_plan(polling *p)
     uint16_t wrong = UINT16_MAX;
     uint8_t status;
 
-    if (p->meter.readable == 0)
+    if (p->read.meter.readable == 0)
         return report(CODE_WRONG, "%s has no field that can be read", p->file);
-    if (!device_plan_make(&p->setup, &p->meter, p->gap, requests))
+    if (!device_plan_make(&p->read.setup, &p->read.meter, p->gap, requests))
         return report(CODE_SYSTEM, REPORT_NO_MEMORY);
-    p->setup.update = take_field;
-    p->setup.context = p;
-    status = mbm_plan_begin(&p->plan, &p->at.client, &p->setup, &wrong);
-    return status == MBM_OK
-               ? CODE_DONE
-               : report(CODE_WRONG, "%s", device_plan_wrong(&p->meter, p->file, status, wrong));
+    p->read.setup.update = take_field;
+    p->read.setup.context = p;
+    status = mbm_plan_begin(&p->read.plan, &p->read.at.client, &p->read.setup, &wrong);
+    return status == MBM_OK ? CODE_DONE
+                            : report(CODE_WRONG, "%s",
+                                     device_plan_wrong(&p->read.meter, p->file, status, wrong));
 }
 
 static void show_plan(polling *p)
@@ -143,23 +134,13 @@ static void show_plan(polling *p)
     char time[32];
     uint16_t i;
 
-    for (i = 0; mbm_plan_getRead(&p->plan, i, &read) == MBM_OK; i++)
+    for (i = 0; mbm_plan_getRead(&p->read.plan, i, &read) == MBM_OK; i++)
         fprintf(stderr, "request %u: unit %u, %s, %u from %u on, every %s\n", i + 1u, read.unit,
                 value_table_names[read.table], read.quantity, read.address,
                 number_time_text(read.intervalMs, time));
 }
 
 /* --- showing --- */
-
-/* The status of a field in words; a lost link has the reason too. */
-static const char *print_status(polling *p, uint8_t status, char text[256])
-{
-    const char *reason = status == MBM_LINK_LOST ? line_reason(&p->at) : NULL;
-
-    snprintf(text, 256, "%s%s%s", report_words(status, exception_of(status)), reason ? ": " : "",
-             reason ? reason : "");
-    return text;
-}
 
 /* How wide a text is on a terminal: its characters, if it is UTF-8. */
 static int width_of(const char *text)
@@ -176,9 +157,9 @@ static int longest_name(polling *p)
     int longest = 0;
     uint16_t i;
 
-    for (i = 0; i < p->meter.readable; i++)
-        if (width_of(p->meter.fields[i].name) > longest)
-            longest = width_of(p->meter.fields[i].name);
+    for (i = 0; i < p->read.meter.readable; i++)
+        if (width_of(p->read.meter.fields[i].name) > longest)
+            longest = width_of(p->read.meter.fields[i].name);
     return longest < LONGEST_NAME ? longest : LONGEST_NAME;
 }
 
@@ -188,44 +169,21 @@ static void print_column(const char *text, int width)
     printf("  %s%*s", text, width > width_of(text) ? width - width_of(text) : 0, "");
 }
 
-/* Appends the names of an enumeration, as far as they fit: " (off)", or " (off,on)" if there are
- * several values; "-" stands for a value without a name. Appends nothing if no value has a name. */
-static void add_names(polling *p, uint16_t field, char *text, size_t capacity)
-{
-    const uint16_t count = device_plan_count(&p->meter.planned[field]);
-    size_t length = strlen(text);
-    uint16_t i, named = 0;
-
-    for (i = 0; i < count; i++)
-        named = (uint16_t)(named + (device_plan_name(&p->plan, &p->meter, field, i) != NULL));
-    for (i = 0; named > 0 && i < count && length < capacity; i++) {
-        const char *name = device_plan_name(&p->plan, &p->meter, field, i);
-
-        length += (size_t)snprintf(text + length, capacity - length, "%s%s%s", i == 0 ? " (" : ",",
-                                   name ? name : "-", i + 1 == count ? ")" : "");
-    }
-}
-
 static void print_row(polling *p, uint16_t field, int name_width)
 {
-    static char value[DEVICE_TEXT_LONGEST + 3 * DEVICE_NAME_BYTES];
-    const char *measure = p->meter.fields[field].unit_of_measurement;
+    static char value[POLLED_VALUE_BYTES];
     char status[256], age[32] = "";
     uint32_t ageMs;
 
-    const uint8_t code = mbm_plan_getStatus(&p->plan, field, &ageMs);
+    const uint8_t code = mbm_plan_getStatus(&p->read.plan, field, &ageMs);
 
-    if (!device_plan_text(&p->plan, &p->meter, field, 0, value))
-        strcpy(value, "-");
-    else if (measure)
-        snprintf(value + strlen(value), DEVICE_NAME_BYTES + 2, " %s", measure);
-    add_names(p, field, value, sizeof value);
+    (void)polled_value(&p->read, field, value);
     if (ageMs != UINT32_MAX)
         snprintf(age, sizeof age, "%ums", (unsigned)ageMs);
-    print_column(p->meter.fields[field].name, name_width);
+    print_column(p->read.meter.fields[field].name, name_width);
     print_column(value, 16);
     print_column(age, 7);
-    printf("  %s\n", print_status(p, code, status));
+    printf("  %s\n", polled_status(&p->read, code, status));
 }
 
 static void print_rows(polling *p, uint32_t round, const char *time)
@@ -233,57 +191,24 @@ static void print_rows(polling *p, uint32_t round, const char *time)
     const int name_width = longest_name(p);
     uint16_t i, right = 0;
 
-    for (i = 0; i < p->meter.readable; i++)
-        right = (uint16_t)(right + (mbm_plan_getStatus(&p->plan, i, NULL) == MBM_OK));
+    for (i = 0; i < p->read.meter.readable; i++)
+        right = (uint16_t)(right + (mbm_plan_getStatus(&p->read.plan, i, NULL) == MBM_OK));
     if (isatty(STDOUT_FILENO))
         printf("\033[H\033[J");
-    printf("round %u, %s: %u of %u fields read\n", (unsigned)round, time, right, p->meter.readable);
-    for (i = 0; i < p->meter.readable; i++)
+    printf("round %u, %s: %u of %u fields read\n", (unsigned)round, time, right,
+           p->read.meter.readable);
+    for (i = 0; i < p->read.meter.readable; i++)
         print_row(p, i, name_width);
-}
-
-/* The names of an enumeration for JSON: a text or null, or an array of these for several values. */
-static cJSON *json_names(polling *p, uint16_t field)
-{
-    const uint16_t count = device_plan_count(&p->meter.planned[field]);
-    cJSON *array = count > 1 ? cJSON_CreateArray() : NULL, *one = NULL;
-    uint16_t i;
-
-    for (i = 0; i < count; i++) {
-        const char *name = device_plan_name(&p->plan, &p->meter, field, i);
-
-        one = name ? cJSON_CreateString(name) : cJSON_CreateNull();
-        if (array)
-            cJSON_AddItemToArray(array, one);
-    }
-    return array ? array : one;
 }
 
 static void print_json(polling *p, uint16_t field, uint32_t round, const char *time)
 {
-    static char value[DEVICE_TEXT_LONGEST];
-    const device_field *of = &p->meter.fields[field];
     cJSON *object = cJSON_CreateObject();
-    char status[256];
-    uint32_t ageMs;
-
-    const uint8_t code = mbm_plan_getStatus(&p->plan, field, &ageMs);
 
     cJSON_AddStringToObject(object, "time", time);
     cJSON_AddNumberToObject(object, "round", round);
-    cJSON_AddNumberToObject(object, "unit", p->meter.planned[field].unit);
-    cJSON_AddStringToObject(object, "name", of->name);
-    if (device_plan_text(&p->plan, &p->meter, field, 1, value))
-        cJSON_AddRawToObject(object, "value", value);
-    else
-        cJSON_AddNullToObject(object, "value");
-    if (of->label_count > 0)
-        cJSON_AddItemToObject(object, "value_name", json_names(p, field));
-    if (of->unit_of_measurement)
-        cJSON_AddStringToObject(object, "unit_of_measurement", of->unit_of_measurement);
-    if (ageMs != UINT32_MAX)
-        cJSON_AddNumberToObject(object, "age_ms", ageMs);
-    report_json(object, code, exception_of(code), print_status(p, code, status));
+    polled_add_json(&p->read, field, object);
+    report_print_json(object);
 }
 
 static void show_round(polling *p, uint32_t round)
@@ -294,7 +219,7 @@ static void show_round(polling *p, uint32_t round)
     (void)clock_now_text(time);
     if (!options.is_json)
         print_rows(p, round, time);
-    for (i = 0; options.is_json && i < p->meter.readable; i++)
+    for (i = 0; options.is_json && i < p->read.meter.readable; i++)
         print_json(p, i, round, time);
     report_flush();
 }
@@ -305,9 +230,9 @@ static void report_first_failure(polling *p)
 {
     const uint8_t status = p->first_failure.status, exception = p->first_failure.exception;
     const char *why = *p->first_failure.why ? p->first_failure.why : NULL;
-    const mbm_planField *planned = &p->meter.planned[p->first_failure.field];
-    const device_field *field = &p->meter.fields[p->first_failure.field];
-    const char *advice = advice_on(&p->at.place, ADVICE_FILE, status, exception, why);
+    const mbm_planField *planned = &p->read.meter.planned[p->first_failure.field];
+    const device_field *field = &p->read.meter.fields[p->first_failure.field];
+    const char *advice = advice_on(&p->read.at.place, ADVICE_FILE, status, exception, why);
     char who[200];
     uint16_t address;
     uint8_t table;
@@ -328,7 +253,7 @@ static void report_first_failure(polling *p)
 /* Says how it went, and what to look at after the first failure. */
 static void show_end(polling *p, uint32_t round)
 {
-    const mbm_counters *counters = &p->at.counters;
+    const mbm_counters *counters = &p->read.at.counters;
 
     if (p->first_failure.status != MBM_OK)
         report_first_failure(p);
@@ -344,8 +269,8 @@ static int is_every_field_read(polling *p)
 {
     uint16_t i;
 
-    for (i = 0; i < p->meter.readable; i++)
-        if (mbm_plan_getStatus(&p->plan, i, NULL) == MBM_PENDING)
+    for (i = 0; i < p->read.meter.readable; i++)
+        if (mbm_plan_getStatus(&p->read.plan, i, NULL) == MBM_PENDING)
             return 0;
     return 1;
 }
@@ -355,18 +280,18 @@ static uint32_t shortest_interval(polling *p)
     uint32_t shortest = MBM_PLAN_LONGEST_INTERVAL;
     uint16_t i;
 
-    for (i = 0; i < p->meter.readable; i++)
-        if (p->meter.planned[i].intervalMs < shortest)
-            shortest = p->meter.planned[i].intervalMs;
+    for (i = 0; i < p->read.meter.readable; i++)
+        if (p->read.meter.planned[i].intervalMs < shortest)
+            shortest = p->read.meter.planned[i].intervalMs;
     return shortest;
 }
 
 /* Sleeps until plan or client have something to do, at most `milliseconds`. */
 static void rest(polling *p, uint32_t milliseconds)
 {
-    const uint32_t delay = mbm_plan_pollDelay(&p->plan) / 1000;
+    const uint32_t delay = mbm_plan_pollDelay(&p->read.plan) / 1000;
 
-    line_rest(&p->at, delay < milliseconds ? delay : milliseconds);
+    line_rest(&p->read.at, delay < milliseconds ? delay : milliseconds);
 }
 
 /* The first round ends when every field was read or failed, each other one an interval later. */
@@ -381,8 +306,8 @@ static void poll_rounds(polling *p)
 
         if (p->forMs && now - start >= p->forMs)
             break;
-        (void)mbm_plan_poll(&p->plan);
-        line_poll(&p->at);
+        (void)mbm_plan_poll(&p->read.plan);
+        line_poll(&p->read.at);
         if (round == 0 ? is_every_field_read(p) : (int32_t)(now - due) >= 0) {
             show_round(p, ++round);
             due =
@@ -406,23 +331,23 @@ int poll_command(int argc, char **argv)
     int code;
 
     argp_parse(&arguments, argc, argv, 0, NULL, p);
-    code = device_file_read(&p->meter, p->file, wrong);
+    code = device_file_read(&p->read.meter, p->file, wrong);
     if (code != CODE_DONE)
         return report(code, "%s", wrong);
-    code = line_open(&p->at, &p->where);
+    code = line_open(&p->read.at, &p->where);
     if (code == CODE_DONE) {
         if (p->rounds == 1)
-            code = line_connect(&p->at);
+            code = line_connect(&p->read.at);
         if (code == CODE_DONE)
             code = begin_plan(p);
         if (code == CODE_DONE && p->shows_plan)
             show_plan(p);
         if (code == CODE_DONE)
             poll_rounds(p);
-        (void)mbm_plan_end(&p->plan);
-        device_plan_free(&p->setup);
-        line_close(&p->at);
+        (void)mbm_plan_end(&p->read.plan);
+        device_plan_free(&p->read.setup);
+        line_close(&p->read.at);
     }
-    device_free(&p->meter);
+    device_free(&p->read.meter);
     return code != CODE_DONE ? code : report_code;
 }

@@ -220,11 +220,16 @@ void report_print_json(cJSON *object)
     cJSON_Delete(object);
 }
 
-void report_json(cJSON *object, uint8_t status, uint8_t exception, const char *words)
+void report_add_json(cJSON *object, uint8_t status, uint8_t exception, const char *words)
 {
     cJSON_AddNumberToObject(object, "code", report_code_of(status, exception));
     cJSON_AddStringToObject(object, "status", words);
     if (exception != 0)
         cJSON_AddNumberToObject(object, "exception", exception);
+}
+
+void report_json(cJSON *object, uint8_t status, uint8_t exception, const char *words)
+{
+    report_add_json(object, status, exception, words);
     report_print_json(object);
 }

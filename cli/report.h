@@ -77,9 +77,11 @@ const char *report_words(uint8_t status, uint8_t exception);
 /* An error number in words. EPIPE is the end of a line here, not "Broken pipe" as strerror says. */
 const char *report_error_text(int error);
 
-/* Prints an object in one line to stdout, and frees it. report_json adds the status of a request
- * before: its exit code, its status in words, and the code of an exception. */
+/* Prints an object in one line to stdout, and frees it. report_add_json adds the status of a
+ * request to it: its exit code, its status in words, and the code of an exception. report_json does
+ * both. */
 struct cJSON;
+void report_add_json(struct cJSON *object, uint8_t status, uint8_t exception, const char *words);
 void report_print_json(struct cJSON *object);
 void report_json(struct cJSON *object, uint8_t status, uint8_t exception, const char *words);
 
