@@ -1,7 +1,7 @@
 //! Which fields of a response must match the request.
 
+use mbm::client::RequestState;
 use mbm::error::Status;
-use mbm::pdu::header::RequestHeader;
 
 #[test]
 fn a_file_record_response_whose_lengths_differ_from_the_request_is_malformed() {
@@ -17,9 +17,9 @@ fn a_file_record_response_whose_lengths_differ_from_the_request_is_malformed() {
         &[0x14, 10, 5, 6, 1, 2, 3, 4, 3, 7, 5, 6],
         &[0x14, 9, 5, 6, 1, 2, 3, 4, 3, 6, 5],
     ];
-    let mut header = RequestHeader::NONE;
-    assert_eq!(header.read_file_records(14), Status::OK);
-    let validate = |response: &[u8]| header.validate(response, |index| groups[index]);
+    let mut state = RequestState::NONE;
+    assert_eq!(state.read_file_records(14), Status::OK);
+    let validate = |response: &[u8]| state.validate(response, |index| groups[index]);
     assert_eq!(validate(&right), Status::OK);
     assert_eq!(validate(&[0x94, 2]), Status::ILLEGAL_DATA_ADDRESS);
     for response in others {

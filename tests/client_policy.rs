@@ -9,8 +9,8 @@ use mbm::pdu::functions::FunctionSpec;
 use wire::{End, Lent, Task};
 
 fn read(unit: u8) -> Task {
-    Task::new(unit, 0, &[], |header| {
-        header.set(FunctionSpec::READ_HOLDING_REGISTERS, 0, 1)
+    Task::new(unit, 0, &[], |state| {
+        state.set(FunctionSpec::READ_HOLDING_REGISTERS, 0, 1)
     })
 }
 

@@ -3,10 +3,9 @@
 mod common;
 
 use common::uart::{Bench, Wire};
-use mbm::client::{Client, Frame, Request, Serial};
+use mbm::client::{Client, Frame, Request, RequestState, Serial};
 use mbm::error::Error;
 use mbm::pdu::functions::FunctionSpec;
-use mbm::pdu::header::RequestHeader;
 use mbm::port::Port;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -164,22 +163,22 @@ fn a_request_that_failed_has_read_nothing() {
 fn a_function_without_a_constructor_takes_and_returns_bytes() {
     let mut bench = Bench::new();
     let mut queue = [0; 64];
-    let read = |header: &mut RequestHeader| header.set(FunctionSpec::READ_FIFO_QUEUE, 0x04DE, 0);
-    let fifo = Request::with_header(17, read, &mut [], &mut queue);
+    let read = |state: &mut RequestState| state.set(FunctionSpec::READ_FIFO_QUEUE, 0x04DE, 0);
+    let fifo = Request::of_bytes(17, read, &mut [], &mut queue);
     let ended = ask(&mut bench, fifo);
     assert_eq!(ended.bytes(), [0x01, 0xB8, 0x12, 0x84]);
     let mut data = [0xA5, 0x37];
     let mut echo = [0; 2];
-    let query = |header: &mut RequestHeader| header.diagnostics(0, 1);
+    let query = |state: &mut RequestState| state.diagnostics(0, 1);
     let ended = ask(
         &mut bench,
-        Request::with_header(17, query, &mut data, &mut echo),
+        Request::of_bytes(17, query, &mut data, &mut echo),
     );
     assert_eq!(ended.bytes(), [0xA5, 0x37]);
-    let refused = Request::with_header(17, query, &mut data[..1], &mut []).err();
+    let refused = Request::of_bytes(17, query, &mut data[..1], &mut []).err();
     assert_eq!(refused, Some(Error::INVALID_ARGUMENT));
-    let beyond = |header: &mut RequestHeader| header.set(FunctionSpec::READ_COILS, 0xFFFF, 2);
-    let refused = Request::with_header(17, beyond, &mut [], &mut []).err();
+    let beyond = |state: &mut RequestState| state.set(FunctionSpec::READ_COILS, 0xFFFF, 2);
+    let refused = Request::of_bytes(17, beyond, &mut [], &mut []).err();
     assert_eq!(refused, Some(Error::ILLEGAL_DATA_ADDRESS));
 }
 

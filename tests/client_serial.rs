@@ -8,13 +8,12 @@ mod frame;
 mod wire;
 
 use exchanges::CASES;
-use mbm::client::{Client, Serial};
+use mbm::client::{Client, RequestState, Serial};
 use mbm::engine::{Frame, MicrosSetting};
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::Rule;
 use mbm::pdu::functions::FunctionSpec;
-use mbm::pdu::header::RequestHeader;
 use wire::{End, Lent, Task};
 
 type Transport = Client<Serial<End, Lent, Task>, Task, 4>;
@@ -84,7 +83,7 @@ fn every_function_is_sent_and_answered_in_rtu() {
 fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
     for length in 250..=253 {
         let (end, mut client) = rtu_client();
-        let build: fn(&mut RequestHeader) -> Status = |o| o.custom(0x43, 0, Rule::Silence);
+        let build: fn(&mut RequestState) -> Status = |o| o.custom(0x43, 0, Rule::Silence);
         assert!(client.queue(Task::new(17, 1, &[], build)).is_ok());
         sent(&end, &mut client);
         let mut response = vec![0x5A; length];
@@ -102,7 +101,7 @@ fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
 #[test]
 fn a_late_reply_to_a_function_08_of_the_program_is_not_taken() {
     let (end, mut client) = rtu_client();
-    let build: fn(&mut RequestHeader) -> Status = |o| o.custom(8, 2, Rule::Fixed(5));
+    let build: fn(&mut RequestState) -> Status = |o| o.custom(8, 2, Rule::Fixed(5));
     for status in [Status::RESPONSE_TIMED_OUT, Status::OK] {
         let task = Task::new(17, 1, &[0, 0x0B], build);
         assert!(client.queue(task).is_ok());
@@ -163,7 +162,7 @@ fn a_response_that_does_not_match_the_request_is_malformed() {
             if free {
                 // Only data that the device chooses may differ.
                 assert!(!matches!(request[0], 5 | 6 | 0x0F | 0x10 | 0x15 | 0x16));
-                assert!(at >= usize::from(task.state.header.data_at()));
+                assert!(at >= usize::from(task.state.data_at()));
             } else {
                 assert!(
                     matches!(
@@ -179,8 +178,8 @@ fn a_response_that_does_not_match_the_request_is_malformed() {
 }
 
 fn read(unit: u8, transaction: u16) -> Task {
-    Task::new(unit, transaction, &[], |header| {
-        header.set(FunctionSpec::READ_HOLDING_REGISTERS, 0, 1)
+    Task::new(unit, transaction, &[], |state| {
+        state.set(FunctionSpec::READ_HOLDING_REGISTERS, 0, 1)
     })
 }
 
@@ -230,7 +229,7 @@ fn only_writes_are_broadcast_and_they_take_the_turnaround_delay() {
         }
     }
     for sub_function in 0..0x15 {
-        let task = Task::new(0, 0, &[0, 0], |header| header.diagnostics(sub_function, 1));
+        let task = Task::new(0, 0, &[0, 0], |state| state.diagnostics(sub_function, 1));
         let queued = client.queue(task).is_ok();
         assert_eq!(queued, matches!(sub_function, 1 | 4 | 0x0A | 0x14));
         if queued {
@@ -242,7 +241,7 @@ fn only_writes_are_broadcast_and_they_take_the_turnaround_delay() {
 #[test]
 fn force_listen_only_mode_ends_without_a_response() {
     let (end, mut client) = rtu_client();
-    let task = Task::new(17, 0, &[0, 0], |header| header.diagnostics(4, 1));
+    let task = Task::new(17, 0, &[0, 0], |state| state.diagnostics(4, 1));
     assert!(client.queue(task).is_ok());
     assert_eq!(run(&end, &mut client).state.status, Status::OK);
     assert!(end.now() < 110_000);
@@ -325,8 +324,8 @@ fn a_suspended_client_sends_nothing() {
 #[test]
 fn a_reply_longer_than_the_capacity_of_the_request_ends_with_buffer_too_small() {
     let (end, mut client) = rtu_client();
-    let mut task = Task::new(1, 1, &[], |header| {
-        header.set(FunctionSpec::REPORT_SERVER_ID, 0, 0)
+    let mut task = Task::new(1, 1, &[], |state| {
+        state.set(FunctionSpec::REPORT_SERVER_ID, 0, 0)
     });
     task.state.capacity = 2;
     assert!(client.queue(task).is_ok());
@@ -345,15 +344,15 @@ fn a_request_longer_than_the_frame_buffer_has_no_exception_of_the_request_before
         ..Lent::default()
     };
     let mut client: Transport = Client::new(Serial::new(end.clone(), storage));
-    let read = Task::new(1, 1, &[], |header| {
-        header.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0)
+    let read = Task::new(1, 1, &[], |state| {
+        state.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0)
     });
     assert!(client.queue(read).is_ok());
     sent(&end, &mut client);
     end.deliver(0, &frame(1, &[0x87, 4]));
     assert_eq!(run(&end, &mut client).state.exception, 4);
-    let write = Task::new(1, 1, &[0; 4], |header| {
-        header.set(FunctionSpec::WRITE_MULTIPLE_REGISTERS, 0, 2)
+    let write = Task::new(1, 1, &[0; 4], |state| {
+        state.set(FunctionSpec::WRITE_MULTIPLE_REGISTERS, 0, 2)
     });
     assert!(client.queue(write).is_ok());
     let task = run(&end, &mut client);
@@ -402,7 +401,7 @@ fn a_late_reply_in_ascii_frames_is_not_the_answer_to_a_later_request() {
 fn ended_in_ascii(line: &[u8]) -> Task {
     let (end, mut client) = ascii_client();
     client.line.engine.storage.frame = Frame::new(vec![0; 40]);
-    let build: fn(&mut RequestHeader) -> Status =
+    let build: fn(&mut RequestState) -> Status =
         |o| o.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0);
     assert!(client.queue(Task::new(2, 1, &[], build)).is_ok());
     sent(&end, &mut client);
@@ -444,7 +443,7 @@ fn the_most_specific_fault_on_an_ascii_line_becomes_the_status() {
 /// Sends a read of the unit and cancels it. Returns how many microseconds passed until it was sent.
 fn send_and_cancel(end: &End, client: &mut Transport, unit: u8) -> u32 {
     let began = end.now();
-    let read: fn(&mut RequestHeader) -> Status = |o| o.set(FunctionSpec::READ_COILS, 0, 8);
+    let read: fn(&mut RequestState) -> Status = |o| o.set(FunctionSpec::READ_COILS, 0, 8);
     assert!(client.queue(Task::new(unit, 1, &[], read)).is_ok());
     // At most the silence after which a unit is clean: 4.1 s.
     for _ in 0..42_000 {
@@ -482,7 +481,7 @@ fn units_are_remembered_exactly_again_after_too_many_were_cancelled() {
 
 /// Queues a read of the unit's exception status, with a timeout of its own.
 fn queue_read(client: &mut Transport, unit: u8, timeout_ms: u32) {
-    let read: fn(&mut RequestHeader) -> Status =
+    let read: fn(&mut RequestState) -> Status =
         |o| o.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0);
     let mut task = Task::new(unit, 1, &[], read);
     task.state.timeout_ms = timeout_ms;

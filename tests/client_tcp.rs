@@ -4,12 +4,11 @@
 #[path = "common/stream.rs"]
 mod stream;
 
-use mbm::client::{Client, Tcp};
+use mbm::client::{Client, RequestState, Tcp};
 use mbm::engine::{Counter, Frame};
 use mbm::error::{Error, Status};
 use mbm::frame::tcp;
 use mbm::pdu::functions::FunctionSpec;
-use mbm::pdu::header::RequestHeader;
 use proptest::prelude::*;
 use stream::wire::{Lent, Task};
 use stream::{client, poll, read, requests, response, TcpIp};
@@ -134,7 +133,7 @@ fn a_server_id_longer_than_its_byte_count_is_taken_whole() {
         (&[0x91, 2, 1], Status::MALFORMED_REPLY),
     ] {
         let (end, mut client) = client();
-        let form = |header: &mut RequestHeader| header.set(FunctionSpec::REPORT_SERVER_ID, 0, 0);
+        let form = |state: &mut RequestState| state.set(FunctionSpec::REPORT_SERVER_ID, 0, 0);
         assert!(client.queue(Task::new(1, 7, &[], form)).is_ok());
         poll(&end, &mut client);
         let [a, b] = tcp::header(&end.sent()).unwrap().transaction.to_be_bytes();
@@ -237,8 +236,8 @@ fn unit_0_answers_over_tcp() {
     assert_eq!(sent[0].1, 0);
     end.deliver(0, &response(sent[0]));
     assert_right(&poll(&end, &mut client)[0]);
-    let write = Task::new(0, 1, &[], |header| {
-        header.set(FunctionSpec::WRITE_SINGLE_REGISTER, 1, 2)
+    let write = Task::new(0, 1, &[], |state| {
+        state.set(FunctionSpec::WRITE_SINGLE_REGISTER, 1, 2)
     });
     assert!(client.queue(write).is_ok());
     assert!(poll(&end, &mut client).is_empty());
@@ -372,8 +371,8 @@ fn a_response_longer_than_the_buffer_is_skipped_and_reported() {
     let (end, mut client) = client();
     client.line.storage.frame = Frame::new(vec![0; 12]);
     assert!(client.queue(read(1, 7)).is_ok());
-    let long = Task::new(1, 8, &[], |header| {
-        header.set(FunctionSpec::READ_HOLDING_REGISTERS, 8, 20)
+    let long = Task::new(1, 8, &[], |state| {
+        state.set(FunctionSpec::READ_HOLDING_REGISTERS, 8, 20)
     });
     assert!(client.queue(long).is_ok());
     poll(&end, &mut client);

@@ -3,8 +3,8 @@
 #[path = "common/vectors.rs"]
 mod vectors;
 
+use mbm::client::RequestState;
 use mbm::error::{Error, Status};
-use mbm::pdu::header::RequestHeader;
 use mbm::pdu::request::Request;
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -12,13 +12,13 @@ use vectors::{all, right_pdus, Direction};
 
 /// Forwards a request PDU. Returns its outline and the PDU that is sent, or the status that
 /// refuses it.
-fn forward(pdu: &[u8]) -> Result<(RequestHeader, Vec<u8>), Error> {
-    let mut header = RequestHeader::NONE;
-    header.forward(pdu[0], &pdu[1..]).result()?;
-    let data = &pdu[pdu.len() - usize::from(header.data_length())..];
-    let mut sent = vec![0; usize::from(header.request_length())];
-    header.emit(&mut sent, |index| data[index]);
-    Ok((header, sent))
+fn forward(pdu: &[u8]) -> Result<(RequestState, Vec<u8>), Error> {
+    let mut state = RequestState::NONE;
+    state.forward(pdu[0], &pdu[1..]).result()?;
+    let data = &pdu[pdu.len() - usize::from(state.data_length())..];
+    let mut sent = vec![0; usize::from(state.request_length())];
+    state.emit(&mut sent, |index| data[index]);
+    Ok((state, sent))
 }
 
 /// The PDU of every valid request of the table.
@@ -34,10 +34,10 @@ static REQUESTS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
 fn every_valid_request_is_forwarded_unchanged() {
     assert!(REQUESTS.len() > 60);
     for pdu in REQUESTS.iter() {
-        let (header, sent) = forward(pdu).unwrap_or_else(|status| panic!("{pdu:02X?} {status:?}"));
+        let (state, sent) = forward(pdu).unwrap_or_else(|status| panic!("{pdu:02X?} {status:?}"));
         assert_eq!(sent, *pdu);
-        assert!(!header.sends_words() && !header.takes_words());
-        assert_eq!((header.data_at(), header.mask()), (1, 0xFF));
+        assert!(!state.sends_words() && !state.takes_words());
+        assert_eq!((state.data_at(), state.mask()), (1, 0xFF));
     }
 }
 
@@ -55,16 +55,16 @@ fn the_responses_printed_in_the_standard_match_their_requests() {
         let (Some(request), true) = (request, right(&answer)) else {
             continue;
         };
-        let (header, _) = forward(&request.bytes).unwrap();
-        let data = &request.bytes[request.bytes.len() - usize::from(header.data_length())..];
+        let (state, _) = forward(&request.bytes).unwrap();
+        let data = &request.bytes[request.bytes.len() - usize::from(state.data_length())..];
         let pdu = &answer.bytes;
-        let length = header.expected(pdu, pdu.len()).unwrap();
+        let length = state.expected(pdu, pdu.len()).unwrap();
         assert_eq!(usize::from(length.get()), pdu.len(), "{name}");
         let status = match *pdu.as_slice() {
             [function, code] if function & 0x80 != 0 => Status::exception(code),
             _ => Status::OK,
         };
-        assert_eq!(header.validate(pdu, |index| data[index]), status, "{name}");
+        assert_eq!(state.validate(pdu, |index| data[index]), status, "{name}");
         count += 1;
     }
     assert!(count >= 18);
@@ -118,12 +118,12 @@ fn a_request_that_every_server_must_refuse_is_refused_with_that_exception() {
 
 /// Forwards the data of a request of 14 or 15 (hex) without their byte count.
 fn forward_groups(function: u8, groups: &[u8]) -> Result<Vec<u8>, Error> {
-    let mut header = RequestHeader::NONE;
-    header.forward_groups(function, groups).result()?;
-    assert!(usize::from(header.data_length()) <= groups.len());
-    let data = &groups[groups.len() - usize::from(header.data_length())..];
-    let mut sent = vec![0; usize::from(header.request_length())];
-    header.emit(&mut sent, |index| data[index]);
+    let mut state = RequestState::NONE;
+    state.forward_groups(function, groups).result()?;
+    assert!(usize::from(state.data_length()) <= groups.len());
+    let data = &groups[groups.len() - usize::from(state.data_length())..];
+    let mut sent = vec![0; usize::from(state.request_length())];
+    state.emit(&mut sent, |index| data[index]);
     Ok(sent)
 }
 

@@ -7,9 +7,9 @@ mod exchanges;
 #[path = "common/vectors.rs"]
 mod vectors;
 
+use mbm::client::RequestState;
 use mbm::pdu::fields::{Byte, Data, Fields, Flag, Word};
 use mbm::pdu::functions;
-use mbm::pdu::header::RequestHeader;
 use mbm::pdu::is_public;
 use mbm::pdu::length::Length;
 use mbm::pdu::request::Request;
@@ -174,12 +174,12 @@ fn a_client_builds_every_public_function() {
 fn a_gateway_knows_the_length_of_the_response_of_every_public_function() {
     for (_, _, request, response, _) in exchanges::CASES {
         let code = request[0];
-        let mut header = RequestHeader::NONE;
-        assert!(!header.forward(code, &request[1..]).is_failure());
+        let mut state = RequestState::NONE;
+        assert!(!state.forward(code, &request[1..]).is_failure());
         // The end of these responses is the end of the frame.
         let own_end = code == functions::REPORT_SERVER_ID || matches!(request, [0x2B, 0x0D, ..]);
         if is_public(code) && !own_end {
-            let found = header.expected(response, response.len() + 9);
+            let found = state.expected(response, response.len() + 9);
             assert_eq!(
                 found.map(|length| usize::from(length.get())),
                 Some(response.len()),

@@ -5,8 +5,8 @@
 mod exchanges;
 
 use exchanges::CASES;
+use mbm::client::RequestState;
 use mbm::error::{Error, Status};
-use mbm::pdu::header::RequestHeader;
 use mbm::pdu::identification::{
     IdentificationReply, ObjectList, BASIC, EXTENDED, INDIVIDUAL, REGULAR,
 };
@@ -16,8 +16,8 @@ use mbm::pdu::response::Response;
 #[test]
 fn every_response_is_restored_from_the_data_that_the_client_stores() {
     for (build, data, request, response, stored) in CASES {
-        let mut header = RequestHeader::NONE;
-        assert_eq!(build(&mut header), Status::OK);
+        let mut state = RequestState::NONE;
+        assert_eq!(build(&mut state), Status::OK);
         let mut wanted = response.to_vec();
         // The unused bits of the last byte are not stored.
         if let ([1 | 2, ..], Some(last), Some(kept)) = (*request, wanted.last_mut(), stored.last())
@@ -26,14 +26,14 @@ fn every_response_is_restored_from_the_data_that_the_client_stores() {
         }
         let (received, sent) = (|index: usize| stored[index], |index: usize| data[index]);
         let mut pdu = [0xEE; 253];
-        let length = header.restore_response(&mut pdu, stored.len() as u8, received, sent);
+        let length = state.restore_response(&mut pdu, stored.len() as u8, received, sent);
         assert_eq!(length, Ok(wanted.len()), "{request:02X?}");
         assert_eq!(pdu[..wanted.len()], wanted, "{request:02X?}");
         assert_eq!(pdu[wanted.len()..], [0xEE; 253][wanted.len()..]);
         let short = &mut pdu[..wanted.len() - 1];
-        let refused = header.restore_response(short, stored.len() as u8, received, sent);
+        let refused = state.restore_response(short, stored.len() as u8, received, sent);
         assert_eq!(refused, Err(Error::BUFFER_TOO_SMALL));
-        let exception = header.exception_pdu(2);
+        let exception = state.exception_pdu(2);
         assert_eq!(
             Response::parse(&exception),
             Ok(Response::Exception {

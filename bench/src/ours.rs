@@ -1,10 +1,10 @@
 //! The work, done by mbm.
 
+use mbm::client::RequestState;
 use mbm::data::bits;
 use mbm::data::view::{send_words, take_words};
 use mbm::error::{Error, Status};
 use mbm::frame::{ascii, rtu, tcp, Adu, Framing};
-use mbm::pdu::header::RequestHeader;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use std::hint::black_box;
@@ -197,7 +197,7 @@ pub fn receive(framing: Framing, frame: &[u8], words: &mut [u16]) {
 /// Finds that a frame is the response to a write, and repeats what was written, as
 /// the client does.
 #[inline(always)]
-pub fn validate(framing: Framing, asked: &RequestHeader, frame: &[u8]) {
+pub fn validate(framing: Framing, asked: &RequestState, frame: &[u8]) {
     let (adu, transaction) = match framing {
         Framing::Rtu => (rtu::parse(frame), 0),
         _ => (tcp::parse(frame), TRANSACTION),

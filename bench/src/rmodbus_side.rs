@@ -2,9 +2,9 @@
 
 use crate::ours::UNIT;
 use crate::Work;
+use mbm::client::RequestState;
 use mbm::error::Status;
 use mbm::pdu::functions::FunctionSpec;
-use mbm::pdu::header::RequestHeader;
 use rmodbus::client::ModbusRequest;
 use rmodbus::server::context::ModbusContext;
 use rmodbus::server::storage::ModbusStorageSmall;
@@ -26,7 +26,7 @@ pub enum Ask {
 }
 
 /// The request as mbm's client keeps it, of one that writes.
-pub fn written(ask: Ask) -> Option<RequestHeader> {
+pub fn written(ask: Ask) -> Option<RequestState> {
     let (form, first, second) = match ask {
         Ask::SetCoil(address) => (FunctionSpec::WRITE_SINGLE_COIL, address, 0xFF00),
         Ask::SetHolding(address, value) => (FunctionSpec::WRITE_SINGLE_REGISTER, address, value),
@@ -42,9 +42,9 @@ pub fn written(ask: Ask) -> Option<RequestHeader> {
         ),
         _ => return None,
     };
-    let mut header = RequestHeader::NONE;
-    assert!(header.set(form, first, second) == Status::OK);
-    Some(header)
+    let mut state = RequestState::NONE;
+    assert!(state.set(form, first, second) == Status::OK);
+    Some(state)
 }
 
 pub fn emit_request(proto: ModbusProto, ask: Ask) -> Work {

@@ -7,12 +7,11 @@
 #[path = "../../tests/common/wire.rs"]
 mod wire;
 
-use mbm::client::{Client, Serial};
+use mbm::client::{Client, RequestState, Serial};
 use mbm::engine::MicrosSetting;
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::functions::FunctionSpec;
-use mbm::pdu::header::RequestHeader;
 use std::collections::VecDeque;
 use wire::{End, Lent, Task};
 
@@ -197,8 +196,8 @@ pub fn play(schedule: Schedule, quiet_time: u32) -> Ended {
     };
     for number in 0..requests {
         let is_heard = device.well >= heard_again;
-        let read = |header: &mut RequestHeader| {
-            header.set(FunctionSpec::READ_HOLDING_REGISTERS, number.into(), 1)
+        let read = |state: &mut RequestState| {
+            state.set(FunctionSpec::READ_HOLDING_REGISTERS, number.into(), 1)
         };
         let queued = client.queue(Task::new(UNIT, 0, &[], read));
         assert!(queued.is_ok(), "the request was refused");

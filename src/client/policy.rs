@@ -165,7 +165,7 @@ pub fn again(
 /// out, so only a request that changes nothing may be sent again.
 pub fn again_when_busy(policy: &Policy, state: &RequestState, status: Status) -> Option<u32> {
     let may_be_repeated = match status {
-        Status::ACKNOWLEDGE => state.header.only_reads(),
+        Status::ACKNOWLEDGE => state.only_reads(),
         status => status == Status::SERVER_DEVICE_BUSY,
     };
     (may_be_repeated && state.busy_retries < policy.busy_retries)

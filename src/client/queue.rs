@@ -106,7 +106,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         } else if state.unit() == BROADCAST
             // In TCP frames unit 0 is a unit (messaging on TCP/IP guide V1.0b, 4.4.1.2).
             && !self.has_transaction_ids
-            && !(self.has_broadcast && state.header.may_be_broadcast())
+            && !(self.has_broadcast && state.may_be_broadcast())
         {
             Status::BROADCAST_NOT_ALLOWED
         } else if self.has_transaction_ids

@@ -4,7 +4,6 @@ use super::request::{ClientRequest, RequestState};
 use crate::data::view::take_words;
 use crate::error::{Error, Status};
 use crate::pdu::functions::{coil_value, FunctionSpec};
-use crate::pdu::header::RequestHeader;
 
 /// The data that a request sends, or the place for those that it receives.
 #[derive(Default, Debug)]
@@ -92,9 +91,9 @@ pub struct Request<'a> {
 }
 
 impl<'a> Request<'a> {
-    /// A request of any function, for those that have no constructor here. `build` calls one of the
-    /// functions of its header. `sends` has the data in the order of the wire, as many bytes as the
-    /// header says; `takes` is the place for the data of the response.
+    /// A request of any function, for those that have no constructor here. `build` calls the function
+    /// of [`RequestState`] that makes the request. `sends` has its data in the order of the wire, as
+    /// many bytes as the request needs; `takes` is the place for the data of the response.
     ///
     /// ```
     /// use mbm::client::Request;
@@ -102,21 +101,21 @@ impl<'a> Request<'a> {
     /// // 08, sub-function 0: the device returns the two bytes.
     /// let (mut data, mut echo) = ([0xA5, 0x37], [0; 2]);
     /// let request =
-    ///     Request::with_header(17, |header| header.diagnostics(0, 1), &mut data, &mut echo)?;
+    ///     Request::of_bytes(17, |state| state.diagnostics(0, 1), &mut data, &mut echo)?;
     /// # Ok::<(), mbm::Error>(())
     /// ```
     ///
     /// # Errors
     /// What `build` returns; [`Error::INVALID_ARGUMENT`] if `sends` has another length.
-    pub fn with_header(
+    pub fn of_bytes(
         unit: u8,
-        build: impl FnOnce(&mut RequestHeader) -> Status,
+        build: impl FnOnce(&mut RequestState) -> Status,
         sends: &'a mut [u8],
         takes: &'a mut [u8],
     ) -> Result<Self, Error> {
         let length = sends.len();
         let request = Request::build(unit, Slice::Bytes(sends), Slice::Bytes(takes), build)?;
-        match usize::from(request.state.header.data_length()) == length {
+        match usize::from(request.state.data_length()) == length {
             true => Ok(request),
             false => Err(Error::INVALID_ARGUMENT),
         }
@@ -126,12 +125,12 @@ impl<'a> Request<'a> {
         unit: u8,
         sends: Slice<'a>,
         takes: Slice<'a>,
-        build: impl FnOnce(&mut RequestHeader) -> Status,
+        build: impl FnOnce(&mut RequestState) -> Status,
     ) -> Result<Self, Error> {
         let mut state = RequestState::NONE;
         state.unit = unit.into();
         state.capacity = takes.capacity();
-        build(&mut state.header).result()?;
+        build(&mut state).result()?;
         Ok(Request {
             state,
             sends,
@@ -147,7 +146,7 @@ impl<'a> Request<'a> {
         sends: Slice<'a>,
         takes: Slice<'a>,
     ) -> Result<Self, Error> {
-        Request::build(unit, sends, takes, |header| header.set(spec, first, second))
+        Request::build(unit, sends, takes, |state| state.set(spec, first, second))
     }
 
     /// 01: reads 1 to 2000 coils, as many as `coils` has.
@@ -260,8 +259,8 @@ impl<'a> Request<'a> {
         and_mask: u16,
         or_mask: u16,
     ) -> Result<Self, Error> {
-        Request::build(unit, Slice::None, Slice::None, |header| {
-            header.mask_write_register(address, and_mask, or_mask)
+        Request::build(unit, Slice::None, Slice::None, |state| {
+            state.mask_write_register(address, and_mask, or_mask)
         })
     }
 
@@ -276,8 +275,8 @@ impl<'a> Request<'a> {
     ) -> Result<Self, Error> {
         let (reads, writes) = (quantity(read.len()), quantity(write.len()));
         let (sends, takes) = (Slice::Registers(write), Slice::Registers(read));
-        Request::build(unit, sends, takes, |header| {
-            header.read_write_registers(read_address, reads, write_address, writes)
+        Request::build(unit, sends, takes, |state| {
+            state.read_write_registers(read_address, reads, write_address, writes)
         })
     }
 
@@ -307,7 +306,7 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// The bytes that a request of [`Request::with_header`] has received.
+    /// The bytes that a request of [`Request::of_bytes`] has received.
     pub fn bytes(&self) -> &[u8] {
         match &self.takes {
             Slice::Bytes(bytes) => bytes.get(..usize::from(self.state.length)),

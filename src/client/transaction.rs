@@ -1,11 +1,10 @@
 //! The request in flight on a serial line, in the form that the engine needs.
 
-use super::request::{data_of, ClientRequest};
+use super::request::{data_of, ClientRequest, RequestState};
 use super::storage::ClientStorage;
 use crate::engine::{ascii, Engine, Transaction};
 use crate::error::Status;
 use crate::frame::{ascii as characters, rtu};
-use crate::pdu::header::RequestHeader;
 use crate::pdu::MAX_PDU;
 use crate::port::Port;
 use core::num::NonZeroU8;
@@ -46,7 +45,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> ClientTransaction<P, S, J> {
 impl<P, S: ClientStorage, J: ClientRequest> ClientTransaction<P, S, J> {
     /// Stores the request to be sent next.
     pub(super) fn begin(&mut self, client_request: J) {
-        self.function = client_request.state().header.function();
+        self.function = client_request.state().function();
         self.client_request = Some(client_request);
     }
 
@@ -55,11 +54,8 @@ impl<P, S: ClientStorage, J: ClientRequest> ClientTransaction<P, S, J> {
         self.ascii.is_some()
     }
 
-    fn header(&self) -> &RequestHeader {
-        match &self.client_request {
-            Some(client_request) => &client_request.state().header,
-            None => &RequestHeader::NONE,
-        }
+    fn state(&self) -> Option<&RequestState> {
+        self.client_request.as_ref().map(J::state)
     }
 
     /// Writes the request PDU.
@@ -67,8 +63,8 @@ impl<P, S: ClientStorage, J: ClientRequest> ClientTransaction<P, S, J> {
         let Some(client_request) = &self.client_request else {
             return;
         };
-        let header = &client_request.state().header;
-        header.emit(pdu, data_of(client_request));
+        let state = client_request.state();
+        state.emit(pdu, data_of(client_request));
     }
 }
 
@@ -88,15 +84,15 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
     }
 
     fn may_be_broadcast(&self) -> bool {
-        self.header().may_be_broadcast()
+        self.state().is_some_and(RequestState::may_be_broadcast)
     }
 
     fn is_answered(&self) -> bool {
-        self.header().is_answered()
+        self.state().is_none_or(RequestState::is_answered)
     }
 
     fn has_unique_reply(&self) -> bool {
-        self.header().returns_query_data()
+        self.state().is_some_and(RequestState::returns_query_data)
     }
 
     fn response_timeout(engine: &ClientEngine<P, S, J>) -> u32 {
@@ -108,7 +104,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
     }
 
     fn fits(&self, space: u16) -> bool {
-        let length = self.header().request_length();
+        let length = self.state().map_or(0, RequestState::request_length);
         let frame = match self.ascii {
             Some(_) => ascii::frame_length(length),
             None => u16::from(length) + rtu::OVERHEAD as u16,
@@ -121,7 +117,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
     }
 
     fn reply_length(&self) -> u16 {
-        match self.header().fixed_length() {
+        match self.state().map_or(0, RequestState::fixed_length) {
             // The end character ends an ASCII frame, so its length need not be known.
             _ if self.ascii.is_some() => u16::MAX,
             0 => 0,
@@ -135,14 +131,16 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         let Some(client_request) = &engine.request.client_request else {
             return false;
         };
-        let header = &client_request.state().header;
-        header.validate(pdu, data_of(client_request)) != Status::MALFORMED_REPLY
+        let state = client_request.state();
+        state.validate(pdu, data_of(client_request)) != Status::MALFORMED_REPLY
     }
 
     fn is_echo(engine: &ClientEngine<P, S, J>, front: u16) -> bool {
-        let header = engine.request.header();
-        let length = u16::from(header.request_length());
-        header.matches_echo(engine.storage.slice(front + rtu::PDU as u16, length))
+        let Some(state) = engine.request.state() else {
+            return false;
+        };
+        let length = u16::from(state.request_length());
+        state.matches_echo(engine.storage.slice(front + rtu::PDU as u16, length))
     }
 
     fn find_ending_reply(engine: &mut ClientEngine<P, S, J>, is_silent: bool) -> u16
@@ -186,14 +184,22 @@ impl<P, S: ClientStorage, J: ClientRequest> ClientEngine<P, S, J> {
             .slice(front + rtu::PDU as u16, length - rtu::PDU as u16);
         let whole = usize::from(length) - rtu::OVERHEAD;
         let end = if is_silent { whole } else { MAX_PDU + 1 };
-        let expected = self.request.header().expected(pdu, end);
+        let expected = self
+            .request
+            .state()
+            .and_then(|state| state.expected(pdu, end));
         usize::from(expected.map_or(0, NonZeroU8::get)) == whole
     }
 }
 
 /// Writes the frame of the request.
 fn write<P, S: ClientStorage, J: ClientRequest>(engine: &mut ClientEngine<P, S, J>) {
-    let length = u16::from(engine.request.header().request_length());
+    let length = u16::from(
+        engine
+            .request
+            .state()
+            .map_or(0, RequestState::request_length),
+    );
     engine.storage.set_byte(0, engine.unit);
     engine.request.emit(engine.storage.bytes(1, length));
     let content = length + 1;

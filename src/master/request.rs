@@ -50,6 +50,9 @@ const _: () = {
 
 /// A request, which the master keeps until the response has arrived: the head, and the
 /// number of bytes of the transmit words that follow it.
+///
+/// It is no `client::RequestState`, which holds every function: that has 27 bytes more, and the
+/// master's programs are 16 to 144 bytes larger if they build a request as a client does.
 // Lengths first: see `Engine`.
 #[derive(Clone, Copy, Hash, Debug)]
 #[repr(C)]

@@ -8,6 +8,9 @@ use crate::error::Error;
 /// The only reference type that the standard defines.
 pub const REFERENCE_TYPE: u8 = 6;
 
+/// The first word of a group of records: the byte count, which is set later, and the reference type.
+pub const GROUP: usize = REFERENCE_TYPE as usize;
+
 /// The records of a file that a sub-request reads or writes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Record {

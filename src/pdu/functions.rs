@@ -218,20 +218,20 @@ pub const fn coil_value(on: bool) -> u16 {
 /// How the request and the response of a function are composed: flags and small numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
-pub struct FunctionSpec(pub(super) u32);
+pub struct FunctionSpec(pub(crate) u32);
 
 /// The data to send are words.
-pub(super) const SENDS_WORDS: u32 = 1 << 9;
+pub(crate) const SENDS_WORDS: u32 = 1 << 9;
 /// The data received are words.
-pub(super) const TAKES_WORDS: u32 = 1 << 10;
+pub(crate) const TAKES_WORDS: u32 = 1 << 10;
 /// The response repeats the whole request.
-pub(super) const REPEATS_DATA: u32 = 1 << 11;
+pub(crate) const REPEATS_DATA: u32 = 1 << 11;
 /// The request may be broadcast.
-pub(super) const BROADCAST: u32 = 1 << 12;
+pub(crate) const BROADCAST: u32 = 1 << 12;
 /// The data of the response are groups of file records.
-pub(super) const GROUPS: u32 = 1 << 13;
+pub(crate) const GROUPS: u32 = 1 << 13;
 /// Units do not respond.
-pub(super) const UNANSWERED: u32 = 1 << 14;
+pub(crate) const UNANSWERED: u32 = 1 << 14;
 /// The second word is a quantity.
 pub(crate) const RANGE: u32 = 1 << 15;
 /// The quantity counts bits, not registers.
@@ -246,25 +246,25 @@ pub const COUNTS: u32 = 2 << 17;
 /// The function has a rule of its own, or only the end of the frame ends the response.
 pub const OWN: u32 = 3 << 17;
 /// The mask of these two bits.
-pub(super) const KIND: u32 = 3 << 17;
+pub(crate) const KIND: u32 = 3 << 17;
 
 /// The lowest of three bits: the length of the head.
-pub(super) const HEAD_LENGTH: u32 = 19;
+pub(crate) const HEAD_LENGTH: u32 = 19;
 /// The lowest of three bits: the length of the response, or the index of the byte that counts.
 /// For [`OWN`] it says which function's rule holds, named by the least length of its response;
 /// 0 means the end of the frame. (The function code does not say it: a user may give it another
 /// rule.)
-pub(super) const LENGTH: u32 = 22;
+pub(crate) const LENGTH: u32 = 22;
 /// The rule of 11 (hex).
-pub(super) const SERVER_ID: u8 = 2;
+pub(crate) const SERVER_ID: u8 = 2;
 /// The rule of 18 (hex).
-pub(super) const QUEUE: u8 = 3;
+pub(crate) const QUEUE: u8 = 3;
 /// The rule of 2B/0E (hex).
-pub(super) const OBJECTS: u8 = 7;
+pub(crate) const OBJECTS: u8 = 7;
 /// The lowest of three bits: the number of bytes of the request that the response repeats.
-pub(super) const REPEATED: u32 = 25;
+pub(crate) const REPEATED: u32 = 25;
 /// The lowest of three bits: the index of the data in the response; 0 if it has none.
-pub(super) const DATA: u32 = 28;
+pub(crate) const DATA: u32 = 28;
 
 impl FunctionSpec {
     /// As [`FunctionSpec::of`], also for 16 and 17 (hex), which have more words.
@@ -276,7 +276,7 @@ impl FunctionSpec {
         }
     }
 
-    pub(super) const fn new(
+    pub(crate) const fn new(
         function: u8,
         flags: u32,
         head: u32,
@@ -300,12 +300,12 @@ impl FunctionSpec {
     }
 
     /// 01, 02.
-    pub(super) const fn bits(function: u8) -> FunctionSpec {
+    pub(crate) const fn bits(function: u8) -> FunctionSpec {
         FunctionSpec::new(function, RANGE | BITS | READ, 5, 0, 0, 2)
     }
 
     /// 03, 04.
-    pub(super) const fn registers(function: u8) -> FunctionSpec {
+    pub(crate) const fn registers(function: u8) -> FunctionSpec {
         FunctionSpec::new(function, RANGE | READ | TAKES_WORDS, 5, 0, 0, 2)
     }
 
@@ -320,12 +320,12 @@ impl FunctionSpec {
     }
 
     /// A request of five bytes that the response repeats.
-    pub(super) const fn echoed(function: u8, flags: u32) -> FunctionSpec {
+    pub(crate) const fn echoed(function: u8, flags: u32) -> FunctionSpec {
         FunctionSpec::new(function, flags, 5, 5, 5, 0)
     }
 
     /// A request that is a function code alone. The table says how long its response is.
-    pub(super) const fn bare(function: u8, flags: u32, data: u32) -> FunctionSpec {
+    pub(crate) const fn bare(function: u8, flags: u32, data: u32) -> FunctionSpec {
         let (kind, length) = match response(function) {
             Some(Rule::Fixed(length)) => (FIXED, length),
             Some(Rule::Counted(offset, _)) => (COUNTS, offset),
@@ -343,7 +343,7 @@ impl FunctionSpec {
         self.0 as u8
     }
 
-    pub(super) const fn number(self, at: u32) -> u8 {
+    pub(crate) const fn number(self, at: u32) -> u8 {
         (self.0 >> at) as u8 & 7
     }
 
@@ -354,7 +354,7 @@ impl FunctionSpec {
     }
 
     /// No request.
-    pub(super) const NONE: FunctionSpec = FunctionSpec(0);
+    pub(crate) const NONE: FunctionSpec = FunctionSpec(0);
 
     /// 01: address and quantity.
     pub const READ_COILS: FunctionSpec = FunctionSpec::bits(READ_COILS);

@@ -102,7 +102,7 @@ fn by_table(pdu: &[u8], rule: Option<Rule>) -> Length {
 }
 
 /// The length of a device identification, in which each object has its own length.
-pub(super) fn objects(pdu: &[u8]) -> Length {
+pub(crate) fn objects(pdu: &[u8]) -> Length {
     let mut end = 7;
     let Some(count) = pdu.get(6) else {
         return Length::AtLeast(end);

@@ -2,14 +2,13 @@
 //! protocol V1.1b3, clause 6).
 //!
 //! [`functions`] is the table of the functions. [`request`] and [`response`] take PDUs apart
-//! and write them, from [`fields`]. A client keeps a [`header`] of each request that it sends.
+//! and write them, from [`fields`]. Master and client make their requests from the same table.
 
 pub mod custom;
 pub mod diagnostics;
 pub mod fields;
 pub mod files;
 pub mod functions;
-pub mod header;
 pub mod identification;
 pub mod identification_stream;
 pub mod length;

@@ -1,14 +1,14 @@
 //! A request of every function, and its response.
 
+use mbm::client::RequestState;
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
 use mbm::pdu::functions::FunctionSpec;
-use mbm::pdu::header::RequestHeader;
 
 /// The builder of a request, the data to send, the PDU of the request, the PDU of the
 /// response, and the data that the client receives.
 pub type Case = (
-    fn(&mut RequestHeader) -> Status,
+    fn(&mut RequestState) -> Status,
     &'static [u8],
     &'static [u8],
     &'static [u8],

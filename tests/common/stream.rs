@@ -19,8 +19,8 @@ pub fn client() -> (End, TcpIp) {
 }
 
 pub fn read(unit: u8, transaction: u16) -> Task {
-    Task::new(unit, transaction, &[], |header| {
-        header.set(FunctionSpec::READ_HOLDING_REGISTERS, transaction, 1)
+    Task::new(unit, transaction, &[], |state| {
+        state.set(FunctionSpec::READ_HOLDING_REGISTERS, transaction, 1)
     })
 }
 

@@ -3,7 +3,6 @@
 use mbm::client::{ClientRequest, ClientStorage, RequestState, UnitRecord};
 use mbm::engine::{Counter, Frame, Storage, COUNTERS};
 use mbm::error::Status;
-use mbm::pdu::header::RequestHeader;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -100,13 +99,13 @@ impl Task {
         unit: u8,
         transaction: u16,
         data: &[u8],
-        build: impl FnOnce(&mut RequestHeader) -> Status,
+        build: impl FnOnce(&mut RequestState) -> Status,
     ) -> Task {
         let mut state = RequestState::NONE;
         state.unit = unit.into();
         state.transaction = transaction;
         state.capacity = 252;
-        assert_eq!(build(&mut state.header), Status::OK);
+        assert_eq!(build(&mut state), Status::OK);
         Task {
             state,
             data: data.to_vec(),

@@ -6,13 +6,12 @@ mod task;
 
 use crate::live_server::{pattern, LiveServer, PEER_TIMEOUT};
 use crate::UNIT;
-use mbm::client::{Client, Serial, Tcp, Transport};
+use mbm::client::{Client, RequestState, Serial, Tcp, Transport};
 use mbm::engine::MicrosSetting;
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::Rule;
 use mbm::pdu::functions::FunctionSpec;
-use mbm::pdu::header::RequestHeader;
 use mbm::port::Port;
 use std::collections::VecDeque;
 use std::io::Write;
@@ -82,7 +81,7 @@ impl<L: Transport<Task>> Requester<L> {
     }
 
     /// Sends a request and waits until it has ended.
-    fn request(&mut self, data: &[u8], build: impl FnOnce(&mut RequestHeader) -> Status) -> Task {
+    fn request(&mut self, data: &[u8], build: impl FnOnce(&mut RequestState) -> Status) -> Task {
         assert!(self.client.queue(Task::new(UNIT, 1, data, build)).is_ok());
         let until = Instant::now() + PEER_TIMEOUT;
         while Instant::now() < until {
@@ -99,22 +98,22 @@ impl<L: Transport<Task>> Requester<L> {
     fn expect_data(
         &mut self,
         data: &[u8],
-        build: impl FnOnce(&mut RequestHeader) -> Status,
+        build: impl FnOnce(&mut RequestState) -> Status,
         expected: &[u8],
     ) {
         let task = self.request(data, build);
-        assert_eq!(task.state.status, Status::OK, "{:02X?}", task.state.header);
-        assert_eq!(task.received(), expected, "{:02X?}", task.state.header);
+        assert_eq!(task.state.status, Status::OK, "{:02X?}", task.state);
+        assert_eq!(task.received(), expected, "{:02X?}", task.state);
     }
 
     fn expect_status(
         &mut self,
         data: &[u8],
-        build: impl FnOnce(&mut RequestHeader) -> Status,
+        build: impl FnOnce(&mut RequestState) -> Status,
         status: Status,
     ) {
         let task = self.request(data, build);
-        assert_eq!(task.state.status, status, "{:02X?}", task.state.header);
+        assert_eq!(task.state.status, status, "{:02X?}", task.state);
     }
 
     fn check_every_function(mut self) {
@@ -177,7 +176,7 @@ impl<L: Transport<Task>> Requester<L> {
         }
         let one = self.request(&[], |o| o.read_device_identification(4, 2));
         assert_eq!(one.received().get(3..), Some(&b"\x01\x02\x05V2.11"[..]));
-        let missing = |o: &mut RequestHeader| o.read_device_identification(4, 9);
+        let missing = |o: &mut RequestState| o.read_device_identification(4, 9);
         self.expect_status(&[], missing, Status::ILLEGAL_DATA_ADDRESS);
         // The same request as raw bytes of any MEI type.
         let raw = self.request(&[4, 2], |o| o.encapsulated(0x0E, 2));
@@ -239,7 +238,7 @@ impl<L: Transport<Task>> Requester<L> {
         );
         let all = [0xBE, 0xEF, 7, 8, 3, 0x25];
         self.expect_data(&[7, 8], |o| o.read_write_registers(9, 3, 10, 1), &all);
-        let absent = |o: &mut RequestHeader| o.set(FunctionSpec::READ_HOLDING_REGISTERS, 60000, 1);
+        let absent = |o: &mut RequestState| o.set(FunctionSpec::READ_HOLDING_REGISTERS, 60000, 1);
         self.expect_status(&[], absent, Status::ILLEGAL_DATA_ADDRESS);
     }
 }

@@ -11,24 +11,23 @@ use mbm::pdu::response::Response;
 /// Writes the PDU of the reply to `pdu`, and returns its fields.
 fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Error> {
     let state = request.state();
-    let header = &state.header;
-    let function = header.function();
+    let function = state.function();
     let length = match state.status {
         Status::OK if function == 0 || !state.has_reply() => return Err(Error::INVALID_ARGUMENT),
-        Status::OK if header.has_data() && !request.wants_data() => {
+        Status::OK if state.has_data() && !request.wants_data() => {
             return Err(Error::BUFFER_TOO_SMALL);
         }
-        Status::OK if header.repeats_data() && !request.has_data() => {
+        Status::OK if state.repeats_data() && !request.has_data() => {
             return Err(Error::INVALID_ARGUMENT);
         }
         Status::OK => {
             let received = |index| request.received_byte(index);
             let sent = |index| request.byte(index);
-            header.restore_response(pdu, state.length, received, sent)?
+            state.restore_response(pdu, state.length, received, sent)?
         }
         status if status.is_exception() && status.code() == state.exception => {
             let place = pdu.first_chunk_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
-            *place = header.exception_pdu(state.exception);
+            *place = state.exception_pdu(state.exception);
             place.len()
         }
         status => {

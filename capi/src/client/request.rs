@@ -122,7 +122,7 @@ impl RequestPtr {
     /// bytes received.
     pub(super) fn received_byte(&self, index: usize) -> u8 {
         let fields = self.fields();
-        let at = place(index, fields.state.header.takes_words());
+        let at = place(index, fields.state.takes_words());
         // SAFETY: the client has put that many bytes there, and the caller keeps them until
         // it queues the request again.
         unsafe { *fields.reply.add(at) }
@@ -137,7 +137,7 @@ impl RequestPtr {
     pub(super) fn lies_in(&self, has_part: impl Fn(*const u8, u16) -> bool) -> bool {
         let fields = self.fields();
         let state = &fields.state;
-        has_part(fields.data, state.header.data_length().into())
+        has_part(fields.data, state.data_length().into())
             || has_part(fields.reply, state.length.into())
     }
 
@@ -174,8 +174,8 @@ impl ClientRequest for RequestPtr {
 
     fn byte(&self, index: usize) -> u8 {
         let fields = self.fields();
-        let at = place(index, fields.state.header.sends_words());
-        // SAFETY: a queued request has as many data bytes as its header says. That number is
+        let at = place(index, fields.state.sends_words());
+        // SAFETY: a queued request has as many data bytes as its state says. That number is
         // even if the data are words.
         unsafe { *fields.data.add(at) }
     }
@@ -186,7 +186,7 @@ impl ClientRequest for RequestPtr {
         // SAFETY: the reply is not NULL and holds `capacity` bytes, and the data are not
         // longer. If they are words, the client receives an even number of bytes.
         unsafe {
-            if fields.state.header.takes_words() {
+            if fields.state.takes_words() {
                 let mut next = reply.cast::<u16>();
                 for word in data.as_chunks().0 {
                     next.write_unaligned(u16::from_be_bytes(*word));

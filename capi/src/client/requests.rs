@@ -6,10 +6,10 @@ use super::request::{mbm_clientRequest, RequestFields, RequestPtr};
 use crate::functions::{mbm_rule, MBM_RULE_COUNTED, MBM_RULE_FIXED, MBM_RULE_SILENCE};
 use crate::pointers;
 use core::slice::from_raw_parts;
-use mbm::client::ClientRequest as _;
+use mbm::client::{ClientRequest as _, RequestState};
 use mbm::error::Status;
+use mbm::pdu::files::GROUP;
 use mbm::pdu::functions::{coil_value, FunctionSpec, COUNTS, FIXED, OWN};
-use mbm::pdu::header::{RequestHeader, GROUP};
 use mbm::pdu::MAX_PDU;
 
 /// The arguments of a C function that makes a request: its function code, and the arguments
@@ -27,7 +27,7 @@ impl Arguments {
     }
 }
 
-/// The further steps of a function after [`RequestHeader::set_all`]. It receives the status
+/// The further steps of a function after [`RequestState::set_all`]. It receives the status
 /// of that function, and returns the status of the request.
 type More = unsafe fn(&mut RequestFields, &[usize; 4], Status) -> Status;
 
@@ -63,16 +63,16 @@ unsafe fn submit(
 ) -> Status {
     // Nothing else uses the request.
     let fields = &mut *request.cast::<RequestFields>();
-    let header = &mut fields.state.header;
-    let mut status = header.set_all(arguments.function, &arguments.words);
+    let state = &mut fields.state;
+    let mut status = state.set_all(arguments.function, &arguments.words);
     if let Some(more) = more {
         status = more(fields, &arguments.words, status);
     }
-    let header = &fields.state.header;
+    let state = &fields.state;
     if status != Status::OK {
-    } else if header.data_length() > 0 && fields.data.is_null() {
+    } else if state.data_length() > 0 && fields.data.is_null() {
         status = Status::INVALID_ARGUMENT;
-    } else if !fields.reply.is_null() && u16::from(header.known_data()) > fields.state.capacity {
+    } else if !fields.reply.is_null() && u16::from(state.known_data()) > fields.state.capacity {
         status = Status::BUFFER_TOO_SMALL;
     } else if let Some(request) = RequestPtr::new(request) {
         return match queue(pointers::object(client)).enqueue(request) {
@@ -167,8 +167,8 @@ unsafe fn with_more(
 /// # Safety
 /// Always safe. It is unsafe only to have the type [`More`].
 unsafe fn add_write(fields: &mut RequestFields, words: &[usize; 4], readable: Status) -> Status {
-    let header = &mut fields.state.header;
-    match header.add_write(words[2] as u16, words[3] as u16) {
+    let state = &mut fields.state;
+    match state.add_write(words[2] as u16, words[3] as u16) {
         Status::OK => readable,
         refused => refused,
     }
@@ -364,7 +364,7 @@ functions! {
     fn mbm_client_readDeviceIdentification(code: u8, object: u8)
         = with_more(
             FunctionSpec::READ_DEVICE_IDENTIFICATION, identification(code, object),
-            Some(|_, words, _| RequestHeader::check_code(words[2] as u8)));
+            Some(|_, words, _| RequestState::check_code(words[2] as u8)));
 }
 
 /// Any function code: sends the bytes of `data` after the function code, and reads the bytes
@@ -412,8 +412,8 @@ pub unsafe extern "C" fn mbm_client_custom(
                 OWN => [0, 0],
                 _ => [response.bytes, response.more],
             };
-            let header = &mut fields.state.header;
-            header.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
+            let state = &mut fields.state;
+            state.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
         }),
     )
 }
@@ -478,7 +478,7 @@ pub unsafe fn forward<const MAY_LACK_COUNT: bool>(
         words,
         Some(|fields, words, _| {
             let body: *const u8 = core::ptr::with_exposed_provenance(words[2]);
-            let header = &mut fields.state.header;
+            let state = &mut fields.state;
             let bytes = match words[1] {
                 0 => &[],
                 _ if body.is_null() => return Status::INVALID_ARGUMENT,
@@ -486,12 +486,12 @@ pub unsafe fn forward<const MAY_LACK_COUNT: bool>(
             };
             let function = words[0] as u8;
             let status = if MAY_LACK_COUNT {
-                header.forward_groups(function, bytes)
+                state.forward_groups(function, bytes)
             } else {
-                header.forward(function, bytes)
+                state.forward(function, bytes)
             };
             if status == Status::OK {
-                let head = words[1] - usize::from(header.data_length());
+                let head = words[1] - usize::from(state.data_length());
                 fields.data = body.wrapping_add(head);
             }
             status
@@ -505,7 +505,7 @@ pub unsafe fn forward<const MAY_LACK_COUNT: bool>(
 
 /// The words of a request for a device identification, and its code.
 fn identification(code: u8, object: u8) -> [usize; 4] {
-    let [first, second] = RequestHeader::identification(code, object);
+    let [first, second] = RequestState::identification(code, object);
     [first.into(), second.into(), code.into(), 0]
 }
 
@@ -514,8 +514,8 @@ fn identification(code: u8, object: u8) -> [usize; 4] {
 /// # Safety
 /// As for [`add_group`].
 unsafe fn add_words(fields: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
-    let header = &mut fields.state.header;
-    header.add_words(words[0] as u16, words[1] as u16)
+    let state = &mut fields.state;
+    state.add_words(words[0] as u16, words[1] as u16)
 }
 
 /// Adds the group of file records that the request reads or writes.
@@ -524,6 +524,6 @@ unsafe fn add_words(fields: &mut RequestFields, words: &[usize; 4], _: Status) -
 /// Always safe. It is unsafe only to have the type [`More`].
 unsafe fn add_group(fields: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
     let [_, file, record, quantity] = *words;
-    let header = &mut fields.state.header;
-    header.add_group(file as u16, record as u16, quantity as u16)
+    let state = &mut fields.state;
+    state.add_group(file as u16, record as u16, quantity as u16)
 }

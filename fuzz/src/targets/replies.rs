@@ -2,10 +2,10 @@
 //! byte. A device identification ends, whatever the device sends.
 
 use crate::Input;
+use mbm::client::RequestState;
 use mbm::error::{Error, Status};
 use mbm::pdu::functions::FunctionSpec;
 use mbm::pdu::functions::REPORT_SERVER_ID;
-use mbm::pdu::header::RequestHeader;
 use mbm::pdu::identification::{IdentificationReply, INDIVIDUAL};
 use mbm::pdu::identification_stream::{Next, ObjectStream};
 
@@ -19,11 +19,11 @@ pub fn run(data: &[u8]) {
 }
 
 /// A request of any function, and the data that it sends.
-fn request(input: &mut Input) -> Option<(RequestHeader, Vec<u8>)> {
-    let mut header = RequestHeader::NONE;
+fn request(input: &mut Input) -> Option<(RequestState, Vec<u8>)> {
+    let mut state = RequestState::NONE;
     let (kind, a, b, c) = (input.u8() % 20, input.u16(), input.u16(), input.u16());
     let code = a as u8;
-    let mut set = |spec| header.set(spec, a, 1 + b % 125);
+    let mut set = |spec| state.set(spec, a, 1 + b % 125);
     let built = match kind {
         0 => set(FunctionSpec::READ_COILS),
         1 => set(FunctionSpec::READ_DISCRETE_INPUTS),
@@ -38,54 +38,54 @@ fn request(input: &mut Input) -> Option<(RequestHeader, Vec<u8>)> {
         10 => set(FunctionSpec::WRITE_MULTIPLE_REGISTERS),
         11 => set(FunctionSpec::REPORT_SERVER_ID),
         12 => set(FunctionSpec::READ_FIFO_QUEUE),
-        13 => header.mask_write_register(a, b, c),
-        14 => header.read_write_registers(a, 1 + b % 125, c, 1 + a % 121),
-        15 => header.diagnostics(a % 24, 1 + b % 8),
-        16 => header.read_file_record(a, b, c % 122),
-        17 => header.write_file_record(a, b, c % 123),
-        18 => header.read_device_identification(code % 5, b as u8),
-        _ => header.forward(code, input.counted()),
+        13 => state.mask_write_register(a, b, c),
+        14 => state.read_write_registers(a, 1 + b % 125, c, 1 + a % 121),
+        15 => state.diagnostics(a % 24, 1 + b % 8),
+        16 => state.read_file_record(a, b, c % 122),
+        17 => state.write_file_record(a, b, c % 123),
+        18 => state.read_device_identification(code % 5, b as u8),
+        _ => state.forward(code, input.counted()),
     };
-    if built != Status::OK || !header.is_answered() {
+    if built != Status::OK || !state.is_answered() {
         return None;
     }
     let mut data = input.counted().to_vec();
-    data.resize(header.data_length().into(), 0x5A);
-    Some((header, data))
+    data.resize(state.data_length().into(), 0x5A);
+    Some((state, data))
 }
 
 fn check_restored(input: &mut Input) {
-    let Some((header, data)) = request(input) else {
+    let Some((state, data)) = request(input) else {
         return;
     };
     let sent = |index: usize| data[index];
     let mut response = input.0.to_vec();
     if let [_, _, ..] = response.as_slice() {
         // Most inputs have the right function code.
-        response[0] = header.function();
+        response[0] = state.function();
     }
-    let length = header.expected(&response, response.len());
+    let length = state.expected(&response, response.len());
     if length.map(|length| usize::from(length.get())) != Some(response.len())
-        || header.validate(&response, sent) != Status::OK
+        || state.validate(&response, sent) != Status::OK
     {
         return;
     }
-    let at = usize::from(header.data_at());
+    let at = usize::from(state.data_at());
     let stored = match at {
         0 => vec![],
         at => response[at..].to_vec(),
     };
     let count = stored.len() as u8;
-    if at == 2 && header.function() == REPORT_SERVER_ID {
+    if at == 2 && state.function() == REPORT_SERVER_ID {
         response[1] = count;
     }
     let received = |index: usize| stored[index];
     let mut restored = [0xEE; 253];
-    let written = header.restore_response(&mut restored, count, received, sent);
+    let written = state.restore_response(&mut restored, count, received, sent);
     assert_eq!(written, Ok(response.len()));
     assert_eq!(&restored[..response.len()], response);
     let short = &mut restored[..response.len() - 1];
-    let refused = header.restore_response(short, count, received, sent);
+    let refused = state.restore_response(short, count, received, sent);
     assert_eq!(refused, Err(Error::BUFFER_TOO_SMALL));
 }
 

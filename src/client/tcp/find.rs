@@ -144,14 +144,14 @@ fn is_answered_by<J: ClientRequest>(request: &J, header: &Header) -> bool {
 /// Checks the response `pdu` and stores its data in the request. Returns the status of the
 /// request.
 fn validate<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
-    let header = &request.state().header;
+    let state = request.state();
     let [function, ..] = *pdu else {
         return Status::MALFORMED_REPLY;
     };
-    if function & 0x7F != header.function() {
+    if function & 0x7F != state.function() {
         return Status::INVALID_FUNCTION;
     }
-    let status = header.validate(pdu, data_of(request));
+    let status = state.validate(pdu, data_of(request));
     if status == Status::OK {
         return store_response(request, pdu);
     }

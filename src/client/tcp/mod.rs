@@ -269,7 +269,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
 
     /// Microseconds for which a request waits when it was sent.
     fn time_of(&mut self, state: &RequestState) -> u32 {
-        if state.header.is_answered() {
+        if state.is_answered() {
             state.response_timeout(&self.storage, self.settings.response_timeout.get())
         } else {
             self.settings.turnaround_delay.get()
@@ -347,7 +347,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     #[cold]
     fn expire<J: ClientRequest>(&mut self, request: &J) -> Status {
         let state = request.state();
-        if !state.header.is_answered() {
+        if !state.is_answered() {
             return Status::OK;
         }
         self.storage.count(Counter::Timeouts, 1);
@@ -386,11 +386,11 @@ fn write_frame<J: ClientRequest>(
     wire: u16,
 ) -> Option<usize> {
     let state = request.state();
-    let length = usize::from(state.header.request_length());
+    let length = usize::from(state.request_length());
     let end = begin + tcp::PDU + length;
     let (header, pdu) = buffer.get_mut(begin..end)?.split_first_chunk_mut()?;
     *header = tcp::emit_header(wire, length, state.unit());
-    state.header.emit(pdu, data_of(request));
+    state.emit(pdu, data_of(request));
     Some(end)
 }
 

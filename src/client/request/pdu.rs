@@ -1,57 +1,18 @@
-//! A request of the client: the head of its PDU, how the caller's data follow it, and how
-//! its response is recognised. The data stay in the caller's memory.
-//!
-//! One number, the [`FunctionSpec`], describes each function. So a firmware that calls every
-//! function needs few bytes for each.
+//! The PDU of a request, and how its response is recognised.
 
-mod build;
-mod forward;
-mod restore;
-
-pub use build::GROUP;
-
-use super::functions::{self, Direction};
-use super::functions::{
-    FunctionSpec, BITS, BROADCAST, COUNTS, DATA, FIXED, GROUPS, KIND, OBJECTS, QUEUE, READ,
-    REPEATS_DATA, SENDS_WORDS, SERVER_ID, TAKES_WORDS, UNANSWERED,
-};
-use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
-use super::length::Length;
-use super::{files, length, EXCEPTION, MAX_FIFO, MAX_PDU};
+use super::RequestState;
 use crate::error::Status;
+use crate::pdu::functions::{self, Direction};
+use crate::pdu::functions::{
+    BITS, BROADCAST, COUNTS, DATA, FIXED, GROUPS, KIND, OBJECTS, QUEUE, READ, REPEATS_DATA,
+    SENDS_WORDS, SERVER_ID, TAKES_WORDS, UNANSWERED,
+};
+use crate::pdu::identification::MEI_READ_DEVICE_IDENTIFICATION;
+use crate::pdu::length::Length;
+use crate::pdu::{files, length, EXCEPTION, MAX_FIFO, MAX_PDU};
 use core::num::NonZeroU8;
 
-/// Bytes of the longest head: that of 17 (hex), with the byte count of its data.
-const HEAD: usize = 10;
-
-/// The header of a request.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct RequestHeader {
-    spec: FunctionSpec,
-    /// The bytes that precede the caller's data, with their byte count if the function has one.
-    head: [u8; HEAD],
-    head_length: u8,
-    /// Bytes of the caller's data.
-    data_length: u8,
-    /// Length of the response PDU, or the index of the byte that counts. For [`OWN`] it is the
-    /// rule, as [`QUEUE`].
-    length: u8,
-    /// Bytes after the counted ones.
-    more: u8,
-}
-
-impl RequestHeader {
-    /// No request.
-    pub const NONE: RequestHeader = RequestHeader {
-        spec: FunctionSpec::NONE,
-        head: [0; HEAD],
-        head_length: 0,
-        data_length: 0,
-        length: 0,
-        more: 0,
-    };
-
+impl RequestState {
     /// The head as sent.
     fn head(&self) -> &[u8] {
         self.head
@@ -118,7 +79,7 @@ impl RequestHeader {
     /// Bytes of data in the response, if the request determines them; otherwise 0.
     pub const fn known_data(&self) -> u8 {
         if self.data_at() > 0 && matches!(self.spec.0 & KIND, FIXED | READ) {
-            self.length.wrapping_sub(self.data_at())
+            self.rule.wrapping_sub(self.data_at())
         } else {
             0
         }
@@ -143,14 +104,14 @@ impl RequestHeader {
 
     /// The byte of the request PDU at `index`. `byte` returns a byte of the data.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn byte_at(&self, index: usize, byte: &impl Fn(usize) -> u8) -> u8 {
+    pub(super) fn byte_at(&self, index: usize, byte: &impl Fn(usize) -> u8) -> u8 {
         match self.head.get(index) {
             Some(byte) if index < usize::from(self.head_length) => *byte,
             _ => byte(index.wrapping_sub(usize::from(self.head_length))),
         }
     }
 
-    /// Writes the request PDU into `pdu`, which has [`RequestHeader::request_length`] bytes.
+    /// Writes the request PDU into `pdu`, which has [`RequestState::request_length`] bytes.
     /// `byte` returns a byte of the data.
     #[inline]
     pub fn emit(&self, pdu: &mut [u8], byte: impl Fn(usize) -> u8) {
@@ -179,7 +140,7 @@ impl RequestHeader {
     /// it.
     pub const fn fixed_length(&self) -> u8 {
         match self.spec.0 & KIND {
-            FIXED | READ => self.length,
+            FIXED | READ => self.rule,
             _ => 0,
         }
     }
@@ -196,13 +157,13 @@ impl RequestHeader {
             [function, ..] if *function == self.function() | EXCEPTION => 2,
             [function, ..] if *function != self.function() => return None,
             _ => match self.spec.0 & KIND {
-                FIXED => usize::from(self.length),
+                FIXED => usize::from(self.rule),
                 READ => match pdu {
-                    [_, count, ..] if *count != self.length - 2 => return None,
-                    _ => usize::from(self.length),
+                    [_, count, ..] if *count != self.rule - 2 => return None,
+                    _ => usize::from(self.rule),
                 },
                 COUNTS => {
-                    let offset = usize::from(self.length);
+                    let offset = usize::from(self.rule);
                     match pdu.get(offset) {
                         Some(count) => offset + 1 + usize::from(*count) + usize::from(self.more),
                         None => offset + 1,
@@ -218,11 +179,11 @@ impl RequestHeader {
         }
     }
 
-    /// As [`RequestHeader::expected`], for the functions 11, 18 and 2B/0E (hex), which have
+    /// As [`RequestState::expected`], for the functions 11, 18 and 2B/0E (hex), which have
     /// rules of their own, and for those whose response only the end of the frame ends.
     #[cold]
     fn own_length(&self, pdu: &[u8], whole: usize) -> usize {
-        match self.length {
+        match self.rule {
             QUEUE => match *pdu {
                 [_, 0, bytes, 0, words, ..]
                     if u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2 =>
@@ -269,7 +230,7 @@ impl RequestHeader {
         self.validate_content(pdu, byte)
     }
 
-    /// The check of the content in [`RequestHeader::validate`], for a response with the right length
+    /// The check of the content in [`RequestState::validate`], for a response with the right length
     /// that is no exception. A request that determines only length and byte count does not need it.
     #[cfg_attr(not(target_os = "none"), inline(never))]
     fn validate_content(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {

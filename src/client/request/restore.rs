@@ -1,16 +1,14 @@
 //! The response to a request, restored from the data that a client stored of it.
 
-use super::super::files;
-use super::super::functions::ENCAPSULATED_INTERFACE_TRANSPORT;
-use super::super::functions::REPEATS_DATA;
-use super::super::EXCEPTION;
-use super::RequestHeader;
+use super::RequestState;
 use crate::error::Error;
+use crate::pdu::functions::{ENCAPSULATED_INTERFACE_TRANSPORT, REPEATS_DATA};
+use crate::pdu::{files, EXCEPTION};
 
 /// The longest part of a response before its data: that of 18.
 const BEFORE_DATA: usize = 5;
 
-impl RequestHeader {
+impl RequestState {
     /// True if the response has data, which the client stores.
     pub const fn has_data(&self) -> bool {
         self.data_at() > 0

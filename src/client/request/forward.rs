@@ -1,20 +1,18 @@
-//! Builds the header of a request that arrived as bytes, to send it to another device
-//! unchanged.
+//! Makes a request of one that arrived as bytes, to send it to another device unchanged.
 
-use super::super::custom::Rule;
-use super::super::files::REFERENCE_TYPE;
-use super::super::functions::{FunctionSpec, BITS, DATA, OWN, SENDS_WORDS, TAKES_WORDS};
-use super::super::{functions, identification};
-use super::RequestHeader;
+use super::RequestState;
 use crate::error::Status;
+use crate::pdu::custom::Rule;
+use crate::pdu::files::REFERENCE_TYPE;
+use crate::pdu::functions::{FunctionSpec, BITS, DATA, OWN, SENDS_WORDS, TAKES_WORDS};
+use crate::pdu::{functions, identification};
 
 /// The last sub-function of 08 that the standard defines or reserves. The standard does not
 /// give the length of the responses of greater ones.
 const LAST_SUB_FUNCTION: u16 = 0x14;
 
-impl RequestHeader {
-    /// Builds the header of the request that consists of `function` and `body`. Its data to
-    /// send are the last [`RequestHeader::data_length`] bytes of `body`. The data of its
+impl RequestState {
+    /// Makes the request that consists of `function` and `body`. Its data to send are the last [`RequestState::data_length`] bytes of `body`. The data of its
     /// response are all bytes after the function code, as on the wire. The response is
     /// validated as that of any request. The length of the response to a function that the
     /// standard does not define is known from the end of the frame.
@@ -29,7 +27,7 @@ impl RequestHeader {
         self.forward_counted(function, body, 0)
     }
 
-    /// As [`RequestHeader::forward`], but the `body` of 14 and 15 (hex) may also be the groups
+    /// As [`RequestState::forward`], but the `body` of 14 and 15 (hex) may also be the groups
     /// alone. Then it lacks the byte count before them, which is added. The first byte tells
     /// both apart, because no byte count is as small as the reference type at the beginning of
     /// a group.
@@ -42,7 +40,7 @@ impl RequestHeader {
         self.forward_counted(function, body, lacks_count.into())
     }
 
-    /// As [`RequestHeader::forward`]. `missing` bytes are sent before `body`: the byte count.
+    /// As [`RequestState::forward`]. `missing` bytes are sent before `body`: the byte count.
     fn forward_counted(&mut self, function: u8, body: &[u8], missing: u16) -> Status {
         let length = body.len() as u16;
         let groups = (length + missing).saturating_sub(1);

@@ -1,24 +1,20 @@
-//! Builds the header of each request.
+//! Makes the request of each function.
 
-use super::super::custom::Rule;
-use super::super::diagnostics::sub_function;
-use super::super::functions::{
+use super::RequestState;
+use crate::error::Status;
+use crate::pdu::custom::Rule;
+use crate::pdu::diagnostics::sub_function;
+use crate::pdu::files::GROUP;
+use crate::pdu::functions::{
     FunctionSpec, BITS, BROADCAST, COUNTS, FIXED, HEAD_LENGTH, LENGTH, OWN, RANGE, READ,
     REPEATS_DATA, UNANSWERED,
 };
-use super::super::identification::MEI_READ_DEVICE_IDENTIFICATION;
-use super::super::{files, EXCEPTION};
-use super::RequestHeader;
-use crate::error::Status;
+use crate::pdu::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use crate::pdu::{
-    check_range, FILE_DATA_BYTES, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS,
+    check_range, EXCEPTION, FILE_DATA_BYTES, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS,
     MAX_READ_WRITE_REGISTERS, MAX_RECORD, MAX_WRITE_BITS, MAX_WRITE_REGISTERS, READ_FILE_BYTES,
     WRITE_FILE_BYTES,
 };
-
-/// The first word of a group of records: the byte count, which is set later, and the
-/// reference type.
-pub const GROUP: usize = files::REFERENCE_TYPE as usize;
 
 /// Bytes of the four words and the function code.
 const FOUR_WORDS: u8 = 9;
@@ -27,8 +23,8 @@ const FOUR_WORDS: u8 = 9;
 //
 // `add_…` and `follow` are functions of their own because all functions of the C API call
 // `set` in one common place first, which is smaller.
-impl RequestHeader {
-    /// Builds the header of the function `spec`. `first` and `second` are the words after the
+impl RequestState {
+    /// Makes a request of the function `spec`. `first` and `second` are the words after the
     /// function code; a function with fewer words ignores them. Returns
     /// [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the standard does not allow,
     /// [`Status::ILLEGAL_DATA_ADDRESS`] if the range goes beyond address 65535, otherwise
@@ -37,7 +33,7 @@ impl RequestHeader {
         self.set_all(spec, &[first.into(), second.into(), 0, 0])
     }
 
-    /// As [`RequestHeader::set`], with up to four words after the function code.
+    /// As [`RequestState::set`], with up to four words after the function code.
     pub fn set_all(&mut self, spec: FunctionSpec, words: &[usize; 4]) -> Status {
         // `map` would compile to a loop.
         let (first, second) = (words[0] as u16, words[1] as u16);
@@ -47,7 +43,7 @@ impl RequestHeader {
             *place = (*word as u16).to_be_bytes();
         }
         self.head_length = spec.number(HEAD_LENGTH);
-        self.length = spec.number(LENGTH);
+        self.rule = spec.number(LENGTH);
         self.data_length = 0;
         self.more = 0;
         if !spec.has(RANGE) {
@@ -59,7 +55,7 @@ impl RequestHeader {
             (second << 1, MAX_READ_REGISTERS, MAX_WRITE_REGISTERS)
         };
         let most = if spec.has(READ) {
-            self.length = (bytes as u8).wrapping_add(2);
+            self.rule = (bytes as u8).wrapping_add(2);
             read
         } else {
             self.count(bytes as u8);
@@ -85,7 +81,7 @@ impl RequestHeader {
     }
 
     /// 17 (hex): the unit writes 1 to 121 registers and then reads 1 to 125. Returns as
-    /// [`RequestHeader::set`].
+    /// [`RequestState::set`].
     pub fn read_write_registers(
         &mut self,
         read_address: u16,
@@ -102,7 +98,7 @@ impl RequestHeader {
         }
     }
 
-    /// Adds the range that 17 (hex) writes, after [`RequestHeader::set_all`].
+    /// Adds the range that 17 (hex) writes, after [`RequestState::set_all`].
     #[inline(always)]
     pub fn add_write(&mut self, address: u16, quantity: u16) -> Status {
         self.head_length = FOUR_WORDS;
@@ -118,10 +114,10 @@ impl RequestHeader {
         self.add_words(sub_function, words)
     }
 
-    /// Adds the number of words of data to 08, after [`RequestHeader::set`].
+    /// Adds the number of words of data to 08, after [`RequestState::set`].
     pub fn add_words(&mut self, sub_function: u16, words: u16) -> Status {
         self.data_length = (words << 1) as u8;
-        self.length = self.data_length.wrapping_add(3);
+        self.rule = self.data_length.wrapping_add(3);
         let (more, most) = match sub_function {
             sub_function::RETURN_QUERY_DATA => (REPEATS_DATA, (MAX_PDU as u16 - 3) / 2),
             sub_function::FORCE_LISTEN_ONLY => (BROADCAST | UNANSWERED, 1),
@@ -135,16 +131,16 @@ impl RequestHeader {
     }
 
     /// Sets the byte count of 14 or 15 (hex) with one group of records, after
-    /// [`RequestHeader::set_all`].
+    /// [`RequestState::set_all`].
     pub fn add_group(&mut self, file: u16, record: u16, length: u16) -> Status {
         let bytes = (length << 1) as u8;
         self.head_length = FOUR_WORDS;
         let (count, most) = if self.spec.has(REPEATS_DATA) {
             self.data_length = bytes;
-            self.length = bytes.wrapping_add(FOUR_WORDS);
+            self.rule = bytes.wrapping_add(FOUR_WORDS);
             (bytes.wrapping_add(7), (WRITE_FILE_BYTES.1 - 7) / 2)
         } else {
-            self.length = bytes.wrapping_add(4);
+            self.rule = bytes.wrapping_add(4);
             (7, (FILE_DATA_BYTES.1 - 2) / 2)
         };
         self.head[1] = count;
@@ -171,7 +167,7 @@ impl RequestHeader {
     }
 
     /// 15 (hex): writes `length` consecutive records, 1 to 122. Returns as
-    /// [`RequestHeader::read_file_record`].
+    /// [`RequestState::read_file_record`].
     pub fn write_file_record(&mut self, file: u16, record: u16, length: u16) -> Status {
         self.group(FunctionSpec::WRITE_FILE_RECORD, file, record, length)
     }
@@ -188,7 +184,7 @@ impl RequestHeader {
     pub fn write_file_records(&mut self, bytes: u16) -> Status {
         let _ = self.set(FunctionSpec::WRITE_FILE_RECORDS, 0, 0);
         self.count(bytes as u8);
-        self.length = (bytes as u8).wrapping_add(2);
+        self.rule = (bytes as u8).wrapping_add(2);
         let bytes = usize::from(bytes);
         value(bytes >= WRITE_FILE_BYTES.0 && bytes <= WRITE_FILE_BYTES.1)
     }
@@ -196,9 +192,9 @@ impl RequestHeader {
     /// 2B/0E (hex): `code` is the read device id code, 1 to 4, `object` the id of the first
     /// object to read.
     pub fn read_device_identification(&mut self, code: u8, object: u8) -> Status {
-        let [first, second] = RequestHeader::identification(code, object);
+        let [first, second] = RequestState::identification(code, object);
         let _ = self.set(FunctionSpec::READ_DEVICE_IDENTIFICATION, first, second);
-        RequestHeader::check_code(code)
+        RequestState::check_code(code)
     }
 
     /// The two words of 2B/0E (hex).
@@ -232,7 +228,7 @@ impl RequestHeader {
     }
 
     /// Adds the function code of a user-defined function, the `kind` of its length rule and
-    /// the numbers of that rule, after [`RequestHeader::set`].
+    /// the numbers of that rule, after [`RequestState::set`].
     #[cfg_attr(target_os = "none", inline(always))]
     pub fn add_rule(
         &mut self,
@@ -243,7 +239,7 @@ impl RequestHeader {
     ) -> Status {
         self.spec.0 |= kind | u32::from(function);
         self.head[0] = function;
-        self.length = length;
+        self.rule = length;
         self.more = more;
         if function == 0 || function & EXCEPTION != 0 {
             return Status::ILLEGAL_FUNCTION;

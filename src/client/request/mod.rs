@@ -1,12 +1,22 @@
 //! A request of a client: its state, the data to send, and the place for the data of the
 //! response.
+//!
+//! One number, the [`FunctionSpec`], describes each function. So a firmware that calls every
+//! function needs few bytes for each.
+
+mod build;
+mod forward;
+mod pdu;
+mod restore;
 
 use crate::engine::BROADCAST;
-use crate::error::Error;
-use crate::error::Status;
-use crate::pdu::header::RequestHeader;
+use crate::error::{Error, Status};
+use crate::pdu::functions::FunctionSpec;
 use crate::time::{Micros, LONGEST_TIMEOUT_MS};
 use core::fmt;
+
+/// Bytes of the longest head: that of 17 (hex), with the byte count of its data.
+const HEAD: usize = 10;
 
 /// The stage of a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -24,9 +34,10 @@ pub(super) enum Stage {
     Ended,
 }
 
-/// The state of a request. The caller sets `capacity`, `transaction`, `unit` and `header`
-/// before it queues the request, and reads `status`, `exception` and `length` when the
-/// request has ended.
+/// What a client keeps of a request: its function and arguments, and what has become of it. The
+/// caller sets `capacity`, `transaction` and `unit`, and calls the function that makes the request,
+/// such as [`RequestState::set`], before it queues the request. It reads `status`, `exception` and
+/// `length` when the request has ended. The data stay in the caller's memory.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct RequestState {
@@ -52,13 +63,23 @@ pub struct RequestState {
     pub(super) retries: u8,
     /// Number of retries so far after an exception.
     pub(super) busy_retries: u8,
+    head_length: u8,
+    /// Bytes of the caller's data.
+    data_length: u8,
+    /// Length of the response PDU, or the index of the byte that counts. For `OWN` it is the
+    /// rule, as `QUEUE`.
+    rule: u8,
+    spec: FunctionSpec,
+    /// The bytes that precede the caller's data, with their byte count if the function has one.
+    /// (Here and before it, a Thumb instruction reaches single bytes.)
+    head: [u8; HEAD],
     /// The transaction identifier of its TCP frame.
     pub(super) wire: u16,
     /// The request is due when `wait` microseconds have passed since `since`.
     pub(super) since: Micros,
     pub(super) wait: Micros,
-    /// The function and its arguments.
-    pub header: RequestHeader,
+    /// Bytes after the counted ones.
+    more: u8,
 }
 
 impl RequestState {
@@ -78,7 +99,12 @@ impl RequestState {
         wire: 0,
         since: 0,
         wait: 0,
-        header: RequestHeader::NONE,
+        spec: FunctionSpec::NONE,
+        head: [0; HEAD],
+        head_length: 0,
+        data_length: 0,
+        rule: 0,
+        more: 0,
     };
 
     /// The unit identifier in the frame.
@@ -106,8 +132,8 @@ impl RequestState {
     /// True if a device answers such a request: its function has a response, and it is no
     /// broadcast. A write to unit 0 counts as a broadcast in TCP frames, too.
     pub const fn has_reply(&self) -> bool {
-        let may_be_broadcast = self.unit() == BROADCAST && self.header.may_be_broadcast();
-        !may_be_broadcast && self.header.is_answered()
+        let may_be_broadcast = self.unit() == BROADCAST && self.may_be_broadcast();
+        !may_be_broadcast && self.is_answered()
     }
 
     /// Ends the request with `status`.
@@ -166,7 +192,7 @@ pub(super) fn is_answer(ended: Status) -> bool {
 
 /// Stores the data of the complete response `pdu` in the request.
 pub(super) fn store_response<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
-    let at = usize::from(request.state().header.data_at());
+    let at = usize::from(request.state().data_at());
     let data = match pdu.get(at..) {
         Some(data) if at > 0 && request.wants_data() => data,
         _ => return Status::OK,
@@ -176,7 +202,7 @@ pub(super) fn store_response<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> S
         return Status::BUFFER_TOO_SMALL;
     }
     state.length = data.len() as u8;
-    let mask = state.header.mask();
+    let mask = state.mask();
     request.store(data, mask);
     Status::OK
 }
