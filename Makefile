@@ -10,6 +10,8 @@ SANITIZED_ARCHIVE := $(BUILD)/sanitized/libmbm.a
 RUST_SANITIZERS := --cfg mbm_reads_single_bytes -Zsanitizer=address -Cdebug-assertions -Coverflow-checks -Copt-level=1 -Cdebuginfo=line-tables-only
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
+# The hooks of a test seldom use all that they get.
+TEST_WARNINGS := $(WARNINGS) -Wno-unused-parameter
 INCLUDES := -Iinclude -Iports/linux -Iexamples/linux -Ic-tests/support -Ic-tests/shim -Icli
 CFLAGS := -std=c11 -O1 -g
 CXXFLAGS := -std=c++11 -O1 -g
@@ -250,10 +252,10 @@ $(filter-out $(patsubst %.d,%.o,$(wildcard $(OBJECTS:.o=.d))),$(OBJECTS)): witho
 define variant
 $(BUILD)/$(1)/%.o: c-tests/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(TEST_WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: c-tests/%.cpp
 	@mkdir -p $$(@D)
-	@$(3) $(DEPENDS) $(CXXFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+	@$(3) $(DEPENDS) $(CXXFLAGS) $(4) $(TEST_WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: examples/%.c
 	@mkdir -p $$(@D)
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@

@@ -110,7 +110,6 @@ static int16_t simulated_write(void *context, const uint8_t *bytes, uint16_t len
 
 static uint8_t is_open(void *context)
 {
-    (void)context;
     return MBM_OK;
 }
 

@@ -15,7 +15,6 @@ static int32_t nano_read(uint8_t *bytes, uint16_t count, int32_t timeout_ms, voi
     struct pollfd ready = {line, POLLIN, 0};
     int32_t have = 0;
 
-    (void)context;
     while (have < count && poll(&ready, 1, timeout_ms) == 1) {
         ssize_t got = read(line, bytes + have, (size_t)(count - have));
 
@@ -28,7 +27,6 @@ static int32_t nano_read(uint8_t *bytes, uint16_t count, int32_t timeout_ms, voi
 
 static int32_t nano_write(const uint8_t *bytes, uint16_t count, int32_t timeout_ms, void *context)
 {
-    (void)timeout_ms, (void)context;
     return (int32_t)write(line, bytes, count);
 }
 

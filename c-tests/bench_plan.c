@@ -32,7 +32,6 @@ static int16_t device_write(void *context, const uint8_t *bytes, uint16_t count)
     const unsigned size =
         bytes[7] <= MBM_FC_READ_DISCRETE_INPUTS ? (quantity + 7) / 8 : 2 * quantity;
 
-    (void)context;
     memcpy(reply, bytes, 8);
     reply[5] = (uint8_t)(3 + size);
     reply[8] = (uint8_t)size;
@@ -48,7 +47,6 @@ static int16_t device_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     const uint16_t left = (uint16_t)(length - taken), count = left < capacity ? left : capacity;
 
-    (void)context;
     memcpy(bytes, reply + taken, count);
     taken = (uint16_t)(taken + count);
     return (int16_t)count;
@@ -58,7 +56,6 @@ static uint32_t now;
 
 static uint32_t micros(void *context)
 {
-    (void)context;
     return now;
 }
 

@@ -4,9 +4,6 @@
 #include "sim.h"
 #include "test.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 fixture each_test = {sim_setup, sim_teardown};
 
 /* Calls all others except begin, setFrame and statusText. */

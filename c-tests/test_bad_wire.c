@@ -6,10 +6,6 @@
 #include "node.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 /* Returns '.' for right data, 'F' for a failed call, 'W' for success with wrong data. */
 static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
 {

@@ -4,8 +4,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 static hooked_port wire, other_wire;
 static mbm_port port, other_port;
 static mbm_client client;
@@ -19,8 +17,6 @@ static unsigned ended, hooks_called;
 
 static void count_done(void *context, mbm_clientRequest *request)
 {
-    (void)context;
-    (void)request;
     ended++;
 }
 
@@ -136,7 +132,6 @@ static void within_the_driver_hook(int hook)
 
 static uint8_t never_drained(void *context)
 {
-    (void)context;
     return 0;
 }
 
@@ -169,8 +164,6 @@ TEST(a_client_that_is_suspended_is_not_begun_again)
 
 static void begin_another(void *context, mbm_clientRequest *request)
 {
-    (void)context;
-    (void)request;
     ended++;
     OK(begin(MBM_FRAMING_TCP, &other_port));
 }

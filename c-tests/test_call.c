@@ -10,8 +10,6 @@
 #include <errno.h>
 #include <pthread.h>
 #include <signal.h>
-#include <stdio.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -150,7 +148,6 @@ static void *hang_up(void *unused)
 {
     char byte;
 
-    (void)unused;
     /* Only when the request is in flight. */
     assert_int_equal(read(ends[1], &byte, 1), 1);
     shutdown(ends[1], SHUT_RDWR);
@@ -184,7 +181,6 @@ static void *interrupt_and_answer(void *unused)
 {
     uint8_t frame[12];
 
-    (void)unused;
     assert_int_equal(read(ends[1], frame, sizeof frame), sizeof frame);
     for (int i = 0; i < 20; i++) {
         pthread_kill(main_thread, SIGUSR1);
@@ -200,13 +196,11 @@ static void *interrupt_and_answer(void *unused)
 
 static void count_signal(int number)
 {
-    (void)number;
     signals++;
 }
 
 static void stop_it(int number)
 {
-    (void)number;
     stop = 1;
 }
 
@@ -236,7 +230,6 @@ static void *signal_when_asked(void *unused)
 {
     char byte;
 
-    (void)unused;
     assert_int_equal(read(ends[1], &byte, 1), 1);
     pthread_kill(main_thread, SIGUSR1);
     return NULL;
@@ -263,17 +256,13 @@ static uint8_t called_in_done;
 
 static void call_again(void *context, mbm_clientRequest *ended)
 {
-    (void)context;
     others_ended++;
     called_in_done = mbm_call(&caller, read_words(1));
     IS(MBM_CANCELLED, request.status);
-    (void)ended;
 }
 
 static void note_end(void *context, mbm_clientRequest *ended)
 {
-    (void)context;
-    (void)ended;
     others_ended++;
 }
 
@@ -331,7 +320,6 @@ static unsigned rounds;
 
 static void once_more(void *context, mbm_clientRequest *ended)
 {
-    (void)context;
     if (++rounds < 3)
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, ended, FIRST, 1));
 }
@@ -385,8 +373,6 @@ TEST(a_call_that_cannot_go_on_is_refused)
 
 static int cannot_wait(void *port, uint32_t timeoutUs)
 {
-    (void)port;
-    (void)timeoutUs;
     return -1;
 }
 
@@ -407,7 +393,6 @@ static int wait_for_long(void *port, uint32_t timeoutUs)
     static const uint8_t rest[] = {0, 0, 0, 5, UNIT, 3, 2, 0x56, 0x78};
     uint8_t frame[12];
 
-    (void)port;
     if (timeoutUs > longest)
         longest = timeoutUs;
     if (recv(ends[1], frame, sizeof frame, MSG_DONTWAIT) == (ssize_t)sizeof frame) {
@@ -470,7 +455,6 @@ static uint8_t status_in_callback;
 
 static void note_failure(void *context, uint8_t event, uint8_t status)
 {
-    (void)context;
     if (event != MBM_LINK_EVENT_FAILED)
         return;
     error_in_callback = tcp.error;

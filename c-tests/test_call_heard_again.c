@@ -7,7 +7,6 @@
 #include "test.h"
 
 #include <poll.h>
-#include <string.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -76,7 +75,6 @@ static int pass(void *context, uint32_t longest)
 {
     struct pollfd end = {line.theirs, POLLIN, 0};
 
-    (void)context;
     serve();
     if (reply_at == 0 || reply_at > clock_now + longest) {
         clock_now += longest;

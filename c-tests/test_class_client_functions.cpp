@@ -3,7 +3,6 @@
 #include "client_checks.h"
 
 #include <math.h>
-#include <string.h>
 
 fixture each_test = {reset_board, nullptr};
 

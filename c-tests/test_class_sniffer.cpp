@@ -3,8 +3,6 @@
 
 #include "ModbusSniffer.h"
 
-#include <string.h>
-
 fixture each_test = {reset_board, nullptr};
 
 /* Collects the printed text. */

@@ -2,7 +2,6 @@
 #include "wire.h"
 
 #include <math.h>
-#include <string.h>
 #include <type_traits>
 
 fixture each_test = {reset_board, nullptr};

@@ -7,7 +7,6 @@
 #include "tcp_server.h"
 #include "test.h"
 
-#include <string.h>
 #include <sys/socket.h>
 
 enum { UNIT = 17 };

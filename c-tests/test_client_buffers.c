@@ -6,9 +6,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 enum { ROUNDS = 120, STEPS = 400, REQUESTS = 20, REPLY = 256 };
 
 typedef struct line {
@@ -165,28 +162,21 @@ static int driver;
 
 static int16_t write_one(void *context, const uint8_t *bytes, uint16_t length)
 {
-    (void)context;
-    (void)bytes;
     return length > 0;
 }
 
 static int16_t read_nothing(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    (void)context;
-    (void)bytes;
-    (void)capacity;
     return 0;
 }
 
 static void switch_on(void *context)
 {
-    (void)context;
     driver++;
 }
 
 static void switch_off(void *context)
 {
-    (void)context;
     driver--;
 }
 

@@ -7,8 +7,6 @@
 #include "memory_port.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { UNIT = 7, REPLY = 252 };
 
 typedef struct exchange {

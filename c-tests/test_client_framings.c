@@ -5,7 +5,6 @@
 #include "served.h"
 #include "test.h"
 
-#include <string.h>
 #include <unistd.h>
 
 static asker a;

@@ -7,9 +7,6 @@
 #include "tcp_peer.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <string.h>
-
 enum { UNIT = 7, MS = 1000, STEPS = 1000 };
 /* Timeouts in milliseconds. */
 enum { CLIENTS = 300, UNITS = 700, OWN = 1100 };

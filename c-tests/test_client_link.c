@@ -4,8 +4,6 @@
 #include "memory_port.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { UNIT = 7, SECOND = 1000000 };
 
 static memory_port m;
@@ -66,7 +64,6 @@ static uint8_t connects_with;
 
 static uint8_t reconnected(void *context)
 {
-    (void)context;
     return connects_with;
 }
 
@@ -122,7 +119,6 @@ static uint32_t number;
 /* Random functions whose values vary in different bits. */
 static uint32_t of_32_bits(void *context)
 {
-    (void)context;
     number = number * 1664525u + 1013904223u;
     return number;
 }
@@ -254,7 +250,6 @@ static uint32_t random_state;
 
 static uint32_t any(void *context)
 {
-    (void)context;
     random_state = random_state * 1103515245u + 12345u;
     return random_state >> 8;
 }

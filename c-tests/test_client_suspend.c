@@ -4,9 +4,6 @@
 #include "memory_port.h"
 #include "test.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 static memory_port m, other_m;
 static mbm_client *client; /* on the heap, so that the sanitizer finds each use after its end */
 static mbm_line line, other_line;
@@ -17,7 +14,6 @@ static uint16_t words[4], other_words[4];
 
 static uint8_t opened(void *context)
 {
-    (void)context;
     return MBM_OK;
 }
 
@@ -174,8 +170,6 @@ static unsigned ended;
 
 static void lend(void *context, mbm_clientRequest *request)
 {
-    (void)context;
-    (void)request;
     ended++;
     OK(mbm_client_suspend(client, &line));
 }

@@ -3,9 +3,6 @@
 #include "sim.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <string.h>
-
 #define WORD(index) s->response[index]
 
 static uint8_t read_words(sim *s, uint16_t quantity, const char *reply)
@@ -71,15 +68,13 @@ SIM_TEST(an_exception_with_a_bad_crc_is_no_exception)
 
 SIM_TEST(response_words_survive_a_failure)
 {
-    static const char *const replies[] = {
-        "11 83 02 +",
-        "11 03 04 AA AA BB BB 00 00",
-        "11 03 02 AA AA +",
-        "11 04 04 AA AA BB BB +",
-        "12 03 04 AA AA BB BB +",
-        "11 03 04 AA",
-        "",
-    };
+    static const char *const replies[] = {"11 83 02 +",
+                                          "11 03 04 AA AA BB BB 00 00",
+                                          "11 03 02 AA AA +",
+                                          "11 04 04 AA AA BB BB +",
+                                          "12 03 04 AA AA BB BB +",
+                                          "11 03 04 AA",
+                                          ""};
 
     OK(read_words(s, 2, "11 03 04 12 34 56 78 +"));
     for (size_t i = 0; i < COUNT(replies); i++) {

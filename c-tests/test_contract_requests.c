@@ -4,8 +4,6 @@
 #include "sim.h"
 #include "test.h"
 
-#include <string.h>
-
 #define WORD(index) s->response[index]
 #define LAST(text) sim_assert_sent(s, s->sent - 1, text)
 

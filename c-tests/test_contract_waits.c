@@ -4,8 +4,6 @@
 #include "sim.h"
 #include "test.h"
 
-#include <string.h>
-
 static void gap_after_reply(sim *s, uint32_t wanted)
 {
     sim_reads(s, 500);
@@ -418,13 +416,11 @@ static mbm_client a_client;
 
 static uint8_t poll_client(sim *s)
 {
-    (void)s;
     return mbm_client_poll(&a_client);
 }
 
 static uint32_t client_delay(sim *s)
 {
-    (void)s;
     return mbm_client_pollDelay(&a_client);
 }
 

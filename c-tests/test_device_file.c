@@ -5,9 +5,6 @@
 #include "report.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 static char path[] = "/tmp/mbm-device-XXXXXX";

@@ -3,8 +3,6 @@
 #include "port_over.h"
 #include "test.h"
 
-#include <string.h>
-
 /* The port below: its bytes, its clock, and how often it was read. */
 static uint8_t bytes[600];
 static uint16_t at, end;
@@ -15,7 +13,6 @@ static int16_t read_below(void *context, uint8_t *to, uint16_t capacity)
 {
     const uint16_t left = (uint16_t)(end - at), count = left < capacity ? left : capacity;
 
-    (void)context;
     reads++;
     memcpy(to, bytes + at, count);
     at = (uint16_t)(at + count);
@@ -24,15 +21,12 @@ static int16_t read_below(void *context, uint8_t *to, uint16_t capacity)
 
 static int16_t write_below(void *context, const uint8_t *from, uint16_t length)
 {
-    (void)context;
-    (void)from;
     writes++;
     return (int16_t)length;
 }
 
 static uint32_t micros_below(void *context)
 {
-    (void)context;
     return now;
 }
 

@@ -3,8 +3,6 @@
 #include "examples.h"
 #include "test.h"
 
-#include <string.h>
-
 static const mbm_framing framings[] = {
     {.kind = MBM_FRAMING_RTU},
     {.kind = MBM_FRAMING_ASCII},

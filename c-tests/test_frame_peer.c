@@ -8,10 +8,8 @@
 #include "test.h"
 
 #include <poll.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
-#include <stdlib.h>
 
 static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
 static const mbm_framing tcp = {.kind = MBM_FRAMING_TCP};

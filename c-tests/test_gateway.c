@@ -13,9 +13,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -41,7 +38,6 @@ static void *serve(void *argument)
 {
     uint8_t request[MODBUS_RTU_MAX_ADU_LENGTH];
 
-    (void)argument;
     for (;;) {
         struct pollfd waits[2] = {{line.ours, POLLIN, 0}, {stop_peer[0], POLLIN, 0}};
         int length;

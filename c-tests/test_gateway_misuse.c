@@ -3,8 +3,6 @@
 #include "gateway_bench.h"
 #include "test.h"
 
-#include <string.h>
-
 static gateway_bench b;
 
 static const mbm_gatewayRoute routes[] = {
@@ -217,7 +215,6 @@ static mbm_port hooked(memory_port *m)
 
 static uint8_t is_ready(void *context)
 {
-    (void)context;
     every_call_is_busy();
     return 1;
 }
@@ -225,9 +222,6 @@ static uint8_t is_ready(void *context)
 static uint16_t serve(void *context, const mbm_request *request, uint8_t *response,
                       uint16_t capacity)
 {
-    (void)context;
-    (void)request;
-    (void)capacity;
     every_call_is_busy();
     response[0] = 0x77;
     return 1;
@@ -235,8 +229,6 @@ static uint16_t serve(void *context, const mbm_request *request, uint8_t *respon
 
 static void done(void *context, mbm_clientRequest *request)
 {
-    (void)context;
-    (void)request;
     every_call_is_busy();
 }
 
@@ -338,8 +330,6 @@ TEST(a_hook_of_a_line_that_the_program_polls_cannot_use_the_gateway)
 /* `done` of a request may use the gateway, if the program itself polls the client. */
 static void done_and_close(void *context, mbm_clientRequest *request)
 {
-    (void)context;
-    (void)request;
     entered++;
     close_and_poll(0);
 }

@@ -2,8 +2,6 @@
 #include "gateway_bench.h"
 #include "test.h"
 
-#include <string.h>
-
 static gateway_bench b;
 
 /* Line 0 has the units 1 to 31, line 1 the units 1 to 31 as 101 to 131. */

@@ -3,8 +3,6 @@
 #include "gateway_bench.h"
 #include "test.h"
 
-#include <string.h>
-
 static gateway_bench b;
 
 static const mbm_gatewayRoute routes[] = {{1, 31, 0, 0}, {101, 131, 1, 1}};
@@ -538,8 +536,6 @@ static unsigned calls, not_yet;
 static uint16_t serve(void *context, const mbm_request *request, uint8_t *response,
                       uint16_t capacity)
 {
-    (void)context;
-    (void)capacity;
     units_seen[calls++ % COUNT(units_seen)] = request->unit;
     if (not_yet > 0) {
         not_yet--;

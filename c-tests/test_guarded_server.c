@@ -7,9 +7,6 @@
 #include <errno.h>
 #include <modbus.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 static char output[4096];
 

@@ -5,10 +5,6 @@
 #include "sim.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 fixture each_test = {sim_setup, sim_teardown};
 
 enum {
@@ -784,10 +780,7 @@ static uint8_t connect_again(void *context)
     return MBM_OK;
 }
 
-static void disconnect(void *context)
-{
-    (void)context;
-}
+static void disconnect(void *context) {}
 
 /* A new connection has no replies of the old one. A serial line that was opened again may. */
 TEST(a_new_connection_of_rtu_over_tcp_owes_nothing)

@@ -4,8 +4,6 @@
 #include "memory_port.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { UNIT = 7, REPLIES = 300, OBJECTS = 64 };
 
 static memory_port m;
@@ -398,7 +396,6 @@ TEST(wrong_arguments_change_nothing)
 
 static void read_the_next(void *context, mbm_identification *identification)
 {
-    (void)context;
     ended++;
     if (ended == 1)
         IS(MBM_PENDING, mbm_identification_read(identification, &client, MBM_DEVICE_ID_REGULAR, 3));

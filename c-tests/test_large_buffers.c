@@ -3,8 +3,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { LARGE = UINT16_MAX };
 
 static uint8_t incoming[LARGE], outgoing[LARGE];
@@ -19,7 +17,6 @@ static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     int16_t count = 0;
 
-    (void)context;
     assert_in_range(capacity, 1, INT16_MAX);
     while (count < capacity && wire.first < wire.last)
         bytes[count++] = wire.arriving[wire.first++];
@@ -28,7 +25,6 @@ static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
 
 static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
 {
-    (void)context;
     memcpy(wire.sent + wire.length, bytes, length);
     wire.length += length;
     return (int16_t)length;
@@ -36,7 +32,6 @@ static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
 
 static uint32_t wire_micros(void *context)
 {
-    (void)context;
     return wire.now += 1000;
 }
 

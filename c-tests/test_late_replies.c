@@ -7,8 +7,6 @@
 #include "sim.h"
 #include "test.h"
 
-#include <string.h>
-
 enum {
     TIMEOUT_MS = 500,
     LATE = 750000,  /* microseconds that the device takes for a late reply */

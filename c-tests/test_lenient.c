@@ -5,10 +5,6 @@
 #include "sim.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 enum { TIMEOUT_MS = 200, TIMEOUT = 200000 };
 
 /* The simulation with a lenient master. */

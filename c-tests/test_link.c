@@ -334,8 +334,6 @@ static void act(void *context, uint8_t event, uint8_t status)
 {
     const mbm_port port = memory_port_of(&m);
 
-    (void)context;
-    (void)status;
     called++;
     if (event != MBM_LINK_EVENT_LOST)
         return;
@@ -570,7 +568,6 @@ TEST(queued_requests_wait_for_a_reconnection_on_demand)
 
 static void queue_again(void *context, mbm_clientRequest *ended)
 {
-    (void)context;
     called++;
     queue_read(ended);
 }

@@ -416,13 +416,11 @@ static int16_t accept_some(void *context, const uint8_t *bytes, uint16_t length)
 
 static void driver_on(void *context)
 {
-    (void)context;
     driver++;
 }
 
 static void driver_off(void *context)
 {
-    (void)context;
     driver--;
 }
 
@@ -626,8 +624,6 @@ TEST(a_link_that_the_program_closes_while_it_is_being_made_sends_nothing_old)
 /* The link is lost, and its callback does this next. */
 static void end_it(void *context, uint8_t event, uint8_t status)
 {
-    (void)context;
-    (void)status;
     if (event != MBM_LINK_EVENT_CONNECTED)
         OK(mbm_link_end(&kept));
 }

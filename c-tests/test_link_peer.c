@@ -8,7 +8,6 @@
 #include "tcp_peer.h"
 #include "test.h"
 
-#include <string.h>
 #include <unistd.h>
 
 enum { FIRST_MS = 20, MOST_MS = 100, UNIT = 17, MANY = 10 };
@@ -216,19 +215,16 @@ static int is_there;
 
 static uint8_t open_tty(void *context)
 {
-    (void)context;
     return is_there && mbm_tty_attach(&a.tty, dup(far_end.line.ours)) == 0 ? MBM_OK : MBM_LINK_LOST;
 }
 
 static void close_tty(void *context)
 {
-    (void)context;
     mbm_tty_close(&a.tty);
 }
 
 static uint8_t status_of_tty(void *context)
 {
-    (void)context;
     return a.tty.isOpen ? MBM_OK : MBM_LINK_LOST;
 }
 

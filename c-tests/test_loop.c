@@ -14,9 +14,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <time.h>
@@ -387,7 +384,6 @@ TEST(an_entry_removes_itself_and_adds_another_in_its_poll)
 
 static void wait_within(inlet *own)
 {
-    (void)own;
     FAILS(EBUSY, mbm_loop_wait(&loop, 0));
     mbm_loop_close(&loop);
     read_one(own);

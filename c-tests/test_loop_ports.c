@@ -14,9 +14,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <netinet/in.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -288,7 +285,6 @@ static uint32_t accept_all(mbm_loop_entry *entry)
 {
     int i;
 
-    (void)entry;
     while ((i = mbm_tcp_accept(&listener, places, PLACES)) >= 0) {
         const mbm_port port = mbm_tcp_port(&places[i]);
 

@@ -5,8 +5,6 @@
 #include "test.h"
 
 #include <errno.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
@@ -35,7 +33,6 @@ static uint32_t seed;
 /* This function replaces that of libc. */
 int clock_gettime(clockid_t id, struct timespec *time)
 {
-    (void)id;
     time->tv_sec = now / 1000000;
     time->tv_nsec = now % 1000000 * 1000;
     return 0;
@@ -103,7 +100,6 @@ static int16_t sim_write(void *context, const uint8_t *bytes, uint16_t length)
 
 static uint32_t sim_micros(void *context)
 {
-    (void)context;
     return (uint32_t)now;
 }
 
@@ -111,7 +107,6 @@ static void note_end(void *context, mbm_clientRequest *request)
 {
     device *d = (device *)context;
 
-    (void)request;
     d->ended = now;
 }
 
@@ -356,14 +351,12 @@ static unsigned eager_polls, calm_polls;
 
 static uint32_t poll_eager(mbm_loop_entry *entry)
 {
-    (void)entry;
     eager_polls++;
     return 0;
 }
 
 static uint32_t poll_calm(mbm_loop_entry *entry)
 {
-    (void)entry;
     calm_polls++;
     return 10 * MS;
 }

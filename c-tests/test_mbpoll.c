@@ -3,9 +3,6 @@
 #include "served.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
 
 static served tcp, rtu;

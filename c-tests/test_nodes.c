@@ -3,8 +3,6 @@
 #include "sim.h"
 #include "test.h"
 
-#include <string.h>
-
 typedef struct other {
     mbm_node node;
     uint16_t words[4];

@@ -6,9 +6,6 @@
 #include "plan_device.h"
 #include "test.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 /* A byte of this value marks an object that was begun. */
 enum { MARK = 0xE6, RANDOM_FILLS = 300 };
 
@@ -240,7 +237,6 @@ static uint8_t use_sniffer(void *object)
 
 static void count_record(void *context, const mbm_traceRecord *record)
 {
-    (void)record;
     ++*(unsigned *)context;
 }
 

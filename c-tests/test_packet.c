@@ -3,8 +3,6 @@
 #include "examples.h"
 #include "test.h"
 
-#include <string.h>
-
 static const mbm_rule three_bytes = {MBM_RULE_FIXED, 3, 0};
 
 TEST(every_example_is_parsed_to_its_fields)

@@ -6,9 +6,6 @@
 #include <float.h>
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 static uint16_t words[VALUE_WORDS];
 static const char *wrong;

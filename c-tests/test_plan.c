@@ -2,8 +2,6 @@
 #include "plan_device.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS, SECOND = 1000 };
 
 static plan_device d;
@@ -272,7 +270,6 @@ TEST(a_plan_that_was_zeroed_ignores_the_reply)
 
 static void ending(void *context, mbm_plan *plan, uint16_t field)
 {
-    (void)field;
     ++*(unsigned *)context;
     OK(mbm_plan_end(plan));
     IS(MBM_NOT_INITIALISED, mbm_plan_refresh(plan, 0));
@@ -299,7 +296,6 @@ TEST(update_may_end_the_plan)
 /* Begins the plan anew, in the middle of the updates of its fields. */
 static void beginning_again(void *context, mbm_plan *plan, uint16_t field)
 {
-    (void)field;
     ++*(unsigned *)context;
     OK(mbm_plan_end(plan));
     d.setup.update = NULL;

@@ -7,7 +7,6 @@
 #include "tcp_server.h"
 #include "test.h"
 
-#include <string.h>
 #include <unistd.h>
 
 enum { UNIT = 17, FIELDS = 7, WORDS = 128 };
@@ -35,8 +34,6 @@ static unsigned updates[FIELDS];
 
 static void count_update(void *context, mbm_plan *plan, uint16_t field)
 {
-    (void)context;
-    (void)plan;
     updates[field]++;
 }
 

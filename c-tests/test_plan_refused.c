@@ -3,9 +3,6 @@
 #include "plan_device.h"
 #include "test.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS };
 
 static plan_device d;
@@ -181,8 +178,6 @@ static unsigned updates;
 
 static void begin_again(void *context, mbm_plan *plan, uint16_t field)
 {
-    (void)context;
-    (void)field;
     if (updates++ == 0) {
         d.setup.fieldCount = 1;
         OK(mbm_plan_begin(plan, &d.client, &d.setup, NULL));

@@ -3,8 +3,6 @@
 #include "test.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS, COILS = MBM_TABLE_COILS };
 

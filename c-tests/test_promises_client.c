@@ -7,8 +7,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 static hooked_port wire;
 static mbm_port port;
 static mbm_client c, never;
@@ -310,7 +308,6 @@ TEST(a_begin_is_refused_without_a_change)
 
 static uint32_t random_number(void *context)
 {
-    (void)context;
     return 4;
 }
 
@@ -483,7 +480,6 @@ TEST(a_client_that_was_never_begun_has_no_settings)
 
 static uint8_t connect_at_once(void *context)
 {
-    (void)context;
     return MBM_OK;
 }
 

@@ -6,9 +6,6 @@
 #include "hooked_port.h"
 #include "test.h"
 
-#include <string.h>
-#include <stdio.h>
-
 enum { TEXT_SUFFICES = 2295 };
 
 static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};

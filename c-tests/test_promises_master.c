@@ -6,8 +6,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { RESPONSE = 125, TRANSMIT = 123 };
 
 static hooked_port wire;

@@ -5,8 +5,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 static hooked_port wire;
 static mbm_port port;
 static mbm_server server;
@@ -173,10 +171,6 @@ TEST(a_poll_reports_what_its_comment_says)
 static uint16_t serve_nothing(void *context, const mbm_request *request, uint8_t *response,
                               uint16_t capacity)
 {
-    (void)context;
-    (void)request;
-    (void)response;
-    (void)capacity;
     return 0;
 }
 

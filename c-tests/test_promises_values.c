@@ -3,8 +3,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { FIRST = 65530, WORDS = 6, VALUE = 0x5A };
 
 static uint16_t words[WORDS];

@@ -4,8 +4,6 @@
 #include "hooked_port.h"
 #include "test.h"
 
-#include <string.h>
-
 /* How often a hook has made its calls. */
 static unsigned entered;
 
@@ -196,7 +194,6 @@ static void every_function_of_the_server_is_busy(void)
 
 static void within_server(int hook)
 {
-    (void)hook;
     UNCHANGED_BY(server, every_function_of_the_server_is_busy());
 }
 
@@ -231,8 +228,6 @@ static void within_unit(void)
 
 static uint8_t before_access(void *context, const mbm_access *access)
 {
-    (void)context;
-    (void)access;
     within_unit();
     return 0;
 }
@@ -244,8 +239,6 @@ static void after_access(void *context, const mbm_access *access)
 
 static uint8_t cell_is_valid(void *context, uint16_t address)
 {
-    (void)context;
-    (void)address;
     within_unit();
     return 1;
 }
@@ -257,7 +250,6 @@ static uint16_t cell_get(void *context, uint16_t address)
 
 static void cell_set(void *context, uint16_t address, uint16_t value)
 {
-    (void)value;
     cell_is_valid(context, address);
 }
 
@@ -266,9 +258,6 @@ static uint16_t carry_out(void *context, const mbm_request *asked, uint8_t *resp
 {
     static mbm_functionMask switches;
 
-    (void)context;
-    (void)capacity;
-    (void)asked;
     within_unit();
     OK(mbm_unit_switchFunction(&unit, &switches, 7, 0));
     response[0] = 1;
@@ -365,8 +354,6 @@ static int begins_anew;
 
 static void start_over(void *context, uint8_t clears)
 {
-    (void)context;
-    (void)clears;
     hooks_called++;
     memset(&server, 0, sizeof server);
     if (begins_anew)
@@ -471,7 +458,6 @@ static void every_function_of_the_client_is_busy(void)
 
 static void within_client(int hook)
 {
-    (void)hook;
     UNCHANGED_BY(client, every_function_of_the_client_is_busy());
 }
 
@@ -479,7 +465,6 @@ static unsigned drawn;
 
 static uint32_t reentrant_random(void *context)
 {
-    (void)context;
     drawn++;
     UNCHANGED_BY(client, every_function_of_the_client_is_busy());
     return 7;
@@ -542,7 +527,6 @@ static int done_does, framing_of_done;
 
 static void connect_anew(void *context)
 {
-    (void)context;
     entered++;
     /* Only the poll that called `done` is running. */
     IS(MBM_BUSY, mbm_client_poll(&client));
@@ -554,7 +538,6 @@ static void done(void *context, mbm_clientRequest *ended)
     const mbm_linkHooks link = {.disconnect = connect_anew};
     static mbm_line borrower;
 
-    (void)context;
     entered++;
     IS(MBM_BUSY, mbm_client_poll(&client));
     switch (done_does) {
@@ -695,7 +678,6 @@ static void within_port(int hook)
 {
     uint32_t age;
 
-    (void)hook;
     UNCHANGED_BY(plan, {
         IS(MBM_BUSY, mbm_plan_poll(&plan));
         assert_int_equal(mbm_plan_pollDelay(&plan), 0);
@@ -714,7 +696,6 @@ static unsigned updated;
 
 static void update(void *context, mbm_plan *of, uint16_t field)
 {
-    (void)context;
     assert_ptr_equal(of, &plan);
     wire.within = NULL;
     OK(mbm_plan_getStatus(&plan, field, NULL));
@@ -802,7 +783,6 @@ TEST_WITH(update_may_call_every_function, begin, NULL)
 
 static void poll_when_done(void *context, mbm_clientRequest *ended)
 {
-    (void)ended;
     ++*(unsigned *)context;
     OK(mbm_plan_poll(&plan));
     IS(MBM_PENDING, requests[0].status);

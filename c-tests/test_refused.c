@@ -7,9 +7,6 @@
 #include "refused.h"
 #include "test.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 static hooked_port wire;
 static mbm_port port;
 
@@ -33,8 +30,6 @@ static unsigned not_yet;
 static uint16_t later(void *context, const mbm_request *request, uint8_t *response,
                       uint16_t capacity)
 {
-    (void)context;
-    (void)request;
     if (not_yet > 0) {
         not_yet--;
         return MBM_REPLY_PENDING;
@@ -219,21 +214,17 @@ static uint8_t flood;
 
 static uint32_t port_micros(void *context)
 {
-    (void)context;
     return clock_now;
 }
 
 static int16_t port_write(void *context, const uint8_t *bytes, uint16_t length)
 {
-    (void)context;
-    (void)bytes;
     return (int16_t)length;
 }
 
 /* A peer that never stops sending the same byte. */
 static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    (void)context;
     assert_true(++reads < 10000);
     memset(bytes, flood, capacity);
     return (int16_t)capacity;

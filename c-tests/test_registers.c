@@ -3,7 +3,6 @@
 #include "test.h"
 
 #include <math.h>
-#include <string.h>
 
 static const uint8_t orders[] = {MBM_ORDER_ABCD, MBM_ORDER_CDAB, MBM_ORDER_BADC, MBM_ORDER_DCBA};
 

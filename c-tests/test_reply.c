@@ -5,9 +5,6 @@
 #include "memory_port.h"
 #include "test.h"
 
-#include <string.h>
-#include <stdio.h>
-
 enum { UNIT = 7 };
 
 static const uint8_t kinds[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
@@ -572,7 +569,6 @@ static void assert_next(void *context, const mbm_object *object)
 {
     const unsigned index = first + handed++;
 
-    (void)context;
     assert_true(index < OBJECTS);
     assert_int_equal(object->id, index < 3 ? index : 0x80 + index);
     assert_int_equal(object->length, LENGTH);

@@ -4,8 +4,6 @@
 #include "memory_port.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { UNIT = 7, LAST = 127, REPLY = 252, STEP = 500 };
 
 static const uint8_t framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
@@ -35,7 +33,6 @@ static void keep(void *context, const mbm_traceRecord *record)
 {
     const int is_right = record->status == MBM_OK;
 
-    (void)context;
     if (is_right && record->direction == MBM_TRACE_SENT && record->kind == MBM_PACKET_REQUEST)
         records.requests++;
     else if (is_right && record->direction == MBM_TRACE_RECEIVED &&
@@ -47,8 +44,6 @@ static void keep(void *context, const mbm_traceRecord *record)
 
 static uint16_t serve(void *context, const mbm_request *asked, uint8_t *response, uint16_t capacity)
 {
-    (void)context;
-    (void)asked;
     assert_true(answer.count <= capacity);
     memcpy(response, answer.bytes, answer.count);
     answer.calls++;

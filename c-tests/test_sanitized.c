@@ -3,8 +3,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
 

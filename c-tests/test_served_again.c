@@ -2,8 +2,6 @@
  * zeroed before or not, and for another unit. */
 #include "answer.h"
 
-#include <string.h>
-
 enum { FAMILIES = 11 };
 
 /* One record of every family, with the data that it needs. */
@@ -33,15 +31,12 @@ static const mbm_object objects[] = {{(const uint8_t *)"a", 1, 0}};
 static uint16_t echo(void *context, const mbm_request *request, uint8_t *response,
                      uint16_t capacity)
 {
-    (void)context;
-    (void)capacity;
     memcpy(response, request->data, request->length);
     return request->length;
 }
 
 static uint16_t get(void *context, uint16_t address)
 {
-    (void)context;
     return address;
 }
 
@@ -291,9 +286,6 @@ static mbm_diagnostics late;
 static uint16_t give_diagnostics(void *context, const mbm_request *request, uint8_t *response,
                                  uint16_t capacity)
 {
-    (void)request;
-    (void)response;
-    (void)capacity;
     OK(mbm_unit_serveDiagnostics((mbm_unit *)context, &late));
     return 0;
 }

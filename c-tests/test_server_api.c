@@ -3,8 +3,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 static mbm_server server;
 static mbm_unit unit;
 static mbm_registerTable table;
@@ -28,7 +26,6 @@ static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     int16_t count = 0;
 
-    (void)context;
     assert_true(capacity > 0);
     if (wire.lost)
         return -1;
@@ -39,7 +36,6 @@ static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
 
 static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
 {
-    (void)context;
     if (wire.piece && length > wire.piece)
         length = (uint16_t)wire.piece;
     memcpy(wire.sent + wire.length, bytes, length);
@@ -50,7 +46,6 @@ static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
 
 static uint8_t wire_flush(void *context)
 {
-    (void)context;
     if (wire.draining == 0)
         return 1;
     wire.draining--;
@@ -59,7 +54,6 @@ static uint8_t wire_flush(void *context)
 
 static uint32_t wire_micros(void *context)
 {
-    (void)context;
     return wire.now += 100;
 }
 
@@ -277,8 +271,6 @@ static unsigned reads;
 
 static uint16_t count_reads(void *context, uint16_t address)
 {
-    (void)context;
-    (void)address;
     return (uint16_t)++reads;
 }
 

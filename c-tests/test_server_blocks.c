@@ -10,9 +10,6 @@
 #include <modbus/modbus.h>
 #include <poll.h>
 #include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -37,7 +34,6 @@ static int16_t receive(void *context, uint8_t *bytes, uint16_t capacity)
 {
     int16_t count = 0;
 
-    (void)context;
     while (count < (int16_t)capacity && line.taken < line.count && line.at[line.taken] <= line.now)
         bytes[count++] = line.bytes[line.taken++];
     return count;
@@ -45,7 +41,6 @@ static int16_t receive(void *context, uint8_t *bytes, uint16_t capacity)
 
 static int16_t transmit(void *context, const uint8_t *bytes, uint16_t length)
 {
-    (void)context;
     if (length == 8 && bytes[0] == UNIT && bytes[1] == 0x10 && crc16(bytes, 8) == 0)
         line.answers++;
     else
@@ -55,7 +50,6 @@ static int16_t transmit(void *context, const uint8_t *bytes, uint16_t length)
 
 static uint32_t micros(void *context)
 {
-    (void)context;
     return (uint32_t)line.now;
 }
 
@@ -166,7 +160,6 @@ static uint8_t ring_storage[MBM_MAX_FRAME + 1];
 
 static int16_t receive_from_ring(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    (void)context;
     return (int16_t)mbm_ring_read(&line.ring, bytes, capacity);
 }
 

@@ -4,8 +4,6 @@
 #include "test.h"
 #include "watched.h"
 
-#include <string.h>
-
 enum { UNIT = 17 };
 
 static mbm_unit unit;
@@ -19,16 +17,12 @@ static int connection;
 
 static uint16_t get(void *context, uint16_t address)
 {
-    (void)context;
     gets++;
     return (uint16_t)(0x100 + address);
 }
 
 static void set(void *context, uint16_t address, uint16_t value)
 {
-    (void)context;
-    (void)address;
-    (void)value;
     sets++;
 }
 
@@ -208,8 +202,6 @@ static mbm_accessHooks others;
 
 static void remove_hooks(char hook, const mbm_access *access)
 {
-    (void)hook;
-    (void)access;
     OK(mbm_registerTable_setHooks(&table, &others));
     OK(mbm_registerTable_setHooks(&table, NULL));
 }

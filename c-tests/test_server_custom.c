@@ -3,8 +3,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { UNIT = 17, HEAD = 7, FIRST_CODE = 65 };
 
 static struct {
@@ -23,7 +21,6 @@ static uint8_t frame[MBM_MAX_TCP_FRAME];
 
 static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    (void)context;
     size_t count = wire.left < capacity ? wire.left : capacity;
     memcpy(bytes, wire.request + sizeof wire.request - wire.left, count);
     wire.left -= count;
@@ -32,7 +29,6 @@ static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
 
 static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
 {
-    (void)context;
     memcpy(wire.sent + wire.length, bytes, length);
     wire.length += length;
     return (int16_t)length;
@@ -40,7 +36,6 @@ static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
 
 static uint32_t wire_micros(void *context)
 {
-    (void)context;
     return 0;
 }
 
@@ -50,7 +45,6 @@ static const mbm_port port = {.read = wire_read, .write = wire_write, .micros = 
 static uint16_t serve(void *context, const mbm_request *request, uint8_t *response,
                       uint16_t capacity)
 {
-    (void)request;
     assert_true(capacity > 0);
     response[0] = (uint8_t)((const mbm_custom *)context - ours);
     return 1;
@@ -163,7 +157,6 @@ static struct {
 static uint16_t decline(void *context, const mbm_request *request, uint8_t *response,
                         uint16_t capacity)
 {
-    (void)context;
     declining.calls++;
     declining.unit = request->unit;
     declining.function = request->function;

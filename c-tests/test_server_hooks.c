@@ -7,7 +7,6 @@
 #include "watched.h"
 
 #include <errno.h>
-#include <string.h>
 #include <unistd.h>
 
 static served rtu, ascii, tcp;

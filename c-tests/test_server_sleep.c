@@ -15,7 +15,6 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -41,10 +40,6 @@ static uint16_t slow_reply;
 static uint16_t slow(void *context, const mbm_request *request, uint8_t *response,
                      uint16_t capacity)
 {
-    (void)context;
-    (void)request;
-    (void)response;
-    (void)capacity;
     calls++;
     return slow_reply;
 }
@@ -295,7 +290,6 @@ static size_t answer(void)
 
 static uint8_t never_drained(void *context)
 {
-    (void)context;
     return 0;
 }
 

@@ -6,9 +6,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 enum { UNIT = 17, WORDS = 125, MOST = 530, ECHO_CODE = 65 };
 
 typedef uint8_t begin_function(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *,
@@ -44,7 +41,6 @@ static int16_t port_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     unsigned count = line.length - line.next;
 
-    (void)context;
     check_place(bytes, capacity);
     if (count > line.at_once)
         count = line.at_once;
@@ -64,7 +60,6 @@ static int16_t port_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     static uint8_t sink[65536];
 
-    (void)context;
     check_place(bytes, length);
     assert_int_not_equal(length, 0);
     memcpy(sink, bytes, length);
@@ -80,7 +75,6 @@ static int16_t port_write(void *context, const uint8_t *bytes, uint16_t length)
 
 static uint32_t port_micros(void *context)
 {
-    (void)context;
     return line.now;
 }
 
@@ -90,7 +84,6 @@ static uint16_t fill(void *context, const mbm_request *request, uint8_t *respons
 {
     uint8_t sum = 0;
 
-    (void)context;
     for (uint16_t i = 0; i < request->length; i++)
         sum = (uint8_t)(sum + request->data[i]);
     check_place(response, capacity);

@@ -4,8 +4,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { UNIT = 17, CATCH_ALL = 0 };
 
 static mbm_unit unit;
@@ -158,13 +156,11 @@ TEST(only_the_table_with_the_cells_calls_its_hooks)
 
 static uint16_t get(void *context, uint16_t address)
 {
-    (void)context;
     return address;
 }
 
 static uint8_t is_valid(void *context, uint16_t address)
 {
-    (void)context;
     return address >= 300;
 }
 
@@ -206,9 +202,6 @@ TEST(bits_of_several_tables_are_read_and_written)
 static uint16_t answer_custom(void *context, const mbm_request *request, uint8_t *out,
                               uint16_t capacity)
 {
-    (void)context;
-    (void)request;
-    (void)capacity;
     custom_calls++;
     out[0] = 0x5A;
     return custom_result;

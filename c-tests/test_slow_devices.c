@@ -7,10 +7,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 enum {
     UNIT = 17,
     READS = 1000,

@@ -6,8 +6,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <string.h>
-
 static mbm_sniffer sniffer;
 static uint8_t buffer[2 * MBM_MAX_ASCII_FRAME];
 static uint32_t now;
@@ -453,8 +451,6 @@ static unsigned records;
 
 static void hook(void *context, const mbm_traceRecord *record)
 {
-    (void)context;
-    (void)record;
     records++;
 }
 

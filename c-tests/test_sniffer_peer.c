@@ -9,8 +9,6 @@
 #include "test.h"
 
 #include <poll.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
@@ -76,7 +74,6 @@ static void pass_on(int from, int to, uint8_t tap_kind)
 
 static void *forward(void *context)
 {
-    (void)context;
     for (;;) {
         struct pollfd waits[3] = {
             {line.client, POLLIN, 0}, {line.server, POLLIN, 0}, {line.stop[0], POLLIN, 0}};

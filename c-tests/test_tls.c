@@ -4,8 +4,6 @@
 #include "test.h"
 #include "tls_pair.h"
 
-#include <string.h>
-
 enum { FIRST = 100, WORDS = 125 };
 
 static tls_pair pair;
@@ -369,13 +367,11 @@ static uint8_t connect_status;
 
 static void cut(void *context)
 {
-    (void)context;
     pair.to_server.is_cut = pair.to_client.is_cut = 1;
 }
 
 static uint8_t join(void *context)
 {
-    (void)context;
     connects++;
     pair.to_server.is_cut = pair.to_client.is_cut = 0;
     pair.to_server.count = pair.to_client.count = 0;

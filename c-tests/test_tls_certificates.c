@@ -4,9 +4,6 @@
 #include "tls_pair.h"
 
 #include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 static tls_pair pair;
 static mbm_tls_files files;

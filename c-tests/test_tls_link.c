@@ -7,10 +7,7 @@
 #include "test.h"
 #include "tls_pair.h"
 
-#include <stdio.h>
-#include <string.h>
 #include <unistd.h>
-#include <stdlib.h>
 
 enum { PLACES = 4, FIRST = 100 };
 
@@ -265,7 +262,6 @@ static uint32_t accept_one(mbm_loop_entry *entry)
 {
     const int place = mbm_tls_accept(&listener, &identity, tlss, tcps, PLACES);
 
-    (void)entry;
     if (place >= 0) {
         const mbm_port port = mbm_tls_port(&tlss[place]);
 
@@ -453,9 +449,6 @@ static uint16_t authorise(void *context, const mbm_request *asked, uint8_t *resp
 {
     const mbm_tls *connection = (const mbm_tls *)asked->connection;
 
-    (void)context;
-    (void)response;
-    (void)capacity;
     if (may(connection, "Operator") ||
         (may(connection, "Viewer") && asked->function == MBM_FC_READ_HOLDING_REGISTERS))
         return MBM_REPLY_DECLINED;
@@ -465,7 +458,6 @@ static uint16_t authorise(void *context, const mbm_request *asked, uint8_t *resp
 /* Only the operator may write register 103. */
 static uint8_t before_write(void *context, const mbm_access *access)
 {
-    (void)context;
     seen = (const mbm_tls *)access->connection;
     if (access->address + access->quantity > FIRST_WORD + 3 && !may(seen, "Operator"))
         return MBM_ILLEGAL_DATA_ADDRESS;

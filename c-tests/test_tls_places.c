@@ -12,8 +12,6 @@
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <signal.h>
-#include <stdio.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <time.h>
@@ -57,7 +55,6 @@ static size_t hello_bytes;
 
 static int16_t keep_hello(void *context, const uint8_t *bytes, uint16_t length)
 {
-    (void)context;
     assert_true(hello_bytes + length <= sizeof hello);
     memcpy(hello + hello_bytes, bytes, length);
     hello_bytes += length;
@@ -66,15 +63,11 @@ static int16_t keep_hello(void *context, const uint8_t *bytes, uint16_t length)
 
 static int16_t read_none(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    (void)context;
-    (void)bytes;
-    (void)capacity;
     return 0;
 }
 
 static uint32_t no_time(void *context)
 {
-    (void)context;
     return 0;
 }
 

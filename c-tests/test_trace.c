@@ -4,8 +4,6 @@
 #include "hooked_port.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { MOST = 32 };
 
 typedef struct kept {

@@ -3,8 +3,6 @@
 
 #include "mbm.h"
 
-#include <string.h>
-
 typedef struct connection {
     uint8_t request[8];
     uint16_t arrived, sent;
@@ -33,26 +31,22 @@ static int16_t read_wire(void *context, uint8_t *bytes, uint16_t capacity)
 
 static int16_t write_wire(void *context, const uint8_t *bytes, uint16_t length)
 {
-    (void)bytes;
     ((connection *)context)->sent = (uint16_t)(((connection *)context)->sent + length);
     return (int16_t)length;
 }
 
 static uint32_t micros(void *context)
 {
-    (void)context;
     return now += 1000;
 }
 
 static void on_record(void *context, const mbm_traceRecord *record)
 {
-    (void)record;
     assert_null(mbm_trace_port((mbm_trace *)context));
 }
 
 static uint8_t before_read(void *context, const mbm_access *access)
 {
-    (void)context;
     accessed = ((const traced *)access->connection)->wire;
     return 0;
 }

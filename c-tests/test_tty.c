@@ -12,7 +12,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/serial.h>
-#include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
@@ -546,10 +545,6 @@ TEST_WITH(after_a_write_bytes_end_the_wait_again, begin_wait, end_wait)
 static uint16_t pending(void *context, const mbm_request *request, uint8_t *response,
                         uint16_t capacity)
 {
-    (void)context;
-    (void)request;
-    (void)response;
-    (void)capacity;
     return MBM_REPLY_PENDING;
 }
 
@@ -582,10 +577,7 @@ TEST_WITH(a_server_with_a_pending_function_sleeps_between_polls, begin_wait, end
     mbm_tty_close(&tty);
 }
 
-static void ignore_signal(int signal_number)
-{
-    (void)signal_number;
-}
+static void ignore_signal(int signal_number) {}
 
 static volatile int waited;
 

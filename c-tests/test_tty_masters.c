@@ -9,8 +9,6 @@
 #include "test.h"
 
 #include <errno.h>
-#include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 enum { TIMEOUT_MS = 20 };

@@ -8,8 +8,6 @@
 #include <arpa/inet.h>
 #include <errno.h>
 #include <netinet/in.h>
-#include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 enum { UNIT = 17, FIRST = 100, WORDS = 125, PATIENCE = 1000 * PATIENCE_MS, FRAME = 12, REPLY = 11 };

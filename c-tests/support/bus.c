@@ -1,8 +1,6 @@
 #include "bus.h"
 #include "test.h"
 
-#include <string.h>
-
 static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
 {
     bus_tap *tap = (bus_tap *)context;

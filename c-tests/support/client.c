@@ -4,8 +4,6 @@
 #include "test.h"
 
 #include <poll.h>
-#include <stdio.h>
-#include <string.h>
 
 static void begin_tty(asker *a, int fd)
 {

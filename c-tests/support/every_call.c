@@ -38,7 +38,6 @@ void every_line_call_returns(uint8_t status, mbm_line *l)
 
 static uint32_t random_number(void *context)
 {
-    (void)context;
     return 7;
 }
 

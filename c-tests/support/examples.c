@@ -1,8 +1,6 @@
 #include "examples.h"
 #include "test.h"
 
-#include <stdlib.h>
-
 #define REQUEST .kind = MBM_PACKET_REQUEST
 #define RESPONSE .kind = MBM_PACKET_RESPONSE
 

@@ -3,10 +3,7 @@
 #include "crc.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <string.h>
 #include <poll.h>
-#include <stdlib.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -170,7 +167,6 @@ static void reply_after_300_bytes_of_noise(responder *r, const uint8_t *request)
 
 static void only_300_bytes_of_noise(responder *r, const uint8_t *request)
 {
-    (void)request;
     noise_of_300_bytes(r);
 }
 
@@ -234,11 +230,7 @@ static void exception_with_bad_crc(responder *r, const uint8_t *request)
     responder_send(r, frame, length);
 }
 
-static void no_reply(responder *r, const uint8_t *request)
-{
-    (void)r;
-    (void)request;
-}
+static void no_reply(responder *r, const uint8_t *request) {}
 
 /* The device takes so long that the master has given up and sent its next request, which
  * waits meanwhile. The device answers this request first, then the next one. */

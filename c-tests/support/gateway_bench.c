@@ -2,8 +2,6 @@
 #include "crc.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { STEPS = 2000 };
 
 void gateway_bench_open(gateway_bench *b, unsigned connection)

@@ -66,7 +66,6 @@ static void hooked_post(void *context)
 
 static void hooked_idle(void *context, mbm_node *node)
 {
-    (void)node;
     call(context, HOOK_IDLE);
 }
 

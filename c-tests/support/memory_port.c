@@ -2,8 +2,6 @@
 #include "crc.h"
 #include "test.h"
 
-#include <string.h>
-
 static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
 {
     memory_port *m = (memory_port *)context;

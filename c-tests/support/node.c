@@ -2,8 +2,6 @@
 #include "await.h"
 #include "test.h"
 
-#include <string.h>
-
 void node_begin(node *n, int fd, uint8_t slave)
 {
     memset(n, 0, sizeof *n);

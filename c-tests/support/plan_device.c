@@ -1,8 +1,6 @@
 #include "plan_device.h"
 #include "test.h"
 
-#include <string.h>
-
 static void log_update(void *context, mbm_plan *plan, uint16_t field)
 {
     plan_device *d = (plan_device *)context;

@@ -28,7 +28,6 @@ static uint8_t before(void *context, const mbm_access *access)
 {
     const uint8_t *data = access->data;
 
-    (void)context;
     for (unsigned i = 0; i < access->quantity; i++)
         if (access->address + i == SERVED_REFUSED && data[2 * i] == 0xBE && data[2 * i + 1] == 0xEF)
             return MBM_ILLEGAL_DATA_VALUE;
@@ -37,14 +36,12 @@ static uint8_t before(void *context, const mbm_access *access)
 
 static void after(void *context, const mbm_access *access)
 {
-    (void)access;
     ((served *)context)->written++;
 }
 
 static uint16_t echo(void *context, const mbm_request *request, uint8_t *response,
                      uint16_t capacity)
 {
-    (void)context;
     if (request->length == 0)
         return MBM_REPLY_EXCEPTION | MBM_ILLEGAL_DATA_VALUE;
     if (request->length > capacity)
@@ -158,7 +155,6 @@ static uint32_t fd_micros(void *context)
 {
     struct timespec now;
 
-    (void)context;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
 }

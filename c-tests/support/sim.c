@@ -3,9 +3,6 @@
 #include "request.h"
 #include "test.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 static void note(sim *s, char event)
 {
     if (s->order_length > 0 && s->order[s->order_length - 1] == event)

@@ -6,7 +6,6 @@
 #include "must.h"
 
 #include <errno.h>
-#include <stdlib.h>
 
 enum { MOST_TESTS = 100 };
 
@@ -46,7 +45,6 @@ static int teardown(void **state)
 
 static int setup_all(void **state)
 {
-    (void)state;
     if (all_tests.setup)
         all_tests.setup();
     return 0;
@@ -54,7 +52,6 @@ static int setup_all(void **state)
 
 static int teardown_all(void **state)
 {
-    (void)state;
     if (all_tests.teardown)
         all_tests.teardown();
     return 0;

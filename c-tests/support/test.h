@@ -1,5 +1,5 @@
-/* cmocka, with the headers that it needs included first, and tests that add themselves to their
- * program. */
+/* cmocka, with the headers that it needs included first, those of the C library that most tests
+ * use, and tests that add themselves to their program. */
 #ifndef TEST_H
 #define TEST_H
 
@@ -7,6 +7,9 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include <cmocka.h>
 

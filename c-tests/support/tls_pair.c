@@ -3,10 +3,6 @@
 
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 static mbm_tls_files files;
 
 void tls_identify(mbm_tls_identity *identity, const char *name, const char *authority,
@@ -75,14 +71,11 @@ static int16_t write_end(void *context, const uint8_t *bytes, uint16_t length)
 
 static uint32_t micros_end(void *context)
 {
-    (void)context;
     return current->now;
 }
 
 static void idle_end(void *context, struct mbm_node *node)
 {
-    (void)context;
-    (void)node;
     if (current->idle)
         current->idle();
 }

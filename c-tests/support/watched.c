@@ -1,10 +1,6 @@
 #include "watched.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 watched watching;
 
 static void add(const char *text)

@@ -51,7 +51,6 @@ static void die(const char *what, const char *which)
 
 static void keep_quiet(avr_t *avr, const int level, const char *format, va_list arguments)
 {
-    (void)avr;
     if (level == LOG_ERROR)
         vfprintf(stderr, format, arguments);
 }
@@ -94,8 +93,6 @@ static avr_cycle_count_t silent(avr_t *avr, avr_cycle_count_t when, void *parame
     uint8_t frame[FRAME];
     size_t length = w->length;
 
-    (void)avr;
-    (void)when;
     memcpy(frame, w->frame, length);
     w->length = 0;
     w->frames++;
@@ -125,7 +122,6 @@ static avr_cycle_count_t next_byte(avr_t *avr, avr_cycle_count_t when, void *par
 {
     wire *w = parameter;
 
-    (void)when;
     /* In the simulator the UART has received the byte one byte time after this call. */
     avr_raise_irq(w->end->in, w->queue[w->tail % QUEUE]);
     w->tail++;
@@ -138,7 +134,6 @@ static void received(struct avr_irq_t *irq, uint32_t value, void *parameter)
 {
     wire *w = parameter;
 
-    (void)irq;
     if (!value)
         return;
     w->received = w->on->avr->cycle;
@@ -151,7 +146,6 @@ static void byte_out(struct avr_irq_t *irq, uint32_t value, void *parameter)
     uint64_t now = w->on->avr->cycle, next = w->last_started + 10 * w->bit;
     int follows = w->length > 0 && now - next < 5 * w->bit;
 
-    (void)irq;
     byte_started(w, (uint8_t)value, now);
     /* The simulator's UART sends byte after byte without a pause. But it reports a byte when the
      * board's interrupt writes it, which another interrupt may delay. */
@@ -214,7 +208,6 @@ static avr_cycle_count_t sample(avr_t *avr, avr_cycle_count_t when, void *parame
     wire *w = parameter;
     end *e = w->end;
 
-    (void)avr;
     if (e->bit_in < 8) {
         e->shift_in = (uint16_t)(e->shift_in >> 1 | (e->level ? 0x80 : 0));
         e->bit_in++;
@@ -234,7 +227,6 @@ static void level_out(struct avr_irq_t *irq, uint32_t value, void *parameter)
     end *e = w->end;
     avr_t *avr = w->on->avr;
 
-    (void)irq;
     e->level = value & 1;
     if (e->listening || e->level)
         return;
@@ -305,7 +297,6 @@ static void pin_out(struct avr_irq_t *irq, uint32_t value, void *parameter)
 {
     watch *w = parameter;
 
-    (void)irq;
     w->changed(w->context, value & 1, w->on->avr->cycle);
 }
 

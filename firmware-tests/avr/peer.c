@@ -62,6 +62,5 @@ void peer_right(wire *w, const uint8_t *frame, size_t length)
 {
     uint8_t reply[FRAME];
 
-    (void)length;
     wire_play(w, MS, reply, peer_right_reply(reply, frame));
 }

@@ -15,7 +15,6 @@ void measure_rhythm(void *context, int level, uint64_t cycle)
 {
     pin_rhythm *r = context;
 
-    (void)level;
     if (r->switches++ && cycle - r->last > r->longest)
         r->longest = cycle - r->last;
     r->last = cycle;

@@ -7,8 +7,6 @@
 #include "peer.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { UNIT = 17, SLAVE = 1 };
 
 static const kind bare = {"avrxmega3", "atmega1284p", '0', {'B', 5}, {'D', 2}, {'D', 4}};

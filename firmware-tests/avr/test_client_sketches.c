@@ -5,10 +5,6 @@
 #include "sketch.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 /* Two meters on one wire. A meter that is not `there` sends no reply. */
 typedef struct meters {
     server all[2];

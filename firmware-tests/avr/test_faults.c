@@ -6,10 +6,6 @@
 
 #include "mbm.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 enum { UNIT = 1, READS = 5, REGISTERS = 10 };
 
 typedef struct fault {
@@ -120,11 +116,7 @@ static void one_byte_lost(wire *w, const uint8_t *request)
     wire_play(w, MS, reply, length - 1);
 }
 
-static void no_reply(wire *w, const uint8_t *request)
-{
-    (void)w;
-    (void)request;
-}
+static void no_reply(wire *w, const uint8_t *request) {}
 
 static void exception(wire *w, const uint8_t *request, uint8_t code, uint8_t damage)
 {

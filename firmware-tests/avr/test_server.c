@@ -6,10 +6,6 @@
 #include "mbm.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 static const kind *const kinds[] = {&uno, &relaxed, &mega, &relaxed_mega};
 
 /* t3.5 at 19200 baud in cycles, and a tick of the core's clock, by which a response may be

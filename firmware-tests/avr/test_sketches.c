@@ -5,10 +5,6 @@
 #include "sketch.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 /* --- the examples, each on both boards */
 
 static void first_read(const kind *k)

@@ -215,7 +215,6 @@ static void answer_at_length(wire *w, const uint8_t *frame, size_t length)
     waiting *o = w->context;
     uint8_t reply[FRAME];
 
-    (void)length;
     o->due = (unsigned)peer_right_reply(reply, frame);
     o->received = w->bytes_received = 0;
     wire_play(w, MS, reply, o->due);
@@ -229,7 +228,6 @@ static void looks(void *context, int level, uint64_t cycle)
     waiting *o = context;
     unsigned received = o->bus->bytes_received;
 
-    (void)level;
     if (o->due && received == 0) {
         if (o->before)
             note(&o->empty, cycle - o->before);

@@ -38,7 +38,6 @@ static void poll_takes_bytes(void *context, int level, uint64_t cycle)
 {
     flood *f = context;
 
-    (void)cycle;
     if (level)
         f->takes = 1;
 }
@@ -199,7 +198,6 @@ static uint8_t random_byte(unsigned i)
 
 static uint8_t zero(unsigned i)
 {
-    (void)i;
     return 0;
 }
 

@@ -5,8 +5,6 @@
 #include "test.h"
 #include "upstream_device.h"
 
-#include <string.h>
-
 static const kind *const boards[] = {&uno, &mega, &atmega1284p};
 enum { BOARDS = COUNT(boards) };
 
@@ -61,7 +59,6 @@ static void driver_switched(void *context, int level, uint64_t cycle)
 {
     upstream_device *d = context;
 
-    (void)cycle;
     d->driver = level;
 }
 

@@ -5,8 +5,6 @@
 #include "peer.h"
 #include "test.h"
 
-#include <string.h>
-
 enum { EVERYTHING = 30000 };
 
 void upstream_device_start(upstream_device *d, int unit)

@@ -7,10 +7,6 @@
 #include "test.h"
 #include "upstream_device.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 /* The program compares 26 frames, or those that the board sends in three seconds. What a sketch
  * prints is a frame too. */
 enum { MOST = 26, SECONDS = 3 };

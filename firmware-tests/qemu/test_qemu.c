@@ -11,8 +11,6 @@
 #include "server.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 static const machine *board;
@@ -86,7 +84,6 @@ static int run_with_libmodbus(void **state)
 {
     unsigned runs = 1;
 
-    (void)state;
     for (;; runs++) {
         server_start(&peer, UNIT);
         done = machine_run(board, peer.line.ours);
@@ -99,7 +96,6 @@ static int run_with_libmodbus(void **state)
 
 static int stop(void **state)
 {
-    (void)state;
     server_stop(&peer);
     return 0;
 }
@@ -107,7 +103,6 @@ static int stop(void **state)
 /* Every step ended as the firmware expects, and the console shows it. */
 static void ends_with_every_request_as_expected(void **state)
 {
-    (void)state;
     ended_with(0);
     assert_int_equal(report_word(held(), REPORT_STEPS), STEPS);
     assert_int_equal(report_word(held(), REPORT_UNEXPECTED), 0);
@@ -116,7 +111,6 @@ static void ends_with_every_request_as_expected(void **state)
 
 static void writes_a_register(void **state)
 {
-    (void)state;
     assert_int_equal(step_word(held(), WRITE_REGISTER, STEP_STATUS), MBM_OK);
     assert_int_equal(held()[100], 0xBEEF);
     assert_int_equal(held()[99], server_pattern(99));
@@ -124,7 +118,6 @@ static void writes_a_register(void **state)
 
 static void writes_queued_registers(void **state)
 {
-    (void)state;
     assert_int_equal(step_word(held(), WRITE_REGISTERS, STEP_STATUS), MBM_OK);
     assert_int_equal(held()[101], 0x1122);
     assert_int_equal(held()[103], 0x3344);
@@ -133,7 +126,6 @@ static void writes_queued_registers(void **state)
 
 static void writes_a_coil(void **state)
 {
-    (void)state;
     assert_int_equal(step_word(held(), WRITE_COIL, STEP_STATUS), MBM_OK);
     assert_int_equal(peer.mapping->tab_bits[40], 1);
 }
@@ -142,7 +134,6 @@ static void writes_coils(void **state)
 {
     unsigned i;
 
-    (void)state;
     assert_int_equal(step_word(held(), WRITE_COILS, STEP_STATUS), MBM_OK);
     assert_int_equal(peer.mapping->tab_bits[49], server_bit_pattern(49));
     for (i = 0; i < 19; i++)
@@ -152,39 +143,33 @@ static void writes_coils(void **state)
 
 static void reads_holding_registers(void **state)
 {
-    (void)state;
     assert_read(held(), READ_HOLDING, 10, sum_of(held() + 20, 10));
 }
 
 static void reads_input_registers(void **state)
 {
-    (void)state;
     assert_read(held(), READ_INPUT_REGISTERS, 10,
                 sum_of(peer.mapping->tab_input_registers + 30, 10));
 }
 
 static void reads_coils(void **state)
 {
-    (void)state;
     assert_read(held(), READ_COILS, 3, sum_of_bits(peer.mapping->tab_bits + 45, 37));
 }
 
 static void reads_discrete_inputs(void **state)
 {
-    (void)state;
     assert_read(held(), READ_INPUTS, 2, sum_of_bits(peer.mapping->tab_input_bits + 70, 21));
 }
 
 static void mask_writes_a_register(void **state)
 {
-    (void)state;
     assert_int_equal(step_word(held(), MASK_WRITE, STEP_STATUS), MBM_OK);
     assert_int_equal(held()[102], (0x5566 & 0x00FF) | 0x3400);
 }
 
 static void writes_and_reads_in_one_request(void **state)
 {
-    (void)state;
     assert_int_equal(held()[104], 0xCAFE);
     assert_int_equal(held()[105], 0xF00D);
     assert_read(held(), READ_WRITE, 6, sum_of(held() + 100, 6));
@@ -192,13 +177,11 @@ static void writes_and_reads_in_one_request(void **state)
 
 static void reads_125_registers(void **state)
 {
-    (void)state;
     assert_read(held(), READ_LONGEST, 125, sum_of(held(), 125));
 }
 
 static void returns_an_exception(void **state)
 {
-    (void)state;
     assert_int_equal(step_word(held(), READ_ABSENT_REGISTER, STEP_STATUS),
                      MBM_ILLEGAL_DATA_ADDRESS);
     assert_int_equal(report_word(held(), REPORT_EXCEPTIONS), 1);
@@ -206,7 +189,6 @@ static void returns_an_exception(void **state)
 
 static void a_broadcast_arrives_and_gets_no_response(void **state)
 {
-    (void)state;
     assert_int_equal(step_word(held(), BROADCAST, STEP_STATUS), MBM_OK);
     assert_int_equal(held()[130], 0x5A5A);
     assert_read(held(), READ_WHAT_WAS_BROADCAST, 1, 0x5A5A);
@@ -216,7 +198,6 @@ static void an_absent_unit_times_out_when_it_should(void **state)
 {
     uint16_t millis = of_absent(held());
 
-    (void)state;
     assert_int_equal(step_word(held(), ASK_ABSENT_UNIT, STEP_STATUS), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(report_word(held(), REPORT_TIMEOUTS), 1);
     /* The gap before the request counts too, and so does other work of this computer. */
@@ -226,7 +207,6 @@ static void an_absent_unit_times_out_when_it_should(void **state)
 
 static void counts_what_happened(void **state)
 {
-    (void)state;
     assert_int_equal(report_word(held(), REPORT_REQUESTS), STEPS);
     /* Neither the broadcast nor the request to the absent unit is answered. */
     assert_int_equal(report_word(held(), REPORT_REPLIES), STEPS - 2);
@@ -241,7 +221,6 @@ static void sleeps_instead_of_polling(void **state)
 {
     unsigned polls = report_word(held(), REPORT_POLLS), sleeps = report_word(held(), REPORT_SLEEPS);
 
-    (void)state;
     assert_int_equal(report_word(held(), REPORT_LOST_BYTES), 0);
     if (!strstr(board->name, "-client")) {
         assert_int_equal(polls + sleeps, 0);
@@ -299,7 +278,6 @@ static void the_clock_keeps_time(void **state)
     uint32_t waited = UINT32_MAX;
     unsigned runs;
 
-    (void)state;
     /* From the request to the absent unit to the next request: its timeout and the quiet
      * time of 100 ms. */
     for (runs = 0; runs < RUNS && waited > right / 10 * 19; runs++) {

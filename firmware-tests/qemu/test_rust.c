@@ -4,8 +4,6 @@
 #include "server.h"
 #include "test.h"
 
-#include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 enum { UNIT = 17 };
@@ -18,7 +16,6 @@ static int run_with_libmodbus(void **state)
     const machine *m = machines;
     running firmware;
 
-    (void)state;
     while (strcmp(m->name, "mps2-an500") != 0)
         m++;
     server_start(&peer, UNIT);
@@ -29,7 +26,6 @@ static int run_with_libmodbus(void **state)
 
 static int stop(void **state)
 {
-    (void)state;
     server_stop(&peer);
     return 0;
 }
@@ -47,7 +43,6 @@ static void printed(const char *name, unsigned first, unsigned second)
 
 static void the_firmware_ends_without_an_error(void **state)
 {
-    (void)state;
     if (!done.ended || done.code != 0)
         print_error("%s", done.console);
     assert_true(done.ended);
@@ -56,13 +51,11 @@ static void the_firmware_ends_without_an_error(void **state)
 
 static void a_polled_master_reads_two_registers(void **state)
 {
-    (void)state;
     printed("polled", server_pattern(20), server_pattern(21));
 }
 
 static void an_awaited_master_writes_a_register_and_reads_two(void **state)
 {
-    (void)state;
     assert_int_equal(peer.mapping->tab_registers[22], 888);
     printed("awaited", 888, server_pattern(23));
 }

@@ -13,8 +13,6 @@
 #include "test.h"
 
 #include <modbus.h>
-#include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 /* Longer than the silence that ends a frame. */
@@ -37,7 +35,6 @@ static uint8_t bit(unsigned i)
 
 static int start(void **state)
 {
-    (void)state;
     pty_open(&line);
     firmware = machine_start(board, "serve", line.ours);
     if (!machine_says(&firmware, "serving"))
@@ -51,7 +48,6 @@ static int start(void **state)
 
 static int stop(void **state)
 {
-    (void)state;
     modbus_close(client);
     modbus_free(client);
     machine_finish(&firmware, 0);
@@ -72,7 +68,6 @@ static void registers_are_written_and_read(void **state)
     uint16_t words[SERVE_CELLS], back[SERVE_CELLS];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < SERVE_CELLS; i++)
         words[i] = value(i);
     assert_int_equal(modbus_write_registers(client_after_pause(), SERVE_BASE, 123, words), 123);
@@ -98,7 +93,6 @@ static void coils_are_written_and_read(void **state)
     uint8_t bits[SERVE_CELLS], back[SERVE_CELLS];
     unsigned i;
 
-    (void)state;
     for (i = 0; i < SERVE_CELLS; i++)
         bits[i] = bit(i);
     assert_int_equal(modbus_write_bits(client_after_pause(), SERVE_BASE, 129, bits), 129);
@@ -132,7 +126,6 @@ static void refusals_are_exceptions(void **state)
     uint16_t words[2] = {1, SERVE_MOST + 1};
     uint8_t bits[2];
 
-    (void)state;
     assert_int_equal(modbus_write_register(client_after_pause(), SERVE_BASE, 9), 1);
     EXCEPTION(2, modbus_read_registers(client_after_pause(), SERVE_BASE - 1, 2, words));
     EXCEPTION(2, modbus_read_input_registers(client_after_pause(), SERVE_BASE + 129, 2, words));
@@ -184,7 +177,6 @@ static void damaged_frames_and_other_units_get_no_response(void **state)
     size_t length = seal(frame, 6);
     uint16_t word;
 
-    (void)state;
     assert_int_equal(modbus_write_register(client_after_pause(), 102, 5), 1);
     frame[5] ^= 0x10;
     is_ignored(frame, length);
@@ -201,7 +193,6 @@ static void a_broadcast_is_carried_out_without_a_response(void **state)
     uint8_t frame[16] = {0, 6, 0, 103, 0x12, 0x34};
     uint16_t word;
 
-    (void)state;
     is_ignored(frame, seal(frame, 6));
     assert_int_equal(modbus_read_registers(client_after_pause(), 103, 1, &word), 1);
     assert_int_equal(word, 0x1234);
@@ -211,7 +202,6 @@ static void the_firmware_ends_when_its_coil_is_set(void **state)
 {
     run done;
 
-    (void)state;
     assert_int_equal(modbus_write_bit(client_after_pause(), SERVE_END, 1), 1);
     done = machine_finish(&firmware, 1);
     if (done.code != 0)
