@@ -305,7 +305,7 @@ static void a_fault_ends_as_expected(void **state)
     assert_int_equal(report_word(registers, REPORT_FOREIGN_FRAMES), f->foreign);
 }
 
-#define TEST(test)                                                                                 \
+#define BEHAVIOUR(test)                                                                            \
     {                                                                                              \
 #test, test                                                                                \
     }
@@ -314,24 +314,24 @@ static const struct {
     const char *name;
     CMUnitTestFunction function;
 } behaviours[] = {
-    TEST(ends_with_every_request_as_expected),
-    TEST(writes_a_register),
-    TEST(writes_queued_registers),
-    TEST(writes_a_coil),
-    TEST(writes_coils),
-    TEST(reads_holding_registers),
-    TEST(reads_input_registers),
-    TEST(reads_coils),
-    TEST(reads_discrete_inputs),
-    TEST(mask_writes_a_register),
-    TEST(writes_and_reads_in_one_request),
-    TEST(reads_125_registers),
-    TEST(returns_an_exception),
-    TEST(a_broadcast_arrives_and_gets_no_response),
-    TEST(an_absent_unit_times_out_when_it_should),
-    TEST(counts_what_happened),
-    TEST(sleeps_instead_of_polling),
-    TEST(the_clock_keeps_time),
+    BEHAVIOUR(ends_with_every_request_as_expected),
+    BEHAVIOUR(writes_a_register),
+    BEHAVIOUR(writes_queued_registers),
+    BEHAVIOUR(writes_a_coil),
+    BEHAVIOUR(writes_coils),
+    BEHAVIOUR(reads_holding_registers),
+    BEHAVIOUR(reads_input_registers),
+    BEHAVIOUR(reads_coils),
+    BEHAVIOUR(reads_discrete_inputs),
+    BEHAVIOUR(mask_writes_a_register),
+    BEHAVIOUR(writes_and_reads_in_one_request),
+    BEHAVIOUR(reads_125_registers),
+    BEHAVIOUR(returns_an_exception),
+    BEHAVIOUR(a_broadcast_arrives_and_gets_no_response),
+    BEHAVIOUR(an_absent_unit_times_out_when_it_should),
+    BEHAVIOUR(counts_what_happened),
+    BEHAVIOUR(sleeps_instead_of_polling),
+    BEHAVIOUR(the_clock_keeps_time),
 };
 
 enum { MOST_TESTS = 40, MOST_NAME = 100 };
