@@ -168,13 +168,25 @@ static int overlap(const char *one, const char *other)
     return strncmp(one, other, length) == 0 && (longer[length] == '\0' || longer[length] == '/');
 }
 
+/* Whether it is a topic by the rule of names. */
+static int is_topic(const char *text)
+{
+    char *topic = names_topic(text);
+    const int is_same = topic && strcmp(topic, text) == 0;
+
+    free(topic);
+    return is_same && names_levels(text) <= NAMES_LEVELS;
+}
+
 static const char *check_line_topic(const bridge_setup *of, const char *topic)
 {
-    const char *wrong = broker_check_name(topic);
     uint8_t i;
 
-    if (wrong)
-        return say("the topic \"%s\" of the line: %s", topic, wrong);
+    if (!is_topic(topic))
+        return say("the topic \"%s\" of the line has a space, + or #, begins with /, has more than "
+                   "%d levels, or is one of the bridge's own: NAME/set, NAME/result, status, "
+                   "unit/N/status",
+                   topic, NAMES_LEVELS);
     if (strlen(topic) > BRIDGE_TOPIC_BYTES)
         return say("the topic of the line has more than %d bytes", BRIDGE_TOPIC_BYTES);
     for (i = 0; i < of->line_count; i++)
@@ -186,20 +198,11 @@ static const char *check_line_topic(const bridge_setup *of, const char *topic)
     return NULL;
 }
 
-const char *bridge_setup_line(bridge_setup *to, const char *name, const char *path,
-                              const char *topic)
+static const char *add_line(bridge_setup *to, const char *name, const char *path, const char *topic)
 {
     const uint8_t at = to->line_count;
-    const char *wrong;
-    char stem[LONGEST_VALUE];
+    const char *wrong = *topic ? check_line_topic(to, topic) : NULL;
 
-    if (at == BRIDGE_LINES)
-        return say("\"%s\" is one line too many: %d are allowed", name, BRIDGE_LINES);
-    if (!topic) {
-        stem_of(path, stem);
-        topic = stem;
-    }
-    wrong = *topic ? check_line_topic(to, topic) : NULL;
     if (wrong)
         return wrong;
     to->lines[at].text = strdup(name);
@@ -209,6 +212,23 @@ const char *bridge_setup_line(bridge_setup *to, const char *name, const char *pa
     if (!to->lines[at].text || !to->lines[at].path || !to->lines[at].topic)
         return REPORT_NO_MEMORY;
     return place_read(&to->lines[at].place, to->lines[at].text, 0);
+}
+
+const char *bridge_setup_line(bridge_setup *to, const char *name, const char *path,
+                              const char *topic)
+{
+    char stem[LONGEST_VALUE], *made;
+    const char *wrong;
+
+    if (to->line_count == BRIDGE_LINES)
+        return say("\"%s\" is one line too many: %d are allowed", name, BRIDGE_LINES);
+    if (topic)
+        return add_line(to, name, path, topic);
+    stem_of(path, stem);
+    made = names_topic(stem);
+    wrong = made ? add_line(to, name, path, made) : REPORT_NO_MEMORY;
+    free(made);
+    return wrong;
 }
 
 /* --- the file --- */

@@ -33,11 +33,10 @@ static uint64_t digest_of(const char *path)
 /* Returns NULL, or why the bridge cannot publish or write a field. */
 static const char *check_field(const device_field *field, const mbm_planField *planned)
 {
-    const char *wrong = broker_check_name(field->name);
     const uint32_t size = device_size(planned);
 
-    if (wrong || !(field->access & DEVICE_WRITE))
-        return wrong;
+    if (!(field->access & DEVICE_WRITE))
+        return NULL;
     if (planned->table == MBM_TABLE_COILS && size > MBM_MAX_WRITE_BITS)
         return "one request writes at most 1968 coils";
     if (planned->table != MBM_TABLE_COILS && size > MBM_MAX_WRITE_REGISTERS)
@@ -199,7 +198,7 @@ static void publish_value(bridge_line *l, uint16_t field)
     static char json[DEVICE_TEXT_LONGEST + 128];
     const published *what = &l->table->last[field];
     const char *value = what->value ? what->value : "null";
-    const char *name = l->table->fields.fields[field].name;
+    const char *name = l->table->fields.fields[field].topic;
     uint32_t age = 0;
     char when[CLOCK_TEXT_BYTES];
 
@@ -306,7 +305,7 @@ static void remove_retained(bridge_line *l, const bridge_table *next)
     uint16_t field;
 
     for (field = 0; field < fields->count; field++) {
-        const char *name = fields->fields[field].name;
+        const char *name = fields->fields[field].topic;
         const int other = others ? device_find(others, name) : -1;
 
         if (field < fields->readable && (other < 0 || other >= others->readable))

@@ -58,7 +58,7 @@ typedef struct bridge_settings {
 typedef struct bridge_write {
     mbm_clientRequest request;
     uint16_t words[MBM_MAX_WRITE_REGISTERS];
-    char name[DEVICE_NAME_BYTES + 1]; /* of the field, since a reload may move it */
+    char name[DEVICE_NAME_BYTES + 2]; /* the topic of the field, since a reload may move it */
     struct bridge_line *line;
     uint8_t is_used;
 } bridge_write;

@@ -41,11 +41,11 @@ static int send_event(broker *of, const broker_event *event)
 /* Calls a function with each of the topics of writes below a name. */
 static void for_levels(broker *of, const char *below, void (*each)(broker *of, const char *topic))
 {
-    char topic[LONGEST_TOPIC], levels[BROKER_TOPIC_BYTES + 2 * BROKER_LEVELS + 1];
+    char topic[LONGEST_TOPIC], levels[BROKER_TOPIC_BYTES + 2 * NAMES_LEVELS + 1];
     int count;
 
     snprintf(levels, sizeof levels, "%s", below);
-    for (count = 0; count < BROKER_LEVELS; count++) {
+    for (count = 0; count < NAMES_LEVELS; count++) {
         strcat(levels, count > 0 ? "/+" : "+");
         join(topic, of->topic, levels, SET + 1);
         each(of, topic);
@@ -143,25 +143,6 @@ static void on_message(struct mosquitto *mosquitto, void *context,
         return;
     atomic_fetch_add(&of->lost, 1);
     broker_publish(of, event.bytes, RESULT + 1, "too many writes wait", 0);
-}
-
-const char *broker_check_name(const char *name)
-{
-    const char *last = strrchr(name, '/'), *at = name;
-    int levels = 1;
-
-    last = last ? last + 1 : name;
-    if (strpbrk(name, "+# ") || name[0] == '/')
-        return "a name in topics has no +, # or space, and does not begin with /";
-    for (; *at; at++)
-        levels += *at == '/';
-    if (levels > BROKER_LEVELS)
-        return "a name in topics has at most 8 levels";
-    if (strcmp(last, "set") == 0 || strcmp(last, "result") == 0 || strcmp(name, "status") == 0 ||
-        (levels == 3 && strncmp(name, "unit/", 5) == 0 && strcmp(last, "status") == 0))
-        return "the name is that of a topic of the bridge: NAME/set, NAME/result, status or "
-               "unit/N/status";
-    return NULL;
 }
 
 /* Applies the options. Returns MOSQ_ERR_SUCCESS or the error of libmosquitto. */

@@ -7,15 +7,15 @@
 #define BROKER_H
 
 #include "device.h"
+#include "names.h"
 #include "payload.h"
 
 #include <stdatomic.h>
 
 struct mosquitto;
 
-/* The most levels of a field's name (a/b/c has three), and the most bytes of the topic of a bridge.
- */
-enum { BROKER_LEVELS = 8, BROKER_TOPIC_BYTES = 200 };
+/* The most bytes of the topic of a bridge. */
+enum { BROKER_TOPIC_BYTES = 200 };
 
 typedef struct broker_options {
     const char *host;
@@ -48,15 +48,12 @@ typedef struct broker {
     atomic_ulong lost; /* writes that the pipe did not take */
 } broker;
 
-/* Returns NULL, or what is wrong with the name of a field: it is the middle of topics. */
-const char *broker_check_name(const char *name);
-
 /* Begins to connect, and does not wait for it. Returns an exit code, after reporting the reason if
  * it is not CODE_DONE. */
 int broker_begin(broker *of, const broker_options *options);
 
 /* Subscribe to the writes of all names below a name that ends with /, or of all names if it is
- * empty; and end that. Names have up to BROKER_LEVELS levels, so that writes to unknown fields are
+ * empty; and end that. Topics have up to NAMES_LEVELS levels, so that writes to unknown fields are
  * answered. Call them after BROKER_CONNECTED. */
 void broker_subscribe(broker *of, const char *below);
 void broker_unsubscribe(broker *of, const char *below);

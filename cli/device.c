@@ -58,6 +58,8 @@ void device_free(device *into)
         }
         free(field->labels);
         free(field->name);
+        free(field->topic);
+        free(field->identifier);
         free(field->unit_of_measurement);
         free(field->description);
         free(field->words);
@@ -71,12 +73,12 @@ void device_free(device *into)
     into->readable = 0;
 }
 
-int device_find(const device *from, const char *name)
+int device_find(const device *from, const char *topic)
 {
     int at;
 
     for (at = 0; at < from->count; at++)
-        if (strcmp(from->fields[at].name, name) == 0)
+        if (strcmp(from->fields[at].topic, topic) == 0)
             return at;
     return -1;
 }

@@ -22,6 +22,7 @@ typedef struct device_label {
 
 typedef struct device_field {
     char *name;
+    char *topic, *identifier;  /* what the name becomes elsewhere: see names.h */
     char *unit_of_measurement; /* NULL if the file gives none */
     char *description;         /* NULL if the file gives none */
     value_form form;
@@ -44,8 +45,8 @@ typedef struct device {
 /* Frees all that a device has. */
 void device_free(device *into);
 
-/* Returns the index of the field with this name, or -1. */
-int device_find(const device *from, const char *name);
+/* Returns the index of the field with this topic, or -1. */
+int device_find(const device *from, const char *topic);
 
 /* Returns the name that an enumeration has for a value of a field, or NULL. `words` are those of
  * the registers; the value of bits is their number. */

@@ -4,6 +4,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "device_file.h"
 
+#include "device_names.h"
 #include "report.h"
 
 #include <errno.h>
@@ -505,7 +506,8 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *from)
         !yaml_file_word(file, "mask_write", values[MASK_WRITE], ANSWERS, &writes_masks))
         return 0;
     into->writes_masks = (uint8_t)writes_masks;
-    return read_fields(file, values[FIELDS], &shared, into) && sort_fields(file, into);
+    return read_fields(file, values[FIELDS], &shared, into) && device_names_make(file, into) &&
+           sort_fields(file, into);
 }
 
 int device_file_read(device *into, const char *path, char wrong[YAML_FILE_WRONG_BYTES])

@@ -94,12 +94,11 @@ static const char *component_of(const device *of, uint16_t field)
 void discovery_topic(const discovery_line *line, const device *of, uint16_t field,
                      char topic[DISCOVERY_TOPIC_BYTES])
 {
-    char node[ID_BYTES], object[ID_BYTES];
+    char node[ID_BYTES];
 
     line_id(line, node);
-    write_id(of->fields[field].name, object);
     snprintf(topic, DISCOVERY_TOPIC_BYTES, "%s/%s/%s/%s/config", line->prefix,
-             component_of(of, field), node, object);
+             component_of(of, field), node, of->fields[field].identifier);
 }
 
 /* --- its message --- */
@@ -284,7 +283,7 @@ static void add_state(cJSON *to, const discovery_line *line, const device *of, u
 
     if (field >= of->readable)
         return;
-    add_topic(to, "state_topic", line, of->fields[field].name, "");
+    add_topic(to, "state_topic", line, of->fields[field].topic, "");
     if (has_names(of, field))
         /* Home Assistant shows a number without a name as unknown. */
         add_names(to, "value_template", &of->fields[field], line->is_plain ? BY_TEXT : BY_NUMBER,
@@ -308,7 +307,7 @@ static void add_command(cJSON *to, const discovery_line *line, const device *of,
 
     if (!(one->access & DEVICE_WRITE))
         return;
-    add_topic(to, "command_topic", line, one->name, "/set");
+    add_topic(to, "command_topic", line, one->topic, "/set");
     if (strcmp(component, "number") == 0)
         add_range(to, one, planned);
     else if (strcmp(component, "select") == 0)
@@ -329,13 +328,12 @@ char *discovery_config(const discovery_line *line, const device *of, uint16_t fi
     const device_field *one = &of->fields[field];
     const char *component = component_of(of, field);
     cJSON *root = cJSON_CreateObject(), *origin;
-    char node[ID_BYTES], object[ID_BYTES], id[2 * ID_BYTES + 8];
+    char node[ID_BYTES], id[DISCOVERY_TOPIC_BYTES];
     char *text;
 
     discovery_topic(line, of, field, topic);
     line_id(line, node);
-    write_id(one->name, object);
-    snprintf(id, sizeof id, "mbm_%s_%s", node, object);
+    snprintf(id, sizeof id, "mbm_%s_%s", node, one->identifier);
     cJSON_AddStringToObject(root, "name", one->name);
     cJSON_AddStringToObject(root, "unique_id", id);
     add_state(root, line, of, field, component);

@@ -8,7 +8,7 @@
 
 #include "device.h"
 
-enum { DISCOVERY_TOPIC_BYTES = 700 };
+enum { DISCOVERY_TOPIC_BYTES = 1000 };
 
 /* Where the fields are published: at TOPIC/BELOWNAME. The topics of discovery begin with `prefix`.
  */

@@ -5,6 +5,7 @@
 
 #include "device_file.h"
 #include "device_plan.h"
+#include "names.h"
 #include "options.h"
 #include "report.h"
 
@@ -69,27 +70,12 @@ static const struct argp arguments = {
 
 /* --- names in C --- */
 
-static int is_plain(char one)
-{
-    return (unsigned char)one < 0x80 && isalnum((unsigned char)one);
-}
-
 char *header_upper(const char *text)
 {
-    char *upper = (char *)malloc(strlen(text) + 1);
-    size_t length = 0;
+    char *upper = names_identifier(text), *at;
 
-    if (!upper)
-        return NULL;
-    for (; *text; text++) {
-        if (is_plain(*text))
-            upper[length++] = (char)toupper((unsigned char)*text);
-        else if (length > 0 && upper[length - 1] != '_')
-            upper[length++] = '_';
-    }
-    if (length > 0 && upper[length - 1] == '_')
-        length--;
-    upper[length] = '\0';
+    for (at = upper; at && *at; at++)
+        *at = (char)toupper((unsigned char)*at);
     return upper;
 }
 
@@ -240,13 +226,6 @@ static int choose_names(header *h, const char *name)
         h->fields[i] = header_upper(field->name);
         if (!h->fields[i])
             return fail();
-        if (h->fields[i][0] == '\0') {
-            (void)report(CODE_WRONG,
-                         "%s:%d: the name \"%s\" has none of the letters A to Z and digits, of "
-                         "which names in C are made",
-                         h->path, field->line, field->name);
-            return 0;
-        }
         if (!header_define(h, i, "", field->line))
             return 0;
     }

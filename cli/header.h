@@ -38,8 +38,8 @@ typedef struct header {
  * Returns 0 after reporting that there is the same name already. */
 int header_define(header *h, uint16_t field, const char *suffix, int line);
 
-/* Turns a text into a part of a C name: letters in upper case, digits, and _ for each run of other
- * characters. NULL without memory; empty if no character is left. */
+/* Turns a text into a part of a C name: its identifier in upper case. NULL without memory; empty if
+ * it has no letter and no digit. */
 char *header_upper(const char *text);
 
 /* The same name in lower case, to be freed. NULL without memory. */

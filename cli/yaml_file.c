@@ -45,21 +45,21 @@ int yaml_file_refuse(yaml_file *file, const yaml_node_t *node, const char *forma
     return 0;
 }
 
-__attribute__((format(printf, 3, 4))) static void refuse_line(yaml_file *file, size_t line,
-                                                              const char *format, ...)
+int yaml_file_refuse_line(yaml_file *file, int line, const char *format, ...)
 {
     va_list values;
 
     va_start(values, format);
-    (void)refuse_at(file, line, format, values);
+    (void)refuse_at(file, (size_t)line, format, values);
     va_end(values);
+    return 0;
 }
 
 int yaml_file_fail(yaml_file *file, int error)
 {
     if (file->code != CODE_DONE)
         return 0;
-    refuse_line(file, 0, "%s", strerror(error));
+    (void)yaml_file_refuse_line(file, 0, "%s", strerror(error));
     file->code = CODE_SYSTEM;
     return 0;
 }
@@ -71,12 +71,12 @@ static void refuse_syntax(yaml_file *file, const yaml_parser_t *parser, FILE *fr
     else if (ferror(from))
         (void)yaml_file_fail(file, errno);
     else if (parser->error == YAML_READER_ERROR)
-        refuse_line(file, 0, "this is not YAML: %s, at byte %zu", parser->problem,
-                    parser->problem_offset);
+        (void)yaml_file_refuse_line(file, 0, "this is not YAML: %s, at byte %zu", parser->problem,
+                                    parser->problem_offset);
     else
-        refuse_line(file, parser->problem_mark.line + 1, "this is not YAML: %s%s%s",
-                    parser->context ? parser->context : "", parser->context ? ", " : "",
-                    parser->problem);
+        (void)yaml_file_refuse_line(
+            file, (int)parser->problem_mark.line + 1, "this is not YAML: %s%s%s",
+            parser->context ? parser->context : "", parser->context ? ", " : "", parser->problem);
 }
 
 /* Reads the document, after which no other may follow. */

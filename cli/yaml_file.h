@@ -32,6 +32,10 @@ size_t yaml_file_line(const yaml_node_t *node);
 int yaml_file_refuse(yaml_file *file, const yaml_node_t *node, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
+/* The same with the number of a line; 0 for none. */
+int yaml_file_refuse_line(yaml_file *file, int line, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
 /* Notes a failure of the system, an errno, if it is the first. Returns 0. */
 int yaml_file_fail(yaml_file *file, int error);
 
