@@ -11,9 +11,15 @@ from services import Broker, Subscriber
 FILES = sorted(glob.glob(f"{ROOT}/examples/devices/*.yaml"))
 WARNINGS = "-std=c11 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror".split()
 
+COMPILERS = [["gcc"], ["avr-gcc", "-mmcu=atmega328p"], ["arm-none-eabi-gcc", "-mthumb", "-mcpu=cortex-m0plus"]]
+
 
 def of_each_file(test):
     return pytest.mark.parametrize("file", FILES, ids=[os.path.basename(file)[:-5] for file in FILES])(test)
+
+
+def test_there_are_ten_device_files():
+    assert len(FILES) >= 10
 
 
 @of_each_file
@@ -48,7 +54,8 @@ def test_the_header_of_each_file_compiles(plain, folder, file):
         plan, server = [line.split()[2] for line in header if line.startswith(" * Define ")]
     with open(f"{folder}/device.c", "w", encoding="utf-8") as program:
         program.write(f"#define {plan}\n#define {server}\n#include <mbm.h>\n#include \"device.h\"\nint main(void) {{ return 0; }}\n")
-    assert run("gcc", *WARNINGS, "-Wno-unused", f"-I{ROOT}/include", "-c", f"{folder}/device.c", "-o", f"{folder}/device.o") == (DONE, "", "")
+    for compiler in COMPILERS:
+        assert run(*compiler, *WARNINGS, f"-I{ROOT}/include", "-c", f"{folder}/device.c", "-o", f"{folder}/device.o") == (DONE, "", "")
 
 
 # --- names
