@@ -33,6 +33,8 @@ EXAMPLES := basic calls custom_client custom_server guarded_server keep_link man
 PORTS := $(patsubst ports/%.c,%,$(filter-out $(TLS),$(wildcard ports/linux/mbm_*.c)))
 # The command line tool.
 TOOL := $(wildcard cli/*.c)
+# What reads a device file, for its tests.
+DEVICE_FILES := $(filter-out cli/device_plan.c,$(wildcard cli/device*.c))
 # The tool uses what glibc and musl have beside POSIX, such as argp.
 TOOL_FLAGS := -D_GNU_SOURCE
 TOOL_PORTS := $(wildcard ports/linux/mbm_*.c)
@@ -273,10 +275,11 @@ $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsu
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload value numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
-$(BUILD)/$(1)/test_device_file: $(patsubst %,$(BUILD)/$(1)/cli/%.o,device device_names names place device_file yaml_file value numbers report)
 $(BUILD)/$(1)/test_names: $(BUILD)/$(1)/cli/names.o
+$(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): $(DEVICE_FILES:%.c=$(BUILD)/$(1)/%.o) \
+	$(patsubst %,$(BUILD)/$(1)/cli/%.o,names place yaml_file value numbers report)
 $(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over clock)
-$(BUILD)/$(1)/test_device_file: LIBS += -lyaml -lcjson -lm
+$(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%

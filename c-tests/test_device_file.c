@@ -1,63 +1,12 @@
 /* The device file: what is read from it, and each refusal with the line and the reason. */
 #define _GNU_SOURCE
 #include "place.h"
-#include "device_file.h"
 #include "report.h"
-#include "test.h"
+#include "device_text.h"
 
-#include <unistd.h>
-
-static char path[] = "/tmp/mbm-device-XXXXXX";
-static device meter;
-static char wrong[YAML_FILE_WRONG_BYTES];
-
-static void make_file(void)
-{
-    const int fd = mkstemp(path);
-
-    assert_true(fd >= 0);
-    close(fd);
-}
-
-static void remove_file(void)
-{
-    remove(path);
-}
-
-fixture all_tests = {make_file, remove_file};
-
-static int read_bytes(const char *text, size_t length)
-{
-    FILE *file = fopen(path, "wb");
-
-    assert_non_null(file);
-    assert_int_equal(fwrite(text, 1, length, file), length);
-    assert_int_equal(fclose(file), 0);
-    return device_file_read(&meter, path, wrong);
-}
-
-static void read_text(const char *text)
-{
-    if (read_bytes(text, strlen(text)) != CODE_DONE)
-        fail_msg("%s", wrong);
-}
-
-static void expect_reason(const char *text, size_t length, const char *reason)
-{
-    char wanted[YAML_FILE_WRONG_BYTES + sizeof path];
-
-    assert_int_equal(read_bytes(text, length), CODE_WRONG);
-    snprintf(wanted, sizeof wanted, "%s:%s", path, reason);
-    assert_string_equal(wrong, wanted);
-    assert_null(meter.fields);
-    assert_null(meter.planned);
-    assert_int_equal(meter.count, 0);
-}
-
-static void expect_refused(const char *text, const char *reason)
-{
-    expect_reason(text, strlen(text), reason);
-}
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 /* A file with one field that has these lines. */
 #define FIELD(lines) "fields:\n  - name: level\n    table: holding\n    address: 7\n" lines
@@ -251,16 +200,19 @@ TEST(a_wrong_word_is_refused_with_its_line)
         expect_refused(rows[i].text, rows[i].reason);
 }
 
+TEST(a_key_that_does_not_exist_is_refused_with_those_that_do)
+{
+    expect_refused_like("maker: a\n" UINT16(""),
+                        "1: key: \"maker\" is not one of device, unit, interval, order, ");
+    expect_refused_like(UINT16("    addr: 5\n"),
+                        "6: key: \"addr\" is not one of name, table, address, type, bit, ");
+}
+
 TEST(a_wrong_key_is_refused_with_its_line)
 {
     static const struct {
         const char *text, *reason;
     } rows[] = {
-        {"maker: a\n" UINT16(""),
-         "1: key: \"maker\" is not one of device, unit, interval, order, mask_write and fields"},
-        {UINT16("    addr: 5\n"),
-         "6: key: \"addr\" is not one of name, table, address, type, bit, count, scale, "
-         "unit_of_measurement, access, interval, value, unit, order, description and enumeration"},
         {UINT16("    address: 7\n"), "6: address is there twice, first in line 4"},
         {UINT16("    name: b\n"), "6: name is there twice, first in line 2"},
         {UINT16("unit: 1\nunit: 2\n"), "7: unit is there twice, first in line 6"},

@@ -57,7 +57,8 @@ static int prepare(bridge *b, const bridge_setup *from, unsigned index, next_lin
     const char *file = from->lines[index].path;
     int code;
 
-    next->table = bridge_table_read(file, bridge_setup_gap(from), &code, wrong);
+    next->table =
+        bridge_table_read(file, bridge_setup_gap(from), bridge_setup_function(from), &code, wrong);
     if (!next->table)
         return code;
     next->line = find_line(b, from->lines[index].text, from->lines[index].topic);
@@ -440,7 +441,11 @@ static const struct argp_option texts[] = {
     {"discovery-prefix", SETTING + BRIDGE_DISCOVERY_PREFIX, "PREFIX", 0,
      "The beginning of the topics of discovery (homeassistant)", 2},
     {"gap", SETTING + BRIDGE_GAP, "N", 0,
-     "Registers between two fields that one request may read too, 0 to 123 (0)", 3},
+     "Registers between two fields that one request may read too, 0 to 123 (gap of FILE, or 0)", 3},
+    {"write-function", SETTING + BRIDGE_WRITE_FUNCTION, "WORD", 0,
+     "How fields are written whose FILE does not say it: single, with functions 05 and 06, or "
+     "multiple, with 0F and 10 (as many values as there are)",
+     3},
     {"check", CHECK, NULL, 0, "Only check the command line and the files", 4},
     {"quiet", 'q', NULL, 0, "Print no summary to stderr", 4},
     {0}};

@@ -13,8 +13,10 @@
 enum { LONGEST_LINE = 1500, LONGEST_VALUE = 1000, LONGEST_PREFIX = 50 };
 
 const char *const bridge_names[] = {
-    "broker",           "topic", "id",  "user", "ca",    "cert", "key", "keep_alive", "discovery",
-    "discovery_prefix", "plain", "all", "gap",  "lines", NULL};
+    "broker", "topic", "id",         "user",           "ca",
+    "cert",   "key",   "keep_alive", "discovery",      "discovery_prefix",
+    "plain",  "all",   "gap",        "write_function", "lines",
+    NULL};
 
 enum { LINE, THE_FILE, LINE_TOPIC, LINE_KEYS };
 static const char *const LINE_NAMES[] = {"line", "file", "topic", NULL};
@@ -73,6 +75,7 @@ static const char *check_value(int setting, const char *text)
     case BRIDGE_PLAIN:
     case BRIDGE_ALL: return number_word(text, ANSWERS, &index);
     case BRIDGE_GAP: return number_read(text, 0, 123, &number);
+    case BRIDGE_WRITE_FUNCTION: return number_word(text, device_functions, &index);
     default: return NULL;
     }
 }
@@ -133,9 +136,19 @@ int bridge_setup_options(const bridge_setup *of, broker_options *to)
     return 1;
 }
 
-uint8_t bridge_setup_gap(const bridge_setup *of)
+int bridge_setup_gap(const bridge_setup *of)
 {
-    return of->values[BRIDGE_GAP] ? (uint8_t)strtoul(of->values[BRIDGE_GAP], NULL, 10) : 0;
+    return of->values[BRIDGE_GAP] ? (int)strtoul(of->values[BRIDGE_GAP], NULL, 10) : -1;
+}
+
+uint8_t bridge_setup_function(const bridge_setup *of)
+{
+    const char *text = of->values[BRIDGE_WRITE_FUNCTION];
+    int index = -1;
+
+    if (text)
+        (void)number_word(text, device_functions, &index);
+    return (uint8_t)(index + 1);
 }
 
 int bridge_setup_is(const bridge_setup *of, int setting)

@@ -37,6 +37,8 @@ static const char *check_field(const device_field *field, const mbm_planField *p
 
     if (!(field->access & DEVICE_WRITE))
         return NULL;
+    if (field->write_function == DEVICE_SINGLE && size > 1)
+        return "write_function single writes one coil or register, and the field has more";
     if (planned->table == MBM_TABLE_COILS && size > MBM_MAX_WRITE_BITS)
         return "one request writes at most 1968 coils";
     if (planned->table != MBM_TABLE_COILS && size > MBM_MAX_WRITE_REGISTERS)
@@ -44,13 +46,19 @@ static const char *check_field(const device_field *field, const mbm_planField *p
     return NULL;
 }
 
-/* Returns an exit code; with the reason in `wrong` if it is not CODE_DONE. */
-static int check_fields(const device *of, const char *path, char wrong[YAML_FILE_WRONG_BYTES])
+/* Gives the fields their function and checks them. Returns an exit code; with the reason in `wrong`
+ * if it is not CODE_DONE. */
+static int check_fields(device *of, const char *path, uint8_t function,
+                        char wrong[YAML_FILE_WRONG_BYTES])
 {
     uint16_t field;
 
     for (field = 0; field < of->count; field++) {
-        const char *why = check_field(&of->fields[field], &of->planned[field]);
+        const char *why;
+
+        if (of->fields[field].write_function == DEVICE_BY_SIZE)
+            of->fields[field].write_function = function;
+        why = check_field(&of->fields[field], &of->planned[field]);
 
         if (!why)
             continue;
@@ -65,7 +73,7 @@ static int check_fields(const device *of, const char *path, char wrong[YAML_FILE
 }
 
 /* Gives the plan its storage. Returns 0 without memory. */
-static int make_storage(bridge_table *table, uint8_t register_gap)
+static int make_storage(bridge_table *table, int register_gap)
 {
     const size_t count = table->fields.readable;
     size_t field;
@@ -75,7 +83,7 @@ static int make_storage(bridge_table *table, uint8_t register_gap)
         table->units[table->fields.planned[field].unit].fields++;
     if (!device_plan_make(&table->setup, &table->fields, register_gap, BRIDGE_REQUESTS))
         return 0;
-    table->setup.bitGap = 0;
+    table->setup.bitGap = table->fields.limits.bit_gap;
     return table->last != NULL;
 }
 
@@ -94,7 +102,7 @@ static int try_plan(const bridge_table *table, const char *path, char wrong[YAML
     return CODE_WRONG;
 }
 
-bridge_table *bridge_table_read(const char *path, uint8_t register_gap, int *code,
+bridge_table *bridge_table_read(const char *path, int register_gap, uint8_t function, int *code,
                                 char wrong[YAML_FILE_WRONG_BYTES])
 {
     bridge_table *table = (bridge_table *)calloc(1, sizeof *table);
@@ -107,7 +115,7 @@ bridge_table *bridge_table_read(const char *path, uint8_t register_gap, int *cod
     table->digest = digest_of(path);
     *code = device_file_read(&table->fields, path, wrong);
     if (*code == CODE_DONE)
-        *code = check_fields(&table->fields, path, wrong);
+        *code = check_fields(&table->fields, path, function, wrong);
     if (*code == CODE_DONE && !make_storage(table, register_gap)) {
         *code = CODE_SYSTEM;
         snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: " REPORT_NO_MEMORY, path);
@@ -373,17 +381,19 @@ static void pack_coils(const uint16_t *bits, uint16_t count, void *bytes)
         to[at / 8] = (uint8_t)(to[at / 8] | (bits[at] & 1) << at % 8);
 }
 
-static uint8_t write_all(bridge_line *l, bridge_write *write, const value_form *form,
+static uint8_t write_all(bridge_line *l, bridge_write *write, const device_field *field,
                          const mbm_planField *planned, const broker_event *event,
                          const char **wrong)
 {
     static uint16_t words[PAYLOAD_WORDS];
-    const uint16_t count = payload_parse_all(form, planned->count, event->bytes + event->name_bytes,
-                                             event->length, words, wrong);
+    const uint16_t count =
+        payload_parse_all(&field->form, planned->count, event->bytes + event->name_bytes,
+                          event->length, words, wrong);
+    const int is_single = count == 1 && field->write_function != DEVICE_MULTIPLE;
 
     if (count == 0)
         return MBM_INVALID_ARGUMENT;
-    if (planned->table == MBM_TABLE_COILS && count == 1)
+    if (planned->table == MBM_TABLE_COILS && is_single)
         return mbm_client_writeSingleCoil(&l->at.client, &write->request, planned->address,
                                           (uint8_t)words[0]);
     if (planned->table == MBM_TABLE_COILS) {
@@ -391,7 +401,7 @@ static uint8_t write_all(bridge_line *l, bridge_write *write, const value_form *
         return mbm_client_writeMultipleCoils(&l->at.client, &write->request, planned->address,
                                              count);
     }
-    if (count == 1)
+    if (is_single)
         return mbm_client_writeSingleRegister(&l->at.client, &write->request, planned->address,
                                               words[0]);
     memcpy(write->words, words, count * sizeof *words);
@@ -437,9 +447,9 @@ static const char *begin_write(bridge_line *l, const char *name, const broker_ev
     write->request.data = write->words;
     write->request.done = on_written;
     write->request.context = write;
-    status = device_is_part(planned) ? write_part(l, write, planned, event, &wrong)
-                                     : write_all(l, write, &l->table->fields.fields[field].form,
-                                                 planned, event, &wrong);
+    status = device_is_part(planned)
+                 ? write_part(l, write, planned, event, &wrong)
+                 : write_all(l, write, &l->table->fields.fields[field], planned, event, &wrong);
     if (wrong)
         return wrong;
     if (status != MBM_OK && status != MBM_PENDING)

@@ -41,9 +41,10 @@ typedef struct bridge_table {
     mbm_planSetup setup; /* complete, but for `update` and `context` */
 } bridge_table;
 
-/* Reads a device file for the bridge, and checks that a plan can read it. Returns NULL after a
+/* Reads a device file for the bridge, and checks that a plan can read it. `register_gap` -1 is that
+ * of the file; `function` writes the fields whose file does not say how. Returns NULL after a
  * failure; `code` has its exit code and `wrong` the reason, a sentence without its full stop. */
-bridge_table *bridge_table_read(const char *path, uint8_t register_gap, int *code,
+bridge_table *bridge_table_read(const char *path, int register_gap, uint8_t function, int *code,
                                 char wrong[YAML_FILE_WRONG_BYTES]);
 void bridge_table_free(bridge_table *table);
 

@@ -3,8 +3,12 @@
  * Licence: MIT OR Apache-2.0. */
 #include "device.h"
 
+#include "numbers.h"
+
 #include <stdlib.h>
 #include <string.h>
+
+const char *const device_functions[] = {"single", "multiple", NULL};
 
 int device_is_part(const mbm_planField *planned)
 {
@@ -67,6 +71,8 @@ void device_free(device *into)
     free(into->fields);
     free(into->planned);
     free(into->name);
+    free(into->limits.excluded);
+    memset(&into->limits, 0, sizeof into->limits);
     into->fields = NULL;
     into->planned = NULL;
     into->name = NULL;
@@ -81,4 +87,26 @@ int device_find(const device *from, const char *topic)
         if (strcmp(from->fields[at].topic, topic) == 0)
             return at;
     return -1;
+}
+
+const char *device_address_text(const device *of, uint8_t table, uint32_t address)
+{
+    static const unsigned DIGITS[] = {0, 0, 1, 4, 3}; /* of each table */
+
+    switch (of->notation) {
+    case DEVICE_ONE_BASED: return say("%u", (unsigned)address + 1);
+    case DEVICE_MODICON:
+        if (table == MBM_TABLE_COILS && address < 9999)
+            return say("%u", (unsigned)address + 1);
+        return say(address < 9999 ? "%u%04u" : "%u%05u", DIGITS[table], (unsigned)address + 1);
+    default: return say("%u", (unsigned)address);
+    }
+}
+
+uint16_t device_most_written(const device *of, uint8_t table)
+{
+    const int is_bits = table <= MBM_TABLE_DISCRETE_INPUTS;
+    const uint16_t own = is_bits ? of->limits.write_bits : of->limits.write_registers;
+
+    return own ? own : is_bits ? MBM_MAX_WRITE_BITS : MBM_MAX_WRITE_REGISTERS;
 }

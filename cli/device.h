@@ -9,6 +9,23 @@
 /* What a field allows. */
 enum { DEVICE_READ = 1, DEVICE_WRITE = 2 };
 
+/* By which function a field is written: 05 or 06 if one request of these can do it, else 0F or 10;
+ * always 05 or 06; always 0F or 10. */
+enum { DEVICE_BY_SIZE, DEVICE_SINGLE, DEVICE_MULTIPLE };
+/* The words for the last two. NULL ends them. */
+extern const char *const device_functions[];
+
+/* How the file writes addresses: as on the wire, from 1 on, or as 40101. */
+enum { DEVICE_ON_WIRE, DEVICE_ONE_BASED, DEVICE_MODICON };
+
+/* What one request may do, and which addresses none may read. */
+typedef struct device_limits {
+    uint16_t read_registers, read_bits, write_registers, write_bits; /* 0: as the standard says */
+    uint16_t register_gap, bit_gap;
+    mbm_planExcludedRange *excluded;
+    uint8_t excluded_count;
+} device_limits;
+
 /* Bytes of the longest name. */
 enum { DEVICE_NAME_BYTES = 200 };
 
@@ -26,8 +43,9 @@ typedef struct device_field {
     char *unit_of_measurement; /* NULL if the file gives none */
     char *description;         /* NULL if the file gives none */
     value_form form;
-    uint8_t access;  /* DEVICE_READ, DEVICE_WRITE or both */
-    uint16_t *words; /* its value: as many as device_size; NULL if the file gives none */
+    uint8_t access;         /* DEVICE_READ, DEVICE_WRITE or both */
+    uint8_t write_function; /* DEVICE_BY_SIZE, DEVICE_SINGLE or DEVICE_MULTIPLE */
+    uint16_t *words;        /* its value: as many as device_size; NULL if the file gives none */
     device_label *labels;
     uint16_t label_count;
     int line, scale_line; /* of the file */
@@ -40,6 +58,8 @@ typedef struct device {
     uint8_t writes_masks; /* the device has function 22, by which bits of a register are written */
     device_field *fields;
     mbm_planField *planned; /* the same fields for mbm_plan_begin */
+    device_limits limits;
+    uint8_t notation; /* DEVICE_ON_WIRE, DEVICE_ONE_BASED or DEVICE_MODICON */
 } device;
 
 /* Frees all that a device has. */
@@ -62,5 +82,12 @@ uint16_t device_mask(const mbm_planField *planned);
 
 /* Returns the word of a register that has this number in the bits of a field. */
 uint16_t device_part(const mbm_planField *planned, uint16_t bits);
+
+/* Returns an address as the file writes addresses, in a buffer that the fourth next call of `say`
+ * overwrites. */
+const char *device_address_text(const device *of, uint8_t table, uint32_t address);
+
+/* Returns the most registers or bits of a table that one request writes. */
+uint16_t device_most_written(const device *of, uint8_t table);
 
 #endif

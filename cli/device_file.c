@@ -4,7 +4,10 @@
  * Licence: MIT OR Apache-2.0. */
 #include "device_file.h"
 
+#include "device_address.h"
+#include "device_limits.h"
 #include "device_names.h"
+#include "device_repeat.h"
 #include "report.h"
 
 #include <errno.h>
@@ -14,9 +17,22 @@
 enum { MOST_REGISTERS = 125, MOST_BITS = 2000, MOST_DESCRIPTION = 10000, MOST_LABELS = 1000 };
 
 /* The keys of the file and of a field. The numbers count from 0 here. */
-enum { DEVICE, DEVICE_UNIT, DEVICE_INTERVAL, DEVICE_ORDER, MASK_WRITE, FIELDS, DEVICE_KEYS };
-static const char *const DEVICE_NAMES[] = {"device",     "unit",   "interval", "order",
-                                           "mask_write", "fields", NULL};
+enum {
+    DEVICE,
+    DEVICE_UNIT,
+    DEVICE_INTERVAL,
+    DEVICE_ORDER,
+    MASK_WRITE,
+    FIELDS,
+    NOTATION,
+    ONE_BASED,
+    DEVICE_WRITE_FUNCTION,
+    LIMITS,
+    DEVICE_KEYS = LIMITS + LIMITS_KEYS
+};
+static const char *const DEVICE_NAMES[] = {
+    "device",    "unit",           "interval",          "order", "mask_write", "fields", "notation",
+    "one_based", "write_function", DEVICE_LIMITS_NAMES, NULL};
 enum {
     NAME,
     TABLE,
@@ -33,15 +49,18 @@ enum {
     ORDER,
     DESCRIPTION,
     ENUMERATION,
+    WRITE_FUNCTION,
+    FIELD_REPEAT,
     FIELD_KEYS
 };
 static const char *const FIELD_NAMES[] = {
     "name",   "table",       "address",     "type",
     "bit",    "count",       "scale",       "unit_of_measurement",
     "access", "interval",    "value",       "unit",
-    "order",  "description", "enumeration", NULL};
+    "order",  "description", "enumeration", "write_function",
+    "repeat", NULL};
 
-#define NEEDED_OF_FIELD (1u << NAME | 1u << TABLE | 1u << ADDRESS)
+#define NEEDED_OF_FIELD (1u << NAME | 1u << ADDRESS)
 
 /* Words whose numbers are their places; those of access count from 1, like the words of value.h. */
 static const char *const ACCESS_NAMES[] = {"", "read", "write", "read-write", NULL};
@@ -62,15 +81,32 @@ static int read_word(yaml_file *file, const char *key, const yaml_node_t *node,
 
 /* --- a field --- */
 
-/* Whether table and type are known and go together. Returns 0 after a refusal. */
+/* Reads table and address; `offset` is that of a repetition. Returns 0 after a refusal. */
+static int read_address(yaml_file *file, const yaml_node_t *field, const yaml_node_t *const *values,
+                        const device *of, uint32_t offset, mbm_planField *planned)
+{
+    device_place at = {0};
+
+    if (!device_address_read_table(file, values[TABLE], &at.table) ||
+        !device_address_read(file, "address", values[ADDRESS], of, &at))
+        return 0;
+    if (at.table == 0)
+        return yaml_file_refuse(file, field, "the field has no key table");
+    if (at.address + offset > 65535)
+        return yaml_file_refuse(file, values[ADDRESS],
+                                "the field is %u addresses after %s: addresses end at 65535",
+                                (unsigned)offset, device_address_text(of, at.table, at.address));
+    planned->table = at.table;
+    planned->address = (uint16_t)(at.address + offset);
+    return 1;
+}
+
+/* Whether the type is known and goes with the table. Returns 0 after a refusal. */
 static int read_type(yaml_file *file, const yaml_node_t *field, const yaml_node_t *const *values,
                      mbm_planField *planned)
 {
-    int is_bits;
+    const int is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
 
-    if (!read_word(file, "table", values[TABLE], value_table_names, &planned->table))
-        return 0;
-    is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
     if (!values[TYPE] && !is_bits)
         return yaml_file_refuse(file, field, "the field has no key type");
     planned->type = MBM_TYPE_BIT;
@@ -87,20 +123,18 @@ static int read_type(yaml_file *file, const yaml_node_t *field, const yaml_node_
     return 1;
 }
 
-/* Reads address and count, which must not reach beyond a request or the table. */
-static int read_place(yaml_file *file, const yaml_node_t *field, const yaml_node_t *const *values,
-                      mbm_planField *planned)
+/* Reads bit and count, which must not reach beyond a request or the table. */
+static int read_size(yaml_file *file, const yaml_node_t *field, const yaml_node_t *const *values,
+                     const device *of, mbm_planField *planned)
 {
-    uint32_t address = 0, bit = 0, count = 1, size;
+    uint32_t bit = 0, count = 1, size;
     const int is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
 
     if (planned->type == MBM_TYPE_TEXT && !values[COUNT])
         return yaml_file_refuse(file, field, "a text needs its number of characters as count");
-    if (!yaml_file_number(file, "address", values[ADDRESS], 0, 65535, &address) ||
-        !yaml_file_number(file, "bit", values[BIT], 0, 15, &bit) ||
+    if (!yaml_file_number(file, "bit", values[BIT], 0, 15, &bit) ||
         !yaml_file_number(file, "count", values[COUNT], 1, MOST_BITS, &count))
         return 0;
-    planned->address = (uint16_t)address;
     planned->count = (uint16_t)count;
     planned->bit = (uint8_t)bit;
     if (device_is_part(planned) && bit + count > 16)
@@ -113,10 +147,12 @@ static int read_place(yaml_file *file, const yaml_node_t *field, const yaml_node
             file, values[COUNT] ? values[COUNT] : field,
             "count is %u: these are %u registers, and one request reads at most %d", count, size,
             MOST_REGISTERS);
-    if (address + size > 65536)
+    if (planned->address + size > 65536)
         return yaml_file_refuse(file, values[ADDRESS],
-                                "the field has %u %s from address %u on: addresses end at 65535",
-                                size, is_bits ? "bits" : "registers", address);
+                                "the field has %u %s from address %s on: addresses end at %s", size,
+                                is_bits ? "bits" : "registers",
+                                device_address_text(of, planned->table, planned->address),
+                                device_address_text(of, planned->table, 65535));
     return 1;
 }
 
@@ -416,26 +452,58 @@ static int check_others(yaml_file *file, const yaml_node_t *node, const device *
     return 1;
 }
 
-/* Reads the next field. `shared` has what a field takes from the device. */
-static int read_field(yaml_file *file, const yaml_node_t *node, const mbm_planField *shared,
-                      device *into)
-{
-    device_field *field = &into->fields[into->count];
-    mbm_planField *planned = &into->planned[into->count];
-    const yaml_node_t *values[FIELD_KEYS] = {NULL};
+/* What fields take from the head of the file. */
+typedef struct head {
+    mbm_planField planned;
+    uint8_t write_function;
+} head;
 
+/* Makes space for another field. Returns 0 after a refusal. */
+static int grow(yaml_file *file, const yaml_node_t *node, device *into)
+{
+    const size_t count = into->count, next = count < 16 ? 16 : 2 * count;
+    void *fields, *planned;
+
+    if (count == MBM_PLAN_MAX_FIELDS)
+        return yaml_file_refuse(file, node, "the file has more than %u fields",
+                                MBM_PLAN_MAX_FIELDS);
+    if (count > 0 && (count < 16 || (count & (count - 1)) != 0))
+        return 1;
+    fields = realloc(into->fields, next * sizeof *into->fields);
+    if (fields)
+        into->fields = (device_field *)fields;
+    planned = realloc(into->planned, next * sizeof *into->planned);
+    if (planned)
+        into->planned = (mbm_planField *)planned;
+    return (fields && planned) || yaml_file_fail(file, ENOMEM);
+}
+
+/* Reads the next field, whose addresses are those of its values and `offset`. */
+static int read_field(yaml_file *file, const yaml_node_t *node, const yaml_node_t *const *values,
+                      const head *shared, uint32_t offset, device *into)
+{
+    device_field *field;
+    mbm_planField *planned;
+
+    if (!grow(file, node, into))
+        return 0;
+    field = &into->fields[into->count];
+    planned = &into->planned[into->count];
+    memset(field, 0, sizeof *field);
+    field->write_function = shared->write_function;
     field->line = (int)yaml_file_line(node);
-    *planned = *shared;
+    *planned = shared->planned;
     into->count++;
-    return yaml_file_keys(file, "the field", node, FIELD_NAMES, NEEDED_OF_FIELD, values) &&
-           yaml_file_copy(file, "name", values[NAME], DEVICE_NAME_BYTES, &field->name) &&
+    return device_repeat_name(file, values[NAME], DEVICE_NAME_BYTES, &field->name) &&
            yaml_file_copy(file, "unit_of_measurement", values[MEASURE], DEVICE_NAME_BYTES,
                           &field->unit_of_measurement) &&
            yaml_file_copy(file, "description", values[DESCRIPTION], MOST_DESCRIPTION,
                           &field->description) &&
-           read_type(file, node, values, planned) && read_place(file, node, values, planned) &&
+           read_address(file, node, values, into, offset, planned) &&
+           read_type(file, node, values, planned) && read_size(file, node, values, into, planned) &&
            read_shared(file, values[FIELD_UNIT], values[INTERVAL], values[ORDER], planned) &&
            read_access(file, values[ACCESS], planned, into->writes_masks, field) &&
+           device_limits_check(file, node, values[WRITE_FUNCTION], into, planned, field) &&
            read_scale(file, values[SCALE], planned, field) &&
            read_value(file, values[VALUE], planned, field) &&
            read_enumeration(file, values[ENUMERATION], planned, field) &&
@@ -444,21 +512,71 @@ static int read_field(yaml_file *file, const yaml_node_t *node, const mbm_planFi
 
 /* --- the file --- */
 
-static int read_fields(yaml_file *file, const yaml_node_t *list, const mbm_planField *shared,
-                       device *into)
+/* Reads a field as often as its file repeats it. `offset` is that of the group it is in, which is
+ * repeated itself if `is_in_group` is 1. */
+static int read_repeated(yaml_file *file, const yaml_node_t *node, const head *shared,
+                         uint32_t offset, int is_in_group, device *into)
+{
+    const yaml_node_t *values[FIELD_KEYS] = {NULL};
+    device_repeat repeat;
+    uint32_t i;
+
+    if (!yaml_file_keys(file, "the field", node, FIELD_NAMES, NEEDED_OF_FIELD, values))
+        return 0;
+    if (!values[FIELD_REPEAT])
+        return read_field(file, node, values, shared, offset, into);
+    if (is_in_group)
+        return yaml_file_refuse(file, values[FIELD_REPEAT],
+                                "a field of a group that is repeated is not repeated itself");
+    if (!device_repeat_read(file, values[FIELD_REPEAT], &repeat))
+        return 0;
+    for (i = 0; i < repeat.count; i++) {
+        device_repeat_begin(file, &repeat, i);
+        if (!read_field(file, node, values, shared, i * repeat.every, into))
+            return 0;
+    }
+    device_repeat_end(file);
+    return 1;
+}
+
+/* Reads the fields of a group as often as its file repeats it: those of the first, those of the
+ * second, and so on. */
+static int read_group(yaml_file *file, const yaml_node_t *list, const yaml_node_t *key,
+                      const head *shared, device *into)
+{
+    const size_t count = yaml_file_items(file, "fields", list, MBM_PLAN_MAX_FIELDS);
+    device_repeat repeat;
+    size_t at;
+    uint32_t i;
+
+    if (count == 0 || !device_repeat_read(file, key, &repeat))
+        return 0;
+    for (i = 0; i < repeat.count; i++) {
+        device_repeat_begin(file, &repeat, i);
+        for (at = 0; at < count; at++)
+            if (!read_repeated(file, yaml_file_item(file, list, at), shared, i * repeat.every, 1,
+                               into))
+                return 0;
+    }
+    device_repeat_end(file);
+    return 1;
+}
+
+static int read_fields(yaml_file *file, const yaml_node_t *list, const head *shared, device *into)
 {
     const size_t count = yaml_file_items(file, "fields", list, MBM_PLAN_MAX_FIELDS);
     size_t at;
 
     if (count == 0)
         return 0;
-    into->fields = (device_field *)calloc(count, sizeof *into->fields);
-    into->planned = (mbm_planField *)calloc(count, sizeof *into->planned);
-    if (!into->fields || !into->planned)
-        return yaml_file_fail(file, ENOMEM);
-    for (at = 0; at < count; at++)
-        if (!read_field(file, yaml_file_item(file, list, at), shared, into))
+    for (at = 0; at < count; at++) {
+        const yaml_node_t *item = yaml_file_item(file, list, at), *repeat = NULL;
+        const yaml_node_t *group = device_repeat_group(file, item, &repeat);
+
+        if (group ? !read_group(file, group, repeat, shared, into)
+                  : !read_repeated(file, item, shared, 0, 0, into))
             return 0;
+    }
     return 1;
 }
 
@@ -495,15 +613,18 @@ static int sort_fields(yaml_file *file, device *into)
 static int read_root(yaml_file *file, const yaml_node_t *root, void *from)
 {
     device *into = (device *)from;
-    mbm_planField shared = {.unit = 1, .intervalMs = 1000, .order = MBM_ORDER_ABCD};
+    head shared = {.planned = {.unit = 1, .intervalMs = 1000, .order = MBM_ORDER_ABCD}};
     const yaml_node_t *values[DEVICE_KEYS] = {NULL};
     int writes_masks = 0;
 
     if (!yaml_file_keys(file, "the file", root, DEVICE_NAMES, 1u << FIELDS, values) ||
         !yaml_file_copy(file, "device", values[DEVICE], DEVICE_NAME_BYTES, &into->name) ||
         !read_shared(file, values[DEVICE_UNIT], values[DEVICE_INTERVAL], values[DEVICE_ORDER],
-                     &shared) ||
-        !yaml_file_word(file, "mask_write", values[MASK_WRITE], ANSWERS, &writes_masks))
+                     &shared.planned) ||
+        !yaml_file_word(file, "mask_write", values[MASK_WRITE], ANSWERS, &writes_masks) ||
+        !device_address_read_notation(file, values[NOTATION], values[ONE_BASED], into) ||
+        !device_limits_read_function(file, values[DEVICE_WRITE_FUNCTION], &shared.write_function) ||
+        !device_limits_read(file, values + LIMITS, into))
         return 0;
     into->writes_masks = (uint8_t)writes_masks;
     return read_fields(file, values[FIELDS], &shared, into) && device_names_make(file, into) &&

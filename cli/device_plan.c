@@ -9,15 +9,24 @@
 #include <stdlib.h>
 #include <string.h>
 
-int device_plan_make(mbm_planSetup *setup, const device *of, uint16_t gap, uint8_t requests)
+int device_plan_make(mbm_planSetup *setup, const device *of, int gap, uint8_t requests)
 {
+    const device_limits *limits = &of->limits;
     const uint16_t count = of->readable;
 
     setup->fields = of->planned;
     setup->fieldCount = setup->readCount = count;
     setup->dataWords = UINT16_MAX;
-    setup->bitGap = gap;
-    setup->registerGap = gap < MBM_MAX_READ_REGISTERS ? gap : MBM_MAX_READ_REGISTERS;
+    setup->bitGap = limits->bit_gap;
+    setup->registerGap = limits->register_gap;
+    if (gap != DEVICE_PLAN_OWN_GAP) {
+        setup->bitGap = (uint16_t)gap;
+        setup->registerGap = gap < MBM_MAX_READ_REGISTERS ? (uint16_t)gap : MBM_MAX_READ_REGISTERS;
+    }
+    setup->registersPerRead = limits->read_registers;
+    setup->bitsPerRead = limits->read_bits;
+    setup->excluded = limits->excluded;
+    setup->excludedCount = limits->excluded_count;
     setup->requestCount = requests;
     setup->positions = (mbm_planPosition *)calloc(count, sizeof *setup->positions);
     setup->reads = (mbm_planRead *)calloc(count, sizeof *setup->reads);

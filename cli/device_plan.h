@@ -6,10 +6,12 @@
 
 #include "device.h"
 
-/* Gives `setup` the fields of a device that can be read, and storage for their plan: as much as any
- * plan takes, and `requests` requests. One read may cover up to `gap` addresses between two fields.
- * Returns 0 without memory. device_plan_free frees the storage in both cases. */
-int device_plan_make(mbm_planSetup *setup, const device *of, uint16_t gap, uint8_t requests);
+/* Gives `setup` the fields of a device that can be read, its limits, and storage for their plan: as
+ * much as any plan takes, and `requests` requests. One read may cover up to `gap` addresses between
+ * two fields; DEVICE_PLAN_OWN_GAP for as many as the file says. Returns 0 without memory.
+ * device_plan_free frees the storage in both cases. The device must outlive the plan. */
+enum { DEVICE_PLAN_OWN_GAP = -1 };
+int device_plan_make(mbm_planSetup *setup, const device *of, int gap, uint8_t requests);
 void device_plan_free(mbm_planSetup *setup);
 
 /* Begins a plan on a client that has no line, to see what the library makes of the fields. Returns

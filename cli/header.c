@@ -18,7 +18,7 @@
 /* What the command line says. */
 typedef struct job {
     const char *file, *output, *name;
-    uint16_t gap;
+    int gap; /* DEVICE_PLAN_OWN_GAP: that of the file */
     uint8_t is_page;
 } job;
 
@@ -33,7 +33,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     switch (key) {
     case 'o': j->output = text; return 0;
     case NAME: j->name = text; return 0;
-    case GAP: j->gap = (uint16_t)options_number(state, "--gap", text, 0, 2000); return 0;
+    case GAP: j->gap = (int)options_number(state, "--gap", text, 0, 2000); return 0;
     case MARKDOWN: j->is_page = 1; return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0)
@@ -53,7 +53,8 @@ static const struct argp_option texts[] = {
     {"name", NAME, "NAME", 0, "The device's name in C (that of the device, or else of the file)",
      1},
     {"gap", GAP, "N", 0,
-     "One request may read up to N addresses between two fields too, if the device has them (0)",
+     "One request may read up to N addresses between two fields too, if the device has them (gap "
+     "of FILE, or 0)",
      1},
     {"markdown", MARKDOWN, NULL, 0, "Write a page with a table of the fields, not a header", 1},
     {0}};
@@ -485,7 +486,7 @@ static int make(job *j, header *h)
 
 int header_command(int argc, char **argv)
 {
-    job data = {0}, *j = &data;
+    job data = {.gap = DEVICE_PLAN_OWN_GAP}, *j = &data;
     device meter;
     header h = {.of = &meter};
     char wrong[YAML_FILE_WRONG_BYTES];

@@ -31,7 +31,8 @@ typedef struct header {
     /* The plan: its fields in the order of their reads, as indexes of the device's fields, how many
      * fields each read has, and the words of data. */
     uint16_t *order, *counts;
-    uint16_t gap, reads, words;
+    uint16_t reads, words;
+    int gap; /* of the command line, or DEVICE_PLAN_OWN_GAP */
 } header;
 
 /* Notes a name that the header defines, a field's name and what follows it, such as "_ADDRESS".
@@ -49,8 +50,9 @@ char *header_lower(const char *upper);
  * the line, is replaced. */
 void header_comment(FILE *out, const char *text);
 
-/* Writes where a field is, such as "holding registers 0 to 1 of unit 17". */
-void header_place(FILE *out, const mbm_planField *planned);
+/* Writes where a field is, such as "holding registers 0 to 1", with the addresses as in the file.
+ */
+void header_place(const header *h, const mbm_planField *planned);
 
 /* The C type of a field's value; that of a bit is uint8_t. */
 const char *header_type(const mbm_planField *planned);

@@ -33,8 +33,9 @@ void header_comment(FILE *out, const char *text)
     }
 }
 
-void header_place(FILE *out, const mbm_planField *planned)
+void header_place(const header *h, const mbm_planField *planned)
 {
+    FILE *const out = h->out;
     static const char *const ONE[] = {"", "coil", "discrete input", "holding register",
                                       "input register"};
     const uint32_t size = device_size(planned);
@@ -45,9 +46,11 @@ void header_place(FILE *out, const mbm_planField *planned)
             fprintf(out, " to %u", planned->bit + planned->count - 1u);
         fprintf(out, " of ");
     }
-    fprintf(out, "%s%s %u", ONE[planned->table], size > 1 ? "s" : "", planned->address);
+    fprintf(out, "%s%s %s", ONE[planned->table], size > 1 ? "s" : "",
+            device_address_text(h->of, planned->table, planned->address));
     if (size > 1)
-        fprintf(out, " to %u", (unsigned)(planned->address + size - 1));
+        fprintf(out, " to %s",
+                device_address_text(h->of, planned->table, planned->address + size - 1));
 }
 
 const char *header_type(const mbm_planField *planned)
@@ -165,7 +168,7 @@ static void write_what_it_is(header *h, uint16_t at)
     fprintf(h->out, "\n/* ");
     header_comment(h->out, field->name);
     fprintf(h->out, ": ");
-    header_place(h->out, planned);
+    header_place(h, planned);
     if (h->unit == 0)
         fprintf(h->out, " of unit %u", planned->unit);
     if (planned->type != MBM_TYPE_BIT)
@@ -230,6 +233,8 @@ int header_write_fields(header *h)
 
     fprintf(h->out,
             "\n/* ==== Fields: addresses as on the wire, sizes in registers or bits ==== */\n");
+    if (h->of->notation != DEVICE_ON_WIRE)
+        fprintf(h->out, "/* In comments they are as in the file, from 1 on. */\n");
     if (h->unit != 0)
         fprintf(h->out, "\n#define %s_UNIT %uu\n", h->upper, h->unit);
     for (i = 0; i < h->of->count; i++)
@@ -344,7 +349,7 @@ static void write_page_row(const header *h, uint16_t at)
     fprintf(h->out, " | ");
     if (h->unit == 0)
         fprintf(h->out, "%u | ", planned->unit);
-    header_place(h->out, planned);
+    header_place(h, planned);
     fprintf(h->out, " | %s", value_type_names[planned->type]);
     if (planned->type == MBM_TYPE_TEXT)
         fprintf(h->out, ", %u characters", planned->count);
@@ -367,6 +372,10 @@ static void write_page_row(const header *h, uint16_t at)
 
 void header_write_page(header *h)
 {
+    static const char *const ADDRESSES[] = {
+        "Addresses are those of the protocol and count from 0.",
+        "Addresses count from 1: those of the protocol are one less.",
+        "Addresses are in Modicon's notation: 40001 is holding register 0 of the protocol."};
     uint16_t i;
 
     fprintf(h->out, "# ");
@@ -376,11 +385,10 @@ void header_write_page(header *h)
     fprintf(h->out, ". ");
     if (h->unit != 0)
         fprintf(h->out, "The unit id is %u. ", h->unit);
-    fprintf(
-        h->out,
-        "Addresses are those of the protocol and count from 0.\n\n| field | %splace | type | scale | in | access | meaning |\n"
-        "|---|%s---|---|---|---|---|---|\n",
-        h->unit == 0 ? "unit | " : "", h->unit == 0 ? "---|" : "");
+    fprintf(h->out,
+            "%s\n\n| field | %splace | type | scale | in | access | meaning |\n"
+            "|---|%s---|---|---|---|---|---|\n",
+            ADDRESSES[h->of->notation], h->unit == 0 ? "unit | " : "", h->unit == 0 ? "---|" : "");
     for (i = 0; i < h->of->count; i++)
         write_page_row(h, i);
 }

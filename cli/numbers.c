@@ -94,7 +94,7 @@ const char *number_time_text(uint32_t milliseconds, char text[32])
 
 const char *number_word(const char *text, const char *const *words, int *index)
 {
-    char list[256] = "";
+    char list[1200] = "";
     size_t length = 0;
     int i;
 
@@ -103,11 +103,12 @@ const char *number_word(const char *text, const char *const *words, int *index)
             *index = i;
             return NULL;
         }
-        length += (size_t)snprintf(list + length, sizeof list - length, "%s%s",
-                                   i == 0         ? ""
-                                   : words[i + 1] ? ", "
-                                                  : " and ",
-                                   words[i]);
+        if (length < sizeof list)
+            length += (size_t)snprintf(list + length, sizeof list - length, "%s%s",
+                                       i == 0         ? ""
+                                       : words[i + 1] ? ", "
+                                                      : " and ",
+                                       words[i]);
     }
     return say("\"%.60s\" is not one of %s", text, list);
 }

@@ -20,7 +20,7 @@ typedef struct polling {
     place where;
     const char *file;
     uint32_t rounds, forMs;
-    uint16_t gap;
+    int gap; /* DEVICE_PLAN_OWN_GAP: that of the file */
     uint8_t shows_plan;
 
     polled read;
@@ -45,7 +45,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
         return 0;
     case FOR: p->forMs = options_time(state, "--for", text, 1, 86400000); return 0;
     case ONCE: p->rounds = 1; return 0;
-    case GAP: p->gap = (uint16_t)options_number(state, "--gap", text, 0, 2000); return 0;
+    case GAP: p->gap = (int)options_number(state, "--gap", text, 0, 2000); return 0;
     case SHOW_PLAN: p->shows_plan = 1; return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 1)
@@ -68,7 +68,8 @@ static const struct argp_option texts[] = {
     {"once", ONCE, NULL, 0, "The same as --rounds 1", 1},
     {"for", FOR, "TIME", 0, "End after a time, such as 10s", 1},
     {"gap", GAP, "N", 0,
-     "One request may read up to N addresses between two fields too, if the device has them (0)",
+     "One request may read up to N addresses between two fields too, if the device has them (gap "
+     "of FILE, or 0)",
      1},
     {"show-plan", SHOW_PLAN, NULL, 0, "First print the requests of the plan to stderr", 3},
     {0}};
@@ -135,8 +136,9 @@ static void show_plan(polling *p)
     uint16_t i;
 
     for (i = 0; mbm_plan_getRead(&p->read.plan, i, &read) == MBM_OK; i++)
-        fprintf(stderr, "request %u: unit %u, %s, %u from %u on, every %s\n", i + 1u, read.unit,
-                value_table_names[read.table], read.quantity, read.address,
+        fprintf(stderr, "request %u: unit %u, %s, %u from %s on, every %s\n", i + 1u, read.unit,
+                value_table_names[read.table], read.quantity,
+                device_address_text(&p->read.meter, read.table, read.address),
                 number_time_text(read.intervalMs, time));
 }
 
@@ -245,8 +247,9 @@ static void report_first_failure(polling *p)
     if (exception == MBM_ILLEGAL_DATA_ADDRESS && table != 0)
         advice = say("In a manual, %u is address %u: write \"table: %s\" and \"address: %u\"",
                      planned->address, address, value_table_names[table], address);
-    else if (exception == MBM_ILLEGAL_DATA_ADDRESS && p->gap > 0)
-        advice = say("%s. Try without --gap", advice);
+    else if (exception == MBM_ILLEGAL_DATA_ADDRESS &&
+             (p->read.setup.registerGap | p->read.setup.bitGap))
+        advice = say("%s. Try without %s", advice, p->gap > 0 ? "--gap" : "gap in the file");
     (void)report_failure(who, status, exception, options.timeoutMs, why, advice);
 }
 
@@ -325,7 +328,7 @@ static void poll_rounds(polling *p)
 
 int poll_command(int argc, char **argv)
 {
-    static polling data;
+    static polling data = {.gap = DEVICE_PLAN_OWN_GAP};
     polling *p = &data;
     char wrong[YAML_FILE_WRONG_BYTES];
     int code;

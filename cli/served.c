@@ -98,12 +98,38 @@ static uint8_t check(const uint8_t *bitmap, const mbm_access *access)
 
 static uint8_t before_read(void *context, const mbm_access *access)
 {
-    return check(((const served_cells *)context)->readable, access);
+    const served_cells *cells = (const served_cells *)context;
+
+    if (cells->most_read > 0 && access->quantity > cells->most_read)
+        return MBM_ILLEGAL_DATA_VALUE;
+    return check(cells->readable, access);
+}
+
+/* Whether the device has the function that writes its cells. */
+static int has_function(const served_cells *cells, const mbm_access *access)
+{
+    const int is_single = access->function == MBM_FC_WRITE_SINGLE_COIL ||
+                          access->function == MBM_FC_WRITE_SINGLE_REGISTER;
+    uint32_t i;
+
+    if (access->function == MBM_FC_MASK_WRITE_REGISTER)
+        return 1;
+    for (i = 0; i < access->quantity; i++)
+        if (cells->functions[(uint16_t)(access->address + i)] ==
+            (is_single ? DEVICE_MULTIPLE : DEVICE_SINGLE))
+            return 0;
+    return 1;
 }
 
 static uint8_t before_write(void *context, const mbm_access *access)
 {
-    return check(((const served_cells *)context)->writable, access);
+    const served_cells *cells = (const served_cells *)context;
+
+    if (!has_function(cells, access))
+        return MBM_ILLEGAL_FUNCTION;
+    if (cells->most_written > 0 && access->quantity > cells->most_written)
+        return MBM_ILLEGAL_DATA_VALUE;
+    return check(cells->writable, access);
 }
 
 /* Makes the cells of a table. Returns 0, or -1 without memory. */
@@ -127,13 +153,14 @@ static int make_cells(served_units *units, uint8_t unit, uint8_t table, enum ser
     if (kind == SERVED_DEVICE) {
         cells->readable = (uint8_t *)calloc(1, BITMAP);
         cells->writable = (uint8_t *)calloc(1, BITMAP);
+        cells->functions = (uint8_t *)calloc(1, CELLS);
         cells->callbacks.isValid = exists;
         cells->hooks.beforeRead = before_read;
         cells->hooks.beforeWrite = before_write;
         (void)mbm_dataCallbacks_setHooks(&cells->callbacks, &cells->hooks);
     }
     if (!cells->values || (kind == SERVED_RANDOM && !cells->written) ||
-        (kind == SERVED_DEVICE && !(cells->readable && cells->writable)))
+        (kind == SERVED_DEVICE && !(cells->readable && cells->writable && cells->functions)))
         return -1;
     (void)mbm_unit_serveCallbacks(&units->units[unit], &cells->callbacks, table);
     return 0;
@@ -215,14 +242,16 @@ static void add_field(served_units *units, const device_field *field, const mbm_
             cells->values[address] = (uint16_t)((cells->values[address] & ~mask) | field->words[i]);
         if (field->access & DEVICE_READ)
             add(cells->readable, address);
-        if (field->access & DEVICE_WRITE)
+        if (field->access & DEVICE_WRITE) {
             add(cells->writable, address);
+            cells->functions[address] = field->write_function;
+        }
     }
 }
 
 int served_make_device(served_units *units, const device *from, served_hook *hook)
 {
-    uint8_t ids[255], is_known[256] = {0}, count = 0;
+    uint8_t ids[255], is_known[256] = {0}, count = 0, table;
     uint16_t i;
 
     for (i = 0; i < from->count; i++)
@@ -232,6 +261,14 @@ int served_make_device(served_units *units, const device *from, served_hook *hoo
             ids[count++] = (uint8_t)i;
     if (begin(units, SERVED_DEVICE, ids, count, from->name, hook) != 0)
         return -1;
+    for (i = 0; i < count; i++)
+        for (table = MBM_TABLE_COILS; table <= MBM_TABLE_INPUT_REGISTERS; table++) {
+            const int is_bits = table <= MBM_TABLE_DISCRETE_INPUTS;
+            served_cells *cells = &units->cells[i][table - 1];
+
+            cells->most_read = is_bits ? from->limits.read_bits : from->limits.read_registers;
+            cells->most_written = is_bits ? from->limits.write_bits : from->limits.write_registers;
+        }
     for (i = 0; i < from->count; i++)
         add_field(units, &from->fields[i], &from->planned[i]);
     return 0;
@@ -246,6 +283,7 @@ void served_free(served_units *units)
             free(units->cells[i][table].values);
             free(units->cells[i][table].readable);
             free(units->cells[i][table].writable);
+            free(units->cells[i][table].functions);
             free(units->cells[i][table].written);
         }
     free(units->cells);

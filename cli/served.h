@@ -19,6 +19,10 @@ typedef struct served_cells {
     /* One bit for each address. Only cells of a device may be neither readable nor writable.
      * `written` are the random cells that hold what was written. */
     uint8_t *readable, *writable, *written;
+    /* Of a device: the most cells of one request, 0 for as many as the standard says, and by which
+     * function each cell is written. */
+    uint16_t most_read, most_written;
+    uint8_t *functions;
 } served_cells;
 
 /* Called for each request before it is served; returns an exception code, or 0. */

@@ -1,5 +1,6 @@
 /* mbm write: writes values. Licence: MIT OR Apache-2.0. */
 #include "advice.h"
+#include "device.h"
 #include "line.h"
 #include "options.h"
 #include "report.h"
@@ -18,7 +19,7 @@ typedef struct writing {
     const char *address_text;
     char *value_texts[MBM_MAX_WRITE_BITS + 1];
     unsigned value_count;
-    int is_multiple;
+    uint8_t function;        /* DEVICE_BY_SIZE, DEVICE_SINGLE or DEVICE_MULTIPLE */
     uint16_t address, total; /* registers or coils */
     uint16_t words[MBM_MAX_WRITE_BITS + VALUE_WORDS];
     uint8_t bits[MBM_MAX_WRITE_BITS / 8];
@@ -26,7 +27,7 @@ typedef struct writing {
 
 /* --- the command line --- */
 
-enum { MULTIPLE = 1 };
+enum { MULTIPLE = 1, WRITE_FUNCTION };
 
 static void read_text(writing *w, const struct argp_state *state, const char *text)
 {
@@ -84,6 +85,9 @@ static void check_arguments(writing *w, const struct argp_state *state)
     if (w->total > most)
         options_wrong(state, "one request writes at most %u %s", most,
                       is_bits ? "coils" : "registers");
+    if (w->function == DEVICE_SINGLE && w->total > 1)
+        options_wrong(state, "--write-function single writes one %s, and these are %u",
+                      is_bits ? "coil" : "register", w->total);
     if (w->address + w->total > 65536)
         options_wrong(state, "%u addresses from %u on end beyond the last address, 65535", w->total,
                       w->address);
@@ -94,7 +98,11 @@ static error_t parse(int key, char *text, struct argp_state *state)
     writing *w = (writing *)state->input;
 
     switch (key) {
-    case MULTIPLE: w->is_multiple = 1; return 0;
+    case MULTIPLE: w->function = DEVICE_MULTIPLE; return 0;
+    case WRITE_FUNCTION:
+        w->function =
+            (uint8_t)(1 + options_word(state, "--write-function", text, device_functions));
+        return 0;
     case ARGP_KEY_ARG:
         if (*text == MINUS)
             *text = '-';
@@ -111,8 +119,9 @@ static error_t parse(int key, char *text, struct argp_state *state)
 }
 
 static const struct argp_option texts[] = {
-    {"multiple", MULTIPLE, NULL, 0,
-     "Write one coil or register with function 0F or 10 too, not 05 or 06", 1},
+    {"write-function", WRITE_FUNCTION, "WORD", 0,
+     "single: only functions 05 and 06; multiple: only 0F and 10 (as many values as there are)", 1},
+    {"multiple", MULTIPLE, NULL, 0, "The same as --write-function multiple", 1},
     {0}};
 
 static const struct argp_child children[] = {
@@ -164,7 +173,7 @@ static void hide_minus(int argc, char **argv)
 
 static uint8_t queue(writing *w, mbm_clientRequest *request, unsigned *function)
 {
-    const int is_one = w->total == 1 && !w->is_multiple;
+    const int is_one = w->total == 1 && w->function != DEVICE_MULTIPLE;
     uint16_t i;
 
     if (options.table == MBM_TABLE_COILS) {

@@ -9,9 +9,16 @@
 #include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { MOST_WORD = 100 };
+
+/* A word that is not in the file as it is read. */
+struct yaml_file_word {
+    struct yaml_file_word *next;
+    char text[];
+};
 
 size_t yaml_file_line(const yaml_node_t *node)
 {
@@ -31,6 +38,9 @@ __attribute__((format(printf, 3, 0))) static int refuse_at(yaml_file *file, size
     else
         snprintf(file->wrong, sizeof file->wrong, "%s: ", file->path);
     length = strlen(file->wrong);
+    if (*file->number)
+        length += (size_t)snprintf(file->wrong + length, sizeof file->wrong - length,
+                                   "repetition %s: ", file->number);
     vsnprintf(file->wrong + length, sizeof file->wrong - length, format, values);
     return 0;
 }
@@ -134,9 +144,42 @@ int yaml_file_read(const char *path, yaml_file_reader read, void *into,
 
     if (root)
         (void)read(&file, root, into);
+    while (file.made) {
+        struct yaml_file_word *word = file.made;
+
+        file.made = word->next;
+        free(word);
+    }
     yaml_document_delete(&file.document);
     memcpy(wrong, file.wrong, sizeof file.wrong);
     return file.code;
+}
+
+/* Puts the number of the repetition in its places. Returns NULL after a refusal. */
+static const char *put_number(yaml_file *file, const char *key, const yaml_node_t *node,
+                              const char *text, size_t most)
+{
+    const size_t mark = sizeof YAML_FILE_NUMBER - 1, length = strlen(file->number);
+    struct yaml_file_word *word;
+    size_t marks = 0;
+    const char *at;
+    char *to;
+
+    for (at = text; (at = strstr(at, YAML_FILE_NUMBER)) != NULL; at += mark)
+        marks++;
+    word = (struct yaml_file_word *)malloc(sizeof *word + strlen(text) + marks * length + 1);
+    if (!word)
+        return yaml_file_fail(file, ENOMEM), NULL;
+    word->next = file->made;
+    file->made = word;
+    for (to = word->text; (at = strstr(text, YAML_FILE_NUMBER)) != NULL; text = at + mark)
+        to += sprintf(to, "%.*s%s", (int)(at - text), text, file->number);
+    strcpy(to, text);
+    if (strlen(word->text) > most)
+        return yaml_file_refuse(file, node, "%s has more than %zu bytes with its number", key,
+                                most),
+               NULL;
+    return word->text;
 }
 
 const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *node, size_t most)
@@ -155,6 +198,8 @@ const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *
          at++)
         if (*at < ' ' || *at == 0x7F || (*at == 0xC2 && at[1] < 0xA0))
             return yaml_file_refuse(file, node, "%s has a control character", key), NULL;
+    if (*file->number && strstr((const char *)node->data.scalar.value, YAML_FILE_NUMBER))
+        return put_number(file, key, node, (const char *)node->data.scalar.value, most);
     return (const char *)node->data.scalar.value;
 }
 

@@ -8,13 +8,18 @@
 #include <stdint.h>
 #include <yaml.h>
 
-enum { YAML_FILE_WRONG_BYTES = 600 };
+enum { YAML_FILE_WRONG_BYTES = 1000, YAML_FILE_NUMBER_BYTES = 12 };
+
+/* Stands for the number of a repetition in its words. */
+#define YAML_FILE_NUMBER "{n}"
 
 typedef struct yaml_file {
     const char *path;
     yaml_document_t document; /* while the file is open */
     int code;                 /* CODE_DONE; CODE_SYSTEM or CODE_WRONG after the first refusal */
-    char wrong[YAML_FILE_WRONG_BYTES]; /* a sentence without its full stop: "FILE:12: ..." */
+    char wrong[YAML_FILE_WRONG_BYTES];   /* a sentence without its full stop: "FILE:12: ..." */
+    char number[YAML_FILE_NUMBER_BYTES]; /* of the repetition that is read; empty in none */
+    struct yaml_file_word *made;         /* words in which that number stands */
 } yaml_file;
 
 /* Reads the root of a file into `into`. Returns 0 after a refusal. */
@@ -47,8 +52,8 @@ int yaml_file_keys(yaml_file *file, const char *what, const yaml_node_t *mapping
 
 /* --- one word --- */
 
-/* The text of a node, which has at most `most` bytes and no control characters. Returns NULL after
- * a refusal. */
+/* The text of a node, which has at most `most` bytes and no control characters. In a repetition its
+ * number stands in place of each YAML_FILE_NUMBER. Returns NULL after a refusal. */
 const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *node, size_t most);
 
 /* The same of a number, which must not begin with 0. */

@@ -1,0 +1,215 @@
+"""Limits of a device, addresses as its manual prints them, and repeated fields: mbm with servers of libmodbus and pymodbus,
+with mbm serve, and with devices that have one function alone."""
+
+import json
+
+import peers
+import pytest
+from peers import DONE, EXCEPTION, PATIENT, TcpDevice, bit, number, pymodbus, wait, word, words
+from services import Broker, Subscriber
+
+
+@pytest.fixture(params=["libmodbus", "pymodbus"])
+def server(request):
+    """The line of a server of unit 17, whose registers and coils are known."""
+    if request.param == "libmodbus":
+        return f"tcp://127.0.0.1:{peers.libmodbus()[2]}"
+    return f"tcp://127.0.0.1:{pymodbus('tcp', '--port', '0').ready[0]}"
+
+
+@pytest.fixture
+def poll(mbm, write):
+    def poll(line, text, *options):
+        """The values that mbm poll reads in one round, by the names of their fields, and what it says."""
+        found = mbm("poll", line, write("device.yaml", text), "--once", "--json", "-q", *options, *PATIENT)
+        assert found.code == DONE, found
+        return {one["name"]: one["value"] for one in map(json.loads, found.out.splitlines())}, found.error
+
+    return poll
+
+
+# --- addresses ---
+
+def test_addresses_of_each_notation_are_those_that_the_device_has(poll, server):
+    wanted = {"level": word(100), "inverse": word(8) ^ 0xFFFF, "relay": bool(bit(30)), "state": not bit(30)}
+    modicon = "notation: modicon\nunit: 17\nfields:\n"
+    assert poll(server, modicon + """\
+- {name: level, address: 40101, type: uint16}
+- {name: inverse, address: 30009, type: uint16}
+- {name: relay, address: 31}
+- {name: state, address: 10031}
+""")[0] == wanted
+    assert poll(server, modicon + """\
+- {name: level, address: 400101, type: uint16}
+- {name: inverse, address: IR9, table: input, type: uint16}
+- {name: relay, address: "000031"}
+- {name: state, address: di31}
+""")[0] == wanted
+    assert poll(server, """\
+one_based: true
+unit: 17
+fields:
+- {name: level, table: holding, address: 101, type: uint16}
+- {name: inverse, table: input, address: 9, type: uint16}
+- {name: relay, table: coils, address: 31}
+- {name: state, table: discrete, address: 31}
+""")[0] == wanted
+
+
+def test_a_plan_is_shown_with_the_addresses_of_the_file(poll, server):
+    _, said = poll(server, "notation: modicon\nunit: 17\nfields: [{name: level, address: 40101, type: uint16}]\n", "--show-plan")
+    assert said == "request 1: unit 17, holding, 1 from 40101 on, every 1s\n"
+    _, said = poll(server, "one_based: yes\nunit: 17\nfields: [{name: level, table: coils, address: 31}]\n", "--show-plan")
+    assert said == "request 1: unit 17, coils, 1 from 31 on, every 1s\n"
+
+
+# --- repeated fields ---
+
+CHANNELS = """\
+unit: 17
+fields:
+- repeat: {count: 5, every: 40}
+  fields:
+  - {name: "channel {n} level", table: holding, address: 10, type: uint16}
+  - {name: relay, table: coils, address: 11}
+- {name: last, table: holding, address: 2, type: uint16, repeat: {count: 3, every: 1, first: 0}}
+"""
+CHANNEL_VALUES = {**{f"channel {n + 1} level": word(10 + 40 * n) for n in range(5)}, **{f"relay {n + 1}": bool(bit(11 + 40 * n)) for n in range(5)},
+                  **{f"last {n}": word(2 + n) for n in range(3)}}
+
+
+def test_repeated_fields_are_read_each_at_its_address(poll, server):
+    assert poll(server, CHANNELS)[0] == CHANNEL_VALUES
+
+
+def test_mbm_serve_is_a_device_with_repeated_fields(mbm, poll, write):
+    text = CHANNELS.replace("address: 10,", "address: 10, value: 7,")
+    place = mbm.serve("tcp://127.0.0.1:0", write("served.yaml", text))
+    values, _ = poll(place, text)
+    assert [values[f"channel {n} level"] for n in range(1, 6)] == [7] * 5
+
+
+def test_a_header_has_repeated_fields_with_their_numbers(plain, write):
+    header = plain("header", write("device.yaml", CHANNELS)).out
+    assert "#define DEVICE_CHANNEL_5_LEVEL_ADDRESS 170u\n" in header and "#define DEVICE_LAST_0_ADDRESS 2u\n" in header
+
+
+# --- limits ---
+
+LIMITED = """\
+max_read_registers: 10
+max_read_bits: 20
+excluded: [holding: 25-26]
+gap: {{registers: 3, bits: 30}}
+unit: 17
+fields:
+- {{name: levels, table: holding, address: 0, type: uint16, repeat: {{count: 25, every: 1}}}}
+- {{name: after, table: holding, address: 27, type: uint16}}
+- {{name: near, table: holding, address: 31, type: uint16}}
+- {{name: relay, table: coils, address: 100, repeat: {{count: 3, every: 19}}}}
+{more}"""
+
+
+def reads(said):
+    """The requests of a plan: table, quantity and first address."""
+    return [(words[4].rstrip(","), int(words[5]), int(words[7])) for words in (line.split() for line in said.splitlines())]
+
+
+def test_requests_keep_within_the_limits_of_the_file(poll, server):
+    values, said = poll(server, LIMITED.format(more=""), "--show-plan")
+    assert values == {**{f"levels {n + 1}": word(n) for n in range(25)}, "after": word(27), "near": word(31),
+                      **{f"relay {n + 1}": bool(bit(100 + 19 * n)) for n in range(3)}}
+    shown = reads(said)
+    for table, quantity, first in shown:
+        assert quantity <= (10 if table == "holding" else 20)
+        assert table == "coils" or first + quantity <= 25 or first > 26
+    assert len(shown) == 6
+
+
+def test_the_gap_of_the_command_line_wins(poll, server):
+    text = "gap: 3\nunit: 17\nfields:\n- {name: a, table: holding, address: 0, type: uint16, repeat: {count: 3, every: 4}}\n"
+    assert reads(poll(server, text, "--show-plan")[1]) == [("holding", 9, 0)]
+    assert len(reads(poll(server, text, "--show-plan", "--gap", 0)[1])) == 3
+    assert reads(poll(server, text.replace("3\n", "0\n", 1), "--show-plan", "--gap", 3)[1]) == [("holding", 9, 0)]
+
+
+def test_mbm_header_groups_within_the_limits_of_the_file(plain, write):
+    header = plain("header", write("device.yaml", LIMITED.format(more=""))).out
+    assert "#define DEVICE_READS 6\n" in header.replace("u\n", "\n")
+
+
+SERVED = """\
+max_read_registers: 4
+max_read_bits: 9
+max_write_registers: 2
+max_write_bits: 3
+fields:
+- {name: level, table: holding, address: 0, type: uint16, count: 4, access: read, value: [1, 2, 3, 4]}
+- {name: limit, table: holding, address: 4, type: uint16, access: read-write}
+- {name: ramp, table: holding, address: 5, type: uint32, access: read-write, write_function: multiple}
+- {name: mode, table: holding, address: 7, type: uint16, access: read-write, write_function: multiple}
+- {name: step, table: holding, address: 8, type: uint16, access: read-write, write_function: single}
+- {name: lamps, table: coils, address: 0, count: 3, access: read-write}
+- {name: more lamps, table: coils, address: 3, count: 7}
+"""
+REFUSED = "exception {}: illegal {}"
+
+
+def test_mbm_serve_keeps_the_limits_of_its_file(mbm, write):
+    place = mbm.serve("tcp://127.0.0.1:0", write("served.yaml", SERVED))
+    mbm.prints("    0  1\n    1  2\n    2  3\n    3  4\n", "read", place, 0, 4)
+    mbm.fails(EXCEPTION, REFUSED.format("03", "data value"), "read", place, 0, 5, *PATIENT)
+    mbm.fails(EXCEPTION, REFUSED.format("03", "data value"), "read", place, "-t", "coils", 0, 10, *PATIENT)
+    mbm.fails(EXCEPTION, REFUSED.format("03", "data value"), "write", place, 4, 1, 2, 3, *PATIENT)
+    mbm.prints("unit 1: wrote 2 holding registers from address 5 on, function 10\n", "write", place, 5, 1, 2)
+    mbm.fails(EXCEPTION, REFUSED.format("01", "function"), "write", place, 7, 1, *PATIENT)
+    mbm.prints("unit 1: wrote 1 holding register from address 7 on, function 10\n", "write", place, 7, 1, "--write-function", "multiple")
+    mbm.fails(EXCEPTION, REFUSED.format("01", "function"), "write", place, 8, 1, "--multiple", *PATIENT)
+    mbm.prints("unit 1: wrote 1 holding register from address 8 on, function 06\n", "write", place, 8, 1, "--write-function", "single")
+
+
+def test_a_write_of_one_function_alone_has_one_value(plain):
+    plain.fails(2, "--write-function single writes one register, and these are 2", "write", "tcp://127.0.0.1:1", 0, 1, 2, "--write-function", "single")
+    plain.fails(2, "--write-function single writes one coil, and these are 3", "write", "tcp://127.0.0.1:1", 0, "-t", "coils", 1, 0, 1,
+                "--write-function", "single")
+    plain.fails(2, '--write-function "both" is not one of single and multiple', "write", "tcp://127.0.0.1:1", 0, 1, "--write-function", "both")
+
+
+# --- the bridge ---
+
+WRITABLE = """\
+interval: 200ms
+{}fields:
+- {{name: level, table: holding, address: 0, type: uint16, access: read-write}}
+- {{name: step, table: holding, address: 1, type: uint16, access: read-write, write_function: single}}
+- {{name: lamp, table: coils, address: 2, access: read-write}}
+"""
+
+
+def answer(pdu):
+    """A device that takes every write, and whose registers and coils are 0."""
+    if pdu[0] == 3:
+        return number(0) if pdu[4] == 1 else bytes([3, 2 * pdu[4]]) + bytes(2 * pdu[4])
+    return b"\x01\x01\x00" if pdu[0] == 1 else pdu[:5]
+
+
+@pytest.mark.parametrize("head, options, wanted", [
+    ("", (), {"level": "0600000007", "step": "0600010007", "lamp": "050002ff00"}),
+    ("write_function: multiple\n", (), {"level": "1000000001020007", "step": "0600010007", "lamp": "0f000200010101"}),
+    ("", ("--write-function", "multiple"), {"level": "1000000001020007", "step": "0600010007", "lamp": "0f000200010101"}),
+    ("write_function: single\n", ("--write-function", "multiple"), {"level": "0600000007", "step": "0600010007", "lamp": "050002ff00"}),
+])
+def test_the_bridge_writes_by_the_function_that_the_device_has(plain, folder, write, head, options, wanted):
+    device, broker = TcpDevice(answer), Broker(folder).come()
+    plain.begin("bridge", "-b", broker.place, "-t", "hall", *options, device.line, write("device.yaml", WRITABLE.format(head)))
+    subscriber = Subscriber(broker)
+    subscriber.expect_last("hall/unit/1/status", "online")
+    for name, pdu in wanted.items():
+        broker.publish(f"hall/{name}/set", "true" if name == "lamp" else "7")
+        assert wait(lambda: (1, pdu) in device.asked), (pdu, device.asked)
+
+
+def test_the_bridge_refuses_a_field_that_its_function_cannot_write(plain, write):
+    text = "fields: [{name: level, table: holding, address: 0, type: uint32, access: read-write}]\n"
+    plain.fails(2, "level: write_function single writes one coil or register, and the field has more", "bridge", "--check",
+                "--write-function", "single", "tcp://127.0.0.1:1", write("device.yaml", text))
