@@ -11,11 +11,9 @@ mod client;
 #[cfg(feature = "pymodbus")]
 mod live_server;
 #[cfg(feature = "pymodbus")]
+mod pdus;
+#[cfg(feature = "pymodbus")]
 mod process;
-#[cfg(feature = "pymodbus")]
-mod requests;
-#[cfg(feature = "pymodbus")]
-mod responses;
 #[cfg(feature = "pymodbus")]
 mod server;
 
