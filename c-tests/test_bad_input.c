@@ -101,18 +101,6 @@ SIM_TEST(a_port_without_its_three_hooks_is_refused)
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
-SIM_TEST(the_last_address_can_be_read_and_written)
-{
-    sim_answer(s, 1, 500, "11 03 02 00 07 +");
-    OK(mbm_node_readHoldingRegisters(n, 65535, 1));
-    sim_answer(s, 1, 500, "11 0F FF FE 00 02 +");
-    OK(mbm_node_writeMultipleCoils(n, 65534, 2));
-    sim_answer(s, 1, 500, "11 06 FF FF 00 02 +");
-    OK(mbm_node_writeSingleRegister(n, 65535, 2));
-    sim_answer(s, 1, 500, "11 17 02 00 07 +");
-    OK(mbm_node_readWriteMultipleRegisters(n, 65535, 1, 65535, 1));
-}
-
 /* Buffers of exactly these sizes, so that sanitizers report an access to one byte more. */
 typedef struct buffers {
     uint16_t *response, *transmit;

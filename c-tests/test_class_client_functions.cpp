@@ -1,5 +1,6 @@
-/* ModbusSerialClient: the request and the reply of every function, and the values in a
- * request's words. The frames are the examples of the standard where it has one. */
+/* ModbusSerialClient: the request and the reply of every function that is not in
+ * test_class_exchanges.cpp, and the values in a request's words. The frames are the examples of the
+ * standard where it has one. */
 #include "client_checks.h"
 
 #include <math.h>
@@ -15,50 +16,9 @@ static void words_of(ModbusRequest &request, std::initializer_list<uint16_t> val
         request[index++] = value;
 }
 
-CLIENT_TEST(bits_are_read_and_written)
-{
-    ModbusRequestOf<4> request(17);
-    expect_exchange(client, client.readCoils(request, 0x13, 0x13), {17, 1, 0, 0x13, 0, 0x13},
-                    {17, 1, 3, 0xCD, 0x6B, 5});
-    assert_true(request.getBit(0) && !request.getBit(1) && request.getBit(2));
-    assert_true(request.getBit(18) && !request.getBit(17));
-    assert_int_equal(request.getByte(1), 0x6B);
-    expect_exchange(client, client.readDiscreteInputs(request, 0xC4, 0x16),
-                    {17, 2, 0, 0xC4, 0, 0x16}, {17, 2, 3, 0xAC, 0xDB, 0x35});
-    assert_true(!request.getBit(0) && request.getBit(2) && request.getBit(21));
-    expect_exchange(client, client.writeSingleCoil(request, 0xAC, true), {17, 5, 0, 0xAC, 0xFF, 0},
-                    {17, 5, 0, 0xAC, 0xFF, 0});
-    expect_exchange(client, client.writeSingleCoil(request, 0xAC, false), {17, 5, 0, 0xAC, 0, 0},
-                    {17, 5, 0, 0xAC, 0, 0});
-    const bool coils[] = {1, 0, 1, 1, 0, 0, 1, 1, 1, 0};
-    for (uint16_t i = 0; i < 10; i++)
-        assert_int_equal(request.setBit(i, coils[i]), MBM_OK);
-    for (uint16_t i = 10; i < 16; i++)
-        request.setBit(i, false);
-    expect_exchange(client, client.writeMultipleCoils(request, 0x13, 10),
-                    {17, 15, 0, 0x13, 0, 10, 2, 0xCD, 1}, {17, 15, 0, 0x13, 0, 10});
-    assert_int_equal(request.status(), MBM_OK);
-}
-
-CLIENT_TEST(registers_are_read_and_written)
+CLIENT_TEST(a_queue_is_read)
 {
     ModbusRequestOf<6> request(17);
-    expect_exchange(client, client.readInputRegisters(request, 8, 1), {17, 4, 0, 8, 0, 1},
-                    {17, 4, 2, 0, 10});
-    assert_int_equal(request[0], 10);
-    words_of(request, {10, 0x0102});
-    expect_exchange(client, client.writeMultipleRegisters(request, 1, 2),
-                    {17, 16, 0, 1, 0, 2, 4, 0, 10, 1, 2}, {17, 16, 0, 1, 0, 2});
-    expect_exchange(client, client.maskWriteRegister(request, 4, 0xF2, 0x25),
-                    {17, 22, 0, 4, 0, 0xF2, 0, 0x25}, {17, 22, 0, 4, 0, 0xF2, 0, 0x25});
-    words_of(request, {0xFF, 0xFE, 0xFD});
-    expect_exchange(client, client.readWriteMultipleRegisters(request, 3, 6, 14, 3),
-                    {17, 23, 0, 3, 0, 6, 0, 14, 0, 3, 6, 0, 0xFF, 0, 0xFE, 0, 0xFD},
-                    {17, 23, 12, 0, 0xFE, 10, 0xCD, 0, 1, 0, 3, 0, 13, 0, 0xFF});
-    assert_int_equal(request.status(), MBM_OK);
-    assert_int_equal(request[0], 0xFE);
-    assert_int_equal(request[1], 0x0ACD);
-    assert_int_equal(request[5], 0xFF);
     expect_exchange(client, client.readFifoQueue(request, 0x04DE), {17, 24, 4, 0xDE},
                     {17, 24, 0, 6, 0, 2, 1, 0xB8, 0x12, 0x84});
     assert_int_equal(request.length(), 4);

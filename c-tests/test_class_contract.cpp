@@ -81,26 +81,6 @@ TEST(the_response_timeout_is_two_seconds)
     }
 }
 
-MASTER_TEST(exception_codes_are_returned_unchanged)
-{
-    for (int code : {1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 0x55, 0x7F}) {
-        Serial.reply(adu({1, 0x83, code}));
-        assert_int_equal(node.readHoldingRegisters(0, 1), code);
-        assert_int_equal(node.getExceptionCode(), code);
-    }
-}
-
-MASTER_TEST(each_failure_has_its_status)
-{
-    Serial.reply(adu({2, 3, 2, 0, 7}));
-    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBInvalidSlaveID);
-    Serial.reply(adu({1, 4, 2, 0, 7}));
-    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBInvalidFunction);
-    Serial.reply(raw({1, 3, 2, 0, 7, 0x12, 0x34}));
-    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBInvalidCRC);
-    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
-}
-
 MASTER_TEST(a_failure_keeps_the_response_words_and_a_transaction_the_transmit_words)
 {
     node.setTransmitBuffer(0, 0x0A0B);
@@ -155,27 +135,6 @@ MASTER_TEST(the_write_address_is_shared)
     Serial.reply(adu({1, 16, 0, 0x55, 0, 1}));
     assert_int_equal(node.writeMultipleRegisters(), 0);
     assert_sent(Serial, {1, 16, 0, 0x55, 0, 1, 2, 0, 9});
-}
-
-MASTER_TEST(reads_of_65_to_125_registers_are_sent)
-{
-    for (int quantity : {65, 66, 125}) {
-        Serial.reply(adu({1, 0x83, 2}));
-        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)), 2);
-        assert_sent(Serial, {1, 3, 0, 0, 0, quantity});
-    }
-}
-
-TEST(units_above_247_are_accepted)
-{
-    ModbusMaster node;
-    for (int unit : {247, 248, 255}) {
-        node.begin(static_cast<uint8_t>(unit), Serial);
-        Serial.reply(adu({unit, 3, 2, 0, unit}));
-        assert_int_equal(node.readHoldingRegisters(0xFFFF, 1), 0);
-        assert_sent(Serial, {unit, 3, 0xFF, 0xFF, 0, 1});
-        assert_int_equal(node.getResponseBuffer(0), unit);
-    }
 }
 
 TEST(callbacks_survive_begin)

@@ -238,43 +238,6 @@ MASTER_TEST(request_from_reads_words_for_receive)
     assert_int_equal(node.status(), 2);
 }
 
-MASTER_TEST(each_read_has_its_function_code)
-{
-    Serial.reply(adu({1, 1, 2, 0xCD, 0x01}));
-    assert_int_equal(node.readCoils(0x13, 9), 0);
-    assert_sent(Serial, {1, 1, 0, 0x13, 0, 9});
-    assert_int_equal(node.getResponseBuffer(0), 0x01CD);
-    Serial.reply(adu({1, 2, 3, 0xAC, 0xDB, 0x35}));
-    assert_int_equal(node.readDiscreteInputs(0xC4, 22), 0);
-    assert_sent(Serial, {1, 2, 0, 0xC4, 0, 22});
-    assert_int_equal(node.getResponseBuffer(0), 0xDBAC);
-    assert_int_equal(node.getResponseBuffer(1), 0x0035);
-    Serial.reply(adu({1, 4, 2, 0, 10}));
-    assert_int_equal(node.readInputRegisters(8, 1), 0);
-    assert_sent(Serial, {1, 4, 0, 8, 0, 1});
-    assert_int_equal(node.getResponseBuffer(0), 10);
-}
-
-MASTER_TEST(each_write_has_its_function_code)
-{
-    Serial.reply(adu({1, 5, 0, 0xAC, 0xFF, 0}));
-    assert_int_equal(node.writeSingleCoil(0xAC, 0x55), 0);
-    assert_sent(Serial, {1, 5, 0, 0xAC, 0xFF, 0});
-    Serial.reply(adu({1, 5, 0, 0xAC, 0, 0}));
-    assert_int_equal(node.writeSingleCoil(0xAC, 0), 0);
-    assert_sent(Serial, {1, 5, 0, 0xAC, 0, 0});
-    node.setTransmitBuffer(0, 0x01CD);
-    Serial.reply(adu({1, 15, 0, 0x13, 0, 10}));
-    assert_int_equal(node.writeMultipleCoils(0x13, 10), 0);
-    assert_sent(Serial, {1, 15, 0, 0x13, 0, 10, 2, 0xCD, 0x01});
-    Serial.reply(adu({1, 0x16, 0, 4, 0, 0xF2, 0, 0x25}));
-    assert_int_equal(node.maskWriteRegister(4, 0xF2, 0x25), 0);
-    assert_sent(Serial, {1, 0x16, 0, 4, 0, 0xF2, 0, 0x25});
-    Serial.reply(adu({1, 16, 0, 1, 0, 2}));
-    assert_int_equal(node.writeMultipleRegisters(1, 2), 0);
-    assert_sent(Serial, {1, 16, 0, 1, 0, 2, 4, 0, 0xF2, 0, 0x25});
-}
-
 MASTER_TEST(reading_and_writing_at_once_has_two_forms)
 {
     node.setTransmitBuffer(0, 0x00FF);

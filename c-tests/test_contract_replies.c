@@ -1,5 +1,5 @@
-/* The contract with programs for ModbusMaster about replies: what is a success,
- * which failure has which status, and that a reply is found among the bytes of a bad wire. */
+/* The contract with programs for ModbusMaster about replies, beside the exchanges of
+ * test_exchanges.c: all exception codes and lengths, pauses, echoes and counters. */
 #include "sim.h"
 #include "test.h"
 
@@ -18,17 +18,6 @@ static void recovers_at_once(sim *s)
     assert_int_equal(s->response[0], 42);
 }
 
-static void found_after(sim *s, const char *noise)
-{
-    char reply[600];
-
-    snprintf(reply, sizeof reply, "%s / 11 03 04 12 34 56 78 +", noise);
-    OK(read_words(s, 2, reply));
-    assert_int_equal(s->response[0], 0x1234);
-    assert_int_equal(s->response[1], 0x5678);
-    recovers_at_once(s);
-}
-
 SIM_TEST(exception_codes_of_the_device_are_returned_unchanged)
 {
     for (unsigned code = 1; code < 0x80; code++) {
@@ -45,65 +34,6 @@ SIM_TEST(exception_codes_of_the_device_are_returned_unchanged)
     assert_int_equal(s->counters.exceptions, 0x7F);
     recovers_at_once(s);
     assert_int_equal(mbm_node_getExceptionCode(n), 0);
-}
-
-SIM_TEST(an_exception_code_of_0_or_from_80_on_is_malformed_and_kept)
-{
-    assert_int_equal(read_words(s, 1, "11 83 00 +"), MBM_MALFORMED_REPLY);
-    assert_int_equal(mbm_node_getExceptionCode(n), 0);
-    assert_int_equal(read_words(s, 1, "11 83 80 +"), MBM_MALFORMED_REPLY);
-    assert_int_equal(mbm_node_getExceptionCode(n), 0x80);
-    assert_int_equal(read_words(s, 1, "11 83 E2 +"), MBM_MALFORMED_REPLY);
-    assert_int_equal(mbm_node_getExceptionCode(n), 0xE2);
-    recovers_at_once(s);
-}
-
-SIM_TEST(an_exception_with_a_bad_crc_is_no_exception)
-{
-    assert_int_equal(read_words(s, 1, "11 83 02 00 00"), MBM_INVALID_CRC);
-    assert_int_equal(mbm_node_getExceptionCode(n), 0);
-    assert_int_equal(s->counters.badCrc, 1);
-    recovers_at_once(s);
-}
-
-SIM_TEST(response_words_survive_a_failure)
-{
-    static const char *const replies[] = {"11 83 02 +",
-                                          "11 03 04 AA AA BB BB 00 00",
-                                          "11 03 02 AA AA +",
-                                          "11 04 04 AA AA BB BB +",
-                                          "12 03 04 AA AA BB BB +",
-                                          "11 03 04 AA",
-                                          ""};
-
-    OK(read_words(s, 2, "11 03 04 12 34 56 78 +"));
-    for (size_t i = 0; i < COUNT(replies); i++) {
-        assert_int_not_equal(read_words(s, 2, replies[i]), MBM_OK);
-        assert_int_equal(WORD(0), 0x1234);
-        assert_int_equal(WORD(1), 0x5678);
-        assert_int_equal(WORD(2), 0);
-    }
-}
-
-SIM_TEST(each_failure_has_its_status)
-{
-    assert_int_equal(read_words(s, 1, ""), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(read_words(s, 1, "12 03 02 00 01 +"), MBM_INVALID_SLAVE_ID);
-    assert_int_equal(read_words(s, 1, "11 04 02 00 01 +"), MBM_INVALID_FUNCTION);
-    assert_int_equal(read_words(s, 1, "11 84 02 +"), MBM_INVALID_FUNCTION);
-    assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
-    assert_int_equal(read_words(s, 1, "11 03 04 00 01 00 02 +"), MBM_MALFORMED_REPLY);
-    assert_int_equal(read_words(s, 1, "11 03 02 00"), MBM_RESPONSE_TIMED_OUT);
-    recovers_at_once(s);
-}
-
-SIM_TEST(the_most_specific_failure_is_reported)
-{
-    assert_int_equal(read_words(s, 1, "12 03 02 00 01 + / 11 04 02 00 01 +"), MBM_INVALID_FUNCTION);
-    assert_int_equal(read_words(s, 1, "11 04 02 00 01 + / 12 03 02 00 01 +"), MBM_INVALID_FUNCTION);
-    assert_int_equal(read_words(s, 1, "11 03 04 00 01 00 02 + / 11 04 02 00 01 +"),
-                     MBM_MALFORMED_REPLY);
-    recovers_at_once(s);
 }
 
 SIM_TEST(a_bad_crc_fails_after_t35_and_not_after_the_timeout)
@@ -134,91 +64,6 @@ SIM_TEST(all_125_registers_and_2000_bits_are_readable)
         assert_int_equal(WORD((uint8_t)i), (2 * i + 1) << 8 | (2 * i));
 }
 
-SIM_TEST(reads_of_65_registers_and_more_are_sent)
-{
-    assert_int_equal(read_words(s, 66, "11 83 02 +"), MBM_ILLEGAL_DATA_ADDRESS);
-    sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
-}
-
-SIM_TEST(a_byte_count_of_251_to_255_is_malformed)
-{
-    mbm_node_setResponseTimeout(n, 100);
-    for (unsigned count = 251; count < 256; count++) {
-        char reply[40];
-
-        snprintf(reply, sizeof reply, "11 03 %02X 12 34 56 78 +", count);
-        assert_int_equal(read_words(s, 1, reply), MBM_MALFORMED_REPLY);
-        /* With a wrong CRC it is no frame. */
-        reply[strlen(reply) - 1] = '\0';
-        assert_int_not_equal(read_words(s, 1, reply), MBM_OK);
-    }
-    recovers_at_once(s);
-}
-
-SIM_TEST(a_byte_count_that_does_not_suit_the_request_is_malformed)
-{
-    OK(read_words(s, 2, "11 03 04 11 11 22 22 +"));
-    assert_int_equal(read_words(s, 4, "11 03 02 AA AA +"), MBM_MALFORMED_REPLY);
-    assert_int_equal(WORD(0), 0x1111);
-    sim_answer(s, 1, 500, "11 01 02 FF FF +");
-    assert_int_equal(mbm_node_readCoils(n, 0, 8), MBM_MALFORMED_REPLY);
-    sim_answer(s, 1, 500, "11 17 02 FF FF +");
-    assert_int_equal(mbm_node_readWriteMultipleRegisters(n, 0, 2, 0, 1), MBM_MALFORMED_REPLY);
-    recovers_at_once(s);
-}
-
-static void malformed(sim *s, uint8_t status)
-{
-    assert_int_equal(status, MBM_MALFORMED_REPLY);
-    recovers_at_once(s);
-}
-
-SIM_TEST(an_echo_with_another_address_or_value_is_malformed)
-{
-    mbm_node_setResponseTimeout(n, 100);
-    sim_answer(s, 1, 500, "11 05 00 02 FF 00 +");
-    malformed(s, mbm_node_writeSingleCoil(n, 1, 1));
-    sim_answer(s, 1, 500, "11 05 00 01 00 00 +");
-    malformed(s, mbm_node_writeSingleCoil(n, 1, 1));
-    sim_answer(s, 1, 500, "11 06 00 02 12 34 +");
-    malformed(s, mbm_node_writeSingleRegister(n, 1, 0x1234));
-    sim_answer(s, 1, 500, "11 06 00 01 12 35 +");
-    malformed(s, mbm_node_writeSingleRegister(n, 1, 0x1234));
-    sim_answer(s, 1, 500, "11 0F 00 01 00 08 +");
-    malformed(s, mbm_node_writeMultipleCoils(n, 1, 9));
-    sim_answer(s, 1, 500, "11 0F 00 00 00 09 +");
-    malformed(s, mbm_node_writeMultipleCoils(n, 1, 9));
-    sim_answer(s, 1, 500, "11 10 00 01 00 01 +");
-    malformed(s, mbm_node_writeMultipleRegisters(n, 1, 2));
-    sim_answer(s, 1, 500, "11 10 01 01 00 02 +");
-    malformed(s, mbm_node_writeMultipleRegisters(n, 1, 2));
-    sim_answer(s, 1, 500, "11 16 00 01 00 02 00 04 +");
-    malformed(s, mbm_node_maskWriteRegister(n, 1, 2, 3));
-    sim_answer(s, 1, 500, "11 16 00 01 00 06 00 03 +");
-    malformed(s, mbm_node_maskWriteRegister(n, 1, 2, 3));
-}
-
-SIM_TEST(the_reply_is_found_after_stray_bytes)
-{
-    found_after(s, "00");
-    found_after(s, "FF FE 7F 00 33");
-    found_after(s, "11");
-    found_after(s, "11 11 11 11");
-    assert_int_equal(s->counters.resynchronisations, 4);
-}
-
-SIM_TEST(the_reply_is_found_after_noise_that_looks_like_its_header)
-{
-    found_after(s, "11 03");
-    found_after(s, "11 03 04");
-    found_after(s, "11 03 04 00");
-    found_after(s, "11 03 04 12 34 56 78");
-    found_after(s, "11 03 04 00 00 00 00 00 00");
-    found_after(s, "11 83");
-    found_after(s, "11 83 02 00 00");
-    assert_int_equal(s->sent, 14);
-}
-
 /* Four bytes that look like the start of a longer reply. An exception after them is found,
  * also if the line was silent between. */
 SIM_TEST(an_exception_after_noise_that_looks_like_a_longer_reply_is_found)
@@ -229,22 +74,6 @@ SIM_TEST(an_exception_after_noise_that_looks_like_a_longer_reply_is_found)
     sim_answer(s, 1, 20000, "11 83 02 +");
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 10), MBM_ILLEGAL_DATA_ADDRESS);
     assert_true(s->now - s->frames[1].end < 30000);
-}
-
-SIM_TEST(the_reply_is_found_after_a_frame_of_another_unit)
-{
-    found_after(s, "12 03 04 AA AA BB BB +");
-    found_after(s, "12 83 02 +");
-    found_after(s, "12 03 00 00 00 02 + / 12 03 04 AA AA BB BB +");
-    assert_int_equal(s->counters.foreignFrames, 4);
-}
-
-SIM_TEST(the_reply_is_found_after_a_late_reply_of_another_function_or_length)
-{
-    found_after(s, "11 04 04 AA AA BB BB +");
-    found_after(s, "11 03 02 AA AA +");
-    found_after(s, "11 06 00 01 00 02 +");
-    found_after(s, "11 84 02 +");
 }
 
 SIM_TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second)
@@ -357,6 +186,7 @@ SIM_TEST(counters_count_what_happened)
     assert_int_equal(read_words(s, 1, "11 83 02 +"), 2);
     assert_int_equal(read_words(s, 1, ""), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
+    assert_int_equal(s->counters.resynchronisations, 0);
     assert_int_equal(s->counters.requests, 4);
     assert_int_equal(s->counters.replies, 2);
     assert_int_equal(s->counters.exceptions, 1);
@@ -364,9 +194,14 @@ SIM_TEST(counters_count_what_happened)
     assert_int_equal(s->counters.badCrc, 1);
     assert_int_equal(s->counters.bytesSent, 32);
     assert_int_equal(s->counters.bytesReceived, 7 + 5 + 7);
+    /* Noise before the reply, and two frames of another unit. */
+    OK(read_words(s, 1, "00 / 11 03 02 00 2A +"));
+    OK(read_words(s, 1, "12 83 02 + / 12 03 02 00 01 + / 11 03 02 00 2A +"));
+    assert_int_equal(s->counters.resynchronisations, 1);
+    assert_int_equal(s->counters.foreignFrames, 2);
     OK(mbm_line_setCounters(&s->line, NULL));
     recovers_at_once(s);
-    assert_int_equal(s->counters.requests, 4);
+    assert_int_equal(s->counters.requests, 6);
 }
 
 SIM_TEST(counters_miss_no_frame_of_a_crowded_line)

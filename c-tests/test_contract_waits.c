@@ -166,17 +166,6 @@ SIM_TEST(a_broadcast_succeeds_after_the_turnaround_delay)
     assert_int_equal(s->idle_while_driving, 0);
 }
 
-SIM_TEST(a_read_is_not_broadcast)
-{
-    mbm_node_setSlaveID(n, 0);
-    assert_int_equal(mbm_node_readCoils(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(mbm_node_readDiscreteInputs(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(mbm_node_readInputRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(mbm_node_readWriteMultipleRegisters(n, 0, 1, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(s->sent, 0);
-}
-
 SIM_TEST(a_line_that_never_falls_silent_is_busy)
 {
     static const uint8_t noise[300] = {0};
