@@ -15,14 +15,23 @@ static union {
     uint32_t uint32;
     uint64_t uint64;
     float single;
+    int32_t int32;
+    int64_t int64;
     double wide;
     char text[16];
+    mbm_date date;
 } value;
+
+static const float one = 1;
+static const uint64_t five = 5;
+static const int64_t minus_five = -5;
+static const mbm_date noon = {.year = 2026, .month = 11, .day = 27, .hour = 12};
+static const mbm_date only_noon = {.hour = 12};
 
 static void setup(void)
 {
     for (unsigned i = 0; i < WORDS; i++)
-        words[i] = (uint16_t)(0x4142 + 0x0202 * i);
+        words[i] = (uint16_t)(0x1112 + 0x0101 * i);
     memset(&value, VALUE, sizeof value);
     OK(mbm_registers_intoWords(&r, words, WORDS, FIRST));
 }
@@ -35,7 +44,8 @@ typedef struct accessor {
     uint8_t (*call)(const mbm_registers *registers, uint16_t address, uint8_t order);
     uint8_t (*null)(const mbm_registers *registers);
     uint16_t registers;
-    uint8_t has_order, sets;
+    /* `is_whole`: three registers, which have no halves. */
+    uint8_t has_order, sets, is_whole;
 } accessor;
 
 #define GETS(name, with_value, with_null)                                                          \
@@ -65,19 +75,62 @@ GETS(setFloat, (v, address, order, &value.single), (v, FIRST, 0, NULL))
 GETS(setDouble, (v, address, order, &value.wide), (v, FIRST, 0, NULL))
 GETS(setString, (v, address, 5, order, "text"), (v, FIRST, 5, 0, NULL))
 GETS(setBytes, (v, address, order, value.bytes, 5), (v, FIRST, 0, NULL, 5))
+GETS(getBcd, (v, address, 2, order, &value.uint32), (v, FIRST, 2, 0, NULL))
+GETS(getM10k, (v, address, 4, order, &value.uint64), (v, FIRST, 4, 0, NULL))
+GETS(getSignedM10k, (v, address, 2, order, &value.int64), (v, FIRST, 2, 0, NULL))
+GETS(getUint24, (v, address, order, &value.uint32), (v, FIRST, 0, NULL))
+GETS(getInt24, (v, address, order, &value.int32), (v, FIRST, 0, NULL))
+GETS(getUint48, (v, address, order, &value.uint64), (v, FIRST, 0, NULL))
+GETS(getInt48, (v, address, order, &value.int64), (v, FIRST, 0, NULL))
+GETS(getSignMagnitude, (v, address, 1, order, &value.int32), (v, FIRST, 1, 0, NULL))
+GETS(getHalf, (v, address, order, &value.single), (v, FIRST, 0, NULL))
+GETS(getBits, (v, address, 2, order, 4, 8, &value.uint64), (v, FIRST, 2, 0, 4, 8, NULL))
+GETS(getText, (v, address, 5, order, MBM_TEXT_SPACES, value.text, 6),
+     (v, FIRST, 5, 0, MBM_TEXT_SPACES, NULL, 6))
+GETS(getDate, (v, address, order, "hm s-", 0, &value.date), (v, FIRST, 0, "hm s-", 0, NULL))
+GETS(getIecDate, (v, address, 3, order, &value.date), (v, FIRST, 3, 0, NULL))
+GETS(setBcd, (v, address, 2, order, 9), (NULL, FIRST, 2, 0, v != NULL))
+GETS(setM10k, (v, address, 4, order, &five), (v, FIRST, 4, 0, NULL))
+GETS(setSignedM10k, (v, address, 2, order, &minus_five), (v, FIRST, 2, 0, NULL))
+GETS(setUint24, (v, address, order, 9), (NULL, FIRST, 0, v != NULL))
+GETS(setInt24, (v, address, order, -9), (NULL, FIRST, 0, v != NULL))
+GETS(setUint48, (v, address, order, &five), (v, FIRST, 0, NULL))
+GETS(setInt48, (v, address, order, &minus_five), (v, FIRST, 0, NULL))
+GETS(setSignMagnitude, (v, address, 1, order, -9), (NULL, FIRST, 1, 0, v != NULL))
+GETS(setHalf, (v, address, order, &one), (v, FIRST, 0, NULL))
+GETS(setBits, (v, address, 2, order, 4, 8, &five), (v, FIRST, 2, 0, 4, 8, NULL))
+GETS(setText, (v, address, 5, order, MBM_TEXT_SPACES, "text"),
+     (v, FIRST, 5, 0, MBM_TEXT_SPACES, NULL))
+GETS(setDate, (v, address, order, "hm s-", 0, &only_noon), (v, FIRST, 0, "hm s-", 0, NULL))
+GETS(setIecDate, (v, address, 3, order, &noon), (v, FIRST, 3, 0, NULL))
 
-#define ROW(name, count, has_order, sets)                                                          \
+#define ROW(name, ...)                                                                             \
     {                                                                                              \
-#name, call_##name, null_##name, count, has_order, sets                                    \
+#name, call_##name, null_##name, __VA_ARGS__                                               \
     }
 
 static const accessor accessors[] = {
-    ROW(getBit, 1, 0, 0),    ROW(getUint16, 1, 1, 0), ROW(getUint32, 2, 1, 0),
-    ROW(getUint64, 4, 1, 0), ROW(getFloat, 2, 1, 0),  ROW(getDouble, 4, 1, 0),
-    ROW(getString, 3, 1, 0), ROW(getBytes, 3, 1, 0),  ROW(setBit, 1, 0, 1),
-    ROW(setUint16, 1, 1, 1), ROW(setUint32, 2, 1, 1), ROW(setUint64, 4, 1, 1),
-    ROW(setFloat, 2, 1, 1),  ROW(setDouble, 4, 1, 1), ROW(setString, 3, 1, 1),
-    ROW(setBytes, 3, 1, 1)};
+    ROW(getBit, 1, 0, 0, 0),           ROW(getUint16, 1, 1, 0, 0),
+    ROW(getUint32, 2, 1, 0, 0),        ROW(getUint64, 4, 1, 0, 0),
+    ROW(getFloat, 2, 1, 0, 0),         ROW(getDouble, 4, 1, 0, 0),
+    ROW(getString, 3, 1, 0, 0),        ROW(getBytes, 3, 1, 0, 0),
+    ROW(setBit, 1, 0, 1, 0),           ROW(setUint16, 1, 1, 1, 0),
+    ROW(setUint32, 2, 1, 1, 0),        ROW(setUint64, 4, 1, 1, 0),
+    ROW(setFloat, 2, 1, 1, 0),         ROW(setDouble, 4, 1, 1, 0),
+    ROW(setString, 3, 1, 1, 0),        ROW(setBytes, 3, 1, 1, 0),
+    ROW(getBcd, 2, 1, 0, 0),           ROW(getM10k, 4, 1, 0, 0),
+    ROW(getSignedM10k, 2, 1, 0, 0),    ROW(getUint24, 2, 1, 0, 0),
+    ROW(getInt24, 2, 1, 0, 0),         ROW(getUint48, 3, 1, 0, 1),
+    ROW(getInt48, 3, 1, 0, 1),         ROW(getSignMagnitude, 1, 1, 0, 0),
+    ROW(getHalf, 1, 1, 0, 0),          ROW(getBits, 2, 1, 0, 0),
+    ROW(getText, 3, 1, 0, 0),          ROW(getDate, 2, 1, 0, 0),
+    ROW(getIecDate, 3, 1, 0, 1),       ROW(setBcd, 2, 1, 1, 0),
+    ROW(setM10k, 4, 1, 1, 0),          ROW(setSignedM10k, 2, 1, 1, 0),
+    ROW(setUint24, 2, 1, 1, 0),        ROW(setInt24, 2, 1, 1, 0),
+    ROW(setUint48, 3, 1, 1, 1),        ROW(setInt48, 3, 1, 1, 1),
+    ROW(setSignMagnitude, 1, 1, 1, 0), ROW(setHalf, 1, 1, 1, 0),
+    ROW(setBits, 2, 1, 1, 0),          ROW(setText, 3, 1, 1, 0),
+    ROW(setDate, 2, 1, 1, 0),          ROW(setIecDate, 3, 1, 1, 1)};
 
 /* Asserts that a call returns a status, and changes neither value, words nor view. */
 #define NOTHING(status, what)                                                                      \
@@ -128,15 +181,17 @@ TEST(only_the_orders_and_kinds_of_the_header_are_accepted)
     for (unsigned i = 0; i < COUNT(accessors); i++) {
         const accessor *a = &accessors[i];
 
+        const unsigned last = a->is_whole ? MBM_ORDER_DCBA : MBM_ORDER_DCBAHGFE;
+
         for (unsigned order = 0; order < 256; order++) {
             setup();
-            if (order <= MBM_ORDER_DCBA)
+            if (order <= last)
                 OK(a->call(&r, FIRST, (uint8_t)order));
             else if (a->has_order)
                 NOTHING(MBM_INVALID_ARGUMENT, a->call(&r, FIRST, (uint8_t)order));
             setup();
             r.order = (uint8_t)order;
-            if (order <= MBM_ORDER_DCBA)
+            if (order <= last)
                 OK(a->call(&r, FIRST, 0));
             else
                 NOTHING(MBM_INVALID_ARGUMENT, a->call(&r, FIRST, 0));
@@ -183,6 +238,7 @@ TEST(a_register_has_sixteen_bits_and_two_bytes)
 
 TEST(a_text_ends_at_its_nul_or_with_its_field)
 {
+    OK(mbm_registers_setString(&r, FIRST, 6, 0, "ABCDEF"));
     OK(mbm_registers_getString(&r, FIRST, 5, 0, value.text, 6));
     assert_string_equal(value.text, "ABCDE");
     NOTHING(MBM_BUFFER_TOO_SMALL, mbm_registers_getString(&r, FIRST, 5, 0, value.text, 5));

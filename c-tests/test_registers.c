@@ -280,8 +280,8 @@ TEST(bytes_of_a_device_that_swaps_them_are_put_in_order)
     memset(bytes, 7, 5);
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getBytes(&r, 41, MBM_ORDER_BADC, bytes, 5));
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBytes(&r, 41, MBM_ORDER_BADC, straight, 5));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytes(&r, 40, 5, bytes, 2));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 40, 5, straight, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytes(&r, 40, 9, bytes, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 40, 9, straight, 2));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytes(&r, 40, 0, NULL, 2));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(NULL, 40, 0, straight, 2));
     OK(mbm_registers_ofBytes(&r, data, 6, 40));

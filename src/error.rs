@@ -145,6 +145,9 @@ errors {
     OUT_OF_RANGE = 0xF6, "the value is out of the range of its type";
     /// The connection was not made in time: the port has accepted no byte.
     CONNECT_TIMED_OUT = 0xF7, "the connection was not made in time";
+    /// The registers hold no value of the type that the caller asked for: a digit above 9, a date
+    /// that does not exist.
+    MALFORMED_VALUE = 0xF9, "the registers hold no value of this type";
 }
 others {
     0x00 => "success";

@@ -226,6 +226,7 @@ pub mod engine;
 // The examples of the guide are tests.
 #[cfg(all(doctest, feature = "embedded-io", feature = "embedded-io-async"))]
 #[doc = include_str!("../docs/guide-rust.md")]
+#[doc = include_str!("../docs/values.md")]
 #[doc = include_str!("../README.md")]
 struct Guide;
 

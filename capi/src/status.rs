@@ -91,6 +91,9 @@ pub const MBM_OUT_OF_RANGE: u8 = 0xF6;
 /// The connection was not made in time: that of a link within its connect timeout. For a
 /// request on Modbus TCP without a link: the port accepted no byte within the response timeout.
 pub const MBM_CONNECT_TIMED_OUT: u8 = 0xF7;
+/// The registers hold no value of the type in which the program reads them: a BCD digit above 9, a
+/// date that does not exist.
+pub const MBM_MALFORMED_VALUE: u8 = 0xF9;
 
 statuses! {
     MBM_OK = Status::OK;
@@ -125,6 +128,7 @@ statuses! {
     MBM_NO_PROGRESS = Status::NO_PROGRESS;
     MBM_OUT_OF_RANGE = Status::OUT_OF_RANGE;
     MBM_CONNECT_TIMED_OUT = Status::CONNECT_TIMED_OUT;
+    MBM_MALFORMED_VALUE = Status::MALFORMED_VALUE;
 }
 
 /// Explains a status in a few words of English. For 1 to 3 these are the words of the device's

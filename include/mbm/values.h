@@ -35,6 +35,22 @@ extern "C" {
 #define MBM_ORDER_BADC 3u
 /** Low word first, low byte first. The example is transmitted as 5256 41AE. */
 #define MBM_ORDER_DCBA 4u
+/** Four registers by halves: low half first, and within a half high word first, high byte first.
+ *  For a value of two registers it is MBM_ORDER_ABCD, which is such a half. */
+#define MBM_ORDER_EFGHABCD 5u
+
+/**
+ * Four registers by halves: high half first, and within a half low word first, as MBM_ORDER_CDAB.
+ */
+#define MBM_ORDER_CDABGHEF 6u
+
+/**
+ * Four registers by halves: low half first, and within a half low byte first, as MBM_ORDER_BADC.
+ */
+#define MBM_ORDER_FEHGBADC 7u
+/** Four registers by halves: high half first, and within a half low word and low byte first, as
+ *  MBM_ORDER_DCBA. */
+#define MBM_ORDER_DCBAHGFE 8u
 /** mbm_registers.kind: words that may only be read, for example the response words of
  *  mbm_node. */
 #define MBM_REGISTERS_OF_WORDS 1u
@@ -45,6 +61,16 @@ extern "C" {
 /** mbm_registers.kind: bytes that may be read and written, the high byte of each register
  *  first. */
 #define MBM_REGISTERS_INTO_BYTES 4u
+/** A flag of mbm_date: the device's clock shows summer time. Only IEC 870-5-4 has it. */
+#define MBM_DATE_SUMMER_TIME 1u
+/** A flag of mbm_date: the device says that its clock may be wrong. Only IEC 870-5-4 has it. */
+#define MBM_DATE_UNRELIABLE 2u
+/** A form of text: each register has one character, in its low byte. */
+#define MBM_TEXT_LOW_BYTES 1u
+/** A form of text: each register has one character, in its high byte. */
+#define MBM_TEXT_HIGH_BYTES 2u
+/** A form of text, alone or added to one of the others: the rest of the field has spaces. */
+#define MBM_TEXT_SPACES 4u
 
 /**
  * A view of consecutive registers, with the addresses that the device gives them. The
@@ -68,6 +94,29 @@ typedef struct mbm_registers {
     /** One of MBM_ORDER_...: the order for calls with MBM_ORDER_DEFAULT. */
     uint8_t order;
 } mbm_registers;
+
+/**
+ * A date and a time of day, in the time zone of the device. If year, month and day are 0, a time
+ * of day without a date.
+ */
+typedef struct mbm_date {
+    /** 1 to 9999. */
+    uint16_t year;
+    /** 0 to 999. */
+    uint16_t millisecond;
+    /** 1 to 12. */
+    uint8_t month;
+    /** 1 to 31. */
+    uint8_t day;
+    /** 0 to 23. */
+    uint8_t hour;
+    /** 0 to 59. */
+    uint8_t minute;
+    /** 0 to 59. */
+    uint8_t second;
+    /** MBM_DATE_..., added up. */
+    uint8_t flags;
+} mbm_date;
 
 /**
  * Packs coils into bytes for a write. The first coil goes into the lowest bit of the
@@ -183,6 +232,80 @@ uint8_t mbm_registers_intoWords(mbm_registers *registers, uint16_t *words, uint1
  */
 uint8_t mbm_registers_intoBytes(mbm_registers *registers, uint8_t *bytes, uint16_t length,
                                 uint16_t first);
+
+/**
+ * Reads a date, or a time of day, from registers of which `layout` says what they hold. It has
+ * a letter for each register, or two for its high and low byte, and a space between two
+ * registers: "Y M D h m s" are six registers, "yM Dh ms" three.
+ *
+ * Y is the year, such as 2026, as a register; y the years since 2000; n those since 1900; C and
+ * y together the first and the last two digits of the year. M and D are month and day from 1
+ * on, h, m and s the time, and f, as a register, milliseconds. What - stands for is not read,
+ * and written as 0. A part that is missing is 0. Without year, month and day it is a time of
+ * day.
+ *
+ * @param address  the device's address of the first register
+ * @param order    one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`. The
+ *                 registers follow each other in every order; one with the low byte first swaps
+ *                 the bytes of each
+ * @param layout   what the registers hold, up to 95 characters
+ * @param isBcd    not 0 if the numbers are in BCD
+ * @param value    receives the date, without flags
+ * @return a status; see mbm_registers. MBM_MALFORMED_VALUE for a date that does not exist, or a
+ *         digit above 9
+ */
+uint8_t mbm_registers_getDate(const mbm_registers *registers, uint16_t address, uint8_t order,
+                              const char *layout, uint8_t isBcd, mbm_date *value);
+
+/**
+ * Writes a date that mbm_registers_getDate reads. Its flags do not count.
+ *
+ * @param value    the date
+ * @return as mbm_registers_setUint16; MBM_INVALID_ARGUMENT for a date that does not exist;
+ *         MBM_OUT_OF_RANGE for one that the layout cannot hold exactly
+ */
+uint8_t mbm_registers_setDate(const mbm_registers *registers, uint16_t address, uint8_t order,
+                              const char *layout, uint8_t isBcd, const mbm_date *value);
+
+/**
+ * Reads a date of IEC 870-5-4, with its flags, from three registers, or from four with
+ * milliseconds: DATETIME and TI081 of Schneider's devices. With MBM_ORDER_CDAB the first
+ * register is the last one.
+ *
+ * @param count    how many registers, 3 or 4
+ * @param value    receives the date, 2000 to 2127
+ * @return a status; see mbm_registers. MBM_MALFORMED_VALUE for a date that does not exist
+ */
+uint8_t mbm_registers_getIecDate(const mbm_registers *registers, uint16_t address, uint16_t count,
+                                 uint8_t order, mbm_date *value);
+
+/**
+ * Writes a date that mbm_registers_getIecDate reads, with its flags and no day of the week.
+ *
+ * @param value    the date
+ * @return as mbm_registers_setDate
+ */
+uint8_t mbm_registers_setIecDate(const mbm_registers *registers, uint16_t address, uint16_t count,
+                                 uint8_t order, const mbm_date *value);
+
+/**
+ * The seconds from 1970-01-01 00:00:00 to a date, as if both were in UTC. Milliseconds and flags do
+ * not count.
+ *
+ * @param date     the date; not a time of day alone
+ * @param seconds  receives the number, below 0 before 1970
+ * @return a status; MBM_INVALID_ARGUMENT for a date that does not exist
+ */
+uint8_t mbm_date_getSeconds(const mbm_date *date, int64_t *seconds);
+
+/**
+ * Sets the date that is so many seconds after 1970-01-01 00:00:00, both in UTC.
+ *
+ * @param date     receives the date, without milliseconds and flags
+ * @param seconds  points to the number
+ * @return a status; MBM_OUT_OF_RANGE before the year 1 and after 9999
+ */
+uint8_t mbm_date_setSeconds(mbm_date *date, const int64_t *seconds);
 
 /**
  * Reads one bit of a register.
@@ -367,6 +490,189 @@ uint8_t mbm_registers_setString(const mbm_registers *registers, uint16_t address
  */
 uint8_t mbm_registers_setBytes(const mbm_registers *registers, uint16_t address, uint8_t order,
                                const uint8_t *bytes, uint16_t length);
+
+/**
+ * Reads a text in another form than mbm_registers_getString. It ends at its first NUL or at the
+ * end of its field; with MBM_TEXT_SPACES the spaces at its end are left out.
+ *
+ * @param address   the device's address of the first register of the field
+ * @param length    length of the field in characters
+ * @param order     one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`. With
+ *                  MBM_TEXT_LOW_BYTES and MBM_TEXT_HIGH_BYTES it has no effect
+ * @param form      0 for two characters a register, or MBM_TEXT_..., added up
+ * @param text      receives the text and a NUL
+ * @param capacity  size of `text` in bytes; `length + 1` are always enough
+ * @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if `text` is
+ */
+uint8_t mbm_registers_getText(const mbm_registers *registers, uint16_t address, uint16_t length,
+                              uint8_t order, uint8_t form, char *text, uint16_t capacity);
+
+/**
+ * Writes a text into a field, as mbm_registers_getText reads it. Every byte of the field's
+ * registers is set.
+ *
+ * @param text      the text; ends with a NUL, which need not fit into the field
+ * @return as mbm_registers_getText; MBM_BUFFER_TOO_SMALL if the text is longer than the field;
+ *         MBM_INVALID_ARGUMENT if it ends with a space, which MBM_TEXT_SPACES would lose
+ */
+uint8_t mbm_registers_setText(const mbm_registers *registers, uint16_t address, uint16_t length,
+                              uint8_t order, uint8_t form, const char *text);
+
+/**
+ * Reads a number in BCD: four digits in one register, eight in two.
+ *
+ * @param address  the device's address of its first register
+ * @param count    how many registers, 1 or 2
+ * @param order    one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value    receives the number
+ * @return a status; see mbm_registers. MBM_MALFORMED_VALUE for a digit above 9
+ */
+uint8_t mbm_registers_getBcd(const mbm_registers *registers, uint16_t address, uint16_t count,
+                             uint8_t order, uint32_t *value);
+
+/**
+ * Writes a number in BCD.
+ *
+ * @return as mbm_registers_setUint16; MBM_OUT_OF_RANGE for a number with more digits
+ */
+uint8_t mbm_registers_setBcd(const mbm_registers *registers, uint16_t address, uint16_t count,
+                             uint8_t order, uint32_t value);
+
+/**
+ * Reads a number of which each register holds four decimal digits, 0 to 9999: M10K or
+ * Mod10 of Schneider's meters. Many have the lowest register first: MBM_ORDER_CDAB.
+ *
+ * @param count    how many registers, 1 to 4
+ * @param value    receives the number
+ * @return as mbm_registers_getBcd; MBM_MALFORMED_VALUE for a register above 9999
+ */
+uint8_t mbm_registers_getM10k(const mbm_registers *registers, uint16_t address, uint16_t count,
+                              uint8_t order, uint64_t *value);
+
+/**
+ * Writes such a number.
+ *
+ * @param value    points to the number
+ * @return as mbm_registers_setUint16; MBM_OUT_OF_RANGE for a number with more digits
+ */
+uint8_t mbm_registers_setM10k(const mbm_registers *registers, uint16_t address, uint16_t count,
+                              uint8_t order, const uint64_t *value);
+
+/** As mbm_registers_getM10k, with a sign in each register: -9999 to 9999. */
+uint8_t mbm_registers_getSignedM10k(const mbm_registers *registers, uint16_t address,
+                                    uint16_t count, uint8_t order, int64_t *value);
+
+/** As mbm_registers_setM10k. Each register that is not 0 gets the sign. */
+uint8_t mbm_registers_setSignedM10k(const mbm_registers *registers, uint16_t address,
+                                    uint16_t count, uint8_t order, const int64_t *value);
+
+/**
+ * Reads a number of 24 bits, in the low bits of two registers. The eight bits above it do
+ * not count; mbm_registers_getBits reads them.
+ *
+ * @return as mbm_registers_getUint16
+ */
+uint8_t mbm_registers_getUint24(const mbm_registers *registers, uint16_t address, uint8_t order,
+                                uint32_t *value);
+
+/**
+ * Writes a number of 24 bits. The eight bits above it become 0.
+ *
+ * @return as mbm_registers_setUint16; MBM_OUT_OF_RANGE for a number with more bits
+ */
+uint8_t mbm_registers_setUint24(const mbm_registers *registers, uint16_t address, uint8_t order,
+                                uint32_t value);
+
+/** As mbm_registers_getUint24, with a sign, in two's complement. */
+uint8_t mbm_registers_getInt24(const mbm_registers *registers, uint16_t address, uint8_t order,
+                               int32_t *value);
+
+/** As mbm_registers_setUint24, with a sign. The eight bits above it become copies of it. */
+uint8_t mbm_registers_setInt24(const mbm_registers *registers, uint16_t address, uint8_t order,
+                               int32_t value);
+
+/**
+ * Reads a number of 48 bits in three registers.
+ *
+ * @return as mbm_registers_getUint16; MBM_INVALID_ARGUMENT for an order by halves
+ */
+uint8_t mbm_registers_getUint48(const mbm_registers *registers, uint16_t address, uint8_t order,
+                                uint64_t *value);
+
+/**
+ * Writes a number of 48 bits.
+ *
+ * @param value    points to the number
+ * @return as mbm_registers_setUint24; MBM_INVALID_ARGUMENT for an order by halves
+ */
+uint8_t mbm_registers_setUint48(const mbm_registers *registers, uint16_t address, uint8_t order,
+                                const uint64_t *value);
+
+/** As mbm_registers_getUint48, with a sign, in two's complement. */
+uint8_t mbm_registers_getInt48(const mbm_registers *registers, uint16_t address, uint8_t order,
+                               int64_t *value);
+
+/** As mbm_registers_setUint48, with a sign. */
+uint8_t mbm_registers_setInt48(const mbm_registers *registers, uint16_t address, uint8_t order,
+                               const int64_t *value);
+
+/**
+ * Reads a number whose highest bit is its sign, and whose other bits are its amount.
+ *
+ * @param count    how many registers, 1 or 2
+ * @param value    receives the number; 0 for both zeros
+ * @return as mbm_registers_getUint16
+ */
+uint8_t mbm_registers_getSignMagnitude(const mbm_registers *registers, uint16_t address,
+                                       uint16_t count, uint8_t order, int32_t *value);
+
+/**
+ * Writes such a number, up to 32767 in one register and 2147483647 in two.
+ *
+ * @return as mbm_registers_setUint24
+ */
+uint8_t mbm_registers_setSignMagnitude(const mbm_registers *registers, uint16_t address,
+                                       uint16_t count, uint8_t order, int32_t value);
+
+/**
+ * Reads a half float of one register, an IEEE 754 binary16. A float holds each exactly.
+ *
+ * @return as mbm_registers_getUint16
+ */
+uint8_t mbm_registers_getHalf(const mbm_registers *registers, uint16_t address, uint8_t order,
+                              float *value);
+
+/**
+ * Writes a half float: the one that is nearest to a float.
+ *
+ * @param value    points to the number
+ * @return as mbm_registers_setUint16; MBM_OUT_OF_RANGE from 65520 on, and for a number other
+ *         than 0 that is nearer to 0 than to a half float
+ */
+uint8_t mbm_registers_setHalf(const mbm_registers *registers, uint16_t address, uint8_t order,
+                              const float *value);
+
+/**
+ * Reads bits of a field of 1 to 4 registers as one number.
+ *
+ * @param count    how many registers the field has, 1 to 4
+ * @param first    the lowest of the bits; 0 is the least significant of the field
+ * @param bits     how many bits, 1 to 64, not beyond those of the field
+ * @param value    receives the number
+ * @return as mbm_registers_getUint16; MBM_INVALID_ARGUMENT for an order by halves of three
+ *         registers
+ */
+uint8_t mbm_registers_getBits(const mbm_registers *registers, uint16_t address, uint16_t count,
+                              uint8_t order, uint8_t first, uint8_t bits, uint64_t *value);
+
+/**
+ * Writes bits of a field of 1 to 4 registers; its other bits do not change.
+ *
+ * @param value    points to the number
+ * @return as mbm_registers_getBits; MBM_OUT_OF_RANGE for a number with more bits
+ */
+uint8_t mbm_registers_setBits(const mbm_registers *registers, uint16_t address, uint16_t count,
+                              uint8_t order, uint8_t first, uint8_t bits, const uint64_t *value);
 
 #ifdef __cplusplus
 }  // extern "C"

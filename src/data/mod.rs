@@ -1,7 +1,14 @@
 //! Conversion between words and bits in the caller's memory and data bytes on the wire.
 
 pub mod bits;
+pub mod clock;
+pub mod date;
+pub mod digits;
+pub mod half;
 pub mod order;
+pub mod raw;
+pub mod text;
+pub mod types;
 pub mod value;
 pub mod view;
 

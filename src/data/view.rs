@@ -117,7 +117,7 @@ impl<C: RegisterBytes> Registers<C> {
 
     /// The index of the high byte of the register `address`, if `length` bytes from there
     /// exist.
-    fn byte_index(&self, address: u16, length: usize) -> Result<usize, Error> {
+    pub(super) fn byte_index(&self, address: u16, length: usize) -> Result<usize, Error> {
         let Some(before) = address.checked_sub(self.first) else {
             return Err(Error::ILLEGAL_DATA_ADDRESS);
         };
@@ -128,6 +128,11 @@ impl<C: RegisterBytes> Registers<C> {
             Some(left) if wanted <= left => Ok(2 * usize::from(before)),
             _ => Err(Error::ILLEGAL_DATA_ADDRESS),
         }
+    }
+
+    /// The byte at the index `place`, 0 past the end.
+    pub(super) fn cell(&self, place: usize) -> u8 {
+        self.cells.byte(place).unwrap_or(0)
     }
 
     /// Fills `bytes` from the registers that begin at `address`. Byte `n` of the registers
@@ -260,6 +265,11 @@ impl<C: RegisterBytes> Registers<C> {
 }
 
 impl<C: RegisterBytesMut> Registers<C> {
+    /// Sets the byte at the index `place`; does nothing past the end.
+    pub(super) fn set_cell(&mut self, place: usize, value: u8) {
+        self.cells.set_byte(place, value);
+    }
+
     /// Sets the registers that begin at `address` from `bytes`, in the order in which
     /// [`Registers::load`] reads them.
     ///

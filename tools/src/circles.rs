@@ -140,7 +140,7 @@ impl File {
                 }
                 "}" | ")" | "]" => depth -= 1,
                 ";" => is_public = false,
-                "pub" => is_public = true,
+                "pub" if depth == 0 => is_public = true,
                 "!" if next != "=" && at > 0 && tokens[at - 1].1 == "macro_rules" => {
                     self.items.insert(next.to_owned());
                 }

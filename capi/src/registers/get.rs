@@ -12,13 +12,14 @@ use mbm::error::{Error, Status};
 ///
 /// # Safety
 /// As for [`view`]; `value` is NULL or points to a `T`.
-unsafe fn get_value<T>(
+pub(super) unsafe fn get_value<T>(
     registers: *const mbm_registers,
+    order: u8,
     value: *mut T,
     find: impl FnOnce(&Registers<BorrowedRegisters>) -> Result<T, Error>,
 ) -> u8 {
     code(
-        view(registers, MBM_ORDER_DEFAULT, false)
+        view(registers, order, false)
             .and_then(|registers| pointers::put_result(value, || find(&registers))),
     )
 }
@@ -54,7 +55,7 @@ functions! {
     /// @param on       receives 0 or 1
     /// @return a status; see mbm_registers
     fn mbm_registers_getBit(address: u16, bit: u8, on: *mut u8)
-        = get_value(on, |registers| registers.bit(address, bit).map(u8::from));
+        = get_value(MBM_ORDER_DEFAULT, on, |registers| registers.bit(address, bit).map(u8::from));
 
     /// Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
     /// int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.

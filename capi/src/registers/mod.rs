@@ -1,11 +1,17 @@
 //! `mbm_registers_*`: reads values from received registers, and writes values into
 //! registers to be sent.
 
+mod date;
 mod get;
 mod set;
+mod text_form;
+mod types;
 
+pub use date::*;
 pub use get::*;
 pub use set::*;
+pub use text_form::*;
+pub use types::*;
 
 use super::pointers;
 use core::ffi::c_void;
@@ -25,6 +31,16 @@ pub const MBM_ORDER_CDAB: u8 = 2;
 pub const MBM_ORDER_BADC: u8 = 3;
 /// Low word first, low byte first. The example is transmitted as 5256 41AE.
 pub const MBM_ORDER_DCBA: u8 = 4;
+/// Four registers by halves: low half first, and within a half high word first, high byte first.
+/// For a value of two registers it is MBM_ORDER_ABCD, which is such a half.
+pub const MBM_ORDER_EFGHABCD: u8 = 5;
+/// Four registers by halves: high half first, and within a half low word first, as MBM_ORDER_CDAB.
+pub const MBM_ORDER_CDABGHEF: u8 = 6;
+/// Four registers by halves: low half first, and within a half low byte first, as MBM_ORDER_BADC.
+pub const MBM_ORDER_FEHGBADC: u8 = 7;
+/// Four registers by halves: high half first, and within a half low word and low byte first, as
+/// MBM_ORDER_DCBA.
+pub const MBM_ORDER_DCBAHGFE: u8 = 8;
 
 /// mbm_registers.kind: words that may only be read, for example the response words of
 /// mbm_node.
@@ -68,6 +84,10 @@ pub(super) fn order(code: u8, default: Order) -> Result<Order, Error> {
         MBM_ORDER_CDAB => Ok(Order::Cdab),
         MBM_ORDER_BADC => Ok(Order::Badc),
         MBM_ORDER_DCBA => Ok(Order::Dcba),
+        MBM_ORDER_EFGHABCD => Ok(Order::Efghabcd),
+        MBM_ORDER_CDABGHEF => Ok(Order::Cdabghef),
+        MBM_ORDER_FEHGBADC => Ok(Order::Fehgbadc),
+        MBM_ORDER_DCBAHGFE => Ok(Order::Dcbahgfe),
         _ => Err(Error::INVALID_ARGUMENT),
     }
 }

@@ -15,7 +15,7 @@ use mbm::error::Error;
 ///
 /// # Safety
 /// As for [`view`].
-unsafe fn with(
+pub(super) unsafe fn with(
     registers: *const mbm_registers,
     order: u8,
     action: impl FnOnce(&mut Registers<BorrowedRegisters>) -> Result<(), Error>,

@@ -1,12 +1,12 @@
 //! Checks that hold for every call with any arguments.
 
 use super::world::World;
-use mbm_c::MBM_CONNECT_TIMED_OUT;
+use mbm_c::MBM_MALFORMED_VALUE;
 
 pub const OK: u8 = 0;
 pub const PENDING: u8 = 235;
 /// The greatest status.
-const LAST: u8 = MBM_CONNECT_TIMED_OUT;
+const LAST: u8 = MBM_MALFORMED_VALUE;
 
 /// Calls a function of the C API. Its first argument, or `$object`, is marked as in use during the
 /// call.

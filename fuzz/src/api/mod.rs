@@ -34,6 +34,7 @@ mod sniffer;
 mod text;
 mod trace;
 mod traffic;
+mod types;
 mod world;
 
 use std::sync::atomic::Ordering;
@@ -54,7 +55,8 @@ fn step(w: &World) {
         23 => ring::step(w),
         24 | 25 => packet::step(w),
         26 | 27 => frame::step(w),
-        28 => registers::step(w),
+        28 if w.byte() & 1 == 0 => registers::step(w),
+        28 => types::step(w),
         29 => bits::step(w),
         30 => ports::change(w),
         _ => match w.byte() {

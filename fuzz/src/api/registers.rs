@@ -23,7 +23,7 @@ fn fill(w: &World, view: *mut mbm_registers) {
         _ if view.is_null() => {}
         _ => {
             // Written by hand. The block has `count` registers in any case.
-            let (kind, order) = (w.byte() % 6, w.byte() % 6);
+            let (kind, order) = (w.byte() % 6, w.byte() % 10);
             let data = words.cast_const().cast();
             // SAFETY: the pointer is not NULL.
             unsafe {
@@ -40,13 +40,13 @@ fn fill(w: &World, view: *mut mbm_registers) {
 }
 
 /// Reads a value. Checks that a refused call leaves it unchanged.
-fn get<T>(w: &World, name: &str, call: impl FnOnce(*mut T) -> u8) {
+pub fn get<T>(w: &World, name: &str, call: impl FnOnce(*mut T) -> u8) {
     let value = w.null_or(32, || w.unset::<T>());
     refused_changes_nothing(w, &[span(value)], name, || call(value));
 }
 
 fn read(w: &World, view: *const mbm_registers) {
-    let (at, order, byte) = (w.word(), w.byte() % 6, w.byte());
+    let (at, order, byte) = (w.word(), w.byte() % 10, w.byte());
     macro_rules! get {
         ($name:ident, $with:expr) => {
             get(w, stringify!($name), |value| {
@@ -89,7 +89,7 @@ fn read(w: &World, view: *const mbm_registers) {
 }
 
 /// The memory of a view.
-fn memory_of(view: *const mbm_registers) -> (*const u8, usize) {
+pub fn memory_of(view: *const mbm_registers) -> (*const u8, usize) {
     if view.is_null() {
         return (null(), 0);
     }
@@ -99,7 +99,7 @@ fn memory_of(view: *const mbm_registers) -> (*const u8, usize) {
 }
 
 fn write(w: &World, view: *const mbm_registers) {
-    let (at, order, byte, word, long) = (w.word(), w.byte() % 6, w.byte(), w.word(), w.long());
+    let (at, order, byte, word, long) = (w.word(), w.byte() % 10, w.byte(), w.word(), w.long());
     let length = w.word();
     let null = w.rarely(32);
     macro_rules! value {

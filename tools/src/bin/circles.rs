@@ -144,8 +144,13 @@ mod tests {
     #[test]
     fn a_name_that_equals_a_private_name_of_another_file_is_not_a_use() {
         let parent = "mod one; pub use one::*; pub struct S; fn f(now: u8) { g }";
-        let child = "use super::S; fn now() {} fn g(s: *const u8) {} pub fn h() {}";
-        assert!(circles(&[("a/mod.rs", parent), ("a/one.rs", child), ("lib.rs", "")]).is_empty());
+        for child in [
+            "use super::S; fn now() {} fn g(s: *const u8) {} pub fn h() {}",
+            "use super::S; pub struct T { pub t: u8 } const now: u8 = 1;",
+        ] {
+            let found = circles(&[("a/mod.rs", parent), ("a/one.rs", child), ("lib.rs", "")]);
+            assert!(found.is_empty(), "{child}");
+        }
     }
 
     #[test]

@@ -1,0 +1,221 @@
+//! A date and a time of day, and the seconds since 1970 that they are. (Gregorian calendar, also
+//! before 1582. There are no leap seconds.)
+
+use crate::error::Error;
+
+/// The device says that its clock shows summer time.
+pub const SUMMER_TIME: u8 = 1;
+/// The device says that its clock may be wrong: it was never set, or lost its power.
+pub const UNRELIABLE: u8 = 2;
+
+/// A date and a time of day, in the time zone of the device. Month and day may both be 0, with the
+/// year 0: a time of day without a date.
+#[repr(C)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Date {
+    /// 1 to 9999.
+    pub year: u16,
+    /// 0 to 999.
+    pub millisecond: u16,
+    /// 1 to 12.
+    pub month: u8,
+    /// 1 to 31.
+    pub day: u8,
+    /// 0 to 23.
+    pub hour: u8,
+    /// 0 to 59.
+    pub minute: u8,
+    /// 0 to 59.
+    pub second: u8,
+    /// [`SUMMER_TIME`], [`UNRELIABLE`].
+    pub flags: u8,
+}
+
+const DAYS_BEFORE_1970: i32 = 719_162;
+const SECONDS_PER_DAY: i64 = 86_400;
+
+/// The days from 1 January of the year 1 to that of another year.
+const fn days_before(year: i32) -> i32 {
+    let passed = year - 1;
+    365 * passed + passed / 4 - passed / 100 + passed / 400
+}
+
+/// The days of a month.
+const fn days_of(year: u16, month: u8) -> u8 {
+    match month {
+        2 if year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400)) => {
+            29
+        }
+        2 => 28,
+        4 | 6 | 9 | 11 => 30,
+        _ => 31,
+    }
+}
+
+impl Date {
+    /// True if it is a time of day without a date.
+    pub const fn is_time_only(&self) -> bool {
+        self.year == 0 && self.month == 0 && self.day == 0
+    }
+
+    /// True if there is such a date and such a time.
+    pub const fn exists(&self) -> bool {
+        let is_date = self.year >= 1
+            && self.year <= 9999
+            && self.month >= 1
+            && self.month <= 12
+            && self.day >= 1
+            && self.day <= days_of(self.year, self.month);
+        (is_date || self.is_time_only())
+            && self.hour < 24
+            && self.minute < 60
+            && self.second < 60
+            && self.millisecond < 1000
+    }
+
+    /// The seconds since 1970-01-01 00:00:00, as if the time zone were UTC; without milliseconds.
+    ///
+    /// # Errors
+    /// [`Error::INVALID_ARGUMENT`] if the date does not exist, or for a time without a date.
+    pub fn seconds(&self) -> Result<i64, Error> {
+        if !self.exists() || self.is_time_only() {
+            return Err(Error::INVALID_ARGUMENT);
+        }
+        let mut days = days_before(self.year.into()) + i32::from(self.day) - 1;
+        for month in 1..self.month {
+            days += i32::from(days_of(self.year, month));
+        }
+        let of_day =
+            i32::from(self.hour) * 3600 + i32::from(self.minute) * 60 + i32::from(self.second);
+        Ok(i64::from(days - DAYS_BEFORE_1970) * SECONDS_PER_DAY + i64::from(of_day))
+    }
+
+    /// The date that is so many seconds after 1970-01-01 00:00:00.
+    ///
+    /// # Errors
+    /// [`Error::OUT_OF_RANGE`] for a date before the year 1 or after 9999.
+    pub fn of_seconds(seconds: i64) -> Result<Date, Error> {
+        const FIRST: i64 = -(DAYS_BEFORE_1970 as i64) * SECONDS_PER_DAY;
+        const END: i64 = (days_before(10_000) as i64 - DAYS_BEFORE_1970 as i64) * SECONDS_PER_DAY;
+        if !(FIRST..END).contains(&seconds) {
+            return Err(Error::OUT_OF_RANGE);
+        }
+        let days = (seconds - FIRST) / SECONDS_PER_DAY;
+        let of_day = (seconds - FIRST - days * SECONDS_PER_DAY) as u32;
+        let mut days = days as i32;
+        // At most one year too many.
+        let mut year = days / 365 + 1;
+        while days_before(year) > days {
+            year -= 1;
+        }
+        days -= days_before(year);
+        let (year, mut month) = (year as u16, 1);
+        while days >= i32::from(days_of(year, month)) {
+            days -= i32::from(days_of(year, month));
+            month += 1;
+        }
+        Ok(Date {
+            year,
+            month,
+            day: days as u8 + 1,
+            hour: (of_day / 3600) as u8,
+            minute: (of_day / 60 % 60) as u8,
+            second: (of_day % 60) as u8,
+            ..Date::default()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn date(year: u16, month: u8, day: u8) -> Date {
+        Date {
+            year,
+            month,
+            day,
+            ..Date::default()
+        }
+    }
+
+    #[test]
+    fn every_day_from_the_year_1_to_9999_is_its_number() {
+        let (mut seconds, mut days) = (date(1, 1, 1).seconds().unwrap(), 0);
+        for year in 1..=9999 {
+            for month in 1..=12 {
+                for day in 1..=days_of(year, month) {
+                    let today = date(year, month, day);
+                    assert_eq!(today.seconds(), Ok(seconds));
+                    assert_eq!(Date::of_seconds(seconds), Ok(today));
+                    seconds += SECONDS_PER_DAY;
+                    days += 1;
+                }
+            }
+        }
+        // 400 years have 97 leap days.
+        assert_eq!(days, 146_097 * 25 - 366);
+        assert_eq!(Date::of_seconds(seconds), Err(Error::OUT_OF_RANGE));
+        assert!(Date::of_seconds(seconds - 1).is_ok());
+    }
+
+    #[test]
+    fn known_moments_are_as_other_clocks_have_them() {
+        for (seconds, year, month, day, hour, minute, second) in [
+            (0, 1970, 1, 1, 0, 0, 0),
+            (946_684_800, 2000, 1, 1, 0, 0, 0),
+            (951_782_400, 2000, 2, 29, 0, 0, 0),
+            (1_234_567_890, 2009, 2, 13, 23, 31, 30),
+            (i64::from(i32::MAX), 2038, 1, 19, 3, 14, 7),
+            (i64::from(u32::MAX), 2106, 2, 7, 6, 28, 15),
+            (-1, 1969, 12, 31, 23, 59, 59),
+            (-62_135_596_800, 1, 1, 1, 0, 0, 0),
+            (253_402_300_799, 9999, 12, 31, 23, 59, 59),
+        ] {
+            let known = Date {
+                hour,
+                minute,
+                second,
+                ..date(year, month, day)
+            };
+            assert_eq!(Date::of_seconds(seconds), Ok(known));
+            assert_eq!(known.seconds(), Ok(seconds));
+        }
+        for seconds in [i64::MIN, -62_135_596_801, 253_402_300_800, i64::MAX] {
+            assert_eq!(Date::of_seconds(seconds), Err(Error::OUT_OF_RANGE));
+        }
+    }
+
+    #[test]
+    fn a_date_that_does_not_exist_has_no_seconds() {
+        for (year, month, day) in [
+            (2026, 2, 29),
+            (1900, 2, 29),
+            (2026, 4, 31),
+            (2026, 13, 1),
+            (2026, 0, 1),
+            (2026, 1, 0),
+            (2026, 1, 32),
+            (0, 1, 1),
+            (10_000, 1, 1),
+            (0, 0, 0),
+        ] {
+            assert_eq!(
+                date(year, month, day).seconds(),
+                Err(Error::INVALID_ARGUMENT)
+            );
+        }
+        assert!(date(2000, 2, 29).exists());
+        let wrong: [fn(&mut Date); 4] = [
+            |date| date.hour = 24,
+            |date| date.minute = 60,
+            |date| date.second = 60,
+            |date| date.millisecond = 1000,
+        ];
+        for change in wrong {
+            let mut changed = date(2026, 1, 1);
+            change(&mut changed);
+            assert!(!changed.exists());
+        }
+    }
+}

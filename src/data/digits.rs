@@ -1,0 +1,164 @@
+//! Decimal digits in registers: BCD, with four digits in a register as four bits each, and
+//! Schneider's modulo 10000 (M10K, Mod10), with four digits in a register as one number.
+
+use crate::error::Error;
+
+/// The number of 8 digits of BCD.
+///
+/// # Errors
+/// [`Error::MALFORMED_VALUE`] for a digit above 9.
+pub fn from_bcd(raw: u32) -> Result<u32, Error> {
+    let mut number = 0;
+    for nth in (0..8).rev() {
+        let digit = raw >> (4 * nth) & 15;
+        if digit > 9 {
+            return Err(Error::MALFORMED_VALUE);
+        }
+        number = number * 10 + digit;
+    }
+    Ok(number)
+}
+
+/// A number as `digits` digits of BCD, at most 8.
+///
+/// # Errors
+/// [`Error::OUT_OF_RANGE`] for a number with more digits.
+pub fn to_bcd(number: u32, digits: u32) -> Result<u32, Error> {
+    let (mut left, mut raw) = (number, 0);
+    for nth in 0..digits.min(8) {
+        raw |= (left % 10) << (4 * nth);
+        left /= 10;
+    }
+    if left > 0 {
+        return Err(Error::OUT_OF_RANGE);
+    }
+    Ok(raw)
+}
+
+/// The most that a register of modulo 10000 holds, and one more.
+const M10K: u64 = 10_000;
+
+/// The number of `count` registers of modulo 10000, each 0 to 9999.
+///
+/// # Errors
+/// [`Error::MALFORMED_VALUE`] for a register above 9999.
+pub fn from_m10k(raw: u64, count: u16) -> Result<u64, Error> {
+    let mut number = 0;
+    for nth in (0..count).rev() {
+        let part = raw >> (16 * nth) & 0xFFFF;
+        if part >= M10K {
+            return Err(Error::MALFORMED_VALUE);
+        }
+        number = number * M10K + part;
+    }
+    Ok(number)
+}
+
+/// The number of `count` registers of modulo 10000, each -9999 to 9999 in two's complement.
+///
+/// # Errors
+/// [`Error::MALFORMED_VALUE`] for a register beyond that.
+pub fn from_signed_m10k(raw: u64, count: u16) -> Result<i64, Error> {
+    let mut number = 0;
+    for nth in (0..count).rev() {
+        let part = i64::from((raw >> (16 * nth)) as i16);
+        if part.unsigned_abs() >= M10K {
+            return Err(Error::MALFORMED_VALUE);
+        }
+        number = number * M10K as i64 + part;
+    }
+    Ok(number)
+}
+
+/// A number in `count` registers of modulo 10000.
+///
+/// # Errors
+/// [`Error::OUT_OF_RANGE`] for a number with more than four digits for each register.
+pub fn to_m10k(number: u64, count: u16) -> Result<u64, Error> {
+    let (mut left, mut raw) = (number, 0);
+    for nth in 0..count {
+        raw |= (left % M10K) << (16 * nth);
+        left /= M10K;
+    }
+    if left > 0 {
+        return Err(Error::OUT_OF_RANGE);
+    }
+    Ok(raw)
+}
+
+/// As [`to_m10k`], for a number with a sign, which each register has that is not 0.
+///
+/// # Errors
+/// As [`to_m10k`].
+pub fn to_signed_m10k(number: i64, count: u16) -> Result<u64, Error> {
+    let raw = to_m10k(number.unsigned_abs(), count)?;
+    if number >= 0 {
+        return Ok(raw);
+    }
+    let mut negative = 0;
+    for nth in 0..count {
+        let part = (raw >> (16 * nth)) as u16;
+        negative |= u64::from(part.wrapping_neg()) << (16 * nth);
+    }
+    Ok(negative)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_register_of_bcd_is_a_number_or_refused() {
+        let mut numbers = 0;
+        for raw in 0..=0xFFFF {
+            let digits = [raw >> 12, raw >> 8 & 15, raw >> 4 & 15, raw & 15];
+            if digits.iter().any(|digit| *digit > 9) {
+                assert_eq!(from_bcd(raw), Err(Error::MALFORMED_VALUE));
+                continue;
+            }
+            let number = digits.iter().fold(0, |sum, digit| sum * 10 + digit);
+            assert_eq!(from_bcd(raw), Ok(number));
+            assert_eq!(to_bcd(number, 4), Ok(raw));
+            numbers += 1;
+        }
+        assert_eq!(numbers, 10_000);
+        assert_eq!(to_bcd(10_000, 4), Err(Error::OUT_OF_RANGE));
+    }
+
+    #[test]
+    fn eight_digits_of_bcd_are_two_registers() {
+        assert_eq!(from_bcd(0x1234_5678), Ok(12_345_678));
+        assert_eq!(to_bcd(99_999_999, 8), Ok(0x9999_9999));
+        assert_eq!(to_bcd(100_000_000, 8), Err(Error::OUT_OF_RANGE));
+        assert_eq!(from_bcd(0xA000_0000), Err(Error::MALFORMED_VALUE));
+        assert_eq!(from_bcd(0x0000_000F), Err(Error::MALFORMED_VALUE));
+    }
+
+    #[test]
+    fn a_register_of_modulo_10000_holds_four_digits() {
+        // The energy of a PM710: 0108 18D4 002B 0000, the lowest register first.
+        assert_eq!(from_m10k(0x0000_002B_18D4_0108, 4), Ok(4_363_560_264));
+        assert_eq!(to_m10k(4_363_560_264, 4), Ok(0x0000_002B_18D4_0108));
+        assert_eq!(from_m10k(0x270F_270F, 2), Ok(99_999_999));
+        assert_eq!(to_m10k(100_000_000, 2), Err(Error::OUT_OF_RANGE));
+        assert_eq!(from_m10k(0x2710_0000, 2), Err(Error::MALFORMED_VALUE));
+        assert_eq!(from_m10k(0x0000_FFFF, 2), Err(Error::MALFORMED_VALUE));
+        assert_eq!(to_m10k(9_999_999_999_999_999, 4), Ok(0x270F_270F_270F_270F));
+    }
+
+    #[test]
+    fn each_register_of_modulo_10000_has_the_sign() {
+        // -123456789 is -1, -2345, -6789.
+        let raw = 0xFFFF_F6D7_E57B;
+        assert_eq!(from_signed_m10k(raw, 3), Ok(-123_456_789));
+        assert_eq!(to_signed_m10k(-123_456_789, 3), Ok(raw));
+        assert_eq!(to_signed_m10k(-10_000, 2), Ok(0xFFFF_0000));
+        assert_eq!(
+            from_signed_m10k(0xD8F0_0000, 2),
+            Err(Error::MALFORMED_VALUE)
+        );
+        assert_eq!(from_signed_m10k(0x8000, 1), Err(Error::MALFORMED_VALUE));
+        assert_eq!(to_signed_m10k(-100_000_000, 2), Err(Error::OUT_OF_RANGE));
+        assert_eq!(to_signed_m10k(i64::MIN, 4), Err(Error::OUT_OF_RANGE));
+    }
+}

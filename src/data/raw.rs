@@ -1,0 +1,104 @@
+//! The bits of one to four registers as a number, in any order: what the types of [`super::types`]
+//! are made of.
+
+use super::order::Order;
+use super::view::{RegisterBytes, RegisterBytesMut, Registers};
+use crate::error::Error;
+
+impl<C: RegisterBytes> Registers<C> {
+    /// The bits of `count` registers, 1 to 4.
+    ///
+    /// # Errors
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count, or for an
+    /// order by halves of three registers.
+    pub fn raw(&self, order: Order, address: u16, count: u16) -> Result<u64, Error> {
+        if count.wrapping_sub(1) > 3 {
+            return Err(Error::INVALID_ARGUMENT);
+        }
+        let _ = self.byte_index(address, 2 * usize::from(count))?;
+        let mut raw = 0;
+        for nth in 0..count {
+            let place = order.place(nth, count).ok_or(Error::INVALID_ARGUMENT)?;
+            let word: u16 = self.get_in(order, address.wrapping_add(place))?;
+            raw = raw << 16 | u64::from(word);
+        }
+        Ok(raw)
+    }
+
+    /// `bits` of the bits of `count` registers, from bit `first` on, as one number; bit 0 is the
+    /// least significant.
+    ///
+    /// # Errors
+    /// As [`Registers::raw`]; [`Error::INVALID_ARGUMENT`] also for no bits, or for bits beyond
+    /// those of the registers.
+    pub fn bits(
+        &self,
+        order: Order,
+        address: u16,
+        count: u16,
+        first: u8,
+        bits: u8,
+    ) -> Result<u64, Error> {
+        let mask = mask_of(count, first, bits)?;
+        Ok((self.raw(order, address, count)? & mask) >> first)
+    }
+}
+
+impl<C: RegisterBytesMut> Registers<C> {
+    /// Sets the bits of `count` registers, 1 to 4.
+    ///
+    /// # Errors
+    /// As [`Registers::raw`]; [`Error::OUT_OF_RANGE`] for a number with more bits. Nothing is set
+    /// then.
+    pub fn set_raw(
+        &mut self,
+        order: Order,
+        address: u16,
+        count: u16,
+        raw: u64,
+    ) -> Result<(), Error> {
+        // Finds every reason to refuse it.
+        let _ = self.raw(order, address, count)?;
+        if count < 4 && raw >> (16 * count) != 0 {
+            return Err(Error::OUT_OF_RANGE);
+        }
+        let mut left = raw;
+        for nth in (0..count).rev() {
+            let place = order.place(nth, count).ok_or(Error::INVALID_ARGUMENT)?;
+            self.set_in(order, address.wrapping_add(place), left as u16)?;
+            left >>= 16;
+        }
+        Ok(())
+    }
+
+    /// Sets `bits` of the bits of `count` registers, from bit `first` on; the others do not change.
+    ///
+    /// # Errors
+    /// As [`Registers::bits`]; [`Error::OUT_OF_RANGE`] for a number with more bits. Nothing is set
+    /// then.
+    pub fn set_bits(
+        &mut self,
+        order: Order,
+        address: u16,
+        count: u16,
+        first: u8,
+        bits: u8,
+        number: u64,
+    ) -> Result<(), Error> {
+        let mask = mask_of(count, first, bits)?;
+        if number > mask >> first {
+            return Err(Error::OUT_OF_RANGE);
+        }
+        let others = self.raw(order, address, count)? & !mask;
+        self.set_raw(order, address, count, others | number << first)
+    }
+}
+
+/// The mask of `bits` bits from bit `first` on, of `count` registers.
+fn mask_of(count: u16, first: u8, bits: u8) -> Result<u64, Error> {
+    let end = u16::from(first) + u16::from(bits);
+    if bits == 0 || end > 64 || end > count.saturating_mul(16) {
+        return Err(Error::INVALID_ARGUMENT);
+    }
+    Ok(u64::MAX >> (64 - bits) << first)
+}

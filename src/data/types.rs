@@ -1,0 +1,245 @@
+//! Numbers in other forms than two's complement and IEEE 754 of 32 and 64 bits. What the
+//! registers hold is exactly such a number, or refused; a call that is refused sets nothing.
+
+use super::digits;
+use super::half;
+use super::order::Order;
+use super::view::{RegisterBytes, RegisterBytesMut, Registers};
+use crate::error::Error;
+
+impl<C: RegisterBytes> Registers<C> {
+    /// A number in BCD: four digits in one register, eight in two.
+    ///
+    /// # Errors
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count;
+    /// [`Error::MALFORMED_VALUE`] for a digit above 9.
+    pub fn bcd(&self, order: Order, address: u16, count: u16) -> Result<u32, Error> {
+        at_most_2(count)?;
+        digits::from_bcd(self.raw(order, address, count)? as u32)
+    }
+
+    /// A number of which each of 1 to 4 registers holds four decimal digits, 0 to 9999: what
+    /// Schneider calls M10K or Mod10.
+    ///
+    /// # Errors
+    /// As [`Registers::raw`]; [`Error::MALFORMED_VALUE`] for a register above 9999.
+    pub fn m10k(&self, order: Order, address: u16, count: u16) -> Result<u64, Error> {
+        digits::from_m10k(self.raw(order, address, count)?, count)
+    }
+
+    /// As [`Registers::m10k`], with a sign in each register: -9999 to 9999.
+    ///
+    /// # Errors
+    /// As [`Registers::m10k`].
+    pub fn signed_m10k(&self, order: Order, address: u16, count: u16) -> Result<i64, Error> {
+        digits::from_signed_m10k(self.raw(order, address, count)?, count)
+    }
+
+    /// An integer of 24 bits, in the low bits of two registers. The eight bits above it do not
+    /// count.
+    ///
+    /// # Errors
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn u24(&self, order: Order, address: u16) -> Result<u32, Error> {
+        Ok(self.get_in::<u32>(order, address)? & 0x00FF_FFFF)
+    }
+
+    /// As [`Registers::u24`], in two's complement.
+    ///
+    /// # Errors
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn i24(&self, order: Order, address: u16) -> Result<i32, Error> {
+        Ok((self.get_in::<u32>(order, address)? << 8).cast_signed() >> 8)
+    }
+
+    /// An integer of 48 bits in three registers.
+    ///
+    /// # Errors
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for an order by halves.
+    pub fn u48(&self, order: Order, address: u16) -> Result<u64, Error> {
+        self.raw(order, address, 3)
+    }
+
+    /// As [`Registers::u48`], in two's complement.
+    ///
+    /// # Errors
+    /// As [`Registers::u48`].
+    pub fn i48(&self, order: Order, address: u16) -> Result<i64, Error> {
+        Ok((self.raw(order, address, 3)? << 16).cast_signed() >> 16)
+    }
+
+    /// An integer of one or two registers whose highest bit is the sign, and whose other bits are
+    /// the magnitude. Both zeros are 0.
+    ///
+    /// # Errors
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count.
+    pub fn sign_magnitude(&self, order: Order, address: u16, count: u16) -> Result<i32, Error> {
+        at_most_2(count)?;
+        let raw = self.raw(order, address, count)? as u32;
+        let sign = sign_of(count);
+        let magnitude = (raw & (sign - 1)).cast_signed();
+        Ok(if raw & sign == 0 {
+            magnitude
+        } else {
+            -magnitude
+        })
+    }
+
+    /// A half float, an IEEE 754 binary16, in one register.
+    ///
+    /// # Errors
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    pub fn half(&self, order: Order, address: u16) -> Result<f32, Error> {
+        let half: u16 = self.get_in(order, address)?;
+        Ok(f32::from_bits(half::to_float(half)))
+    }
+}
+
+impl<C: RegisterBytesMut> Registers<C> {
+    /// Sets what [`Registers::bcd`] reads.
+    ///
+    /// # Errors
+    /// As [`Registers::bcd`]; [`Error::OUT_OF_RANGE`] for a number with more digits.
+    pub fn set_bcd(
+        &mut self,
+        order: Order,
+        address: u16,
+        count: u16,
+        number: u32,
+    ) -> Result<(), Error> {
+        at_most_2(count)?;
+        let raw = digits::to_bcd(number, 4 * u32::from(count))?;
+        self.set_raw(order, address, count, raw.into())
+    }
+
+    /// Sets what [`Registers::m10k`] reads.
+    ///
+    /// # Errors
+    /// As [`Registers::raw`]; [`Error::OUT_OF_RANGE`] for a number with more digits.
+    pub fn set_m10k(
+        &mut self,
+        order: Order,
+        address: u16,
+        count: u16,
+        number: u64,
+    ) -> Result<(), Error> {
+        at_most_4(count)?;
+        self.set_raw(order, address, count, digits::to_m10k(number, count)?)
+    }
+
+    /// Sets what [`Registers::signed_m10k`] reads: each register that is not 0 gets the sign.
+    ///
+    /// # Errors
+    /// As [`Registers::set_m10k`].
+    pub fn set_signed_m10k(
+        &mut self,
+        order: Order,
+        address: u16,
+        count: u16,
+        number: i64,
+    ) -> Result<(), Error> {
+        at_most_4(count)?;
+        let raw = digits::to_signed_m10k(number, count)?;
+        self.set_raw(order, address, count, raw)
+    }
+
+    /// Sets what [`Registers::u24`] reads; the eight bits above it become 0.
+    ///
+    /// # Errors
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::OUT_OF_RANGE`] for a number with more bits.
+    pub fn set_u24(&mut self, order: Order, address: u16, number: u32) -> Result<(), Error> {
+        if number >> 24 != 0 {
+            return Err(Error::OUT_OF_RANGE);
+        }
+        self.set_in(order, address, number)
+    }
+
+    /// Sets what [`Registers::i24`] reads; the eight bits above it become copies of the sign.
+    ///
+    /// # Errors
+    /// As [`Registers::set_u24`].
+    pub fn set_i24(&mut self, order: Order, address: u16, number: i32) -> Result<(), Error> {
+        if number << 8 >> 8 != number {
+            return Err(Error::OUT_OF_RANGE);
+        }
+        self.set_in(order, address, number)
+    }
+
+    /// Sets what [`Registers::u48`] reads.
+    ///
+    /// # Errors
+    /// As [`Registers::u48`]; [`Error::OUT_OF_RANGE`] for a number with more bits.
+    pub fn set_u48(&mut self, order: Order, address: u16, number: u64) -> Result<(), Error> {
+        self.set_raw(order, address, 3, number)
+    }
+
+    /// Sets what [`Registers::i48`] reads.
+    ///
+    /// # Errors
+    /// As [`Registers::set_u48`].
+    pub fn set_i48(&mut self, order: Order, address: u16, number: i64) -> Result<(), Error> {
+        if number << 16 >> 16 != number {
+            return Err(Error::OUT_OF_RANGE);
+        }
+        self.set_raw(order, address, 3, number.cast_unsigned() << 16 >> 16)
+    }
+
+    /// Sets what [`Registers::sign_magnitude`] reads.
+    ///
+    /// # Errors
+    /// As [`Registers::sign_magnitude`]; [`Error::OUT_OF_RANGE`] for a number with more bits.
+    pub fn set_sign_magnitude(
+        &mut self,
+        order: Order,
+        address: u16,
+        count: u16,
+        number: i32,
+    ) -> Result<(), Error> {
+        at_most_2(count)?;
+        let sign = sign_of(count);
+        let magnitude = number.unsigned_abs();
+        if magnitude >= sign {
+            return Err(Error::OUT_OF_RANGE);
+        }
+        let raw = if number < 0 {
+            magnitude | sign
+        } else {
+            magnitude
+        };
+        self.set_raw(order, address, count, raw.into())
+    }
+
+    /// Sets what [`Registers::half`] reads, rounded to the nearest half.
+    ///
+    /// # Errors
+    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::OUT_OF_RANGE`] for a number that would become
+    /// infinite, or 0 without being 0.
+    pub fn set_half(&mut self, order: Order, address: u16, number: f32) -> Result<(), Error> {
+        self.set_in(order, address, half::from_float(number.to_bits())?)
+    }
+}
+
+/// Refuses a count of registers that is not 1 or 2.
+fn at_most_2(count: u16) -> Result<(), Error> {
+    if count.wrapping_sub(1) > 1 {
+        return Err(Error::INVALID_ARGUMENT);
+    }
+    Ok(())
+}
+
+/// Refuses a count of registers that is not 1 to 4.
+fn at_most_4(count: u16) -> Result<(), Error> {
+    if count.wrapping_sub(1) > 3 {
+        return Err(Error::INVALID_ARGUMENT);
+    }
+    Ok(())
+}
+
+/// The bit of the sign in one or two registers.
+fn sign_of(count: u16) -> u32 {
+    if count == 1 {
+        0x8000
+    } else {
+        0x8000_0000
+    }
+}
