@@ -1,16 +1,16 @@
-/* The faults that mbm serve plays on request, --fault KIND[=VALUE][@WHEN], and the port that plays
- * them.
+/* The faults that mbm serve plays on request, --fault KIND[=VALUE][@WHEN]: those of a line, and the
+ * manners of devices of the field.
  *
  * Licence: MIT OR Apache-2.0. */
 #ifndef FAULT_H
 #define FAULT_H
 
-#include "mbm.h"
 #include "place.h"
 
 #include <stdint.h>
 
 enum fault_kind {
+    /* of the line */
     FAULT_LATE,
     FAULT_DEAF,
     FAULT_SLOW,
@@ -22,8 +22,31 @@ enum fault_kind {
     FAULT_FOREIGN,
     FAULT_WRONG_LENGTH,
     FAULT_CLOSE,
+    FAULT_BLOCKS,
+    FAULT_BLOCKS_EVERY,
+    /* of the device */
+    FAULT_UNIT,
+    FAULT_TRANSACTION,
+    FAULT_ONLY_FUNCTION,
+    FAULT_NO_FUNCTION,
+    FAULT_MOST_REGISTERS,
+    FAULT_MOST_BITS,
+    FAULT_HOLE,
+    FAULT_REFUSED_WITH,
+    FAULT_NEEDS_DELAY,
+    FAULT_NEEDS_MESSAGE_WAIT,
+    FAULT_ONE_REQUEST,
+    FAULT_BUSY,
+    FAULT_CLOSE_IDLE,
+    FAULT_CLOSE_AFTER,
+    FAULT_DEAF_AFTER,
+    FAULT_CONNECTIONS,
     FAULT_KINDS
 };
+
+/* Values of FAULT_TRANSACTION beside a number: a count of the answers, and the number of the
+ * request before. */
+enum { FAULT_OWN_COUNT = 0x10000, FAULT_NUMBER_BEFORE };
 
 #define FAULT_HELP                                                                                 \
     "FAULT is KIND or KIND=VALUE. It happens to every answer, or with @3 to that of the third "    \
@@ -32,6 +55,8 @@ enum fault_kind {
     "  late=TIME       answers after that time\n"                                                  \
     "  deaf            does not answer\n"                                                          \
     "  slow=TIME       pauses between the bytes\n"                                                 \
+    "  blocks=N        hands the answer over in blocks of N bytes\n"                               \
+    "  blocks-every=TIME  the same, with the bytes of that time in each block\n"                   \
     "  damaged         a wrong CRC or LRC; on TCP a wrong protocol identifier\n"                   \
     "  cut=N           sends only the first N bytes\n"                                             \
     "  noise=N         sends N other bytes before the answer\n"                                    \
@@ -40,13 +65,30 @@ enum fault_kind {
     "  foreign         sends an answer of the next unit first\n"                                   \
     "  wrong-length    a wrong byte count; on TCP a wrong length in the header\n"                  \
     "  close           closes the connection instead (tcp://, rtu+tcp://, tls://)\n"               \
-    "udp:// has late, deaf, twice, exception and foreign.\n"
+    "Devices as they are:\n"                                                                       \
+    "  unit=N          answers with unit N\n"                                                      \
+    "  transaction=N   answers with transaction number N; count: its own count; before: the "      \
+    "number of the request before\n"                                                               \
+    "  only-function=N, no-function=N  exception 01 for the others, or for this one\n"             \
+    "  most-registers=N, most-bits=N, hole=A-B  exception 02 for a request of more, or of an "     \
+    "address from A to B\n"                                                                        \
+    "  refused-with=N  that exception in place of 02\n"                                            \
+    "  needs-delay=TIME         drops the requests of a connection's first time\n"                 \
+    "  needs-message-wait=TIME  drops a request without that pause before it\n"                    \
+    "  one-request     drops the requests that come while it answers another one\n"                \
+    "  busy            exception 06 for what these three drop\n"                                   \
+    "  close-idle=TIME, close-after=N, deaf-after=N  closes a connection without requests, or "    \
+    "after N answers; or answers no more on it\n"                                                  \
+    "  connections=N   closes further connections at once\n"                                       \
+    "The last six have no @. udp:// has no bytes, only datagrams: without slow, blocks, damaged, " \
+    "cut, noise, wrong-length and what is about connections.\n"
 
 enum { FAULT_MOST = 32 };
 
 typedef struct fault {
     enum fault_kind kind;
     uint32_t value;        /* milliseconds, or a number */
+    uint32_t last;         /* of a range, which begins with `value` */
     uint32_t first, every; /* the first request, and every nth after it; 0: only it */
 } fault;
 
@@ -63,37 +105,19 @@ typedef struct fault_choice {
 } fault_choice;
 
 /* Reads one fault and adds it. Returns NULL, or what is wrong as a sentence without its full stop,
- * in a buffer that the next call overwrites. */
+ * in a buffer that the fourth next call of `say` overwrites. */
 const char *fault_read(fault_list *list, const char *text, enum place_kind line);
 
-/* Counts a request, and finds its faults. */
-void fault_choose(fault_list *list, fault_choice *choice);
+/* Checks them together. Returns as fault_read. */
+const char *fault_check(const fault_list *list);
 
-/* --- the port of a server, which changes, delays or drops answers --- */
+/* Returns the value of a fault that is there for the whole run, or 0. */
+uint32_t fault_value(const fault_list *list, enum fault_kind kind);
 
-/* Noise, an answer of another unit, and the answer twice. */
-enum { FAULT_PORT_BYTES = 2048, FAULT_PORT_PIECES = 4 };
+/* Whether a fault of the list happens to the request that was counted last. */
+int fault_is_due(const fault_list *list, const fault *one);
 
-typedef struct fault_port {
-    mbm_port below;
-    uint8_t framing, is_datagrams, is_lost, is_closing;
-    fault_choice chosen; /* the faults of the request that is answered; all 0: none */
-    /* The answer that is still to be sent: pieces, each after a pause. */
-    uint8_t bytes[FAULT_PORT_BYTES];
-    uint16_t ends[FAULT_PORT_PIECES];
-    uint32_t pausesUs[FAULT_PORT_PIECES];
-    uint16_t count, piece, sent, end;
-    uint32_t sinceUs, pauseUs; /* the next byte is due `pauseUs` after `sinceUs` */
-    uint32_t random;
-} fault_port;
-
-/* Begins it on a port, which may send each frame as a datagram. Returns the port for the server,
- * whose context is the fault_port. */
-mbm_port fault_port_begin(fault_port *port, const mbm_port *below, uint8_t framing,
-                          int is_datagrams);
-
-/* Returns the microseconds until something is due: 0 if the link is lost, UINT32_MAX if nothing is
- * to be sent. */
-uint32_t fault_port_delay(fault_port *port);
+/* Finds the faults of that request; of several of one kind the last one. */
+void fault_choose(const fault_list *list, fault_choice *choice);
 
 #endif

@@ -3,7 +3,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #include "device_file.h"
-#include "fault.h"
+#include "fault_device.h"
 #include "line.h"
 #include "numbers.h"
 #include "options.h"
@@ -37,7 +37,7 @@ typedef struct serve_connection {
 
 typedef struct serve_line {
     place at;
-    fault_list faults;
+    fault_device faults;
     mbm_tty tty;
     int far_end; /* of a pseudo terminal, kept open so that the line does not hang up; or -1 */
     char linked_to[64]; /* the pseudo terminal to which this program has made a link */
@@ -261,8 +261,21 @@ static uint8_t before_request(void *context, const mbm_request *request)
     /* A broadcast has no answer. */
     if (request->unit == 0 && place_is_serial(&l->at))
         return 0;
-    fault_choose(&l->faults, &port->chosen);
-    return (uint8_t)port->chosen.value[FAULT_EXCEPTION];
+    return fault_device_take(&l->faults, request);
+}
+
+/* The microseconds of a byte on the line; where there is no rate, at the standard's 19200 baud. */
+static uint32_t char_time(const serve_line *l)
+{
+    return 11 * 1000000u / (l->at.tty.baud ? l->at.tty.baud : 19200);
+}
+
+/* How many connections there may be. */
+static size_t most_connections(const serve_line *l)
+{
+    const uint32_t most = fault_value(&l->faults.list, FAULT_CONNECTIONS);
+
+    return most ? most : PLACES;
 }
 
 /* Begins the server of a connection. */
@@ -276,8 +289,8 @@ static void begin(serve_line *l, served_units *units, int i, const mbm_port *bel
     else
         snprintf(name, sizeof name, "client %d", i + 1);
     traced = trace_server(*below, l->at.framing, name);
-    port =
-        fault_port_begin(&l->connections[i].port, &traced, l->at.framing, l->at.kind == PLACE_UDP);
+    port = fault_port_begin(&l->connections[i].port, &l->faults, &traced, l->at.framing,
+                            l->at.kind == PLACE_UDP, char_time(l));
     switch (l->at.framing) {
     case MBM_FRAMING_RTU:
         (void)mbm_server_beginRtu(&l->connections[i].server, &port, units->units, units->count,
@@ -310,9 +323,11 @@ static void begin(serve_line *l, served_units *units, int i, const mbm_port *bel
 /* How long the server of a connection has nothing to do. */
 static uint32_t delay_of(serve_line *l, int i)
 {
-    const uint32_t due = fault_port_delay(&l->connections[i].port);
+    const uint32_t due = fault_port_delay(&l->connections[i].port),
+                   server = mbm_server_pollDelay(&l->connections[i].server);
 
-    return due != UINT32_MAX ? due : mbm_server_pollDelay(&l->connections[i].server);
+    /* While an answer waits, the server would look every millisecond. */
+    return fault_port_is_waiting(&l->connections[i].port) || due < server ? due : server;
 }
 
 static int is_used(serve_line *l, int i)
@@ -347,14 +362,14 @@ static void accept_all(serve_line *l, served_units *units)
     int i;
 
     if (l->at.kind == PLACE_TLS) {
-        i = mbm_tls_accept(&l->listener, &l->identity, l->tlss, l->tcps, PLACES);
+        i = mbm_tls_accept(&l->listener, &l->identity, l->tlss, l->tcps, most_connections(l));
         if (i >= 0) {
             port = mbm_tls_port(&l->tlss[i]);
             begin(l, units, i, &port);
         }
         return;
     }
-    while ((i = mbm_tcp_accept(&l->listener, l->tcps, PLACES)) >= 0) {
+    while ((i = mbm_tcp_accept(&l->listener, l->tcps, most_connections(l))) >= 0) {
         port = mbm_tcp_port(&l->tcps[i]);
         begin(l, units, i, &port);
     }
@@ -368,9 +383,10 @@ static void find_due(serve_line *l, uint8_t is_due[PLACES])
     int i;
 
     for (i = 0; i < l->count; i++)
-        is_due[i] = is_used(l, i) &&
-                    (!l->set.isOpen || fault_port_delay(&l->connections[i].port) != UINT32_MAX ||
-                     mbm_server_pollDelay(&l->connections[i].server) == 0);
+        is_due[i] =
+            is_used(l, i) && (!l->set.isOpen || fault_port_is_waiting(&l->connections[i].port) ||
+                              fault_port_delay(&l->connections[i].port) == 0 ||
+                              mbm_server_pollDelay(&l->connections[i].server) == 0);
     while (l->set.isOpen && (tcp = mbm_tcp_nextReady(&l->set)))
         is_due[tcp - l->tcps] = 1;
 }
@@ -399,6 +415,7 @@ static int run_line(serve_line *l, served_units *units)
                 return report(
                     CODE_LINE, "%s: the line was lost: %s", l->at.text,
                     report_error_text(l->at.kind == PLACE_UDP ? l->udp.error : l->tty.error));
+            fault_port_end(&l->connections[i].port);
             mbm_tls_close(&l->tlss[i]);
             mbm_tcp_close(&l->tcps[i]);
         }
@@ -424,11 +441,13 @@ static void check(serving *s, const struct argp_state *state)
         options_wrong(state, "--unit goes with --random and --echo: a device file has its units");
     options_place(state, &s->where, s->place_text, 1);
     for (i = 0; i < s->fault_count; i++) {
-        const char *wrong = fault_read(&s->line.faults, s->fault_texts[i], s->where.kind);
+        const char *wrong = fault_read(&s->line.faults.list, s->fault_texts[i], s->where.kind);
 
         if (wrong)
             options_wrong(state, "--fault %s", wrong);
     }
+    if (fault_check(&s->line.faults.list))
+        options_wrong(state, "--fault %s", fault_check(&s->line.faults.list));
     s->id_count =
         (uint8_t)options_units(state, "--unit", s->unit_text ? s->unit_text : "1", s->ids);
 }
@@ -522,7 +541,7 @@ static int serve(serving *s)
         code = run_line(&s->line, &s->units);
         if (!s->is_quiet)
             fprintf(stderr, "%s: requests: %u, with a fault: %u.\n", report_name,
-                    s->line.faults.requests, s->line.faults.hit);
+                    s->line.faults.list.requests, s->line.faults.list.hit);
     }
     close_line(&s->line);
     return code;

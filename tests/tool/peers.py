@@ -414,13 +414,11 @@ class SerialDevice:
 
 
 class TcpDevice:
-    """Answers requests of Modbus TCP by a function of the PDU; None is no answer. It may close the
-    connection after each answer, or after `idle` seconds without a request, answer late, answer only the
-    first `answers` requests of a connection, or be away."""
+    """Answers requests of Modbus TCP by a function of the PDU; None is no answer. It may be away. `mbm serve --fault` plays
+    devices with other manners."""
 
-    def __init__(self, answer=lambda pdu: number(42), hangs_up=False, late=0.0, host="127.0.0.1", idle=None, answers=None):
-        self.answer, self.hangs_up, self.late, self.host = answer, hangs_up, late, host
-        self.idle, self.answers, self.connections = idle, answers, 0
+    def __init__(self, answer=lambda pdu: number(42), host="127.0.0.1"):
+        self.answer, self.host = answer, host
         self.port = 0
         self.asked = []
         self.come()
@@ -456,7 +454,6 @@ class TcpDevice:
             except OSError:
                 return
             self.peers.append(peer)
-            self.connections += 1
             threading.Thread(target=self.serve, args=(peer,), daemon=True).start()
 
     def reply(self, head, pdu):
@@ -466,20 +463,11 @@ class TcpDevice:
         return reply and head[:4] + (len(reply) + 1).to_bytes(2, "big") + head[6:] + reply
 
     def serve(self, peer):
-        answered = 0
         try:
-            peer.settimeout(self.idle)
             stream = peer.makefile("rb")
             while len(head := stream.read(7)) == 7:
                 reply = self.reply(head, stream.read(int.from_bytes(head[4:6], "big") - 1))
-                if reply is None or answered == self.answers:
-                    continue
-                answered += 1
-                time.sleep(self.late)
-                peer.sendall(reply)
-                if self.hangs_up:
-                    peer.shutdown(socket.SHUT_RDWR)
-        except TimeoutError:
-            peer.shutdown(socket.SHUT_RDWR)
+                if reply is not None:
+                    peer.sendall(reply)
         except OSError:
             pass

@@ -67,7 +67,7 @@ def test_the_first_of_two_failures_counts(mbm):
 
 
 def test_a_connection_that_the_device_closes_is_reported(mbm):
-    mbm.fails(LINE, "the link was lost: the other end has closed it.", "read", TcpDevice(hangs_up=True, answer=lambda pdu: b"").line, 0)
+    mbm.fails(LINE, "the link was lost: the other end has closed it.", "read", mbm.serve("tcp://127.0.0.1:0", "--echo", "--fault", "close"), 0)
 
 
 def test_trace_goes_to_stderr(mbm, device):

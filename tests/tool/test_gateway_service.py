@@ -361,28 +361,33 @@ def test_a_client_that_closes_its_connection_and_asks_again_is_answered_after_on
     assert wait(lambda: asks(patience)) and serial.mood == "right"
 
 
-def test_devices_that_close_connections_get_each_request_once(gateway, setting):
-    idle, closing = TcpDevice(lambda pdu: number(1), idle=0.2), TcpDevice(lambda pdu: number(2), hangs_up=True)
-    service = gateway(setting((idle.line, "1"), (closing.line, "2"), head=LISTEN + "timeout: 300ms\n"))
+def playing(mbm, unit, fault):
+    """mbm serve as a device whose registers are all 0."""
+    return mbm.begin("serve", "tcp://127.0.0.1:0", "--echo", "--unit", unit, "--fault", fault)
+
+
+def test_devices_that_close_connections_get_each_request_once(mbm, gateway, setting):
+    idle, closing = playing(mbm, 1, "close-idle=200ms"), playing(mbm, 2, "close-after=1")
+    service = gateway(setting((idle.last_word(), "1"), (closing.last_word(), "2"), head=LISTEN + "timeout: 300ms\n"))
     client = Client(service.port)
     for _ in range(8):
-        assert client.ask(1) == number(1)
+        assert client.ask(1) == number(0)
         time.sleep(0.4)
-    assert len(idle.asked) == 8
-    assert [client.ask(2) for _ in range(8) if not time.sleep(0.1)] == [number(2)] * 8
+    assert [client.ask(2) for _ in range(8) if not time.sleep(0.1)] == [number(0)] * 8
     assert service.log == []
+    assert "requests: 8," in idle.end().error
 
 
-def test_a_connection_on_which_a_device_is_silent_is_made_anew(gateway, setting):
-    silent, kept = (TcpDevice(lambda pdu: number(3), answers=3) for _ in range(2))
-    service = gateway(setting((silent.line, "3"), (kept.line, "4", ", replace_after: 0"), head=LISTEN + "timeout: 300ms\n"))
+def test_a_connection_on_which_a_device_is_silent_is_made_anew(mbm, gateway, setting):
+    silent, kept = (playing(mbm, unit, "deaf-after=3").last_word() for unit in (3, 4))
+    service = gateway(setting((silent, "3"), (kept, "4", ", replace_after: 0"), head=LISTEN + "timeout: 300ms\n"))
     client = Client(service.port)
     # It costs two requests, and is reported once.
-    assert [client.ask(3) for _ in range(20)] == ([number(3)] * 3 + [NO_ANSWER] * 2) * 4
+    assert [client.ask(3) for _ in range(20)] == ([number(0)] * 3 + [NO_ANSWER] * 2) * 4
     service.await_line(r"^warning: tcp://.*: no byte came after 2 requests in a row\. The connection is made anew, now and each time "
                        r"that this happens\.$")
     assert len(service.log) == 1
-    assert [client.ask(4) for _ in range(8)] == [number(3)] * 3 + [NO_ANSWER] * 5
+    assert [client.ask(4) for _ in range(8)] == [number(0)] * 3 + [NO_ANSWER] * 5
 
 
 def test_the_example_that_is_installed_maps_units(gateway, write):

@@ -7,6 +7,7 @@ import signal
 import pytest
 from peers import DONE, LINE, NO_REPLY, Program, SerialDevice, TcpDevice, sealed, wait
 
+ANY = "tcp://127.0.0.1:0"
 LOST = "no complete reply in time"
 
 
@@ -55,7 +56,8 @@ def test_rounds_go_on_while_a_device_is_away(mbm, gone):
 
 def test_samples_go_on_over_new_connections(mbm):
     """The device closes the connection after each answer."""
-    program = mbm.begin("read", TcpDevice(hangs_up=True).line, 0, "--every", "1500ms", "--times", 4, "--csv")
+    device = mbm.serve(ANY, "--echo", "--fault", "close-after=1")
+    program = mbm.begin("read", device, 0, "--every", "1500ms", "--times", 4, "--csv")
     assert statuses(program.wait().out) == ["success"] * 4
     sleeps(program)
 
@@ -65,27 +67,28 @@ POLL = "device: d\nunit: 1\ninterval: 600ms\nfields:\n- {name: a, table: holding
 
 @pytest.mark.parametrize("command", ["read", "poll"])
 def test_a_connection_that_is_closed_when_idle_costs_no_request(mbm, write, command):
-    device = TcpDevice(idle=0.3)
+    device = mbm.begin("serve", ANY, "--echo", "--fault", "close-idle=300ms")
     words = (0, "--every", "600ms", "--times", 5, "--csv") if command == "read" else (write("d.yaml", POLL), "--rounds", 5)
-    program = mbm.begin(command, device.line, *words, "--timeout", "500ms")
+    program = mbm.begin(command, device.last_word(), *words, "--timeout", "500ms")
     _, out, error = program.wait(DONE)
     assert "lost" not in out + error
-    assert len(device.asked) in (4, 5)
+    assert re.search("requests: [45],", device.end().error)
     sleeps(program)
 
 
-@pytest.mark.parametrize("options, connections, wanted", [
-    (("--every", "100ms", "--times", 10, "--retries", 2), 4, ["success"] * 10),
+@pytest.mark.parametrize("options, requests, wanted", [
+    # Two of each of the first three connections are not answered.
+    (("--every", "100ms", "--times", 10, "--retries", 2), 16, ["success"] * 10),
     # A silent connection costs two requests.
-    (("--every", "400ms", "--times", 10), None, (["success"] * 3 + [LOST] * 2) * 2),
-    (("--every", "400ms", "--times", 9, "--replace-after", 0), 1, ["success"] * 3 + [LOST] * 6),
+    (("--every", "400ms", "--times", 10), 10, (["success"] * 3 + [LOST] * 2) * 2),
+    (("--every", "400ms", "--times", 9, "--replace-after", 0), 9, ["success"] * 3 + [LOST] * 6),
 ], ids=["retries", "two requests", "never replaced"])
-def test_a_silent_connection_is_replaced(mbm, options, connections, wanted):
+def test_a_silent_connection_is_replaced(mbm, options, requests, wanted):
     """After three answers the device takes requests and answers no more, until it is connected to anew."""
-    device = TcpDevice(answers=3)
-    code, out, _ = mbm("read", device.line, 0, *options, "--csv", "--timeout", "300ms")
+    device = mbm.begin("serve", ANY, "--echo", "--fault", "deaf-after=3")
+    code, out, _ = mbm("read", device.last_word(), 0, *options, "--csv", "--timeout", "300ms")
     assert statuses(out) == wanted
-    assert connections in (None, device.connections)
+    assert f"requests: {requests}," in device.end().error
     assert (code == DONE) == (LOST not in wanted)
 
 
@@ -102,7 +105,8 @@ def test_of_units_behind_a_gateway_that_asks_them_one_after_the_other_fewer_requ
 
 
 def test_responses_that_come_too_late_are_no_success(mbm):
-    program = mbm.begin("read", TcpDevice(late=2.5).line, 0, "--every", "5s", "--times", 2, "--csv")
+    device = mbm.serve(ANY, "--echo", "--fault", "late=2500ms")
+    program = mbm.begin("read", device, 0, "--every", "5s", "--times", 2, "--csv")
     assert set(statuses(program.wait(NO_REPLY).out)) == {LOST}
     sleeps(program)
 

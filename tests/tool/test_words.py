@@ -147,6 +147,21 @@ serve pty: @FILE --fault deaf@|after @ stand N, N- or N/M, such as @3, @3- or @3
 serve pty: @FILE --fault deaf@0|"0" is out of range: from 1
 serve pty: @FILE --fault deaf@3/0|"0" is out of range: from 1
 serve pty: @FILE --fault deaf@-3|after @ stand N, N- or N/M
+serve tcp://:0 @FILE --fault unit=256|--fault "unit=256": "256" is out of range: from 0 to 255 is allowed
+serve tcp://:0 @FILE --fault transaction=own|"own" is not a whole decimal number
+serve tcp://:0 @FILE --fault transaction|the value is missing, such as transaction=0
+serve pty: @FILE --fault transaction=0|"transaction": this line cannot have it
+serve tcp://:0 @FILE --fault hole=9-5|"hole=9-5": the range ends before it begins
+serve tcp://:0 @FILE --fault hole=1-65536|"65536" is out of range
+serve tcp://:0 @FILE --fault only-function=0x80|"0x80" is not a function code: from 0x01 to 0x7F is allowed
+serve tcp://:0 @FILE --fault only-function=0x|"0x" is not a function code
+serve tcp://:0 @FILE --fault only-function=3,4|"3,4" is not a whole decimal number
+serve tcp://:0 @FILE --fault most-registers=126|"126" is out of range: from 1 to 125 is allowed
+serve tcp://:0 @FILE --fault busy|"busy": it goes with needs-delay, needs-message-wait or one-request
+serve tcp://:0 @FILE --fault refused-with=3|"refused-with": it goes with most-registers, most-bits or hole
+serve tcp://:0 @FILE --fault deaf-after=1@2|deaf-after is there for the whole run, and has no @
+serve pty: @FILE --fault connections=1|"connections": this line cannot have it
+serve udp://:0 @FILE --fault one-request|"one-request": this line cannot have it
 serve pty: @BAD|@BAD:5: type: "real" is not one of bit, uint16,
 serve tls://:0?ca=/a&cert=/b&key=/c --echo|serve: /b: No such file or directory
 poll|LINE is missing
